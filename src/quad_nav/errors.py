@@ -1,0 +1,72 @@
+"""Every error that this package raises on purpose, and what it means to a goal.
+
+A planner's failure is an exception, so that no caller can mistake it for a
+plan. The action result that each one ends in is ``GOAL_RESULTS`` below.
+"""
+from __future__ import annotations
+
+from typing import Dict, List, Sequence, Type
+
+
+class QuadError(Exception):
+    """Root of the tree."""
+
+
+class InputError(QuadError):
+    """Something that a person wrote cannot be used: file, place, what was expected.
+
+    ``problems`` holds one line per fault; nothing is reported one at a time.
+    """
+
+    def __init__(self, problems: Sequence[str]):
+        self.problems: List[str] = list(problems)
+        super().__init__("\n".join(self.problems))
+
+
+class NavigationError(QuadError):
+    """Something that happens while navigating."""
+
+
+class PlanningError(NavigationError):
+    """No global plan."""
+
+
+class StartOutsideMap(PlanningError):
+    """The robot is not on the global costmap."""
+
+
+class GoalOutsideMap(PlanningError):
+    """The goal is not on the global costmap."""
+
+
+class NoPath(PlanningError):
+    """The goal cannot be reached from the robot's cell."""
+
+
+class ControlError(NavigationError):
+    """No velocity command."""
+
+
+class NoValidTrajectory(ControlError):
+    """Every sampled trajectory collides or leaves the costmap."""
+
+
+class NoLocalPlan(ControlError):
+    """The global plan has no part in the local window, or there is none."""
+
+
+class InvalidGoal(NavigationError):
+    """The goal's pose cannot be used: not a rotation, not finite, unknown frame."""
+
+
+class StaleSensor(NavigationError):
+    """A sensor that a costmap depends on has been silent for too long."""
+
+
+# What a goal that ends in this error is reported as to an action client.
+GOAL_RESULTS: Dict[Type[NavigationError], str] = {
+    InvalidGoal: "ABORTED",
+    PlanningError: "ABORTED",
+    ControlError: "ABORTED",
+    StaleSensor: "ABORTED",
+}

@@ -1,0 +1,48 @@
+"""Grids over the plane: cells, world coordinates and cell costs.
+
+The axis convention, stated once: a grid is ``uint8[row, column]`` = ``[y, x]``.
+Row 0 has the lowest y and column 0 the lowest x; ``origin`` is the world
+position of the lower left corner of cell (0, 0). Cell coordinates are written
+(cell_x, cell_y).
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional, Tuple
+
+FREE = 0
+INSCRIBED = 253
+LETHAL = 254
+UNKNOWN = 255
+
+
+@dataclass(frozen=True)
+class GridSpec:
+    """Size, resolution and place of a grid."""
+
+    size_x: int
+    size_y: int
+    resolution_m: float
+    origin_x_m: float = 0.0
+    origin_y_m: float = 0.0
+
+    @property
+    def shape(self) -> Tuple[int, int]:
+        """(rows, columns), as numpy wants it."""
+        return (self.size_y, self.size_x)
+
+    def contains_cell(self, cell_x: int, cell_y: int) -> bool:
+        return 0 <= cell_x < self.size_x and 0 <= cell_y < self.size_y
+
+    def cell_of(self, x_m: float, y_m: float) -> Optional[Tuple[int, int]]:
+        """The cell that holds a world point, or None outside the grid."""
+        if x_m < self.origin_x_m or y_m < self.origin_y_m:
+            return None
+        cell = (int((x_m - self.origin_x_m) / self.resolution_m),
+                int((y_m - self.origin_y_m) / self.resolution_m))
+        return cell if self.contains_cell(*cell) else None
+
+    def centre_of(self, cell_x: int, cell_y: int) -> Tuple[float, float]:
+        """World coordinates of a cell's centre."""
+        return (self.origin_x_m + (cell_x + 0.5) * self.resolution_m,
+                self.origin_y_m + (cell_y + 0.5) * self.resolution_m)
