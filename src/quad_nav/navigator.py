@@ -1,0 +1,533 @@
+"""move_base's state machine: which of planning, driving and recovering is on.
+
+``Navigator.tick`` does whatever is due at a time: update a costmap, look for a
+plan, run a control cycle. It owns no clock and no thread; the caller ticks it
+at ``next_due_s`` or more often.
+
+The states and their transitions are those of ROS's move_base: PLANNING until
+there is a plan, CONTROLLING along it, CLEARING (one recovery behaviour after
+the other) when planning or control has failed for its patience or the robot
+oscillates, and then PLANNING again. What differs, and why, is in
+``docs/faults.md``.
+"""
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, field, replace
+from typing import Dict, List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from quad_nav.control.controller import Control, Controller
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.errors import ControlError, PlanningError
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.plan.planner import GlobalPlanner
+from quad_nav.recovery import Recovery, Surroundings
+
+
+class State(enum.Enum):
+    IDLE = "idle"
+    PLANNING = "planning"
+    CONTROLLING = "controlling"
+    CLEARING = "clearing"
+
+
+class Trigger(enum.Enum):
+    """Why recoveries are run; the value is the original's closing sentence."""
+
+    PLANNING = "Failed to find a valid plan. Even after executing recovery behaviors."
+    CONTROLLING = "Failed to find a valid control. Even after executing recovery behaviors."
+    OSCILLATION = "Robot is oscillating. Even after executing recovery behaviors."
+
+
+@dataclass(frozen=True)
+class NavigatorParams:
+    """move_base's own parameters, and the limits that mend its faults."""
+
+    base_global_planner: str = "navfn/NavfnROS"
+    base_local_planner: str = "base_local_planner/TrajectoryPlannerROS"
+    recovery_behaviors: Optional[Tuple[Tuple[str, str], ...]] = None  # (name, type); None: default
+    controller_frequency_hz: float = 20.0
+    planner_frequency_hz: float = 0.0
+    planner_patience_s: float = 5.0
+    controller_patience_s: float = 15.0
+    max_planning_retries: int = -1
+    oscillation_timeout_s: float = 0.0
+    oscillation_distance_m: float = 0.5
+    conservative_reset_dist_m: float = 3.0
+    recovery_behavior_enabled: bool = True
+    clearing_rotation_allowed: bool = True
+    shutdown_costmaps: bool = False
+    make_plan_clear_costmap: bool = True
+    make_plan_add_unreachable_goal: bool = True
+
+    # Mended faults; 0 gives the original's behaviour back.
+    progress_timeout_s: float = 10.0
+    progress_distance_m: float = 0.1
+    sensor_timeout_s: float = 1.0
+
+    @property
+    def control_period_s(self) -> float:
+        return 1.0 / self.controller_frequency_hz
+
+
+@dataclass(frozen=True)
+class Located:
+    """Where the robot is in each costmap's frame; None when it is not known."""
+
+    in_global: Optional[Pose2D]
+    in_local: Optional[Pose2D]
+
+
+@dataclass(frozen=True)
+class RecoveryStart:
+    """A recovery behaviour begins: its name, its number and how many there are."""
+
+    name: str
+    index: int
+    total: int
+    trigger: Trigger
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The end of a goal."""
+
+    succeeded: bool
+    text: str
+
+
+@dataclass
+class Tick:
+    """What one tick did, for topics, report and tuner alike."""
+
+    now_s: float
+    state: State = State.IDLE
+    updated: Tuple[str, ...] = ()  # costmaps that were updated: "global", "local"
+    cycle: bool = False  # whether a control cycle ran
+    command: Optional[Twist2D] = None  # to be sent now, if any
+    plan: Optional[np.ndarray] = None  # a new global plan float64[n, 3]
+    planning_failed: str = ""
+    control: Optional[Control] = None
+    recovery: Optional[RecoveryStart] = None
+    outcome: Optional[Outcome] = None
+    warnings: List[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class NamedRecovery:
+    name: str
+    behaviour: Recovery
+
+
+class Schedule:
+    """When something periodic is due; a frequency of 0 means never."""
+
+    def __init__(self, frequency_hz: float):
+        self.period_s = 1.0 / frequency_hz if frequency_hz > 0.0 else math.inf
+        self.due_s = math.inf
+
+    def start(self, now_s: float) -> None:
+        self.due_s = now_s if math.isfinite(self.period_s) else math.inf
+
+    def take(self, now_s: float) -> bool:
+        """Whether it is due; if so the next time is set, and missed turns are dropped."""
+        if now_s < self.due_s - 1e-9:
+            return False
+        missed = math.floor((now_s - self.due_s + 1e-9) / self.period_s)
+        self.due_s += (missed + 1) * self.period_s
+        return True
+
+
+class Navigator:
+    """One robot's move_base.
+
+    The costmaps are given observations by the caller (through their layers);
+    the navigator updates them when their update frequency says so.
+    """
+
+    def __init__(self, params: NavigatorParams, global_costmap: LayeredCostmap,
+                 local_costmap: LayeredCostmap, planner: GlobalPlanner, controller: Controller,
+                 recoveries: Sequence[NamedRecovery]):
+        self.params = params
+        self.global_costmap = global_costmap
+        self.local_costmap = local_costmap
+        self.planner = planner
+        self.controller = controller
+        self.recoveries = tuple(recoveries)
+        self.state = State.IDLE
+        self.goal: Optional[Pose2D] = None
+        self._costmaps: Dict[str, Tuple[LayeredCostmap, Schedule]] = {
+            "global": (global_costmap, Schedule(global_costmap.params.update_frequency_hz)),
+            "local": (local_costmap, Schedule(local_costmap.params.update_frequency_hz))}
+        self._cycle = Schedule(params.controller_frequency_hz)
+        self._replan = Schedule(params.planner_frequency_hz)
+        self._started = False
+        self._plan_wanted = False
+        self._new_plan: Optional[np.ndarray] = None
+        self._reset_recovery()
+
+    # -- goals ---------------------------------------------------------------------
+
+    def accepts_goal(self, now_s: float) -> bool:
+        """Whether a new goal or a cancel takes effect now.
+
+        An active goal is replaced or cancelled at the next control cycle only.
+        """
+        return self.state is State.IDLE or now_s >= self._cycle.due_s - 1e-9
+
+    def set_goal(self, goal: Pose2D, now_s: float) -> None:
+        """Heads for a pose in the global costmap's frame, from this cycle on."""
+        if self.state is State.IDLE:
+            self._cycle.start(now_s)
+        self.goal = goal
+        self._reset_recovery()
+        self._begin_planning(now_s)
+        self._last_valid_control_s = now_s
+        self._last_moved_s = now_s
+        self._moved_from: Optional[Pose2D] = None
+
+    def cancel(self) -> None:
+        """Drops the goal; the next tick sends a stop."""
+        self._stop_wanted = self.state is not State.IDLE
+        self._end_goal()
+
+    # -- time ----------------------------------------------------------------------
+
+    @property
+    def next_due_s(self) -> float:
+        """When the next tick has something to do; -inf before the first."""
+        if not self._started:
+            return -math.inf
+        due = [schedule.due_s for _, schedule in self._costmaps.values()]
+        if self.state is not State.IDLE:
+            due.append(self._cycle.due_s)
+            due.append(self._replan.due_s)
+            if self._active is not None:
+                due.append(self._recovery_due_s)
+        return min(due)
+
+    def tick(self, now_s: float, located: Located, velocity: Twist2D) -> Tick:
+        """Does what is due.
+
+        ``velocity`` is the odometry's twist in the robot's frame.
+        """
+        if not self._started:
+            self._started = True
+            for _, schedule in self._costmaps.values():
+                schedule.start(now_s)
+        tick = Tick(now_s)
+        self._update_costmaps(tick, located)
+        if self._stop_wanted:
+            self._stop_wanted = False
+            tick.command = Twist2D()
+        if self.state is not State.IDLE:
+            self._plan(tick, located.in_global)
+            if self._active is not None:
+                self._step_recovery(tick, located)
+            if self._cycle.take(now_s):
+                tick.cycle = True
+                self._control_cycle(tick, located, velocity)
+        tick.state = self.state
+        return tick
+
+    # -- costmaps ------------------------------------------------------------------
+
+    def _update_costmaps(self, tick: Tick, located: Located) -> None:
+        poses = {"global": located.in_global, "local": located.in_local}
+        updated = []
+        for name, (costmap, schedule) in self._costmaps.items():
+            if not schedule.take(tick.now_s):
+                continue
+            pose = poses[name]
+            if pose is None:
+                tick.warnings.append(f"{name} costmap not updated: the robot's pose is unknown")
+                continue
+            costmap.update(tick.now_s, pose)
+            updated.append(name)
+        tick.updated = tuple(updated)
+
+    def clear_costmaps(self) -> None:
+        """Forgets everything that was observed, as ``~clear_costmaps`` does."""
+        self.global_costmap.reset_layers()
+        self.local_costmap.reset_layers()
+
+    def _stale_sensors(self, now_s: float) -> List[str]:
+        """The sources that have been silent for too long, each as a sentence."""
+        stale = {}
+        for costmap in (self.global_costmap, self.local_costmap):
+            for source, age_s in costmap.silent_sources(now_s, self.params.sensor_timeout_s):
+                stale[source] = age_s
+        return [f"no data from {name} for {age_s:.1f} s" for name, age_s in stale.items()]
+
+    # -- planning ------------------------------------------------------------------
+
+    def make_plan(self, start: Pose2D, goal: Pose2D, tolerance_m: float = 0.0) -> np.ndarray:
+        """A plan between two poses without flying it, as ``~make_plan`` gives it.
+
+        With ``make_plan_clear_costmap`` the area around the start (the original
+        takes a square of twice the circumscribed radius of clear cells) is not
+        trusted less than the robot itself: the start cell is always free.
+        When the goal has no plan, the cells around it are tried ring by ring up
+        to ``tolerance_m``; ``make_plan_add_unreachable_goal`` appends the goal.
+
+        Raises:
+            PlanningError: no plan, not even near the goal.
+        """
+        try:
+            return self._plan_between(start, goal)
+        except PlanningError:
+            near = self._plan_near(start, goal, tolerance_m)
+            if near is None:
+                raise
+        if self.params.make_plan_add_unreachable_goal:
+            near = np.vstack([near, [goal.x_m, goal.y_m, goal.yaw_rad]])
+        return near
+
+    def _plan_between(self, start: Pose2D, goal: Pose2D) -> np.ndarray:
+        costmap = self.global_costmap
+        return self.planner.make_plan(costmap.spec, costmap.costs, start, goal)
+
+    def _plan_near(self, start: Pose2D, goal: Pose2D, tolerance_m: float) -> Optional[np.ndarray]:
+        """Square rings around the goal, three cells apart, smallest first."""
+        step_m = 3.0 * self.global_costmap.spec.resolution_m
+        if 0.0 < tolerance_m < step_m:
+            step_m = tolerance_m
+        for ring in range(1, int(math.floor(tolerance_m / step_m + 1e-9)) + 1):
+            offsets = step_m * np.arange(-ring, ring + 1)
+            for dy in offsets:
+                for dx in offsets:
+                    if max(abs(dx), abs(dy)) < ring * step_m - 1e-9:
+                        continue
+                    try:
+                        return self._plan_between(
+                            start, Pose2D(goal.x_m + dx, goal.y_m + dy, goal.yaw_rad))
+                    except PlanningError:
+                        continue
+        return None
+
+    def _begin_planning(self, now_s: float) -> None:
+        self.state = State.PLANNING
+        self._plan_wanted = True
+        self._new_plan = None
+        self._last_valid_plan_s = now_s
+        self._planning_retries = 0
+        self._replan.start(now_s)
+
+    def _plan(self, tick: Tick, start: Optional[Pose2D]) -> None:
+        """Looks for a plan when one is wanted, at most once per tick."""
+        again = self.state is State.CONTROLLING and self._replan.take(tick.now_s)
+        if self.state is State.PLANNING and self._plan_wanted:
+            # A failed search is repeated once per control cycle: the costs it
+            # depends on change no faster.
+            again = tick.now_s >= self._cycle.due_s - 1e-9
+        if not again or self.goal is None:
+            return
+        try:
+            if start is None:
+                raise PlanningError("the robot's pose is unknown")
+            tick.plan = self._plan_between(start, self.goal)
+        except PlanningError as error:
+            tick.planning_failed = str(error)
+            self._planning_failed(tick)
+            return
+        self._new_plan = tick.plan
+        self._last_valid_plan_s = tick.now_s
+        self._planning_retries = 0
+        self._plan_wanted = False
+        if self.state is State.PLANNING:
+            self._replan.take(tick.now_s)
+            self.state = State.CONTROLLING
+
+    def _planning_failed(self, tick: Tick) -> None:
+        if self.state is not State.PLANNING:
+            return
+        self._planning_retries += 1
+        too_long = tick.now_s > self._last_valid_plan_s + self.params.planner_patience_s
+        too_often = 0 <= self.params.max_planning_retries < self._planning_retries
+        if too_long or too_often:
+            self._enter_clearing(tick, Trigger.PLANNING)
+
+    # -- control -------------------------------------------------------------------
+
+    def _control_cycle(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
+        if located.in_global is None or located.in_local is None:
+            tick.warnings.append("stopped: the robot's pose is unknown")
+            tick.command = Twist2D()
+            return
+        self._watch_oscillation(tick.now_s, located.in_global)
+        stale = self._stale_sensors(tick.now_s)
+        if stale or not self.local_costmap.is_current(tick.now_s):
+            tick.warnings.append("stopped: " + ("; ".join(stale) or "sensor data is out of date"))
+            tick.command = Twist2D()
+            return
+        if self._new_plan is not None:
+            self.controller.set_plan(self._new_plan)
+            self._new_plan = None
+            if self._trigger is Trigger.PLANNING:
+                self._recovery_index = 0
+        if self.state is State.CONTROLLING:
+            self._follow(tick, located, velocity)
+        elif self.state is State.CLEARING and self._active is None:
+            self._start_recovery(tick, located)
+
+    def _follow(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
+        assert located.in_local is not None and located.in_global is not None
+        costmap = self.local_costmap
+        transform = local_from_global(located)
+        if self.controller.is_goal_reached(located.in_local, velocity, transform):
+            self._finish(tick, Outcome(True, "Goal reached."))
+            return
+        if self._is_oscillating(tick.now_s):
+            self._enter_clearing(tick, Trigger.OSCILLATION)
+            return
+        if not self._is_progressing(tick, located.in_global):
+            return
+        try:
+            tick.control = self.controller.compute_velocity(
+                costmap.spec, costmap.costs, located.in_local, velocity, transform)
+        except ControlError as error:
+            tick.warnings.append(str(error))
+            self._control_failed(tick)
+            return
+        tick.command = tick.control.command
+        self._last_valid_control_s = tick.now_s
+        if self._trigger is Trigger.CONTROLLING:
+            self._recovery_index = 0
+
+    def _control_failed(self, tick: Tick) -> None:
+        if tick.now_s > self._last_valid_control_s + self.params.controller_patience_s:
+            self._enter_clearing(tick, Trigger.CONTROLLING)
+        else:
+            tick.command = Twist2D()
+            self._begin_planning(tick.now_s)
+
+    # -- oscillation and progress --------------------------------------------------
+
+    def _watch_oscillation(self, now_s: float, pose: Pose2D) -> None:
+        reference = self._oscillation_pose
+        if reference is None or pose.distance_to(reference) >= self.params.oscillation_distance_m:
+            self._oscillation_pose = pose
+            self._last_oscillation_reset_s = now_s
+            if self._trigger is Trigger.OSCILLATION:
+                self._recovery_index = 0
+
+    def _is_oscillating(self, now_s: float) -> bool:
+        timeout_s = self.params.oscillation_timeout_s
+        return timeout_s > 0.0 and self._last_oscillation_reset_s + timeout_s < now_s
+
+    def _is_progressing(self, tick: Tick, pose: Pose2D) -> bool:
+        """Whether the robot has moved lately; if not, a new plan, then recoveries.
+
+        The original takes an in-place turn for valid control for ever.
+        """
+        timeout_s = self.params.progress_timeout_s
+        if timeout_s <= 0.0:
+            return True
+        if (self._moved_from is None
+                or pose.distance_to(self._moved_from) >= self.params.progress_distance_m):
+            self._moved_from = pose
+            self._last_moved_s = tick.now_s
+            self._replanned_for_progress = False
+            return True
+        if tick.now_s <= self._last_moved_s + timeout_s:
+            return True
+        self._last_moved_s = tick.now_s
+        where = f"no progress for {timeout_s:g} s at ({pose.x_m:.2f}, {pose.y_m:.2f})"
+        if self._replanned_for_progress:
+            tick.warnings.append(where + " with a new plan either: trying recoveries")
+            self._enter_clearing(tick, Trigger.OSCILLATION)
+        else:
+            tick.warnings.append(where + ": planning anew")
+            self._replanned_for_progress = True
+            tick.command = Twist2D()
+            self._begin_planning(tick.now_s)
+        return False
+
+    # -- recovery ------------------------------------------------------------------
+
+    def _reset_recovery(self) -> None:
+        self._recovery_index = 0
+        self._trigger: Optional[Trigger] = None
+        self._active: Optional[Recovery] = None
+        self._recovery_due_s = math.inf
+        self._oscillation_pose: Optional[Pose2D] = None
+        self._last_oscillation_reset_s = -math.inf
+        self._replanned_for_progress = False
+        self._stop_wanted = False
+
+    def _enter_clearing(self, tick: Tick, trigger: Trigger) -> None:
+        self.state = State.CLEARING
+        self._plan_wanted = False
+        self._trigger = trigger
+        tick.command = Twist2D()
+
+    def _start_recovery(self, tick: Tick, located: Located) -> None:
+        assert self._trigger is not None
+        enabled = self.params.recovery_behavior_enabled
+        if not enabled or self._recovery_index >= len(self.recoveries):
+            self._finish(tick, Outcome(False, self._trigger.value))
+            return
+        named = self.recoveries[self._recovery_index]
+        tick.recovery = RecoveryStart(
+            named.name, self._recovery_index, len(self.recoveries), self._trigger)
+        self._active = named.behaviour
+        self._recovery_due_s = tick.now_s
+        named.behaviour.start(self._surroundings(tick.now_s, located))
+        self._step_recovery(tick, located)
+
+    def _step_recovery(self, tick: Tick, located: Located) -> None:
+        assert self._active is not None
+        if tick.now_s < self._recovery_due_s - 1e-9:
+            return
+        step = self._active.step(self._surroundings(tick.now_s, located))
+        self._recovery_due_s = tick.now_s + self._active.period_s
+        if step.command is not None:
+            tick.command = step.command
+        if step.message:
+            tick.warnings.append(step.message)
+        if step.done:
+            self._active = None
+            self._recovery_due_s = math.inf
+            self._recovery_index += 1
+            self._last_oscillation_reset_s = tick.now_s
+            self._last_moved_s = tick.now_s
+            self._replanned_for_progress = False
+            self._begin_planning(tick.now_s)
+
+    def _surroundings(self, now_s: float, located: Located) -> Surroundings:
+        return Surroundings(now_s, self.global_costmap, self.local_costmap,
+                            located.in_global, located.in_local)
+
+    # -- the end of a goal ---------------------------------------------------------
+
+    def _finish(self, tick: Tick, outcome: Outcome) -> None:
+        tick.outcome = outcome
+        tick.command = Twist2D()
+        self._end_goal()
+
+    def _end_goal(self) -> None:
+        self.state = State.IDLE
+        self.goal = None
+        self._plan_wanted = False
+        self._new_plan = None
+        self._active = None
+        self._cycle.due_s = math.inf
+
+
+def local_from_global(located: Located) -> Pose2D:
+    """The planar transform between the costmaps' frames, from the two poses."""
+    if located.in_local == located.in_global:
+        return Pose2D(0.0, 0.0, 0.0)
+    assert located.in_local is not None and located.in_global is not None
+    a, b = located.in_local, located.in_global
+    yaw = a.yaw_rad - b.yaw_rad
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return Pose2D(a.x_m - (cos * b.x_m - sin * b.y_m), a.y_m - (sin * b.x_m + cos * b.y_m), yaw)
+
+
+def with_changes(params: NavigatorParams, **changes: object) -> NavigatorParams:
+    """``dataclasses.replace`` under a name that the shells read well."""
+    return replace(params, **changes)  # type: ignore[arg-type]

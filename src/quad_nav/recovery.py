@@ -1,0 +1,170 @@
+"""What the navigator tries when it is stuck: forget obstacles, look around.
+
+A recovery is started once and then stepped in every cycle until it says that it
+is done; it never blocks, so a goal can be cancelled in the middle of a turn.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Callable, Optional, Protocol, Tuple
+
+import numpy as np
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.geometry import Pose2D, Twist2D, angle_difference
+
+# The original clears a layer called "obstacles" by default, a name that its own
+# loader never gives: it calls the layer "obstacle_layer". Both are cleared here.
+ORIGINAL_LAYER_NAMES = ("obstacles",)
+DEFAULT_LAYER_NAMES = ("obstacles", "obstacle_layer", "obstacles_layer", "voxel_layer")
+
+
+@dataclass(frozen=True)
+class ClearCostmapParams:
+    """Parameters of ``clear_costmap_recovery/ClearCostmapRecovery``."""
+
+    reset_distance_m: float = 3.0
+    layer_names: Tuple[str, ...] = DEFAULT_LAYER_NAMES
+    invert_area_to_clear: bool = False
+    force_updating: bool = False
+    affected_maps: str = "both"  # "global", "local" or "both"
+
+
+@dataclass(frozen=True)
+class RotateParams:
+    """Parameters of ``rotate_recovery/RotateRecovery``."""
+
+    frequency_hz: float = 20.0
+    sim_granularity_rad: float = 0.017
+    yaw_goal_tolerance_rad: float = 0.10
+    acc_lim_theta_radps2: float = 3.2
+    max_vel_theta_radps: float = 1.0
+    min_in_place_vel_theta_radps: float = 0.4
+    stop_afterwards: bool = True
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a recovery may look at and change. Poses are None when unknown."""
+
+    now_s: float
+    global_costmap: LayeredCostmap
+    local_costmap: LayeredCostmap
+    pose_in_global: Optional[Pose2D]
+    pose_in_local: Optional[Pose2D]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a recovery: a command to send, if any, and whether it is over."""
+
+    command: Optional[Twist2D] = None
+    done: bool = False
+    message: str = ""
+
+
+class Recovery(Protocol):
+    """What the navigator asks of a recovery behaviour."""
+
+    period_s: float
+
+    def start(self, surroundings: Surroundings) -> None: ...
+
+    def step(self, surroundings: Surroundings) -> Step: ...
+
+
+class ClearCostmap:
+    """Forgets the obstacles beyond a square around the robot.
+
+    Everything outside the square with sides of ``reset_distance_m`` goes, or
+    everything inside it with ``invert_area_to_clear``.
+    """
+
+    period_s = 0.0
+
+    def __init__(self, params: ClearCostmapParams):
+        self.params = params
+
+    def start(self, surroundings: Surroundings) -> None:
+        pass
+
+    def step(self, surroundings: Surroundings) -> Step:
+        params = self.params
+        targets = (
+            ("global", surroundings.global_costmap, surroundings.pose_in_global),
+            ("local", surroundings.local_costmap, surroundings.pose_in_local))
+        skipped = []
+        for name, costmap, pose in targets:
+            if params.affected_maps not in (name, "both"):
+                continue
+            if pose is None:
+                skipped.append(name)
+                continue
+            costmap.clear_area(params.layer_names, pose.x_m, pose.y_m,
+                               params.reset_distance_m, keep_inside=not params.invert_area_to_clear)
+            if params.force_updating:
+                costmap.update(surroundings.now_s, pose)
+        message = ""
+        if skipped:
+            message = "not cleared, the robot's pose is unknown: " + ", ".join(skipped)
+        return Step(done=True, message=message)
+
+
+FootprintCost = Callable[[LayeredCostmap, Pose2D], float]
+
+
+class Rotate:
+    """Turns once around on the spot, as long as the footprint stays free.
+
+    The speed follows the braking curve sqrt(2 * acceleration * angle left),
+    between the in-place minimum and the maximum (the maximum wins).
+    """
+
+    def __init__(self, params: RotateParams, footprint_cost: FootprintCost):
+        self.params = params
+        self.period_s = 1.0 / params.frequency_hz
+        self._footprint_cost = footprint_cost
+        self._start_yaw_rad: Optional[float] = None
+        self._past_half_turn = False
+
+    def start(self, surroundings: Surroundings) -> None:
+        self._start_yaw_rad = None
+        self._past_half_turn = False
+
+    def step(self, surroundings: Surroundings) -> Step:
+        pose = surroundings.pose_in_local
+        if pose is None:
+            return self._end("rotation ended: the robot's pose is unknown", stop=True)
+        if self._start_yaw_rad is None:
+            self._start_yaw_rad = pose.yaw_rad
+        left_rad = self._angle_left(pose.yaw_rad)
+        if left_rad is None:
+            return self._end("", stop=self.params.stop_afterwards)
+        if not self._is_free(surroundings.local_costmap, pose, left_rad):
+            return self._end("rotation ended: the footprint would touch an obstacle", stop=True)
+        return Step(command=Twist2D(vyaw_radps=self._speed(left_rad)))
+
+    def _end(self, message: str, stop: bool) -> Step:
+        return Step(command=Twist2D() if stop else None, done=True, message=message)
+
+    def _angle_left(self, yaw_rad: float) -> Optional[float]:
+        """Radians until the turn is full, None when it is."""
+        assert self._start_yaw_rad is not None
+        tolerance = self.params.yaw_goal_tolerance_rad
+        to_half_turn = abs(angle_difference(self._start_yaw_rad + math.pi, yaw_rad))
+        if not self._past_half_turn:
+            self._past_half_turn = to_half_turn < tolerance
+            return math.pi + to_half_turn
+        left_rad = abs(angle_difference(self._start_yaw_rad, yaw_rad))
+        return None if left_rad <= tolerance else left_rad
+
+    def _is_free(self, costmap: LayeredCostmap, pose: Pose2D, left_rad: float) -> bool:
+        return all(
+            self._footprint_cost(costmap, Pose2D(pose.x_m, pose.y_m, pose.yaw_rad + turn)) >= 0.0
+            for turn in np.arange(0.0, left_rad, self.params.sim_granularity_rad))
+
+    def _speed(self, left_rad: float) -> float:
+        params = self.params
+        speed = math.sqrt(2.0 * params.acc_lim_theta_radps2 * left_rad)
+        return min(max(speed, params.min_in_place_vel_theta_radps), params.max_vel_theta_radps)
