@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -526,8 +526,3 @@ def local_from_global(located: Located) -> Pose2D:
     yaw = a.yaw_rad - b.yaw_rad
     cos, sin = math.cos(yaw), math.sin(yaw)
     return Pose2D(a.x_m - (cos * b.x_m - sin * b.y_m), a.y_m - (sin * b.x_m + cos * b.y_m), yaw)
-
-
-def with_changes(params: NavigatorParams, **changes: object) -> NavigatorParams:
-    """``dataclasses.replace`` under a name that the shells read well."""
-    return replace(params, **changes)  # type: ignore[arg-type]
