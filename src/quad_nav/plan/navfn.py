@@ -1,7 +1,36 @@
-"""NavFn: a wavefront planner over the global costmap."""
+"""NavFn: a wavefront planner over the global costmap.
+
+The potential of a cell is the cost of the cheapest way to it from the robot's
+cell. It solves the eikonal equation |grad P| = cost in one upwind step per
+visit: with ``lower`` the lower and ``gap`` the difference of the two
+neighbours that a wave arrives over (one horizontal, one vertical),
+
+    P = lower + cost                        where gap >= cost
+    P = lower + cost * f(gap / cost)        else,  f(r) = -0.2301 r^2 + 0.5307 r + 0.7040
+
+where the quadratic f stands for the exact (r + sqrt(2 - r^2)) / 2. Cells wait
+in buckets by potential (100 wide), not in a sorted queue, so a cell may be
+visited again. The path is steepest descent from the goal, half a cell a step,
+turned round. Brock and Konolige's planner (Konolige 2000, "A gradient method
+for real-time robot navigation") as ROS navigation has it, limits included:
+
+* the wave stops after ``max(size_x * size_y / 20, size_x + size_y)`` fronts;
+* a path has at most ``4 * size_x`` points. A longer one is cut, and then begins
+  somewhere between robot and goal.
+"""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Optional, Tuple
+
+import numpy as np
+
+from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import FREE, INSCRIBED, UNKNOWN, GridSpec
+from quad_nav.kernels import navfn as kernel
+
+Cell = Tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -13,3 +42,137 @@ class NavfnParams:
     visualize_potential: bool = False
     planner_window_x_m: float = 0.0  # read by the original as well, and never used
     planner_window_y_m: float = 0.0
+
+
+class Navfn:
+    """The planner ``navfn/NavfnROS``.
+
+    ``potential`` is the last float32[H, W] computed, ``NOT_REACHED`` (1e10)
+    where the wave did not come; None before the first plan.
+    """
+
+    def __init__(self, params: NavfnParams = NavfnParams()):
+        self.params = params
+        self.potential: Optional[np.ndarray] = None
+
+    def make_plan(self, spec: GridSpec, costs: np.ndarray, start: Pose2D,
+                  goal: Pose2D) -> np.ndarray:
+        """A plan from start to goal, float64[n, 3] rows x, y, yaw.
+
+        ``costs`` is uint8[H, W] on ``spec``; the start's cell is set to FREE in
+        place. Way points have yaw 0; the last row is the goal itself, or the
+        nearest reached point within ``default_tolerance_m`` of it, with the
+        goal's yaw. The rows before it (``plan[:-1]``) are the descended path,
+        which the original publishes on its own first.
+
+        Raises StartOutsideMap, GoalOutsideMap (only without a tolerance) and
+        NoPath.
+        """
+        start_cell = spec.cell_of(start.x_m, start.y_m)
+        if start_cell is None:
+            raise StartOutsideMap(f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
+                                  f"the global costmap, {_extent(spec)}")
+        costs[start_cell[1], start_cell[0]] = FREE
+        goal_cell = spec.cell_of(goal.x_m, goal.y_m)
+        if goal_cell is None:
+            if self.params.default_tolerance_m <= 0.0:
+                raise GoalOutsideMap(f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
+                                     f"the global costmap, {_extent(spec)}")
+            goal_cell = (0, 0)  # a border cell is never reached, so the wave covers the map
+        self.potential = potential_from(navigation_costs(costs, self.params.allow_unknown),
+                                        source=start_cell, target=goal_cell, stop_at_target=True)
+        end = self._reached_pose_near(spec, goal)
+        if end is None:
+            raise NoPath(f"no way from ({start.x_m:.2f}, {start.y_m:.2f}) to "
+                         f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap")
+        return self._plan_to(spec, start_cell, end)
+
+    def _reached_pose_near(self, spec: GridSpec, goal: Pose2D) -> Optional[Pose2D]:
+        """The reached point nearest to the goal, on a square lattice around it."""
+        tolerance_m = self.params.default_tolerance_m
+        best, best_distance2 = None, float("inf")
+        y_m = goal.y_m - tolerance_m
+        while y_m <= goal.y_m + tolerance_m:
+            x_m = goal.x_m - tolerance_m
+            while x_m <= goal.x_m + tolerance_m:
+                distance2 = (x_m - goal.x_m) ** 2 + (y_m - goal.y_m) ** 2
+                if distance2 < best_distance2 and self._is_reached(spec.cell_of(x_m, y_m)):
+                    best, best_distance2 = Pose2D(x_m, y_m, goal.yaw_rad), distance2
+                x_m += spec.resolution_m
+            y_m += spec.resolution_m
+        return best
+
+    def _is_reached(self, cell: Optional[Cell]) -> bool:
+        assert self.potential is not None
+        return cell is not None and bool(self.potential[cell[1], cell[0]] < kernel.NOT_REACHED)
+
+    def _plan_to(self, spec: GridSpec, start_cell: Cell, end: Pose2D) -> np.ndarray:
+        end_cell = spec.cell_of(end.x_m, end.y_m)
+        assert self.potential is not None and end_cell is not None
+        path, _ = path_from(self.potential, end_cell, start_cell)
+        if not len(path):
+            raise NoPath(f"the potential has no descent from ({end.x_m:.2f}, {end.y_m:.2f}) m")
+        plan = np.zeros((len(path) + 1, 3))
+        # The original takes a path cell's lower left corner for its position, not its centre.
+        plan[:-1, :2] = (path[::-1].astype(np.float64) * spec.resolution_m
+                         + (spec.origin_x_m, spec.origin_y_m))
+        plan[-1] = end.x_m, end.y_m, end.yaw_rad
+        return plan
+
+
+def navigation_costs(costs: np.ndarray, allow_unknown: bool) -> np.ndarray:
+    """NavFn's own costs of a costmap, uint8[H, W]: 50 for free cells to 254 for obstacles.
+
+    A cost below INSCRIBED becomes 50 + 0.8 cost, at most 253; unknown cells are
+    253 or obstacles; the outermost ring of cells is always an obstacle.
+    """
+    table = np.full(256, kernel.OBSTACLE, dtype=np.uint8)
+    table[:INSCRIBED] = np.minimum(kernel.NEUTRAL + 0.8 * np.arange(INSCRIBED),
+                                   kernel.OBSTACLE - 1)
+    if allow_unknown:
+        table[UNKNOWN] = kernel.OBSTACLE - 1
+    nav_costs = table[costs]
+    nav_costs[[0, -1], :] = kernel.OBSTACLE
+    nav_costs[:, [0, -1]] = kernel.OBSTACLE
+    return nav_costs
+
+
+def potential_from(nav_costs: np.ndarray, source: Cell, target: Cell, stop_at_target: bool,
+                   heuristic: bool = False) -> np.ndarray:
+    """Potential float32[H, W] of the wave from ``source``.
+
+    With ``stop_at_target`` it stops at the front that reaches the target, and
+    with ``heuristic`` cells are taken in A*'s order.
+    """
+    size_y, size_x = nav_costs.shape
+    cells = size_x * size_y
+    wave = kernel.Wave(
+        costs=nav_costs.ravel(), potential=np.full(cells, kernel.NOT_REACHED, dtype=np.float32),
+        pending=np.zeros(cells, dtype=np.bool_),
+        buckets=np.zeros((3, kernel.BUCKET_SIZE), dtype=np.int64),
+        counts=np.zeros(3, dtype=np.int64), size_x=size_x)
+    kernel.propagate(wave, _flat(source, size_x), _flat(target, size_x),
+                     max(cells // 20, size_x + size_y), stop_at_target, heuristic)
+    return wave.potential.reshape(nav_costs.shape)
+
+
+def path_from(potential: np.ndarray, start: Cell, source: Cell) -> Tuple[np.ndarray, bool]:
+    """Descent from ``start`` to the wave's source: float32[n, 2] cells (x, y).
+
+    The flag is False when the descent ended elsewhere: out of points, at the
+    map's border, or where the potential has no slope.
+    """
+    size_x = potential.shape[1]
+    path = np.empty((4 * size_x, 2), dtype=np.float32)
+    points, arrived = kernel.descend(potential.ravel(), size_x, _flat(start, size_x),
+                                     _flat(source, size_x), path)
+    return path[:points], bool(arrived)
+
+
+def _flat(cell: Cell, size_x: int) -> int:
+    return cell[1] * size_x + cell[0]
+
+
+def _extent(spec: GridSpec) -> str:
+    return (f"x {spec.origin_x_m:.2f} to {spec.origin_x_m + spec.size_x * spec.resolution_m:.2f}, "
+            f"y {spec.origin_y_m:.2f} to {spec.origin_y_m + spec.size_y * spec.resolution_m:.2f} m")

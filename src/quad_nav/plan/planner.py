@@ -1,0 +1,23 @@
+"""What the navigator asks of a global planner."""
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import GridSpec
+
+
+class GlobalPlanner(Protocol):
+    """Makes a path over the global costmap."""
+
+    def make_plan(self, spec: GridSpec, costs: np.ndarray, start: Pose2D,
+                  goal: Pose2D) -> np.ndarray:
+        """A plan from start to goal, float64[n, 3] rows x, y, yaw.
+
+        ``costs`` is uint8[H, W] on ``spec``; start, goal and plan are in the
+        costmap's frame. Raises a ``PlanningError`` when there is no plan; a
+        plan returned is never empty.
+        """
+        ...
