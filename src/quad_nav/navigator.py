@@ -20,7 +20,7 @@ from typing import Dict, List, Optional, Sequence, Tuple
 import numpy as np
 
 from quad_nav.control.controller import Control, Controller
-from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.layered import LayeredCostmap, Window
 from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.plan.planner import GlobalPlanner
@@ -105,7 +105,7 @@ class Tick:
 
     now_s: float
     state: State = State.IDLE
-    updated: Tuple[str, ...] = ()  # costmaps that were updated: "global", "local"
+    windows: Dict[str, Window] = field(default_factory=dict)  # changed by costmap updates
     cycle: bool = False  # whether a control cycle ran
     command: Optional[Twist2D] = None  # to be sent now, if any
     plan: Optional[np.ndarray] = None  # a new global plan float64[n, 3]
@@ -209,6 +209,20 @@ class Navigator:
                 due.append(self._recovery_due_s)
         return min(due)
 
+    @property
+    def has_work(self) -> bool:
+        """Whether a tick is wanted at once: the first one, or a stop to be sent."""
+        return not self._started or self._stop_wanted
+
+    def restart(self, now_s: float) -> None:
+        """For a clock that has jumped back: schedules and patience begin anew."""
+        goal = self.goal
+        self._end_goal()
+        for _, schedule in self._costmaps.values():
+            schedule.start(now_s)
+        if goal is not None:
+            self.set_goal(goal, now_s)
+
     def tick(self, now_s: float, located: Located, velocity: Twist2D) -> Tick:
         """Does what is due.
 
@@ -237,7 +251,6 @@ class Navigator:
 
     def _update_costmaps(self, tick: Tick, located: Located) -> None:
         poses = {"global": located.in_global, "local": located.in_local}
-        updated = []
         for name, (costmap, schedule) in self._costmaps.items():
             if not schedule.take(tick.now_s):
                 continue
@@ -245,9 +258,7 @@ class Navigator:
             if pose is None:
                 tick.warnings.append(f"{name} costmap not updated: the robot's pose is unknown")
                 continue
-            costmap.update(tick.now_s, pose)
-            updated.append(name)
-        tick.updated = tuple(updated)
+            tick.windows[name] = costmap.update(tick.now_s, pose)
 
     def clear_costmaps(self) -> None:
         """Forgets everything that was observed, as ``~clear_costmaps`` does."""

@@ -1,0 +1,80 @@
+"""A costmap's topics: the full grid, its updates and the footprint.
+
+The rules are the original's: nothing is published without a listener; the full
+grid when the map moved or changed its size, else only the window that changed;
+one full grid for every new listener; with a publish frequency of 0 that is all.
+"""
+from __future__ import annotations
+
+from typing import Optional
+
+import rospy
+from geometry_msgs.msg import PolygonStamped
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid
+
+from quad_nav.costmap.layered import LayeredCostmap, Window
+from quad_nav.footprint import oriented
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import GridSpec
+from quad_nav.ros.nav_messages import grid_message, polygon_message, update_message
+
+
+class _NewListener(rospy.SubscribeListener):
+    def __init__(self, send):
+        self._send = send
+
+    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+        self._send(peer_publish)
+
+
+class CostmapPublisher:
+    """Publishes one costmap below ``~<name>/``. ``lock`` guards the costmap."""
+
+    def __init__(self, name: str, costmap: LayeredCostmap, lock):
+        self._costmap = costmap
+        self._lock = lock
+        self._changed: Optional[Window] = None
+        self._published: Optional[GridSpec] = None
+        self._last_s = 0.0
+        self._footprint = rospy.Publisher(f"~{name}/footprint", PolygonStamped, queue_size=1)
+        self._updates = rospy.Publisher(
+            f"~{name}/costmap_updates", OccupancyGridUpdate, queue_size=10)
+        self._grid = rospy.Publisher(
+            f"~{name}/costmap", OccupancyGrid, queue_size=1,
+            subscriber_listener=_NewListener(self._send_full))
+
+    def updated(self, now_s: float, pose: Pose2D, window: Window) -> None:
+        """To be called after each update of the costmap, with the window it changed."""
+        params, stamp = self._costmap.params, rospy.Time.from_sec(now_s)
+        if self._footprint.get_num_connections() > 0:
+            self._footprint.publish(polygon_message(
+                oriented(self._costmap.footprint, pose), params.global_frame, stamp))
+        self._changed = window if self._changed is None else self._changed.union(window)
+        period_s = 1.0 / params.publish_frequency_hz if params.publish_frequency_hz > 0.0 else None
+        if period_s is None or now_s < self._last_s + period_s - 1e-6:
+            return
+        self._last_s = now_s
+        self._publish(stamp)
+
+    def _publish(self, stamp: rospy.Time) -> None:
+        costmap, changed = self._costmap, self._changed
+        self._changed = None
+        if self._grid.get_num_connections() == 0 and self._updates.get_num_connections() == 0:
+            return
+        if costmap.params.always_send_full_costmap or costmap.spec != self._published:
+            self._grid.publish(self._full(stamp))
+            self._published = costmap.spec
+        elif changed is not None and not changed.is_empty:
+            part = costmap.costs[changed.y0:changed.yn, changed.x0:changed.xn]
+            self._updates.publish(update_message(
+                part, changed.x0, changed.y0, costmap.params.global_frame, stamp))
+
+    def _full(self, stamp: rospy.Time) -> OccupancyGrid:
+        costmap = self._costmap
+        return grid_message(costmap.spec, costmap.costs, costmap.params.global_frame, stamp)
+
+    def _send_full(self, send) -> None:
+        with self._lock:
+            message = self._full(rospy.Time.now())
+        send(message)

@@ -1,0 +1,121 @@
+"""The navigator's arrays as standard messages, and goals back from them."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point32, PolygonStamped, Pose, PoseStamped, Quaternion, Twist
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid, Path
+from sensor_msgs.msg import PointCloud2, PointField
+
+from quad_nav.costmap.occupancy import COST_TO_OCCUPANCY
+from quad_nav.errors import InvalidGoal
+from quad_nav.geometry import (
+    Pose2D,
+    Pose3D,
+    Twist2D,
+    quaternion_from_yaw,
+    rotation_from_quaternion,
+)
+from quad_nav.grid import GridSpec
+
+
+def pose_message(pose: Pose3D) -> Pose:
+    message = Pose(orientation=Quaternion(*pose.quaternion))
+    message.position.x, message.position.y, message.position.z = pose.x_m, pose.y_m, pose.z_m
+    return message
+
+
+def pose_from_message(message: Pose) -> Pose3D:
+    """A message's pose with its quaternion normalised.
+
+    Raises:
+        InvalidGoal: not finite, or not a turn about z: with the original's sentence
+            for quaternions, and ours for positions.
+    """
+    p, q = message.position, message.orientation
+    if not all(map(math.isfinite, (p.x, p.y, p.z))):
+        raise InvalidGoal("Aborting on goal because its position is not finite")
+    length = math.sqrt(q.x ** 2 + q.y ** 2 + q.z ** 2 + q.w ** 2)
+    if not math.isfinite(length) or length < 1e-3:
+        raise InvalidGoal("Aborting on goal because it was sent with an invalid quaternion")
+    quaternion = (q.x / length, q.y / length, q.z / length, q.w / length)
+    if abs(rotation_from_quaternion(quaternion)[2, 2] - 1.0) > 1e-3:
+        raise InvalidGoal("Aborting on goal because it was sent with an invalid quaternion")
+    return Pose3D(p.x, p.y, p.z, quaternion)
+
+
+def planar_pose(pose: Pose2D, z_m: float = 0.0) -> Pose3D:
+    return Pose3D(pose.x_m, pose.y_m, z_m, quaternion_from_yaw(pose.yaw_rad))
+
+
+def pose_stamped(pose: Pose3D, frame: str, stamp: rospy.Time) -> PoseStamped:
+    message = PoseStamped(pose=pose_message(pose))
+    message.header.frame_id, message.header.stamp = frame, stamp
+    return message
+
+
+def twist_message(twist: Twist2D) -> Twist:
+    message = Twist()
+    message.linear.x, message.linear.y = twist.vx_mps, twist.vy_mps
+    message.angular.z = twist.vyaw_radps
+    return message
+
+
+def path_message(plan: np.ndarray, frame: str, stamp: rospy.Time) -> Path:
+    """A plan float64[n, 3] (x, y, yaw) as a path; every pose carries the stamp."""
+    path = Path()
+    path.header.frame_id, path.header.stamp = frame, stamp
+    path.poses = [pose_stamped(planar_pose(Pose2D(*row)), frame, stamp) for row in plan.tolist()]
+    return path
+
+
+def polygon_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> PolygonStamped:
+    """A footprint float64[n, 2] already in ``frame``."""
+    message = PolygonStamped()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.polygon.points = [Point32(x, y, 0.0) for x, y in points.tolist()]
+    return message
+
+
+def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Time) -> OccupancyGrid:
+    """A costmap's master grid uint8[H, W] in occupancies."""
+    message = OccupancyGrid()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.info.map_load_time = stamp
+    message.info.resolution = spec.resolution_m
+    message.info.width, message.info.height = spec.size_x, spec.size_y
+    message.info.origin.position.x = spec.origin_x_m
+    message.info.origin.position.y = spec.origin_y_m
+    message.info.origin.orientation.w = 1.0
+    message.data = COST_TO_OCCUPANCY[costs].ravel().tolist()
+    return message
+
+
+def update_message(costs: np.ndarray, x0: int, y0: int, frame: str,
+                   stamp: rospy.Time) -> OccupancyGridUpdate:
+    """A window uint8[h, w] of a costmap whose lower left cell is (x0, y0)."""
+    message = OccupancyGridUpdate(x=x0, y=y0, width=costs.shape[1], height=costs.shape[0])
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.data = COST_TO_OCCUPANCY[costs].ravel().tolist()
+    return message
+
+
+CLOUD_FIELDS = ("x", "y", "z", "path_cost", "goal_cost", "occ_cost", "total_cost")
+
+
+def cost_cloud_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> PointCloud2:
+    """Scored cells float32[n, 7] in the order of ``CLOUD_FIELDS``."""
+    data = np.ascontiguousarray(points, dtype=np.float32)
+    message = PointCloud2()
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.height, message.width = 1, len(data)
+    message.fields = [PointField(name, 4 * k, PointField.FLOAT32, 1)
+                      for k, name in enumerate(CLOUD_FIELDS)]
+    message.point_step = 4 * len(CLOUD_FIELDS)
+    message.row_step = message.point_step * len(data)
+    message.is_dense = True
+    message.data = data.tobytes()
+    return message

@@ -1,0 +1,81 @@
+"""What a tick planned and commanded, as the original's topics."""
+from __future__ import annotations
+
+import rospy
+from geometry_msgs.msg import Twist
+from move_base_msgs.msg import RecoveryStatus
+from nav_msgs.msg import Path
+from sensor_msgs.msg import PointCloud2
+
+from quad_nav.geometry import Pose3D
+from quad_nav.navigator import Navigator, Tick
+from quad_nav.ros.nav_messages import (
+    cost_cloud_message,
+    path_message,
+    pose_stamped,
+    twist_message,
+)
+
+
+def plugin_name(plugin: str) -> str:
+    """``navfn/NavfnROS`` has its topics below ``NavfnROS``."""
+    return plugin.replace("::", "/").split("/")[-1]
+
+
+class PlanTopics:
+    """Publishers of command, plans, scores and recoveries."""
+
+    def __init__(self, navigator: Navigator):
+        self._navigator = navigator
+        planner = plugin_name(navigator.params.base_global_planner)
+        controller = plugin_name(navigator.params.base_local_planner)
+        self._command = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        self._plan = rospy.Publisher(f"~{planner}/plan", Path, queue_size=2)
+        self._global_plan = rospy.Publisher(f"~{controller}/global_plan", Path, queue_size=1)
+        self._local_plan = rospy.Publisher(f"~{controller}/local_plan", Path, queue_size=1)
+        self._cost_cloud = rospy.Publisher(f"~{controller}/cost_cloud", PointCloud2, queue_size=1)
+        self._recovery = rospy.Publisher(
+            "move_base/recovery_status", RecoveryStatus, queue_size=1)
+
+    @property
+    def _global_frame(self) -> str:
+        return self._navigator.global_costmap.params.global_frame
+
+    @property
+    def _local_frame(self) -> str:
+        return self._navigator.local_costmap.params.global_frame
+
+    def publish(self, tick: Tick, pose: Pose3D) -> None:
+        now = rospy.Time.from_sec(tick.now_s)
+        if tick.command is not None:
+            self._command.publish(twist_message(tick.command))
+        if tick.plan is not None:
+            self.plan(tick.plan, now)
+        if tick.recovery is not None:
+            self._recovery.publish(RecoveryStatus(
+                pose_stamped(pose, self._global_frame, now), tick.recovery.index,
+                tick.recovery.total, tick.recovery.name))
+        if tick.control is not None:
+            self._control(tick.control, now)
+
+    def plan(self, plan, now: rospy.Time) -> None:
+        """Twice, as the original: what the search found, then with the goal itself."""
+        if self._plan.get_num_connections() == 0:
+            return
+        message = path_message(plan, self._global_frame, now)
+        self._plan.publish(Path(message.header, message.poses[:-1]))
+        self._plan.publish(message)
+
+    def _control(self, control, now: rospy.Time) -> None:
+        if len(control.global_plan) and self._global_plan.get_num_connections() > 0:
+            self._global_plan.publish(
+                path_message(control.global_plan, self._local_frame, rospy.Time(0)))
+        if len(control.local_plan) and self._local_plan.get_num_connections() > 0:
+            self._local_plan.publish(path_message(control.local_plan, self._local_frame, now))
+        if self._cost_cloud.get_num_connections() > 0:
+            cloud = self._navigator.controller.cost_cloud()
+            if cloud is not None:
+                self._cost_cloud.publish(cost_cloud_message(cloud, self._local_frame, now))
+
+    def stop(self) -> None:
+        self._command.publish(Twist())

@@ -1,0 +1,116 @@
+"""Sensor topics into the costmaps' obstacle layers.
+
+A message waits until tf knows where its sensor was at its stamp, as in the
+original's message filter; the oldest of too many waiting ones is dropped.
+"""
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Deque, Dict, List, Sequence, Tuple
+
+import numpy as np
+import rospy
+from sensor_msgs import point_cloud2
+from sensor_msgs.msg import LaserScan, PointCloud, PointCloud2
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.geometry import Pose3D
+from quad_nav.ros.convert import scan_from_message
+from quad_nav.ros.transforms import Transforms, TransformUnavailable
+
+MESSAGE_TYPES = {"LaserScan": LaserScan, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
+QUEUE_LENGTH = 50
+
+
+class Sensor:
+    """One topic and the (costmap, layer, source) that take what it brings."""
+
+    def __init__(self, topic: str, data_type: str):
+        self.topic = topic
+        self.data_type = data_type
+        self.targets: List[Tuple[LayeredCostmap, ObstacleLayer, str, str]] = []
+        self.waiting: Deque = deque(maxlen=QUEUE_LENGTH)
+        self._lock = threading.Lock()
+        self.subscriber = rospy.Subscriber(
+            topic, MESSAGE_TYPES[data_type], self._store, queue_size=QUEUE_LENGTH)
+
+    def _store(self, message) -> None:
+        with self._lock:
+            self.waiting.append((message, rospy.get_time()))
+
+    def deliver(self, transforms: Transforms) -> None:
+        """Hands over every message whose transforms are known."""
+        while True:
+            with self._lock:
+                if not self.waiting:
+                    return
+                message, received_s = self.waiting[0]
+            try:
+                poses = [self._poses(transforms, message, target) for target in self.targets]
+            except TransformUnavailable as error:
+                if error.later and self._is_ahead(transforms, message):
+                    return
+                rospy.logwarn_throttle(5.0, "%s: a message in frame '%s' is dropped: %s",
+                                       self.topic, message.header.frame_id, error)
+                self._drop(message)
+                continue
+            self._drop(message)
+            for target, (points_pose, origin_pose) in zip(self.targets, poses):
+                self._add(message, received_s, target, points_pose, origin_pose)
+
+    def _drop(self, message) -> None:
+        with self._lock:
+            if self.waiting and self.waiting[0][0] is message:
+                self.waiting.popleft()
+
+    def _is_ahead(self, transforms: Transforms, message) -> bool:
+        """Whether the transform may still come: the stamp is younger than tf's latest."""
+        costmap = self.targets[0][0]
+        return transforms.locate(costmap.params.global_frame, message.header.frame_id,
+                                 message.header.stamp.to_sec(), 0.0) is None
+
+    @staticmethod
+    def _poses(transforms: Transforms, message, target) -> Tuple[Pose3D, Pose3D]:
+        costmap, _, _, sensor_frame = target
+        stamp_s = message.header.stamp.to_sec()
+        frame = message.header.frame_id
+        points_pose = transforms.lookup(costmap.params.global_frame, frame, stamp_s)
+        if sensor_frame in ("", frame):
+            return points_pose, points_pose
+        return points_pose, transforms.lookup(costmap.params.global_frame, sensor_frame, stamp_s)
+
+    def _add(self, message, received_s: float, target, points_pose: Pose3D,
+             origin_pose: Pose3D) -> None:
+        _, layer, source, _ = target
+        if self.data_type == "LaserScan":
+            layer.add_scan(source, scan_from_message(message), points_pose, received_s,
+                           origin=origin_pose)
+        else:
+            layer.add_cloud(source, _cloud_points(message), points_pose,
+                            message.header.stamp.to_sec(), received_s, origin=origin_pose)
+
+
+def _cloud_points(message) -> np.ndarray:
+    """float32[n, 3] in the message's frame."""
+    if isinstance(message, PointCloud):
+        points = [(p.x, p.y, p.z) for p in message.points]
+    else:
+        points = list(point_cloud2.read_points(message, field_names=("x", "y", "z")))
+    return np.array(points, dtype=np.float32).reshape(-1, 3)
+
+
+def connect(costmaps: Sequence[LayeredCostmap]) -> List[Sensor]:
+    """Subscribes to every source of every obstacle layer, each topic once."""
+    sensors: Dict[Tuple[str, str], Sensor] = {}
+    for costmap in costmaps:
+        for layer in costmap.layers.values():
+            if not isinstance(layer, ObstacleLayer):
+                continue
+            for source in layer.params.sources:
+                key = (source.topic or source.name, source.data_type)
+                if key not in sensors:
+                    sensors[key] = Sensor(*key)
+                sensors[key].targets.append((costmap, layer, source.name, source.sensor_frame))
+    return list(sensors.values())

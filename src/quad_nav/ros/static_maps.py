@@ -1,0 +1,52 @@
+"""Map topics into the costmaps' static layers."""
+from __future__ import annotations
+
+from typing import Sequence
+
+import numpy as np
+import rospy
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.static import StaticLayer
+from quad_nav.grid import GridSpec
+
+
+class MapListener:
+    """One static layer's map topic. ``lock`` guards the costmap."""
+
+    def __init__(self, costmap: LayeredCostmap, layer: StaticLayer, lock):
+        self._costmap = costmap
+        self._layer = layer
+        self._lock = lock
+        topic = layer.params.map_topic
+        self._grid = rospy.Subscriber(topic, OccupancyGrid, self._on_map, queue_size=1)
+        if layer.params.subscribe_to_updates:
+            self._updates = rospy.Subscriber(
+                topic + "_updates", OccupancyGridUpdate, self._on_update, queue_size=10)
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        info = message.info
+        spec = GridSpec(info.width, info.height, info.resolution,
+                        info.origin.position.x, info.origin.position.y)
+        frame, wanted = message.header.frame_id, self._costmap.params.global_frame
+        if frame != wanted and not self._costmap.params.rolling_window:
+            rospy.logwarn("map on %s is in frame '%s', the costmap in '%s': used as if it were "
+                          "the same", self._grid.resolved_name, frame, wanted)
+        occupancy = np.array(message.data, dtype=np.int8).reshape(spec.shape)
+        with self._lock:
+            self._costmap.set_static_map(self._layer, spec, occupancy)
+        if self._layer.params.first_map_only:
+            self._grid.unregister()
+
+    def _on_update(self, message: OccupancyGridUpdate) -> None:
+        part = np.array(message.data, dtype=np.int8).reshape(message.height, message.width)
+        with self._lock:
+            self._layer.update_map(message.x, message.y, part)
+
+
+def connect(costmaps: Sequence[LayeredCostmap], lock) -> list:
+    """Subscribes to the map topic of every static layer."""
+    return [MapListener(costmap, layer, lock) for costmap in costmaps
+            for layer in costmap.layers.values() if isinstance(layer, StaticLayer)]
