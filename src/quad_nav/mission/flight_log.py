@@ -1,0 +1,181 @@
+"""What was flown: path lengths, smallest gaps, contacts, and each goal's outcome.
+
+Gaps are between hulls: a quadcopter is a disc of ``robot_radius_m``, so the
+gap to an obstacle is the centre's distance to its surface less one radius, and
+the gap between two quadcopters their centres' distance less both radii.
+"""
+from __future__ import annotations
+
+import collections
+from dataclasses import dataclass
+from typing import Callable, Deque, Dict, List, Optional, Sequence, Tuple
+
+from quad_nav.geometry import Pose2D
+from quad_nav.mission.goal_sequence import Goal, GoalSequence
+from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, Sequencer
+
+# Distance in metres from a place in ``map`` to the nearest surface, negative inside.
+Clearance = Callable[[float, float], float]
+
+SAME_CONTACT_S = 1.0
+TRACK_LENGTH = 100
+
+
+@dataclass(frozen=True)
+class Leg:
+    """The flight to one goal; ``straight_length_m`` is from where it was sent to where it ended."""
+
+    index: int
+    lap: int
+    goal: Goal
+    reached: bool
+    reason: str
+    attempts: int
+    time_s: Optional[float] = None
+    path_length_m: float = 0.0
+    straight_length_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Two things touched; ``other`` is a quadcopter's name or an obstacle's."""
+
+    time_s: float
+    robot: str
+    other: str
+    x_m: float
+    y_m: float
+
+
+class Track:
+    """Where a quadcopter was lately."""
+
+    def __init__(self) -> None:
+        self._samples: Deque[Tuple[float, Pose2D]] = collections.deque(maxlen=TRACK_LENGTH)
+
+    def append(self, stamp_s: float, pose: Pose2D) -> None:
+        self._samples.append((stamp_s, pose))
+
+    def at(self, stamp_s: float) -> Optional[Pose2D]:
+        """The position at a time that the samples enclose, on the straight line between two."""
+        later: Optional[Tuple[float, Pose2D]] = None
+        for time_s, pose in reversed(self._samples):
+            if time_s == stamp_s:
+                return pose
+            if time_s < stamp_s:
+                if later is None:
+                    return None
+                part = (stamp_s - time_s) / (later[0] - time_s)
+                return Pose2D(pose.x_m + part * (later[1].x_m - pose.x_m),
+                              pose.y_m + part * (later[1].y_m - pose.y_m))
+            later = (time_s, pose)
+        return None
+
+
+class RobotLog:
+    """What one quadcopter has flown since its first goal was sent."""
+
+    def __init__(self, name: str):
+        self.name = name
+        self.track = Track()
+        self.legs: List[Leg] = []
+        self.path_length_m = 0.0
+        self.min_clearance_m: Optional[float] = None
+        self.min_separation_m: Optional[float] = None
+        self.recoveries = 0
+        self._pose: Optional[Pose2D] = None
+        self._stamp_s = 0.0
+        self._leg_start: Optional[Pose2D] = None
+        self._leg_start_length_m = 0.0
+
+    def move(self, stamp_s: float, pose: Pose2D) -> bool:
+        """Take a pose; False for one that is not newer than the last."""
+        if self._pose is not None:
+            if stamp_s <= self._stamp_s:
+                return False
+            self.path_length_m += self._pose.distance_to(pose)
+        self._pose, self._stamp_s = pose, stamp_s
+        self.track.append(stamp_s, pose)
+        return True
+
+    def act(self, action: Action) -> Optional[Leg]:
+        """Take the sequencer's action; the leg when it ended one."""
+        if isinstance(action, SendGoal) and not action.why:
+            self._leg_start, self._leg_start_length_m = self._pose, self.path_length_m
+        if not isinstance(action, GoalEnded):
+            return None
+        leg = self._leg(action.index, action.lap, action.goal, action.reached, action.reason,
+                        action.attempts, action.time_s)
+        self.legs.append(leg)
+        return leg
+
+    def all_legs(self, sequencer: Sequencer, now_s: float) -> List[Leg]:
+        """The legs flown, the one cut short and those that were never begun."""
+        flight, index, lap = sequencer.flight, sequencer.index, sequencer.lap
+        rest: List[Leg] = []
+        for number, goal in enumerate(sequencer.sequence.goals[index:], start=index):
+            if flight is not None and number == index:
+                rest.append(self._leg(number, lap, goal, False, "interrupted", flight.attempt,
+                                      now_s - flight.first_sent_s))
+            else:
+                rest.append(Leg(number, lap, goal, False, "not sent", 0))
+        return self.legs + rest
+
+    def _leg(self, index: int, lap: int, goal: Goal, reached: bool, reason: str, attempts: int,
+             time_s: float) -> Leg:
+        straight_m = 0.0
+        if self._leg_start is not None and self._pose is not None:
+            straight_m = self._leg_start.distance_to(self._pose)
+        return Leg(index, lap, goal, reached, reason, attempts, time_s,
+                   self.path_length_m - self._leg_start_length_m, straight_m)
+
+
+class FlightLog:
+    """What all quadcopters of a mission have flown."""
+
+    def __init__(self, names: Sequence[str], robot_radius_m: float,
+                 clearance_m: Optional[Clearance] = None):
+        self.robots: Dict[str, RobotLog] = {name: RobotLog(name) for name in names}
+        self.robot_radius_m = robot_radius_m
+        self.contacts: List[Contact] = []
+        self._clearance_m = clearance_m
+        self._last_contact_s: Dict[frozenset, float] = {}
+
+    def move(self, name: str, stamp_s: float, pose: Pose2D) -> None:
+        """Take a quadcopter's pose in ``map``."""
+        robot = self.robots[name]
+        if not robot.move(stamp_s, pose):
+            return
+        if self._clearance_m is not None:
+            gap_m = self._clearance_m(pose.x_m, pose.y_m) - self.robot_radius_m
+            robot.min_clearance_m = _smaller(robot.min_clearance_m, gap_m)
+        for other in self.robots.values():
+            # Messages arrive one by one: compare with where the other was at the same time.
+            # What it has not told yet is measured when it does.
+            there = other.track.at(stamp_s) if other is not robot else None
+            if there is not None:
+                gap_m = pose.distance_to(there) - 2 * self.robot_radius_m
+                robot.min_separation_m = _smaller(robot.min_separation_m, gap_m)
+                other.min_separation_m = _smaller(other.min_separation_m, gap_m)
+
+    def touch(self, contact: Contact) -> bool:
+        """Take a contact; False when it is the last one going on, or seen from the other side."""
+        pair = frozenset((contact.robot, contact.other))
+        last_s = self._last_contact_s.get(pair)
+        self._last_contact_s[pair] = contact.time_s
+        if last_s is not None and contact.time_s - last_s <= SAME_CONTACT_S:
+            return False
+        self.contacts.append(contact)
+        return True
+
+    def contacts_of(self, name: str) -> int:
+        return sum(name in (contact.robot, contact.other) for contact in self.contacts)
+
+
+def unflown(sequence: GoalSequence, reason: str) -> List[Leg]:
+    """The legs of a mission that never began."""
+    return [Leg(index, 1, goal, False, reason, 0) for index, goal in enumerate(sequence.goals)]
+
+
+def _smaller(a: Optional[float], b: float) -> float:
+    return b if a is None else min(a, b)

@@ -1,0 +1,248 @@
+"""Goal files: ``{"goals": [[x, y], [x, y, yaw], ...]}``, metres and radians in ``map``.
+
+A file is refused as a whole and every fault in it is listed at once, each as
+``file: place: what is wrong; what was expected``. ``goals/schema.json`` says
+the same to an editor, ``docs/goals.md`` to a person.
+"""
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import itertools
+import json
+import math
+from pathlib import Path
+from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
+
+from quad_nav.errors import InputError
+from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, Goal, GoalSequence, SequenceSettings
+
+# Says what is wrong with a place and what was expected, or None where a robot may be.
+PlaceCheck = Callable[[float, float], Optional[str]]
+
+
+class _Setting(NamedTuple):
+    field: str
+    accepts: Callable[[Any], bool]
+    expected: str
+
+
+def _is_number(value: Any) -> bool:
+    # bool is a subclass of int, and true is not a number of metres.
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+SETTINGS: Dict[str, _Setting] = {
+    "goal_tolerance": _Setting("goal_tolerance_m", lambda v: _is_number(v) and v > 0,
+                               "a number of metres above 0"),
+    "goal_timeout": _Setting("goal_timeout_s", lambda v: _is_number(v) and v > 0,
+                             "a number of seconds above 0"),
+    "retries": _Setting("retries", lambda v: _is_number(v) and v >= 0 and v == int(v),
+                        "a whole number, 0 or more"),
+    "loop": _Setting("loop", lambda v: isinstance(v, bool), "true or false"),
+}
+KEYS: Tuple[str, ...] = ("goals", "$schema", *SETTINGS)
+
+
+def load_goals(path: Union[str, Path], check_place: Optional[PlaceCheck] = None,
+               defaults: SequenceSettings = DEFAULT_SETTINGS) -> GoalSequence:
+    """The sequence in a goal file; raises InputError with every fault in it."""
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError([f"{path}: cannot be read: {error.strerror}; expected a goal file"]
+                         ) from error
+    return parse_goals(content, str(path), check_place, defaults)
+
+
+def parse_goals(content: Union[bytes, str], name: str, check_place: Optional[PlaceCheck] = None,
+                defaults: SequenceSettings = DEFAULT_SETTINGS) -> GoalSequence:
+    """The sequence in a goal file's content; ``name`` stands for the file in messages.
+
+    ``defaults`` are the settings that the file does not give itself.
+    """
+    tree, problems = _decode(content, name)
+    if not isinstance(tree, dict):
+        raise InputError([f'{name}: is {_kind(tree)}; expected {{"goals": [[x, y], ...]}}'])
+    problems += [_unknown_key(name, key) for key in tree if key not in KEYS]
+    if not isinstance(tree.get("$schema", ""), str):
+        problems.append(f"{name}: $schema: is {_show(tree['$schema'])}; expected a string")
+    given = {key: tree[key] for key in SETTINGS if key in tree}
+    settings, faults = read_settings(given, name, defaults)
+    goals, goal_faults = _read_goals(tree, name, check_place)
+    problems += faults + goal_faults
+    if not problems and settings.loop:
+        problems += _loop_faults(goals, settings.goal_tolerance_m, name)
+    if problems:
+        raise InputError(problems)
+    return GoalSequence(tuple(goals), settings)
+
+
+def read_settings(values: Mapping[str, Any], name: str,
+                  defaults: SequenceSettings = DEFAULT_SETTINGS
+                  ) -> Tuple[SequenceSettings, List[str]]:
+    """Settings by their names in a goal file, and what is wrong with them."""
+    problems = [f"{name}: {key}: is {_show(value)}; expected {SETTINGS[key].expected}"
+                for key, value in values.items() if not SETTINGS[key].accepts(value)]
+    if problems:
+        return defaults, problems
+    fields = {SETTINGS[key].field: value for key, value in values.items()}
+    if "retries" in fields:
+        fields["retries"] = int(fields["retries"])
+    return dataclasses.replace(defaults, **fields), []
+
+
+def clearance_check(contains: Callable[[float, float], bool],
+                    clearance_m: Callable[[float, float], float],
+                    robot_radius_m: float, arena: str = "the arena") -> PlaceCheck:
+    """Places in the arena and no nearer to anything than the robot's radius.
+
+    ``clearance_m(x, y)`` is the distance to the nearest surface, negative inside.
+    """
+    def check(x_m: float, y_m: float) -> Optional[str]:
+        if not contains(x_m, y_m):
+            return f"is outside the arena; expected a place in {arena}"
+        clearance = clearance_m(x_m, y_m)
+        if clearance <= 0.0:
+            return f"is inside an obstacle; expected {robot_radius_m:.2f} m of room around it"
+        if clearance < robot_radius_m:
+            return (f"is {clearance:.2f} m from an obstacle or a wall; "
+                    f"expected at least the robot's radius, {robot_radius_m:.2f} m")
+        return None
+    return check
+
+
+class WatchedGoalFile:
+    """A goal file that a person may edit while the mission flies."""
+
+    def __init__(self, path: Union[str, Path], check_place: Optional[PlaceCheck] = None,
+                 defaults: SequenceSettings = DEFAULT_SETTINGS):
+        self.path = Path(path)
+        self._check_place = check_place
+        self._defaults = defaults
+        self._judged: Optional[bytes] = None
+        self._seen: Optional[bytes] = None
+
+    def load(self) -> GoalSequence:
+        """The sequence now; later polls compare with this content."""
+        self._judged = self._seen = self._content()
+        return load_goals(self.path, self._check_place, self._defaults)
+
+    def poll(self) -> Optional[GoalSequence]:
+        """The new sequence when the file has changed, else None.
+
+        New content is taken when two polls have seen the same, so that a file
+        is not read while an editor is half through writing it. A bad edit
+        raises InputError once.
+        """
+        content = self._content()
+        settled, self._seen = content == self._seen, content
+        if not settled or content == self._judged:
+            return None
+        self._judged = content
+        return load_goals(self.path, self._check_place, self._defaults)
+
+    def _content(self) -> Optional[bytes]:
+        # A file that is gone for good is a changed content like any other: load_goals says so.
+        try:
+            return self.path.read_bytes()
+        except OSError:
+            return None
+
+
+def _decode(content: Union[bytes, str], name: str) -> Tuple[Any, List[str]]:
+    """The JSON tree with every number a float, and the keys that come twice."""
+    problems: List[str] = []
+
+    def unique(pairs: Iterable[Tuple[str, Any]]) -> Dict[str, Any]:
+        tree: Dict[str, Any] = {}
+        for key, value in pairs:
+            if key in tree:
+                problems.append(f"{name}: {key}: is given twice; expected once")
+            tree[key] = value
+        return tree
+
+    try:
+        text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
+    except UnicodeDecodeError as error:
+        raise InputError([f"{name}: byte {error.start} is not UTF-8; expected a JSON text"]
+                         ) from error
+    # The tutorial prints its goal files without the braces around them.
+    bare = text.lstrip().startswith('"goals"')
+    try:
+        # parse_int=float: a whole number with a thousand digits becomes infinity, as 1e999 does.
+        return json.loads("{" + text + "}" if bare else text, object_pairs_hook=unique,
+                          parse_int=float), problems
+    except json.JSONDecodeError as error:
+        column = error.colno - (bare and error.lineno == 1)
+        problem = f'{name}:{error.lineno}:{column}: is not JSON: {error.msg}; '
+        raise InputError([problem + 'expected {"goals": [[x, y], [x, y, yaw], ...]}']) from error
+    except RecursionError as error:
+        raise InputError([f'{name}: is nested too deeply; expected {{"goals": [[x, y], ...]}}']
+                         ) from error
+
+
+def _read_goals(tree: Dict[str, Any], name: str, check_place: Optional[PlaceCheck]
+                ) -> Tuple[List[Goal], List[str]]:
+    if "goals" not in tree:
+        return [], [f"{name}: has no goals; expected \"goals\": [[x, y], ...]"]
+    entries = tree["goals"]
+    if not isinstance(entries, list):
+        return [], [f"{name}: goals: is {_kind(entries)}; expected a list [[x, y], ...]"]
+    if not entries:
+        return [], [f"{name}: goals: is empty; expected at least one goal [x, y]"]
+    goals: List[Goal] = []
+    problems: List[str] = []
+    for index, entry in enumerate(entries):
+        place = f"{name}: goals[{index}] (goal {index + 1})"
+        faults = list(_goal_faults(entry))
+        if not faults:
+            goals.append(Goal(*entry))
+            fault = check_place(entry[0], entry[1]) if check_place else None
+            faults = [f": ({entry[0]:g}, {entry[1]:g}) {fault}"] if fault else []
+        problems += [place + fault for fault in faults]
+    return goals, problems
+
+
+def _goal_faults(entry: Any) -> Iterable[str]:
+    if not isinstance(entry, list):
+        yield f": is {_show(entry)}; expected [x, y] or [x, y, yaw]"
+        return
+    if len(entry) not in (2, 3):
+        yield f": has {len(entry)} numbers; expected [x, y] or [x, y, yaw]"
+        return
+    for label, unit, value in zip(("x", "y", "yaw"), ("metres", "metres", "radians"), entry):
+        if not _is_number(value):
+            yield f": {label} is {_show(value)}; expected a finite number of {unit}"
+        elif label == "yaw" and abs(value) > 2 * math.pi:
+            yield (f": yaw is {value:g}; expected radians between -2 pi and 2 pi "
+                   f"({value:g} degrees are {math.radians(value):.4g})")
+
+
+def _loop_faults(goals: List[Goal], tolerance_m: float, name: str) -> List[str]:
+    """Goals that one place can reach all at once would be flown round endlessly on the spot."""
+    if any(a.pose.distance_to(b.pose) > 2 * tolerance_m
+           for a, b in itertools.combinations(goals, 2)):
+        return []
+    expected = f"two goals more than twice the goal_tolerance apart ({2 * tolerance_m:g} m)"
+    return [f"{name}: loop: has nowhere to go; expected {expected}"]
+
+
+def _unknown_key(name: str, key: str) -> str:
+    near = difflib.get_close_matches(key.lower(), KEYS, n=1)
+    expected = near[0] if near else "one of " + ", ".join(KEYS)
+    return f"{name}: {key}: is not a key of goal files; expected {expected}"
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, dict):
+        return "an object"
+    if isinstance(value, list):
+        return "a list"
+    return _show(value)
+
+
+def _show(value: Any) -> str:
+    """A value as the file has it, shortened."""
+    text = f"{value:g}" if isinstance(value, float) and math.isfinite(value) else json.dumps(value)
+    return text if len(text) <= 40 else text[:37] + "..."
