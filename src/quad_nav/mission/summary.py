@@ -42,10 +42,6 @@ class RobotSummary:
         return sum(not leg.reached and leg.attempts > 0 and leg.reason != "interrupted"
                    for leg in self.legs)
 
-    @property
-    def retries(self) -> int:
-        return sum(max(leg.attempts - 1, 0) for leg in self.legs)
-
 
 @dataclass(frozen=True)
 class MissionSummary:
@@ -123,7 +119,7 @@ def table(summary: MissionSummary) -> str:
 
 def _goal_table(robots: Sequence[RobotSummary]) -> str:
     laps = any(leg.lap > 1 for robot in robots for leg in robot.legs)
-    header = ["quadcopter", "goal", "x\nm", "y\nm", "result", "time\ns", "tries", "path\nm",
+    header = ["robot", "goal", "x\nm", "y\nm", "result", "time\ns", "tries", "path\nm",
               "straight\nm", "path /\nstraight"]
     rows: List[Sequence[str]] = []
     notes: List[str] = []
@@ -155,15 +151,14 @@ def _goal_row(robot: str, goal: str, leg: Leg) -> List[str]:
 
 def _robot_table(summary: MissionSummary) -> str:
     rows = [[robot.robot, f"{robot.reached} of {len(robot.legs)}", str(robot.skipped),
-             str(robot.retries), str(robot.recoveries),
-             str(robot.contacts) if summary.contacts_reported else "-",
+             str(robot.recoveries), str(robot.contacts) if summary.contacts_reported else "-",
              f"{robot.path_length_m:.2f}", _ratio(robot.path_length_m, robot.straight_length_m),
              _figure(robot.min_clearance_m, 2), _figure(robot.min_separation_m, 2)]
             for robot in summary.robots]
-    header = ["quadcopter", "reached", "skipped", "retries", "recov-\neries", "con-\ntacts",
-              "path\nm", "path /\nstraight", "min gap to\nobstacle, m", "min gap to\nquadcopter, m"]
+    header = ["robot", "reached", "skipped", "recov-\neries", "con-\ntacts", "path\nm",
+              "path /\nstraight", "least gap to\nobstacle, m", "least gap to\nrobot, m"]
     text = tabulate.tabulate(rows, header, tablefmt="simple", disable_numparse=True,
-                             colalign=("left",) + ("right",) * 9)
+                             colalign=("left",) + ("right",) * 8)
     note = f"Gaps are between hulls: discs of {summary.robot_radius_m:.2f} m radius."
     return f"{text}\n{note}"
 
@@ -171,7 +166,7 @@ def _robot_table(summary: MissionSummary) -> str:
 def _contact_table(contacts: Sequence[Contact]) -> str:
     rows = [[f"{contact.time_s:.2f}", contact.robot, contact.other, f"{contact.x_m:.2f}",
              f"{contact.y_m:.2f}"] for contact in contacts]
-    return tabulate.tabulate(rows, ["contact at\ns", "quadcopter", "touched", "x\nm", "y\nm"],
+    return tabulate.tabulate(rows, ["contact at\ns", "robot", "touched", "x\nm", "y\nm"],
                              tablefmt="simple", disable_numparse=True,
                              colalign=("right", "left", "left", "right", "right"))
 

@@ -1,0 +1,147 @@
+"""What was flown, as figures that can be worked out by hand."""
+import json
+
+import pytest
+
+from quad_nav.geometry import Pose2D
+from quad_nav.mission.flight_log import Contact, FlightLog, Leg, Track, unflown
+from quad_nav.mission.goal_sequence import Goal, GoalSequence
+from quad_nav.mission.sequencer import Sequencer
+from quad_nav.mission.summary import (
+    MissionSummary,
+    RobotSummary,
+    summarize_robot,
+    table,
+    to_json,
+    write_json,
+)
+
+# From (0, 0) over (3, 0) to the goal: 7 m where the straight line has 5 m.
+DETOUR = [(0.0, Pose2D(0, 0)), (10.0, Pose2D(3, 0)), (20.0, Pose2D(3, 4))]
+GOALS = GoalSequence((Goal(3.0, 4.0), Goal(9.0, 4.0), Goal(9.0, 9.0)))
+
+
+def fly(log, name, sequencer, samples):
+    for now_s, pose in samples:
+        log.move(name, now_s, pose)
+        for action in sequencer.tick(now_s, pose):
+            log.robots[name].act(action)
+
+
+def leg(reached=True, **fields):
+    return Leg(0, 1, Goal(3.0, 4.0), reached,
+               **{"reason": "", "attempts": 1, "time_s": 10.0, "path_length_m": 7.0,
+                  "straight_length_m": 5.0, **fields})
+
+
+def mission(*legs, **fields):
+    return MissionSummary((RobotSummary("quad0", legs or (leg(),), 7.0),), **fields)
+
+
+def test_track_interpolates_between_samples_and_does_not_guess_beyond():
+    track = Track()
+    track.append(1.0, Pose2D(0.0, 0.0))
+    track.append(3.0, Pose2D(4.0, 2.0))
+    assert track.at(1.5) == Pose2D(1.0, 0.5)
+    assert track.at(3.0) == Pose2D(4.0, 2.0)
+    assert track.at(0.9) is None and track.at(3.1) is None
+
+
+def test_legs_measure_the_way_flown_and_the_straight_way():
+    log, sequencer = FlightLog(["quad0"], 0.3), Sequencer(GOALS)
+    fly(log, "quad0", sequencer, [*DETOUR, (25.0, Pose2D(5, 4))])
+    legs = log.robots["quad0"].all_legs(sequencer, 26.0)
+    assert legs[0] == Leg(0, 1, GOALS.goals[0], True, "", 1, 20.0, 7.0, 5.0)
+    assert legs[1] == Leg(1, 1, GOALS.goals[1], False, "interrupted", 1, 6.0, 2.0, 2.0)
+    assert legs[2] == Leg(2, 1, GOALS.goals[2], False, "not sent", 0)
+    robot = summarize_robot(log, "quad0", legs)
+    assert (robot.path_length_m, robot.straight_length_m) == (9.0, 7.0)
+    assert (robot.reached, robot.skipped) == (1, 0)
+
+
+def test_a_pose_that_is_not_newer_is_not_flown():
+    log = FlightLog(["quad0"], 0.3)
+    log.move("quad0", 1.0, Pose2D(0, 0))
+    log.move("quad0", 1.0, Pose2D(5, 0))
+    log.move("quad0", 2.0, Pose2D(1, 0))
+    assert log.robots["quad0"].path_length_m == 1.0
+
+
+def test_gaps_are_between_hulls():
+    # A wall along x = 0: the clearance of a centre is its x.
+    log = FlightLog(["quad0", "quad1", "quad2"], 0.3, lambda x, y: x)
+    log.move("quad0", 0.0, Pose2D(2.0, 0.0))
+    log.move("quad0", 1.0, Pose2D(1.0, 0.0))
+    log.move("quad0", 2.0, Pose2D(4.0, 0.0))
+    log.move("quad1", 1.0, Pose2D(4.0, 4.0))
+    robots = log.robots
+    assert robots["quad0"].min_clearance_m == pytest.approx(0.7)
+    # 3-4-5 triangle at 1 s; at 2 s quad0 would be nearer, but quad1 has not told where it is.
+    assert robots["quad0"].min_separation_m == pytest.approx(5.0 - 0.6)
+    assert robots["quad1"].min_separation_m == pytest.approx(5.0 - 0.6)
+    log.move("quad1", 2.0, Pose2D(4.0, 1.0))
+    assert robots["quad0"].min_separation_m == pytest.approx(1.0 - 0.6)
+    assert robots["quad2"].min_separation_m is None
+
+
+def test_one_touch_is_one_contact_from_both_sides_and_while_it_lasts():
+    log = FlightLog(["quad0", "quad1"], 0.3)
+    assert log.touch(Contact(5.0, "quad0", "quad1", 1.0, 2.0))
+    assert not log.touch(Contact(5.0, "quad1", "quad0", 1.0, 2.0))
+    assert not log.touch(Contact(6.0, "quad0", "quad1", 1.0, 2.0))
+    assert log.touch(Contact(6.0, "quad0", "pillar", 1.0, 2.0))
+    assert log.touch(Contact(7.5, "quad1", "quad0", 1.0, 2.0))
+    assert log.contacts_of("quad0") == 3 and log.contacts_of("quad1") == 2
+
+
+CONTACT = Contact(5.0, "quad0", "pillar", 1.0, 2.0)
+
+
+@pytest.mark.parametrize("summary, status", [
+    (mission(), 0),
+    (mission(leg(), leg(False, reason="aborted")), 1),
+    (mission(contacts=(CONTACT,)), 1),
+    (mission(reason="interrupted"), 1),
+    (mission(problems=("f.json: goals: is empty",)), 2),
+])
+def test_only_a_complete_flight_without_contact_is_a_success(summary, status):
+    assert summary.exit_status == status
+    assert summary.success is (status == 0)
+
+
+def test_the_table_fits_the_terminal_and_says_why():
+    long_reason = "aborted: Failed to find a valid plan. Even after executing recovery behaviors."
+    text = table(mission(leg(), leg(False, reason=long_reason, attempts=2),
+                         Leg(2, 1, Goal(9.0, 9.0), False, "not sent", 0),
+                         contacts=(CONTACT,), sim_time_s=20.0, wall_time_s=10.0))
+    assert max(map(len, text.splitlines())) <= 100
+    assert f"quad0 goal 1: {long_reason}" in text
+    assert "pillar" in text and "not sent" in text and "1.40" in text
+    assert text.splitlines()[-1] == ("Mission FAILED: 1 of 3 goals reached, 1 contact in 20.0 s "
+                                     "(wall 10.0 s, real-time factor 2.00).")
+
+
+def test_the_json_has_the_documented_keys(tmp_path):
+    summary = mission(leg(time_s=10.00049), contacts=(CONTACT,), sim_time_s=20.0, wall_time_s=10.0,
+                      robot_radius_m=0.3)
+    path = tmp_path / "deep" / "result.json"
+    write_json(summary, path)
+    assert json.loads(path.read_text()) == to_json(summary) == {
+        "success": False, "exit_status": 1, "reason": "", "problems": [],
+        "sim_time_s": 20.0, "wall_time_s": 10.0, "real_time_factor": 2.0, "robot_radius_m": 0.3,
+        "robots": [{
+            "robot": "quad0",
+            "goals": [{"goal": 1, "lap": 1, "x_m": 3.0, "y_m": 4.0, "yaw_rad": None,
+                       "reached": True, "time_s": 10.0, "reason": "", "attempts": 1,
+                       "path_length_m": 7.0, "straight_length_m": 5.0}],
+            "path_length_m": 7.0, "straight_length_m": 5.0, "min_clearance_m": None,
+            "min_separation_m": None, "recoveries": 0, "contacts": 0}],
+        "contacts": [{"time_s": 5.0, "robot": "quad0", "with": "pillar", "x_m": 1.0, "y_m": 2.0}],
+        "contacts_reported": True,
+    }
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_mission_that_never_began_lists_its_goals():
+    assert [(leg.index, leg.reached, leg.reason) for leg in unflown(GOALS, "not sent")] == [
+        (0, False, "not sent"), (1, False, "not sent"), (2, False, "not sent")]
