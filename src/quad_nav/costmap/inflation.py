@@ -1,9 +1,25 @@
-"""The inflation layer: costs that fall with the distance to the nearest obstacle."""
+"""The inflation layer: costs that fall with the distance to the nearest obstacle.
+
+At distance d from a lethal cell the cost is 254 for d = 0, 253 up to the inscribed radius
+r (the robot's centre there means contact), and 252 exp(-k (d - r)) beyond it, with k the
+cost scaling factor, cut to a whole number; nothing beyond the inflation radius.
+
+Obstacles just outside a window reach into it, so seeds are taken from one inflation radius
+around the window, and cells up to two radii away can change.
+"""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Tuple
 
-from quad_nav.costmap.layer import LayerParams
+import numpy as np
+
+from quad_nav.costmap.cost_grid import EVERYWHERE, Bounds, CostGrid, Window
+from quad_nav.costmap.layer import Layer, LayerParams
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
+from quad_nav.kernels.inflation import inflate
 
 
 @dataclass(frozen=True)
@@ -13,3 +29,81 @@ class InflationLayerParams(LayerParams):
     inflation_radius_m: float = 0.55
     cost_scaling_factor: float = 10.0
     inflate_unknown: bool = False
+
+    def make_layer(self, spec: GridSpec, rolling_window: bool,
+                   default_cost: int) -> InflationLayer:
+        return InflationLayer(self, spec.resolution_m)
+
+
+class InflationLayer(Layer):
+    """Spreads the obstacles of the layers before it.
+
+    ``radius_cells`` and ``cost_table``, uint8[radius_cells + 2, radius_cells + 2] by
+    (|dx|, |dy|) in cells, follow from the parameters, the resolution and the footprint.
+    """
+
+    params: InflationLayerParams
+
+    def __init__(self, params: InflationLayerParams, resolution_m: float,
+                 inscribed_radius_m: float = 0.0):
+        super().__init__(params)
+        self._resolution_m = resolution_m
+        self._inscribed_radius_m = inscribed_radius_m
+        self._last_bounds = EVERYWHERE
+        self._make_tables()
+
+    def reconfigure(self, params: InflationLayerParams) -> None:
+        if params != self.params:
+            self.params = params
+            self._make_tables()
+
+    def resize(self, spec: GridSpec) -> None:
+        self._resolution_m = spec.resolution_m
+        self._make_tables()
+
+    def set_footprint(self, footprint: np.ndarray, inscribed_radius_m: float) -> None:
+        self._inscribed_radius_m = inscribed_radius_m
+        self._make_tables()
+
+    def reset(self, now_s: float) -> None:
+        """Nothing is collected here, and a full update that was due no longer is."""
+        self._redo_everything = False
+
+    def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
+        """What changed now or changed in the last update, and one inflation radius around."""
+        last, self._last_bounds = self._last_bounds, bounds
+        if self._redo_everything:
+            self._redo_everything = False
+            return EVERYWHERE
+        return bounds.union(last).grown(self.params.inflation_radius_m)
+
+    def update_costs(self, master: CostGrid, window: Window) -> None:
+        if self.radius_cells == 0:
+            return
+        reach, spec = self.radius_cells, master.spec
+        inflate(master.costs, max(0, window.x0 - reach), min(spec.size_x, window.xn + reach),
+                max(0, window.y0 - reach), min(spec.size_y, window.yn + reach),
+                reach, self.cost_table, self._rank_table, self.params.inflate_unknown)
+
+    def _make_tables(self) -> None:
+        self.radius_cells = int(max(0.0, math.ceil(
+            self.params.inflation_radius_m / self._resolution_m)))
+        self._redo_everything = True
+        n = self.radius_cells + 2
+        squared = np.array([[dx * dx + dy * dy for dx in range(n)] for dy in range(n)])
+        self.cost_table = np.array([[self.cost_at(math.sqrt(d)) for d in row] for row in squared],
+                                   dtype=np.uint8)
+        # Everything beyond the radius has one rank, the last.
+        _, ranks = np.unique(np.minimum(squared, self.radius_cells ** 2 + 1),
+                             return_inverse=True)
+        self._rank_table = ranks.reshape(n, n).astype(np.int32)
+
+    def cost_at(self, distance_cells: float) -> int:
+        """Cost of a cell this far from its obstacle."""
+        if distance_cells == 0.0:
+            return LETHAL
+        beyond_m = distance_cells * self._resolution_m - self._inscribed_radius_m
+        if distance_cells * self._resolution_m <= self._inscribed_radius_m:
+            return INSCRIBED
+        return int((INSCRIBED - 1) * math.exp(-1.0 * self.params.cost_scaling_factor * beyond_m))
+

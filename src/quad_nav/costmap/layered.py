@@ -1,12 +1,26 @@
-"""The layered costmap: layers write into one master grid, in order."""
+"""The layered costmap: layers write into one master grid, in order.
+
+    scans -> layers' own grids -> master grid -> planners
+
+An update moves the grid along with the robot if it is a rolling window, asks each layer
+what has to be made again, resets the smallest window that holds all of it, and lets the
+layers write into that window.
+"""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Dict, Iterable, List, Optional, Tuple
 
+import numpy as np
+
+from quad_nav import footprint as footprints
+from quad_nav.costmap.cost_grid import NO_CELLS, NOWHERE, CostGrid, Window
 from quad_nav.costmap.inflation import InflationLayerParams
-from quad_nav.costmap.layer import LayerParams
+from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import FREE, UNKNOWN, GridSpec
 
 NamedLayers = Tuple[Tuple[str, LayerParams], ...]
 
@@ -37,3 +51,134 @@ class CostmapParams:
     transform_tolerance_s: float = 0.3
     layers: NamedLayers = (("obstacle_layer", ObstacleLayerParams()),
                            ("inflation_layer", InflationLayerParams()))
+
+    @property
+    def spec(self) -> GridSpec:
+        return GridSpec(int(self.width_m / self.resolution_m),
+                        int(self.height_m / self.resolution_m),
+                        self.resolution_m, self.origin_x_m, self.origin_y_m)
+
+    @property
+    def unpadded_footprint(self) -> np.ndarray:
+        """float64[n, 2]"""
+        if self.footprint is None:
+            return footprints.circle(self.robot_radius_m)
+        return np.array(self.footprint, dtype=np.float64)
+
+
+class LayeredCostmap:
+    """Costs around one robot.
+
+    ``layers``: name -> layer, in order. ``footprint``: padded, float64[n, 2] in the
+    robot's frame. ``costs`` belongs to the costmap: copy what has to outlive an update.
+    """
+
+    def __init__(self, params: CostmapParams, static_map: Optional[StaticMap] = None):
+        self.params = params
+        default_cost = UNKNOWN if params.track_unknown_space else FREE
+        self._master = CostGrid(params.spec, default_cost)
+        self._size_locked = False
+        self.layers: Dict[str, Layer] = {
+            name: layer_params.make_layer(params.spec, params.rolling_window, default_cost)
+            for name, layer_params in params.layers}
+        self.set_footprint(params.unpadded_footprint)
+        if static_map is not None:
+            self.set_map(static_map)
+
+    @property
+    def spec(self) -> GridSpec:
+        return self._master.spec
+
+    @property
+    def costs(self) -> np.ndarray:
+        """uint8[H, W], the master grid."""
+        return self._master.costs
+
+    def update(self, now_s: float, robot: Pose2D) -> Window:
+        """Bring the master grid up to date; returns the cells that may have changed.
+
+        ``robot`` is in the global frame. Inflation can change costs up to two inflation
+        radii outside the window, as in the original.
+        """
+        if self.params.rolling_window:
+            self._master.centre_on(robot.x_m, robot.y_m)
+        layers = self._enabled_layers()
+        bounds = NOWHERE
+        for layer in layers:
+            bounds = layer.update_bounds(robot, now_s, bounds)
+        window = self._master.window_of(bounds)
+        if not layers or window.is_empty:
+            return NO_CELLS
+        self._master.reset(window)
+        for layer in layers:
+            layer.update_costs(self._master, window)
+        return window
+
+    def is_current(self, now_s: float) -> bool:
+        """Whether every enabled layer is recent enough to drive by."""
+        return all(layer.is_current(now_s) for layer in self._enabled_layers())
+
+    def stale_sources(self, now_s: float) -> List[Tuple[str, float]]:
+        """(layer/sensor, seconds since its last message) of each sensor that is silent."""
+        return [(f"{name}/{source}", age_s) for name, layer in self.layers.items()
+                if layer.params.enabled for source, age_s in layer.stale_sources(now_s)]
+
+    def reset_layers(self, now_s: float) -> None:
+        """Forget all costs, as the service ``clear_costmaps`` does."""
+        self._master.reset()
+        for layer in self.layers.values():
+            layer.reset(now_s)
+
+    def clear_area(self, layer_names: Iterable[str], centre_x_m: float, centre_y_m: float,
+                   size_m: float, keep_inside: bool) -> List[str]:
+        """Forget, in the named layers, everything outside a square around a point, or
+        with ``keep_inside`` False everything inside it. The master follows at the next
+        update. Returns the layers that were cleared: names can be wrong.
+        """
+        wanted = set(layer_names)
+        return [name for name, layer in self.layers.items() if name in wanted
+                and layer.clear_area(centre_x_m, centre_y_m, size_m, keep_inside)]
+
+    def set_footprint(self, footprint: footprints.Footprint) -> None:
+        """Take an unpadded footprint, float64[n, 2] in the robot's frame."""
+        self._unpadded_footprint = np.asarray(footprint, dtype=np.float64)
+        self.footprint = footprints.pad(footprint, self.params.footprint_padding_m)
+        self.inscribed_radius_m, self.circumscribed_radius_m = footprints.radii(self.footprint)
+        for layer in self.layers.values():
+            layer.set_footprint(self.footprint, self.inscribed_radius_m)
+
+    def set_map(self, static_map: StaticMap, layer_name: Optional[str] = None) -> None:
+        """Give the static layers, or the one named, their map.
+
+        A costmap that does not roll takes the map's size and place and keeps them.
+        """
+        for name, layer in self.layers.items():
+            if isinstance(layer, StaticLayer) and layer_name in (None, name):
+                if not self.params.rolling_window and layer.accepts_maps:
+                    self._resize(static_map.spec)
+                    self._size_locked = True
+                layer.set_map(static_map)
+
+    def reconfigure(self, params: CostmapParams) -> None:
+        """Take other parameters; the list of layers and their sources must be the same.
+
+        Another size, resolution or origin empties the costmap, unless a map fixed them.
+        """
+        old, self.params = self.params, params
+        if params.spec != old.spec and not self._size_locked:
+            self._resize(params.spec)
+        if (params.footprint, params.robot_radius_m) != (old.footprint, old.robot_radius_m):
+            self.set_footprint(params.unpadded_footprint)
+        elif params.footprint_padding_m != old.footprint_padding_m:
+            self.set_footprint(self._unpadded_footprint)
+        for name, layer_params in params.layers:
+            self.layers[name].reconfigure(layer_params)
+
+    def _resize(self, spec: GridSpec) -> None:
+        if spec != self.spec:
+            self._master.resize(spec)
+            for layer in self.layers.values():
+                layer.resize(spec)
+
+    def _enabled_layers(self) -> List[Layer]:
+        return [layer for layer in self.layers.values() if layer.params.enabled]

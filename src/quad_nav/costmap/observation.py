@@ -2,7 +2,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional
+from typing import List, Optional
+
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -27,3 +29,67 @@ class SourceParams:
     marking: bool = True
     clearing: bool = False
     inf_is_valid: bool = False
+
+
+@dataclass(frozen=True)
+class Observation:
+    """``points``: float32[n, 3], ``sensor``: float64[3], both in the global frame, metres."""
+
+    stamp_s: float
+    sensor: np.ndarray
+    points: np.ndarray
+
+
+class ObservationBuffer:
+    """The observations of one source, newest first.
+
+    Age is judged when a message arrives, against that moment, and never between messages:
+    if a sensor falls silent its last observations stay.
+    """
+
+    def __init__(self, params: SourceParams):
+        self.params = params
+        self.observations: List[Observation] = []
+        self._last_reception_s: Optional[float] = None
+
+    def add(self, points: np.ndarray, sensor: np.ndarray, stamp_s: float, now_s: float) -> None:
+        """Keep the points whose height counts, float32[n, 3]; drop what is too old now."""
+        heights = points[:, 2].astype(np.float64)
+        kept = points[(heights <= self.params.max_obstacle_height_m)
+                      & (heights >= self.params.min_obstacle_height_m)]
+        self.observations.insert(0, Observation(stamp_s, sensor, kept))
+        self._last_reception_s = now_s
+        self._drop_stale()
+
+    def start_clock(self, now_s: float) -> None:
+        """Count silence from now if nothing was ever received."""
+        if self._last_reception_s is None:
+            self._last_reception_s = now_s
+
+    def restart_clock(self, now_s: float) -> None:
+        """Count silence from now."""
+        self._last_reception_s = now_s
+        self._drop_stale()
+
+    def silence_s(self, now_s: float) -> float:
+        return 0.0 if self._last_reception_s is None else now_s - self._last_reception_s
+
+    def is_current(self, now_s: float) -> bool:
+        period_s = self.params.expected_update_period_s
+        return period_s == 0.0 or _nanoseconds(self.silence_s(now_s)) <= _nanoseconds(period_s)
+
+    def _drop_stale(self) -> None:
+        persistence_s = self.params.observation_persistence_s
+        if persistence_s == 0.0:
+            del self.observations[1:]
+            return
+        for k, observation in enumerate(self.observations):
+            age_s = self._last_reception_s - observation.stamp_s
+            if _nanoseconds(age_s) > _nanoseconds(persistence_s):
+                del self.observations[k:]
+                return
+
+
+def _nanoseconds(seconds: float) -> int:
+    """ROS compares times as whole nanoseconds; so 0.3 s is never above 0.3 s."""
+    return round(seconds * 1e9)

@@ -1,11 +1,23 @@
-"""The obstacle layer: what the sensors see, marked and cleared by ray tracing."""
+"""The obstacle layer: what the sensors see, marked and cleared by ray tracing.
+
+At every update all kept observations are ray traced first, then all are marked. A point
+that a newer scan cleared therefore comes back until its own scan expires.
+"""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
-from quad_nav.costmap.layer import LayerParams
-from quad_nav.costmap.observation import SourceParams
+import numpy as np
+
+from quad_nav import footprint as footprints
+from quad_nav.costmap.cost_grid import Bounds, CostGrid, Window, merge_known, merge_maximum
+from quad_nav.costmap.layer import GridLayer, LayerParams
+from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceParams
+from quad_nav.costmap.projection import scan_points, transform_points
+from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.grid import FREE, UNKNOWN, GridSpec
+from quad_nav.kernels.raytrace import clear_rays, mark_points
 
 COMBINE_OVERWRITE = 0
 COMBINE_MAXIMUM = 1
@@ -14,7 +26,9 @@ COMBINE_MAXIMUM = 1
 @dataclass(frozen=True)
 class ObstacleLayerParams(LayerParams):
     """``track_unknown_space`` None means as the costmap does. ``obstacle_range_m``
-    and ``raytrace_range_m`` count for the sources that set none of their own."""
+    and ``raytrace_range_m`` count for the sources that set none of their own.
+    ``combination_method``: 0 overwrites what is known, 1 takes the maximum, all others
+    leave the master grid alone."""
 
     footprint_clearing_enabled: bool = True
     max_obstacle_height_m: float = 2.0
@@ -23,3 +37,117 @@ class ObstacleLayerParams(LayerParams):
     raytrace_range_m: float = 3.0
     track_unknown_space: Optional[bool] = None
     sources: Tuple[SourceParams, ...] = ()
+
+    def make_layer(self, spec: GridSpec, rolling_window: bool,
+                   default_cost: int) -> ObstacleLayer:
+        if self.track_unknown_space is not None:
+            default_cost = UNKNOWN if self.track_unknown_space else FREE
+        return ObstacleLayer(self, spec, rolling_window, default_cost)
+
+
+class ObstacleLayer(GridLayer):
+    """Sensors write with ``add_scan`` and ``add_cloud``; ``grid`` holds the outcome.
+
+    The sources are fixed at construction; ``reconfigure`` changes the other parameters.
+    """
+
+    params: ObstacleLayerParams
+
+    def __init__(self, params: ObstacleLayerParams, spec: GridSpec, rolling_window: bool,
+                 default_cost: int):
+        super().__init__(params, spec, default_cost)
+        self.buffers: Dict[str, ObservationBuffer] = {
+            source.name: ObservationBuffer(source) for source in params.sources}
+        self._rolling_window = rolling_window
+        self._footprint = np.empty((0, 2))
+        self._footprint_now = np.empty((0, 2))
+
+    def add_scan(self, source_name: str, scan: Scan, global_from_sensor: Pose3D, now_s: float,
+                 global_from_origin: Optional[Pose3D] = None) -> None:
+        """Take a scan; ``now_s`` is when it arrived.
+
+        ``global_from_sensor`` is the pose of the scan's frame at its stamp. Rays start at
+        ``global_from_origin``, which differs only if the source names a ``sensor_frame``
+        other than the scan's.
+        """
+        points = scan_points(scan, self.buffers[source_name].params.inf_is_valid)
+        self.add_cloud(source_name, points, global_from_sensor, scan.stamp_s, now_s,
+                       global_from_origin)
+
+    def add_cloud(self, source_name: str, points: np.ndarray, global_from_sensor: Pose3D,
+                  stamp_s: float, now_s: float,
+                  global_from_origin: Optional[Pose3D] = None) -> None:
+        """Take points, float32[n, 3] in the sensor's frame; the rest as ``add_scan``."""
+        origin = global_from_origin or global_from_sensor
+        self.buffers[source_name].add(transform_points(points, global_from_sensor),
+                                      origin.translation, stamp_s, now_s)
+
+    def set_footprint(self, footprint: np.ndarray, inscribed_radius_m: float) -> None:
+        self._footprint = footprint
+
+    def reset(self, now_s: float) -> None:
+        """Forget the grid. Kept observations are used again by the next update."""
+        self.grid.reset()
+        self._awaits_update = False
+        for buffer in self.buffers.values():
+            buffer.restart_clock(now_s)
+
+    def is_current(self, now_s: float) -> bool:
+        return super().is_current(now_s) and not self.stale_sources(now_s)
+
+    def stale_sources(self, now_s: float) -> List[Tuple[str, float]]:
+        return [(name, buffer.silence_s(now_s)) for name, buffer in self.buffers.items()
+                if (buffer.params.marking or buffer.params.clearing)
+                and not buffer.is_current(now_s)]
+
+    def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
+        if self._rolling_window:
+            self.grid.centre_on(robot.x_m, robot.y_m)
+        bounds = super().update_bounds(robot, now_s, bounds)
+        for buffer in self.buffers.values():
+            buffer.start_clock(now_s)
+        marking = [b for b in self.buffers.values() if b.params.marking]
+        # The original does not clear while a source that marks is overdue.
+        overdue = not all(b.is_current(now_s) for b in marking)
+        clearing = [] if overdue else [b for b in self.buffers.values() if b.params.clearing]
+        touched = np.array([bounds.min_x_m, bounds.min_y_m, bounds.max_x_m, bounds.max_y_m])
+        for buffer in clearing:
+            for observation in buffer.observations:
+                self._clear(observation, self._raytrace_range(buffer.params), touched)
+        for buffer in marking:
+            for observation in buffer.observations:
+                self._mark(observation, self._obstacle_range(buffer.params), touched)
+        bounds = Bounds(*touched.tolist())
+        self._footprint_now = footprints.oriented(self._footprint, robot)
+        if self.params.footprint_clearing_enabled and len(self._footprint_now):
+            bounds = bounds.including(self._footprint_now)
+        return bounds
+
+    def update_costs(self, master: CostGrid, window: Window) -> None:
+        if self.params.footprint_clearing_enabled:
+            self.grid.fill_polygon(self._footprint_now, FREE)
+        below, above = master.costs[window.slices], self.grid.costs[window.slices]
+        if self.params.combination_method == COMBINE_OVERWRITE:
+            merge_known(below, above)
+        elif self.params.combination_method == COMBINE_MAXIMUM:
+            merge_maximum(below, above)
+
+    def _clear(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
+        spec = self.grid.spec
+        clear_rays(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
+                   observation.sensor[0], observation.sensor[1], observation.points, range_m,
+                   touched)
+
+    def _mark(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
+        spec = self.grid.spec
+        mark_points(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
+                    observation.sensor, observation.points, range_m,
+                    self.params.max_obstacle_height_m, touched)
+
+    def _raytrace_range(self, source: SourceParams) -> float:
+        range_m = source.raytrace_range_m
+        return self.params.raytrace_range_m if range_m is None else range_m
+
+    def _obstacle_range(self, source: SourceParams) -> float:
+        range_m = source.obstacle_range_m
+        return self.params.obstacle_range_m if range_m is None else range_m

@@ -1,9 +1,24 @@
 """The static layer: a map made beforehand."""
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Optional, Tuple
 
-from quad_nav.costmap.layer import LayerParams
+import numpy as np
+
+from quad_nav.costmap.cost_grid import Bounds, CostGrid, Window, merge_maximum
+from quad_nav.costmap.layer import GridLayer, LayerParams
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
+
+
+@dataclass(frozen=True)
+class StaticMap:
+    """``occupancy``, int8[H, W] at ``spec``: 0..100, -1 unknown, as in OccupancyGrid."""
+
+    occupancy: np.ndarray
+    spec: GridSpec
 
 
 @dataclass(frozen=True)
@@ -18,3 +33,146 @@ class StaticLayerParams(LayerParams):
     lethal_cost_threshold: int = 100
     unknown_cost_value: int = -1
     trinary_costmap: bool = True
+
+    def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> StaticLayer:
+        return StaticLayer(self, spec, rolling_window, default_cost)
+
+
+class StaticLayer(GridLayer):
+    """Copies a map into the master grid.
+
+    In a costmap that does not roll, the master takes the map's size and place (see
+    ``LayeredCostmap.set_map``). In one that rolls, ``map_from_global`` may turn and shift
+    the map against the costmap's global frame.
+    """
+
+    params: StaticLayerParams
+
+    def __init__(self, params: StaticLayerParams, spec: GridSpec, rolling_window: bool,
+                 default_cost: int):
+        super().__init__(params, spec, default_cost)
+        self.map_from_global = Pose2D(0.0, 0.0)
+        self._rolling_window = rolling_window
+        self._map: Optional[StaticMap] = None
+        self._changed: Optional[Window] = None
+
+    def resize(self, spec: GridSpec) -> None:
+        if not self._rolling_window:
+            super().resize(spec)
+
+    @property
+    def accepts_maps(self) -> bool:
+        return self._map is None or not self.params.first_map_only
+
+    def set_map(self, static_map: StaticMap) -> None:
+        """Take a whole map; with ``first_map_only`` later ones are ignored."""
+        if not self.accepts_maps:
+            return
+        self._map = static_map
+        if self.grid.spec != static_map.spec:
+            self.grid.resize(static_map.spec)
+        self.grid.costs[...] = self.costs_of(static_map.occupancy)
+        self._mark_all_changed()
+
+    def update_map(self, occupancy: np.ndarray, cell_x: int, cell_y: int) -> None:
+        """Replace a rectangle, int8[h, w] with its lower left cell at (cell_x, cell_y).
+
+        What lies outside the map is cut off. Nothing happens before the first map.
+        """
+        if self._map is None:
+            return
+        height, width = occupancy.shape
+        spec = self.grid.spec
+        area = Window(max(0, cell_x), min(spec.size_x, cell_x + width),
+                      max(0, cell_y), min(spec.size_y, cell_y + height))
+        if area.is_empty:
+            return
+        part = occupancy[area.y0 - cell_y:area.yn - cell_y, area.x0 - cell_x:area.xn - cell_x]
+        self.grid.costs[area.slices] = self.costs_of(part)
+        self._changed = _union(self._changed, area)
+
+    def costs_of(self, occupancy: np.ndarray) -> np.ndarray:
+        """Occupancies, int8 of any shape, as costs, uint8, by the layer's thresholds."""
+        table = np.array([self._cost_of(value) for value in range(256)], dtype=np.uint8)
+        return table[np.ascontiguousarray(occupancy, dtype=np.int8).view(np.uint8)]
+
+    def _cost_of(self, value: int) -> int:
+        """Cost of an occupancy read as a byte: unknown, -1, is 255."""
+        params = self.params
+        threshold = max(min(params.lethal_cost_threshold, 100), 0)
+        if value == params.unknown_cost_value % 256:
+            return UNKNOWN if params.track_unknown_space else FREE
+        if value >= threshold:
+            return LETHAL
+        return FREE if params.trinary_costmap else int(value / threshold * LETHAL)
+
+    def reset(self, now_s: float) -> None:
+        """Read the map again, without the updates that came later."""
+        self._awaits_update = False
+        if self._map is None:
+            return
+        if not self.params.first_map_only:
+            self.grid.costs[...] = self.costs_of(self._map.occupancy)
+        self._mark_all_changed()
+
+    def is_current(self, now_s: float) -> bool:
+        return super().is_current(now_s) and self._map is not None
+
+    def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
+        bounds = super().update_bounds(robot, now_s, bounds)
+        area, self._changed = self._changed, None
+        if self._rolling_window and self._map is not None:
+            area = self._everything()
+        if area is None:
+            return bounds
+        spec = self.grid.spec
+        corners = np.array([spec.centre_of(x, y) for x in (area.x0, area.xn)
+                            for y in (area.y0, area.yn)])
+        return bounds.including(self._global_points(corners))
+
+    def update_costs(self, master: CostGrid, window: Window) -> None:
+        if self._map is None:
+            return
+        if self._rolling_window:
+            self._copy_by_position(master, window)
+        elif self.params.use_maximum:
+            merge_maximum(master.costs[window.slices], self.grid.costs[window.slices])
+        else:
+            master.costs[window.slices] = self.grid.costs[window.slices]
+
+    def _copy_by_position(self, master: CostGrid, window: Window) -> None:
+        """Each master cell takes the map cell under its centre."""
+        x, y = _centres(master.spec, window)
+        pose, spec = self.map_from_global, self.grid.spec
+        cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+        column = (x * cos - y * sin + pose.x_m - spec.origin_x_m) / spec.resolution_m
+        row = (x * sin + y * cos + pose.y_m - spec.origin_y_m) / spec.resolution_m
+        inside = (column >= 0) & (column < spec.size_x) & (row >= 0) & (row < spec.size_y)
+        found = self.grid.costs[row[inside].astype(np.intp), column[inside].astype(np.intp)]
+        below = master.costs[window.slices]
+        below[inside] = np.maximum(found, below[inside]) if self.params.use_maximum else found
+
+    def _global_points(self, points: np.ndarray) -> np.ndarray:
+        pose = self.map_from_global
+        cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+        x, y = points[:, 0] - pose.x_m, points[:, 1] - pose.y_m
+        return np.column_stack((x * cos + y * sin, y * cos - x * sin))
+
+    def _everything(self) -> Window:
+        return Window(0, self.grid.spec.size_x, 0, self.grid.spec.size_y)
+
+    def _mark_all_changed(self) -> None:
+        self._changed = self._everything()
+
+
+def _union(a: Optional[Window], b: Window) -> Window:
+    if a is None:
+        return b
+    return Window(min(a.x0, b.x0), max(a.xn, b.xn), min(a.y0, b.y0), max(a.yn, b.yn))
+
+
+def _centres(spec: GridSpec, window: Window) -> Tuple[np.ndarray, np.ndarray]:
+    """World x, float64[1, n], and y, float64[m, 1], of a window's cell centres."""
+    x = spec.origin_x_m + (np.arange(window.x0, window.xn) + 0.5) * spec.resolution_m
+    y = spec.origin_y_m + (np.arange(window.y0, window.yn) + 0.5) * spec.resolution_m
+    return x[None, :], y[:, None]

@@ -1,0 +1,163 @@
+"""A grid of costs that can move, and the parts of it that change."""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Optional, Tuple
+
+import numpy as np
+
+from quad_nav.grid import FREE, UNKNOWN, GridSpec
+from quad_nav.kernels.polygon import fill_convex_polygon
+
+
+@dataclass(frozen=True)
+class Window:
+    """Cells of columns x0..xn-1 and rows y0..yn-1."""
+
+    x0: int
+    xn: int
+    y0: int
+    yn: int
+
+    @property
+    def is_empty(self) -> bool:
+        return self.xn <= self.x0 or self.yn <= self.y0
+
+    @property
+    def slices(self) -> Tuple[slice, slice]:
+        """Index of ``[y, x]`` arrays."""
+        return slice(self.y0, self.yn), slice(self.x0, self.xn)
+
+
+NO_CELLS = Window(0, 0, 0, 0)
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """A rectangle in metres, in the global frame; with min above max it holds nothing."""
+
+    min_x_m: float
+    min_y_m: float
+    max_x_m: float
+    max_y_m: float
+
+    def union(self, other: Bounds) -> Bounds:
+        return Bounds(min(self.min_x_m, other.min_x_m), min(self.min_y_m, other.min_y_m),
+                      max(self.max_x_m, other.max_x_m), max(self.max_y_m, other.max_y_m))
+
+    def grown(self, margin_m: float) -> Bounds:
+        return Bounds(self.min_x_m - margin_m, self.min_y_m - margin_m,
+                      self.max_x_m + margin_m, self.max_y_m + margin_m)
+
+    def including(self, points: np.ndarray) -> Bounds:
+        """points: float64[n, 2]"""
+        return self.union(Bounds(*points.min(axis=0).tolist(), *points.max(axis=0).tolist()))
+
+
+NOWHERE = Bounds(1e30, 1e30, -1e30, -1e30)
+_FLOAT_MAX = float(np.finfo(np.float32).max)
+EVERYWHERE = Bounds(-_FLOAT_MAX, -_FLOAT_MAX, _FLOAT_MAX, _FLOAT_MAX)
+
+
+class CostGrid:
+    """``costs``, uint8[H, W], at ``spec``; new cells have ``default_cost``.
+
+    ``costs`` stays the same array until ``resize``.
+    """
+
+    def __init__(self, spec: GridSpec, default_cost: int = FREE):
+        self.default_cost = default_cost
+        self.resize(spec)
+
+    def resize(self, spec: GridSpec) -> None:
+        """Take another size, resolution or place; forgets all costs."""
+        self.spec = spec
+        self.costs = np.full(spec.shape, self.default_cost, dtype=np.uint8)
+
+    def reset(self, window: Optional[Window] = None) -> None:
+        """Give the window, or everything, the default cost."""
+        self.costs[window.slices if window else ...] = self.default_cost
+
+    def centre_on(self, x_m: float, y_m: float) -> None:
+        """Move by whole cells so that the point is in the middle; keep what still fits.
+
+        As in costmap_2d, the middle is half of (size - 1/2) cells, and the number of
+        cells to move is cut towards zero.
+        """
+        spec = self.spec
+        res = spec.resolution_m
+        move_x = int((x_m - (spec.size_x - 1 + 0.5) * res / 2 - spec.origin_x_m) / res)
+        move_y = int((y_m - (spec.size_y - 1 + 0.5) * res / 2 - spec.origin_y_m) / res)
+        if move_x == 0 and move_y == 0:
+            return
+        kept = self.costs[_kept(move_y, spec.size_y), _kept(move_x, spec.size_x)].copy()
+        self.reset()
+        self.costs[_kept(-move_y, spec.size_y), _kept(-move_x, spec.size_x)] = kept
+        self.spec = replace(spec, origin_x_m=spec.origin_x_m + move_x * res,
+                            origin_y_m=spec.origin_y_m + move_y * res)
+
+    def window_of(self, bounds: Bounds) -> Window:
+        """The cells that the bounds touch; the cell of each border is inside."""
+        spec = self.spec
+        x0 = _clamped_cell(bounds.min_x_m, spec.origin_x_m, spec.resolution_m, spec.size_x)
+        xn = _clamped_cell(bounds.max_x_m, spec.origin_x_m, spec.resolution_m, spec.size_x)
+        y0 = _clamped_cell(bounds.min_y_m, spec.origin_y_m, spec.resolution_m, spec.size_y)
+        yn = _clamped_cell(bounds.max_y_m, spec.origin_y_m, spec.resolution_m, spec.size_y)
+        return Window(x0, min(spec.size_x, xn + 1), y0, min(spec.size_y, yn + 1))
+
+    def fill_polygon(self, vertices: np.ndarray, cost: int) -> bool:
+        """Set the cells of a convex polygon, float64[n, 2] in the grid's frame.
+
+        Does nothing and returns False when a vertex is off the grid.
+        """
+        cells = [self.spec.cell_of(x, y) for x, y in vertices.tolist()]
+        if None in cells:
+            return False
+        if len(cells) >= 3:
+            fill_convex_polygon(self.costs, np.array(cells, dtype=np.int64), cost)
+        return True
+
+    def forget_area(self, centre_x_m: float, centre_y_m: float, size_m: float,
+                    keep_inside: bool) -> None:
+        """Make unknown all cells outside a square (``keep_inside``), or those inside.
+
+        The cells of the square's border count as outside.
+        """
+        spec = self.spec
+        low_x = _cell(centre_x_m - size_m / 2, spec.origin_x_m, spec.resolution_m)
+        low_y = _cell(centre_y_m - size_m / 2, spec.origin_y_m, spec.resolution_m)
+        high_x = _cell(centre_x_m - size_m / 2 + size_m, spec.origin_x_m, spec.resolution_m)
+        high_y = _cell(centre_y_m - size_m / 2 + size_m, spec.origin_y_m, spec.resolution_m)
+        inside = np.zeros(spec.shape, dtype=bool)
+        inside[max(0, low_y + 1):max(0, high_y), max(0, low_x + 1):max(0, high_x)] = True
+        self.costs[~inside if keep_inside else inside] = UNKNOWN
+
+
+def merge_maximum(below: np.ndarray, above: np.ndarray) -> None:
+    """Keep the higher cost of each cell in ``below``; unknown is lower than free.
+
+    Adding 1 to uint8 takes unknown (255) to 0 and so puts the costs in that order.
+    """
+    np.subtract(np.maximum(below + np.uint8(1), above + np.uint8(1)), np.uint8(1), out=below)
+
+
+def merge_known(below: np.ndarray, above: np.ndarray) -> None:
+    """Overwrite ``below`` wherever ``above`` is not unknown."""
+    np.copyto(below, above, where=above != UNKNOWN)
+
+
+def _kept(move: int, size: int) -> slice:
+    """Cells of the old grid that are still inside after moving by ``move`` cells."""
+    return slice(min(max(move, 0), size), min(max(move + size, 0), size))
+
+
+def _cell(world_m: float, origin_m: float, resolution_m: float) -> int:
+    return int((world_m - origin_m) / resolution_m)
+
+
+def _clamped_cell(world_m: float, origin_m: float, resolution_m: float, size: int) -> int:
+    if world_m < origin_m:
+        return 0
+    if world_m > resolution_m * size + origin_m:
+        return size - 1
+    return _cell(world_m, origin_m, resolution_m)

@@ -1,0 +1,83 @@
+"""Footprints: the robot's outline as a polygon, float64[n, 2], in metres.
+
+A footprint is convex, in the robot's frame unless said otherwise. The numbers follow
+costmap_2d to the last bit where costs depend on them.
+"""
+from __future__ import annotations
+
+import ast
+import math
+from typing import Sequence, Tuple, Union
+
+import numpy as np
+
+from quad_nav.geometry import Pose2D
+
+Footprint = Union[np.ndarray, Sequence[Tuple[float, float]]]
+
+CIRCLE_POINTS = 16
+
+
+def circle(radius_m: float) -> np.ndarray:
+    """A circle as 16 points, the first on the x axis, counter-clockwise."""
+    angles = [k * 2.0 * math.pi / CIRCLE_POINTS for k in range(CIRCLE_POINTS)]
+    return np.array([(math.cos(a) * radius_m, math.sin(a) * radius_m) for a in angles])
+
+
+def parse(text: str) -> np.ndarray:
+    """A footprint written as ``[[x1, y1], [x2, y2], ...]``, at least three points.
+
+    costmap_2d reads the numbers as float32, so 0.3 m is 0.300000012 m here too. Raises
+    ValueError with what was expected.
+    """
+    try:
+        points = np.array(ast.literal_eval(text.strip()), dtype=np.float32)
+    except (ValueError, SyntaxError, TypeError):
+        points = np.empty(0, dtype=np.float32)
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
+        raise ValueError(f"footprint {text!r}: expected [[x1, y1], [x2, y2], [x3, y3], ...]")
+    return points.astype(np.float64)
+
+
+def pad(footprint: Footprint, padding_m: float) -> np.ndarray:
+    """Move every non-zero coordinate away from zero by the padding.
+
+    costmap_2d keeps the padding as float32, so 0.01 m is 0.009999999776 m here too.
+    """
+    points = _points(footprint)
+    return points + np.sign(points) * float(np.float32(padding_m))
+
+
+def radii(footprint: Footprint) -> Tuple[float, float]:
+    """(inscribed, circumscribed): least and greatest distance of the outline from (0, 0).
+
+    Both are 0 for fewer than three points. A footprint that does not hold the origin has
+    an inscribed radius as well: the distance to its nearest edge.
+    """
+    points = _points(footprint).tolist()
+    if len(points) <= 2:
+        return 0.0, 0.0
+    corners = [math.hypot(x, y) for x, y in points]
+    edges = [_origin_to_segment(a, b) for a, b in zip(points, points[1:] + points[:1])]
+    return min(corners + edges), max(corners + edges)
+
+
+def oriented(footprint: Footprint, pose: Pose2D) -> np.ndarray:
+    """The footprint of a robot at ``pose``, in the frame of the pose."""
+    x, y = _points(footprint).T
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    return np.column_stack((pose.x_m + (x * cos - y * sin), pose.y_m + (x * sin + y * cos)))
+
+
+def _points(footprint: Footprint) -> np.ndarray:
+    return np.asarray(footprint, dtype=np.float64).reshape(-1, 2)
+
+
+def _origin_to_segment(a: Sequence[float], b: Sequence[float]) -> float:
+    (ax, ay), (bx, by) = a, b
+    dx, dy = bx - ax, by - ay
+    length_squared = dx * dx + dy * dy
+    if length_squared == 0.0:
+        return math.hypot(ax, ay)
+    along = min(1.0, max(0.0, (-ax * dx - ay * dy) / length_squared))
+    return math.hypot(ax + along * dx, ay + along * dy)

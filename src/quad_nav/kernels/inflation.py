@@ -1,0 +1,84 @@
+"""The wavefront of the inflation layer."""
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN
+
+_VISITED = -1
+_NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))  # left, lower, right, upper
+
+
+@njit(cache=True, nogil=True)
+def inflate(costs, x0, xn, y0, yn, radius, cost_table, rank_table, inflate_unknown):
+    """Spread costs from the lethal cells of a window to ``radius`` cells, in place.
+
+    costs: uint8[H, W]. Lethal cells in columns x0..xn-1 and rows y0..yn-1, which must lie
+    inside the grid, are seeds in row order. cost_table (uint8) and rank_table (int32),
+    both [radius + 2, radius + 2], give for (|dx|, |dy|) to the seed the cost, and the rank
+    of that distance among all distances; distances beyond the radius have the highest rank.
+
+    Cells are visited by rank, first in first out within one, and pass their seed on to
+    their left, lower, right and upper neighbour. A cell keeps the first seed that reaches
+    it, so this is close to the exact Euclidean transform and not equal to it.
+
+    A neighbour that already waits at the same or a lower rank is not queued again: it
+    would find itself visited. This keeps queues short and changes nothing.
+    """
+    size_y, size_x = costs.shape
+    beyond = rank_table.max()
+    waiting = np.full((size_y, size_x), beyond, np.int32)
+    columns = min(size_x, xn + radius) - max(0, x0 - radius)
+    rows = min(size_y, yn + radius) - max(0, y0 - radius)
+    queue = np.empty((5 * max(0, columns) * max(0, rows), 5), np.int32)  # next, x, y, dx, dy
+    first = np.full(beyond, -1, np.int64)
+    last = np.full(beyond, -1, np.int64)
+    queued = 0
+    for y in range(y0, yn):
+        for x in range(x0, xn):
+            if costs[y, x] == LETHAL:
+                _append(queue, first, last, queued, 0, x, y, 0, 0)
+                queued += 1
+    for rank in range(beyond):
+        entry = first[rank]
+        while entry >= 0:
+            x, y, dx, dy = queue[entry, 1], queue[entry, 2], queue[entry, 3], queue[entry, 4]
+            if waiting[y, x] != _VISITED:
+                waiting[y, x] = _VISITED
+                _raise_cost(costs, x, y, cost_table[abs(dx), abs(dy)], inflate_unknown)
+                for step_x, step_y in _NEIGHBOURS:
+                    nx, ny = x + step_x, y + step_y
+                    if not (0 <= nx < size_x and 0 <= ny < size_y):
+                        continue
+                    n_rank = rank_table[abs(dx + step_x), abs(dy + step_y)]
+                    if rank <= n_rank < waiting[ny, nx]:
+                        waiting[ny, nx] = n_rank
+                        _append(queue, first, last, queued, n_rank, nx, ny,
+                                dx + step_x, dy + step_y)
+                        queued += 1
+            entry = queue[entry, 0]
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _append(queue, first, last, entry, rank, x, y, dx, dy):
+    queue[entry, 0] = -1
+    queue[entry, 1] = x
+    queue[entry, 2] = y
+    queue[entry, 3] = dx
+    queue[entry, 4] = dy
+    if first[rank] < 0:
+        first[rank] = entry
+    else:
+        queue[last[rank], 0] = entry
+    last[rank] = entry
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _raise_cost(costs, x, y, cost, inflate_unknown):
+    old = costs[y, x]
+    if old == UNKNOWN:
+        if cost >= INSCRIBED or (inflate_unknown and cost > FREE):
+            costs[y, x] = cost
+    elif cost > old:
+        costs[y, x] = cost

@@ -1,0 +1,135 @@
+"""Loops of the obstacle layer: Bresenham rays that clear, points that mark."""
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from quad_nav.grid import FREE, LETHAL
+from quad_nav.kernels.cells import cell_index
+
+
+@njit(cache=True, nogil=True)
+def clear_line(costs, x0, y0, x1, y1, max_cells):
+    """Free the cells from (x0, y0) towards (x1, y1), both inside the grid.
+
+    At most about ``max_cells`` long, measured along the line; both ends included.
+    """
+    dx, dy = x1 - x0, y1 - y0
+    length = math.hypot(dx, dy)
+    scale = 1.0
+    if length > max_cells:
+        scale = max_cells / length
+    step_x = 1 if dx > 0 else -1
+    step_y = 1 if dy > 0 else -1
+    steps_x, steps_y = abs(dx), abs(dy)
+    x, y = x0, y0
+    if steps_x >= steps_y:
+        error = steps_x // 2
+        for _ in range(int(scale * steps_x)):
+            costs[y, x] = FREE
+            x += step_x
+            error += steps_y
+            if error >= steps_x:
+                y += step_y
+                error -= steps_x
+    else:
+        error = steps_y // 2
+        for _ in range(int(scale * steps_y)):
+            costs[y, x] = FREE
+            y += step_y
+            error += steps_x
+            if error >= steps_y:
+                x += step_x
+                error -= steps_y
+    costs[y, x] = FREE
+
+
+@njit(cache=True, nogil=True)
+def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
+    """The ray's end pulled back along the ray to the grid's border.
+
+    Ends beyond the high borders land 1 mm inside, so that they fall into a cell.
+    """
+    dx, dy = x - sensor_x, y - sensor_y
+    if x < low_x:
+        t = (low_x - sensor_x) / dx
+        x, y = low_x, sensor_y + dy * t
+    if y < low_y:
+        t = (low_y - sensor_y) / dy
+        x, y = sensor_x + dx * t, low_y
+    if x > high_x:
+        t = (high_x - sensor_x) / dx
+        x, y = high_x - 0.001, sensor_y + dy * t
+    if y > high_y:
+        t = (high_y - sensor_y) / dy
+        x, y = sensor_x + dx * t, high_y - 0.001
+    return x, y
+
+
+@njit(cache=True, nogil=True)
+def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points, range_m,
+               bounds):
+    """Free the cells between the sensor and each point, up to ``range_m``.
+
+    points: float32[n, 3] in the frame of the grid. ``bounds``, float64[4] (min x,
+    min y, max x, max y in metres), grows by what was touched. A sensor outside the
+    grid clears nothing: returns False.
+    """
+    size_y, size_x = costs.shape
+    x0 = cell_index(sensor_x, origin_x, resolution, size_x)
+    y0 = cell_index(sensor_y, origin_y, resolution, size_y)
+    if x0 < 0 or y0 < 0:
+        return False
+    include(bounds, sensor_x, sensor_y)
+    high_x, high_y = origin_x + size_x * resolution, origin_y + size_y * resolution
+    max_cells = max(0.0, math.ceil(range_m / resolution))
+    last_x, last_y = -1, -1
+    for k in range(points.shape[0]):
+        x, y = clip_to_grid(sensor_x, sensor_y, float(points[k, 0]), float(points[k, 1]),
+                            origin_x, origin_y, high_x, high_y)
+        x1 = cell_index(x, origin_x, resolution, size_x)
+        y1 = cell_index(y, origin_y, resolution, size_y)
+        if x1 < 0 or y1 < 0:
+            continue
+        if x1 != last_x or y1 != last_y:
+            clear_line(costs, x0, y0, x1, y1, max_cells)
+            last_x, last_y = x1, y1
+        dx, dy = x - sensor_x, y - sensor_y
+        length = math.hypot(dx, dy)
+        scale = range_m / length if length > range_m else 1.0
+        include(bounds, sensor_x + dx * scale, sensor_y + dy * scale)
+    return True
+
+
+@njit(cache=True, nogil=True)
+def mark_points(costs, origin_x, origin_y, resolution, sensor, points, range_m, max_height_m,
+                bounds):
+    """Make lethal the cell of each point nearer than ``range_m`` and not too high.
+
+    sensor: float64[3], points: float32[n, 3], in the frame of the grid. ``bounds`` as
+    in ``clear_rays``.
+    """
+    size_y, size_x = costs.shape
+    for k in range(points.shape[0]):
+        x, y, z = float(points[k, 0]), float(points[k, 1]), float(points[k, 2])
+        if z > max_height_m:
+            continue
+        dx, dy, dz = x - sensor[0], y - sensor[1], z - sensor[2]
+        if dx * dx + dy * dy + dz * dz >= range_m * range_m:
+            continue
+        cell_x = cell_index(x, origin_x, resolution, size_x)
+        cell_y = cell_index(y, origin_y, resolution, size_y)
+        if cell_x < 0 or cell_y < 0:
+            continue
+        costs[cell_y, cell_x] = LETHAL
+        include(bounds, x, y)
+
+
+@njit(cache=True, nogil=True)
+def include(bounds, x, y):
+    """Grow float64[4] (min x, min y, max x, max y) to hold a point."""
+    bounds[0] = min(bounds[0], x)
+    bounds[1] = min(bounds[1], y)
+    bounds[2] = max(bounds[2], x)
+    bounds[3] = max(bounds[3], y)
