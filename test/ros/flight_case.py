@@ -1,0 +1,93 @@
+"""What the tests on running nodes share: waiting for conditions, goals, commands."""
+from __future__ import annotations
+
+import time
+import unittest
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalID
+from geometry_msgs.msg import PoseStamped, Twist
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from nav_msgs.msg import Odometry
+from std_srvs.srv import Trigger
+
+PATIENCE_S = 60.0  # wall time; generous, because a condition that holds ends the wait
+
+
+class Latest:
+    """The last message of a topic, and how many there were."""
+
+    def __init__(self, topic, message_type):
+        self.message = None
+        self.count = 0
+        self._subscriber = rospy.Subscriber(topic, message_type, self._store, queue_size=100)
+
+    def _store(self, message):
+        self.message = message
+        self.count += 1
+
+
+class FlightCase(unittest.TestCase):
+    """Two quadcopters whose simulation has been started and whose odometry comes."""
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("test_flight", anonymous=True)
+        cls.odometry = [Latest(f"/odom{i}", Odometry) for i in (0, 1)]
+        cls.command = [Latest(f"/cmd_vel{i}", Twist) for i in (0, 1)]
+        cls.goal_topics = [rospy.Publisher(f"/move_base_simple/goal{i}", PoseStamped, queue_size=1)
+                           for i in (0, 1)]
+        cls.cancel_topics = [rospy.Publisher(f"/move_base{i}/cancel", GoalID, queue_size=1)
+                             for i in (0, 1)]
+        cls.clients = [actionlib.SimpleActionClient(f"/move_base{i}", MoveBaseAction)
+                       for i in (0, 1)]
+
+    @classmethod
+    def start(cls):
+        """Navigators connected, simulation running."""
+        rospy.wait_for_service("/simulation/start", timeout=PATIENCE_S)
+        rospy.ServiceProxy("/simulation/start", Trigger)()
+        for client in cls.clients:
+            if not client.wait_for_server(rospy.Duration(PATIENCE_S)):
+                raise AssertionError(f"no action server for {client.action_client.ns}")
+
+    def wait(self, condition, what, patience_s=PATIENCE_S):
+        """Until the condition holds; a failure names what did not come."""
+        end = time.monotonic() + patience_s
+        while time.monotonic() < end and not rospy.is_shutdown():
+            if condition():
+                return
+            time.sleep(0.02)
+        self.fail(f"not within {patience_s:g} s: {what}")
+
+    def simulated_seconds(self, seconds):
+        """Lets simulated time pass."""
+        end = rospy.get_time() + seconds
+        self.wait(lambda: rospy.get_time() >= end, f"{seconds} simulated seconds")
+
+    def position(self, i):
+        p = self.odometry[i].message.pose.pose.position
+        return p.x, p.y
+
+    def distance(self, i, x, y):
+        px, py = self.position(i)
+        return ((px - x) ** 2 + (py - y) ** 2) ** 0.5
+
+    def speed(self, i):
+        v = self.odometry[i].message.twist.twist.linear
+        return (v.x ** 2 + v.y ** 2) ** 0.5
+
+
+def goal_pose(x, y, w=1.0, frame="map"):
+    """A goal with yaw 0, or a broken one with another w."""
+    goal = PoseStamped()
+    goal.header.frame_id = frame
+    goal.header.stamp = rospy.Time.now()
+    goal.pose.position.x, goal.pose.position.y = x, y
+    goal.pose.orientation.w = w
+    return goal
+
+
+def action_goal(x, y, **keywords):
+    return MoveBaseGoal(goal_pose(x, y, **keywords))

@@ -1,0 +1,33 @@
+#!/usr/bin/env python3
+"""A LIDAR that falls silent stops its quadcopter, and no other."""
+import rospy
+import rostest
+from flight_case import FlightCase, goal_pose
+from std_srvs.srv import SetBool
+
+
+class DeadLidar(FlightCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.start()
+
+    def lidar(self, i, on):
+        answer = rospy.ServiceProxy(f"/simulation/lidar{i}/enable", SetBool)(on)
+        self.assertTrue(answer.success, answer.message)
+
+    def test_stops_within_two_seconds_and_goes_on_when_it_is_back(self):
+        for i, y in ((0, 6.5), (1, 8.0)):
+            self.goal_topics[i].publish(goal_pose(self.position(i)[0], y))
+        self.wait(lambda: all(self.speed(i) > 0.1 for i in (0, 1)), "both under way")
+        self.lidar(0, False)
+        silent_s = rospy.get_time()
+        self.wait(lambda: self.speed(0) < 0.03, "robot 0 standing")
+        self.assertLess(rospy.get_time() - silent_s, 3.0)
+        self.wait(lambda: self.speed(1) > 0.1, "robot 1 still under way")
+        self.lidar(0, True)
+        self.wait(lambda: self.speed(0) > 0.1, "robot 0 under way again")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "dead_lidar", DeadLidar)

@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""Goals by action and by topic, preempted, cancelled and refused."""
+
+import rospy
+import rostest
+from actionlib_msgs.msg import GoalID, GoalStatus
+from flight_case import FlightCase, Latest, action_goal, goal_pose
+from move_base_msgs.msg import MoveBaseActionResult
+
+
+
+class Goals(FlightCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.results = [Latest(f"/move_base{i}/result", MoveBaseActionResult) for i in (0, 1)]
+        cls.start()
+
+    def setUp(self):
+        for client in self.clients:
+            client.cancel_all_goals()
+        self.wait(lambda: all(self.speed(i) < 0.02 for i in (0, 1)), "both standing")
+
+    def result_after(self, i, count):
+        self.wait(lambda: self.results[i].count > count, f"a result of robot {i}")
+        return self.results[i].message.status
+
+    def test_goal_by_action_is_reached_and_succeeds(self):
+        x, y = self.position(0)
+        self.clients[0].send_goal(action_goal(x + 0.8, y))
+        self.assertTrue(self.clients[0].wait_for_result(rospy.Duration(60)))
+        self.assertEqual(self.clients[0].get_state(), GoalStatus.SUCCEEDED)
+        self.assertEqual(self.clients[0].get_goal_status_text(), "Goal reached.")
+        self.assertLess(self.distance(0, x + 0.8, y), 0.2)
+
+    def test_goal_by_topic_is_reached(self):
+        count = self.results[1].count
+        x, y = self.position(1)
+        self.goal_topics[1].publish(goal_pose(x - 0.8, y))
+        self.assertEqual(self.result_after(1, count).status, GoalStatus.SUCCEEDED)
+        self.assertLess(self.distance(1, x - 0.8, y), 0.2)
+
+    def test_new_goal_preempts_the_old_one(self):
+        count = self.results[0].count
+        x, y = self.position(0)
+        self.goal_topics[0].publish(goal_pose(x, y + 3.0))
+        self.wait(lambda: self.speed(0) > 0.05, "robot 0 under way")
+        self.goal_topics[0].publish(goal_pose(x, y + 2.0))
+        status = self.result_after(0, count)
+        self.assertEqual(status.status, GoalStatus.PREEMPTED)
+        self.assertIn("another goal was recieved", status.text)
+        self.wait(lambda: self.speed(0) > 0.05, "robot 0 under way to the second goal")
+
+    def test_cancelling_one_does_not_stop_the_other(self):
+        counts = [result.count for result in self.results]
+        for i in (0, 1):
+            x, y = self.position(i)
+            self.goal_topics[i].publish(goal_pose(x, y + 4.0))
+        self.wait(lambda: all(self.speed(i) > 0.05 for i in (0, 1)), "both under way")
+        self.cancel_topics[0].publish(GoalID())
+        self.assertEqual(self.result_after(0, counts[0]).status, GoalStatus.PREEMPTED)
+        self.wait(lambda: self.speed(0) < 0.02, "robot 0 standing")
+        self.assertEqual(self.results[1].count, counts[1])
+        self.wait(lambda: self.speed(1) > 0.05, "robot 1 still under way")
+
+    def test_zero_quaternion_is_aborted_with_the_reason(self):
+        count = self.results[0].count
+        self.goal_topics[0].publish(goal_pose(3.0, 3.0, w=0.0))
+        status = self.result_after(0, count)
+        self.assertEqual(status.status, GoalStatus.ABORTED)
+        self.assertEqual(
+            status.text, "Aborting on goal because it was sent with an invalid quaternion")
+
+    def test_unknown_frame_is_aborted_with_the_reason(self):
+        count = self.results[0].count
+        self.goal_topics[0].publish(goal_pose(3.0, 3.0, frame="nowhere"))
+        status = self.result_after(0, count)
+        self.assertEqual(status.status, GoalStatus.ABORTED)
+        self.assertIn("frame 'nowhere' can't be transformed to 'map'", status.text)
+
+    def test_goal_in_the_robots_own_frame(self):
+        count = self.results[0].count
+        x, y = self.position(0)
+        self.goal_topics[0].publish(goal_pose(0.3, 0.0, frame="base_link0"))
+        self.assertEqual(self.result_after(0, count).status, GoalStatus.SUCCEEDED)
+        self.assertLess(abs(self.distance(0, x, y) - 0.3), 0.15)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "goals", Goals)

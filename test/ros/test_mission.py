@@ -1,0 +1,30 @@
+#!/usr/bin/env python3
+"""The tutorial's mission, from its launch file to the summary's last number."""
+import json
+import os
+
+import rospy
+import rostest
+from flight_case import FlightCase
+
+GOALS = ([(3.0, 6.5), (9.0, 5.5), (1.5, 9.0)], [(4.0, 3.5), (2.0, 9.0), (8.5, 5.0)])
+
+
+class Mission(FlightCase):
+    def test_both_quadcopters_reach_all_goals(self):
+        path = rospy.get_param("~result")
+        self.addCleanup(lambda: os.path.exists(path) and os.remove(path))
+        self.wait(lambda: os.path.exists(path), "the summary", patience_s=380.0)
+        with open(path, encoding="utf-8") as file:
+            result = json.load(file)
+        self.assertEqual(len(result["robots"]), 2)
+        for robot, goals in zip(result["robots"], GOALS):
+            self.assertEqual([(g["x_m"], g["y_m"]) for g in robot["goals"]], goals)
+            for goal in robot["goals"]:
+                self.assertTrue(goal["reached"], goal)
+            self.assertGreater(robot["path_length_m"], 0.9 * robot["straight_length_m"] - 1.2)
+            self.assertGreater(robot["min_clearance_m"], 0.0)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "mission", Mission)

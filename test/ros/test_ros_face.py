@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+"""The topics, types, rates, frames and services that others' tools depend on."""
+import rosgraph
+import rospy
+import rosservice
+import rostest
+import tf2_ros
+from actionlib_msgs.msg import GoalStatusArray
+from flight_case import FlightCase, Latest, goal_pose
+from geometry_msgs.msg import PolygonStamped
+from nav_msgs.msg import OccupancyGrid, Odometry, Path
+from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
+
+TYPES = {
+    "/cmd_vel{i}": "geometry_msgs/Twist",
+    "/odom{i}": "nav_msgs/Odometry",
+    "/scan{i}": "sensor_msgs/LaserScan",
+    "/move_base{i}/goal": "move_base_msgs/MoveBaseActionGoal",
+    "/move_base{i}/feedback": "move_base_msgs/MoveBaseActionFeedback",
+    "/move_base{i}/result": "move_base_msgs/MoveBaseActionResult",
+    "/move_base{i}/status": "actionlib_msgs/GoalStatusArray",
+    "/move_base{i}/recovery_status": "move_base_msgs/RecoveryStatus",
+    "/move_base{i}/current_goal": "geometry_msgs/PoseStamped",
+    "/move_base{i}/NavfnROS/plan": "nav_msgs/Path",
+    "/move_base{i}/TrajectoryPlannerROS/cost_cloud": "sensor_msgs/PointCloud2",
+    "/move_base{i}/TrajectoryPlannerROS/global_plan": "nav_msgs/Path",
+    "/move_base{i}/TrajectoryPlannerROS/local_plan": "nav_msgs/Path",
+    "/move_base{i}/global_costmap/costmap": "nav_msgs/OccupancyGrid",
+    "/move_base{i}/global_costmap/costmap_updates": "map_msgs/OccupancyGridUpdate",
+    "/move_base{i}/global_costmap/footprint": "geometry_msgs/PolygonStamped",
+    "/move_base{i}/local_costmap/costmap": "nav_msgs/OccupancyGrid",
+    "/move_base{i}/local_costmap/costmap_updates": "map_msgs/OccupancyGridUpdate",
+    "/move_base{i}/local_costmap/footprint": "geometry_msgs/PolygonStamped",
+    "/move_base{i}/parameter_descriptions": "dynamic_reconfigure/ConfigDescription",
+    "/move_base{i}/parameter_updates": "dynamic_reconfigure/Config",
+}
+SERVICES = {
+    "/move_base{i}/make_plan": "nav_msgs/GetPlan",
+    "/move_base{i}/NavfnROS/make_plan": "nav_msgs/GetPlan",
+    "/move_base{i}/clear_costmaps": "std_srvs/Empty",
+    "/move_base{i}/set_parameters": "dynamic_reconfigure/Reconfigure",
+    "/move_base{i}/TrajectoryPlannerROS/set_parameters": "dynamic_reconfigure/Reconfigure",
+    "/move_base{i}/global_costmap/set_parameters": "dynamic_reconfigure/Reconfigure",
+    "/move_base{i}/global_costmap/obstacle_layer/set_parameters":
+        "dynamic_reconfigure/Reconfigure",
+    "/move_base{i}/local_costmap/inflation_layer/set_parameters":
+        "dynamic_reconfigure/Reconfigure",
+}
+SUBSCRIBED = {
+    "/move_base{i}/cancel": "actionlib_msgs/GoalID",
+    "/move_base_simple/goal{i}": "geometry_msgs/PoseStamped",
+}
+
+
+class RosFace(FlightCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.start()
+
+    def numbered(self, table):
+        return {name.format(i=i): kind for name, kind in table.items() for i in (0, 1)}
+
+    def test_every_topic_has_its_type(self):
+        published = dict(rospy.get_published_topics())
+        for name, kind in self.numbered(TYPES).items():
+            self.assertEqual(published.get(name), kind, name)
+
+    def test_every_subscription_is_there(self):
+        _, subscriptions, _ = rosgraph.Master("/test").getSystemState()
+        names = {name for name, _ in subscriptions}
+        for name in self.numbered(SUBSCRIBED):
+            self.assertIn(name, names)
+
+    def test_every_service_has_its_type(self):
+        for name, kind in self.numbered(SERVICES).items():
+            self.assertEqual(rosservice.get_service_type(name), kind, name)
+
+    def rate(self, topic, message_type, seconds=5.0):
+        """Messages per simulated second."""
+        latest = Latest(topic, message_type)
+        self.wait(lambda: latest.count > 0, f"a message on {topic}")
+        begin, count = rospy.get_time(), latest.count
+        self.simulated_seconds(seconds)
+        return (latest.count - count) / (rospy.get_time() - begin)
+
+    def test_rates_in_simulated_time(self):
+        for topic, kind, hz in (("/scan0", LaserScan, 20.0), ("/odom1", Odometry, 40.0),
+                                ("/tf", TFMessage, 40.0),
+                                ("/move_base0/status", GoalStatusArray, 5.0),
+                                ("/move_base0/global_costmap/footprint", PolygonStamped, 5.0),
+                                ("/move_base1/local_costmap/footprint", PolygonStamped, 10.0)):
+            self.assertAlmostEqual(self.rate(topic, kind), hz, delta=0.1 * hz, msg=topic)
+
+    def test_scan_has_the_tutorials_limits(self):
+        scan = rospy.wait_for_message("/scan1", LaserScan, timeout=30)
+        self.assertEqual(scan.header.frame_id, "Lidar1")
+        self.assertEqual(len(scan.ranges), 512)
+        self.assertAlmostEqual(scan.range_min, 0.02, places=6)
+        self.assertAlmostEqual(scan.range_max, 60.0)
+        self.assertAlmostEqual(scan.angle_max, scan.angle_min + 511 * scan.angle_increment,
+                               places=5)
+
+    def test_tf_tree(self):
+        buffer = tf2_ros.Buffer()
+        listener = tf2_ros.TransformListener(buffer)
+        for i in (0, 1):
+            for parent, child in (("map", f"odom{i}"), (f"odom{i}", f"base_link{i}"),
+                                  (f"base_link{i}", f"Lidar{i}")):
+                self.wait(lambda p=parent, c=child: buffer.can_transform(p, c, rospy.Time(0)),
+                          f"transform {parent} -> {child}")
+            mount = buffer.lookup_transform(f"base_link{i}", f"Lidar{i}", rospy.Time(0))
+            self.assertAlmostEqual(mount.transform.translation.z, 0.06)
+        listener.unregister()
+
+    def test_odometry_is_in_its_frames(self):
+        odometry = rospy.wait_for_message("/odom0", Odometry, timeout=30)
+        self.assertEqual(odometry.header.frame_id, "odom0")
+        self.assertEqual(odometry.child_frame_id, "base_link0")
+        self.assertAlmostEqual(odometry.pose.pose.position.z, 1.0, delta=0.05)
+
+    def test_costmap_sees_the_walls(self):
+        grid = rospy.wait_for_message("/move_base0/global_costmap/costmap", OccupancyGrid, 30)
+        self.assertEqual((grid.info.width, grid.info.height), (240, 240))
+        self.assertEqual(grid.header.frame_id, "map")
+        self.wait(lambda: 100 in rospy.wait_for_message(
+            "/move_base0/global_costmap/costmap", OccupancyGrid, 30).data, "lethal cells")
+
+    def test_plan_comes_twice_the_second_time_with_the_goal(self):
+        plans = []
+        subscriber = rospy.Subscriber("/move_base0/NavfnROS/plan", Path, plans.append,
+                                      queue_size=10)
+        self.wait(lambda: subscriber.get_num_connections() > 0, "the plan's publisher")
+        x, y = self.position(0)
+        self.goal_topics[0].publish(goal_pose(x + 0.5, y + 0.5))
+        self.wait(lambda: len(plans) >= 2, "two plans")
+        self.assertEqual(len(plans[0].poses) + 1, len(plans[1].poses))
+        last = plans[1].poses[-1].pose.position
+        self.assertAlmostEqual(last.x, x + 0.5)
+        self.assertAlmostEqual(last.y, y + 0.5)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "ros_face", RosFace)

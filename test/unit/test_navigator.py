@@ -1,0 +1,289 @@
+"""The state machine with planners that do as they are told."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from quad_nav.errors import NoPath, NoValidTrajectory
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import GridSpec
+from quad_nav.navigator import (
+    Located,
+    NamedRecovery,
+    Navigator,
+    NavigatorParams,
+    Schedule,
+    State,
+    Trigger,
+    local_from_global,
+)
+from quad_nav.recovery import Step
+
+HERE = Pose2D(1.0, 1.0, 0.0)
+GOAL = Pose2D(5.0, 1.0, 0.0)
+FORWARD = Twist2D(vx_mps=0.3)
+
+
+@dataclass
+class CostmapParams:
+    update_frequency_hz: float
+
+
+class FakeCostmap:
+    def __init__(self, update_frequency_hz):
+        self.params = CostmapParams(update_frequency_hz)
+        self.spec = GridSpec(10, 10, 1.0)
+        self.costs = np.zeros((10, 10), dtype=np.uint8)
+        self.updates = []
+        self.current = True
+        self.silent = []
+
+    def update(self, now_s, pose):
+        self.updates.append(now_s)
+        return (0, 0, 0, 0)
+
+    def is_current(self, now_s):
+        return self.current
+
+    def silent_sources(self, now_s, timeout_s):
+        return self.silent
+
+    def reset_layers(self):
+        pass
+
+
+class FakePlanner:
+    def __init__(self):
+        self.fails = False
+        self.calls = 0
+
+    def make_plan(self, spec, costs, start, goal):
+        self.calls += 1
+        if self.fails:
+            raise NoPath("walled in")
+        return np.array([[start.x_m, start.y_m, 0.0], [goal.x_m, goal.y_m, goal.yaw_rad]])
+
+
+class FakeController:
+    def __init__(self):
+        self.fails = False
+        self.reached = False
+        self.plans = []
+        self.command = FORWARD
+
+    def set_plan(self, plan):
+        self.plans.append(plan)
+
+    def is_goal_reached(self, pose, velocity, local_from_plan):
+        return self.reached
+
+    def compute_velocity(self, spec, costs, pose, velocity, local_from_plan):
+        if self.fails:
+            raise NoValidTrajectory("everything collides")
+        return type("Control", (), {"command": self.command})()
+
+
+class FakeRecovery:
+    def __init__(self, steps=1, period_s=0.05):
+        self.period_s = period_s
+        self.steps = steps
+        self.started = 0
+
+    def start(self, surroundings):
+        self.started += 1
+        self.left = self.steps
+
+    def step(self, surroundings):
+        self.left -= 1
+        return Step(command=Twist2D(vyaw_radps=1.0), done=self.left == 0)
+
+
+class Flight:
+    """A navigator, its fakes, and a clock that stops wherever something is due."""
+
+    def __init__(self, recoveries=(), **params):
+        params.setdefault("controller_frequency_hz", 10.0)
+        self.global_costmap = FakeCostmap(5.0)
+        self.local_costmap = FakeCostmap(4.0)
+        self.planner, self.controller = FakePlanner(), FakeController()
+        self.navigator = Navigator(NavigatorParams(**params), self.global_costmap,
+                                   self.local_costmap, self.planner, self.controller, recoveries)
+        self.now_s = 0.0
+        self.pose = HERE
+
+    def until(self, end_s):
+        ticks = []
+        while self.now_s <= end_s + 1e-9:
+            ticks.append(self.navigator.tick(self.now_s, Located(self.pose, self.pose), FORWARD))
+            self.now_s = max(min(self.navigator.next_due_s, self.now_s + 0.5), self.now_s + 1e-6)
+        return ticks
+
+
+def outcomes(ticks):
+    return [(tick.outcome.succeeded, tick.outcome.text) for tick in ticks if tick.outcome]
+
+
+def test_costmaps_are_updated_at_their_own_frequencies():
+    flight = Flight()
+    flight.until(1.0)
+    assert flight.global_costmap.updates == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    assert flight.local_costmap.updates == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
+
+
+def test_a_goal_is_planned_once_and_commanded_in_every_cycle():
+    flight = Flight(controller_frequency_hz=2.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = flight.until(2.0)
+    assert flight.planner.calls == 1
+    assert [tick.now_s for tick in ticks if tick.command == FORWARD] == pytest.approx(
+        [0.0, 0.5, 1.0, 1.5, 2.0])
+    np.testing.assert_array_equal(flight.controller.plans[0], [[1, 1, 0], [5, 1, 0]])
+
+
+def test_planner_frequency_plans_again_and_again():
+    flight = Flight(planner_frequency_hz=1.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = flight.until(3.05)
+    assert [tick.now_s for tick in ticks if tick.plan is not None] == pytest.approx(
+        [0.0, 1.0, 2.0, 3.0])
+
+
+def test_reaching_the_goal_stops_and_succeeds_with_the_originals_words():
+    flight = Flight()
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.0)
+    flight.controller.reached = True
+    ticks = flight.until(2.0)
+    assert outcomes(ticks) == [(True, "Goal reached.")]
+    assert [tick.command for tick in ticks if tick.command] == [Twist2D()]
+    assert flight.navigator.state is State.IDLE
+
+
+def test_no_plan_within_patience_runs_all_recoveries_and_aborts():
+    recoveries = [NamedRecovery(f"r{k}", FakeRecovery()) for k in range(2)]
+    flight = Flight(recoveries, planner_patience_s=2.0)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = flight.until(10.0)
+    starts = [(tick.recovery.name, tick.recovery.index, tick.recovery.total)
+              for tick in ticks if tick.recovery]
+    assert starts == [("r0", 0, 2), ("r1", 1, 2)]
+    assert outcomes(ticks) == [(False, Trigger.PLANNING.value)]
+    ended = next(tick.now_s for tick in ticks if tick.outcome)
+    assert ended == pytest.approx(3 * 2.0, abs=0.5)  # patience before each of three endings
+
+
+def test_retries_end_planning_before_patience():
+    flight = Flight(max_planning_retries=3, recovery_behavior_enabled=False)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    assert outcomes(flight.until(2.0)) == [(False, Trigger.PLANNING.value)]
+    assert flight.planner.calls == 4
+
+
+def test_failing_control_stops_replans_and_aborts_after_its_patience():
+    flight = Flight(controller_patience_s=1.0, recovery_behavior_enabled=False)
+    flight.controller.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = flight.until(3.0)
+    assert {tick.command for tick in ticks if tick.command} == {Twist2D()}
+    assert flight.planner.calls > 5
+    assert outcomes(ticks) == [(False, Trigger.CONTROLLING.value)]
+    ended = next(tick.now_s for tick in ticks if tick.outcome)
+    assert ended == pytest.approx(1.2, abs=0.11)
+
+
+def test_oscillation_timeout_aborts_when_the_robot_stays_within_its_distance():
+    flight = Flight(oscillation_timeout_s=2.0, recovery_behavior_enabled=False)
+    flight.navigator.set_goal(GOAL, 0.0)
+    assert outcomes(flight.until(4.0)) == [(False, Trigger.OSCILLATION.value)]
+
+
+def test_standing_still_is_replanned_then_recovered_then_aborted():
+    flight = Flight([NamedRecovery("r", FakeRecovery())], progress_timeout_s=2.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = flight.until(12.0)
+    assert "no progress for 2 s at (1.00, 1.00): planning anew" in ticks[-1].warnings or any(
+        "planning anew" in w for tick in ticks for w in tick.warnings)
+    assert [tick.recovery.name for tick in ticks if tick.recovery] == ["r"]
+    assert outcomes(ticks) == [(False, Trigger.OSCILLATION.value)]
+
+
+def test_with_the_originals_progress_timeout_it_spins_for_ever():
+    flight = Flight(progress_timeout_s=0.0)
+    flight.controller.command = Twist2D(vyaw_radps=1.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    assert outcomes(flight.until(60.0)) == []
+
+
+def test_a_new_goal_and_a_cancel_wait_for_the_next_cycle():
+    flight = Flight(controller_frequency_hz=1.0)
+    assert flight.navigator.accepts_goal(0.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(0.3)
+    assert not flight.navigator.accepts_goal(0.5)
+    assert flight.navigator.accepts_goal(1.0)
+
+
+def test_cancel_sends_one_stop():
+    flight = Flight()
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(0.5)
+    flight.navigator.cancel()
+    ticks = flight.until(2.0)
+    assert [tick.command for tick in ticks if tick.command is not None] == [Twist2D()]
+    assert flight.navigator.state is State.IDLE
+
+
+def test_a_rotation_can_be_cancelled_in_its_middle():
+    flight = Flight([NamedRecovery("turn", FakeRecovery(steps=1000))], planner_patience_s=0.5)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = flight.until(2.0)
+    assert ticks[-1].state is State.CLEARING
+    turning = [tick.now_s for tick in ticks if tick.command == Twist2D(vyaw_radps=1.0)]
+    assert np.diff(turning) == pytest.approx(0.05)
+    flight.navigator.cancel()
+    assert [t.command for t in flight.until(3.0) if t.command] == [Twist2D()]
+
+
+def test_silent_sensor_stops_the_robot_and_says_which():
+    flight = Flight()
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.0)
+    flight.local_costmap.silent = [("base_scan", 1.25)]
+    ticks = flight.until(1.2)
+    assert {tick.command for tick in ticks if tick.cycle} == {Twist2D()}
+    assert "stopped: no data from base_scan for 1.2 s" in ticks[0].warnings[0] or any(
+        "no data from base_scan" in w for tick in ticks for w in tick.warnings)
+    flight.local_costmap.silent = []
+    assert FORWARD in {tick.command for tick in flight.until(2.0)}
+
+
+def test_unknown_pose_stops_the_robot():
+    flight = Flight()
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.0)
+    tick = flight.navigator.tick(flight.now_s, Located(None, None), FORWARD)
+    assert tick.command in (Twist2D(), None)
+    assert any("pose is unknown" in warning for warning in tick.warnings)
+
+
+def test_schedule_drops_missed_turns():
+    schedule = Schedule(10.0)
+    schedule.start(0.0)
+    assert schedule.take(0.0)
+    assert not schedule.take(0.05)
+    assert schedule.take(0.37)
+    assert schedule.due_s == pytest.approx(0.4)
+    assert not Schedule(0.0).take(1e9)
+
+
+def test_local_from_global_takes_the_global_pose_to_the_local_one():
+    located = Located(Pose2D(2.0, 1.0, np.pi / 2), Pose2D(0.0, 3.0, 0.0))
+    transform = local_from_global(located)
+    # Turned by -90 degrees: (2, 1) becomes (1, -2); (0, 3) - (1, -2) = (-1, 5).
+    assert (transform.x_m, transform.y_m) == pytest.approx((-1.0, 5.0))
+    assert transform.yaw_rad == pytest.approx(-np.pi / 2)
