@@ -1,0 +1,52 @@
+# `make fly` and `make test` set up what they need first: system packages through apt, a virtual
+# environment .venv and a catkin workspace .ws in the checkout. Later calls do none of it again.
+
+SHELL := /bin/bash
+PYTHON := .venv/bin/python3
+
+# The parts of a target run one after the other, apart from the user's own Python set-up.
+.NOTPARALLEL:
+unexport PYTHONPATH PYTHONHOME
+export PYTHONNOUSERSITE := 1
+
+.PHONY: help fly test unit unit38 lint rostest packages venv workspace clean distclean
+
+help:  ## List the targets
+	@sed -nE 's/^([a-z0-9]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
+
+fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
+	@scripts/ros_env scripts/fly $(ARGS)
+
+test: unit unit38 lint rostest  ## Run every test and static check
+	@echo "quad: all tests passed"
+
+unit: venv  ## The unit tests
+	@scripts/make_venv .venv requirements-test.txt
+	$(PYTHON) -m pytest
+
+unit38: packages  ## The unit tests under Python 3.8, where there is one
+	@scripts/unit_tests_38
+
+lint: venv  ## ruff and mypy
+	@scripts/make_venv .venv requirements-lint.txt
+	$(PYTHON) -m ruff check
+	$(PYTHON) -m mypy
+
+rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
+	@scripts/ros_env scripts/rostests $(TEST)
+
+packages:  ## Install the system packages
+	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
+
+venv: packages  ## Make the virtual environment
+	@scripts/make_venv .venv requirements.txt
+
+workspace: venv  ## Build the catkin workspace
+	@scripts/build_workspace
+
+clean:  ## Remove what was built, but not the virtual environments
+	rm -rf .ws build dist .pytest_cache .mypy_cache .ruff_cache src/*.egg-info
+	find src test nodes -name __pycache__ -prune -exec rm -rf {} +
+
+distclean: clean  ## Remove the virtual environments too
+	rm -rf .venv .venv38

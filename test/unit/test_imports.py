@@ -1,0 +1,135 @@
+"""Imports go one way: from the shells to the core, and each third party has its one place."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from typing import Iterator, List, Set
+
+import pytest
+
+SOURCES = Path(__file__).resolve().parents[2] / "src"
+PACKAGE = "quad_nav"
+
+# A unit (a module or subpackage of quad_nav) imports itself and units of the rows above its own.
+LAYERS = [
+    {"errors", "footprint", "geometry", "grid"},
+    {"kernels"},
+    {"sim", "costmap", "plan", "control"},
+    {"recovery"},
+    {"navigator", "mission"},
+    {"config"},
+    {"assembly"},
+    {"offline", "ros"},
+]
+NOUNS = LAYERS[0]  # they may import one another
+WORLD_USERS = {"sim", "config", "assembly", "offline", "ros"}  # navigation knows no simulator
+
+# Where a third-party package may be imported: that file or folder and nowhere else.
+PLACES = {
+    "numba": "kernels/",
+    "pybullet": "sim/body.py",
+    "rospy": "ros/",
+    "rosgraph": "ros/",
+    "actionlib": "ros/",
+    "dynamic_reconfigure": "ros/",
+    "tf2_ros": "ros/",
+    "matplotlib": "offline/report",
+}
+MESSAGE_SUFFIXES = ("_msgs", "_srvs")
+
+
+def test_every_unit_has_a_layer():
+    units = {unit_of(path) for path in modules()} - {"__init__"}
+    assert units <= set().union(*LAYERS), "name the new unit in LAYERS"
+
+
+@pytest.mark.parametrize("path", [*(SOURCES / PACKAGE).rglob("*.py")], ids=lambda path: path.name)
+def test_module_imports_only_what_it_may(path):
+    assert forbidden_imports(path, imported_names(path.read_text(), package_of(path))) == []
+
+
+@pytest.mark.parametrize(
+    "module, statement",
+    [
+        ("costmap/layered.py", "import quad_nav.navigator"),
+        ("costmap/layered.py", "from quad_nav import plan"),
+        ("costmap/layered.py", "from ..sim.scene import Scene"),
+        ("navigator.py", "def tick():\n    from quad_nav.sim import scene"),
+        ("offline/run.py", "from quad_nav.ros import topics"),
+        ("kernels/navfn.py", "from quad_nav.costmap.layered import LayeredCostmap"),
+        ("navigator.py", "import rospy"),
+        ("mission/summary.py", "from geometry_msgs.msg import Pose"),
+        ("sim/lidar.py", "import pybullet as p"),
+        ("plan/navfn.py", "from numba import njit"),
+    ],
+)
+def test_rules_refuse(module, statement):
+    path = SOURCES / PACKAGE / module
+    assert len(forbidden_imports(path, imported_names(statement, package_of(path)))) == 1
+
+
+@pytest.mark.parametrize(
+    "module, statement",
+    [
+        ("costmap/layered.py", "from . import static\nfrom quad_nav import footprint, grid"),
+        ("navigator.py", "import numpy\nfrom quad_nav.plan.navfn import Navfn"),
+        ("ros/move_base_node.py", "import rospy\nfrom nav_msgs.msg import Path"),
+        ("sim/body.py", "import pybullet"),
+        ("kernels/navfn.py", "from numba import njit"),
+    ],
+)
+def test_rules_allow(module, statement):
+    path = SOURCES / PACKAGE / module
+    assert forbidden_imports(path, imported_names(statement, package_of(path))) == []
+
+
+def modules() -> Iterator[Path]:
+    return (SOURCES / PACKAGE).rglob("*.py")
+
+
+def unit_of(path: Path) -> str:
+    """`costmap` for quad_nav/costmap/layered.py, `grid` for quad_nav/grid.py."""
+    return path.relative_to(SOURCES / PACKAGE).with_suffix("").parts[0]
+
+
+def package_of(path: Path) -> List[str]:
+    """The dotted parts of the package that the module's relative imports start from."""
+    return list(path.relative_to(SOURCES).parent.parts)
+
+
+def imported_names(source: str, package: List[str]) -> Set[str]:
+    """The dotted names that the source imports anywhere, `from a import b` as `a.b`."""
+    names = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            parts = [*base, *(node.module or "").split(".")] if node.module else base
+            names.update(".".join([*parts, alias.name]) for alias in node.names)
+    return names
+
+
+def forbidden_imports(path: Path, names: Set[str]) -> List[str]:
+    return sorted(name for name in names if not may_import(path, name))
+
+
+def may_import(path: Path, name: str) -> bool:
+    first, *rest = name.split(".")
+    if first == PACKAGE:
+        return not rest or may_import_unit(unit_of(path), rest[0])
+    place = "ros/" if first.endswith(MESSAGE_SUFFIXES) else PLACES.get(first, "")
+    return path.relative_to(SOURCES / PACKAGE).as_posix().startswith(place)
+
+
+def may_import_unit(importer: str, imported: str) -> bool:
+    if importer == imported or {importer, imported} <= NOUNS:
+        return True
+    if imported == "sim" and importer not in WORLD_USERS:
+        return False
+    return layer(imported) < layer(importer)
+
+
+def layer(unit: str) -> int:
+    return next(i for i, units in enumerate(LAYERS) if unit in units)
