@@ -1,0 +1,180 @@
+"""Rigid bodies: the scene and the quadcopters in pybullet, the only file that imports it.
+
+A quadcopter touches and is seen as an upright cylinder, its propeller guard. It
+is centred on its own LIDAR, so that two level quadcopters see each other, also
+while one of them tilts by a few degrees.
+"""
+from __future__ import annotations
+
+import os
+from typing import List, Optional, Sequence, Tuple
+
+import numpy as np
+import pybullet
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D, quaternion_from_yaw
+from quad_nav.sim.contacts import Touch
+from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
+from quad_nav.sim.lidar import MOUNT_HEIGHT_M
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene
+
+GUARD_HEIGHT_M = 0.24
+_MAX_RAYS_PER_CALL = 16384
+_ROBOT_COLOURS = [(0.12, 0.47, 0.71, 1.0), (0.84, 0.15, 0.16, 1.0), (0.17, 0.63, 0.17, 1.0),
+                  (1.0, 0.5, 0.05, 1.0), (0.58, 0.4, 0.74, 1.0), (0.55, 0.34, 0.29, 1.0)]
+
+Sphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
+"""Centre in metres, radius in metres, RGBA in 0..1."""
+
+
+class World:
+    """Scene and quadcopters; steps by a fixed time under given forces.
+
+    With ``gui`` pybullet opens a window; ``InputError`` if there is no display.
+    """
+
+    def __init__(self, scene: Scene, starts: Sequence[Pose2D], airframe: Airframe, step_s: float,
+                 gui: bool = False):
+        self._scene = scene
+        self._airframe = airframe
+        self._step_s = step_s
+        self._client = _connect(gui)
+        self._goal_ids: List[int] = []
+        self.reset(starts)
+
+    def reset(self, starts: Sequence[Pose2D]) -> None:
+        """Build everything anew, so that nothing of the past is left in the engine."""
+        client = self._client
+        pybullet.resetSimulation(physicsClientId=client)
+        pybullet.setGravity(0.0, 0.0, -GRAVITY_MPS2, physicsClientId=client)
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=self._step_s,
+                                           deterministicOverlappingPairs=1,
+                                           physicsClientId=client)
+        floor = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+        self._names = {pybullet.createMultiBody(0.0, floor, physicsClientId=client): "floor"}
+        for solid in (*self._scene.wall_boxes(), *self._scene.obstacles):
+            self._names[self._add_obstacle(solid)] = solid.name
+        self._robots = [self._add_quadcopter(k, start) for k, start in enumerate(starts)]
+        self._goal_ids = []
+        pybullet.performCollisionDetection(physicsClientId=client)
+
+    def close(self) -> None:
+        if pybullet.isConnected(self._client):
+            pybullet.disconnect(self._client)
+
+    @property
+    def is_open(self) -> bool:
+        """False once the window has been closed."""
+        return bool(pybullet.isConnected(self._client))
+
+    def state(self) -> BodyState:
+        """Read all bodies."""
+        client = self._client
+        poses = [pybullet.getBasePositionAndOrientation(robot, physicsClientId=client)
+                 for robot in self._robots]
+        twists = [pybullet.getBaseVelocity(robot, physicsClientId=client)
+                  for robot in self._robots]
+        return BodyState(np.array([position for position, _ in poses]),
+                         np.array([quaternion for _, quaternion in poses]),
+                         np.array([linear for linear, _ in twists]),
+                         np.array([angular for _, angular in twists]))
+
+    def step(self, positions_m: np.ndarray, forces_n: np.ndarray, torques_nm: np.ndarray) -> None:
+        """One time step under forces at the bodies' centres and torques, float64[n, 3] in map."""
+        client, in_map = self._client, pybullet.WORLD_FRAME
+        for robot, position, force, torque in zip(self._robots, positions_m.tolist(),
+                                                  forces_n.tolist(), torques_nm.tolist()):
+            pybullet.applyExternalForce(robot, -1, force, position, in_map,
+                                        physicsClientId=client)
+            pybullet.applyExternalTorque(robot, -1, torque, in_map, physicsClientId=client)
+        pybullet.stepSimulation(physicsClientId=client)
+
+    def touches(self) -> List[Touch]:
+        """What presses on the quadcopters after the last step."""
+        touches = {}
+        for point in pybullet.getContactPoints(physicsClientId=self._client):
+            body_a, body_b, position, normal_force = point[1], point[2], point[5], point[9]
+            if normal_force <= 0.0:
+                continue
+            touch = self._touch(body_a, body_b, position)
+            touches[touch.robot, touch.other] = touch
+        return [touches[key] for key in sorted(touches)]
+
+    def cast(self, starts_m: np.ndarray, ends_m: np.ndarray) -> np.ndarray:
+        """See ``lidar.RayCaster.cast``. A quadcopter's own beams start inside its guard: unseen."""
+        starts, ends = starts_m.tolist(), ends_m.tolist()
+        hits: List[float] = []
+        for k in range(0, len(starts), _MAX_RAYS_PER_CALL):
+            chunk = slice(k, k + _MAX_RAYS_PER_CALL)
+            hits += [hit[2] if hit[0] >= 0 else np.inf
+                     for hit in pybullet.rayTestBatch(starts[chunk], ends[chunk], numThreads=1,
+                                                      physicsClientId=self._client)]
+        return np.array(hits)
+
+    def show_goals(self, spheres: Sequence[Sphere]) -> None:
+        """Draw goals that nothing can touch or see, in place of the last ones."""
+        client = self._client
+        for goal in self._goal_ids:
+            pybullet.removeBody(goal, physicsClientId=client)
+        self._goal_ids = []
+        for centre, radius, rgba in spheres:
+            shape = pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=radius,
+                                               rgbaColor=rgba, physicsClientId=client)
+            self._goal_ids.append(pybullet.createMultiBody(
+                0.0, baseVisualShapeIndex=shape, basePosition=centre, physicsClientId=client))
+
+    def _touch(self, body_a: int, body_b: int, position: Tuple[float, float, float]) -> Touch:
+        numbers = sorted(self._robots.index(body) for body in (body_a, body_b)
+                         if body not in self._names)
+        other: Optional[int] = numbers[1] if len(numbers) == 2 else None
+        name = (f"quadcopter {other}" if other is not None
+                else self._names[body_a if body_a in self._names else body_b])
+        return Touch(numbers[0], name, other, position)
+
+    def _add_obstacle(self, solid: Obstacle) -> int:
+        client, height = self._client, solid.height_m
+        if isinstance(solid, Box):
+            yaw = solid.yaw_rad
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_BOX, physicsClientId=client,
+                halfExtents=[solid.size_x_m / 2, solid.size_y_m / 2, height / 2])
+        else:
+            yaw = 0.0
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_CYLINDER, radius=solid.radius_m, height=height,
+                physicsClientId=client)
+        return int(pybullet.createMultiBody(
+            0.0, shape, basePosition=[solid.x_m, solid.y_m, solid.bottom_m + height / 2],
+            baseOrientation=quaternion_from_yaw(yaw), physicsClientId=client))
+
+    def _add_quadcopter(self, number: int, start: Pose2D) -> int:
+        client, offset = self._client, [0.0, 0.0, MOUNT_HEIGHT_M]
+        guard = pybullet.createCollisionShape(
+            pybullet.GEOM_CYLINDER, radius=BODY_RADIUS_M, height=GUARD_HEIGHT_M,
+            collisionFramePosition=offset, physicsClientId=client)
+        looks = pybullet.createVisualShape(
+            pybullet.GEOM_CYLINDER, radius=BODY_RADIUS_M, length=GUARD_HEIGHT_M,
+            rgbaColor=_ROBOT_COLOURS[number % len(_ROBOT_COLOURS)],
+            visualFramePosition=offset, physicsClientId=client)
+        body = int(pybullet.createMultiBody(
+            self._airframe.mass_kg, guard, looks,
+            basePosition=[start.x_m, start.y_m, self._scene.altitude_m],
+            baseOrientation=quaternion_from_yaw(start.yaw_rad), physicsClientId=client))
+        pybullet.changeDynamics(
+            body, -1, localInertiaDiagonal=self._airframe.inertia_kgm2, linearDamping=0.0,
+            angularDamping=0.0, restitution=0.0, lateralFriction=0.2, physicsClientId=client)
+        return body
+
+
+def _connect(gui: bool) -> int:
+    """Open the engine; a window needs a display, without which pybullet ends the process."""
+    if gui and os.name == "posix" and os.uname().sysname == "Linux" \
+            and not os.environ.get("DISPLAY"):
+        raise InputError([("gui: no display, expected DISPLAY to be set; "
+                           "use gui:=false to simulate without a window")])
+    client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
+    if client < 0:
+        raise InputError([("gui: pybullet cannot open its window; "
+                           "use gui:=false to simulate without one")])
+    return int(client)

@@ -1,0 +1,210 @@
+"""The simulated quadcopters: commands in, poses, scans and contacts out.
+
+Time is counted in whole steps of 1/240 s. Equal arguments and equal calls give
+equal results, bit for bit.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import List, Sequence, Tuple
+
+import numpy as np
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.sim.body import Sphere, World
+from quad_nav.sim.contacts import Contact, ContactLog
+from quad_nav.sim.flight import (
+    Airframe,
+    BodyState,
+    FlightParams,
+    limit_command,
+    thrust_and_torque,
+)
+from quad_nav.sim.lidar import Lidar, LidarParams, base_from_lidar
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene
+
+STEPS_PER_S = 240
+STEP_S = 1.0 / STEPS_PER_S
+_START_GAP_M = 0.05
+_START_TRIES = 1000
+
+
+@dataclass(frozen=True)
+class SimulationParams:
+    """Everything but the scene and the number of quadcopters.
+
+    Commands count for ``command_timeout_s + controller_period_s`` after they
+    arrive, then a quadcopter hovers. Starts are displaced at random by up to
+    ``jitter_m``.
+    """
+
+    lidar: LidarParams = field(default_factory=LidarParams)
+    flight: FlightParams = field(default_factory=FlightParams)
+    airframe: Airframe = field(default_factory=Airframe)
+    command_timeout_s: float = 0.5
+    controller_period_s: float = 0.05
+    jitter_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        problems = [f"{name}: {value}, expected {unit}, 0 or more"
+                    for name, value, unit in [
+                        ("command_timeout", self.command_timeout_s, "seconds"),
+                        ("controller_period", self.controller_period_s, "seconds"),
+                        ("jitter", self.jitter_m, "metres")]
+                    if not 0.0 <= value < math.inf]
+        if problems:
+            raise InputError(problems)
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """Pose of ``base_link`` in ``map``, velocities in ``base_link``.
+
+    ``linear_mps`` and ``angular_radps`` are (x, y, z).
+    """
+
+    map_from_base: Pose3D
+    linear_mps: Tuple[float, float, float]
+    angular_radps: Tuple[float, float, float]
+
+    @property
+    def twist(self) -> Twist2D:
+        return Twist2D(self.linear_mps[0], self.linear_mps[1], self.angular_radps[2])
+
+
+class Simulation:
+    """N quadcopters in a scene, one step at a time.
+
+    Raises ``InputError`` when the scene has fewer start poses than ``n_robots``,
+    or no free place near one of them with ``jitter_m``. ``start_step`` is the
+    step that the clock starts at.
+    """
+
+    def __init__(self, scene: Scene, n_robots: int, params: SimulationParams = SimulationParams(),
+                 seed: int = 0, gui: bool = False, start_step: int = 0):
+        self.scene = scene
+        self.params = params
+        self.seed = seed
+        self.step_count = start_step
+        self._lidar = Lidar(params.lidar)
+        self._starts = start_poses(scene, n_robots, params.jitter_m, seed)
+        self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
+        self._begin()
+
+    def _begin(self) -> None:
+        n = self.n_robots
+        self._commands = np.zeros((n, 3))
+        self._command_step = np.full(n, -math.inf)
+        self._contact_log = ContactLog()
+        self._noise = [np.random.default_rng([self.seed, 1, robot]) for robot in range(n)]
+        self._state = self._world.state()
+
+    @property
+    def n_robots(self) -> int:
+        return len(self._starts)
+
+    @property
+    def now_s(self) -> float:
+        return self.step_count / STEPS_PER_S
+
+    @property
+    def contacts(self) -> List[Contact]:
+        """Contacts since the start or the last reset, oldest first."""
+        return self._contact_log.contacts
+
+    def reset(self) -> None:
+        """Back to the start poses without commands or contacts; the clock goes on."""
+        self._world.reset(self._starts)
+        self._begin()
+
+    def close(self) -> None:
+        """Free the physics engine; nothing else may be called afterwards."""
+        self._world.close()
+
+    @property
+    def is_open(self) -> bool:
+        """False once the window has been closed."""
+        return self._world.is_open
+
+    def set_command(self, robot: int, twist: Twist2D) -> None:
+        """Velocity for a quadcopter, from the next step on. Raises ValueError if not finite."""
+        if not twist.is_finite:
+            raise ValueError(f"command for quadcopter {robot} is not finite: {twist}")
+        self._commands[robot] = limit_command(twist, self.params.flight)
+        self._command_step[robot] = self.step_count
+
+    def step(self) -> List[Contact]:
+        """Advance by ``STEP_S``; returns the contacts that begin."""
+        params = self.params
+        commands = np.where(self.is_hovering[:, None], 0.0, self._commands)
+        forces, torques = thrust_and_torque(self._state, commands, self.scene.altitude_m,
+                                            params.airframe, params.flight)
+        self._world.step(self._state.positions_m, forces, torques)
+        self.step_count += 1
+        self._state = self._world.state()
+        return self._contact_log.update(self.now_s, self._world.touches())
+
+    @property
+    def body_state(self) -> BodyState:
+        """All quadcopters as arrays, in ``map``."""
+        return self._state
+
+    @property
+    def is_hovering(self) -> np.ndarray:
+        """bool[n]: no command has come yet or the last one is too old."""
+        age_s = (self.step_count - self._command_step) * STEP_S
+        return age_s > self.params.command_timeout_s + self.params.controller_period_s
+
+    def state(self, robot: int) -> RobotState:
+        rotation = self._state.rotations[robot]
+        x, y, z = self._state.positions_m[robot].tolist()
+        linear = (rotation.T @ self._state.velocities_mps[robot]).tolist()
+        angular = (rotation.T @ self._state.angular_radps[robot]).tolist()
+        qx, qy, qz, qw = self._state.quaternions[robot].tolist()
+        return RobotState(Pose3D(x, y, z, (qx, qy, qz, qw)), tuple(linear), tuple(angular))
+
+    def scan(self, robot: int) -> Scan:
+        """What the LIDAR of a quadcopter sees at this instant."""
+        map_from_lidar = self.state(robot).map_from_base.compose(base_from_lidar)
+        return self._lidar.scan(self.now_s, map_from_lidar, self._world, self._noise[robot])
+
+    def show_goals(self, spheres: Sequence[Sphere]) -> None:
+        """Draw goals in the window."""
+        self._world.show_goals(spheres)
+
+
+def start_poses(scene: Scene, n_robots: int, jitter_m: float, seed: int) -> List[Pose2D]:
+    """Start poses of the first robots, displaced within a disc of radius ``jitter_m``.
+
+    Each stays clear of obstacles, walls and the robots before it. Raises
+    ``InputError`` when the scene has too few starts or no free place is found.
+    """
+    if not 1 <= n_robots <= len(scene.starts):
+        raise InputError([(f"robots: {n_robots}, expected 1 to {len(scene.starts)}, "
+                           f"the start poses of scene {scene.name}")])
+    random = np.random.default_rng([seed, 0])
+    starts: List[Pose2D] = []
+    for robot in range(n_robots):
+        starts.append(_displaced(scene, robot, starts, jitter_m, random))
+    return starts
+
+
+def _displaced(scene: Scene, robot: int, others: Sequence[Pose2D], jitter_m: float,
+               random: np.random.Generator) -> Pose2D:
+    start = scene.starts[robot]
+    if jitter_m == 0.0:
+        return start
+    for _ in range(_START_TRIES):
+        radius_m = jitter_m * math.sqrt(random.random())
+        angle_rad = 2.0 * math.pi * random.random()
+        x_m, y_m = (start.x_m + radius_m * math.cos(angle_rad),
+                    start.y_m + radius_m * math.sin(angle_rad))
+        pose = Pose2D(x_m, y_m, start.yaw_rad)
+        if (scene.contains(x_m, y_m)
+                and scene.clearance_m(x_m, y_m, scene.altitude_m) > BODY_RADIUS_M + _START_GAP_M
+                and all(pose.distance_to(o) > 2 * BODY_RADIUS_M + _START_GAP_M for o in others)):
+            return pose
+    raise InputError([(f"jitter: {jitter_m:g} m leaves no free start for quadcopter {robot} around "
+                           f"({start.x_m:g}, {start.y_m:g}), expected a smaller one")])

@@ -1,0 +1,160 @@
+"""Scenes: distances by hand, the shipped arena, and what is said about faulty files."""
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Walls
+from quad_nav.sim.scene_file import load_scene, scene_from_document
+
+ARENA = Path(__file__).parents[2] / "scenes" / "arena.yaml"
+GOALS = [(3.0, 6.5), (9.0, 5.5), (1.5, 9.0), (4.0, 3.5), (2.0, 9.0), (8.5, 5.0)]
+
+
+def faults_of(document) -> list:
+    with pytest.raises(InputError) as caught:
+        scene_from_document(document, "s.yaml")
+    return caught.value.problems
+
+
+def small_document(**changes):
+    return {"size": [4.0, 6.0], "starts": [[1.0, 1.0, 0.5]], **changes}
+
+
+def test_box_clearance_from_face_edge_corner_top_and_inside():
+    box = Box("b", 2.0, 1.0, 2.0, 1.0, 1.0)
+    assert box.clearance_m(4.0, 1.0, 0.5) == pytest.approx(1.0)
+    assert box.clearance_m(6.0, 5.5, 0.5) == pytest.approx(5.0)
+    assert box.clearance_m(2.0, 1.0, 1.25) == pytest.approx(0.25)
+    assert box.clearance_m(5.0, 2.5, 3.0) == pytest.approx(3.0)
+    assert box.clearance_m(2.0, 1.4, 0.5) == pytest.approx(-0.1)
+
+
+def test_turned_box_clearance():
+    box = Box("b", 0.0, 0.0, 2.0, 2.0, 2.0, yaw_rad=math.pi / 4)
+    assert box.clearance_m(math.sqrt(2.0) + 0.5, 0.0, 1.0) == pytest.approx(0.5)
+    assert box.clearance_m(2.0, 2.0, 1.0) == pytest.approx(2.0 * math.sqrt(2.0) - 1.0)
+
+
+def test_cylinder_clearance_beside_above_and_below_a_lifted_one():
+    cylinder = Cylinder("c", 1.0, 1.0, 0.5, 1.0, bottom_m=2.0)
+    assert cylinder.clearance_m(4.0, 5.0, 2.5) == pytest.approx(4.5)
+    assert cylinder.clearance_m(1.0, 1.0, 3.2) == pytest.approx(0.2)
+    assert cylinder.clearance_m(1.0, 1.0, 1.0) == pytest.approx(1.0)
+    assert cylinder.clearance_m(1.1, 1.0, 2.5) == pytest.approx(-0.4)
+
+
+def test_walls_have_their_inner_faces_on_the_border():
+    scene = Scene("s", 4.0, 6.0, 1.0, Walls(2.0, 0.1), (), (Pose2D(1.0, 1.0),))
+    assert scene.clearance_m(0.5, 3.0, 1.0) == pytest.approx(0.5)
+    assert scene.clearance_m(3.75, 3.0, 1.0) == pytest.approx(0.25)
+    assert scene.clearance_m(2.0, 5.9, 1.0) == pytest.approx(0.1)
+    assert scene.clearance_m(-0.05, 3.0, 1.0) == pytest.approx(-0.05)
+    assert scene.nearest(2.0, 0.3, 1.0).name == "wall_south"
+    assert scene.contains(3.9, 5.9) and not scene.contains(4.0, 3.0)
+
+
+def test_arena_leaves_the_tutorial_goals_free():
+    scene = load_scene(ARENA)
+    assert (scene.size_x_m, scene.size_y_m, scene.altitude_m) == (12.0, 12.0, 1.0)
+    assert len(scene.obstacles) == 8
+    assert scene.starts[0] == Pose2D(1.5, 1.5, 0.0)
+    assert scene.starts[1] == Pose2D(10.0, 2.0, math.pi)
+    for x, y in GOALS:
+        assert scene.clearance_m(x, y, 1.0) > 0.8
+    for start in scene.starts:
+        assert scene.clearance_m(start.x_m, start.y_m, 1.0) > 0.8
+
+
+def test_arena_passages_let_an_inflated_quadcopter_through():
+    scene = load_scene(ARENA)
+    solids = [s for s in (*scene.wall_boxes(), *scene.obstacles)
+              if s.bottom_m + s.height_m > scene.altitude_m]
+    for k in range(240):
+        for j in range(240):
+            x, y = 0.025 + 0.05 * k, 0.025 + 0.05 * j
+            first, second = sorted((s.clearance_m(x, y, 1.0), s.name) for s in solids)[:2]
+            if first[0] > 0.0 and not (first[1][:4] == second[1][:4] == "wall"):
+                assert first[0] + second[0] > 1.2, (x, y, first, second)
+
+
+def test_defaults():
+    scene = scene_from_document(small_document(), "s.yaml", "hall")
+    assert scene == Scene("hall", 4.0, 6.0, 1.0, Walls(2.0, 0.1), (), (Pose2D(1.0, 1.0, 0.5),))
+
+
+def test_all_faults_are_listed_at_once():
+    problems = faults_of({
+        "size": [4.0, 6.0], "altitud": 1.0,
+        "obstacles": [
+            {"name": "a", "shape": "box", "centre": [1.0, float("nan")], "size": [1.0, -1.0],
+             "height": 2.0},
+            {"shape": "cone"},
+            {"shape": "cylinder", "centre": [2.0, 3.0], "radius": True, "height": "high",
+             "bottom": -1.0},
+        ],
+        "starts": [[9.0, 1.0], [1.0]]})
+    assert problems == [
+        "s.yaml: altitud: unknown key; did you mean altitude?",
+        "s.yaml: obstacles[0].centre[1]: nan, expected a finite number",
+        "s.yaml: obstacles[0].size[1]: -1.0, expected a number above 0",
+        "s.yaml: obstacles[1].shape: 'cone', expected box or cylinder",
+        "s.yaml: obstacles[2].height: 'high', expected a number above 0",
+        "s.yaml: obstacles[2].bottom: -1 m is below the floor, expected 0 or more",
+        "s.yaml: obstacles[2].radius: True, expected a number above 0",
+        "s.yaml: starts[1]: a list of 1, expected [x, y] or [x, y, yaw]",
+        "s.yaml: starts[0]: (9, 1) is outside the arena, expected 0 < x < 4 and 0 < y < 6",
+    ]
+
+
+def test_start_outside_inside_an_obstacle_and_too_close_to_another():
+    pillar = {"name": "pillar", "shape": "cylinder", "centre": [2.0, 3.0], "radius": 0.5,
+              "height": 2.0}
+    problems = faults_of(small_document(
+        obstacles=[pillar], starts=[[1.0, 1.0], [4.5, 1.0], [2.2, 3.0], [1.4, 1.0]]))
+    assert problems == [
+        "s.yaml: starts[1]: (4.5, 1) is outside the arena, expected 0 < x < 4 and 0 < y < 6",
+        ("s.yaml: starts[2]: (2.2, 3) is -0.30 m from pillar, expected more than a quadcopter's "
+         f"radius, {BODY_RADIUS_M:g} m"),
+        "s.yaml: starts[3]: is 0.40 m from starts[0], expected more than two body radii, 0.6 m",
+    ]
+
+
+FLOOR_PILLAR = {"name": "floor", "shape": "cylinder", "centre": [3.0, 3.0], "radius": 0.2,
+                "height": 1.0}
+
+
+@pytest.mark.parametrize("document, problem", [
+    (None, "missing, expected a mapping with name, size, altitude, walls, obstacles, starts"),
+    ({"size": [4.0, 4.0]}, "starts: missing, expected a list"),
+    (small_document(starts=[]), "starts: no start pose, expected at least one [x, y, yaw]"),
+    (small_document(size=[4.0, math.inf]), "size[1]: inf, expected a number above 0"),
+    (small_document(walls={"height": 0}), "walls.height: 0, expected a number above 0"),
+    (small_document(obstacles=[3]),
+     "obstacles[0]: 3, expected a mapping that describes an obstacle"),
+    (small_document(obstacles=[FLOOR_PILLAR]),
+     "obstacles: name 'floor' is taken, expected unique names"),
+])
+def test_single_faults(document, problem):
+    assert faults_of(document) == [f"s.yaml: {problem}"]
+
+
+@pytest.mark.parametrize("text, problem", [
+    ("size: [4.0, 6.0\nstarts: []\n", "line 2, column 7: expected ',' or ']', but got ':'"),
+    ("size: [4.0, 6.0]\nsize: [2.0, 2.0]\n", "line 2, column 1: key 'size' is given twice"),
+])
+def test_yaml_faults_name_the_line(tmp_path, text, problem):
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_scene(path)
+    assert caught.value.problems == [f"{path}: {problem}"]
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(InputError, match="nowhere.yaml: cannot be read: .*No such file"):
+        load_scene(tmp_path / "nowhere.yaml")

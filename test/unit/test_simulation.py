@@ -1,0 +1,258 @@
+"""Flights of the whole simulation: tracking, hovering, contacts, scans, repeatability."""
+from __future__ import annotations
+
+import math
+from typing import Set, Tuple
+
+import numpy as np
+import pytest
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.sim.contacts import SEPARATION_S, ContactLog, Touch
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.scene import Box, Cylinder, Scene, Walls
+from quad_nav.sim.simulation import STEPS_PER_S, Simulation, SimulationParams, start_poses
+
+
+def room(*starts: Pose2D, obstacles=(), size_m: float = 20.0) -> Scene:
+    return Scene("room", size_m, size_m, 1.0, Walls(), tuple(obstacles), starts)
+
+
+MIDDLE = Pose2D(10.0, 10.0, 0.0)
+
+
+@pytest.fixture
+def make():
+    """Simulations that are closed at the end of the test."""
+    made = []
+
+    def build(*args, **kwargs) -> Simulation:
+        made.append(Simulation(*args, **kwargs))
+        return made[-1]
+
+    yield build
+    for simulation in made:
+        simulation.close()
+
+
+def fly(simulation: Simulation, seconds: float, *twists: Twist2D) -> np.ndarray:
+    """Fly with one steady command per quadcopter.
+
+    Returns float64[steps, n, 4]: body-frame vx, vy, yaw rate, and z in map.
+    """
+    rows = []
+    for _ in range(round(seconds * STEPS_PER_S)):
+        for robot, twist in enumerate(twists):
+            simulation.set_command(robot, twist)
+        simulation.step()
+        states = [simulation.state(robot) for robot in range(simulation.n_robots)]
+        rows.append([[s.twist.vx_mps, s.twist.vy_mps, s.twist.vyaw_radps, s.map_from_base.z_m]
+                     for s in states])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("command, axis, value", [
+    (Twist2D(0.3, 0.0, 0.0), 0, 0.3), (Twist2D(-0.3, 0.0, 0.0), 0, -0.3),
+    (Twist2D(0.0, 0.3, 0.0), 1, 0.3), (Twist2D(0.0, 0.0, 1.0), 2, 1.0),
+    (Twist2D(1.0, 0.0, 0.0), 0, 1.0)])
+def test_step_settles_within_a_second_without_overshoot(make, command, axis, value):
+    flown = fly(make(room(MIDDLE), 1), 2.5, command)
+    relative = flown[:, 0, axis] / value
+    settled = round((1.0 if abs(value) == 0.3 else 1.25) * STEPS_PER_S)
+    assert abs(relative[settled:] - 1.0).max() < 0.05
+    assert relative.max() < 1.02
+    assert relative[:24].min() > -0.01
+    assert abs(flown[:, 0, 3] - 1.0).max() < 0.02
+
+
+def test_turning_while_moving_keeps_the_body_velocity(make):
+    flown = fly(make(room(MIDDLE), 1), 4.0, Twist2D(0.3, 0.0, 1.0))[-240:, 0]
+    assert abs(flown[:, 0] - 0.3).max() < 0.01
+    assert abs(flown[:, 1]).max() < 0.01
+    assert abs(flown[:, 2] - 1.0).max() < 0.01
+
+
+def test_accelerating_needs_tilt_and_is_limited(make):
+    simulation = make(room(MIDDLE), 1)
+    simulation.set_command(0, Twist2D(2.0, 0.0, 0.0))
+    tilts = []
+    for _ in range(120):
+        simulation.step()
+        tilts.append(math.acos(simulation.body_state.rotations[0, 2, 2]))
+    assert max(tilts) == pytest.approx(math.atan(2.0 / 9.81), rel=0.1)
+    assert tilts[0] < 0.01
+
+
+def test_hovers_when_commands_stop(make):
+    params = SimulationParams(command_timeout_s=0.5, controller_period_s=0.1)
+    simulation = make(room(MIDDLE, Pose2D(5.0, 5.0)), 2, params)
+    assert simulation.is_hovering.tolist() == [True, True]
+    fly(simulation, 1.0, Twist2D(0.3, 0.0, 0.0))
+    assert simulation.is_hovering.tolist() == [False, True]
+    fly(simulation, 0.59)
+    assert simulation.is_hovering.tolist() == [False, True]
+    fly(simulation, 0.02)
+    assert simulation.is_hovering.tolist() == [True, True]
+    stopped = fly(simulation, 2.0)
+    assert abs(stopped[-1, 0, :3]).max() < 0.003
+
+
+def test_a_command_that_is_not_finite_never_reaches_the_body(make):
+    simulation = make(room(MIDDLE), 1)
+    for bad in (Twist2D(math.nan, 0.0, 0.0), Twist2D(0.0, math.inf, 0.0),
+                Twist2D(0.0, 0.0, -math.inf)):
+        with pytest.raises(ValueError, match="not finite"):
+            simulation.set_command(0, bad)
+    fly(simulation, 0.5)
+    assert simulation.state(0).map_from_base.to_2d() == MIDDLE
+
+
+def test_odometry_is_in_the_body_frame(make):
+    simulation = make(room(Pose2D(10.0, 10.0, math.pi / 2)), 1)
+    fly(simulation, 2.0, Twist2D(0.3, 0.0, 0.0))
+    state = simulation.state(0)
+    assert state.linear_mps == pytest.approx((0.3, 0.0, 0.0), abs=0.002)
+    assert simulation.body_state.velocities_mps[0] == pytest.approx([0.0, 0.3, 0.0], abs=0.002)
+    assert state.map_from_base.yaw_rad == pytest.approx(math.pi / 2, abs=1e-3)
+    assert state.map_from_base.y_m > 10.4
+
+
+def test_one_contact_for_a_push_against_a_pillar(make):
+    pillar = Cylinder("pillar", 12.0, 10.0, 0.5, 2.0)
+    simulation = make(room(MIDDLE, obstacles=[pillar]), 1)
+    fly(simulation, 6.0, Twist2D(0.5, 0.0, 0.0))
+    assert len(simulation.contacts) == 1
+    contact = simulation.contacts[0]
+    assert str(contact) == "quadcopter 0 touches pillar"
+    assert contact.position_m[:2] == pytest.approx((11.5, 10.0), abs=0.02)
+    # 1.2 m to go at 0.5 m/s, and 0.32 s that the velocity loop lags behind
+    assert contact.time_s == pytest.approx(1.2 / 0.5 + 0.32, abs=0.05)
+    assert simulation.state(0).map_from_base.z_m == pytest.approx(1.0, abs=0.02)
+    simulation.reset()
+    assert simulation.contacts == []
+
+
+def test_two_quadcopters_make_one_contact_that_involves_both(make):
+    simulation = make(room(Pose2D(9.0, 10.0, 0.0), Pose2D(11.0, 10.0, math.pi)), 2)
+    fly(simulation, 3.0, Twist2D(0.5, 0.0, 0.0), Twist2D(0.5, 0.0, 0.0))
+    assert [str(c) for c in simulation.contacts] == ["quadcopter 0 touches quadcopter 1"]
+    contact = simulation.contacts[0]
+    assert contact.involves(0) and contact.involves(1)
+    assert contact.position_m[:2] == pytest.approx((10.0, 10.0), abs=0.02)
+
+
+def test_a_low_crate_is_flown_over(make):
+    crate = Box("crate", 11.0, 10.0, 0.5, 0.5, 0.5)
+    simulation = make(room(MIDDLE, obstacles=[crate]), 1)
+    fly(simulation, 4.0, Twist2D(0.5, 0.0, 0.0))
+    assert simulation.contacts == []
+    assert simulation.state(0).map_from_base.x_m > 11.7
+
+
+def test_walls_touch(make):
+    simulation = make(room(Pose2D(1.0, 5.0, math.pi)), 1)
+    fly(simulation, 3.0, Twist2D(0.5, 0.0, 0.0))
+    assert [c.other for c in simulation.contacts] == ["wall_west"]
+
+
+def test_contact_log_needs_separation_before_a_new_contact():
+    log = ContactLog()
+    touch = Touch(0, "pillar", None, (1.0, 2.0, 3.0))
+    other = Touch(1, "pillar", None, (1.0, 2.0, 3.0))
+    assert [c.time_s for c in log.update(1.0, [touch])] == [1.0]
+    assert log.update(1.0 + SEPARATION_S, [touch]) == []
+    assert [c.robot for c in log.update(1.1 + SEPARATION_S, [touch, other])] == [1]
+    assert log.update(3.0, []) == []
+    assert [c.time_s for c in log.update(3.0, [touch])] == [3.0]
+    assert len(log.contacts) == 3
+
+
+def test_scan_sees_walls_obstacles_and_the_peer_but_not_itself(make):
+    params = SimulationParams(LidarParams(step_size_rad=math.pi / 2))
+    scene = room(MIDDLE, Pose2D(12.0, 10.0), obstacles=[
+        Box("box", 10.0, 13.0, 1.0, 1.0, 2.0), Cylinder("pillar", 10.0, 6.0, 0.5, 2.0)])
+    ranges = make(scene, 2, params).scan(0).ranges_m
+    west, pillar, peer, box = ranges
+    assert (west, pillar, peer, box) == pytest.approx((10.0, 3.5, 1.7, 2.5), abs=1e-3)
+
+
+def test_scan_above_low_walls_returns_infinity(make):
+    scene = Scene("low", 8.0, 8.0, 1.0, Walls(height_m=0.8), (), (Pose2D(4.0, 4.0),))
+    assert np.isinf(make(scene, 1).scan(0).ranges_m).all()
+
+
+def test_lidar_tilts_with_the_body(make):
+    """Speeding up pitches the nose down: the floor comes into view ahead, not behind."""
+    simulation = make(room(MIDDLE, size_m=60.0), 1)
+    simulation.set_command(0, Twist2D(2.0, 0.0, 0.0))
+    for _ in range(60):
+        simulation.step()
+    state = simulation.state(0)
+    pitch = math.asin(-simulation.body_state.rotations[0, 2, 0])
+    ranges = simulation.scan(0).ranges_m
+    height_m = state.map_from_base.z_m + 0.06 * math.cos(pitch)
+    assert ranges[256] == pytest.approx(height_m / math.sin(pitch), rel=1e-3)
+    assert np.isinf(ranges[0])
+
+
+def test_same_seed_same_bits(make):
+    params = SimulationParams(LidarParams(noise_std_m=0.01), jitter_m=0.3)
+    scene = room(Pose2D(9.0, 10.0), Pose2D(11.0, 10.0, math.pi),
+                 obstacles=[Cylinder("pillar", 10.0, 11.0, 0.3, 2.0)])
+    commands = Twist2D(0.5, 0.1, 0.2), Twist2D(0.5, -0.1, -0.3)
+
+    def flight(simulation):
+        flown = fly(simulation, 3.0, *commands)
+        return flown, simulation.scan(1).ranges_m, list(simulation.contacts)
+
+    first = make(scene, 2, params, seed=5)
+    flown, ranges, contacts = flight(first)
+    first.reset()
+    for again in (make(scene, 2, params, seed=5), first):
+        flown_again, ranges_again, contacts_again = flight(again)
+        assert np.array_equal(flown, flown_again)
+        assert np.array_equal(ranges, ranges_again)
+        assert len(contacts) > 0
+        assert [c.position_m for c in contacts] == [c.position_m for c in contacts_again]
+    assert not np.array_equal(flown, flight(make(scene, 2, params, seed=6))[0])
+
+
+def test_reset_goes_back_to_the_start_and_lets_the_clock_go_on(make):
+    simulation = make(room(MIDDLE), 1, start_step=240)
+    fly(simulation, 1.0, Twist2D(0.3, 0.0, 0.5))
+    assert simulation.now_s == pytest.approx(2.0)
+    simulation.reset()
+    state = simulation.state(0)
+    assert state.map_from_base.to_2d() == MIDDLE
+    assert state.linear_mps == (0.0, 0.0, 0.0)
+    assert simulation.now_s == pytest.approx(2.0)
+    assert simulation.is_hovering.tolist() == [True]
+    fly(simulation, 0.5)
+    assert simulation.state(0).map_from_base.to_2d() == MIDDLE
+
+
+def test_jittered_starts_are_free():
+    scene = room(Pose2D(1.0, 1.0), Pose2D(1.7, 1.0),
+                 obstacles=[Cylinder("pillar", 1.0, 2.0, 0.4, 2.0)])
+    seen: Set[Tuple[float, float]] = set()
+    for seed in range(50):
+        starts = start_poses(scene, 2, 0.5, seed)
+        assert starts == start_poses(scene, 2, 0.5, seed)
+        assert starts[0].distance_to(starts[1]) > 0.6
+        for start, nominal in zip(starts, scene.starts):
+            assert 0.0 < start.distance_to(nominal) <= 0.5
+            assert scene.clearance_m(start.x_m, start.y_m, 1.0) > 0.3
+        seen.update((s.x_m, s.y_m) for s in starts)
+    assert len(seen) == 100
+
+
+def test_more_robots_than_starts():
+    with pytest.raises(InputError, match="robots: 3, expected 1 to 2"):
+        start_poses(room(MIDDLE, Pose2D(5.0, 5.0)), 3, 0.0, 0)
+
+
+def test_bad_parameters_are_listed_together():
+    with pytest.raises(InputError) as caught:
+        SimulationParams(command_timeout_s=math.nan, jitter_m=-1.0)
+    assert [p.split(":")[0] for p in caught.value.problems] == ["command_timeout", "jitter"]
