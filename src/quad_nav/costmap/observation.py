@@ -52,14 +52,10 @@ class ObservationBuffer:
         self.observations: List[Observation] = []
         self._last_reception_s: Optional[float] = None
 
-    def add(self, points: np.ndarray, sensor: np.ndarray, stamp_s: float, now_s: float) -> None:
-        """Keep the points whose height counts, float32[n, 3]; drop what is too old now."""
-        heights = points[:, 2].astype(np.float64)
-        kept = points[(heights <= self.params.max_obstacle_height_m)
-                      & (heights >= self.params.min_obstacle_height_m)]
-        self.observations.insert(0, Observation(stamp_s, sensor, kept))
-        self._last_reception_s = now_s
-        self._drop_stale()
+    def add(self, observation: Observation, now_s: float) -> None:
+        """Keep an observation that arrived now; drop those that are too old now."""
+        self.observations.insert(0, observation)
+        self.restart_clock(now_s)
 
     def start_clock(self, now_s: float) -> None:
         """Count silence from now if nothing was ever received."""
@@ -69,7 +65,7 @@ class ObservationBuffer:
     def restart_clock(self, now_s: float) -> None:
         """Count silence from now."""
         self._last_reception_s = now_s
-        self._drop_stale()
+        self._drop_stale(now_s)
 
     def silence_s(self, now_s: float) -> float:
         return 0.0 if self._last_reception_s is None else now_s - self._last_reception_s
@@ -78,13 +74,13 @@ class ObservationBuffer:
         period_s = self.params.expected_update_period_s
         return period_s == 0.0 or _nanoseconds(self.silence_s(now_s)) <= _nanoseconds(period_s)
 
-    def _drop_stale(self) -> None:
+    def _drop_stale(self, reception_s: float) -> None:
         persistence_s = self.params.observation_persistence_s
         if persistence_s == 0.0:
             del self.observations[1:]
             return
         for k, observation in enumerate(self.observations):
-            age_s = self._last_reception_s - observation.stamp_s
+            age_s = reception_s - observation.stamp_s
             if _nanoseconds(age_s) > _nanoseconds(persistence_s):
                 del self.observations[k:]
                 return

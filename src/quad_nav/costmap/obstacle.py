@@ -77,10 +77,15 @@ class ObstacleLayer(GridLayer):
     def add_cloud(self, source_name: str, points: np.ndarray, global_from_sensor: Pose3D,
                   stamp_s: float, now_s: float,
                   global_from_origin: Optional[Pose3D] = None) -> None:
-        """Take points, float32[n, 3] in the sensor's frame; the rest as ``add_scan``."""
+        """Take points, float32[n, 3] in the sensor's frame; the rest as ``add_scan``.
+
+        Only points within the source's heights count, for marking and for clearing.
+        """
+        buffer = self.buffers[source_name]
+        points = transform_points(points, global_from_sensor, buffer.params.min_obstacle_height_m,
+                                  buffer.params.max_obstacle_height_m)
         origin = global_from_origin or global_from_sensor
-        self.buffers[source_name].add(transform_points(points, global_from_sensor),
-                                      origin.translation, stamp_s, now_s)
+        buffer.add(Observation(stamp_s, origin.translation, points), now_s)
 
     def set_footprint(self, footprint: np.ndarray, inscribed_radius_m: float) -> None:
         self._footprint = footprint

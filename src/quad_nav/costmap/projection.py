@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from quad_nav.geometry import Pose3D, Quaternion, Scan
+from quad_nav.kernels.projection import project_ranges, transform_between_heights
 
 
 def scan_points(scan: Scan, inf_is_valid: bool) -> np.ndarray:
@@ -20,25 +21,21 @@ def scan_points(scan: Scan, inf_is_valid: bool) -> np.ndarray:
     A beam counts when ``range_min_m <= range < range_max_m``. With ``inf_is_valid`` a beam
     without return counts as ending 0.1 mm before ``range_max_m``.
     """
-    range_max = np.float32(scan.range_max_m)
-    ranges = np.asarray(scan.ranges_m, dtype=np.float32)
-    if inf_is_valid:
-        ranges = np.where(np.isposinf(ranges), range_max - np.float32(0.0001), ranges)
+    ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
     directions = _directions(float(np.float32(scan.angle_min_rad)),
                              float(np.float32(scan.angle_increment_rad)), len(ranges))
-    valid = (ranges >= np.float32(scan.range_min_m)) & (ranges < range_max)
-    points = np.zeros((int(valid.sum()), 3), dtype=np.float32)
-    points[:, :2] = ranges[valid, None].astype(np.float64) * directions[valid]
-    return points
+    range_max = np.float32(scan.range_max_m)
+    inf_range = range_max - np.float32(0.0001) if inf_is_valid else np.float32(np.inf)
+    return project_ranges(ranges, directions, np.float32(scan.range_min_m), range_max, inf_range)
 
 
-def transform_points(points: np.ndarray, a_from_b: Pose3D) -> np.ndarray:
-    """float32[n, 3] of frame b in frame a."""
-    rotation = _rotation_float32(a_from_b.quaternion)
-    translation = np.array([a_from_b.x_m, a_from_b.y_m, a_from_b.z_m], dtype=np.float32)
-    x, y, z = np.asarray(points, dtype=np.float32).T
-    return np.column_stack([((row[0] * x + row[1] * y) + row[2] * z) + t
-                            for row, t in zip(rotation, translation)])
+def transform_points(points: np.ndarray, a_from_b: Pose3D, min_z_m: float = -math.inf,
+                     max_z_m: float = math.inf) -> np.ndarray:
+    """float32[n, 3] of frame b in frame a; only those whose height in a is within limits."""
+    return transform_between_heights(
+        np.ascontiguousarray(points, dtype=np.float32), _rotation_float32(a_from_b.quaternion),
+        np.array([a_from_b.x_m, a_from_b.y_m, a_from_b.z_m], dtype=np.float32),
+        min_z_m, max_z_m)
 
 
 @lru_cache(maxsize=64)

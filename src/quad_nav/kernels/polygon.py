@@ -37,7 +37,7 @@ def _span_line(lowest, highest, x0, y0, x1, y1):
     steps = max(steps_x, steps_y)
     error = steps // 2
     x, y = x0, y0
-    for k in range(steps + 1):
+    for _ in range(steps + 1):
         lowest[x] = min(lowest[x], y)
         highest[x] = max(highest[x], y)
         error += steps_y if along_x else steps_x

@@ -10,39 +10,31 @@ from quad_nav.kernels.cells import cell_index
 
 
 @njit(cache=True, nogil=True)
-def clear_line(costs, x0, y0, x1, y1, max_cells):
+def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
     """Free the cells from (x0, y0) towards (x1, y1), both inside the grid.
 
-    At most about ``max_cells`` long, measured along the line; both ends included.
+    flat_costs: uint8[H * W], rows of ``size_x`` cells. The line is cut to about
+    ``max_cells``, measured along it; both of its ends are freed.
     """
     dx, dy = x1 - x0, y1 - y0
     length = math.hypot(dx, dy)
-    scale = 1.0
-    if length > max_cells:
-        scale = max_cells / length
-    step_x = 1 if dx > 0 else -1
-    step_y = 1 if dy > 0 else -1
-    steps_x, steps_y = abs(dx), abs(dy)
-    x, y = x0, y0
-    if steps_x >= steps_y:
-        error = steps_x // 2
-        for _ in range(int(scale * steps_x)):
-            costs[y, x] = FREE
-            x += step_x
-            error += steps_y
-            if error >= steps_x:
-                y += step_y
-                error -= steps_x
-    else:
-        error = steps_y // 2
-        for _ in range(int(scale * steps_y)):
-            costs[y, x] = FREE
-            y += step_y
-            error += steps_x
-            if error >= steps_y:
-                x += step_x
-                error -= steps_y
-    costs[y, x] = FREE
+    scale = max_cells / length if length > max_cells else 1.0
+    along, across = abs(dx), abs(dy)
+    step_along = 1 if dx > 0 else -1
+    step_across = size_x if dy > 0 else -size_x
+    if across > along:
+        along, across = across, along
+        step_along, step_across = step_across, step_along
+    cell = y0 * size_x + x0
+    error = along // 2
+    for _ in range(int(scale * along)):
+        flat_costs[cell] = FREE
+        cell += step_along
+        error += across
+        if error >= along:
+            cell += step_across
+            error -= along
+    flat_costs[cell] = FREE
 
 
 @njit(cache=True, nogil=True)
@@ -84,6 +76,7 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
     include(bounds, sensor_x, sensor_y)
     high_x, high_y = origin_x + size_x * resolution, origin_y + size_y * resolution
     max_cells = max(0.0, math.ceil(range_m / resolution))
+    flat_costs = costs.reshape(-1)
     last_x, last_y = -1, -1
     for k in range(points.shape[0]):
         x, y = clip_to_grid(sensor_x, sensor_y, float(points[k, 0]), float(points[k, 1]),
@@ -93,7 +86,7 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
         if x1 < 0 or y1 < 0:
             continue
         if x1 != last_x or y1 != last_y:
-            clear_line(costs, x0, y0, x1, y1, max_cells)
+            clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
             last_x, last_y = x1, y1
         dx, dy = x - sensor_x, y - sensor_y
         length = math.hypot(dx, dy)

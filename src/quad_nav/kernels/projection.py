@@ -1,0 +1,42 @@
+"""Scan to points, and points from frame to frame, in float32 (see costmap/projection.py)."""
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def project_ranges(ranges, directions, range_min, range_max, inf_range):
+    """Points float32[m, 3] of the ranges in [range_min, range_max), in order.
+
+    ranges: float32[n]; directions: float64[n, 2], cosine and sine of each beam.
+    ``inf_range`` takes the place of +inf. All numbers are float32.
+    """
+    points = np.zeros((len(ranges), 3), np.float32)
+    m = 0
+    for k in range(len(ranges)):
+        beam = inf_range if ranges[k] == np.inf else ranges[k]
+        if range_min <= beam < range_max:
+            points[m, 0] = np.float64(beam) * directions[k, 0]
+            points[m, 1] = np.float64(beam) * directions[k, 1]
+            m += 1
+    return points[:m]
+
+
+@njit(cache=True, nogil=True)
+def transform_between_heights(points, rotation, translation, min_z, max_z):
+    """Points float32[m, 3] in the new frame, those with min_z <= z <= max_z, in order.
+
+    points: float32[n, 3]; rotation: float32[3, 3]; translation: float32[3]. The heights
+    are float64.
+    """
+    moved = np.empty_like(points)
+    m = 0
+    for k in range(len(points)):
+        x, y, z = points[k, 0], points[k, 1], points[k, 2]
+        for row in range(3):
+            moved[m, row] = (rotation[row, 0] * x + rotation[row, 1] * y
+                             + rotation[row, 2] * z + translation[row])
+        if min_z <= np.float64(moved[m, 2]) <= max_z:
+            m += 1
+    return moved[:m].copy()
