@@ -13,14 +13,16 @@ oscillates, and then PLANNING again. What differs, and why, is in
 from __future__ import annotations
 
 import enum
+import itertools
 import math
 from dataclasses import dataclass, field
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from quad_nav.control.controller import Control, Controller
-from quad_nav.costmap.layered import LayeredCostmap, Window
+from quad_nav.control.controller import Control, LocalPlanner
+from quad_nav.costmap.cost_grid import Window
+from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.plan.planner import GlobalPlanner
@@ -126,8 +128,12 @@ class Schedule:
     """When something periodic is due; a frequency of 0 means never."""
 
     def __init__(self, frequency_hz: float):
-        self.period_s = 1.0 / frequency_hz if frequency_hz > 0.0 else math.inf
         self.due_s = math.inf
+        self.set_frequency(frequency_hz)
+
+    def set_frequency(self, frequency_hz: float) -> None:
+        """Another period from the next turn on."""
+        self.period_s = 1.0 / frequency_hz if frequency_hz > 0.0 else math.inf
 
     def start(self, now_s: float) -> None:
         self.due_s = now_s if math.isfinite(self.period_s) else math.inf
@@ -149,7 +155,7 @@ class Navigator:
     """
 
     def __init__(self, params: NavigatorParams, global_costmap: LayeredCostmap,
-                 local_costmap: LayeredCostmap, planner: GlobalPlanner, controller: Controller,
+                 local_costmap: LayeredCostmap, planner: GlobalPlanner, controller: LocalPlanner,
                  recoveries: Sequence[NamedRecovery]):
         self.params = params
         self.global_costmap = global_costmap
@@ -168,6 +174,14 @@ class Navigator:
         self._plan_wanted = False
         self._new_plan: Optional[np.ndarray] = None
         self._reset_recovery()
+
+    def set_params(self, params: NavigatorParams) -> None:
+        """Takes other parameters over; a goal under way keeps going."""
+        if params.controller_frequency_hz != self.params.controller_frequency_hz:
+            self._cycle.set_frequency(params.controller_frequency_hz)
+        if params.planner_frequency_hz != self.params.planner_frequency_hz:
+            self._replan.set_frequency(params.planner_frequency_hz)
+        self.params = params
 
     # -- goals ---------------------------------------------------------------------
 
@@ -260,29 +274,26 @@ class Navigator:
                 continue
             tick.windows[name] = costmap.update(tick.now_s, pose)
 
-    def clear_costmaps(self) -> None:
+    def clear_costmaps(self, now_s: float) -> None:
         """Forgets everything that was observed, as ``~clear_costmaps`` does."""
-        self.global_costmap.reset_layers()
-        self.local_costmap.reset_layers()
+        self.global_costmap.reset_layers(now_s)
+        self.local_costmap.reset_layers(now_s)
 
-    def _stale_sensors(self, now_s: float) -> List[str]:
-        """The sources that have been silent for too long, each as a sentence."""
-        stale = {}
-        for costmap in (self.global_costmap, self.local_costmap):
-            for source, age_s in costmap.silent_sources(now_s, self.params.sensor_timeout_s):
-                stale[source] = age_s
-        return [f"no data from {name} for {age_s:.1f} s" for name, age_s in stale.items()]
+    def _out_of_date(self, now_s: float) -> str:
+        """Why the local costmap is not to be driven by, "" when it is."""
+        if self.local_costmap.is_current(now_s):
+            return ""
+        stale = [f"nothing from {name} for {age_s:.1f} s"
+                 for name, age_s in self.local_costmap.stale_sources(now_s)]
+        return "; ".join(stale) or "the local costmap is out of date"
 
     # -- planning ------------------------------------------------------------------
 
     def make_plan(self, start: Pose2D, goal: Pose2D, tolerance_m: float = 0.0) -> np.ndarray:
         """A plan between two poses without flying it, as ``~make_plan`` gives it.
 
-        With ``make_plan_clear_costmap`` the area around the start (the original
-        takes a square of twice the circumscribed radius of clear cells) is not
-        trusted less than the robot itself: the start cell is always free.
-        When the goal has no plan, the cells around it are tried ring by ring up
-        to ``tolerance_m``; ``make_plan_add_unreachable_goal`` appends the goal.
+        When the goal has no plan, points around it are tried ring by ring up to
+        ``tolerance_m``; ``make_plan_add_unreachable_goal`` appends the goal then.
 
         Raises:
             PlanningError: no plan, not even near the goal.
@@ -302,21 +313,15 @@ class Navigator:
         return self.planner.make_plan(costmap.spec, costmap.costs, start, goal)
 
     def _plan_near(self, start: Pose2D, goal: Pose2D, tolerance_m: float) -> Optional[np.ndarray]:
-        """Square rings around the goal, three cells apart, smallest first."""
         step_m = 3.0 * self.global_costmap.spec.resolution_m
         if 0.0 < tolerance_m < step_m:
             step_m = tolerance_m
-        for ring in range(1, int(math.floor(tolerance_m / step_m + 1e-9)) + 1):
-            offsets = step_m * np.arange(-ring, ring + 1)
-            for dy in offsets:
-                for dx in offsets:
-                    if max(abs(dx), abs(dy)) < ring * step_m - 1e-9:
-                        continue
-                    try:
-                        return self._plan_between(
-                            start, Pose2D(goal.x_m + dx, goal.y_m + dy, goal.yaw_rad))
-                    except PlanningError:
-                        continue
+        for dx, dy in ring_offsets(step_m, tolerance_m):
+            try:
+                return self._plan_between(start, Pose2D(goal.x_m + dx, goal.y_m + dy,
+                                                        goal.yaw_rad))
+            except PlanningError:
+                continue
         return None
 
     def _begin_planning(self, now_s: float) -> None:
@@ -369,9 +374,9 @@ class Navigator:
             tick.command = Twist2D()
             return
         self._watch_oscillation(tick.now_s, located.in_global)
-        stale = self._stale_sensors(tick.now_s)
-        if stale or not self.local_costmap.is_current(tick.now_s):
-            tick.warnings.append("stopped: " + ("; ".join(stale) or "sensor data is out of date"))
+        out_of_date = self._out_of_date(tick.now_s)
+        if out_of_date:
+            tick.warnings.append("stopped: " + out_of_date)
             tick.command = Twist2D()
             return
         if self._new_plan is not None:
@@ -386,9 +391,7 @@ class Navigator:
 
     def _follow(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
         assert located.in_local is not None and located.in_global is not None
-        costmap = self.local_costmap
-        transform = local_from_global(located)
-        if self.controller.is_goal_reached(located.in_local, velocity, transform):
+        if self.controller.is_goal_reached():
             self._finish(tick, Outcome(True, "Goal reached."))
             return
         if self._is_oscillating(tick.now_s):
@@ -398,7 +401,8 @@ class Navigator:
             return
         try:
             tick.control = self.controller.compute_velocity(
-                costmap.spec, costmap.costs, located.in_local, velocity, transform)
+                self.local_costmap.spec, self.local_costmap.costs, located.in_local, velocity,
+                local_from_global(located))
         except ControlError as error:
             tick.warnings.append(str(error))
             self._control_failed(tick)
@@ -537,3 +541,15 @@ def local_from_global(located: Located) -> Pose2D:
     yaw = a.yaw_rad - b.yaw_rad
     cos, sin = math.cos(yaw), math.sin(yaw)
     return Pose2D(a.x_m - (cos * b.x_m - sin * b.y_m), a.y_m - (sin * b.x_m + cos * b.y_m), yaw)
+
+
+def ring_offsets(step_m: float, reach_m: float) -> Iterator[Tuple[float, float]]:
+    """Points on growing square rings around a centre, in the original's order."""
+    for ring in range(1, int(math.floor(reach_m / step_m + 1e-9)) + 1):
+        for y, x in itertools.product(range(ring + 1), repeat=2):
+            if max(x, y) < ring:
+                continue
+            for sign_y, sign_x in itertools.product((-1, 1), repeat=2):
+                if (y == 0 and sign_y < 0) or (x == 0 and sign_x < 0):
+                    continue
+                yield sign_x * x * step_m, sign_y * y * step_m

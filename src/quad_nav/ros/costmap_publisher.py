@@ -13,7 +13,8 @@ from geometry_msgs.msg import PolygonStamped
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
 
-from quad_nav.costmap.layered import LayeredCostmap, Window
+from quad_nav.costmap.cost_grid import Window
+from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
@@ -66,7 +67,7 @@ class CostmapPublisher:
             self._grid.publish(self._full(stamp))
             self._published = costmap.spec
         elif changed is not None and not changed.is_empty:
-            part = costmap.costs[changed.y0:changed.yn, changed.x0:changed.xn]
+            part = costmap.costs[changed.slices]
             self._updates.publish(update_message(
                 part, changed.x0, changed.y0, costmap.params.global_frame, stamp))
 

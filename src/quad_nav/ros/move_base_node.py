@@ -115,7 +115,7 @@ class MoveBaseNode:
 
     def _clear_costmaps(self, _) -> EmptyResponse:
         with self._lock:
-            self._navigator.clear_costmaps()
+            self._navigator.clear_costmaps(rospy.get_time())
         return EmptyResponse()
 
     # -- the loop ------------------------------------------------------------------

@@ -10,7 +10,7 @@ from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid, Path
 from sensor_msgs.msg import PointCloud2, PointField
 
-from quad_nav.costmap.occupancy import COST_TO_OCCUPANCY
+from quad_nav.costmap.occupancy import occupancy
 from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import (
     Pose2D,
@@ -90,7 +90,7 @@ def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Tim
     message.info.origin.position.x = spec.origin_x_m
     message.info.origin.position.y = spec.origin_y_m
     message.info.origin.orientation.w = 1.0
-    message.data = COST_TO_OCCUPANCY[costs].ravel().tolist()
+    message.data = occupancy(costs).ravel().tolist()
     return message
 
 
@@ -99,7 +99,7 @@ def update_message(costs: np.ndarray, x0: int, y0: int, frame: str,
     """A window uint8[h, w] of a costmap whose lower left cell is (x0, y0)."""
     message = OccupancyGridUpdate(x=x0, y=y0, width=costs.shape[1], height=costs.shape[0])
     message.header.frame_id, message.header.stamp = frame, stamp
-    message.data = COST_TO_OCCUPANCY[costs].ravel().tolist()
+    message.data = occupancy(costs).ravel().tolist()
     return message
 
 

@@ -86,10 +86,10 @@ class Sensor:
         _, layer, source, _ = target
         if self.data_type == "LaserScan":
             layer.add_scan(source, scan_from_message(message), points_pose, received_s,
-                           origin=origin_pose)
+                           origin_pose)
         else:
             layer.add_cloud(source, _cloud_points(message), points_pose,
-                            message.header.stamp.to_sec(), received_s, origin=origin_pose)
+                            message.header.stamp.to_sec(), received_s, origin_pose)
 
 
 def _cloud_points(message) -> np.ndarray:

@@ -9,15 +9,16 @@ from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
 
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.static import StaticLayer
+from quad_nav.costmap.static import StaticLayer, StaticMap
 from quad_nav.grid import GridSpec
 
 
 class MapListener:
     """One static layer's map topic. ``lock`` guards the costmap."""
 
-    def __init__(self, costmap: LayeredCostmap, layer: StaticLayer, lock):
+    def __init__(self, costmap: LayeredCostmap, name: str, layer: StaticLayer, lock):
         self._costmap = costmap
+        self._name = name
         self._layer = layer
         self._lock = lock
         topic = layer.params.map_topic
@@ -36,17 +37,17 @@ class MapListener:
                           "the same", self._grid.resolved_name, frame, wanted)
         occupancy = np.array(message.data, dtype=np.int8).reshape(spec.shape)
         with self._lock:
-            self._costmap.set_static_map(self._layer, spec, occupancy)
+            self._costmap.set_map(StaticMap(occupancy, spec), self._name)
         if self._layer.params.first_map_only:
             self._grid.unregister()
 
     def _on_update(self, message: OccupancyGridUpdate) -> None:
         part = np.array(message.data, dtype=np.int8).reshape(message.height, message.width)
         with self._lock:
-            self._layer.update_map(message.x, message.y, part)
+            self._layer.update_map(part, message.x, message.y)
 
 
 def connect(costmaps: Sequence[LayeredCostmap], lock) -> list:
     """Subscribes to the map topic of every static layer."""
-    return [MapListener(costmap, layer, lock) for costmap in costmaps
-            for layer in costmap.layers.values() if isinstance(layer, StaticLayer)]
+    return [MapListener(costmap, name, layer, lock) for costmap in costmaps
+            for name, layer in costmap.layers.items() if isinstance(layer, StaticLayer)]

@@ -1,0 +1,72 @@
+"""A navigator made from a configuration, and changed by another one."""
+from __future__ import annotations
+
+from dataclasses import replace
+
+from quad_nav.config import Configuration
+from quad_nav.config.recoveries import RecoveryParams
+from quad_nav.control.rollout import footprint_cost
+from quad_nav.control.trajectory_planner import TrajectoryPlanner
+from quad_nav.costmap.layer import LayerParams
+from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.geometry import Pose2D
+from quad_nav.navigator import NamedRecovery, Navigator
+from quad_nav.plan.navfn import Navfn
+from quad_nav.recovery import ClearCostmap, ClearCostmapParams, Recovery, Rotate
+
+
+def build_navigator(configuration: Configuration) -> Navigator:
+    """The navigator that a configuration describes, standing idle."""
+    global_costmap = LayeredCostmap(_watched(configuration, configuration.global_costmap))
+    local_costmap = LayeredCostmap(_watched(configuration, configuration.local_costmap))
+    controller = TrajectoryPlanner(configuration.trajectory_planner, local_costmap.footprint,
+                                   configuration.local_planner_period_s)
+    recoveries = [NamedRecovery(name, _recovery(params))
+                  for name, params in configuration.recoveries]
+    return Navigator(configuration.navigator, global_costmap, local_costmap,
+                     Navfn(configuration.navfn), controller, recoveries)
+
+
+def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
+    """Takes over every parameter that may change in flight; plan and goal stay."""
+    navigator.set_params(configuration.navigator)
+    navigator.global_costmap.reconfigure(_watched(configuration, configuration.global_costmap))
+    navigator.local_costmap.reconfigure(_watched(configuration, configuration.local_costmap))
+    navigator.planner = Navfn(configuration.navfn)
+    assert isinstance(navigator.controller, TrajectoryPlanner)
+    navigator.controller.set_params(configuration.trajectory_planner)
+    navigator.controller.set_footprint(navigator.local_costmap.footprint)
+
+
+def _watched(configuration: Configuration, costmap: CostmapParams) -> CostmapParams:
+    """The costmap with no sensor trusted for longer than ``sensor_timeout_s``.
+
+    ``expected_update_rate`` is a period in seconds, and people write 21.0 into it
+    for a LIDAR of 20 Hz; the robot would fly blind for 21 s.
+    """
+    limit_s = configuration.navigator.sensor_timeout_s
+    if limit_s <= 0.0:
+        return costmap
+    layers = tuple((name, _watched_layer(layer, limit_s)) for name, layer in costmap.layers)
+    return replace(costmap, layers=layers)
+
+
+def _watched_layer(layer: LayerParams, limit_s: float) -> LayerParams:
+    if not isinstance(layer, ObstacleLayerParams):
+        return layer
+    sources = tuple(
+        replace(source, expected_update_period_s=min(
+            source.expected_update_period_s or limit_s, limit_s))
+        for source in layer.sources)
+    return replace(layer, sources=sources)
+
+
+def _recovery(params: RecoveryParams) -> Recovery:
+    if isinstance(params, ClearCostmapParams):
+        return ClearCostmap(params)
+    return Rotate(params, _footprint_cost)
+
+
+def _footprint_cost(costmap: LayeredCostmap, pose: Pose2D) -> float:
+    return footprint_cost(costmap.spec, costmap.costs, costmap.footprint, pose)

@@ -1,0 +1,61 @@
+"""Parameters that are lists of numbers written as text."""
+from __future__ import annotations
+
+from typing import Any, Optional, Sequence, Tuple
+
+import numpy as np
+import yaml
+
+Polygon = Tuple[Tuple[float, float], ...]
+
+
+def polygon_from_text(text: str) -> Optional[Polygon]:
+    """A footprint's vertices in metres; None for "" and "[]", which mean "a circle".
+
+    The original reads these numbers as float32, so they are rounded to that.
+
+    Raises:
+        ValueError: not a list of at least three [x, y].
+    """
+    if text.strip() in ("", "[]"):
+        return None
+    try:
+        points = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ValueError("not a list") from None
+    return polygon_from_list(points)
+
+
+def polygon_from_list(points: Any) -> Optional[Polygon]:
+    """The same of a list. Raises ValueError as ``polygon_from_text`` does."""
+    if points == []:
+        return None
+    if not isinstance(points, list) or len(points) < 3:
+        raise ValueError("fewer than three points")
+    return tuple(_vertex(point) for point in points)
+
+
+def text_from_polygon(polygon: Sequence[Tuple[float, float]]) -> str:
+    """As the original writes it back to the parameter server: six digits."""
+    return "[" + ",".join(f"[{x:g},{y:g}]" for x, y in polygon) + "]"
+
+
+def numbers_from_text(text: str) -> Tuple[float, ...]:
+    """ "-0.3, 0.3" as numbers. Raises ValueError when one of them is none."""
+    words = text.strip().strip("[]").replace(",", " ").split()
+    numbers = tuple(float(word) for word in words)
+    if not np.all(np.isfinite(numbers)):
+        raise ValueError("not finite")
+    return numbers
+
+
+def _vertex(point: Any) -> Tuple[float, float]:
+    if not isinstance(point, list) or len(point) != 2:
+        raise ValueError(f"{point!r} is not a point [x, y]")
+    for number in point:
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or (
+                not np.isfinite(number)):
+            raise ValueError(f"{number!r} is not a number")
+    # Through six digits and float32, the way that the original takes them.
+    x, y = (float(np.float32(f"{number:g}")) for number in point)
+    return (x, y)
