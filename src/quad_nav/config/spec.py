@@ -110,7 +110,7 @@ class Parameter:
             names = ", ".join(f"{choice.value} ({choice.name})" for choice in self.choices)
             raise Unusable(f"{value} is no choice; expected one of {names}")
         # roscpp rounds a double that is read as an int, halves upwards.
-        return float(value) if self.kind == "double" else int(math.floor(value + 0.5))
+        return float(value) if self.kind == "double" else math.floor(value + 0.5)
 
     def clamp(self, value: Any) -> Any:
         """The nearest value within dynamic_reconfigure's range."""
@@ -146,6 +146,27 @@ class Table:
             if parameter.name == name:
                 return parameter
         raise KeyError(name)
+
+
+def double(name: str, default: float, field: str, unit: str, description: str,
+           domain: Domain = Domain.NOT_NEGATIVE, low: Any = None, high: Any = None,
+           **more: Any) -> Parameter:
+    return Parameter(name, "double", default, field, description, unit, domain, low, high, **more)
+
+
+def integer(name: str, default: int, field: str, unit: str, description: str,
+            domain: Domain = Domain.ANY, low: Any = None, high: Any = None,
+            **more: Any) -> Parameter:
+    return Parameter(name, "int", default, field, description, unit, domain, low, high, **more)
+
+
+def flag(name: str, default: bool, field: str, description: str) -> Parameter:
+    return Parameter(name, "bool", default, field, description)
+
+
+def text(name: str, default: str, field: str, expected: str, description: str,
+         **more: Any) -> Parameter:
+    return Parameter(name, "str", default, field, description, expected, **more)
 
 
 def _hint(value: Any) -> str:

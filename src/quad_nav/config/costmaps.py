@@ -1,0 +1,185 @@
+"""The trees of ``global_costmap`` and ``local_costmap``.
+
+Two styles are in use. With a ``plugins`` list each layer has a namespace of its
+name. Without one, layer parameters stand among the costmap's own (before ROS
+Hydro) and move_base moves them: ``observation_sources`` and the sources below
+``obstacle_layer``, ``inflation_radius`` below ``inflation_layer``, and so on.
+In both styles some parameters of the costmap replace the layer's.
+"""
+from __future__ import annotations
+
+from typing import Any, Dict, List, Tuple
+
+from quad_nav.config import costmap_tables as tables
+from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, settle_layer
+from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
+from quad_nav.config.reader import Namespace, fields, settle, subtree
+from quad_nav.config.spec import Table
+from quad_nav.config.texts import polygon_from_list, text_from_polygon
+from quad_nav.costmap.layered import CostmapParams
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+
+OBSTACLE, VOXEL = "costmap_2d::ObstacleLayer", "costmap_2d::VoxelLayer"
+STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
+_OLD_STYLE = ("static_map", "map_type")
+
+
+def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
+    """Brings ``tree[name]`` into the state in which the original leaves it.
+
+    Args:
+        tree: the node's tree; footprints and ranges may be inherited from it.
+    """
+    costmap = subtree(tree, name, "", notes)
+    _settle_footprint(costmap, name, tree, notes)
+    if "plugins" not in costmap:
+        _settle_old_style(costmap, name, notes)
+    plugins = _checked_plugins(costmap, name, notes)
+    _remark_on_old_style(costmap, name, [layer_type for _, layer_type in plugins], notes)
+    for layer, layer_type in plugins:
+        _copy_parent_parameters(costmap, name, layer, layer_type, notes)
+    chain = ((name, costmap), ("", tree))
+    for layer, layer_type in plugins:
+        if layer_type in LAYERS:
+            settle_layer(costmap, name, layer, layer_type, chain, notes)
+    known = {layer for layer, _ in plugins} | {"plugins", *_OLD_STYLE}
+    for _, layer_type in plugins:
+        known |= set(PARENT_PARAMETERS.get(layer_type, ()))
+    # ObstacleLayer's ranges are looked for upwards, wherever plugins put it.
+    settle(costmap, name, _without_layer_parameters(costmap, name, known, notes), notes, known)
+
+
+def costmap_params(costmap: Namespace) -> CostmapParams:
+    """The dataclass of a settled costmap."""
+    layers = []
+    for plugin in costmap["plugins"]:
+        layer = LAYERS.get(plugin["type"])
+        if layer is not None:
+            layers.append((plugin["name"], layer.params(costmap, plugin["name"])))
+    return CostmapParams(layers=tuple(layers), **fields(costmap, tables.COSTMAP.parameters))
+
+
+def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
+    """A costmap that no sensor writes to is legal, and a robot that flies into things."""
+    if not any(isinstance(layer, ObstacleLayerParams) and layer.sources
+               for _, layer in params.layers):
+        notes.remark(name, CAUTION, "no layer with observation_sources: sensors mark nothing here")
+
+
+def _settle_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:
+    """Footprint and radius may stand at the node's level; a list becomes a text."""
+    for key in ("footprint", "robot_radius"):
+        if key not in costmap and key in tree:
+            costmap[key] = tree[key]
+            notes.moved(join(name, key), key)
+    if not isinstance(costmap.get("footprint"), list):
+        return
+    try:
+        polygon = polygon_from_list(costmap["footprint"])
+    except ValueError as error:
+        expected = tables.COSTMAP["footprint"].expected
+        notes.problem(join(name, "footprint"), f"{error}; expected {expected}")
+        polygon = None
+    costmap["footprint"] = "[]" if polygon is None else text_from_polygon(polygon)
+
+
+def _settle_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
+    """Writes the plugins list of a costmap that has none, and moves the layers' parameters."""
+    plugins: List[Tuple[str, str]] = []
+    static_map = costmap.get("static_map", False)
+    if not isinstance(static_map, bool):
+        notes.problem(join(name, "static_map"),
+                      f"{static_map!r} is neither true nor false; expected true or false")
+    elif static_map:
+        plugins.append(("static_layer", STATIC))
+    voxels = costmap.get("map_type") == "voxel"
+    plugins.append(("obstacle_layer", VOXEL if voxels else OBSTACLE))
+    plugins.append(("inflation_layer", INFLATION))
+    for layer, layer_type in plugins:
+        keys = list(PARENT_PARAMETERS[layer_type])
+        if layer == "obstacle_layer":
+            sources = costmap.get("observation_sources", "")
+            keys += sources.split() if isinstance(sources, str) else []
+            keys.append("observation_sources")
+        for key in keys:
+            keep = key == "track_unknown_space"  # the costmap itself reads it too
+            _move(costmap, name, layer, key, notes, keep=keep)
+    costmap["plugins"] = [{"name": layer, "type": kind} for layer, kind in plugins]
+
+
+def _remark_on_old_style(costmap: Namespace, name: str, types: List[str], notes: Notes) -> None:
+    """Old switches that promise a layer which plugins do not have."""
+    for key, value, promised in (("static_map", True, STATIC), ("map_type", "voxel", VOXEL)):
+        if costmap.get(key) == value and promised not in types:
+            notes.remark(join(name, key), IGNORED, "ignored by move_base: plugins say which layers"
+                         f" there are, and {promised} is not among them")
+
+
+def _copy_parent_parameters(costmap: Namespace, name: str, layer: str, layer_type: str,
+                            notes: Notes) -> None:
+    for key in PARENT_PARAMETERS.get(layer_type, ()):
+        below = costmap.get(layer)
+        if key in costmap and isinstance(below, dict) and below.get(key, costmap[key]) != (
+                costmap[key]):
+            notes.remark(join(name, layer, key), IGNORED,
+                         f"ignored by move_base: {join(name, key)} replaces it")
+        _move(costmap, name, layer, key, notes, keep=True)
+
+
+def _move(costmap: Namespace, name: str, layer: str, key: str, notes: Notes, keep: bool) -> None:
+    if key not in costmap:
+        return
+    subtree(costmap, layer, name, notes)[key] = costmap[key]
+    notes.moved(join(name, layer, key), join(name, key))
+    value = costmap[key] if keep else costmap.pop(key)
+    for below in value if isinstance(value, dict) else ():
+        notes.moved(join(name, layer, key, below), join(name, key, below))
+
+
+def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[str, str]]:
+    """(name, type) of each layer; what cannot be one is a problem or a remark."""
+    place = join(name, "plugins")
+    plugins = costmap["plugins"]
+    if not isinstance(plugins, list):
+        notes.problem(place, f"{plugins!r} is not a list; expected a list of {{name: , type: }}")
+        return []
+    checked: List[Tuple[str, str]] = []
+    for entry in plugins:
+        if not isinstance(entry, dict) or not all(
+                isinstance(entry.get(key), str) for key in ("name", "type")):
+            notes.problem(place, f"{entry!r} is no layer; expected {{name: , type: }}")
+        elif entry["name"] in dict(checked):
+            notes.problem(place, f"{entry['name']!r} is there twice; expected a name for each")
+        else:
+            checked.append((entry["name"], entry["type"]))
+            _remark_on_type(join(place, entry["name"]), entry["type"], notes)
+    return checked
+
+
+def _remark_on_type(place: str, layer_type: str, notes: Notes) -> None:
+    if layer_type == VOXEL:
+        notes.remark(place, UNSUPPORTED, f"{VOXEL} is known to move_base but not supported here;"
+                     f" it is flown as {OBSTACLE}")
+    elif layer_type not in LAYERS:
+        notes.remark(place, UNSUPPORTED, f"{layer_type} is not supported here, the layer is left"
+                     f" out; there are {', '.join(sorted(LAYERS))}")
+
+
+def _without_layer_parameters(costmap: Namespace, name: str, known: Any,
+                              notes: Notes) -> Table:
+    """COSTMAP, with the layers' keys that no layer takes told as ignored."""
+    misplaced: Dict[str, str] = {}
+    for layer_type, keys in PARENT_PARAMETERS.items():
+        for key in keys:
+            if key not in known:
+                misplaced[key] = f"no {layer_type} in plugins takes it"
+    if "observation_sources" in costmap:
+        misplaced["observation_sources"] = "with plugins it belongs below the obstacle layer's name"
+        for source in str(costmap["observation_sources"]).split():
+            misplaced[source] = misplaced["observation_sources"]
+    for key, value in costmap.items():
+        if isinstance(value, dict) and key not in known and key not in misplaced:
+            misplaced[key] = "no layer of that name is in plugins"
+    base = tables.COSTMAP
+    return Table(base.reconfigurable, base.fixed, base.unsupported,
+                        tuple(misplaced.items()))

@@ -1,0 +1,198 @@
+"""A robot's YAML files, read offline as the launch files load them.
+
+``costmap_common_params`` goes into both costmaps; the others hold their own
+namespaces, or stand at the node's level. Later files win, key by key. Files may
+be numbered by hand (``costmap_common_params0.yaml``) or be one template in which
+roslaunch puts the robot's number for ``$(arg i)``.
+"""
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
+
+import yaml
+
+from quad_nav.config.notes import CAUTION, Remark
+from quad_nav.errors import InputError
+
+COMMON = "costmap_common_params"
+REQUIRED = (COMMON, "local_costmap_params", "global_costmap_params", "base_local_planner_params")
+OPTIONAL = ("move_base_params",)
+_COSTMAPS = ("global_costmap", "local_costmap")
+_SUBSTITUTION = re.compile(r"\$\(([^)]*)\)")
+
+
+class ParameterTree(Dict[str, Any]):
+    """A tree that knows where its values were written.
+
+    ``origins``: path -> "file:line". ``remarks``: what was odd about the files.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.origins: Dict[str, str] = {}
+        self.remarks: List[Remark] = []
+
+
+def load_files(source: Union[str, Path, Sequence[Union[str, Path]]],
+               substitutions: Optional[Mapping[str, str]] = None) -> ParameterTree:
+    """The parameter tree of one robot.
+
+    Args:
+        source: a folder with the four files (and ``move_base_params.yaml`` and
+            ``robot{i}.yaml`` if there are such), or a list of files, whose order
+            is kept. In a folder a file with the robot's number goes before one
+            without.
+        substitutions: what ``$(arg name)`` stands for; ``{"i": "0"}``.
+
+    Raises:
+        InputError: every file that is missing or cannot be read, with its line.
+    """
+    arguments = {} if substitutions is None else dict(substitutions)
+    if isinstance(source, (str, Path)):
+        paths = files_of(Path(source), arguments.get("i"))
+    else:
+        paths = [Path(path) for path in source]
+    tree = ParameterTree()
+    problems: List[str] = []
+    for path in paths:
+        try:
+            document = _read(path, arguments)
+        except InputError as error:
+            problems.extend(error.problems)
+            continue
+        prefixes = _COSTMAPS if path.name.startswith("costmap_common") else ("",)
+        for prefix in prefixes:
+            _merge(tree, document, prefix)
+        for line, key in document.duplicates:
+            tree.remarks.append(Remark(f"{path}:{line}", CAUTION,
+                                       f"{key} is there twice; YAML takes the last one"))
+    if problems:
+        raise InputError(problems)
+    return tree
+
+
+def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
+    """The files of a robot in a folder, in the order in which they are loaded.
+
+    Raises:
+        InputError: the folder, or one of the four files, is missing.
+    """
+    if not folder.is_dir():
+        raise InputError([f"{folder}: no such folder; expected one with {REQUIRED[0]}.yaml"])
+    paths: List[Path] = []
+    problems: List[str] = []
+    for stem in REQUIRED + OPTIONAL:
+        numbered, plain = folder / f"{stem}{number}.yaml", folder / f"{stem}.yaml"
+        found = [path for path in (numbered, plain) if path.is_file()]
+        if found:
+            paths.append(found[0])
+        elif stem in REQUIRED:
+            names = plain.name if number is None else f"{plain.name} or {numbered.name}"
+            problems.append(f"{folder}: no {names}")
+    if problems:
+        raise InputError(problems)
+    own = folder / f"robot{number}.yaml"
+    return paths + [own] if own.is_file() else paths
+
+
+class _Document:
+    """One file: its values, the line of each path, and keys that are there twice."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.values: List[Tuple[Tuple[str, ...], Any]] = []  # leaves, in order
+        self.lines: Dict[Tuple[str, ...], int] = {}
+        self.duplicates: List[Tuple[int, str]] = []
+
+
+def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError([f"{path}: cannot be read: {error}"]) from error
+    text = _substituted(text, path, arguments)
+    document = _Document(path)
+    loader = yaml.SafeLoader(text)
+    try:
+        node = loader.get_single_node()
+        if node is None:
+            return document
+        if not isinstance(node, yaml.MappingNode):
+            raise InputError([f"{path}:1: not a list of names with values"])
+        _collect(node, (), document, loader)
+    except yaml.YAMLError as error:
+        raise InputError([_told(error, path)]) from error
+    finally:
+        loader.dispose()
+    return document
+
+
+def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
+    """The text with every ``$(arg name)`` replaced, in comments too, as roslaunch does."""
+    problems: List[str] = []
+
+    def value(match: re.Match) -> str:
+        words = match.group(1).split()
+        if len(words) == 2 and words[0] == "arg" and words[1] in arguments:
+            return str(arguments[words[1]])
+        line = text.count("\n", 0, match.start()) + 1
+        known = ", ".join(f"$(arg {name})" for name in arguments) or "nothing in $( )"
+        problems.append(f"{path}:{line}: {match.group(0)} stands for nothing; expected {known}")
+        return match.group(0)
+
+    substituted = _SUBSTITUTION.sub(value, text)
+    if problems:
+        raise InputError(problems)
+    return substituted
+
+
+def _collect(node: yaml.MappingNode, above: Tuple[str, ...], document: _Document,
+             loader: yaml.SafeLoader) -> None:
+    """Walks the nodes rather than the values: only they have lines and duplicates."""
+    loader.flatten_mapping(node)
+    seen = set()
+    for key_node, value_node in node.value:
+        key = str(loader.construct_object(key_node, deep=True))
+        line = key_node.start_mark.line + 1
+        if key in seen:
+            document.duplicates.append((line, "/".join((*above, key))))
+        seen.add(key)
+        path = above + tuple(filter(None, key.split("/")))
+        document.lines[path] = line
+        if isinstance(value_node, yaml.MappingNode):
+            document.values.append((path, {}))
+            _collect(value_node, path, document, loader)
+        else:
+            document.values.append((path, loader.construct_object(value_node, deep=True)))
+
+
+def _merge(tree: ParameterTree, document: _Document, prefix: str) -> None:
+    """Key by key: a namespace that is there already keeps what the file does not set."""
+    above = (prefix,) if prefix else ()
+    for below, value in document.values:
+        path = above + below
+        namespace = _namespace(tree, path[:-1])
+        if value == {} and isinstance(value, dict):
+            if not isinstance(namespace.get(path[-1]), dict):
+                namespace[path[-1]] = {}
+        else:
+            namespace[path[-1]] = value
+        tree.origins["/".join(path)] = f"{document.path}:{document.lines[below]}"
+
+
+def _namespace(tree: Dict[str, Any], path: Iterable[str]) -> Dict[str, Any]:
+    for name in path:
+        if not isinstance(tree.get(name), dict):
+            tree[name] = {}
+        tree = tree[name]
+    return tree
+
+
+def _told(error: yaml.YAMLError, path: Path) -> str:
+    mark = getattr(error, "problem_mark", None)
+    if mark is None:
+        return f"{path}: not YAML: {error}"
+    what = ", ".join(filter(None, (getattr(error, "context", None), error.problem)))  # type: ignore[attr-defined]
+    return f"{path}:{mark.line + 1}:{mark.column + 1}: not YAML: {what}"

@@ -1,0 +1,119 @@
+"""Changing a configuration while it is in force, as dynamic_reconfigure does."""
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from typing import Any, Dict, List, Mapping, Tuple
+
+from quad_nav.config import costmap_tables, tables
+from quad_nav.config.configuration import (
+    COSTMAPS,
+    Configuration,
+    navigator_params,
+    trajectory_planner_params,
+)
+from quad_nav.config.costmaps import costmap_params
+from quad_nav.config.layers import layer_tables
+from quad_nav.config.notes import join
+from quad_nav.config.planners import SUPPORTED, TRAJECTORY_PLANNER
+from quad_nav.config.spec import Parameter, Unusable
+from quad_nav.errors import InputError
+
+_GROUPS = "groups"  # dynamic_reconfigure's own bookkeeping among the values
+_RESTORE = "restore_defaults"
+
+
+def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, ...]]:
+    """Namespace -> its reconfigurable parameters, in the original's order.
+
+    Namespaces are relative to the node: "" is move_base itself.
+    """
+    namespaces = {"": tables.NAVIGATOR, TRAJECTORY_PLANNER: tables.TRAJECTORY_PLANNER}
+    for costmap in COSTMAPS:
+        namespaces[costmap] = costmap_tables.COSTMAP
+        for layer, table in layer_tables(configuration.tree[costmap]["plugins"]).items():
+            namespaces[join(costmap, layer)] = table
+    return {name: table.reconfigurable for name, table in namespaces.items()}
+
+
+def values(configuration: Configuration, namespace: str) -> Dict[str, Any]:
+    """The ROS values in force of a namespace's reconfigurable parameters."""
+    settled = _below(configuration.tree, namespace)
+    return {parameter.name: settled[parameter.name]
+            for parameter in reconfigurable(configuration)[namespace]}
+
+
+def updated(configuration: Configuration, namespace: str,
+            changes: Mapping[str, Any]) -> Configuration:
+    """The configuration with some parameters of one namespace changed.
+
+    Values are clamped to their ranges. ``restore_defaults`` puts the namespace
+    back to how it was loaded. As in the original, recoveries keep the parameters
+    that they were loaded with.
+
+    Raises:
+        InputError: one line for every change that cannot be made; none is made then.
+    """
+    parameters = reconfigurable(configuration).get(namespace)
+    if parameters is None:
+        names = ", ".join(repr(name) for name in reconfigurable(configuration))
+        raise InputError([f"{namespace}: nothing to reconfigure; expected one of {names}"])
+    checked = _checked(parameters, namespace, changes)
+    if checked.get(_RESTORE):
+        start = _below(configuration.tree_at_start, namespace)
+        checked = {parameter.name: start[parameter.name] for parameter in parameters}
+    tree = copy.deepcopy(dict(configuration.tree))
+    _below(tree, namespace).update(checked)
+    return _remade(replace(configuration, tree=tree), namespace)
+
+
+def _checked(parameters: Tuple[Parameter, ...], namespace: str,
+             changes: Mapping[str, Any]) -> Dict[str, Any]:
+    known = {parameter.name: parameter for parameter in parameters}
+    checked: Dict[str, Any] = {}
+    problems: List[str] = []
+    for name, value in changes.items():
+        if name == _GROUPS:
+            continue
+        place = join(namespace, name)
+        if name not in known:
+            problems.append(f"{place}: unknown; expected one of {', '.join(known)}")
+        elif name in SUPPORTED and value != SUPPORTED[name]:
+            problems.append(f"{place}: {value!r} is not supported here; expected {SUPPORTED[name]}")
+        else:
+            try:
+                checked[name] = _clamped(known[name], value)
+            except Unusable as problem:
+                problems.append(f"{place}: {problem}")
+    if problems:
+        raise InputError(problems)
+    return checked
+
+
+def _clamped(parameter: Parameter, value: Any) -> Any:
+    """Clamped first: -1 m/s is then 0 m/s, while 0 Hz stays an error where it cannot be."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        value = parameter.clamp(value)
+    return parameter.check(value)
+
+
+def _remade(configuration: Configuration, namespace: str) -> Configuration:
+    """The dataclass of that namespace from the tree; the others stay as they are."""
+    tree = configuration.tree
+    if namespace == "":
+        listed = configuration.navigator.recovery_behaviors
+        return replace(configuration, navigator=navigator_params(tree, listed, given=tree))
+    if namespace == TRAJECTORY_PLANNER:
+        planner = trajectory_planner_params(tree[TRAJECTORY_PLANNER])
+        return replace(configuration, trajectory_planner=planner)
+    costmap = namespace.split("/")[0]
+    params = costmap_params(tree[costmap])
+    if costmap == "global_costmap":
+        return replace(configuration, global_costmap=params)
+    return replace(configuration, local_costmap=params)
+
+
+def _below(tree: Mapping[str, Any], namespace: str) -> Any:
+    for name in filter(None, namespace.split("/")):
+        tree = tree[name]
+    return tree

@@ -1,0 +1,150 @@
+"""The recovery behaviours: move_base's default sequence, or a list of one's own."""
+from __future__ import annotations
+
+from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+
+from quad_nav.config import tables
+from quad_nav.config.costmap_tables import COSTMAP
+from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
+from quad_nav.config.planners import TRAJECTORY_PLANNER
+from quad_nav.config.reader import Namespace, fields, settle, subtree
+from quad_nav.config.spec import Table
+from quad_nav.costmap.layered import CostmapParams
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.recovery import DEFAULT_LAYER_NAMES, ClearCostmapParams, RotateParams
+
+RecoveryParams = Union[ClearCostmapParams, RotateParams]
+NamedTypes = Tuple[Tuple[str, str], ...]
+
+CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
+ROTATE = "rotate_recovery/RotateRecovery"
+_TABLES: Dict[str, Table] = {CLEAR: tables.CLEAR_COSTMAP, ROTATE: tables.ROTATE}
+_CONSERVATIVE, _AGGRESSIVE, _ROTATE = "conservative_reset", "aggressive_reset", "rotate_recovery"
+_AFFECTED_MAPS = ("local", "global", "both")
+
+
+def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
+    """Brings the recoveries' namespaces into the state in which the original leaves them.
+
+    Returns:
+        (name, type) of each behaviour when the tree lists any, else None.
+    """
+    listed = _listed(tree, notes)
+    if listed is None:
+        _settle_default_distances(tree, notes)
+    for name, kind in dict(listed or _default_sequence(tree)).items():
+        # The behaviours of the default sequence need no namespace, and leave none.
+        if name not in tree and listed is None:
+            continue
+        namespace = subtree(tree, name, "", notes)
+        layers = ("layer_names",) if kind == CLEAR else ()
+        settle(namespace, name, _TABLES[kind], notes, also_known=layers)
+        if kind == CLEAR:
+            _check_clearing(namespace, name, notes)
+    return listed
+
+
+def recoveries(tree: Mapping[str, Any], listed: Optional[NamedTypes],
+               costmaps: Tuple[CostmapParams, ...]) -> Tuple[Tuple[str, RecoveryParams], ...]:
+    """(name, parameters) in the order in which they are tried, of a settled tree."""
+    sequence = _default_sequence(tree) if listed is None else listed
+    return tuple((name, _clear_params(tree.get(name, {}), costmaps) if kind == CLEAR
+                  else _rotate_params(tree.get(name, {}), tree[TRAJECTORY_PLANNER]))
+                 for name, kind in sequence)
+
+
+def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
+    """move_base takes it from a parameter of its own, not from the footprint."""
+    costmap = tree["local_costmap"]
+    return costmap.get("circumscribed_radius", COSTMAP["circumscribed_radius"].default)
+
+
+def _default_sequence(tree: Mapping[str, Any]) -> NamedTypes:
+    rotation: NamedTypes = ()
+    if tree.get("clearing_rotation_allowed", True):
+        rotation = ((_ROTATE, ROTATE),)
+    return ((_CONSERVATIVE, CLEAR), *rotation, (_AGGRESSIVE, CLEAR), *rotation)
+
+
+def _settle_default_distances(tree: Namespace, notes: Notes) -> None:
+    """The original writes these two over whatever is there."""
+    radius_m = circumscribed_radius_m(tree)
+    if not isinstance(radius_m, float):
+        return  # already told
+    distances = {_CONSERVATIVE: tree["conservative_reset_dist"], _AGGRESSIVE: 4.0 * radius_m}
+    for name, distance in distances.items():
+        namespace = subtree(tree, name, "", notes)
+        if namespace.get("reset_distance", distance) != distance:
+            notes.remark(join(name, "reset_distance"), IGNORED,
+                         f"ignored by move_base: without recovery_behaviors it is {distance}")
+        namespace["reset_distance"] = distance
+
+
+def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
+    """The ``recovery_behaviors`` that can be flown, None when there is no such list."""
+    if "recovery_behaviors" not in tree:
+        return None
+    entries = tree["recovery_behaviors"]
+    if not isinstance(entries, list):
+        notes.problem("recovery_behaviors",
+                      f"{entries!r} is not a list; expected a list of {{name: , type: }}")
+        return ()
+    listed: Dict[str, str] = {}
+    for entry in entries:
+        if not isinstance(entry, dict) or not all(
+                isinstance(entry.get(key), str) for key in ("name", "type")):
+            notes.problem("recovery_behaviors",
+                          f"{entry!r} is no behaviour; expected {{name: , type: }}")
+        elif entry["name"] in listed:
+            notes.problem("recovery_behaviors",
+                          f"{entry['name']!r} is there twice; expected a name for each")
+        else:
+            listed[entry["name"]] = _full_type(entry["type"])
+    for name in [name for name, kind in listed.items() if kind not in _TABLES]:
+        notes.remark(join("recovery_behaviors", name), UNSUPPORTED,
+                     f"{listed.pop(name)} is not supported here, the behaviour is left out;"
+                     f" there are {CLEAR} and {ROTATE}")
+    return tuple(listed.items())
+
+
+def listed_names(tree: Mapping[str, Any]) -> List[str]:
+    """Namespaces that recoveries may have, supported or not."""
+    entries = tree.get("recovery_behaviors")
+    names = []
+    if isinstance(entries, list):
+        names = [str(entry.get("name")) for entry in entries if isinstance(entry, dict)]
+    return [*names, _CONSERVATIVE, _AGGRESSIVE, _ROTATE]
+
+
+def _full_type(kind: str) -> str:
+    """Old configurations leave the package away."""
+    for known in _TABLES:
+        if kind == known.split("/")[1]:
+            return known
+    return kind
+
+
+def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
+    maps = namespace.get("affected_maps", "both")
+    if isinstance(maps, str) and maps not in _AFFECTED_MAPS:
+        expected = tables.CLEAR_COSTMAP["affected_maps"].expected
+        notes.problem(join(name, "affected_maps"), f"{maps!r} is no choice; expected {expected}")
+    layers = namespace.get("layer_names", [])
+    if not isinstance(layers, list) or not all(isinstance(layer, str) for layer in layers):
+        notes.problem(join(name, "layer_names"), f"{layers!r} is no list of names; expected the"
+                      " names of layers, as in [obstacle_layer]")
+
+
+def _clear_params(namespace: Mapping[str, Any],
+                  costmaps: Tuple[CostmapParams, ...]) -> ClearCostmapParams:
+    """Without ``layer_names`` the obstacle layers are cleared, whatever their names."""
+    obstacles = [name for costmap in costmaps for name, layer in costmap.layers
+                 if isinstance(layer, ObstacleLayerParams)]
+    default = tuple(dict.fromkeys([*DEFAULT_LAYER_NAMES, *obstacles]))
+    return ClearCostmapParams(layer_names=tuple(namespace.get("layer_names", default)),
+                              **fields(namespace, tables.CLEAR_COSTMAP.parameters))
+
+
+def _rotate_params(namespace: Mapping[str, Any], planner: Mapping[str, Any]) -> RotateParams:
+    return RotateParams(**fields(namespace, tables.ROTATE.parameters),
+                        **fields(planner, tables.ROTATE_FROM_PLANNER))
