@@ -30,7 +30,7 @@ def build_navigator(configuration: Configuration) -> Navigator:
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
     """Takes over every parameter that may change in flight; plan and goal stay."""
-    navigator.set_params(configuration.navigator)
+    navigator.params = configuration.navigator
     navigator.global_costmap.reconfigure(_watched(configuration, configuration.global_costmap))
     navigator.local_costmap.reconfigure(_watched(configuration, configuration.local_costmap))
     navigator.planner = Navfn(configuration.navfn)

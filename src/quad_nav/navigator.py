@@ -12,36 +12,30 @@ oscillates, and then PLANNING again. What differs, and why, is in
 """
 from __future__ import annotations
 
-import enum
-import itertools
 import math
-from dataclasses import dataclass, field
-from typing import Dict, Iterator, List, Optional, Sequence, Tuple
+from dataclasses import dataclass
+from typing import Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
-from quad_nav.control.controller import Control, LocalPlanner
-from quad_nav.costmap.cost_grid import Window
+from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.plan.near import plan_near
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.recovery import Recovery, Surroundings
-
-
-class State(enum.Enum):
-    IDLE = "idle"
-    PLANNING = "planning"
-    CONTROLLING = "controlling"
-    CLEARING = "clearing"
-
-
-class Trigger(enum.Enum):
-    """Why recoveries are run; the value is the original's closing sentence."""
-
-    PLANNING = "Failed to find a valid plan. Even after executing recovery behaviors."
-    CONTROLLING = "Failed to find a valid control. Even after executing recovery behaviors."
-    OSCILLATION = "Robot is oscillating. Even after executing recovery behaviors."
+from quad_nav.schedule import Schedule
+from quad_nav.standstill import Standstill
+from quad_nav.tick import (
+    Located,
+    Outcome,
+    RecoveryStart,
+    State,
+    Tick,
+    Trigger,
+    local_from_global,
+)
 
 
 @dataclass(frozen=True)
@@ -76,75 +70,9 @@ class NavigatorParams:
 
 
 @dataclass(frozen=True)
-class Located:
-    """Where the robot is in each costmap's frame; None when it is not known."""
-
-    in_global: Optional[Pose2D]
-    in_local: Optional[Pose2D]
-
-
-@dataclass(frozen=True)
-class RecoveryStart:
-    """A recovery behaviour begins: its name, its number and how many there are."""
-
-    name: str
-    index: int
-    total: int
-    trigger: Trigger
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The end of a goal."""
-
-    succeeded: bool
-    text: str
-
-
-@dataclass
-class Tick:
-    """What one tick did, for topics, report and tuner alike."""
-
-    now_s: float
-    state: State = State.IDLE
-    windows: Dict[str, Window] = field(default_factory=dict)  # changed by costmap updates
-    cycle: bool = False  # whether a control cycle ran
-    command: Optional[Twist2D] = None  # to be sent now, if any
-    plan: Optional[np.ndarray] = None  # a new global plan float64[n, 3]
-    planning_failed: str = ""
-    control: Optional[Control] = None
-    recovery: Optional[RecoveryStart] = None
-    outcome: Optional[Outcome] = None
-    warnings: List[str] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
 class NamedRecovery:
     name: str
     behaviour: Recovery
-
-
-class Schedule:
-    """When something periodic is due; a frequency of 0 means never."""
-
-    def __init__(self, frequency_hz: float):
-        self.due_s = math.inf
-        self.set_frequency(frequency_hz)
-
-    def set_frequency(self, frequency_hz: float) -> None:
-        """Another period from the next turn on."""
-        self.period_s = 1.0 / frequency_hz if frequency_hz > 0.0 else math.inf
-
-    def start(self, now_s: float) -> None:
-        self.due_s = now_s if math.isfinite(self.period_s) else math.inf
-
-    def take(self, now_s: float) -> bool:
-        """Whether it is due; if so the next time is set, and missed turns are dropped."""
-        if now_s < self.due_s - 1e-9:
-            return False
-        missed = math.floor((now_s - self.due_s + 1e-9) / self.period_s)
-        self.due_s += (missed + 1) * self.period_s
-        return True
 
 
 class Navigator:
@@ -175,14 +103,6 @@ class Navigator:
         self._new_plan: Optional[np.ndarray] = None
         self._reset_recovery()
 
-    def set_params(self, params: NavigatorParams) -> None:
-        """Takes other parameters over; a goal under way keeps going."""
-        if params.controller_frequency_hz != self.params.controller_frequency_hz:
-            self._cycle.set_frequency(params.controller_frequency_hz)
-        if params.planner_frequency_hz != self.params.planner_frequency_hz:
-            self._replan.set_frequency(params.planner_frequency_hz)
-        self.params = params
-
     # -- goals ---------------------------------------------------------------------
 
     def accepts_goal(self, now_s: float) -> bool:
@@ -200,8 +120,6 @@ class Navigator:
         self._reset_recovery()
         self._begin_planning(now_s)
         self._last_valid_control_s = now_s
-        self._last_moved_s = now_s
-        self._moved_from: Optional[Pose2D] = None
 
     def cancel(self) -> None:
         """Drops the goal; the next tick sends a stop."""
@@ -215,12 +133,13 @@ class Navigator:
         """When the next tick has something to do; -inf before the first."""
         if not self._started:
             return -math.inf
-        due = [schedule.due_s for _, schedule in self._costmaps.values()]
+        due = [math.inf]
+        if not self._costmaps_rest:
+            due += [schedule.due_s for _, schedule in self._costmaps.values()]
         if self.state is not State.IDLE:
-            due.append(self._cycle.due_s)
+            due += [self._cycle.due_s, self._recovery_due_s]
+        if self.state is State.CONTROLLING:
             due.append(self._replan.due_s)
-            if self._active is not None:
-                due.append(self._recovery_due_s)
         return min(due)
 
     @property
@@ -252,6 +171,8 @@ class Navigator:
             self._stop_wanted = False
             tick.command = Twist2D()
         if self.state is not State.IDLE:
+            self._cycle.follow(self.params.controller_frequency_hz, now_s)
+            self._replan.follow(self.params.planner_frequency_hz, now_s)
             self._plan(tick, located.in_global)
             if self._active is not None:
                 self._step_recovery(tick, located)
@@ -263,9 +184,16 @@ class Navigator:
 
     # -- costmaps ------------------------------------------------------------------
 
+    @property
+    def _costmaps_rest(self) -> bool:
+        return self.params.shutdown_costmaps and self.state is State.IDLE
+
     def _update_costmaps(self, tick: Tick, located: Located) -> None:
+        if self._costmaps_rest:
+            return
         poses = {"global": located.in_global, "local": located.in_local}
         for name, (costmap, schedule) in self._costmaps.items():
+            schedule.follow(costmap.params.update_frequency_hz, tick.now_s)
             if not schedule.take(tick.now_s):
                 continue
             pose = poses[name]
@@ -292,37 +220,16 @@ class Navigator:
     def make_plan(self, start: Pose2D, goal: Pose2D, tolerance_m: float = 0.0) -> np.ndarray:
         """A plan between two poses without flying it, as ``~make_plan`` gives it.
 
-        When the goal has no plan, points around it are tried ring by ring up to
-        ``tolerance_m``; ``make_plan_add_unreachable_goal`` appends the goal then.
-
         Raises:
-            PlanningError: no plan, not even near the goal.
+            PlanningError: no plan, not even within the tolerance of the goal.
         """
-        try:
-            return self._plan_between(start, goal)
-        except PlanningError:
-            near = self._plan_near(start, goal, tolerance_m)
-            if near is None:
-                raise
-        if self.params.make_plan_add_unreachable_goal:
-            near = np.vstack([near, [goal.x_m, goal.y_m, goal.yaw_rad]])
-        return near
+        costmap = self.global_costmap
+        return plan_near(self.planner, costmap.spec, costmap.costs, start, goal, tolerance_m,
+                         self.params.make_plan_add_unreachable_goal)
 
     def _plan_between(self, start: Pose2D, goal: Pose2D) -> np.ndarray:
         costmap = self.global_costmap
         return self.planner.make_plan(costmap.spec, costmap.costs, start, goal)
-
-    def _plan_near(self, start: Pose2D, goal: Pose2D, tolerance_m: float) -> Optional[np.ndarray]:
-        step_m = 3.0 * self.global_costmap.spec.resolution_m
-        if 0.0 < tolerance_m < step_m:
-            step_m = tolerance_m
-        for dx, dy in ring_offsets(step_m, tolerance_m):
-            try:
-                return self._plan_between(start, Pose2D(goal.x_m + dx, goal.y_m + dy,
-                                                        goal.yaw_rad))
-            except PlanningError:
-                continue
-        return None
 
     def _begin_planning(self, now_s: float) -> None:
         self.state = State.PLANNING
@@ -373,7 +280,10 @@ class Navigator:
             tick.warnings.append("stopped: the robot's pose is unknown")
             tick.command = Twist2D()
             return
-        self._watch_oscillation(tick.now_s, located.in_global)
+        if (self._oscillation.has_moved(
+                tick.now_s, located.in_global, self.params.oscillation_distance_m)
+                and self._trigger is Trigger.OSCILLATION):
+            self._recovery_index = 0
         out_of_date = self._out_of_date(tick.now_s)
         if out_of_date:
             tick.warnings.append("stopped: " + out_of_date)
@@ -394,7 +304,7 @@ class Navigator:
         if self.controller.is_goal_reached():
             self._finish(tick, Outcome(True, "Goal reached."))
             return
-        if self._is_oscillating(tick.now_s):
+        if self._oscillation.exceeds(tick.now_s, self.params.oscillation_timeout_s):
             self._enter_clearing(tick, Trigger.OSCILLATION)
             return
         if not self._is_progressing(tick, located.in_global):
@@ -419,37 +329,17 @@ class Navigator:
             tick.command = Twist2D()
             self._begin_planning(tick.now_s)
 
-    # -- oscillation and progress --------------------------------------------------
-
-    def _watch_oscillation(self, now_s: float, pose: Pose2D) -> None:
-        reference = self._oscillation_pose
-        if reference is None or pose.distance_to(reference) >= self.params.oscillation_distance_m:
-            self._oscillation_pose = pose
-            self._last_oscillation_reset_s = now_s
-            if self._trigger is Trigger.OSCILLATION:
-                self._recovery_index = 0
-
-    def _is_oscillating(self, now_s: float) -> bool:
-        timeout_s = self.params.oscillation_timeout_s
-        return timeout_s > 0.0 and self._last_oscillation_reset_s + timeout_s < now_s
-
     def _is_progressing(self, tick: Tick, pose: Pose2D) -> bool:
         """Whether the robot has moved lately; if not, a new plan, then recoveries.
 
         The original takes an in-place turn for valid control for ever.
         """
         timeout_s = self.params.progress_timeout_s
-        if timeout_s <= 0.0:
-            return True
-        if (self._moved_from is None
-                or pose.distance_to(self._moved_from) >= self.params.progress_distance_m):
-            self._moved_from = pose
-            self._last_moved_s = tick.now_s
+        if self._progress.has_moved(tick.now_s, pose, self.params.progress_distance_m):
             self._replanned_for_progress = False
+        if not self._progress.exceeds(tick.now_s, timeout_s):
             return True
-        if tick.now_s <= self._last_moved_s + timeout_s:
-            return True
-        self._last_moved_s = tick.now_s
+        self._progress.restart(tick.now_s)
         where = f"no progress for {timeout_s:g} s at ({pose.x_m:.2f}, {pose.y_m:.2f})"
         if self._replanned_for_progress:
             tick.warnings.append(where + " with a new plan either: trying recoveries")
@@ -468,8 +358,8 @@ class Navigator:
         self._trigger: Optional[Trigger] = None
         self._active: Optional[Recovery] = None
         self._recovery_due_s = math.inf
-        self._oscillation_pose: Optional[Pose2D] = None
-        self._last_oscillation_reset_s = -math.inf
+        self._oscillation = Standstill()
+        self._progress = Standstill()
         self._replanned_for_progress = False
         self._stop_wanted = False
 
@@ -507,8 +397,8 @@ class Navigator:
             self._active = None
             self._recovery_due_s = math.inf
             self._recovery_index += 1
-            self._last_oscillation_reset_s = tick.now_s
-            self._last_moved_s = tick.now_s
+            self._oscillation.restart(tick.now_s)
+            self._progress.restart(tick.now_s)
             self._replanned_for_progress = False
             self._begin_planning(tick.now_s)
 
@@ -530,26 +420,3 @@ class Navigator:
         self._new_plan = None
         self._active = None
         self._cycle.due_s = math.inf
-
-
-def local_from_global(located: Located) -> Pose2D:
-    """The planar transform between the costmaps' frames, from the two poses."""
-    if located.in_local == located.in_global:
-        return Pose2D(0.0, 0.0, 0.0)
-    assert located.in_local is not None and located.in_global is not None
-    a, b = located.in_local, located.in_global
-    yaw = a.yaw_rad - b.yaw_rad
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return Pose2D(a.x_m - (cos * b.x_m - sin * b.y_m), a.y_m - (sin * b.x_m + cos * b.y_m), yaw)
-
-
-def ring_offsets(step_m: float, reach_m: float) -> Iterator[Tuple[float, float]]:
-    """Points on growing square rings around a centre, in the original's order."""
-    for ring in range(1, int(math.floor(reach_m / step_m + 1e-9)) + 1):
-        for y, x in itertools.product(range(ring + 1), repeat=2):
-            if max(x, y) < ring:
-                continue
-            for sign_y, sign_x in itertools.product((-1, 1), repeat=2):
-                if (y == 0 and sign_y < 0) or (x == 0 and sign_x < 0):
-                    continue
-                yield sign_x * x * step_m, sign_y * y * step_m

@@ -8,7 +8,6 @@ from flight_case import FlightCase, Latest, action_goal, goal_pose
 from move_base_msgs.msg import MoveBaseActionResult
 
 
-
 class Goals(FlightCase):
     @classmethod
     def setUpClass(cls):

@@ -9,17 +9,11 @@ import pytest
 from quad_nav.errors import NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.navigator import (
-    Located,
-    NamedRecovery,
-    Navigator,
-    NavigatorParams,
-    Schedule,
-    State,
-    Trigger,
-    local_from_global,
-)
+from quad_nav.navigator import NamedRecovery, Navigator, NavigatorParams
+from quad_nav.plan.near import ring_offsets
 from quad_nav.recovery import Step
+from quad_nav.schedule import Schedule
+from quad_nav.tick import Located, State, Trigger, local_from_global
 
 HERE = Pose2D(1.0, 1.0, 0.0)
 GOAL = Pose2D(5.0, 1.0, 0.0)
@@ -283,3 +277,30 @@ def test_local_from_global_takes_the_global_pose_to_the_local_one():
     # Turned by -90 degrees: (2, 1) becomes (1, -2); (0, 3) - (1, -2) = (-1, 5).
     assert (transform.x_m, transform.y_m) == pytest.approx((-1.0, 5.0))
     assert transform.yaw_rad == pytest.approx(-np.pi / 2)
+
+
+def test_rings_around_a_goal():
+    first = list(ring_offsets(0.15, 0.15))
+    # The axis points once each, the corners with both signs: 8 points of one ring.
+    assert len(first) == len(set(first)) == 8
+    assert set(first) == {
+        (x, y) for x in (-0.15, 0, 0.15) for y in (-0.15, 0, 0.15)} - {(0, 0)}
+    assert list(ring_offsets(0.15, 0.1)) == []
+
+
+def test_shutdown_costmaps_rest_without_a_goal():
+    flight = Flight(shutdown_costmaps=True)
+    flight.until(2.0)
+    assert flight.global_costmap.updates == []
+    flight.navigator.set_goal(GOAL, flight.now_s)
+    flight.until(4.0)
+    assert len(flight.global_costmap.updates) >= 5
+
+
+def test_changed_frequency_counts_at_once():
+    flight = Flight()
+    flight.until(1.0)
+    flight.global_costmap.params.update_frequency_hz = 20.0
+    before = len(flight.global_costmap.updates)
+    flight.until(2.0)
+    assert len(flight.global_costmap.updates) - before >= 16

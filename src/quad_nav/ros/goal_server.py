@@ -19,9 +19,10 @@ from move_base_msgs.msg import (
 
 from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose3D
-from quad_nav.navigator import Navigator, Outcome
+from quad_nav.navigator import Navigator
 from quad_nav.ros.nav_messages import pose_from_message, pose_stamped
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
+from quad_nav.tick import Outcome
 
 
 class GoalServer:

@@ -19,7 +19,6 @@ from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.errors import InputError, InvalidGoal, PlanningError
 from quad_nav.geometry import Pose3D, Twist2D
-from quad_nav.navigator import Located, State, Tick
 from quad_nav.ros import sensors, static_maps
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
@@ -28,6 +27,7 @@ from quad_nav.ros.plan_topics import PlanTopics, plugin_name
 from quad_nav.ros.reconfigure import serve_namespaces
 from quad_nav.ros.silence import SilenceWatch
 from quad_nav.ros.transforms import Transforms
+from quad_nav.tick import Located, State, Tick
 
 IDLE_POLL_S = 0.05  # how soon a goal for an idle navigator is noticed
 WARN_AGAIN_S = 5.0
