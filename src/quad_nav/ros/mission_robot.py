@@ -1,0 +1,148 @@
+"""One quadcopter of a mission: its sequencer between its topics, its log and the terminal."""
+from __future__ import annotations
+
+import time
+from typing import Optional
+
+import rospy
+from nav_msgs.msg import Odometry
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose3D
+from quad_nav.mission.flight_log import FlightLog, Leg, RobotLog
+from quad_nav.mission.sequencer import Action, SendGoal, SequenceDone, Sequencer
+from quad_nav.ros.mission_display import FlownPath
+from quad_nav.ros.mission_link import Inbox, RobotLink
+from quad_nav.ros.mission_setup import RobotGoals
+from quad_nav.ros.transforms import Transforms, TransformUnavailable
+
+FILE_POLL_S = 0.5  # wall time: a person edits while the simulation is paused, too
+ODOMETRY_SILENT_S = 3.0
+WARN_AGAIN_S = 5.0
+# How far odometry may be ahead of our clock; what is further is from before a reset.
+AHEAD_S = 1.0
+
+
+class MissionRobot:
+    """Flies one quadcopter's goals. ``step`` is called by one thread, under the mission's lock."""
+
+    def __init__(self, index: int, goals: RobotGoals, transforms: Transforms):
+        self.name = goals.name
+        self.sequencer = Sequencer(goals.sequence)
+        self.link = RobotLink(index)
+        self.pose: Optional[Pose3D] = None
+        self.retries = 0
+        self.is_silent = False
+        self._heard_s = 0.0
+        self._file = goals.file
+        self._next_poll_s = 0.0
+        self._transforms = transforms
+        self._path = FlownPath(f"/path{index}")
+
+    def begin(self, now_s: float) -> None:
+        """From the first goal: at the start, and after the simulation's clock went back."""
+        self.sequencer = Sequencer(self.sequencer.sequence)
+        self.pose, self.retries, self.is_silent, self._heard_s = None, 0, False, now_s
+        self.link.forget()
+        self._path.clear()
+
+    def step(self, inbox: Inbox, now_s: float, log: FlightLog) -> bool:
+        """Take what has come and act on it; whether the goals or their states changed."""
+        changed = self._poll_file()
+        for odometry in inbox.odometry:
+            self._move(odometry, now_s, log)
+        for recovery in inbox.recoveries:
+            log.robots[self.name].recoveries += 1
+            rospy.logwarn("%s: recovery %d of %d: %s", self.name,
+                          recovery.current_recovery_number + 1,
+                          recovery.total_number_of_recoveries, recovery.recovery_behavior_name)
+        for newcomer in inbox.newcomers:
+            if self.link.send_to(newcomer):
+                rospy.loginfo("%s: %s sent to a node that began to listen", self.name,
+                              self._goal(self.sequencer.index))
+        self._watch_silence(now_s)
+        if self.pose is None:
+            return changed
+        actions = self.sequencer.tick(now_s, self.pose.to_2d(), inbox.reports,
+                                      self.link.navigator_is_idle(now_s))
+        for action in actions:
+            self._do(action, log.robots[self.name])
+        return changed or bool(actions)
+
+    def map_from(self, frame: str) -> Pose3D:
+        """Raises TransformUnavailable."""
+        return self._transforms.lookup("map", frame) if frame != "map" else Pose3D(0.0, 0.0, 0.0)
+
+    def _move(self, odometry: Odometry, now_s: float, log: FlightLog) -> None:
+        stamp_s = odometry.header.stamp.to_sec()
+        if stamp_s > now_s + AHEAD_S:
+            return
+        try:
+            map_from_odom = self.map_from(odometry.header.frame_id)
+        except TransformUnavailable as error:
+            rospy.logwarn_throttle(WARN_AGAIN_S, f"{self.name}: its place in map is unknown: "
+                                                 f"{error}")
+            return
+        p, q = odometry.pose.pose.position, odometry.pose.pose.orientation
+        self.pose = map_from_odom.compose(Pose3D(p.x, p.y, p.z, (q.x, q.y, q.z, q.w)))
+        self._heard_s = now_s
+        log.move(self.name, stamp_s, self.pose.to_2d())
+        self._path.add(stamp_s, self.pose)
+
+    def _watch_silence(self, now_s: float) -> None:
+        was_silent, self.is_silent = self.is_silent, now_s - self._heard_s > ODOMETRY_SILENT_S
+        if self.is_silent and not was_silent:
+            rospy.logwarn("%s: nothing has come on %s for %.0f s", self.name,
+                          self.link.odometry.resolved_name, ODOMETRY_SILENT_S)
+
+    def _poll_file(self) -> bool:
+        if time.monotonic() < self._next_poll_s:
+            return False
+        self._next_poll_s = time.monotonic() + FILE_POLL_S
+        try:
+            sequence = self._file.poll()
+        except InputError as error:
+            rospy.logerr("%s: its edited goal file cannot be used, the goals stay as they were:\n"
+                         "  %s", self.name, "\n  ".join(error.problems))
+            return False
+        if sequence is None:
+            return False
+        self.sequencer.replace_sequence(sequence)
+        rospy.loginfo("%s: goal file edited: %d goals, %d of them flown", self.name,
+                      len(sequence.goals), min(self.sequencer.index, len(sequence.goals)))
+        return True
+
+    def _do(self, action: Action, log: RobotLog) -> None:
+        leg = log.act(action)
+        if isinstance(action, SendGoal):
+            self.link.send(action.pose)
+            self._tell_sent(action)
+        elif isinstance(action, SequenceDone):
+            self.link.forget()
+            rospy.loginfo("%s: no more goals", self.name)
+        elif leg is not None:
+            self._tell_ended(leg)
+
+    def _tell_sent(self, action: SendGoal) -> None:
+        goal = self._goal(action.index)
+        if not action.why:
+            away_m = self.pose.to_2d().distance_to(action.pose) if self.pose else 0.0
+            rospy.loginfo("%s: %s (%.2f, %.2f) sent, %.2f m away", self.name, goal,
+                          action.pose.x_m, action.pose.y_m, away_m)
+            return
+        self.retries += 1
+        rospy.logwarn("%s: %s sent again, attempt %d of %d: %s", self.name, goal, action.attempt,
+                      self.sequencer.sequence.settings.retries + 1, action.why)
+
+    def _tell_ended(self, leg: Leg) -> None:
+        goal = self._goal(leg.index)
+        if leg.reached:
+            rospy.loginfo("%s: %s reached in %.1f s, path %.2f m (straight %.2f m)", self.name,
+                          goal, leg.time_s, leg.path_length_m, leg.straight_length_m)
+        else:
+            rospy.logwarn("%s: %s SKIPPED after %.1f s: %s", self.name, goal, leg.time_s,
+                          leg.reason)
+
+    def _goal(self, index: int) -> str:
+        lap = f"lap {self.sequencer.lap}, " if self.sequencer.sequence.settings.loop else ""
+        return f"{lap}goal {index + 1} of {len(self.sequencer.sequence.goals)}"
