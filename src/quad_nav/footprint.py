@@ -1,11 +1,10 @@
 """Footprints: the robot's outline as a polygon, float64[n, 2], in metres.
 
-A footprint is convex, in the robot's frame unless said otherwise. The numbers follow
-costmap_2d to the last bit where costs depend on them.
+A footprint is convex, in the robot's frame unless said otherwise. The numbers are those of
+costmap_2d to the last bit, because radii decide costs.
 """
 from __future__ import annotations
 
-import ast
 import math
 from typing import Sequence, Tuple, Union
 
@@ -22,21 +21,6 @@ def circle(radius_m: float) -> np.ndarray:
     """A circle as 16 points, the first on the x axis, counter-clockwise."""
     angles = [k * 2.0 * math.pi / CIRCLE_POINTS for k in range(CIRCLE_POINTS)]
     return np.array([(math.cos(a) * radius_m, math.sin(a) * radius_m) for a in angles])
-
-
-def parse(text: str) -> np.ndarray:
-    """A footprint written as ``[[x1, y1], [x2, y2], ...]``, at least three points.
-
-    costmap_2d reads the numbers as float32, so 0.3 m is 0.300000012 m here too. Raises
-    ValueError with what was expected.
-    """
-    try:
-        points = np.array(ast.literal_eval(text.strip()), dtype=np.float32)
-    except (ValueError, SyntaxError, TypeError):
-        points = np.empty(0, dtype=np.float32)
-    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
-        raise ValueError(f"footprint {text!r}: expected [[x1, y1], [x2, y2], [x3, y3], ...]")
-    return points.astype(np.float64)
 
 
 def pad(footprint: Footprint, padding_m: float) -> np.ndarray:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quad_nav import footprint as footprints
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.observation import SourceParams
@@ -66,10 +65,10 @@ def costmap_params(tree):
     else:
         layers = (("obstacle_layer", obstacle_params(tree)),
                   ("inflation_layer", inflation_params(tree)))
-    footprint = tree.get("footprint")
-    return CostmapParams(
-        layers=layers, footprint=footprint and tuple(map(tuple, footprints.parse(footprint))),
-        **renamed(tree, COSTMAP_FIELDS))
+    # The original reads the numbers of a footprint as float32.
+    points = np.array(json.loads(tree.get("footprint", "[]")), dtype=np.float32).tolist()
+    return CostmapParams(layers=layers, footprint=tuple(map(tuple, points)) or None,
+                         **renamed(tree, COSTMAP_FIELDS))
 
 
 class Replay:

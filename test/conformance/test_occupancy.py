@@ -29,7 +29,7 @@ def test_case(case):
 
 def check_footprint(recorded, meta):
     params = meta["params"]
-    unpadded = (footprints.parse(params["footprint"]) if "footprint" in params
+    unpadded = (np.array(json.loads(params["footprint"]), dtype=np.float32) if "footprint" in params
                 else footprints.circle(params["robot_radius"]))
     padded = footprints.pad(unpadded, params["footprint_padding"])
     oriented = footprints.oriented(padded, Pose2D(*meta["pose"]))
