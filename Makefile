@@ -14,6 +14,7 @@ export PYTHONNOUSERSITE := 1
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
 
+# make itself ends with 2 on any failure and names the sequencer's own exit status in its message.
 fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
 	@scripts/ros_env scripts/fly $(ARGS)
 
