@@ -19,12 +19,11 @@ from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.errors import InputError, InvalidGoal, PlanningError
 from quad_nav.geometry import Pose3D, Twist2D
-from quad_nav.ros import sensors, static_maps
+from quad_nav.ros import reconfigure_servers, sensors, static_maps
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
 from quad_nav.ros.nav_messages import path_message, pose_from_message
 from quad_nav.ros.plan_topics import PlanTopics, plugin_name
-from quad_nav.ros.reconfigure import serve_namespaces
 from quad_nav.ros.silence import SilenceWatch
 from quad_nav.ros.transforms import Transforms
 from quad_nav.tick import Located, State, Tick
@@ -54,7 +53,7 @@ class MoveBaseNode:
         self._maps = static_maps.connect(costmaps, self._lock)
         self._silence = SilenceWatch(
             [self._odometry] + [sensor.subscriber for sensor in self._sensors])
-        self._reconfigure = serve_namespaces(configuration, self._on_reconfigure)
+        self._reconfigure = reconfigure_servers.serve(configuration, self._on_reconfigure)
         planner = plugin_name(navigator.params.base_global_planner)
         self._services = [
             rospy.Service("~make_plan", GetPlan, self._make_plan),
@@ -189,6 +188,7 @@ def main() -> int:
         return EXIT_BAD_INPUT
     for warning in configuration.warnings:
         rospy.logwarn("%s", warning)
+    rospy.set_param("~", configuration.to_tree())  # as the original leaves it: defaults filled in
     node = MoveBaseNode(configuration)
     try:
         node.spin()
