@@ -1,4 +1,4 @@
-"""The trajectory rollout controller of ROS navigation."""
+"""Parameters of the trajectory rollout controller."""
 from __future__ import annotations
 
 import math

@@ -1,0 +1,50 @@
+"""What the navigator asks of a local planner."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import GridSpec
+
+IDENTITY = Pose2D(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Control:
+    """A velocity command and what it was chosen from.
+
+    ``cost`` is the chosen trajectory's, nan while stopping or turning at the
+    goal (``goal_mode``). ``local_plan`` float64[k, 3] is that trajectory,
+    ``global_plan`` float64[m, 3] the part of the global plan that was followed;
+    both are rows x, y, yaw in the local costmap's frame.
+    """
+
+    command: Twist2D
+    cost: float
+    local_plan: np.ndarray
+    global_plan: np.ndarray
+    goal_mode: bool = False
+
+
+class LocalPlanner(Protocol):
+    """Follows a global plan over the local costmap."""
+
+    def set_plan(self, plan: np.ndarray) -> None:
+        """A new global plan, float64[n, 3] rows x, y, yaw in its own frame."""
+        ...
+
+    def set_footprint(self, footprint: np.ndarray) -> None:
+        """The padded footprint, float64[n, 2] in the robot's frame."""
+        ...
+
+    def compute_velocity(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
+                         local_from_plan: Pose2D = IDENTITY) -> Control:
+        """The command for now. Raises a ``ControlError`` when there is none."""
+        ...
+
+    def is_goal_reached(self) -> bool:
+        """Whether the plan's end was reached, heading included."""
+        ...

@@ -1,0 +1,45 @@
+"""Distances over the local costmap: to the global plan, and to the local goal.
+
+Both count steps between the four neighbours of a cell, around obstacles. The
+local goal is the last cell of the plan's first stretch inside the window.
+Cells under the robot's footprint count as free for the path distance, so that
+a robot at an obstacle still finds its way to the plan; not so for the goal
+distance.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quad_nav.geometry import Pose2D
+from quad_nav.kernels.collision import Window, mark_footprint
+from quad_nav.kernels.map_grid import cells_on_plan, spread
+
+
+@dataclass(frozen=True)
+class DistanceGrids:
+    """Distances in cells, int32[H, W].
+
+    H * W marks an obstacle that the wave touched, H * W + 1 what it did not
+    reach. ``within_robot``, bool[H, W], are the cells inside the footprint.
+    """
+
+    path: np.ndarray
+    goal: np.ndarray
+    within_robot: np.ndarray
+
+
+def distance_grids(window: Window, plan_xy: np.ndarray, footprint: np.ndarray,
+                   pose: Pose2D) -> DistanceGrids:
+    """Distance grids of a plan, float64[m, 2], for a robot at a pose.
+
+    Without a point of the plan on known ground, nothing is reached.
+    """
+    nowhere = np.zeros(window.costs.shape, dtype=np.bool_)
+    within_robot = nowhere.copy()
+    mark_footprint(window, footprint, pose.x_m, pose.y_m, pose.yaw_rad, within_robot)
+    cells = cells_on_plan(window, plan_xy)
+    return DistanceGrids(path=spread(window.costs, within_robot, cells),
+                         goal=spread(window.costs, nowhere, cells[-1:]),
+                         within_robot=within_robot)

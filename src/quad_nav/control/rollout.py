@@ -1,0 +1,149 @@
+"""Trajectory rollout: what a velocity would lead to, and what that costs.
+
+A sample (vx, vy, vtheta) is simulated for ``sim_time_s`` in steps of about
+``sim_granularity_m`` or ``angular_sim_granularity_rad``, starting with the
+current velocity and approaching the sample as the acceleration limits allow.
+With the last pose's distances to path and goal, in cells,
+
+    cost = path_scale * path distance + goal_scale * goal distance
+         + occdist_scale * highest cell cost under the footprint on the way
+
+A trajectory is worth nothing (negative cost) when the footprint touches a
+lethal or unknown cell or leaves the window (-1), or when a pose lies where
+neither path nor goal can be reached from (-2). With ``heading_scoring``, path
+and goal distances are those of one early pose only, and the angle to the
+farthest visible plan point counts as well; with ``simple_attractor``, only the
+squared distance to the plan's end counts. B. Gerkey and K. Konolige 2008,
+"Planning and control in unstructured terrain".
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional, Tuple
+
+import numpy as np
+
+from quad_nav.control.map_grid import distance_grids
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import INSCRIBED, GridSpec
+from quad_nav.kernels import collision
+from quad_nav.kernels import rollout as kernel
+
+Triple = Tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A simulated sample: its cost and its poses, float64[k, 3] rows x, y, yaw."""
+
+    sample: Triple
+    cost: float
+    points: np.ndarray
+
+
+class Rollout:
+    """Simulates and scores samples from one robot state on one costmap.
+
+    ``plan`` is float64[m, 3], m >= 1, in the costmap's frame.
+    """
+
+    def __init__(self, params: TrajectoryPlannerParams, spec: GridSpec, costs: np.ndarray,
+                 footprint: np.ndarray, plan: np.ndarray, pose: Pose2D, velocity: Twist2D):
+        self.spec = spec
+        # The original keeps the robot's state in single precision.
+        self.pose = Pose2D(*_single(pose.x_m, pose.y_m, pose.yaw_rad))
+        self.velocity = _single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)
+        window = kernel_window(spec, costs)
+        plan_xy = np.ascontiguousarray(plan[:, :2])
+        self.goal_x_m, self.goal_y_m = plan_xy[-1]
+        self.grids = distance_grids(window, plan_xy, footprint, self.pose)
+        self.scene = kernel.Scene(window, footprint, self.grids.path, self.grids.goal, plan_xy)
+        self.rules = _rules(params, spec.resolution_m)
+
+    def score(self, samples: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3]."""
+        return kernel.score(self.scene, self.rules, _triple(self.pose), self.velocity, samples)
+
+    def trajectory(self, sample: Triple) -> Trajectory:
+        return self._simulate(_triple(self.pose), self.velocity, sample)
+
+    def is_valid(self, pose: Pose2D, velocity: Twist2D, command: Twist2D) -> bool:
+        """Whether a command from the given state, in double precision, hits nothing."""
+        return self._simulate(_triple(pose), _twist_triple(velocity),
+                              _twist_triple(command)).cost >= 0.0
+
+    def _simulate(self, pose: Triple, velocity: Triple, sample: Triple) -> Trajectory:
+        row = np.array(sample)
+        points = np.empty((kernel.step_count(self.rules, row), 3))
+        cost, count = kernel.simulate(self.scene, self.rules, pose, velocity, row, points)
+        return Trajectory(sample, cost, points[:count])
+
+    def goal_distance_at(self, x_m: float, y_m: float) -> Optional[int]:
+        """Goal distance in cells, None off the map."""
+        cell = self.spec.cell_of(x_m, y_m)
+        return None if cell is None else int(self.grids.goal[cell[1], cell[0]])
+
+    def cost_cloud(self) -> np.ndarray:
+        """Every cell that a robot could be in, float32[n, 7], column by column.
+
+        Rows x, y, z = 0, path_cost, goal_cost, occ_cost, total_cost: the fields
+        of the point cloud ``cost_cloud``. Distances are in cells; cells in or
+        behind obstacles and under the robot are left out.
+        """
+        costs, path = self.scene.window.costs, self.grids.path
+        usable = (path < costs.size) & (costs < INSCRIBED) & ~self.grids.within_robot
+        x, y = np.nonzero(usable.T)
+        centre_x, centre_y = self.spec.centre_of(x, y)
+        parts = path[y, x], self.grids.goal[y, x], costs[y, x]
+        total = (self.rules.path_scale * parts[0] + self.rules.goal_scale * parts[1]
+                 + self.rules.occupancy_scale * parts[2])
+        return np.column_stack((centre_x, centre_y, np.zeros(len(x)), *parts, total)
+                               ).astype(np.float32)
+
+
+def kernel_window(spec: GridSpec, costs: np.ndarray) -> collision.Window:
+    """A costmap, uint8[H, W] on ``spec``, as the kernels take it."""
+    return collision.Window(np.ascontiguousarray(costs), float(spec.origin_x_m), float(spec.origin_y_m),
+                            float(spec.resolution_m))
+
+
+def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray,
+                   pose: Pose2D) -> float:
+    """The highest cost under the outline of a footprint, float64[n, 2], at a pose.
+
+    Negative where it cannot be: -1 on a lethal cell, -2 on an unknown one, -3
+    off the map.
+    """
+    return collision.footprint_cost(kernel_window(spec, costs), footprint, *_triple(pose))
+
+
+def _rules(params: TrajectoryPlannerParams, resolution_m: float) -> kernel.Rules:
+    # Biases are per metre with meter scoring, distances are in cells.
+    per_cell = resolution_m if params.meter_scoring else 1.0
+    return kernel.Rules(
+        sim_time_s=float(params.sim_time_s),
+        sim_granularity_m=float(params.sim_granularity_m),
+        angular_sim_granularity_rad=float(params.angular_sim_granularity_rad),
+        acc_lim_x_mps2=float(params.acc_lim_x_mps2),
+        acc_lim_y_mps2=float(params.acc_lim_y_mps2),
+        acc_lim_theta_radps2=float(params.acc_lim_theta_radps2),
+        path_scale=params.path_distance_bias * per_cell,
+        goal_scale=params.goal_distance_bias * per_cell,
+        occupancy_scale=float(params.occdist_scale),
+        heading_scoring=bool(params.heading_scoring),
+        heading_scoring_timestep_s=float(params.heading_scoring_timestep_s),
+        simple_attractor=bool(params.simple_attractor))
+
+
+def _single(*values: float) -> Triple:
+    x, y, z = (float(np.float32(value)) for value in values)
+    return x, y, z
+
+
+def _triple(pose: Pose2D) -> Triple:
+    return float(pose.x_m), float(pose.y_m), float(pose.yaw_rad)
+
+
+def _twist_triple(twist: Twist2D) -> Triple:
+    return float(twist.vx_mps), float(twist.vy_mps), float(twist.vyaw_radps)

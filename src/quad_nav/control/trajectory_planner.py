@@ -1,0 +1,141 @@
+"""The controller ``base_local_planner/TrajectoryPlannerROS``: trajectory rollout.
+
+Each call cuts the global plan to the local window, measures distances to it
+(``map_grid``), simulates velocities (``rollout``) and takes the best one
+(``velocity_search``). Within ``xy_goal_tolerance_m`` of the plan's last pose in
+the window it stops and turns in place instead (``goal``).
+"""
+from __future__ import annotations
+
+from typing import Optional
+
+import numpy as np
+
+from quad_nav.control.controller import IDENTITY, Control
+from quad_nav.control.goal import is_stopped, stopping_command, turning_command
+from quad_nav.control.oscillation import Oscillation
+from quad_nav.control.plan_window import count_passed, plan_in_window
+from quad_nav.control.rollout import Rollout, Trajectory
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.control.velocity_search import choose_trajectory
+from quad_nav.errors import NoLocalPlan, NoValidTrajectory
+from quad_nav.geometry import Pose2D, Twist2D, angle_difference
+from quad_nav.grid import GridSpec
+
+__all__ = ["TrajectoryPlanner", "TrajectoryPlannerParams"]
+
+_NO_POSES = np.zeros((0, 3))
+
+
+class TrajectoryPlanner:
+    """Follows a plan; remembers what it tried from call to call.
+
+    Readable: ``plan`` float64[n, 3] (what is left of the global plan, in its
+    own frame), ``local_global_plan`` float64[m, 3] (its part in the window, in
+    the local frame, also after a failed call), ``oscillation``, and of the last
+    call ``best`` and ``rollout`` (None if it did not simulate).
+    """
+
+    def __init__(self, params: TrajectoryPlannerParams, footprint: np.ndarray,
+                 control_period_s: float):
+        self.control_period_s = control_period_s
+        self.oscillation = Oscillation()
+        self.plan = _NO_POSES
+        self.local_global_plan = _NO_POSES
+        self.best: Optional[Trajectory] = None
+        self.rollout: Optional[Rollout] = None
+        self.rotating_to_goal = False
+        self.xy_tolerance_latch = False
+        self._goal_reached = False
+        self.params = params
+        self.set_footprint(footprint)
+
+    def set_params(self, params: TrajectoryPlannerParams) -> None:
+        """Take new parameters; plan and state stay, but the goal is no longer reached."""
+        self.params = params
+        self._goal_reached = False
+
+    def set_footprint(self, footprint: np.ndarray) -> None:
+        """The padded footprint, float64[n, 2] in the robot's frame."""
+        self.footprint = np.array(footprint, dtype=np.float64)
+
+    def set_plan(self, plan: np.ndarray) -> None:
+        """A new global plan, float64[n, 3] rows x, y, yaw; the goal is to be reached anew."""
+        self.plan = np.array(plan, dtype=np.float64).reshape(-1, 3)
+        self.xy_tolerance_latch = False
+        self._goal_reached = False
+
+    def is_goal_reached(self) -> bool:
+        """Whether a call since ``set_plan`` found the robot at the goal, heading included."""
+        return self._goal_reached
+
+    def compute_velocity(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
+                         local_from_plan: Pose2D = IDENTITY) -> Control:
+        """The command for a robot at ``pose`` on ``costs``, uint8[H, W] on ``spec``.
+
+        ``velocity`` is the odometry's, in the body frame. Raises NoLocalPlan
+        when no part of the plan is near, and NoValidTrajectory when path or
+        goal are out of reach or the command at the goal would hit something.
+        """
+        self.best = self.rollout = None
+        plan = self._cut_plan(spec, pose, local_from_plan)
+        goal = Pose2D(*plan[-1])
+        if self.xy_tolerance_latch or pose.distance_to(goal) <= self.params.xy_goal_tolerance_m:
+            self.xy_tolerance_latch = self.xy_tolerance_latch or self.params.latch_xy_goal_tolerance
+            command = self._command_at_goal(spec, costs, pose, velocity, goal)
+            return Control(command, float("nan"), _NO_POSES, plan, goal_mode=True)
+        best = self._search(spec, costs, pose, velocity)
+        if best.cost < 0.0:
+            raise NoValidTrajectory(f"the global plan or its end in the local costmap is out of "
+                                    f"reach from ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+        return Control(Twist2D(*best.sample), best.cost, best.points, plan)
+
+    def cost_cloud(self) -> np.ndarray:
+        """What each cell of the window cost in the last call, float32[n, 7].
+
+        Rows as in ``Rollout.cost_cloud``; empty if the last call did not simulate.
+        """
+        if self.rollout is None:
+            return np.zeros((0, 7), dtype=np.float32)
+        return self.rollout.cost_cloud()
+
+    def _cut_plan(self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D) -> np.ndarray:
+        self.local_global_plan = _NO_POSES
+        if not len(self.plan):
+            raise NoLocalPlan("there is no global plan to follow")
+        plan = plan_in_window(self.plan, spec, pose, local_from_plan)
+        if self.params.prune_plan:
+            passed = count_passed(plan, pose)
+            plan, self.plan = plan[passed:], self.plan[passed:]
+        if not len(plan):
+            raise NoLocalPlan(f"the global plan does not come near the robot at "
+                              f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+        self.local_global_plan = plan
+        return plan
+
+    def _command_at_goal(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
+                         goal: Pose2D) -> Twist2D:
+        turn_rad = angle_difference(goal.yaw_rad, pose.yaw_rad)
+        if abs(turn_rad) <= self.params.yaw_goal_tolerance_rad:
+            self.rotating_to_goal = self.xy_tolerance_latch = False
+            self._goal_reached = True
+            return Twist2D()
+        self._search(spec, costs, pose, velocity)  # the oscillation state goes on at the goal
+        if not self.rotating_to_goal and not is_stopped(velocity, self.params):
+            command = stopping_command(velocity, self.params, self.control_period_s)
+        else:
+            self.rotating_to_goal = True
+            command = turning_command(turn_rad, velocity, self.params, self.control_period_s)
+        assert self.rollout is not None
+        if not self.rollout.is_valid(pose, velocity, command):
+            raise NoValidTrajectory(f"no room to stop and turn at the goal, "
+                                    f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+        return command
+
+    def _search(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D,
+                velocity: Twist2D) -> Trajectory:
+        self.rollout = Rollout(self.params, spec, costs, self.footprint, self.local_global_plan,
+                               pose, velocity)
+        self.best = choose_trajectory(self.rollout, self.params, self.oscillation,
+                                      self.control_period_s)
+        return self.best
