@@ -18,6 +18,7 @@ from quad_nav.config.spec import Table
 from quad_nav.config.texts import polygon_from_list, text_from_polygon
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.static import StaticLayerParams
 
 OBSTACLE, VOXEL = "costmap_2d::ObstacleLayer", "costmap_2d::VoxelLayer"
 STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
@@ -36,6 +37,9 @@ def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
         _settle_old_style(costmap, name, notes)
     plugins = _checked_plugins(costmap, name, notes)
     _remark_on_old_style(costmap, name, [layer_type for _, layer_type in plugins], notes)
+    for layer, _ in plugins:
+        if layer in _OLD_STYLE and not isinstance(costmap.get(layer), dict):
+            costmap.pop(layer, None)  # a parameter server replaces it by the layer's namespace
     for layer, layer_type in plugins:
         _copy_parent_parameters(costmap, name, layer, layer_type, notes)
     chain = ((name, costmap), ("", tree))
@@ -60,10 +64,12 @@ def costmap_params(costmap: Namespace) -> CostmapParams:
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
-    """A costmap that no sensor writes to is legal, and a robot that flies into things."""
-    if not any(isinstance(layer, ObstacleLayerParams) and layer.sources
+    """A costmap that nothing writes to is legal, and flies into things."""
+    if not any(isinstance(layer, StaticLayerParams)
+               or isinstance(layer, ObstacleLayerParams) and layer.sources
                for _, layer in params.layers):
-        notes.remark(name, CAUTION, "no layer with observation_sources: sensors mark nothing here")
+        notes.remark(name, CAUTION, "no map and no observation_sources: there are no obstacles in"
+                     " this costmap")
 
 
 def _settle_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:
@@ -162,7 +168,7 @@ def _remark_on_type(place: str, layer_type: str, notes: Notes) -> None:
                      f" it is flown as {OBSTACLE}")
     elif layer_type not in LAYERS:
         notes.remark(place, UNSUPPORTED, f"{layer_type} is not supported here, the layer is left"
-                     f" out; there are {', '.join(sorted(LAYERS))}")
+                     f" out; there are {', '.join(sorted(set(LAYERS) - {VOXEL}))}")
 
 
 def _without_layer_parameters(costmap: Namespace, name: str, known: Any,
