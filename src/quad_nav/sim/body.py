@@ -14,6 +14,7 @@ import pybullet
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, quaternion_from_yaw
+from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.contacts import Touch
 from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
@@ -21,8 +22,6 @@ from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene
 
 GUARD_HEIGHT_M = 0.24
 _MAX_RAYS_PER_CALL = 16384
-_ROBOT_COLOURS = [(0.12, 0.47, 0.71, 1.0), (0.84, 0.15, 0.16, 1.0), (0.17, 0.63, 0.17, 1.0),
-                  (1.0, 0.5, 0.05, 1.0), (0.58, 0.4, 0.74, 1.0), (0.55, 0.34, 0.29, 1.0)]
 
 Sphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
 """Centre in metres, radius in metres, RGBA in 0..1."""
@@ -155,7 +154,7 @@ class World:
             collisionFramePosition=offset, physicsClientId=client)
         looks = pybullet.createVisualShape(
             pybullet.GEOM_CYLINDER, radius=BODY_RADIUS_M, length=GUARD_HEIGHT_M,
-            rgbaColor=_ROBOT_COLOURS[number % len(_ROBOT_COLOURS)],
+            rgbaColor=robot_rgba(number),
             visualFramePosition=offset, physicsClientId=client)
         body = int(pybullet.createMultiBody(
             self._airframe.mass_kg, guard, looks,

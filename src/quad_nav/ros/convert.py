@@ -1,0 +1,88 @@
+"""Messages and our dataclasses, in pairs: ``x_message`` and ``x_from_message``."""
+from __future__ import annotations
+
+from typing import Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Pose, Quaternion, Transform, TransformStamped, Twist, Vector3
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+
+from quad_nav.geometry import Pose3D, Scan, Twist2D
+
+
+def time_message(seconds: float) -> rospy.Time:
+    """The nearest nanosecond."""
+    whole = int(seconds)
+    return rospy.Time(whole, round((seconds - whole) * 1e9))
+
+
+def twist_message(twist: Twist2D) -> Twist:
+    return Twist(Vector3(twist.vx_mps, twist.vy_mps, 0.0), Vector3(0.0, 0.0, twist.vyaw_radps))
+
+
+def twist_from_message(message: Twist) -> Twist2D:
+    """The horizontal part; it may hold NaN or infinity, see ``Twist2D.is_finite``."""
+    return Twist2D(message.linear.x, message.linear.y, message.angular.z)
+
+
+def pose_message(pose: Pose3D) -> Pose:
+    message = Pose(orientation=Quaternion(*pose.quaternion))
+    message.position.x, message.position.y, message.position.z = pose.x_m, pose.y_m, pose.z_m
+    return message
+
+
+def pose_from_message(message: Pose) -> Pose3D:
+    """As it is: neither finite numbers nor a unit quaternion are checked."""
+    p, q = message.position, message.orientation
+    return Pose3D(p.x, p.y, p.z, (q.x, q.y, q.z, q.w))
+
+
+def transform_message(parent_from_child: Pose3D, parent: str, child: str,
+                      stamp: rospy.Time) -> TransformStamped:
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id, message.header.stamp = parent, stamp
+    message.transform = Transform(
+        Vector3(parent_from_child.x_m, parent_from_child.y_m, parent_from_child.z_m),
+        Quaternion(*parent_from_child.quaternion))
+    return message
+
+
+def pose_from_transform(message: TransformStamped) -> Pose3D:
+    """``parent_from_child``."""
+    t, q = message.transform.translation, message.transform.rotation
+    return Pose3D(t.x, t.y, t.z, (q.x, q.y, q.z, q.w))
+
+
+def odometry_message(odom_from_base: Pose3D, linear_mps: Tuple[float, float, float],
+                     angular_radps: Tuple[float, float, float], frames: Tuple[str, str],
+                     stamp: rospy.Time) -> Odometry:
+    """``frames`` are the odometry frame and the body's, which the velocities are in."""
+    message = Odometry(child_frame_id=frames[1])
+    message.header.frame_id, message.header.stamp = frames[0], stamp
+    message.pose.pose = pose_message(odom_from_base)
+    message.twist.twist = Twist(Vector3(*linear_mps), Vector3(*angular_radps))
+    return message
+
+
+def odometry_from_message(message: Odometry) -> Tuple[Pose3D, Twist2D]:
+    """The body's pose in the odometry frame and its velocity in its own."""
+    return pose_from_message(message.pose.pose), twist_from_message(message.twist.twist)
+
+
+def scan_message(scan: Scan, frame: str) -> LaserScan:
+    """All beams are of one instant: ``time_increment`` and ``scan_time`` are 0."""
+    message = LaserScan(
+        angle_min=scan.angle_min_rad,
+        angle_max=scan.angle_min_rad + (len(scan.ranges_m) - 1) * scan.angle_increment_rad,
+        angle_increment=scan.angle_increment_rad, range_min=scan.range_min_m,
+        range_max=scan.range_max_m, ranges=scan.ranges_m.tolist())
+    message.header.frame_id, message.header.stamp = frame, time_message(scan.stamp_s)
+    return message
+
+
+def scan_from_message(message: LaserScan) -> Scan:
+    return Scan(message.header.stamp.to_sec(), message.angle_min, message.angle_increment,
+                message.range_min, message.range_max,
+                np.array(message.ranges, dtype=np.float32))

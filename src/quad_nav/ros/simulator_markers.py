@@ -1,0 +1,91 @@
+"""Scene and quadcopters for RViz, and goal spheres from there for pybullet's window."""
+from __future__ import annotations
+
+import math
+from typing import List, Tuple
+
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from quad_nav.geometry import quaternion_from_yaw
+from quad_nav.sim.body import Sphere
+from quad_nav.sim.colours import robot_rgba
+from quad_nav.sim.lidar import MOUNT_HEIGHT_M
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene
+
+_FLOOR_RGBA = (0.93, 0.93, 0.90, 1.0)
+_WALL_RGBA = (0.55, 0.60, 0.65, 0.35)
+_OBSTACLE_RGBA = (0.62, 0.50, 0.38, 1.0)
+_DARK_RGBA = (0.15, 0.15, 0.17, 1.0)
+_ARM_M = 0.19
+_ROTOR_DIAMETER_M = 0.20
+
+_Size = Tuple[float, float, float]
+_Rgba = Tuple[float, float, float, float]
+
+
+def scene_markers(scene: Scene) -> MarkerArray:
+    """Floor, walls and obstacles in ``map``."""
+    floor = _marker("map", "floor", 0, Marker.CUBE,
+                    (scene.size_x_m / 2, scene.size_y_m / 2, -0.01),
+                    (scene.size_x_m, scene.size_y_m, 0.01), _FLOOR_RGBA)
+    walls = [_solid(wall, "walls", k, _WALL_RGBA) for k, wall in enumerate(scene.wall_boxes())]
+    obstacles = [_solid(obstacle, "obstacles", k, _OBSTACLE_RGBA)
+                 for k, obstacle in enumerate(scene.obstacles)]
+    return MarkerArray([floor, *walls, *obstacles])
+
+
+def quadcopter_markers(n_robots: int) -> MarkerArray:
+    """A body, arms, rotors and the LIDAR for each quadcopter, moving with ``base_link{i}``."""
+    return MarkerArray([marker for robot in range(n_robots) for marker in _quadcopter(robot)])
+
+
+def goal_spheres(message: MarkerArray) -> List[Sphere]:
+    """The spheres among markers in ``map``."""
+    return [((m.pose.position.x, m.pose.position.y, m.pose.position.z), m.scale.x / 2,
+             (m.color.r, m.color.g, m.color.b, m.color.a))
+            for m in message.markers if m.type == Marker.SPHERE and m.action == Marker.ADD]
+
+
+def _quadcopter(robot: int) -> List[Marker]:
+    """Rotors are at 45 degrees; the two in front are in the quadcopter's colour."""
+    frame, name, rgba = f"base_link{robot}", f"quad{robot}", robot_rgba(robot)
+    parts = [
+        _marker(frame, name, 0, Marker.CUBE, (0.0, 0.0, 0.0), (0.16, 0.10, 0.05), rgba),
+        _marker(frame, name, 1, Marker.CYLINDER, (0.0, 0.0, MOUNT_HEIGHT_M - 0.015),
+                (0.07, 0.07, 0.05), _DARK_RGBA),
+        _marker(frame, name, 2, Marker.CYLINDER, (0.0, 0.0, MOUNT_HEIGHT_M),
+                (2 * BODY_RADIUS_M, 2 * BODY_RADIUS_M, 0.01), robot_rgba(robot, 0.15)),
+    ]
+    for k, angle in enumerate((math.pi / 4, -math.pi / 4)):
+        parts.append(_marker(frame, name, 3 + k, Marker.CUBE, (0.0, 0.0, 0.0),
+                             (2 * _ARM_M, 0.025, 0.02), _DARK_RGBA, angle))
+    for k in range(4):
+        angle = math.pi / 4 + k * math.pi / 2
+        place = (_ARM_M * math.cos(angle), _ARM_M * math.sin(angle), 0.03)
+        colour = robot_rgba(robot, 0.8) if k in (0, 3) else (0.3, 0.3, 0.32, 0.7)
+        parts.append(_marker(frame, name, 5 + k, Marker.CYLINDER, place,
+                             (_ROTOR_DIAMETER_M, _ROTOR_DIAMETER_M, 0.01), colour))
+    for part in parts:
+        part.frame_locked = True
+    return parts
+
+
+def _solid(solid: Obstacle, namespace: str, number: int, rgba: _Rgba) -> Marker:
+    place = (solid.x_m, solid.y_m, solid.bottom_m + solid.height_m / 2)
+    if isinstance(solid, Box):
+        return _marker("map", namespace, number, Marker.CUBE, place,
+                       (solid.size_x_m, solid.size_y_m, solid.height_m), rgba, solid.yaw_rad)
+    diameter = 2 * solid.radius_m
+    return _marker("map", namespace, number, Marker.CYLINDER, place,
+                   (diameter, diameter, solid.height_m), rgba)
+
+
+def _marker(frame: str, namespace: str, number: int, kind: int, place: _Size, size: _Size,
+            rgba: _Rgba, yaw_rad: float = 0.0) -> Marker:
+    marker = Marker(ns=namespace, id=number, type=kind, action=Marker.ADD,
+                    pose=Pose(Point(*place), Quaternion(*quaternion_from_yaw(yaw_rad))),
+                    scale=Vector3(*size), color=ColorRGBA(*rgba))
+    marker.header.frame_id = frame
+    return marker

@@ -1,0 +1,130 @@
+"""What the simulator tells: clock, transforms, odometry, scans, contacts, health."""
+from __future__ import annotations
+
+from typing import List, Sequence
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
+
+from quad_nav.geometry import Pose3D
+from quad_nav.ros.convert import (
+    odometry_message,
+    scan_message,
+    time_message,
+    transform_message,
+)
+from quad_nav.ros.simulator_markers import quadcopter_markers, scene_markers
+from quad_nav.sim.contacts import Contact
+from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.simulation import Simulation
+
+_IDENTITY = Pose3D(0.0, 0.0, 0.0)
+_LAGS_BELOW = 0.9
+"""Part of the asked-for rate below which the simulation is said to lag."""
+_LAGGING_REPORTS = 3
+"""Reports in a row that lag before it is logged; nodes that start up take their time."""
+
+
+class SimulatorTopics:
+    """The publishers, one method for each thing that is told together.
+
+    Odometry and scans are made only while somebody listens. ``/clock`` and
+    ``/tf`` are latched: a node that comes while the simulation is paused gets
+    them, and tf is not sent twice with one stamp, which tf2 would complain about.
+    """
+
+    def __init__(self, simulation: Simulation):
+        self._simulation = simulation
+        robots = range(simulation.n_robots)
+        self.lidar_enabled = [True for _ in robots]
+        self._lagging_reports = 0
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
+        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, latch=True)
+        self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
+        self._scans = [rospy.Publisher(f"/scan{i}", LaserScan, queue_size=10) for i in robots]
+        self._contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=100)
+        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._scene = rospy.Publisher("/simulation/scene", MarkerArray, queue_size=1, latch=True)
+        self._quadcopters = rospy.Publisher("/simulation/quadcopters", MarkerArray, queue_size=1,
+                                            latch=True)
+        self._scene.publish(scene_markers(simulation.scene))
+        self._quadcopters.publish(quadcopter_markers(simulation.n_robots))
+
+    def publish_clock(self) -> None:
+        self._clock.publish(Clock(time_message(self._simulation.now_s)))
+
+    def publish_transforms(self) -> None:
+        """``map -> odom{i} -> base_link{i} -> Lidar{i}`` of all quadcopters in one message."""
+        stamp = time_message(self._simulation.now_s)
+        transforms = []
+        for i in range(self._simulation.n_robots):
+            odom, base, lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
+            pose = self._simulation.state(i).map_from_base
+            transforms += [transform_message(_IDENTITY, "map", odom, stamp),
+                           transform_message(pose, odom, base, stamp),
+                           transform_message(base_from_lidar, base, lidar, stamp)]
+        self._tf.publish(TFMessage(transforms))
+
+    def publish_odometry(self) -> None:
+        stamp = time_message(self._simulation.now_s)
+        for i, publisher in enumerate(self._odometry):
+            if publisher.get_num_connections():
+                state = self._simulation.state(i)
+                publisher.publish(odometry_message(
+                    state.map_from_base, state.linear_mps, state.angular_radps,
+                    (f"odom{i}", f"base_link{i}"), stamp))
+
+    def publish_scans(self) -> None:
+        for i, publisher in enumerate(self._scans):
+            if self.lidar_enabled[i] and publisher.get_num_connections():
+                publisher.publish(scan_message(self._simulation.scan(i), f"Lidar{i}"))
+
+    def publish_contact(self, contact: Contact) -> None:
+        x, y, _ = contact.position_m
+        rospy.logwarn("%s at (%.2f, %.2f) m, time %.2f s", contact, x, y, contact.time_s)
+        self._contacts.publish(DiagnosticStatus(
+            level=DiagnosticStatus.WARN, name="contact", hardware_id=f"quad{contact.robot}",
+            message=str(contact),
+            values=_values(time_s=contact.time_s, robot=contact.robot,
+                           **{"with": contact.other}, x_m=x, y_m=y)))
+
+    def publish_health(self, paused: bool, rate: float, factor: float) -> None:
+        """``factor`` is the real-time factor reached of the ``rate`` asked for."""
+        array = DiagnosticArray(status=[self._clock_health(paused, rate, factor),
+                                        *self._robots_health()])
+        array.header.stamp = time_message(self._simulation.now_s)
+        self._diagnostics.publish(array)
+
+    def _clock_health(self, paused: bool, rate: float, factor: float) -> DiagnosticStatus:
+        lags = not paused and factor < _LAGS_BELOW * rate
+        self._lagging_reports = self._lagging_reports + 1 if lags else 0
+        if self._lagging_reports >= _LAGGING_REPORTS:
+            rospy.logwarn_throttle(10.0 * rate, "simulated time lags: %.2f of %g seconds per "
+                                   "second are reached", factor, rate)
+        message = "paused" if paused else f"{'lags: ' if lags else ''}{factor:.2f} x real time"
+        return DiagnosticStatus(
+            level=DiagnosticStatus.WARN if lags else DiagnosticStatus.OK,
+            name="simulator: clock", hardware_id="simulator", message=message,
+            values=_values(real_time_factor=factor, rate=rate,
+                           contacts=len(self._simulation.contacts)))
+
+    def _robots_health(self) -> List[DiagnosticStatus]:
+        simulation = self._simulation
+        return [DiagnosticStatus(
+            level=DiagnosticStatus.OK if self.lidar_enabled[i] else DiagnosticStatus.WARN,
+            name=f"simulator: quadcopter {i}", hardware_id=f"quad{i}",
+            message=("hovering, no commands" if hovering else "flying")
+            + ("" if self.lidar_enabled[i] else ", LIDAR switched off"),
+            values=_values(contacts=sum(c.involves(i) for c in simulation.contacts),
+                           lidar=self.lidar_enabled[i]))
+            for i, hovering in enumerate(simulation.is_hovering)]
+
+
+def _values(**entries: object) -> Sequence[KeyValue]:
+    return [KeyValue(key, f"{value:.6g}" if isinstance(value, float) else str(value))
+            for key, value in entries.items()]

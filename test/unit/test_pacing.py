@@ -1,0 +1,59 @@
+"""Steps that are due at given wall times."""
+from __future__ import annotations
+
+import pytest
+
+from quad_nav.sim.pacing import Pacer, RateMeter
+
+
+def run(pacer: Pacer, *wall_s: float) -> list:
+    return [pacer.take_due(t) for t in wall_s]
+
+
+def test_steps_come_at_the_rate():
+    pacer = Pacer(rate=2.0, step_s=0.25)  # a step each 0.125 s
+    pacer.start(100.0)
+    assert run(pacer, 100.0, 100.12, 100.125, 100.2, 100.25, 100.3) == [0, 0, 1, 0, 1, 0]
+
+
+def test_wait_until_steps_are_due():
+    pacer = Pacer(rate=1.0, step_s=0.25)
+    pacer.start(10.0)
+    assert pacer.wait_s(10.0, 1) == 0.25
+    assert pacer.wait_s(10.0, 3) == 0.75
+    assert pacer.wait_s(11.0, 1) == 0.0
+
+
+def test_a_slow_simulation_catches_up_a_tenth_of_a_second_and_no_more():
+    pacer = Pacer(rate=1.0, step_s=1.0 / 128)
+    pacer.start(0.0)
+    assert run(pacer, 5.0, 5.0, 5.005, 5.009) == [13, 0, 1, 0]
+
+
+def test_bursts_are_bounded_at_high_rates():
+    pacer = Pacer(rate=1000.0, step_s=0.01)
+    pacer.start(0.0)
+    assert run(pacer, 1.0, 1.0) == [24, 24]
+
+
+def test_time_spent_paused_is_not_caught_up():
+    pacer = Pacer(rate=1.0, step_s=0.01)
+    pacer.start(0.0)
+    pacer.take_due(0.05)
+    pacer.start(9.0)
+    assert run(pacer, 9.0, 9.0125) == [0, 1]
+
+
+def test_long_runs_keep_their_rate():
+    pacer = Pacer(rate=1.0, step_s=1.0 / 240)
+    pacer.start(0.0)
+    steps = sum(pacer.take_due(0.0083 * k) for k in range(1, 1001))
+    assert steps == pytest.approx(8.3 * 240, abs=1.5)
+
+
+def test_meter_reads_the_factor_since_the_last_reading():
+    meter = RateMeter()
+    meter.start(10.0, 1.0)
+    assert meter.read(12.0, 2.0) == 0.5
+    assert meter.read(13.0, 4.0) == 2.0
+    assert meter.read(13.0, 4.0) == 0.0
