@@ -17,6 +17,7 @@ LAYERS = [
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},
+    {"schedule", "standstill", "tick"},
     {"navigator", "mission"},
     {"config"},
     {"assembly"},
@@ -132,4 +133,6 @@ def may_import_unit(importer: str, imported: str) -> bool:
 
 
 def layer(unit: str) -> int:
-    return next(i for i, units in enumerate(LAYERS) if unit in units)
+    rows = [row for row, units in enumerate(LAYERS) if unit in units]
+    assert rows, f"name the unit {unit} in LAYERS"
+    return rows[0]
