@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from quad_nav.control.oscillation import Oscillation
-from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.rollout import Rollout, footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.control.velocity_search import choose_trajectory
 from quad_nav.errors import ControlError
-from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.geometry import Pose2D, Twist2D, multiply_quaternions, rotation_from_quaternion
 from quad_nav.grid import GridSpec
 
 DATA = Path(__file__).parent / "data" / "trajectory_planner"

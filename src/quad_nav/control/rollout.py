@@ -26,7 +26,7 @@ import numpy as np
 from quad_nav.control.map_grid import distance_grids
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import INSCRIBED, GridSpec
+from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
 from quad_nav.kernels import collision
 from quad_nav.kernels import rollout as kernel
 
@@ -58,7 +58,9 @@ class Rollout:
         plan_xy = np.ascontiguousarray(plan[:, :2])
         self.goal_x_m, self.goal_y_m = plan_xy[-1]
         self.grids = distance_grids(window, plan_xy, footprint, self.pose)
-        self.scene = kernel.Scene(window, footprint, self.grids.path, self.grids.goal, plan_xy)
+        self.scene = kernel.Scene(
+            window, _highest_near(window, footprint), footprint, self.grids.path, self.grids.goal,
+            plan_xy)
         self.rules = _rules(params, spec.resolution_m)
 
     def score(self, samples: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -94,7 +96,8 @@ class Rollout:
         costs, path = self.scene.window.costs, self.grids.path
         usable = (path < costs.size) & (costs < INSCRIBED) & ~self.grids.within_robot
         x, y = np.nonzero(usable.T)
-        centre_x, centre_y = self.spec.centre_of(x, y)
+        centre_x = self.spec.origin_x_m + (x + 0.5) * self.spec.resolution_m
+        centre_y = self.spec.origin_y_m + (y + 0.5) * self.spec.resolution_m
         parts = path[y, x], self.grids.goal[y, x], costs[y, x]
         total = (self.rules.path_scale * parts[0] + self.rules.goal_scale * parts[1]
                  + self.rules.occupancy_scale * parts[2])
@@ -104,8 +107,9 @@ class Rollout:
 
 def kernel_window(spec: GridSpec, costs: np.ndarray) -> collision.Window:
     """A costmap, uint8[H, W] on ``spec``, as the kernels take it."""
-    return collision.Window(np.ascontiguousarray(costs), float(spec.origin_x_m), float(spec.origin_y_m),
-                            float(spec.resolution_m))
+    return collision.Window(costs=np.ascontiguousarray(costs), origin_x_m=float(spec.origin_x_m),
+                            origin_y_m=float(spec.origin_y_m),
+                            resolution_m=float(spec.resolution_m))
 
 
 def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray,
@@ -116,6 +120,25 @@ def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray,
     off the map.
     """
     return collision.footprint_cost(kernel_window(spec, costs), footprint, *_triple(pose))
+
+
+def _highest_near(window: collision.Window, footprint: np.ndarray) -> np.ndarray:
+    """The highest cost in a square around each cell that holds the footprint at any heading.
+
+    uint8[H, W]; off the map counts as UNKNOWN. Where it is low the outline need
+    not be drawn. The square is built up from maxima over two, four, ... cells.
+    """
+    reach = int(np.hypot(footprint[:, 0], footprint[:, 1]).max() / window.resolution_m) + 1
+    size_y, size_x = window.costs.shape
+    highest = np.full((size_y + 2 * reach, size_x + 2 * reach), UNKNOWN, dtype=np.uint8)
+    highest[reach:-reach, reach:-reach] = window.costs
+    side, covered = 2 * reach + 1, 1
+    while covered < side:
+        shift = min(covered, side - covered)
+        highest = np.maximum(highest[shift:], highest[:-shift])
+        highest = np.maximum(highest[:, shift:], highest[:, :-shift])
+        covered += shift
+    return highest
 
 
 def _rules(params: TrajectoryPlannerParams, resolution_m: float) -> kernel.Rules:

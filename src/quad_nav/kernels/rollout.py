@@ -22,6 +22,7 @@ class Scene(NamedTuple):
     """What trajectories are scored against."""
 
     window: Window
+    highest_near: np.ndarray   # uint8[H, W], no less than the highest cost under the footprint
     footprint: np.ndarray      # float64[n, 2], robot frame
     path_distance: np.ndarray  # int32[H, W]
     goal_distance: np.ndarray  # int32[H, W]
@@ -71,10 +72,13 @@ def simulate(scene, rules, pose, velocity, sample, points):
     path_distance, goal_distance, occupancy, heading, time = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(steps):
         cell_x, cell_y = cell_of(scene.window, x, y)
-        cost = footprint_cost(scene.window, scene.footprint, x, y, theta)
-        if cost < 0.0:
+        if cell_x < 0 or cell_y < 0:
             return COLLIDES, k
-        occupancy = max(occupancy, cost, float(scene.window.costs[cell_y, cell_x]))
+        if scene.highest_near[cell_y, cell_x] > occupancy:  # else the footprint changes nothing
+            cost = footprint_cost(scene.window, scene.footprint, x, y, theta)
+            if cost < 0.0:
+                return COLLIDES, k
+            occupancy = max(occupancy, cost, float(scene.window.costs[cell_y, cell_x]))
         if rules.simple_attractor:
             goal_distance = (x - scene.plan[-1, 0]) ** 2 + (y - scene.plan[-1, 1]) ** 2
         elif not rules.heading_scoring or _is_heading_step(rules, time, dt):
