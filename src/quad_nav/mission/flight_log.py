@@ -12,13 +12,17 @@ from typing import Callable, Deque, Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
-from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, Sequencer
+from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
 
 # Distance in metres from a place in ``map`` to the nearest surface, negative inside.
 Clearance = Callable[[float, float], float]
 
 SAME_CONTACT_S = 1.0
 TRACK_LENGTH = 100
+
+# Reasons of legs that no fault of theirs kept from their end.
+INTERRUPTED = "interrupted"
+NOT_SENT = "not sent"
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,7 @@ class Track:
 
 
 class RobotLog:
-    """What one quadcopter has flown since its first goal was sent."""
+    """What one quadcopter has flown from its first goal to its last."""
 
     def __init__(self, name: str):
         self.name = name
@@ -85,6 +89,7 @@ class RobotLog:
         self.recoveries = 0
         self._pose: Optional[Pose2D] = None
         self._stamp_s = 0.0
+        self._is_flying = False
         self._leg_start: Optional[Pose2D] = None
         self._leg_start_length_m = 0.0
 
@@ -93,13 +98,15 @@ class RobotLog:
         if self._pose is not None:
             if stamp_s <= self._stamp_s:
                 return False
-            self.path_length_m += self._pose.distance_to(pose)
+            if self._is_flying:
+                self.path_length_m += self._pose.distance_to(pose)
         self._pose, self._stamp_s = pose, stamp_s
         self.track.append(stamp_s, pose)
         return True
 
     def act(self, action: Action) -> Optional[Leg]:
         """Take the sequencer's action; the leg when it ended one."""
+        self._is_flying = not isinstance(action, SequenceDone)
         if isinstance(action, SendGoal) and not action.why:
             self._leg_start, self._leg_start_length_m = self._pose, self.path_length_m
         if not isinstance(action, GoalEnded):
@@ -115,10 +122,10 @@ class RobotLog:
         rest: List[Leg] = []
         for number, goal in enumerate(sequencer.sequence.goals[index:], start=index):
             if flight is not None and number == index:
-                rest.append(self._leg(number, lap, goal, False, "interrupted", flight.attempt,
+                rest.append(self._leg(number, lap, goal, False, INTERRUPTED, flight.attempt,
                                       now_s - flight.first_sent_s))
             else:
-                rest.append(Leg(number, lap, goal, False, "not sent", 0))
+                rest.append(Leg(number, lap, goal, False, NOT_SENT, 0))
         return self.legs + rest
 
     def _leg(self, index: int, lap: int, goal: Goal, reached: bool, reason: str, attempts: int,
@@ -172,9 +179,9 @@ class FlightLog:
         return sum(name in (contact.robot, contact.other) for contact in self.contacts)
 
 
-def unflown(sequence: GoalSequence, reason: str) -> List[Leg]:
+def unflown(sequence: GoalSequence) -> List[Leg]:
     """The legs of a mission that never began."""
-    return [Leg(index, 1, goal, False, reason, 0) for index, goal in enumerate(sequence.goals)]
+    return [Leg(index, 1, goal, False, NOT_SENT, 0) for index, goal in enumerate(sequence.goals)]
 
 
 def _smaller(a: Optional[float], b: float) -> float:

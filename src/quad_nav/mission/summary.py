@@ -12,7 +12,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import tabulate
 
-from quad_nav.mission.flight_log import Contact, FlightLog, Leg
+from quad_nav.mission.flight_log import INTERRUPTED, Contact, FlightLog, Leg
 
 EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT = 0, 1, 2
 
@@ -39,7 +39,7 @@ class RobotSummary:
 
     @property
     def skipped(self) -> int:
-        return sum(not leg.reached and leg.attempts > 0 and leg.reason != "interrupted"
+        return sum(not leg.reached and leg.attempts > 0 and leg.reason != INTERRUPTED
                    for leg in self.legs)
 
 
@@ -129,7 +129,7 @@ def _goal_table(robots: Sequence[RobotSummary]) -> str:
         for leg in robot.legs:
             goal = f"{leg.lap}/{leg.index + 1}" if laps else str(leg.index + 1)
             rows.append(_goal_row(robot.robot if leg is robot.legs[0] else "", goal, leg))
-            if leg.reason and leg.attempts:
+            if leg.reason and leg.attempts and leg.reason != INTERRUPTED:
                 notes.append(f"{robot.robot} goal {goal}: {leg.reason}")
     if laps:
         header[1] = "lap/goal"
@@ -141,7 +141,7 @@ def _goal_table(robots: Sequence[RobotSummary]) -> str:
 def _goal_row(robot: str, goal: str, leg: Leg) -> List[str]:
     flown = leg.time_s is not None
     result = "reached" if leg.reached else (
-        leg.reason if leg.reason == "interrupted" or not flown else "skipped")
+        leg.reason if leg.reason == INTERRUPTED or not flown else "skipped")
     return [robot, goal, f"{leg.goal.x_m:.2f}", f"{leg.goal.y_m:.2f}", result,
             _figure(leg.time_s, 1), str(leg.attempts),
             _figure(leg.path_length_m if flown else None, 2),

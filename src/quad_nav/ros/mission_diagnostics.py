@@ -1,6 +1,7 @@
 """The mission's progress as ``diagnostic_msgs``."""
 from __future__ import annotations
 
+import re
 from typing import Sequence
 
 import rospy
@@ -22,6 +23,7 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
     skipped = sum(not leg.reached for leg in flown.legs)
     contacts = log.contacts_of(robot.name)
     flight, pose = sequencer.flight, robot.pose
+    attempts = [leg.attempts for leg in flown.legs] + ([flight.attempt] if flight else [])
     distance_m = None
     if flight is not None and pose is not None:
         distance_m = pose.to_2d().distance_to(flight.pose)
@@ -35,7 +37,7 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
     values = {
         "goal": min(sequencer.index + 1, count), "goals": count, "lap": sequencer.lap,
         "distance_m": "" if distance_m is None else f"{distance_m:.2f}",
-        "attempt": flight.attempt if flight else 0, "retries": robot.retries,
+        "attempt": flight.attempt if flight else 0, "retries": sum(attempts) - len(attempts),
         "reached": len(flown.legs) - skipped, "skipped": skipped, "contacts": contacts,
         "recoveries": flown.recoveries, "path_length_m": f"{flown.path_length_m:.2f}",
     }
@@ -48,7 +50,9 @@ def contact_from_message(status: DiagnosticStatus) -> Contact:
     """A contact as the simulator reports it. Raises ValueError for what cannot be read."""
     values = {pair.key: pair.value for pair in status.values}
     try:
-        return Contact(float(values["time_s"]), status.hardware_id, values["with"],
+        # The simulator writes "quadcopter 1"; robots[].robot in our summary is "quad1".
+        other = re.sub(r"^quadcopter (\d+)$", r"quad\1", values["with"])
+        return Contact(float(values["time_s"]), status.hardware_id, other,
                        float(values["x_m"]), float(values["y_m"]))
     except (KeyError, ValueError) as error:
         raise ValueError(f"a contact without a readable {error}; expected the values time_s, "

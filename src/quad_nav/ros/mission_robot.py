@@ -1,6 +1,7 @@
 """One quadcopter of a mission: its sequencer between its topics, its log and the terminal."""
 from __future__ import annotations
 
+import math
 import time
 from typing import Optional
 
@@ -19,8 +20,10 @@ from quad_nav.ros.transforms import Transforms, TransformUnavailable
 FILE_POLL_S = 0.5  # wall time: a person edits while the simulation is paused, too
 ODOMETRY_SILENT_S = 3.0
 WARN_AGAIN_S = 5.0
-# How far odometry may be ahead of our clock; what is further is from before a reset.
+# How far odometry may be ahead of our clock; what is further is from before the clock went back.
 AHEAD_S = 1.0
+# A step of odometry that no flight makes: a simulation's reset.
+JUMP_M, JUMP_MPS = 1.0, 5.0
 
 
 class MissionRobot:
@@ -31,8 +34,9 @@ class MissionRobot:
         self.sequencer = Sequencer(goals.sequence)
         self.link = RobotLink(index)
         self.pose: Optional[Pose3D] = None
-        self.retries = 0
         self.is_silent = False
+        self._odometry: Optional[Odometry] = None
+        self._begun_s = 0.0
         self._heard_s = 0.0
         self._file = goals.file
         self._next_poll_s = 0.0
@@ -40,11 +44,18 @@ class MissionRobot:
         self._path = FlownPath(f"/path{index}")
 
     def begin(self, now_s: float) -> None:
-        """From the first goal: at the start, and after the simulation's clock went back."""
+        """From the first goal: at the start, and after the simulation was reset."""
         self.sequencer = Sequencer(self.sequencer.sequence)
-        self.pose, self.retries, self.is_silent, self._heard_s = None, 0, False, now_s
+        self.pose, self.is_silent, self._begun_s, self._heard_s = None, False, now_s, now_s
+        self._odometry = None
         self.link.forget()
         self._path.clear()
+
+    def was_reset(self, inbox: Inbox) -> bool:
+        """Whether the odometry that has come says that the quadcopter was put somewhere else."""
+        usable = [o for o in inbox.odometry if o.header.stamp.to_sec() >= self._begun_s]
+        before = [self._odometry, *usable] if self._odometry is not None else usable
+        return any(_is_jump(a, b) for a, b in zip(before, before[1:]))
 
     def step(self, inbox: Inbox, now_s: float, log: FlightLog) -> bool:
         """Take what has come and act on it; whether the goals or their states changed."""
@@ -59,7 +70,7 @@ class MissionRobot:
         for newcomer in inbox.newcomers:
             if self.link.send_to(newcomer):
                 rospy.loginfo("%s: %s sent to a node that began to listen", self.name,
-                              self._goal(self.sequencer.index))
+                              self._goal(self.sequencer.index, self.sequencer.lap))
         self._watch_silence(now_s)
         if self.pose is None:
             return changed
@@ -75,8 +86,9 @@ class MissionRobot:
 
     def _move(self, odometry: Odometry, now_s: float, log: FlightLog) -> None:
         stamp_s = odometry.header.stamp.to_sec()
-        if stamp_s > now_s + AHEAD_S:
+        if not self._begun_s <= stamp_s <= now_s + AHEAD_S:
             return
+        self._odometry = odometry
         try:
             map_from_odom = self.map_from(odometry.header.frame_id)
         except TransformUnavailable as error:
@@ -124,18 +136,17 @@ class MissionRobot:
             self._tell_ended(leg)
 
     def _tell_sent(self, action: SendGoal) -> None:
-        goal = self._goal(action.index)
+        goal = self._goal(action.index, action.lap)
         if not action.why:
             away_m = self.pose.to_2d().distance_to(action.pose) if self.pose else 0.0
             rospy.loginfo("%s: %s (%.2f, %.2f) sent, %.2f m away", self.name, goal,
                           action.pose.x_m, action.pose.y_m, away_m)
             return
-        self.retries += 1
         rospy.logwarn("%s: %s sent again, attempt %d of %d: %s", self.name, goal, action.attempt,
                       self.sequencer.sequence.settings.retries + 1, action.why)
 
     def _tell_ended(self, leg: Leg) -> None:
-        goal = self._goal(leg.index)
+        goal = self._goal(leg.index, leg.lap)
         if leg.reached:
             rospy.loginfo("%s: %s reached in %.1f s, path %.2f m (straight %.2f m)", self.name,
                           goal, leg.time_s, leg.path_length_m, leg.straight_length_m)
@@ -143,6 +154,14 @@ class MissionRobot:
             rospy.logwarn("%s: %s SKIPPED after %.1f s: %s", self.name, goal, leg.time_s,
                           leg.reason)
 
-    def _goal(self, index: int) -> str:
-        lap = f"lap {self.sequencer.lap}, " if self.sequencer.sequence.settings.loop else ""
-        return f"{lap}goal {index + 1} of {len(self.sequencer.sequence.goals)}"
+    def _goal(self, index: int, lap: int) -> str:
+        sequence = self.sequencer.sequence
+        round_ = f"lap {lap}, " if sequence.settings.loop else ""
+        return f"{round_}goal {index + 1} of {len(sequence.goals)}"
+
+
+def _is_jump(before: Odometry, after: Odometry) -> bool:
+    a, b = before.pose.pose.position, after.pose.pose.position
+    apart_m = math.hypot(b.x - a.x, b.y - a.y)
+    time_s = (after.header.stamp - before.header.stamp).to_sec()
+    return apart_m > max(JUMP_M, JUMP_MPS * time_s)

@@ -78,9 +78,8 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path) -> Missio
     Raises:
         InputError: every fault in the parameters, the scene and the goal files.
     """
-    problems = [_unknown(name, key) for key in parameters if key not in {**DEFAULTS, **SETTINGS}]
     values = {**DEFAULTS, **parameters}
-    problems += _faults(values, name) + _result_faults(result, name)
+    problems = _faults(values, name) + _result_faults(result, name)
     given = {key: values[key] for key in SETTINGS if key in values}
     settings, faults = read_settings(given, name)
     problems += faults
@@ -93,7 +92,8 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path) -> Missio
     clearance = _clearance(scene) if scene else None
     return MissionSetup(tuple(robots), radius_m, scene.altitude_m if scene else None, clearance,
                         values["simulation"], float(values["ready_timeout"]),
-                        values["exit_when_done"], tuple(_close_ends(robots, radius_m)))
+                        values["exit_when_done"],
+                        (*_unknown(parameters, name), *_close_ends(robots, radius_m)))
 
 
 def _faults(values: Mapping[str, Any], name: str) -> List[str]:
@@ -132,11 +132,15 @@ def _result_faults(result: Path, name: str) -> List[str]:
     return []
 
 
-def _unknown(name: str, key: str) -> str:
+def _unknown(parameters: Mapping[str, Any], name: str) -> List[str]:
+    """No faults: a parameter server keeps what earlier launches set."""
     known = [*DEFAULTS, *SETTINGS]
-    near = difflib.get_close_matches(key, known, n=1)
-    expected = near[0] if near else "one of " + ", ".join(known)
-    return f"{name}: {key}: is not a parameter of the sequencer; expected {expected}"
+    warnings = []
+    for key in sorted(set(parameters) - set(known)):
+        near = difflib.get_close_matches(key, known, n=1) or [f"one of {', '.join(known)}"]
+        warnings.append(f"{name}: {key}: is not a parameter of the sequencer and does nothing; "
+                        f"expected {near[0]}")
+    return warnings
 
 
 def _scene(path: Any, problems: List[str]) -> Optional[Scene]:

@@ -66,7 +66,10 @@ def missing_topic(name: str, message_type: str) -> str:
 
 def missing_subscriber(name: str) -> str:
     """Why nobody would hear what is published on a topic."""
-    there = _near(name, _providers(1))
+    listeners = _providers(1)
+    if name in listeners:
+        return f"{name}: a node listens to it, but has not connected yet"
+    there = _near(name, listeners)
     return f"{name}: no navigator listens to it; {there or 'nor to any topic like it'}"
 
 

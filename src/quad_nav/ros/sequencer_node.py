@@ -92,8 +92,8 @@ class Mission:
             inbox = robot.link.take(WAIT_S)
             with self._lock:
                 now_s = rospy.get_time()
-                if now_s < self._now_s:
-                    rospy.logwarn("the clock went back to %.2f s: the mission starts again", now_s)
+                if now_s < self._now_s or robot.was_reset(inbox):
+                    rospy.logwarn("the simulation was reset: the mission starts again")
                     self._begin(now_s)
                 self._now_s = now_s
                 with _topics_may_close():
@@ -204,15 +204,20 @@ def watch(mission: Mission, threads: List[Future], exit_when_done: bool, result:
 
 def report(summary: MissionSummary, result: Path) -> int:
     """The table on the terminal and the JSON where it belongs; the exit status."""
-    if summary.robots:
-        print(f"\n{table(summary)}", flush=True)
+    print(f"\n{table(summary)}", flush=True)
+    if not _write(summary, result):
+        return summary.exit_status or EXIT_FAILURE
+    print(f"Written to {result}\n", flush=True)
+    return summary.exit_status
+
+
+def _write(summary: MissionSummary, result: Path) -> bool:
     try:
         write_json(summary, result)
     except OSError as error:
         rospy.logerr("%s: cannot be written: %s", result, error.strerror)
-        return summary.exit_status or EXIT_FAILURE
-    print(f"Written to {result}\n", flush=True)
-    return summary.exit_status
+        return False
+    return True
 
 
 def fly(setup: MissionSetup, result: Path) -> int:
@@ -220,25 +225,30 @@ def fly(setup: MissionSetup, result: Path) -> int:
     mission = Mission(setup)
     missing = readiness.wait_for(mission.needs(), setup.ready_timeout_s)
     if missing:
-        return _not_flown(setup, result, "not ready: " + "; ".join(missing), missing)
+        reason = "stopped while waiting for" if rospy.is_shutdown() else "not ready"
+        return _not_flown(setup, result, reason, missing)
     try:
         mission.start()
     except (rospy.ServiceException, rospy.ROSException) as error:
-        return _not_flown(setup, result, f"{START_SERVICE}: {error}", [f"{START_SERVICE}: {error}"])
+        return _not_flown(setup, result, "the simulation did not start",
+                          [f"{START_SERVICE}: {error}"])
     with ThreadPoolExecutor(len(mission.robots)) as pool:
         threads = [pool.submit(mission.fly, robot) for robot in mission.robots]
         try:
             return watch(mission, threads, setup.exit_when_done, result)
+        except Exception as error:  # what was flown is not lost with a fault of ours
+            report(mission.summary(f"internal error: {error!r}"), result)
+            raise
         finally:
             rospy.signal_shutdown("the sequencer is through")
 
 
 def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:
-    rospy.logfatal("nothing is flown:\n  %s", "\n  ".join(lines))
-    robots = tuple(RobotSummary(robot.name, tuple(unflown(robot.sequence, "not sent")))
+    rospy.logfatal("nothing is flown, %s:\n  %s", reason, "\n  ".join(lines))
+    robots = tuple(RobotSummary(robot.name, tuple(unflown(robot.sequence)))
                    for robot in setup.robots)
-    write_json(MissionSummary(robots, robot_radius_m=setup.robot_radius_m, reason=reason,
-                              contacts_reported=False), result)
+    _write(MissionSummary(robots, robot_radius_m=setup.robot_radius_m,
+                          reason=f"{reason}: {'; '.join(lines)}", contacts_reported=False), result)
     return EXIT_FAILURE
 
 
@@ -251,17 +261,10 @@ def main() -> int:
     try:
         setup = read_setup(parameters, name, result)
     except InputError as error:
-        rospy.logfatal("nothing is flown, %d faults:\n  %s", len(error.problems),
-                       "\n  ".join(error.problems))
-        return _refused(error, result)
+        rospy.logfatal("nothing is flown:\n  %s", "\n  ".join(error.problems))
+        _write(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)
+        return EXIT_BAD_INPUT
     for warning in setup.warnings:
         rospy.logwarn("%s", warning)
     return fly(setup, result)
 
-
-def _refused(error: InputError, result: Path) -> int:
-    try:
-        write_json(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)
-    except OSError as fault:
-        rospy.logerr("%s: cannot be written: %s", result, fault.strerror)
-    return EXIT_BAD_INPUT
