@@ -8,7 +8,7 @@ In both styles some parameters of the costmap replace the layer's.
 """
 from __future__ import annotations
 
-from typing import Any, Dict, List, Tuple
+from typing import Dict, List, Set, Tuple
 
 from quad_nav.config import costmap_tables as tables
 from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, settle_layer
@@ -49,8 +49,7 @@ def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
     known = {layer for layer, _ in plugins} | {"plugins", *_OLD_STYLE}
     for _, layer_type in plugins:
         known |= set(PARENT_PARAMETERS.get(layer_type, ()))
-    # ObstacleLayer's ranges are looked for upwards, wherever plugins put it.
-    settle(costmap, name, _without_layer_parameters(costmap, name, known, notes), notes, known)
+    settle(costmap, name, _table_with_misplaced(costmap, known), notes, known)
 
 
 def costmap_params(costmap: Namespace) -> CostmapParams:
@@ -84,7 +83,8 @@ def _settle_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Not
         polygon = polygon_from_list(costmap["footprint"])
     except ValueError as error:
         expected = tables.COSTMAP["footprint"].expected
-        notes.problem(join(name, "footprint"), f"{error}; expected {expected}")
+        notes.problem(join(name, "footprint"),
+                      f"{costmap['footprint']}: {error}; expected {expected}")
         polygon = None
     costmap["footprint"] = "[]" if polygon is None else text_from_polygon(polygon)
 
@@ -171,21 +171,18 @@ def _remark_on_type(place: str, layer_type: str, notes: Notes) -> None:
                      f" out; there are {', '.join(sorted(set(LAYERS) - {VOXEL}))}")
 
 
-def _without_layer_parameters(costmap: Namespace, name: str, known: Any,
-                              notes: Notes) -> Table:
-    """COSTMAP, with the layers' keys that no layer takes told as ignored."""
+def _table_with_misplaced(costmap: Namespace, known: Set[str]) -> Table:
+    """COSTMAP, and among its ignored keys those of layers that are not there to take them."""
     misplaced: Dict[str, str] = {}
     for layer_type, keys in PARENT_PARAMETERS.items():
-        for key in keys:
-            if key not in known:
-                misplaced[key] = f"no {layer_type} in plugins takes it"
+        for key in set(keys) - known:
+            misplaced[key] = f"no {layer_type} in plugins takes it"
     if "observation_sources" in costmap:
-        misplaced["observation_sources"] = "with plugins it belongs below the obstacle layer's name"
-        for source in str(costmap["observation_sources"]).split():
-            misplaced[source] = misplaced["observation_sources"]
+        reason = "with plugins it belongs below the obstacle layer's name"
+        for key in ("observation_sources", *str(costmap["observation_sources"]).split()):
+            misplaced[key] = reason
     for key, value in costmap.items():
-        if isinstance(value, dict) and key not in known and key not in misplaced:
-            misplaced[key] = "no layer of that name is in plugins"
+        if isinstance(value, dict) and key not in known:
+            misplaced.setdefault(key, "no layer of that name is in plugins")
     base = tables.COSTMAP
-    return Table(base.reconfigurable, base.fixed, base.unsupported,
-                        tuple(misplaced.items()))
+    return Table(base.reconfigurable, base.fixed, base.unsupported, tuple(misplaced.items()))

@@ -151,14 +151,18 @@ def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
 def _collect(node: yaml.MappingNode, above: Tuple[str, ...], document: _Document,
              loader: yaml.SafeLoader) -> None:
     """Walks the nodes rather than the values: only they have lines and duplicates."""
-    loader.flatten_mapping(node)
     seen = set()
+    for key_node, _ in node.value:
+        if not isinstance(key_node, yaml.ScalarNode):
+            continue
+        if key_node.value in seen:
+            document.duplicates.append(
+                (key_node.start_mark.line + 1, "/".join((*above, key_node.value))))
+        seen.add(key_node.value)
+    loader.flatten_mapping(node)  # merge keys, "<<": what they bring in is no duplicate
     for key_node, value_node in node.value:
         key = str(loader.construct_object(key_node, deep=True))
         line = key_node.start_mark.line + 1
-        if key in seen:
-            document.duplicates.append((line, "/".join((*above, key))))
-        seen.add(key)
         path = above + tuple(filter(None, key.split("/")))
         document.lines[path] = line
         if isinstance(value_node, yaml.MappingNode):

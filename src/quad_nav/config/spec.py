@@ -10,9 +10,9 @@ from typing import Any, Callable, Optional, Tuple
 class Domain(enum.Enum):
     """Which numbers make sense at all; the others are errors."""
 
-    ANY = "a number"
-    NOT_NEGATIVE = "a number not below 0"
-    POSITIVE = "a positive number"
+    ANY = "a {number}"
+    NOT_NEGATIVE = "a {number}, 0 or more"
+    POSITIVE = "a positive {number}"
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,10 @@ class Parameter:
             return "true or false"
         if self.kind == "str":
             return self.unit or "a text"
-        words = self.domain.value
-        if self.kind == "int":
-            words = words.replace("number", "whole number")
-        return words + (" of " + self.unit if self.unit else "")
+        number = f"number of {self.unit}" if self.unit else "number"
+        if self.kind == "int" and not self.unit:
+            number = "whole number"
+        return self.domain.value.format(number=number)
 
     @property
     def in_force(self) -> Any:

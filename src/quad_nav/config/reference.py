@@ -1,0 +1,107 @@
+"""The reference page of parameters, written from the tables: ``docs/parameters.md``.
+
+    python -m quad_nav.config.reference > docs/parameters.md
+"""
+from __future__ import annotations
+
+from typing import Iterable, List, Tuple
+
+from quad_nav.config import costmap_tables, tables
+from quad_nav.config.spec import Parameter, Table
+
+_HEAD = """# Parameters
+
+Written by `python -m quad_nav.config.reference`; edit the tables in `src/quad_nav/config/`.
+
+Parameters have the names, places and meanings that they have in ROS's `move_base` (navigation
+1.17.3). A default is the value in force when nothing is set: where dynamic_reconfigure's
+description and the wiki differ, it is dynamic_reconfigure's. Values outside a range are clamped to
+it, and told. Parameters with a mark (R) can be changed while flying, with dynamic_reconfigure.
+
+What cannot be a value at all (a text for a number, NaN, a negative radius) is an error; every error
+is told before anything flies. What is legal and odd is told and flown: unknown keys with the
+nearest known name, keys and plugins that move_base knows and this package does not, keys that the
+original ignores, old names.
+
+## Where parameters go
+
+* A costmap with a `plugins` list reads each layer's parameters below the layer's name. Without one
+  it has an `obstacle_layer` and an `inflation_layer` (and a `static_layer` first, with
+  `static_map: true`), and layer parameters stand among the costmap's own, as before ROS Hydro.
+* In both cases what stands at the costmap's level replaces the layer's own value:
+  `inflation_radius` and `cost_scaling_factor`; `obstacle_range`, `raytrace_range`, `max_obstacle_height` and
+  `track_unknown_space`; `map_topic`, `lethal_cost_threshold` and `unknown_cost_value`.
+* Topics are relative to the node's namespace: `scan0` is `/scan0` for `/move_base0`.
+* `footprint` counts before `robot_radius`. move_base's own radii are other parameters:
+  `local_costmap/circumscribed_radius` and `clearing_radius`.
+* Old names that still count: `pdist_scale`, `gdist_scale`, `min_in_place_rotational_vel`.
+* `controller_patience` is 15 s at start, and 5 s from the first reconfiguration of move_base on,
+  unless it is set: the original's two defaults differ.
+* `TrajectoryPlannerROS/controller_frequency` changes what rollouts reckon with, not the loop's
+  rate.
+* Without `recovery_behaviors` the sequence is `conservative_reset`, `rotate_recovery`,
+  `aggressive_reset`, `rotate_recovery`, and the two `reset_distance` are `conservative_reset_dist`
+  and four times `local_costmap/circumscribed_radius`, whatever is set below those names.
+* A `costmap_2d::VoxelLayer` is flown as an obstacle layer; layers, planners and behaviours of other
+  packages are left out, or replaced by the ones that fly here.
+"""
+
+
+def reference() -> str:
+    """The page, as Markdown."""
+    parts = [_HEAD]
+    for title, text, table in _sections():
+        parts.append(f"\n## {title}\n\n{text}\n\n" + "\n".join(_rows(table)) + "\n")
+    return "".join(parts)
+
+
+def _sections() -> Iterable[Tuple[str, str, Table]]:
+    yield "move_base", "At the node's level.", tables.NAVIGATOR
+    yield "TrajectoryPlannerROS", "The local planner.", tables.TRAJECTORY_PLANNER
+    yield "NavfnROS", "The global planner.", tables.NAVFN
+    yield "Costmaps", "Below `global_costmap` and `local_costmap`.", costmap_tables.COSTMAP
+    yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", costmap_tables.OBSTACLE_LAYER)
+    yield ("Sources", "Each name in `observation_sources` is a namespace below the layer.",
+           costmap_tables.SOURCE)
+    yield ("Inflation layer", "`costmap_2d::InflationLayer`.", costmap_tables.INFLATION_LAYER)
+    yield "Static layer", "`costmap_2d::StaticLayer`.", costmap_tables.STATIC_LAYER
+    yield ("Clearing", "`clear_costmap_recovery/ClearCostmapRecovery`, below the behaviour's name."
+           " `layer_names` lists the layers that are cleared; the obstacle layers when unset.",
+           tables.CLEAR_COSTMAP)
+    yield ("Turning", "`rotate_recovery/RotateRecovery`, below the behaviour's name. Speeds and"
+           " accelerations are those of TrajectoryPlannerROS.", tables.ROTATE)
+
+
+def _rows(table: Table) -> List[str]:
+    rows = ["| name | default | range | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+    for parameter in table.parameters:
+        mark = " (R)" if parameter in table.reconfigurable else ""
+        unit = "" if parameter.kind == "str" else parameter.unit
+        rows.append(f"| `{parameter.name}`{mark} | {_default(parameter)} | {_range(parameter)} |"
+                    f" {unit} | {parameter.description} |")
+    for name, reason in table.unsupported:
+        rows.append(f"| `{name}` | | | | not supported here: {reason} |")
+    for name, reason in table.ignored:
+        rows.append(f"| `{name}` | | | | ignored: {reason} |")
+    return rows
+
+
+def _default(parameter: Parameter) -> str:
+    if parameter.kind == "bool":
+        return str(parameter.default).lower()
+    if parameter.kind == "str":
+        return f'`"{parameter.default}"`'
+    return f"{parameter.in_force:g}"
+
+
+def _range(parameter: Parameter) -> str:
+    if parameter.choices:
+        return ", ".join(f"{choice.value} {choice.name}" for choice in parameter.choices)
+    if parameter.low is None and parameter.high is None:
+        return ""
+    ends = ("" if end is None else f"{end:g}" for end in (parameter.low, parameter.high))
+    return " .. ".join(ends)
+
+
+if __name__ == "__main__":
+    print(reference(), end="")

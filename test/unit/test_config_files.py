@@ -1,0 +1,124 @@
+"""YAML files: where each goes, the robot's number, and what is wrong with them."""
+from __future__ import annotations
+
+import pytest
+
+from quad_nav.config import load, load_files
+from quad_nav.errors import InputError
+
+FILES = {
+    "costmap_common_params":
+        "robot_radius: 0.35\nbase_scan: {topic: scan$(arg i), marking: true}\n",
+    "local_costmap_params": "local_costmap:\n  width: 3.0\n  robot_radius: 0.2\n",
+    "global_costmap_params": "global_costmap: {width: 12.0}\n",
+    "base_local_planner_params": "TrajectoryPlannerROS: {max_vel_x: 0.3}\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for stem, text in FILES.items():
+        (tmp_path / f"{stem}.yaml").write_text(text)
+    return tmp_path
+
+
+def problems(*arguments):
+    with pytest.raises(InputError) as caught:
+        load_files(*arguments)
+    return caught.value.problems
+
+
+def test_common_goes_into_both_costmaps_and_the_own_file_wins(folder):
+    assert load_files(folder, {"i": "7"}) == {
+        "global_costmap": {"robot_radius": 0.35, "width": 12.0,
+                           "base_scan": {"topic": "scan7", "marking": True}},
+        "local_costmap": {"robot_radius": 0.2, "width": 3.0,
+                          "base_scan": {"topic": "scan7", "marking": True}},
+        "TrajectoryPlannerROS": {"max_vel_x": 0.3}}
+
+
+def test_move_base_file_and_the_robots_own_on_top(folder):
+    (folder / "move_base_params.yaml").write_text("controller_frequency: 5.0\n")
+    (folder / "robot1.yaml").write_text(
+        "controller_frequency: 9.0\nlocal_costmap: {base_scan: {marking: false}}\n")
+    one, two = (load_files(folder, {"i": number}) for number in "12")
+    assert (one["controller_frequency"], two["controller_frequency"]) == (9.0, 5.0)
+    assert one["local_costmap"]["base_scan"] == {"topic": "scan1", "marking": False}
+
+
+def test_sets_numbered_by_hand(folder):
+    (folder / "local_costmap_params0.yaml").write_text("local_costmap: {width: 4.0}\n")
+    assert load_files(folder, {"i": "0"})["local_costmap"]["width"] == 4.0
+    assert load_files(folder, {"i": "1"})["local_costmap"]["width"] == 3.0
+
+
+def test_list_of_files_in_the_order_given(folder):
+    (folder / "other.yaml").write_text("local_costmap/width: 9.0\n")
+    names = ["local_costmap_params.yaml", "other.yaml"]
+    assert load_files([folder / name for name in names])["local_costmap"]["width"] == 9.0
+    assert load_files([folder / name for name in names[::-1]])["local_costmap"]["width"] == 3.0
+
+
+def test_values_remember_their_file_and_line(folder):
+    (folder / "local_costmap_params.yaml").write_text("local_costmap:\n  width: three\n")
+    with pytest.raises(InputError) as caught:
+        load(load_files(folder, {"i": "0"}), "/move_base0")
+    assert caught.value.problems == [
+        f"/move_base0/local_costmap/width ({folder / 'local_costmap_params.yaml'}:2): 'three' is"
+        " not a number; expected a positive number of metres"]
+
+
+def test_missing_files_are_all_named(tmp_path):
+    (tmp_path / "global_costmap_params.yaml").write_text("")
+    assert problems(tmp_path, {"i": "0"}) == [
+        f"{tmp_path}: no {stem}.yaml or {stem}0.yaml" for stem in (
+            "costmap_common_params", "local_costmap_params", "base_local_planner_params")]
+    assert problems(tmp_path / "nowhere") == [
+        f"{tmp_path / 'nowhere'}: no such folder; expected one with costmap_common_params.yaml"]
+
+
+def test_every_broken_file_is_named_with_its_line(folder):
+    (folder / "local_costmap_params.yaml").write_text("local_costmap:\n  width: [1\n")
+    (folder / "global_costmap_params.yaml").write_text("- a list\n")
+    told = problems(folder, {"i": "0"})
+    assert told[0].startswith(f"{folder / 'local_costmap_params.yaml'}:3:1: not YAML: ")
+    assert told[1] == f"{folder / 'global_costmap_params.yaml'}:1: not a list of names with values"
+
+
+def test_tabs_are_told_as_yaml_tells_them(folder):
+    (folder / "local_costmap_params.yaml").write_text("local_costmap:\n\twidth: 1\n")
+    (told,) = problems(folder, {"i": "0"})
+    assert told.startswith(f"{folder / 'local_costmap_params.yaml'}:2:1: not YAML: ")
+    assert "'\\t'" in told
+
+
+def test_substitution_that_stands_for_nothing(folder):
+    (folder / "global_costmap_params.yaml").write_text("# $(arg i)\na: $(find quad)\nb: $(arg j)\n")
+    path = folder / "global_costmap_params.yaml"
+    assert problems(folder, {"i": "0"}) == [
+        f"{path}:2: $(find quad) stands for nothing; expected $(arg i)",
+        f"{path}:3: $(arg j) stands for nothing; expected $(arg i)"]
+
+
+def test_key_that_is_there_twice_counts_once_and_is_told(folder):
+    (folder / "local_costmap_params.yaml").write_text(
+        "local_costmap:\n  width: 3.0\n  height: 3.0\n  width: 5.0\n")
+    tree = load_files(folder, {"i": "0"})
+    assert tree["local_costmap"]["width"] == 5.0
+    assert [str(remark) for remark in load(tree, "").remarks if "twice" in remark.text] == [
+        f"{folder / 'local_costmap_params.yaml'}:4: local_costmap/width is there twice; YAML takes"
+        " the last one"]
+
+
+def test_empty_file_sets_nothing(folder):
+    (folder / "base_local_planner_params.yaml").write_text("# nothing yet\n")
+    assert "TrajectoryPlannerROS" not in load_files(folder, {"i": "0"})
+
+
+def test_anchors_and_merge_keys(folder):
+    (folder / "base_local_planner_params.yaml").write_text(
+        "x: &fast {max_vel_x: 0.5, min_vel_x: 0.1}\n"
+        "TrajectoryPlannerROS: {<<: *fast, max_vel_x: 0.7}\n")
+    tree = load_files(folder, {"i": "0"})
+    assert tree["TrajectoryPlannerROS"] == {"max_vel_x": 0.7, "min_vel_x": 0.1}
+    assert tree.remarks == []  # a merge key's value under an own one is no duplicate

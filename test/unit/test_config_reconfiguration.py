@@ -1,0 +1,126 @@
+"""Changes while a configuration is in force, and what dynamic_reconfigure is told about them."""
+from __future__ import annotations
+
+import pytest
+
+from quad_nav.config import load, reconfigurable, updated, values
+from quad_nav.errors import InputError
+
+TREE = {
+    "controller_frequency": 1.0,
+    "conservative_reset_dist": 1.0,
+    "TrajectoryPlannerROS": {"max_vel_x": 0.3},
+    "local_costmap": {"static_map": True, "inflation_radius": 0.4},
+}
+
+
+@pytest.fixture
+def configuration():
+    return load(TREE, "/nav")
+
+
+def test_namespaces_and_the_order_of_parameters(configuration):
+    namespaces = reconfigurable(configuration)
+    assert list(namespaces) == [
+        "", "TrajectoryPlannerROS", "global_costmap", "global_costmap/obstacle_layer",
+        "global_costmap/inflation_layer", "local_costmap", "local_costmap/static_layer",
+        "local_costmap/obstacle_layer", "local_costmap/inflation_layer"]
+    names = {namespace: [parameter.name for parameter in parameters]
+             for namespace, parameters in namespaces.items()}
+    assert names["local_costmap"] == [
+        "transform_tolerance", "update_frequency", "publish_frequency", "width", "height",
+        "resolution", "origin_x", "origin_y", "footprint", "robot_radius", "footprint_padding"]
+    assert names["local_costmap/obstacle_layer"] == [
+        "enabled", "footprint_clearing_enabled", "max_obstacle_height", "combination_method"]
+    assert names["local_costmap/inflation_layer"] == [
+        "enabled", "cost_scaling_factor", "inflation_radius", "inflate_unknown"]
+    assert names["local_costmap/static_layer"] == ["enabled"]
+    assert names[""][:4] == ["base_global_planner", "base_local_planner", "planner_frequency",
+                             "controller_frequency"]
+    assert len(names[""]) == 16
+    assert len(names["TrajectoryPlannerROS"]) == 28
+    assert names["TrajectoryPlannerROS"][-2:] == ["y_vels", "restore_defaults"]
+
+
+def test_types_are_those_of_the_messages(configuration):
+    for namespace, parameters in reconfigurable(configuration).items():
+        now = values(configuration, namespace)
+        kinds = {"double": float, "int": int, "bool": bool, "str": str}
+        for parameter in parameters:
+            assert type(now[parameter.name]) is kinds[parameter.kind], parameter.name
+            assert type(parameter.default) is kinds[parameter.kind], parameter.name
+
+
+def test_change_of_the_planner_leaves_the_rest(configuration):
+    changed = updated(configuration, "TrajectoryPlannerROS", {"max_vel_x": 0.5, "dwa": True})
+    assert (changed.trajectory_planner.max_vel_x_mps, changed.trajectory_planner.dwa) == (0.5, True)
+    assert configuration.trajectory_planner.max_vel_x_mps == 0.3
+    assert changed.navigator == configuration.navigator
+    assert changed.recoveries == configuration.recoveries
+    assert values(changed, "TrajectoryPlannerROS")["max_vel_x"] == 0.5
+
+
+def test_changes_of_costmaps_and_layers(configuration):
+    changed = updated(configuration, "local_costmap/inflation_layer", {"inflation_radius": 1})
+    assert dict(changed.local_costmap.layers)["inflation_layer"].inflation_radius_m == 1.0
+    assert changed.global_costmap == configuration.global_costmap
+    changed = updated(changed, "local_costmap", {"width": 4, "footprint": "[[1,0],[0,1],[0,-1]]"})
+    assert changed.local_costmap.width_m == 4.0
+    assert changed.local_costmap.footprint == ((1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
+    assert dict(changed.local_costmap.layers)["inflation_layer"].inflation_radius_m == 1.0
+
+
+def test_values_are_clamped(configuration):
+    changed = updated(configuration, "TrajectoryPlannerROS",
+                      {"max_vel_x": -3.0, "vx_samples": 1000, "min_vel_theta": 0.5})
+    planner = changed.trajectory_planner
+    assert (planner.max_vel_x_mps, planner.min_vel_theta_radps) == (0.0, 0.0)
+    assert planner.vx_samples == 300
+
+
+def test_first_change_of_move_base_brings_the_described_controller_patience(configuration):
+    assert configuration.navigator.controller_patience_s == 15.0
+    changed = updated(configuration, "", {"planner_frequency": 2.0})
+    assert changed.navigator.planner_frequency_hz == 2.0
+    assert changed.navigator.controller_patience_s == 5.0
+    elsewhere = updated(configuration, "local_costmap", {"width": 4})
+    assert elsewhere.navigator.controller_patience_s == 15.0
+
+
+def test_recoveries_keep_what_they_were_loaded_with(configuration):
+    changed = updated(configuration, "", {"conservative_reset_dist": 2.0})
+    assert changed.navigator.conservative_reset_dist_m == 2.0
+    assert dict(changed.recoveries)["conservative_reset"].reset_distance_m == 1.0
+
+
+def test_restore_defaults_goes_back_to_what_was_loaded(configuration):
+    changed = updated(configuration, "TrajectoryPlannerROS", {"max_vel_x": 0.5, "sim_time": 2.0})
+    restored = updated(changed, "TrajectoryPlannerROS", {"restore_defaults": True, "sim_time": 3.0})
+    assert restored.trajectory_planner == configuration.trajectory_planner
+    assert restored.to_tree() == configuration.to_tree()
+
+
+def test_changes_that_cannot_be_made_are_all_told_and_none_is_made(configuration):
+    with pytest.raises(InputError) as caught:
+        updated(configuration, "", {
+            "planner_frequency": 2.0, "controller_frequency": 0.0, "planner_patience": float("nan"),
+            "shutdown_costmaps": 1, "base_local_planner": "dwa_local_planner/DWAPlannerROS"})
+    assert caught.value.problems == [
+        "controller_frequency: 0.0 cannot be; expected a positive number of Hz",
+        "planner_patience: nan is not finite; expected a number of seconds, 0 or more",
+        "shutdown_costmaps: 1 is neither true nor false; expected true or false",
+        "base_local_planner: 'dwa_local_planner/DWAPlannerROS' is not supported here; expected"
+        " base_local_planner/TrajectoryPlannerROS"]
+    assert configuration.navigator.planner_frequency_hz == 0.0
+
+
+def test_names_and_namespaces_that_do_not_exist(configuration):
+    with pytest.raises(InputError, match="^TrajectoryPlannerROS/speed: unknown; expected one of"):
+        updated(configuration, "TrajectoryPlannerROS", {"speed": 1.0})
+    with pytest.raises(InputError, match="^NavfnROS: nothing to reconfigure; expected one of"):
+        updated(configuration, "NavfnROS", {})
+
+
+def test_dynamic_reconfigures_own_groups_are_passed_over(configuration):
+    changed = updated(configuration, "local_costmap", {"groups": {"id": 0}, "width": 4})
+    assert changed.local_costmap.width_m == 4.0

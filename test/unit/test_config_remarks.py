@@ -1,0 +1,147 @@
+"""What is legal and yet worth a line: unknown, unsupported, ignored, clamped, renamed."""
+from __future__ import annotations
+
+import pytest
+
+from quad_nav.config import load
+from quad_nav.recovery import ClearCostmapParams, RotateParams
+
+SEEING = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}}
+
+
+def remarks(tree):
+    """(kind, line) of each remark; costmaps that see, so that blindness is not among them."""
+    tree = {"global_costmap": dict(SEEING), "local_costmap": dict(SEEING), **tree}
+    return [(remark.kind, str(remark)) for remark in load(tree, "/nav").remarks]
+
+
+def planner(**parameters):
+    return {"TrajectoryPlannerROS": parameters}
+
+
+@pytest.mark.parametrize("tree, kind, line", [
+    ({"recovery_behaviour_enabled": True}, "unknown",
+     "recovery_behaviour_enabled: unknown, nothing reads it; did you mean"
+     " recovery_behavior_enabled?"),
+    ({"zzz": 1}, "unknown", "zzz: unknown, nothing reads it"),
+    (planner(max_vel_y=0.0), "unknown",
+     "TrajectoryPlannerROS/max_vel_y: unknown, nothing reads it; did you mean max_vel_x?"),
+    (planner(path_distance_bias=32.0), "clamped",
+     "TrajectoryPlannerROS/path_distance_bias: 32.0 becomes 5.0, the largest that move_base"
+     " allows"),
+    (planner(min_vel_theta=0.4), "clamped",
+     "TrajectoryPlannerROS/min_vel_theta: 0.4 becomes 0.0, the largest that move_base allows"),
+    (planner(vx_samples=0), "clamped",
+     "TrajectoryPlannerROS/vx_samples: 0 becomes 1, the smallest that move_base allows"),
+    (planner(vx_samples=6.5), "clamped",
+     "TrajectoryPlannerROS/vx_samples: 6.5 becomes 7: move_base takes whole numbers only"),
+    (planner(pdist_scale=2.0), "renamed",
+     "TrajectoryPlannerROS/pdist_scale: called path_distance_bias today"),
+    (planner(pdist_scale=2.0, path_distance_bias=1.0), "ignored",
+     "TrajectoryPlannerROS/pdist_scale: ignored by move_base: path_distance_bias is there as well"),
+    (planner(acc_limit_x=2.0), "ignored",
+     "TrajectoryPlannerROS/acc_limit_x: ignored by move_base: the name is acc_lim_x"),
+    (planner(meter_scoring=False), "ignored",
+     "TrajectoryPlannerROS/meter_scoring: ignored by move_base: distances are always scored in"
+     " metres"),
+    (planner(world_model="costmap"), "unsupported",
+     "TrajectoryPlannerROS/world_model: known to move_base but not supported here: the costmap is"
+     " the only world model"),
+    (planner(escape_vel=0.1), "caution",
+     "TrajectoryPlannerROS/escape_vel: the robot escapes forwards: a velocity below 0 backs up"),
+    ({**planner(controller_frequency=20.0), "controller_frequency": 5.0}, "caution",
+     "TrajectoryPlannerROS/controller_frequency: rollouts reckon with 20.0 Hz, while the loop runs"
+     " at 5.0 Hz"),
+    ({"DWAPlannerROS": {"max_vel_x": 1.0}}, "unsupported",
+     "DWAPlannerROS: no such planner flies here, nothing below is read"),
+    ({"base_local_planner": "dwa_local_planner/DWAPlannerROS"}, "unsupported",
+     "base_local_planner: dwa_local_planner/DWAPlannerROS is not supported here;"
+     " base_local_planner/TrajectoryPlannerROS flies instead"),
+    ({"base_global_planner": "NavfnROS"}, "renamed",
+     "base_global_planner: NavfnROS is called navfn/NavfnROS today"),
+    ({"aggressive_reset": {"reset_distance": 0.5}}, "ignored",
+     "aggressive_reset/reset_distance: ignored by move_base: without recovery_behaviors it is"
+     " 1.84"),
+    ({"recovery_behaviors": [{"name": "slow", "type": "move_slow_and_clear/MoveSlowAndClear"}]},
+     "unsupported",
+     "recovery_behaviors/slow: move_slow_and_clear/MoveSlowAndClear is not supported here, the"
+     " behaviour is left out; there are clear_costmap_recovery/ClearCostmapRecovery and"
+     " rotate_recovery/RotateRecovery"),
+    ({"local_costmap": {**SEEING, "plugins": []}}, "ignored",
+     "local_costmap/observation_sources: ignored by move_base: with plugins it belongs below the"
+     " obstacle layer's name"),
+    ({"local_costmap": {"plugins": [], "inflation_radius": 1.0}}, "ignored",
+     "local_costmap/inflation_radius: ignored by move_base: no costmap_2d::InflationLayer in"
+     " plugins takes it"),
+    ({"local_costmap": {"plugins": [], "inflater": {"inflation_radius": 1.0}}}, "ignored",
+     "local_costmap/inflater: ignored by move_base: no layer of that name is in plugins"),
+    ({"local_costmap": {"plugins": [], "static_map": True}}, "ignored",
+     "local_costmap/static_map: ignored by move_base: plugins say which layers there are, and"
+     " costmap_2d::StaticLayer is not among them"),
+    ({"local_costmap": {}}, "caution",
+     "local_costmap: no map and no observation_sources: there are no obstacles in this costmap"),
+    ({"local_costmap": {**SEEING, "obstacle_layer": {"rear": {"topic": "scan1"}}}}, "caution",
+     "local_costmap/obstacle_layer/rear: looks like a source, and observation_sources does not"
+     " name it: nothing reads it"),
+    ({"local_costmap": {"observation_sources": "scan", "scan": {"topic": "scan0"}}}, "caution",
+     "local_costmap/scan: no data_type: move_base listens for a PointCloud"),
+    ({"local_costmap": {**SEEING, "inflation_layer": {"robot_radius": 0.3}}}, "unknown",
+     "local_costmap/inflation_layer/robot_radius: unknown, nothing reads it"),
+], ids=str)
+def test_remark(tree, kind, line):
+    assert (kind, "/nav/" + line) in remarks(tree)
+
+
+def test_ordinary_parameters_need_no_remark():
+    assert remarks({"controller_frequency": 10.0, **planner(max_vel_x=0.5, dwa=True)}) == []
+
+
+def test_old_names_count_unless_the_new_one_is_there():
+    alone = load(planner(gdist_scale=2.0, min_in_place_rotational_vel=0.3), "").trajectory_planner
+    assert (alone.goal_distance_bias, alone.min_in_place_vel_theta_radps) == (2.0, 0.3)
+    both = load(planner(gdist_scale=2.0, goal_distance_bias=1.0), "").trajectory_planner
+    assert both.goal_distance_bias == 1.0
+
+
+def test_rollouts_reckon_with_the_planners_own_rate_then_the_nodes():
+    own = {**planner(controller_frequency=20.0), "controller_frequency": 5.0}
+    assert load(own, "").local_planner_period_s == 0.05
+    assert load({"controller_frequency": 5.0}, "").local_planner_period_s == 0.2
+    assert load(planner(controller_frequency=-1.0), "").local_planner_period_s == 0.05
+
+
+def test_listed_recoveries_are_flown_in_their_order_with_their_parameters():
+    tree = {"recovery_behaviors": [
+                {"name": "look", "type": "rotate_recovery/RotateRecovery"},
+                {"name": "forget", "type": "ClearCostmapRecovery"}],
+            "forget": {"reset_distance": 0.5, "layer_names": ["obstacles"],
+                       "affected_maps": "local"},
+            "look": {"frequency": 10}, **planner(max_vel_theta=0.7, yaw_goal_tolerance=0.2)}
+    configuration = load(tree, "")
+    assert configuration.recoveries == (
+        ("look", RotateParams(frequency_hz=10.0, max_vel_theta_radps=0.7,
+                              yaw_goal_tolerance_rad=0.2)),
+        ("forget", ClearCostmapParams(reset_distance_m=0.5, layer_names=("obstacles",),
+                                      affected_maps="local")))
+    assert configuration.navigator.recovery_behaviors == (
+        ("look", "rotate_recovery/RotateRecovery"),
+        ("forget", "clear_costmap_recovery/ClearCostmapRecovery"))
+
+
+def test_no_rotation_when_it_is_not_allowed():
+    recoveries = load({"clearing_rotation_allowed": False}, "").recoveries
+    assert [name for name, _ in recoveries] == ["conservative_reset", "aggressive_reset"]
+
+
+def test_clearing_covers_obstacle_layers_of_any_name():
+    costmap = {"plugins": [{"name": "laser", "type": "costmap_2d::ObstacleLayer"}]}
+    clear = dict(load({"local_costmap": costmap}, "").recoveries)["conservative_reset"]
+    assert "laser" in clear.layer_names
+
+
+def test_radii_of_move_base_itself():
+    tree = {"local_costmap": {"circumscribed_radius": 0.5}}
+    configuration = load(tree, "")
+    assert dict(configuration.recoveries)["aggressive_reset"].reset_distance_m == 2.0
+    assert configuration.clearing_radius_m == 0.5
+    assert load({**tree, "clearing_radius": 0.7}, "").clearing_radius_m == 0.7

@@ -1,0 +1,68 @@
+"""The tables agree with the dataclasses that they fill, and the reference page with them."""
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from quad_nav.config import costmap_tables, tables
+from quad_nav.config.reference import reference
+from quad_nav.config.spec import Table
+from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
+from quad_nav.costmap.inflation import InflationLayerParams
+from quad_nav.costmap.layered import CostmapParams
+from quad_nav.costmap.observation import SourceParams
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.navigator import NavigatorParams
+from quad_nav.plan.navfn import NavfnParams
+from quad_nav.recovery import ClearCostmapParams, RotateParams
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
+
+ROTATE = Table(fixed=tables.ROTATE.fixed + tables.ROTATE_FROM_PLANNER)
+# (dataclass, table, fields that are read in another way than from one row)
+PAIRS = [
+    (NavigatorParams, tables.NAVIGATOR, {"recovery_behaviors"}),
+    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER, set()),
+    (NavfnParams, tables.NAVFN, set()),
+    (ClearCostmapParams, tables.CLEAR_COSTMAP, {"layer_names"}),
+    (RotateParams, ROTATE, set()),
+    (CostmapParams, costmap_tables.COSTMAP, {"layers"}),
+    (ObstacleLayerParams, costmap_tables.OBSTACLE_LAYER, {"sources", "track_unknown_space"}),
+    (SourceParams, costmap_tables.SOURCE, {"name", "obstacle_range_m", "raytrace_range_m"}),
+    (InflationLayerParams, costmap_tables.INFLATION_LAYER, set()),
+    (StaticLayerParams, costmap_tables.STATIC_LAYER, set()),
+]
+TABLES = [table for _, table, _ in PAIRS]
+
+
+@pytest.mark.parametrize("params, table, apart", PAIRS, ids=lambda value: getattr(
+    value, "__name__", ""))
+def test_every_field_has_a_spelling_and_the_same_default(params, table, apart):
+    of_table = {parameter.field: parameter.field_value(parameter.in_force)
+                for parameter in table.parameters if parameter.field}
+    of_class = {field.name: field.default for field in fields(params)}
+    assert set(of_class) == set(of_table) | apart
+    shared = set(of_table) - apart
+    assert {name: of_table[name] for name in shared} == {name: of_class[name] for name in shared}
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_defaults_are_values_that_may_be_written(table):
+    for parameter in table.parameters:
+        for value in (parameter.default, parameter.in_force):
+            assert parameter.clamp(parameter.check(value)) == value, parameter.name
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_names_are_unique(table):
+    names = [parameter.name for parameter in table.parameters]
+    names += [name for name, _ in table.unsupported + table.ignored]
+    assert len(names) == len(set(names))
+
+
+def test_reference_page_is_up_to_date():
+    command = "python -m quad_nav.config.reference > docs/parameters.md"
+    assert PAGE.read_text() == reference(), command
