@@ -30,7 +30,8 @@ original ignores, old names.
   `static_map: true`), and layer parameters stand among the costmap's own, as before ROS Hydro.
 * In both cases what stands at the costmap's level replaces the layer's own value:
   `inflation_radius` and `cost_scaling_factor`; `obstacle_range`, `raytrace_range`,
-  `max_obstacle_height` and `track_unknown_space`; `map_topic`, `lethal_cost_threshold` and `unknown_cost_value`.
+  `max_obstacle_height` and `track_unknown_space`; `map_topic`, `lethal_cost_threshold` and
+  `unknown_cost_value`.
 * Topics are relative to the node's namespace: `scan0` is `/scan0` for `/move_base0`.
 * `footprint` counts before `robot_radius`. move_base's own radii are other parameters:
   `local_costmap/circumscribed_radius` and `clearing_radius`.
