@@ -82,7 +82,7 @@ class InflationLayer(Layer):
         reach, spec = self.radius_cells, master.spec
         inflate(master.costs, max(0, window.x0 - reach), min(spec.size_x, window.xn + reach),
                 max(0, window.y0 - reach), min(spec.size_y, window.yn + reach),
-                reach, self.cost_table, self._rank_table, self.params.inflate_unknown)
+                self.cost_table, self._rank_table, self.params.inflate_unknown)
 
     def _make_tables(self) -> None:
         self.radius_cells = int(max(0.0, math.ceil(

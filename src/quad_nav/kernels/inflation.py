@@ -11,13 +11,13 @@ _NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))  # left, lower, right, upper
 
 
 @njit(cache=True, nogil=True)
-def inflate(costs, x0, xn, y0, yn, radius, cost_table, rank_table, inflate_unknown):
-    """Spread costs from the lethal cells of a window to ``radius`` cells, in place.
+def inflate(costs, x0, xn, y0, yn, cost_table, rank_table, inflate_unknown):
+    """Spread costs from the lethal cells of a window, in place.
 
     costs: uint8[H, W]. Lethal cells in columns x0..xn-1 and rows y0..yn-1, which must lie
     inside the grid, are seeds in row order. cost_table (uint8) and rank_table (int32),
     both [radius + 2, radius + 2], give for (|dx|, |dy|) to the seed the cost, and the rank
-    of that distance among all distances; distances beyond the radius have the highest rank.
+    of that distance among all distances; all those beyond the radius have the highest rank.
 
     Cells are visited by rank, first in first out within one, and pass their seed on to
     their left, lower, right and upper neighbour. A cell keeps the first seed that reaches
@@ -29,9 +29,9 @@ def inflate(costs, x0, xn, y0, yn, radius, cost_table, rank_table, inflate_unkno
     size_y, size_x = costs.shape
     beyond = rank_table.max()
     waiting = np.full((size_y, size_x), beyond, np.int32)
-    columns = min(size_x, xn + radius) - max(0, x0 - radius)
-    rows = min(size_y, yn + radius) - max(0, y0 - radius)
-    queue = np.empty((5 * max(0, columns) * max(0, rows), 5), np.int32)  # next, x, y, dx, dy
+    radius = rank_table.shape[0] - 2
+    # next, x, y, dx, dy; memory is taken from the system as far as it is written to.
+    queue = np.empty((_most_entries(costs, x0, xn, y0, yn, radius), 5), np.int32)
     first = np.full(beyond, -1, np.int64)
     last = np.full(beyond, -1, np.int64)
     queued = 0
@@ -58,6 +58,16 @@ def inflate(costs, x0, xn, y0, yn, radius, cost_table, rank_table, inflate_unkno
                                 dx + step_x, dy + step_y)
                         queued += 1
             entry = queue[entry, 0]
+
+
+@njit(cache=True, nogil=True)
+def _most_entries(costs, x0, xn, y0, yn, radius):
+    """How many entries the queue can get: each seed, and each visited cell's neighbours."""
+    seeds = 0
+    for y in range(y0, yn):
+        for x in range(x0, xn):
+            seeds += costs[y, x] == LETHAL
+    return seeds + len(_NEIGHBOURS) * min(costs.size, seeds * (2 * radius + 1) ** 2)
 
 
 @njit(cache=True, nogil=True, inline="always")
