@@ -5,6 +5,7 @@ import pytest
 from costmap_maps import costs_of, drawn, picture
 
 from quad_nav.costmap.cost_grid import (
+    NO_CELLS,
     NOWHERE,
     Bounds,
     CostGrid,
@@ -77,6 +78,12 @@ def test_bounds_combine():
         -1.0, 1.0, 2.0, 5.0)
     assert Bounds(0.0, 1.0, 2.0, 3.0).grown(0.5) == Bounds(-0.5, 0.5, 2.5, 3.5)
     assert NOWHERE.including(np.array([(1.0, 5.0), (3.0, 4.0)])) == Bounds(1.0, 4.0, 3.0, 5.0)
+
+
+def test_windows_combine():
+    assert Window(1, 2, 3, 9).union(Window(0, 2, 4, 5)) == Window(0, 2, 3, 9)
+    assert NO_CELLS.union(Window(4, 5, 6, 7)) == Window(4, 5, 6, 7)
+    assert Window(4, 5, 6, 7).union(Window(9, 3, 0, 0)) == Window(4, 5, 6, 7)
 
 
 def test_fill_polygon_includes_its_outline():

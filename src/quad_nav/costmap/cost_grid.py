@@ -23,6 +23,13 @@ class Window:
     def is_empty(self) -> bool:
         return self.xn <= self.x0 or self.yn <= self.y0
 
+    def union(self, other: Window) -> Window:
+        """The smallest window that holds both; an empty one adds nothing."""
+        if self.is_empty or other.is_empty:
+            return other if self.is_empty else self
+        return Window(min(self.x0, other.x0), max(self.xn, other.xn),
+                      min(self.y0, other.y0), max(self.yn, other.yn))
+
     @property
     def slices(self) -> Tuple[slice, slice]:
         """Index of ``[y, x]`` arrays."""

@@ -7,7 +7,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from quad_nav.costmap.cost_grid import Bounds, CostGrid, Window, merge_maximum
+from quad_nav.costmap.cost_grid import NO_CELLS, Bounds, CostGrid, Window, merge_maximum
 from quad_nav.costmap.layer import GridLayer, LayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
@@ -54,7 +54,7 @@ class StaticLayer(GridLayer):
         self.map_from_global = Pose2D(0.0, 0.0)
         self._rolling_window = rolling_window
         self._map: Optional[StaticMap] = None
-        self._changed: Optional[Window] = None
+        self._changed = NO_CELLS
 
     def resize(self, spec: GridSpec) -> None:
         if not self._rolling_window:
@@ -89,7 +89,7 @@ class StaticLayer(GridLayer):
             return
         part = occupancy[area.y0 - cell_y:area.yn - cell_y, area.x0 - cell_x:area.xn - cell_x]
         self.grid.costs[area.slices] = self.costs_of(part)
-        self._changed = _union(self._changed, area)
+        self._changed = self._changed.union(area)
 
     def costs_of(self, occupancy: np.ndarray) -> np.ndarray:
         """Occupancies, int8 of any shape, as costs, uint8, by the layer's thresholds."""
@@ -120,10 +120,10 @@ class StaticLayer(GridLayer):
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
         bounds = super().update_bounds(robot, now_s, bounds)
-        area, self._changed = self._changed, None
+        area, self._changed = self._changed, NO_CELLS
         if self._rolling_window and self._map is not None:
             area = self._everything()
-        if area is None:
+        if area.is_empty:
             return bounds
         spec = self.grid.spec
         corners = np.array([spec.centre_of(x, y) for x in (area.x0, area.xn)
@@ -163,12 +163,6 @@ class StaticLayer(GridLayer):
 
     def _mark_all_changed(self) -> None:
         self._changed = self._everything()
-
-
-def _union(a: Optional[Window], b: Window) -> Window:
-    if a is None:
-        return b
-    return Window(min(a.x0, b.x0), max(a.xn, b.xn), min(a.y0, b.y0), max(a.yn, b.yn))
 
 
 def _centres(spec: GridSpec, window: Window) -> Tuple[np.ndarray, np.ndarray]:
