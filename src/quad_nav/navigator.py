@@ -101,6 +101,8 @@ class Navigator:
         self._started = False
         self._plan_wanted = False
         self._new_plan: Optional[np.ndarray] = None
+        self._oscillation = Standstill()
+        self._progress = Standstill()
         self._reset_recovery()
 
     # -- goals ---------------------------------------------------------------------
@@ -206,6 +208,13 @@ class Navigator:
         """Forgets everything that was observed, as ``~clear_costmaps`` does."""
         self.global_costmap.reset_layers(now_s)
         self.local_costmap.reset_layers(now_s)
+
+    def free_surroundings(self, located: Located, radius_m: float) -> None:
+        """Takes the square around the robot for free until the next updates."""
+        for costmap, pose in ((self.global_costmap, located.in_global),
+                              (self.local_costmap, located.in_local)):
+            if pose is not None:
+                costmap.free_square(pose.x_m, pose.y_m, 2.0 * radius_m)
 
     def _out_of_date(self, now_s: float) -> str:
         """Why the local costmap is not to be driven by, "" when it is."""

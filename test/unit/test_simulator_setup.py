@@ -47,8 +47,8 @@ def test_every_fault_is_listed():
 @pytest.mark.parametrize("parameters, problem", [
     ({"robots": 9}, "simulator: robots: 9, expected 1 to 8, the start poses of scene arena"),
     ({"robots": True}, "simulator: robots: is True, expected a whole number, 1 or more"),
-    ({"step_size": 4.0}, "simulator: step_size: 4.0, expected an angle that divides scan_range, "
-     + f"{2 * math.pi}, into 2 or more"),
+    ({"scan_range": 3.0, "step_size": 4.0},
+     "simulator: step_size: 4.0, expected an angle that divides scan_range, 3.0, into 2 or more"),
     ({"scan_range": 7.0, "step_size": 0.1},
      "simulator: scan_range: 7.0, expected an angle in (0, 2 pi]"),
 ])

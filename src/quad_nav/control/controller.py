@@ -48,3 +48,8 @@ class LocalPlanner(Protocol):
     def is_goal_reached(self) -> bool:
         """Whether the plan's end was reached, heading included."""
         ...
+
+    def cost_cloud(self) -> np.ndarray:
+        """What each cell cost in the last call, float32[n, 7]: x, y, z, path, goal,
+        obstacle and total; float32[0, 7] for a planner that scores no cells."""
+        ...

@@ -139,6 +139,14 @@ class LayeredCostmap:
         return [name for name, layer in self.layers.items() if name in wanted
                 and layer.clear_area(centre_x_m, centre_y_m, size_m, keep_inside)]
 
+    def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> None:
+        """Make the master free in a square; layers that still know better put it right
+        at the next update. Nothing is done when the square leaves the map."""
+        half_m = 0.5 * size_m
+        corners = np.array([[-half_m, -half_m], [-half_m, half_m],
+                            [half_m, half_m], [half_m, -half_m]])
+        self._master.fill_polygon(corners + (centre_x_m, centre_y_m), FREE)
+
     def set_footprint(self, footprint: footprints.Footprint) -> None:
         """Take an unpadded footprint, float64[n, 2] in the robot's frame."""
         self._unpadded_footprint = np.asarray(footprint, dtype=np.float64)

@@ -13,7 +13,7 @@ from geometry_msgs.msg import PolygonStamped
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
 
-from quad_nav.costmap.cost_grid import Window
+from quad_nav.costmap.cost_grid import NO_CELLS, Window
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
@@ -35,7 +35,7 @@ class CostmapPublisher:
     def __init__(self, name: str, costmap: LayeredCostmap, lock):
         self._costmap = costmap
         self._lock = lock
-        self._changed: Optional[Window] = None
+        self._changed = NO_CELLS
         self._published: Optional[GridSpec] = None
         self._last_s = 0.0
         self._footprint = rospy.Publisher(f"~{name}/footprint", PolygonStamped, queue_size=1)
@@ -51,7 +51,7 @@ class CostmapPublisher:
         if self._footprint.get_num_connections() > 0:
             self._footprint.publish(polygon_message(
                 oriented(self._costmap.footprint, pose), params.global_frame, stamp))
-        self._changed = window if self._changed is None else self._changed.union(window)
+        self._changed = self._changed.union(window)
         period_s = 1.0 / params.publish_frequency_hz if params.publish_frequency_hz > 0.0 else None
         if period_s is None or now_s < self._last_s + period_s - 1e-6:
             return
@@ -60,13 +60,13 @@ class CostmapPublisher:
 
     def _publish(self, stamp: rospy.Time) -> None:
         costmap, changed = self._costmap, self._changed
-        self._changed = None
+        self._changed = NO_CELLS
         if self._grid.get_num_connections() == 0 and self._updates.get_num_connections() == 0:
             return
         if costmap.params.always_send_full_costmap or costmap.spec != self._published:
             self._grid.publish(self._full(stamp))
             self._published = costmap.spec
-        elif changed is not None and not changed.is_empty:
+        elif not changed.is_empty:
             part = costmap.costs[changed.slices]
             self._updates.publish(update_message(
                 part, changed.x0, changed.y0, costmap.params.global_frame, stamp))

@@ -19,11 +19,12 @@ from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.errors import InputError, InvalidGoal, PlanningError
 from quad_nav.geometry import Pose3D, Twist2D
-from quad_nav.ros import reconfigure_servers, sensors, static_maps
+from quad_nav.ros import sensors, static_maps
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
 from quad_nav.ros.nav_messages import path_message, pose_from_message
 from quad_nav.ros.plan_topics import PlanTopics, plugin_name
+from quad_nav.ros.reconfigure import serve_namespaces
 from quad_nav.ros.silence import SilenceWatch
 from quad_nav.ros.transforms import Transforms
 from quad_nav.tick import Located, State, Tick
@@ -53,7 +54,7 @@ class MoveBaseNode:
         self._maps = static_maps.connect(costmaps, self._lock)
         self._silence = SilenceWatch(
             [self._odometry] + [sensor.subscriber for sensor in self._sensors])
-        self._reconfigure = reconfigure_servers.serve(configuration, self._on_reconfigure)
+        self._reconfigure = serve_namespaces(configuration, self._on_reconfigure)
         planner = plugin_name(navigator.params.base_global_planner)
         self._services = [
             rospy.Service("~make_plan", GetPlan, self._make_plan),
@@ -80,11 +81,18 @@ class MoveBaseNode:
             if self._navigator.state is not State.IDLE:
                 raise rospy.ServiceException(
                     "move_base must be in an inactive state to make a plan for an external user")
+            if self._navigator.params.make_plan_clear_costmap:
+                self._free_surroundings(rospy.get_time())
             return self._plan_response(request, self._navigator.make_plan)
 
     def _make_planner_plan(self, request) -> GetPlanResponse:
         with self._lock:
             return self._plan_response(request, self._navigator.make_plan)
+
+    def _free_surroundings(self, now_s: float) -> None:
+        in_global = self._locate(self._navigator.global_costmap, now_s)
+        self._navigator.free_surroundings(
+            self._located(in_global, now_s), self._configuration.clearing_radius_m)
 
     def _plan_response(self, request, make_plan) -> GetPlanResponse:
         frame = self._navigator.global_costmap.params.global_frame
@@ -145,9 +153,7 @@ class MoveBaseNode:
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
             return
         in_global = self._locate(navigator.global_costmap, now_s)
-        in_local = self._locate(navigator.local_costmap, now_s)
-        located = Located(in_global.to_2d() if in_global else None,
-                          in_local.to_2d() if in_local else None)
+        located = self._located(in_global, now_s)
         tick = navigator.tick(now_s, located, self._velocity)
         self._publish(tick, in_global, located)
 
@@ -155,6 +161,11 @@ class MoveBaseNode:
         params = costmap.params
         return self._transforms.locate(
             params.global_frame, params.robot_base_frame, now_s, params.transform_tolerance_s)
+
+    def _located(self, in_global: Optional[Pose3D], now_s: float) -> Located:
+        in_local = self._locate(self._navigator.local_costmap, now_s)
+        return Located(in_global.to_2d() if in_global else None,
+                       in_local.to_2d() if in_local else None)
 
     def _publish(self, tick: Tick, in_global: Optional[Pose3D], located: Located) -> None:
         for warning in tick.warnings:
@@ -172,7 +183,9 @@ class MoveBaseNode:
             self._topics.stop()
         poses = {"global": located.in_global, "local": located.in_local}
         for name, window in tick.windows.items():
-            self._publishers[name].updated(tick.now_s, poses[name], window)
+            pose = poses[name]
+            assert pose is not None  # a costmap is updated at a known pose only
+            self._publishers[name].updated(tick.now_s, pose, window)
         self._goals.finish(tick.outcome)
 
 
@@ -188,7 +201,6 @@ def main() -> int:
         return EXIT_BAD_INPUT
     for warning in configuration.warnings:
         rospy.logwarn("%s", warning)
-    rospy.set_param("~", configuration.to_tree())  # as the original leaves it: defaults filled in
     node = MoveBaseNode(configuration)
     try:
         node.spin()

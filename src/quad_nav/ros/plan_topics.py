@@ -74,9 +74,8 @@ class PlanTopics:
         if len(control.local_plan) and self._local_plan.get_num_connections() > 0:
             self._local_plan.publish(path_message(control.local_plan, self._local_frame, now))
         if self._cost_cloud.get_num_connections() > 0:
-            cloud = self._navigator.controller.cost_cloud()
-            if cloud is not None:
-                self._cost_cloud.publish(cost_cloud_message(cloud, self._local_frame, now))
+            self._cost_cloud.publish(cost_cloud_message(
+                self._navigator.controller.cost_cloud(), self._local_frame, now))
 
     def stop(self) -> None:
         self._command.publish(Twist())
