@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import collections
 import functools
+import signal
 import sys
 import time
 from concurrent.futures import Future
@@ -47,7 +48,7 @@ class SimulatorNode:
         self._meter = RateMeter()
         # Faster than real time, the clock comes with the odometry: nobody needs it more often.
         self._steps_per_clock = _STEPS_PER_CLOCK if setup.rate <= 1.0 else _STEPS_PER_ODOMETRY
-        self._paused = True
+        self._paused, self._stopping = True, False
         self._next_health_s = self._next_republish_s = 0.0
         self._commands: Deque[Tuple[int, Twist]] = collections.deque()
         self._requests: Deque[Tuple[Callable[[], str], Future]] = collections.deque()
@@ -56,11 +57,11 @@ class SimulatorNode:
         self._offer_services()
 
     def run(self) -> None:
-        """Until ROS shuts down or the window is closed."""
+        """Until ``stop``, ROS shuts down or the window is closed."""
         self._publish_all()
         if not self._setup.start_paused:
             self._start()
-        while not rospy.is_shutdown() and self._simulation.is_open:
+        while not (self._stopping or rospy.is_shutdown()) and self._simulation.is_open:
             self._answer_requests()
             self._show_goals()
             self._report()
@@ -69,6 +70,10 @@ class SimulatorNode:
             else:
                 self._advance()
         self._simulation.close()
+
+    def stop(self) -> None:
+        """End ``run`` soon."""
+        self._stopping = True
 
     def _subscribe(self) -> None:
         for i in range(self._setup.robots):
@@ -197,8 +202,12 @@ class SimulatorNode:
 
 
 def main() -> int:
-    """0 after a shutdown, 2 when the parameters or the scene cannot be used."""
-    rospy.init_node("simulator")
+    """0 after a shutdown, 2 when the parameters or the scene cannot be used.
+
+    rospy's own signal handler would close the publishers in the middle of a
+    publish of this thread, and wait for ever for a lock that it holds itself.
+    """
+    rospy.init_node("simulator", disable_signals=True)
     name = rospy.get_name().lstrip("/")
     try:
         node = SimulatorNode(read_setup(rospy.get_param("~", {}), name))
@@ -208,5 +217,8 @@ def main() -> int:
     if not rospy.get_param("/use_sim_time", False):
         rospy.logwarn("/use_sim_time is not set: other nodes will not follow the simulation's "
                       "clock, expected true before they start")
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: node.stop())
     node.run()
+    rospy.signal_shutdown("the simulation has ended")
     return 0
