@@ -12,6 +12,7 @@ import signal
 import sys
 import time
 from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Callable, Deque, Tuple
 
 import rospy
@@ -103,7 +104,10 @@ class SimulatorNode:
         def handle(_) -> TriggerResponse:
             done: Future = Future()
             self._requests.append((action, done))
-            return TriggerResponse(True, done.result(_ANSWER_WITHIN_S))
+            try:
+                return TriggerResponse(True, done.result(_ANSWER_WITHIN_S))
+            except FutureTimeoutError:
+                return TriggerResponse(False, f"not done within {_ANSWER_WITHIN_S:g} s")
         return handle
 
     def _enable_lidar(self, robot: int, request) -> SetBoolResponse:

@@ -6,7 +6,9 @@ while one of them tilts by a few degrees.
 """
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -39,6 +41,7 @@ class World:
         self._airframe = airframe
         self._step_s = step_s
         self._client = _connect(gui)
+        self._gui = gui
         self._goal_ids: List[int] = []
         self.reset(starts)
 
@@ -46,6 +49,7 @@ class World:
         """Build everything anew, so that nothing of the past is left in the engine."""
         client = self._client
         pybullet.resetSimulation(physicsClientId=client)
+        self._draw(False)
         pybullet.setGravity(0.0, 0.0, -GRAVITY_MPS2, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(fixedTimeStep=self._step_s,
                                            deterministicOverlappingPairs=1,
@@ -57,6 +61,7 @@ class World:
         self._robots = [self._add_quadcopter(k, start) for k, start in enumerate(starts)]
         self._goal_ids = []
         pybullet.performCollisionDetection(physicsClientId=client)
+        self._draw(True)
 
     def close(self) -> None:
         if pybullet.isConnected(self._client):
@@ -123,6 +128,16 @@ class World:
             self._goal_ids.append(pybullet.createMultiBody(
                 0.0, baseVisualShapeIndex=shape, basePosition=centre, physicsClientId=client))
 
+    def _draw(self, on: bool) -> None:
+        """Stop drawing while bodies are added, which is slow otherwise, and go on after it."""
+        if not self._gui:
+            return
+        client, size_x, size_y = self._client, self._scene.size_x_m, self._scene.size_y_m
+        for option, value in ((pybullet.COV_ENABLE_GUI, 0), (pybullet.COV_ENABLE_RENDERING, on)):
+            pybullet.configureDebugVisualizer(option, int(value), physicsClientId=client)
+        pybullet.resetDebugVisualizerCamera(0.9 * max(size_x, size_y), 0.0, -60.0,
+                                            [size_x / 2, size_y / 2, 0.0], physicsClientId=client)
+
     def _touch(self, body_a: int, body_b: int, position: Tuple[float, float, float]) -> Touch:
         numbers = sorted(self._robots.index(body) for body in (body_a, body_b)
                          if body not in self._names)
@@ -168,12 +183,23 @@ class World:
 
 def _connect(gui: bool) -> int:
     """Open the engine; a window needs a display, without which pybullet ends the process."""
-    if gui and os.name == "posix" and os.uname().sysname == "Linux" \
-            and not os.environ.get("DISPLAY"):
-        raise InputError([("gui: no display, expected DISPLAY to be set; "
-                           "use gui:=false to simulate without a window")])
+    if gui and sys.platform == "linux" and not _has_display():
+        display = os.environ.get("DISPLAY", "")
+        raise InputError([f"gui: no display at DISPLAY={display!r}, expected one or gui:=false"])
     client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
     if client < 0:
-        raise InputError([("gui: pybullet cannot open its window; "
-                           "use gui:=false to simulate without one")])
+        raise InputError(["gui: pybullet cannot open its window; gui:=false simulates without"])
     return int(client)
+
+
+def _has_display() -> bool:
+    """Whether an X server answers."""
+    try:
+        x11 = ctypes.CDLL("libX11.so.6")
+    except OSError:
+        return False
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    display = x11.XOpenDisplay(None)
+    if display:
+        x11.XCloseDisplay(ctypes.c_void_p(display))
+    return bool(display)
