@@ -44,7 +44,8 @@ def _goal_markers(robot: int, index: int, sequencer: Sequencer, altitude_m: floa
     sphere = Marker(ns=f"goal{robot}", id=index, type=Marker.SPHERE, action=Marker.ADD,
                     color=_colour(robot, alpha), scale=Vector3(diameter_m, diameter_m, diameter_m))
     number = Marker(ns=f"goal{robot}_number", id=index, type=Marker.TEXT_VIEW_FACING,
-                    action=Marker.ADD, text=str(index + 1), color=_colour(robot, max(alpha, 0.4)),
+                    action=Marker.ADD, text=str(index + 1),
+                    color=ColorRGBA(0.1, 0.1, 0.1, max(alpha, 0.4)),
                     scale=Vector3(0.0, 0.0, TEXT_HEIGHT_M))
     for marker, above_m in ((sphere, 0.0), (number, diameter_m / 2 + TEXT_HEIGHT_M / 2)):
         marker.pose.position.x, marker.pose.position.y = goal.x_m, goal.y_m

@@ -28,7 +28,7 @@ _Rgba = Tuple[float, float, float, float]
 def scene_markers(scene: Scene) -> MarkerArray:
     """Floor, walls and obstacles in ``map``."""
     floor = _marker("map", "floor", 0, Marker.CUBE,
-                    (scene.size_x_m / 2, scene.size_y_m / 2, -0.01),
+                    (scene.size_x_m / 2, scene.size_y_m / 2, -0.1),
                     (scene.size_x_m, scene.size_y_m, 0.01), _FLOOR_RGBA)
     walls = [_solid(wall, "walls", k, _WALL_RGBA) for k, wall in enumerate(scene.wall_boxes())]
     obstacles = [_solid(obstacle, "obstacles", k, _OBSTACLE_RGBA)
