@@ -6,8 +6,10 @@ import pytest
 
 from quad_nav.config import load
 from quad_nav.costmap.inflation import InflationLayerParams
+from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.errors import InputError
 
 OBSTACLE = {"name": "obstacles", "type": "costmap_2d::ObstacleLayer"}
@@ -84,15 +86,40 @@ def test_own_namespaces_count_without_plugins_too():
     assert not layers(tree)["obstacle_layer"].enabled
 
 
-def test_voxel_layer_is_flown_as_an_obstacle_layer_and_told():
-    configuration = load({"local_costmap": {"map_type": "voxel", "z_voxels": 10}}, "")
-    assert isinstance(dict(configuration.local_costmap.layers)["obstacle_layer"],
-                      ObstacleLayerParams)
-    told = {remark.place: remark.text for remark in configuration.remarks
-            if remark.kind == "unsupported"}
-    assert told["/local_costmap/plugins/obstacle_layer"].endswith(
-        "flown as costmap_2d::ObstacleLayer")
-    assert told["/local_costmap/z_voxels"].startswith("known to move_base but not supported here")
+def test_map_type_voxel_makes_a_voxel_layer_of_the_costmaps_parameters():
+    tree = {"map_type": "voxel", "z_voxels": 8, "z_resolution": 0.25, "mark_threshold": 1,
+            "publish_voxel_map": True, "observation_sources": "scan",
+            "scan": {"data_type": "LaserScan"}, "obstacle_layer": {"unknown_threshold": 4}}
+    configuration = load({"local_costmap": tree}, "")
+    layer = dict(configuration.local_costmap.layers)["obstacle_layer"]
+    assert layer == VoxelLayerParams(
+        z_voxels=8, z_resolution_m=0.25, mark_threshold=1, publish_voxel_map=True,
+        unknown_threshold=4, sources=(SourceParams("scan", "scan", data_type="LaserScan"),))
+    assert [str(remark) for remark in configuration.remarks if "local" in remark.place] == []
+    assert configuration.to_tree()["local_costmap"]["obstacle_layer"]["z_voxels"] == 8
+
+
+def test_voxel_layer_among_plugins():
+    voxels = {"name": "space", "type": "costmap_2d::VoxelLayer"}
+    tree = {"plugins": [voxels], "origin_z": 0.5, "space": {"origin_z": 1.5, "z_voxels": 20,
+                                                           "max_obstacle_height": 1.0}}
+    configuration = load({"local_costmap": tree}, "")
+    layer = dict(configuration.local_costmap.layers)["space"]
+    assert (layer.origin_z_m, layer.z_voxels, layer.max_obstacle_height_m) == (0.5, 16, 1.0)
+    told = [str(remark) for remark in configuration.remarks]
+    assert ("/local_costmap/space/origin_z: ignored by move_base: local_costmap/origin_z replaces"
+            " it") in told
+    assert ("/local_costmap/space/z_voxels: 20 becomes 16, the largest that move_base allows"
+            in told)
+    with pytest.raises(InputError, match="^/local_costmap/z_voxels: 0 cannot be; expected a"):
+        load({"local_costmap": {"map_type": "voxel", "z_voxels": 0}}, "")
+
+
+def test_an_obstacle_layer_reads_no_voxels():
+    tree = {"obstacle_layer": {"z_voxels": 8}}
+    told = [str(remark) for remark in load({"local_costmap": tree}, "").remarks]
+    assert ("/local_costmap/obstacle_layer/z_voxels: ignored by move_base: only a"
+            " costmap_2d::VoxelLayer reads it") in told
 
 
 def test_unsupported_layers_are_left_out_and_told():

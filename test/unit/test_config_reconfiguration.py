@@ -70,6 +70,17 @@ def test_changes_of_costmaps_and_layers(configuration):
     assert dict(changed.local_costmap.layers)["inflation_layer"].inflation_radius_m == 1.0
 
 
+def test_voxel_layer():
+    configuration = load({"local_costmap": {"map_type": "voxel"}}, "")
+    names = [parameter.name
+             for parameter in reconfigurable(configuration)["local_costmap/obstacle_layer"]]
+    assert names == ["enabled", "footprint_clearing_enabled", "max_obstacle_height", "origin_z",
+                     "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold",
+                     "combination_method"]
+    changed = updated(configuration, "local_costmap/obstacle_layer", {"z_voxels": 4})
+    assert dict(changed.local_costmap.layers)["obstacle_layer"].z_voxels == 4
+
+
 def test_values_are_clamped(configuration):
     changed = updated(configuration, "TrajectoryPlannerROS",
                       {"max_vel_x": -3.0, "vx_samples": 1000, "min_vel_theta": 0.5})

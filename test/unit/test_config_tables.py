@@ -15,6 +15,7 @@ from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.navigator import NavigatorParams
 from quad_nav.plan.navfn import NavfnParams
 from quad_nav.recovery import ClearCostmapParams, RotateParams
@@ -31,6 +32,7 @@ PAIRS = [
     (RotateParams, ROTATE, set()),
     (CostmapParams, costmap_tables.COSTMAP, {"layers"}),
     (ObstacleLayerParams, costmap_tables.OBSTACLE_LAYER, {"sources", "track_unknown_space"}),
+    (VoxelLayerParams, costmap_tables.VOXEL_LAYER, {"sources", "track_unknown_space"}),
     (SourceParams, costmap_tables.SOURCE, {"name", "obstacle_range_m", "raytrace_range_m"}),
     (InflationLayerParams, costmap_tables.INFLATION_LAYER, set()),
     (StaticLayerParams, costmap_tables.STATIC_LAYER, set()),

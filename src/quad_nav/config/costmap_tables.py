@@ -1,7 +1,7 @@
 """The parameters of costmaps and their layers, as the original has them in force.
 
-As in ``tables``; the descriptions are Costmap2D, ObstaclePlugin, InflationPlugin
-and GenericPlugin.
+As in ``tables``; the descriptions are Costmap2D, ObstaclePlugin, VoxelPlugin,
+InflationPlugin and GenericPlugin.
 """
 from __future__ import annotations
 
@@ -11,10 +11,6 @@ from quad_nav.config.texts import polygon_from_text
 _ANY, _POSITIVE = Domain.ANY, Domain.POSITIVE
 
 _ENABLED = flag("enabled", True, "enabled", "Whether to apply this plugin or not")
-
-_VOXELS = tuple((name, "voxels are not supported here") for name in (
-    "origin_z", "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold",
-    "publish_voxel_map"))
 
 COSTMAP = Table(
     reconfigurable=(
@@ -59,30 +55,58 @@ COSTMAP = Table(
         double("circumscribed_radius", 0.46, "", "metres",
                 "Of local_costmap: a quarter of aggressive_reset/reset_distance.")))
 
-OBSTACLE_LAYER = Table(
+_FOOTPRINT_CLEARING = flag("footprint_clearing_enabled", True, "footprint_clearing_enabled",
+                           "Whether to clear the robot's footprint of lethal obstacles")
+_MAX_OBSTACLE_HEIGHT = double(
+    "max_obstacle_height", 2.0, "max_obstacle_height_m", "metres",
+    "The maximum height of any obstacle to be inserted into the costmap in meters.", _ANY, 0, 50)
+_COMBINATION_METHOD = integer(
+    "combination_method", 1, "combination_method", "", "Method for combining two layers",
+    choices=(Choice("Overwrite", 0, "Overwrite values"),
+             Choice("Maximum", 1, "Take the maximum of the values"),
+             Choice("Nothing", 99, "Do nothing")),
+    choices_description="Method for combining layers enum")
+_SENSORS = (
+    double("obstacle_range", 2.5, "obstacle_range_m", "metres",
+            "Obstacles further off are not marked, for sources that set none."),
+    double("raytrace_range", 3.0, "raytrace_range_m", "metres",
+            "Space further off is not cleared, for sources that set none."),
+    flag("track_unknown_space", False, "track_unknown_space",
+          "When unset, as the costmap."),
+    text("observation_sources", "", "", "names separated by blanks",
+         "The sensors; each has a namespace of its name."))
+
+VOXEL_LAYER = Table(
     reconfigurable=(
         _ENABLED,
-        flag("footprint_clearing_enabled", True, "footprint_clearing_enabled",
-              "Whether to clear the robot's footprint of lethal obstacles"),
-        double("max_obstacle_height", 2.0, "max_obstacle_height_m", "metres",
-                "The maximum height of any obstacle to be inserted into the costmap in meters.",
-                _ANY, 0, 50),
-        integer("combination_method", 1, "combination_method", "",
-             "Method for combining two layers",
-             choices=(Choice("Overwrite", 0, "Overwrite values"),
-                      Choice("Maximum", 1, "Take the maximum of the values"),
-                      Choice("Nothing", 99, "Do nothing")),
-             choices_description="Method for combining layers enum")),
+        _FOOTPRINT_CLEARING,
+        _MAX_OBSTACLE_HEIGHT,
+        double("origin_z", 0.0, "origin_z_m", "metres", "The z origin of the map in meters.",
+                _ANY, 0),
+        double("z_resolution", 0.2, "z_resolution_m", "metres",
+                "The z resolution of the map in meters/cell.", _POSITIVE, 0, 50),
+        integer("z_voxels", 10, "z_voxels", "", "The number of voxels in each vertical column.",
+                _POSITIVE, 0, 16),
+        integer("unknown_threshold", 15, "unknown_threshold", "",
+                "The number of unknown cells allowed in a column considered to be known",
+                low=0, high=16),
+        integer("mark_threshold", 0, "mark_threshold", "",
+                "The maximum number of marked cells allowed in a column considered to be free",
+                low=0, high=16),
+        _COMBINATION_METHOD),
     fixed=(
-        double("obstacle_range", 2.5, "obstacle_range_m", "metres",
-                "Obstacles further off are not marked, for sources that set none."),
-        double("raytrace_range", 3.0, "raytrace_range_m", "metres",
-                "Space further off is not cleared, for sources that set none."),
-        flag("track_unknown_space", False, "track_unknown_space",
-              "When unset, as the costmap."),
-        text("observation_sources", "", "", "names separated by blanks",
-             "The sensors; each has a namespace of its name.")),
-    unsupported=_VOXELS)
+        *_SENSORS,
+        flag("publish_voxel_map", False, "publish_voxel_map",
+              "Publish the marked voxels, as markers.")))
+
+# What a voxel layer has on top of an obstacle layer.
+VOXEL_PARAMETERS = ("origin_z", "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold",
+                    "publish_voxel_map")
+
+OBSTACLE_LAYER = Table(
+    reconfigurable=(_ENABLED, _FOOTPRINT_CLEARING, _MAX_OBSTACLE_HEIGHT, _COMBINATION_METHOD),
+    fixed=_SENSORS,
+    ignored=tuple((name, "only a costmap_2d::VoxelLayer reads it") for name in VOXEL_PARAMETERS))
 
 SOURCE = Table(fixed=(
     text("topic", "", "topic", "a topic's name", "When unset, the source's name."),

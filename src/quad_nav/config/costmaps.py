@@ -163,12 +163,9 @@ def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[
 
 
 def _remark_on_type(place: str, layer_type: str, notes: Notes) -> None:
-    if layer_type == VOXEL:
-        notes.remark(place, UNSUPPORTED, f"{VOXEL} is known to move_base but not supported here;"
-                     f" it is flown as {OBSTACLE}")
-    elif layer_type not in LAYERS:
+    if layer_type not in LAYERS:
         notes.remark(place, UNSUPPORTED, f"{layer_type} is not supported here, the layer is left"
-                     f" out; there are {', '.join(sorted(set(LAYERS) - {VOXEL}))}")
+                     f" out; there are {', '.join(sorted(LAYERS))}")
 
 
 def _table_with_misplaced(costmap: Namespace, known: Set[str]) -> Table:

@@ -13,6 +13,7 @@ from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.costmap.voxel import VoxelLayerParams
 
 Chain = Tuple[Tuple[str, Mapping[str, Any]], ...]
 _DATA_TYPES = ("LaserScan", "PointCloud", "PointCloud2")
@@ -20,14 +21,13 @@ _RANGES = ("obstacle_range", "raytrace_range")
 # A longer silence than this goes unnoticed only by mistake.
 _LONG_PERIOD_S = 2.0
 
-_VOXELS = tuple(name for name, _ in tables.OBSTACLE_LAYER.unsupported)
 _OBSTACLES = ("max_obstacle_height", *_RANGES, "track_unknown_space")
 
 # What a costmap hands down to a layer of each type, over the layer's own value.
 PARENT_PARAMETERS: Dict[str, Tuple[str, ...]] = {
     "costmap_2d::StaticLayer": ("map_topic", "unknown_cost_value", "lethal_cost_threshold",
                                 "track_unknown_space"),
-    "costmap_2d::VoxelLayer": _VOXELS + _OBSTACLES,
+    "costmap_2d::VoxelLayer": tables.VOXEL_PARAMETERS + _OBSTACLES,
     "costmap_2d::ObstacleLayer": _OBSTACLES,
     "costmap_2d::InflationLayer": ("cost_scaling_factor", "inflation_radius"),
 }
@@ -51,7 +51,7 @@ def settle_layer(costmap: Namespace, costmap_path: str, name: str, layer_type: s
     path = join(costmap_path, name)
     layer = subtree(costmap, name, costmap_path, notes)
     table = LAYERS[layer_type].table
-    if table is not tables.OBSTACLE_LAYER:
+    if table not in (tables.OBSTACLE_LAYER, tables.VOXEL_LAYER):
         settle(layer, path, table, notes)
         return
     sources = _source_names(layer)
@@ -96,13 +96,16 @@ def _take_ranges_from_above(layer: Namespace, path: str, chain: Chain, notes: No
             notes.moved(join(path, key), written_at)
 
 
-def _obstacle_params(costmap: Mapping[str, Any], name: str) -> ObstacleLayerParams:
-    layer = costmap[name]
-    arguments = fields(layer, tables.OBSTACLE_LAYER.parameters)
-    arguments["track_unknown_space"] = layer.get("track_unknown_space")
-    sources = tuple(_source_params(layer.get(source, {}), source)
-                    for source in _source_names(layer))
-    return ObstacleLayerParams(sources=sources, **arguments)
+def _seeing(table: Table, params: Callable[..., ObstacleLayerParams]) -> LayerType:
+    """A layer with sources."""
+    def make(costmap: Mapping[str, Any], name: str) -> LayerParams:
+        layer = costmap[name]
+        arguments = fields(layer, table.parameters)
+        arguments["track_unknown_space"] = layer.get("track_unknown_space")
+        sources = tuple(_source_params(layer.get(source, {}), source)
+                        for source in _source_names(layer))
+        return params(sources=sources, **arguments)
+    return LayerType(table, make)
 
 
 def _source_params(source: Mapping[str, Any], name: str) -> SourceParams:
@@ -121,8 +124,8 @@ def _plain(table: Table, params: Callable[..., LayerParams]) -> LayerType:
 
 
 LAYERS: Dict[str, LayerType] = {
-    "costmap_2d::ObstacleLayer": LayerType(tables.OBSTACLE_LAYER, _obstacle_params),
-    "costmap_2d::VoxelLayer": LayerType(tables.OBSTACLE_LAYER, _obstacle_params),
+    "costmap_2d::ObstacleLayer": _seeing(tables.OBSTACLE_LAYER, ObstacleLayerParams),
+    "costmap_2d::VoxelLayer": _seeing(tables.VOXEL_LAYER, VoxelLayerParams),
     "costmap_2d::InflationLayer": _plain(tables.INFLATION_LAYER, InflationLayerParams),
     "costmap_2d::StaticLayer": _plain(tables.STATIC_LAYER, StaticLayerParams),
 }

@@ -43,8 +43,10 @@ original ignores, old names.
 * Without `recovery_behaviors` the sequence is `conservative_reset`, `rotate_recovery`,
   `aggressive_reset`, `rotate_recovery`, and the two `reset_distance` are `conservative_reset_dist`
   and four times `local_costmap/circumscribed_radius`, whatever is set below those names.
-* A `costmap_2d::VoxelLayer` is flown as an obstacle layer; layers, planners and behaviours of other
-  packages are left out, or replaced by the ones that fly here.
+* `map_type: voxel` makes the `obstacle_layer` of a costmap without `plugins` a
+  `costmap_2d::VoxelLayer`. Voxel parameters at the costmap's level, too, replace the layer's own.
+* Layers, planners and behaviours of other packages are left out, or replaced by the ones that fly
+  here.
 """
 
 
@@ -62,6 +64,7 @@ def _sections() -> Iterable[Tuple[str, str, Table]]:
     yield "NavfnROS", "The global planner.", tables.NAVFN
     yield "Costmaps", "Below `global_costmap` and `local_costmap`.", costmap_tables.COSTMAP
     yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", costmap_tables.OBSTACLE_LAYER)
+    yield ("Voxel layer", "`costmap_2d::VoxelLayer`.", costmap_tables.VOXEL_LAYER)
     yield ("Sources", "Each name in `observation_sources` is a namespace below the layer.",
            costmap_tables.SOURCE)
     yield ("Inflation layer", "`costmap_2d::InflationLayer`.", costmap_tables.INFLATION_LAYER)

@@ -85,23 +85,22 @@ class CostGrid:
         """Give the window, or everything, the default cost."""
         self.costs[window.slices if window else ...] = self.default_cost
 
-    def centre_on(self, x_m: float, y_m: float) -> None:
+    def centre_on(self, x_m: float, y_m: float) -> Tuple[int, int]:
         """Move by whole cells so that the point is in the middle; keep what still fits.
 
         As in costmap_2d, the middle is half of (size - 1/2) cells, and the number of
-        cells to move is cut towards zero.
+        cells to move is cut towards zero. Returns that number in x and in y.
         """
         spec = self.spec
         res = spec.resolution_m
         move_x = int((x_m - (spec.size_x - 1 + 0.5) * res / 2 - spec.origin_x_m) / res)
         move_y = int((y_m - (spec.size_y - 1 + 0.5) * res / 2 - spec.origin_y_m) / res)
         if move_x == 0 and move_y == 0:
-            return
-        kept = self.costs[_kept(move_y, spec.size_y), _kept(move_x, spec.size_x)].copy()
-        self.reset()
-        self.costs[_kept(-move_y, spec.size_y), _kept(-move_x, spec.size_x)] = kept
+            return 0, 0
+        shift(self.costs, move_x, move_y, self.default_cost)
         self.spec = replace(spec, origin_x_m=spec.origin_x_m + move_x * res,
                             origin_y_m=spec.origin_y_m + move_y * res)
+        return move_x, move_y
 
     def window_of(self, bounds: Bounds) -> Window:
         """The cells that the bounds touch; the cell of each border is inside."""
@@ -138,6 +137,14 @@ class CostGrid:
         inside = np.zeros(spec.shape, dtype=bool)
         inside[max(0, low_y + 1):max(0, high_y), max(0, low_x + 1):max(0, high_x)] = True
         self.costs[~inside if keep_inside else inside] = UNKNOWN
+
+
+def shift(cells: np.ndarray, move_x: int, move_y: int, empty: int) -> None:
+    """Move the grid below ``cells``, [y, x, ...], in place; cells that come in are ``empty``."""
+    size_y, size_x = cells.shape[:2]
+    kept = cells[_kept(move_y, size_y), _kept(move_x, size_x)].copy()
+    cells[...] = empty
+    cells[_kept(-move_y, size_y), _kept(-move_x, size_x)] = kept
 
 
 def merge_maximum(below: np.ndarray, above: np.ndarray) -> None:

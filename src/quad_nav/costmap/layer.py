@@ -103,12 +103,16 @@ class GridLayer(Layer):
         The layer is not current until the next update has carried this to the master.
         """
         self.grid.forget_area(centre_x_m, centre_y_m, size_m, keep_inside)
+        self._pass_on_everything()
+        return True
+
+    def is_current(self, now_s: float) -> bool:
+        return not self._awaits_update
+
+    def _pass_on_everything(self) -> None:
+        """The next update makes the whole master grid again; until then it is out of date."""
         spec = self.grid.spec
         self._cleared = Bounds(spec.origin_x_m, spec.origin_y_m,
                                spec.origin_x_m + spec.size_x * spec.resolution_m,
                                spec.origin_y_m + spec.size_y * spec.resolution_m)
         self._awaits_update = True
-        return True
-
-    def is_current(self, now_s: float) -> bool:
-        return not self._awaits_update

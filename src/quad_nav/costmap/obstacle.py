@@ -40,9 +40,13 @@ class ObstacleLayerParams(LayerParams):
 
     def make_layer(self, spec: GridSpec, rolling_window: bool,
                    default_cost: int) -> ObstacleLayer:
-        if self.track_unknown_space is not None:
-            default_cost = UNKNOWN if self.track_unknown_space else FREE
-        return ObstacleLayer(self, spec, rolling_window, default_cost)
+        return ObstacleLayer(self, spec, rolling_window, self.cost_of_unseen(default_cost))
+
+    def cost_of_unseen(self, default_cost: int) -> int:
+        """Cost of a cell that no sensor has seen, in a costmap with this default."""
+        if self.track_unknown_space is None:
+            return default_cost
+        return UNKNOWN if self.track_unknown_space else FREE
 
 
 class ObstacleLayer(GridLayer):
@@ -107,7 +111,7 @@ class ObstacleLayer(GridLayer):
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
         if self._rolling_window:
-            self.grid.centre_on(robot.x_m, robot.y_m)
+            self._centre_on(robot)
         bounds = super().update_bounds(robot, now_s, bounds)
         for buffer in self.buffers.values():
             buffer.start_clock(now_s)
@@ -136,6 +140,9 @@ class ObstacleLayer(GridLayer):
             merge_known(below, above)
         elif self.params.combination_method == COMBINE_MAXIMUM:
             merge_maximum(below, above)
+
+    def _centre_on(self, robot: Pose2D) -> None:
+        self.grid.centre_on(robot.x_m, robot.y_m)
 
     def _clear(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
         spec = self.grid.spec

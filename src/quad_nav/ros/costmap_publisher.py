@@ -19,6 +19,7 @@ from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
 from quad_nav.ros.nav_messages import grid_message, polygon_message, update_message
+from quad_nav.ros.voxel_publisher import voxel_publishers
 
 
 class _NewListener(rospy.SubscribeListener):
@@ -44,6 +45,7 @@ class CostmapPublisher:
         self._grid = rospy.Publisher(
             f"~{name}/costmap", OccupancyGrid, queue_size=1,
             subscriber_listener=_NewListener(self._send_full))
+        self._voxels = voxel_publishers(name, costmap)
 
     def updated(self, now_s: float, pose: Pose2D, window: Window) -> None:
         """To be called after each update of the costmap, with the window it changed."""
@@ -51,6 +53,8 @@ class CostmapPublisher:
         if self._footprint.get_num_connections() > 0:
             self._footprint.publish(polygon_message(
                 oriented(self._costmap.footprint, pose), params.global_frame, stamp))
+        for voxels in self._voxels:
+            voxels.publish(params.global_frame, stamp)
         self._changed = self._changed.union(window)
         period_s = 1.0 / params.publish_frequency_hz if params.publish_frequency_hz > 0.0 else None
         if period_s is None or now_s < self._last_s + period_s - 1e-6:

@@ -1,0 +1,110 @@
+"""The voxel layer: an obstacle layer that keeps heights apart.
+
+Space is cut into voxels, each of them free, marked or unknown. Sensors mark the voxel of
+each point and clear those along the ray to it, in three dimensions: a beam that passes
+above a table does not clear it, as it would in the obstacle layer. Whenever a voxel
+changes, its column becomes one cost:
+
+* lethal with more than ``mark_threshold`` marked voxels;
+* else, when it was cleared, unknown with more than ``unknown_threshold`` unknown voxels,
+  and free otherwise.
+
+The robot's footprint and the clearing recoveries clear costs only, as in the original:
+the voxels stay, and count again when a sensor sees something in their column.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quad_nav.costmap.cost_grid import shift
+from quad_nav.costmap.observation import Observation
+from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import LETHAL, UNKNOWN, GridSpec
+from quad_nav.kernels.voxels import clear_voxel_rays, mark_voxels
+
+
+@dataclass(frozen=True)
+class VoxelLayerParams(ObstacleLayerParams):
+    """``z_voxels`` voxels of ``z_resolution_m`` stand on ``origin_z_m`` in each column.
+
+    ``mark_threshold``: so many marked voxels in a column are not yet an obstacle.
+    ``unknown_threshold``: so many unknown ones do not yet make a column unknown.
+    """
+
+    origin_z_m: float = 0.0
+    z_resolution_m: float = 0.2
+    z_voxels: int = 10
+    unknown_threshold: int = 15
+    mark_threshold: int = 0
+    publish_voxel_map: bool = False
+
+    def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> VoxelLayer:
+        return VoxelLayer(self, spec, rolling_window, self.cost_of_unseen(default_cost))
+
+
+class VoxelLayer(ObstacleLayer):
+    """``voxels``, uint8[H, W, Z], are FREE, LETHAL or UNKNOWN; ``grid`` has the columns' costs."""
+
+    params: VoxelLayerParams
+
+    def __init__(self, params: VoxelLayerParams, spec: GridSpec, rolling_window: bool,
+                 default_cost: int):
+        super().__init__(params, spec, rolling_window, default_cost)
+        self._make_voxels()
+
+    def reconfigure(self, params: VoxelLayerParams) -> None:
+        """Take other parameters; any change empties the layer, as in the original."""
+        if params == self.params:
+            return
+        self.params = params
+        self.grid.reset()
+        self._make_voxels()
+        self._pass_on_everything()
+
+    def resize(self, spec: GridSpec) -> None:
+        super().resize(spec)
+        self._make_voxels()
+
+    def reset(self, now_s: float) -> None:
+        super().reset(now_s)
+        self.voxels[...] = UNKNOWN
+
+    def marked_voxels(self) -> np.ndarray:
+        """Centres of the marked voxels, float64[n, 3] in the global frame."""
+        y, x, z = np.nonzero(self.voxels == LETHAL)
+        return self._origin + (np.column_stack((x, y, z)) + 0.5) * self._voxel_size
+
+    def _make_voxels(self) -> None:
+        self.voxels = np.full((*self.grid.spec.shape, self.params.z_voxels), UNKNOWN,
+                              dtype=np.uint8)
+
+    @property
+    def _origin(self) -> np.ndarray:
+        spec = self.grid.spec
+        return np.array([spec.origin_x_m, spec.origin_y_m, self.params.origin_z_m])
+
+    @property
+    def _voxel_size(self) -> np.ndarray:
+        resolution_m = self.grid.spec.resolution_m
+        return np.array([resolution_m, resolution_m, self.params.z_resolution_m])
+
+    def _centre_on(self, robot: Pose2D) -> None:
+        move_x, move_y = self.grid.centre_on(robot.x_m, robot.y_m)
+        if move_x or move_y:
+            shift(self.voxels, move_x, move_y, UNKNOWN)
+
+    def _clear(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
+        params = self.params
+        clear_voxel_rays(self.voxels, self.grid.costs, self._origin, self._voxel_size,
+                         observation.sensor, observation.points, range_m,
+                         params.max_obstacle_height_m, params.unknown_threshold,
+                         params.mark_threshold, touched)
+
+    def _mark(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
+        params = self.params
+        mark_voxels(self.voxels, self.grid.costs, self._origin, self._voxel_size,
+                    observation.sensor, observation.points, range_m,
+                    params.max_obstacle_height_m, params.mark_threshold, touched)
