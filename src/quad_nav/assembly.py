@@ -13,7 +13,14 @@ from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.navigator import NamedRecovery, Navigator
 from quad_nav.plan.navfn import Navfn
-from quad_nav.recovery import ClearCostmap, ClearCostmapParams, Recovery, Rotate
+from quad_nav.recovery import (
+    ClearCostmap,
+    ClearCostmapParams,
+    MoveSlowAndClear,
+    MoveSlowAndClearParams,
+    Recovery,
+    Rotate,
+)
 
 
 def build_navigator(configuration: Configuration) -> Navigator:
@@ -34,8 +41,7 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
     navigator.global_costmap.reconfigure(_watched(configuration, configuration.global_costmap))
     navigator.local_costmap.reconfigure(_watched(configuration, configuration.local_costmap))
     navigator.planner = Navfn(configuration.navfn)
-    assert isinstance(navigator.controller, TrajectoryPlanner)
-    navigator.controller.set_params(configuration.trajectory_planner)
+    navigator.set_controller_params(configuration.trajectory_planner)
     navigator.controller.set_footprint(navigator.local_costmap.footprint)
 
 
@@ -65,6 +71,8 @@ def _watched_layer(layer: LayerParams, limit_s: float) -> LayerParams:
 def _recovery(params: RecoveryParams) -> Recovery:
     if isinstance(params, ClearCostmapParams):
         return ClearCostmap(params)
+    if isinstance(params, MoveSlowAndClearParams):
+        return MoveSlowAndClear(params)
     return Rotate(params, _footprint_cost)
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Dict, Optional, Sequence, Tuple
+from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from quad_nav.plan.near import plan_near
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.recovery import Recovery, Surroundings
 from quad_nav.schedule import Schedule
+from quad_nav.speed_limiter import SpeedLimiter
 from quad_nav.standstill import Standstill
 from quad_nav.tick import (
     Located,
@@ -91,6 +92,7 @@ class Navigator:
         self.planner = planner
         self.controller = controller
         self.recoveries = tuple(recoveries)
+        self._speed = SpeedLimiter(controller)
         self.state = State.IDLE
         self.goal: Optional[Pose2D] = None
         self._costmaps: Dict[str, Tuple[LayeredCostmap, Schedule]] = {
@@ -155,6 +157,7 @@ class Navigator:
         self._end_goal()
         for _, schedule in self._costmaps.values():
             schedule.start(now_s)
+        self._speed.lift()
         if goal is not None:
             self.set_goal(goal, now_s)
 
@@ -289,6 +292,7 @@ class Navigator:
             tick.warnings.append("stopped: the robot's pose is unknown")
             tick.command = Twist2D()
             return
+        self._speed.follow(located.in_global)
         if (self._oscillation.has_moved(
                 tick.now_s, located.in_global, self.params.oscillation_distance_m)
                 and self._trigger is Trigger.OSCILLATION):
@@ -360,6 +364,10 @@ class Navigator:
             self._begin_planning(tick.now_s)
         return False
 
+    def set_controller_params(self, params: Any) -> None:
+        """Other parameters for the controller; a recovery's speed limit stays in force."""
+        self._speed.set_params(params)
+
     # -- recovery ------------------------------------------------------------------
 
     def _reset_recovery(self) -> None:
@@ -402,6 +410,8 @@ class Navigator:
             tick.command = step.command
         if step.message:
             tick.warnings.append(step.message)
+        if step.speed_limit is not None and located.in_global is not None:
+            self._speed.impose(step.speed_limit, located.in_global)
         if step.done:
             self._active = None
             self._recovery_due_s = math.inf

@@ -4,7 +4,7 @@ from __future__ import annotations
 import pytest
 
 from quad_nav.config import load
-from quad_nav.recovery import ClearCostmapParams, RotateParams
+from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
 
 SEEING = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}}
 
@@ -17,6 +17,11 @@ def remarks(tree):
 
 def planner(**parameters):
     return {"TrajectoryPlannerROS": parameters}
+
+
+def slow(**parameters):
+    return {"recovery_behaviors": [{"name": "slow", "type": "MoveSlowAndClear"}],
+            "slow": parameters}
 
 
 @pytest.mark.parametrize("tree, kind, line", [
@@ -62,11 +67,18 @@ def planner(**parameters):
     ({"aggressive_reset": {"reset_distance": 0.5}}, "ignored",
      "aggressive_reset/reset_distance: ignored by move_base: without recovery_behaviors it is"
      " 1.84"),
-    ({"recovery_behaviors": [{"name": "slow", "type": "move_slow_and_clear/MoveSlowAndClear"}]},
+    ({"recovery_behaviors": [{"name": "back", "type": "twist_recovery/TwistRecovery"}]},
      "unsupported",
-     "recovery_behaviors/slow: move_slow_and_clear/MoveSlowAndClear is not supported here, the"
-     " behaviour is left out; there are clear_costmap_recovery/ClearCostmapRecovery and"
-     " rotate_recovery/RotateRecovery"),
+     "recovery_behaviors/back: twist_recovery/TwistRecovery is not supported here, the"
+     " behaviour is left out; there are clear_costmap_recovery/ClearCostmapRecovery,"
+     " rotate_recovery/RotateRecovery, move_slow_and_clear/MoveSlowAndClear"),
+    (slow(planner_namespace="DWAPlannerROS", max_trans_param_name="max_vel_trans"), "caution",
+     "slow/planner_namespace: DWAPlannerROS does not fly here: TrajectoryPlannerROS is limited"),
+    (slow(max_rot_param_name="max_vel_thet"), "caution",
+     "slow/max_rot_param_name: TrajectoryPlannerROS has no speed of the name max_vel_thet; did you"
+     " mean max_vel_theta?"),
+    (slow(limited_speed=0.1), "unknown",
+     "slow/limited_speed: unknown, nothing reads it; did you mean limited_rot_speed?"),
     ({"local_costmap": {**SEEING, "plugins": []}}, "ignored",
      "local_costmap/observation_sources: ignored by move_base: with plugins it belongs below the"
      " obstacle layer's name"),
@@ -126,6 +138,23 @@ def test_listed_recoveries_are_flown_in_their_order_with_their_parameters():
     assert configuration.navigator.recovery_behaviors == (
         ("look", "rotate_recovery/RotateRecovery"),
         ("forget", "clear_costmap_recovery/ClearCostmapRecovery"))
+
+
+def test_going_slowly_limits_every_speed_of_the_planner():
+    ((name, params),) = load(slow(limited_trans_speed=0.1, clearing_distance=1), "").recoveries
+    assert name == "slow"
+    assert params == MoveSlowAndClearParams(
+        clearing_distance_m=1.0, limited_trans_speed_mps=0.1,
+        translation_fields=("max_vel_x_mps", "min_vel_x_mps", "escape_vel_mps"),
+        rotation_fields=("max_vel_theta_radps", "min_vel_theta_radps",
+                         "min_in_place_vel_theta_radps", "max_rotational_vel_radps"))
+
+
+def test_the_names_of_speeds_may_be_the_originals_or_the_planners():
+    names = {"planner_namespace": "TrajectoryPlannerROS", "max_trans_param_name": "max_vel_x",
+             "max_rot_param_name": "max_rot_vel"}
+    assert remarks(slow(**names)) == []
+    assert load(slow(**names), "").recoveries == load(slow(), "").recoveries
 
 
 def test_no_rotation_when_it_is_not_allowed():

@@ -18,7 +18,7 @@ from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.navigator import NavigatorParams
 from quad_nav.plan.navfn import NavfnParams
-from quad_nav.recovery import ClearCostmapParams, RotateParams
+from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
 
@@ -30,6 +30,7 @@ PAIRS = [
     (NavfnParams, tables.NAVFN, set()),
     (ClearCostmapParams, tables.CLEAR_COSTMAP, {"layer_names"}),
     (RotateParams, ROTATE, set()),
+    (MoveSlowAndClearParams, tables.MOVE_SLOW, {"translation_fields", "rotation_fields"}),
     (CostmapParams, costmap_tables.COSTMAP, {"layers"}),
     (ObstacleLayerParams, costmap_tables.OBSTACLE_LAYER, {"sources", "track_unknown_space"}),
     (VoxelLayerParams, costmap_tables.VOXEL_LAYER, {"sources", "track_unknown_space"}),

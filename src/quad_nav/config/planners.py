@@ -1,11 +1,13 @@
 """The trees of the planners: which plugin flies, and TrajectoryPlannerROS's old names."""
 from __future__ import annotations
 
-from typing import Any, Dict, Mapping
+from dataclasses import dataclass
+from typing import Any, Dict, Mapping, Tuple
 
 from quad_nav.config import tables
 from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, UNSUPPORTED, Notes, join
 from quad_nav.config.reader import Namespace, settle, subtree
+from quad_nav.config.spec import Table
 
 TRAJECTORY_PLANNER = "TrajectoryPlannerROS"
 NAVFN = "NavfnROS"
@@ -18,6 +20,24 @@ SUPPORTED: Dict[str, str] = {
 # Namespaces of planners that people configure beside the one that they fly.
 OTHER_PLANNERS = ("DWAPlannerROS", "GlobalPlanner", "CarrotPlanner", "TebLocalPlannerROS",
                   "EBandPlannerROS", "DWBLocalPlanner", "SBPLLatticePlanner")
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """The parameters of a local planner that say how fast the robot may go and turn."""
+
+    table: Table
+    translation: Tuple[str, ...]
+    rotation: Tuple[str, ...]
+
+
+# By the planner's namespace.
+SPEEDS: Dict[str, Speeds] = {
+    TRAJECTORY_PLANNER: Speeds(
+        tables.TRAJECTORY_PLANNER, translation=("max_vel_x", "min_vel_x", "escape_vel"),
+        rotation=("max_vel_theta", "min_vel_theta", "min_in_place_vel_theta",
+                  "max_rotational_vel")),
+}
 
 _RENAMED: Dict[str, str] = {
     "pdist_scale": "path_distance_bias",
@@ -55,6 +75,11 @@ def settle_planners(tree: Namespace, notes: Notes) -> None:
         notes.remark(join(TRAJECTORY_PLANNER, "escape_vel"), CAUTION,
                      "the robot escapes forwards: a velocity below 0 backs up")
     settle(subtree(tree, NAVFN, "", notes), NAVFN, tables.NAVFN, notes)
+
+
+def local_planner_namespace(tree: Mapping[str, Any]) -> str:
+    """The namespace of the local planner that flies, of a settled tree."""
+    return tree["base_local_planner"].split("/")[-1]
 
 
 def local_planner_period_s(tree: Mapping[str, Any]) -> float:

@@ -74,6 +74,9 @@ def _sections() -> Iterable[Tuple[str, str, Table]]:
            tables.CLEAR_COSTMAP)
     yield ("Turning", "`rotate_recovery/RotateRecovery`, below the behaviour's name. Speeds and"
            " accelerations are those of TrajectoryPlannerROS.", tables.ROTATE)
+    yield ("Going slowly", "`move_slow_and_clear/MoveSlowAndClear`, below the behaviour's name. It"
+           " frees the obstacle layers around the robot and limits the local planner's speeds,"
+           " forwards, backwards and turning, until the robot has moved away.", tables.MOVE_SLOW)
 
 
 def _rows(table: Table) -> List[str]:

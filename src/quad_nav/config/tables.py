@@ -203,6 +203,22 @@ ROTATE = Table(fixed=(
     flag("stop_afterwards", True, "stop_afterwards",
           "Not in the original: send a stop after the turn.")))
 
+MOVE_SLOW = Table(fixed=(
+    double("clearing_distance", 0.5, "clearing_distance_m", "metres",
+            "Obstacles are cleared so far to each side of the robot."),
+    double("limited_trans_speed", 0.25, "limited_trans_speed_mps", "m/s",
+            "Greatest speed afterwards.", _POSITIVE),
+    double("limited_rot_speed", 0.45, "limited_rot_speed_radps", "rad/s",
+            "Fastest turn afterwards.", _POSITIVE),
+    double("limited_distance", 0.3, "limited_distance_m", "metres",
+            "The limits are lifted when the robot has moved so far."),
+    text("planner_namespace", "", "", "a planner's namespace",
+         "The planner that is limited: it is the local planner that flies, whatever is set."),
+    text("max_trans_param_name", "", "", "a parameter's name",
+         "One more parameter of the planner that limited_trans_speed limits."),
+    text("max_rot_param_name", "", "", "a parameter's name",
+         "One more parameter of the planner that limited_rot_speed limits.")))
+
 # The turn also takes these from TrajectoryPlannerROS, with defaults of its own.
 ROTATE_FROM_PLANNER = (
     double("yaw_goal_tolerance", 0.10, "yaw_goal_tolerance_rad", "radians", ""),

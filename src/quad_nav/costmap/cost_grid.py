@@ -123,6 +123,13 @@ class CostGrid:
             fill_convex_polygon(self.costs, np.array(cells, dtype=np.int64), cost)
         return True
 
+    def fill_square(self, centre_x_m: float, centre_y_m: float, size_m: float, cost: int) -> bool:
+        """Set the cells of a square; does nothing and returns False when it leaves the grid."""
+        half_m = 0.5 * size_m
+        corners = np.array([[-half_m, -half_m], [-half_m, half_m],
+                            [half_m, half_m], [half_m, -half_m]])
+        return self.fill_polygon(corners + (centre_x_m, centre_y_m), cost)
+
     def forget_area(self, centre_x_m: float, centre_y_m: float, size_m: float,
                     keep_inside: bool) -> None:
         """Make unknown all cells outside a square (``keep_inside``), or those inside.

@@ -69,6 +69,10 @@ class Layer:
         """Forget a square's inside or its outside; False if there is nothing to forget."""
         return False
 
+    def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> bool:
+        """Take the obstacles in a square for gone; False if there is nothing to free."""
+        return False
+
     def is_current(self, now_s: float) -> bool:
         """Whether what the layer knows is recent enough to drive by."""
         return True
@@ -103,16 +107,19 @@ class GridLayer(Layer):
         The layer is not current until the next update has carried this to the master.
         """
         self.grid.forget_area(centre_x_m, centre_y_m, size_m, keep_inside)
-        self._pass_on_everything()
+        self._pass_on(self._whole_map())
         return True
 
     def is_current(self, now_s: float) -> bool:
         return not self._awaits_update
 
-    def _pass_on_everything(self) -> None:
-        """The next update makes the whole master grid again; until then it is out of date."""
-        spec = self.grid.spec
-        self._cleared = Bounds(spec.origin_x_m, spec.origin_y_m,
-                               spec.origin_x_m + spec.size_x * spec.resolution_m,
-                               spec.origin_y_m + spec.size_y * spec.resolution_m)
+    def _pass_on(self, bounds: Bounds) -> None:
+        """The next update makes the master grid there again; until then it is out of date."""
+        self._cleared = self._cleared.union(bounds)
         self._awaits_update = True
+
+    def _whole_map(self) -> Bounds:
+        spec = self.grid.spec
+        return Bounds(spec.origin_x_m, spec.origin_y_m,
+                      spec.origin_x_m + spec.size_x * spec.resolution_m,
+                      spec.origin_y_m + spec.size_y * spec.resolution_m)

@@ -142,10 +142,15 @@ class LayeredCostmap:
     def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> None:
         """Make the master free in a square; layers that still know better put it right
         at the next update. Nothing is done when the square leaves the map."""
-        half_m = 0.5 * size_m
-        corners = np.array([[-half_m, -half_m], [-half_m, half_m],
-                            [half_m, half_m], [half_m, -half_m]])
-        self._master.fill_polygon(corners + (centre_x_m, centre_y_m), FREE)
+        self._master.fill_square(centre_x_m, centre_y_m, size_m, FREE)
+
+    def free_obstacles(self, centre_x_m: float, centre_y_m: float, size_m: float) -> List[str]:
+        """Take what sensors saw in a square for gone; the master follows at the next update.
+
+        Returns the layers where that was done: none when the square leaves the map.
+        """
+        return [name for name, layer in self.layers.items()
+                if layer.free_square(centre_x_m, centre_y_m, size_m)]
 
     def set_footprint(self, footprint: footprints.Footprint) -> None:
         """Take an unpadded footprint, float64[n, 2] in the robot's frame."""

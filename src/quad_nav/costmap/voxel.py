@@ -62,7 +62,7 @@ class VoxelLayer(ObstacleLayer):
         self.params = params
         self.grid.reset()
         self._make_voxels()
-        self._pass_on_everything()
+        self._pass_on(self._whole_map())
 
     def resize(self, spec: GridSpec) -> None:
         super().resize(spec)

@@ -1,34 +1,15 @@
-"""What the navigator tries when it is stuck: forget obstacles, look around.
-
-A recovery is started once and then stepped in every cycle until it says that it
-is done; it never blocks, so a goal can be cancelled in the middle of a turn.
-"""
+"""The recovery ``rotate_recovery/RotateRecovery``: look around."""
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Callable, Optional, Protocol, Tuple
+from typing import Callable, Optional
 
 import numpy as np
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
-
-# The original clears a layer called "obstacles" by default, a name that its own
-# loader never gives: it calls the layer "obstacle_layer". Both are cleared here.
-ORIGINAL_LAYER_NAMES = ("obstacles",)
-DEFAULT_LAYER_NAMES = ("obstacles", "obstacle_layer", "obstacles_layer", "voxel_layer")
-
-
-@dataclass(frozen=True)
-class ClearCostmapParams:
-    """Parameters of ``clear_costmap_recovery/ClearCostmapRecovery``."""
-
-    reset_distance_m: float = 3.0
-    layer_names: Tuple[str, ...] = DEFAULT_LAYER_NAMES
-    invert_area_to_clear: bool = False
-    force_updating: bool = False
-    affected_maps: str = "both"  # "global", "local" or "both"
+from quad_nav.recovery.recovery import Step, Surroundings
 
 
 @dataclass(frozen=True)
@@ -42,73 +23,6 @@ class RotateParams:
     max_vel_theta_radps: float = 1.0
     min_in_place_vel_theta_radps: float = 0.4
     stop_afterwards: bool = True
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What a recovery may look at and change. Poses are None when unknown."""
-
-    now_s: float
-    global_costmap: LayeredCostmap
-    local_costmap: LayeredCostmap
-    pose_in_global: Optional[Pose2D]
-    pose_in_local: Optional[Pose2D]
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of a recovery: a command to send, if any, and whether it is over."""
-
-    command: Optional[Twist2D] = None
-    done: bool = False
-    message: str = ""
-
-
-class Recovery(Protocol):
-    """What the navigator asks of a recovery behaviour."""
-
-    period_s: float
-
-    def start(self, surroundings: Surroundings) -> None: ...
-
-    def step(self, surroundings: Surroundings) -> Step: ...
-
-
-class ClearCostmap:
-    """Forgets the obstacles beyond a square around the robot.
-
-    Everything outside the square with sides of ``reset_distance_m`` goes, or
-    everything inside it with ``invert_area_to_clear``.
-    """
-
-    period_s = 0.0
-
-    def __init__(self, params: ClearCostmapParams):
-        self.params = params
-
-    def start(self, surroundings: Surroundings) -> None:
-        pass
-
-    def step(self, surroundings: Surroundings) -> Step:
-        params = self.params
-        targets = (
-            ("global", surroundings.global_costmap, surroundings.pose_in_global),
-            ("local", surroundings.local_costmap, surroundings.pose_in_local))
-        skipped = []
-        for name, costmap, pose in targets:
-            if params.affected_maps not in (name, "both"):
-                continue
-            if pose is None:
-                skipped.append(name)
-                continue
-            costmap.clear_area(params.layer_names, pose.x_m, pose.y_m,
-                               params.reset_distance_m, keep_inside=not params.invert_area_to_clear)
-            if params.force_updating:
-                costmap.update(surroundings.now_s, pose)
-        message = ""
-        if skipped:
-            message = "not cleared, the robot's pose is unknown: " + ", ".join(skipped)
-        return Step(done=True, message=message)
 
 
 FootprintCost = Callable[[LayeredCostmap, Pose2D], float]

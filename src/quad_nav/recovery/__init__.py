@@ -1,0 +1,20 @@
+"""What the navigator tries when it is stuck: forget obstacles, look around, go slowly.
+
+A recovery is started once and then stepped in every cycle until it says that it
+is done; it never blocks, so a goal can be cancelled in the middle of a turn.
+"""
+from __future__ import annotations
+
+from quad_nav.recovery.clear_costmap import (
+    DEFAULT_LAYER_NAMES,
+    ORIGINAL_LAYER_NAMES,
+    ClearCostmap,
+    ClearCostmapParams,
+)
+from quad_nav.recovery.move_slow import MoveSlowAndClear, MoveSlowAndClearParams
+from quad_nav.recovery.recovery import Recovery, SpeedLimit, Step, Surroundings
+from quad_nav.recovery.rotate import FootprintCost, Rotate, RotateParams
+
+__all__ = ["DEFAULT_LAYER_NAMES", "ORIGINAL_LAYER_NAMES", "ClearCostmap", "ClearCostmapParams",
+           "FootprintCost", "MoveSlowAndClear", "MoveSlowAndClearParams", "Recovery", "Rotate",
+           "RotateParams", "SpeedLimit", "Step", "Surroundings"]

@@ -1,0 +1,60 @@
+"""The recovery ``clear_costmap_recovery/ClearCostmapRecovery``: forget obstacles."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Tuple
+
+from quad_nav.recovery.recovery import Step, Surroundings
+
+# The original clears a layer called "obstacles" by default, a name that its own
+# loader never gives: it calls the layer "obstacle_layer". Both are cleared here.
+ORIGINAL_LAYER_NAMES = ("obstacles",)
+DEFAULT_LAYER_NAMES = ("obstacles", "obstacle_layer", "obstacles_layer", "voxel_layer")
+
+
+@dataclass(frozen=True)
+class ClearCostmapParams:
+    """Parameters of ``clear_costmap_recovery/ClearCostmapRecovery``."""
+
+    reset_distance_m: float = 3.0
+    layer_names: Tuple[str, ...] = DEFAULT_LAYER_NAMES
+    invert_area_to_clear: bool = False
+    force_updating: bool = False
+    affected_maps: str = "both"  # "global", "local" or "both"
+
+
+class ClearCostmap:
+    """Forgets the obstacles beyond a square around the robot.
+
+    Everything outside the square with sides of ``reset_distance_m`` goes, or
+    everything inside it with ``invert_area_to_clear``.
+    """
+
+    period_s = 0.0
+
+    def __init__(self, params: ClearCostmapParams):
+        self.params = params
+
+    def start(self, surroundings: Surroundings) -> None:
+        pass
+
+    def step(self, surroundings: Surroundings) -> Step:
+        params = self.params
+        targets = (
+            ("global", surroundings.global_costmap, surroundings.pose_in_global),
+            ("local", surroundings.local_costmap, surroundings.pose_in_local))
+        skipped = []
+        for name, costmap, pose in targets:
+            if params.affected_maps not in (name, "both"):
+                continue
+            if pose is None:
+                skipped.append(name)
+                continue
+            costmap.clear_area(params.layer_names, pose.x_m, pose.y_m,
+                               params.reset_distance_m, keep_inside=not params.invert_area_to_clear)
+            if params.force_updating:
+                costmap.update(surroundings.now_s, pose)
+        message = ""
+        if skipped:
+            message = "not cleared, the robot's pose is unknown: " + ", ".join(skipped)
+        return Step(done=True, message=message)

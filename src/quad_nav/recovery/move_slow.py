@@ -1,0 +1,65 @@
+"""The recovery ``move_slow_and_clear/MoveSlowAndClear``: forget what is near, then go slowly.
+
+The obstacles that are forgotten may be there: the robot can hit them, but not fast. They
+come back with the next observation that shows them.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Tuple
+
+from quad_nav.recovery.recovery import SpeedLimit, Step, Surroundings
+
+
+@dataclass(frozen=True)
+class MoveSlowAndClearParams:
+    """Parameters of ``move_slow_and_clear/MoveSlowAndClear``.
+
+    ``translation_fields`` and ``rotation_fields`` are the fields of the controller's
+    parameters that the two speeds limit.
+    """
+
+    clearing_distance_m: float = 0.5
+    limited_trans_speed_mps: float = 0.25
+    limited_rot_speed_radps: float = 0.45
+    limited_distance_m: float = 0.3
+    translation_fields: Tuple[str, ...] = ()
+    rotation_fields: Tuple[str, ...] = ()
+
+    @property
+    def speed_limit(self) -> SpeedLimit:
+        greatest = [(field, self.limited_trans_speed_mps) for field in self.translation_fields]
+        greatest += [(field, self.limited_rot_speed_radps) for field in self.rotation_fields]
+        return SpeedLimit(tuple(greatest), self.limited_distance_m)
+
+
+class MoveSlowAndClear:
+    """Frees the square of ``clearing_distance_m`` on each side of the robot in the obstacle
+    layers, and limits the speed until the robot has moved ``limited_distance_m``."""
+
+    period_s = 0.0
+
+    def __init__(self, params: MoveSlowAndClearParams):
+        self.params = params
+
+    def start(self, surroundings: Surroundings) -> None:
+        pass
+
+    def step(self, surroundings: Surroundings) -> Step:
+        params = self.params
+        targets = (
+            ("global", surroundings.global_costmap, surroundings.pose_in_global),
+            ("local", surroundings.local_costmap, surroundings.pose_in_local))
+        messages = []
+        for name, costmap, pose in targets:
+            if pose is None:
+                messages.append(f"{name} costmap not cleared: the robot's pose is unknown")
+            elif not costmap.free_obstacles(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m):
+                messages.append(f"{name} costmap not cleared: it has no obstacle layer, or"
+                                f" ends within {params.clearing_distance_m:g} m of the robot")
+        if surroundings.pose_in_global is None:
+            return Step(done=True, message="; ".join(messages))
+        messages.append(f"not above {params.limited_trans_speed_mps:g} m/s and"
+                        f" {params.limited_rot_speed_radps:g} rad/s for the next"
+                        f" {params.limited_distance_m:g} m")
+        return Step(done=True, message="; ".join(messages), speed_limit=params.speed_limit)

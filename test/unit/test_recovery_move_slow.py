@@ -1,0 +1,212 @@
+"""Going slowly after a recovery: what is cleared, what is limited and for how long."""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from costmap_maps import drawn, picture
+
+from quad_nav.assembly import apply_configuration, build_navigator
+from quad_nav.config import load, updated
+from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
+from quad_nav.costmap.inflation import InflationLayerParams
+from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.navigator import Navigator
+from quad_nav.recovery import MoveSlowAndClear, MoveSlowAndClearParams, SpeedLimit, Surroundings
+from quad_nav.speed_limiter import SpeedLimiter
+from quad_nav.tick import Located, State
+
+HERE = Pose2D(2.5, 2.5)
+LIMIT = SpeedLimit((("max_vel_x_mps", 0.25), ("max_vel_theta_radps", 0.45),
+                    ("min_vel_theta_radps", 0.45)), distance_m=0.3)
+
+
+@dataclass
+class Controller:
+    params: TrajectoryPlannerParams
+
+    def set_params(self, params):
+        self.params = params
+
+
+def costmap_of(size_m=6.0, **layers):
+    layers = layers or {"laser": ObstacleLayerParams(), "inflation": InflationLayerParams()}
+    return LayeredCostmap(CostmapParams(width_m=size_m, height_m=size_m, resolution_m=1.0,
+                                        layers=tuple(layers.items())))
+
+
+def full(costmap):
+    costmap.layers["laser"].grid.costs[...] = 254
+    costmap.update(0.0, Pose2D(0.0, 0.0))
+    return costmap
+
+
+def test_the_square_around_the_robot_is_freed_and_reaches_the_master():
+    local = full(costmap_of())
+    around = Surroundings(0.0, full(costmap_of()), local, HERE, HERE)
+    step = MoveSlowAndClear(MoveSlowAndClearParams(clearing_distance_m=1.0)).step(around)
+    assert step.done and step.command is None
+    assert picture(local.layers["laser"].grid.costs) == drawn("""######
+                                                                 ######
+                                                                 #...##
+                                                                 #...##
+                                                                 #...##
+                                                                 ######""")
+    assert not local.is_current(0.0)
+    window = local.update(0.0, Pose2D(0.0, 0.0))
+    assert (window.x0, window.xn, window.y0, window.yn) == (0, 5, 0, 5)  # one cell of inflation
+    assert local.costs[2, 2] < 254 and local.costs[4, 4] == 254
+    assert around.global_costmap.layers["laser"].grid.costs[2, 2] == 0
+
+
+def test_costmaps_that_cannot_be_cleared_are_told():
+    blind = costmap_of(inflation=InflationLayerParams())
+    small = full(costmap_of(size_m=3.0))
+    step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
+        Surroundings(0.0, small, blind, Pose2D(2.75, 1.0), Pose2D(0.5, 0.5)))
+    why = "it has no obstacle layer, or ends within 0.5 m of the robot"
+    assert step.message.split("; ") == [
+        f"global costmap not cleared: {why}", f"local costmap not cleared: {why}",
+        "not above 0.25 m/s and 0.45 rad/s for the next 0.3 m"]
+    assert (small.layers["laser"].grid.costs == 254).all()
+
+
+def test_at_an_unknown_pose_nothing_is_done():
+    costmap = full(costmap_of())
+    step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
+        Surroundings(0.0, costmap, costmap, None, None))
+    assert step.done and step.speed_limit is None
+    assert step.message.count("the robot's pose is unknown") == 2
+    assert (costmap.layers["laser"].grid.costs == 254).all()
+
+
+def test_the_speeds_become_one_limit():
+    params = MoveSlowAndClearParams(translation_fields=("a", "b"), rotation_fields=("c",))
+    assert params.speed_limit == SpeedLimit((("a", 0.25), ("b", 0.25), ("c", 0.45)), 0.3)
+
+
+def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
+    usual = TrajectoryPlannerParams(max_vel_x_mps=1.0, min_vel_theta_radps=-2.0)
+    controller = Controller(usual)
+    speed = SpeedLimiter(controller)
+    speed.impose(LIMIT, HERE)
+    limited = controller.params
+    assert limited == replace(usual, max_vel_x_mps=0.25, max_vel_theta_radps=0.45,
+                              min_vel_theta_radps=-0.45)
+    speed.follow(Pose2D(2.5, 2.79))
+    assert controller.params == limited
+    speed.follow(Pose2D(2.5, 2.81))
+    assert controller.params == usual
+
+
+def test_a_robot_that_is_slow_already_is_not_made_faster():
+    controller = Controller(TrajectoryPlannerParams(max_vel_x_mps=0.1))
+    SpeedLimiter(controller).impose(LIMIT, HERE)
+    assert controller.params.max_vel_x_mps == 0.1
+
+
+def test_a_second_limit_replaces_the_first_and_counts_from_its_own_place():
+    controller = Controller(TrajectoryPlannerParams())
+    speed = SpeedLimiter(controller)
+    speed.impose(LIMIT, HERE)
+    speed.impose(SpeedLimit((("max_vel_x_mps", 0.4),), 1.0), Pose2D(2.5, 2.7))
+    assert controller.params == replace(TrajectoryPlannerParams(), max_vel_x_mps=0.4)
+    speed.follow(Pose2D(2.5, 3.0))
+    assert controller.params.max_vel_x_mps == 0.4
+    speed.follow(Pose2D(2.5, 3.8))
+    assert controller.params == TrajectoryPlannerParams()
+
+
+def test_parameters_that_change_under_a_limit_come_into_force_with_its_end():
+    controller = Controller(TrajectoryPlannerParams())
+    speed = SpeedLimiter(controller)
+    speed.impose(LIMIT, HERE)
+    speed.set_params(TrajectoryPlannerParams(max_vel_x_mps=2.0, sim_time_s=1.0))
+    assert (controller.params.max_vel_x_mps, controller.params.sim_time_s) == (0.25, 1.0)
+    speed.lift()
+    assert controller.params == TrajectoryPlannerParams(max_vel_x_mps=2.0, sim_time_s=1.0)
+    speed.lift()
+    assert controller.params.max_vel_x_mps == 2.0
+
+
+TREE = {
+    "recovery_behaviors": [{"name": "slow", "type": "move_slow_and_clear/MoveSlowAndClear"}],
+    "planner_patience": 0.5, "controller_frequency": 10.0,
+    "TrajectoryPlannerROS": {"max_vel_x": 0.6, "min_vel_x": 0.1},
+    "global_costmap": {"width": 6, "height": 6, "resolution": 0.1},
+    "local_costmap": {"width": 6, "height": 6, "resolution": 0.1},
+}
+
+
+class Stuck:
+    """A navigator that has run its recovery: there was no plan, and now there is one."""
+
+    def __init__(self):
+        self.configuration = load(TREE, "")
+        self.navigator: Navigator = build_navigator(self.configuration)
+        self.now_s = 0.0
+        self.navigator.global_costmap.layers["obstacle_layer"].grid.costs[:, 40] = 254
+        self.navigator.set_goal(Pose2D(5.0, 2.5, 0.0), 0.0)
+        self.ticks = self.fly(HERE, 0.8)
+        self.navigator.clear_costmaps(self.now_s)
+
+    def fly(self, pose, seconds):
+        ticks, end_s = [], self.now_s + seconds
+        while self.now_s <= end_s:
+            ticks.append(self.navigator.tick(self.now_s, Located(pose, pose), Twist2D()))
+            self.now_s += 0.1
+        return ticks
+
+    @property
+    def max_vel_x_mps(self):
+        return self.navigator.controller.params.max_vel_x_mps
+
+
+@pytest.fixture
+def stuck():
+    return Stuck()
+
+
+def test_the_navigator_limits_its_controller_and_lifts_the_limit(stuck):
+    assert [tick.recovery.name for tick in stuck.ticks if tick.recovery] == ["slow"]
+    assert ("not above 0.25 m/s and 0.45 rad/s for the next 0.3 m"
+            in [warning for tick in stuck.ticks for warning in tick.warnings])
+    assert stuck.max_vel_x_mps == 0.25
+    stuck.fly(Pose2D(2.7, 2.5), 0.5)
+    assert stuck.max_vel_x_mps == 0.25
+    stuck.fly(Pose2D(2.9, 2.5), 0.5)
+    assert stuck.max_vel_x_mps == 0.6
+
+
+def test_commands_stay_below_the_limit(stuck):
+    ticks = stuck.fly(Pose2D(2.6, 2.5), 2.0)
+    speeds = [tick.command.vx_mps for tick in ticks if tick.control]
+    assert speeds and max(speeds) <= 0.25
+    assert np.max(np.abs([tick.command.vyaw_radps for tick in ticks if tick.control])) <= 0.45
+
+
+def test_a_limit_outlives_a_cancelled_goal_and_not_the_way_to_the_next(stuck):
+    stuck.navigator.cancel()
+    stuck.fly(HERE, 0.3)
+    assert stuck.navigator.state is State.IDLE
+    stuck.navigator.set_goal(Pose2D(1.0, 2.5, 0.0), stuck.now_s)
+    stuck.fly(HERE, 0.3)
+    assert stuck.max_vel_x_mps == 0.25
+    stuck.fly(Pose2D(2.0, 2.5), 0.3)
+    assert stuck.max_vel_x_mps == 0.6
+
+
+def test_a_clock_that_jumps_back_lifts_the_limit(stuck):
+    stuck.navigator.restart(0.0)
+    assert stuck.max_vel_x_mps == 0.6
+
+
+def test_reconfiguration_does_not_lift_the_limit(stuck):
+    changed = updated(stuck.configuration, "TrajectoryPlannerROS", {"max_vel_x": 0.8})
+    apply_configuration(stuck.navigator, changed)
+    assert stuck.max_vel_x_mps == 0.25
+    stuck.fly(Pose2D(2.9, 2.5), 0.5)
+    assert stuck.max_vel_x_mps == 0.8
