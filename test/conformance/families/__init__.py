@@ -1,0 +1,43 @@
+"""What the original computed, family by family, and how ours is compared with it.
+
+A family is a folder of recorded cases, all of one kind. Its module here has
+``check(path)``: it computes a case anew and returns the differences, none of
+which is wanted. The tests and ``run.py`` both call it. For another family write
+``<family>.py`` with a ``check`` in the way of ``inflation.py``, name it in
+``FAMILIES``, and have ``test_<family>.py`` call it as ``test_inflation.py`` does.
+"""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Callable, Dict, List
+
+from families import defaults, inflation, navfn, obstacle, occupancy, trajectory_planner
+from families.case import Unusable, cases_in
+from families.comparison import Difference
+
+Check = Callable[[Path], List[Difference]]
+
+FAMILIES: Dict[str, Check] = {
+    "defaults": defaults.check,
+    "inflation": inflation.check,
+    "navfn": navfn.check,
+    "obstacle": obstacle.check,
+    "occupancy": occupancy.check,
+    "trajectory_planner": trajectory_planner.check,
+}
+DATA = Path(__file__).resolve().parents[1] / "data"
+
+__all__ = ["DATA", "FAMILIES", "Check", "Difference", "Unusable", "cases"]
+
+
+def cases(family: str, data: Path = DATA) -> List[Path]:
+    """The files of a family's cases; none when ``data`` does not have the family.
+
+    Raises:
+        Unusable: the family is there and can't be read.
+    """
+    if family == "defaults":
+        file = data / "defaults.json"
+        return [file] if file.is_file() else []
+    folder = data / family
+    return cases_in(folder) if folder.is_dir() else []

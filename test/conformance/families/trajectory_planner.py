@@ -1,0 +1,168 @@
+"""The trajectory planner: single searches, and closed loops call by call."""
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Dict, List, Optional
+
+import numpy as np
+
+from families.case import Case, Recorded, Unusable, load_case
+from families.comparison import Comparison, Difference
+from quad_nav.config import load
+from quad_nav.control.controller import Control
+from quad_nav.control.oscillation import Oscillation
+from quad_nav.control.rollout import Rollout, footprint_cost
+from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
+from quad_nav.control.velocity_search import choose_trajectory
+from quad_nav.errors import ControlError
+from quad_nav.geometry import Pose2D, Twist2D, multiply_quaternions, rotation_from_quaternion
+from quad_nav.grid import GridSpec
+
+_TOLERANCE = 1e-9
+
+
+def check(path: Path) -> List[Difference]:
+    case, comparison = load_case(path), Comparison()
+    if case.meta["mode"] == "single":
+        _check_single(case, comparison)
+    elif case.meta["mode"] == "loop":
+        _check_loop(case, comparison)
+    else:
+        raise Unusable(f"{case.meta['mode']!r} is no mode; expected single or loop")
+    return comparison.differences
+
+
+def _params(meta: Recorded) -> TrajectoryPlannerParams:
+    params = load({"TrajectoryPlannerROS": meta["params"]}).trajectory_planner
+    return replace(params, meter_scoring=meta["meter_scoring_effective"])
+
+
+def _period_s(meta: Recorded) -> float:
+    return 1.0 / meta["controller_frequency"] if meta["controller_frequency"] else 0.05
+
+
+def _spec(meta: Recorded, origin: Any) -> GridSpec:
+    return GridSpec(meta["size_x"], meta["size_y"], meta["resolution"], *origin)
+
+
+def _plan(rows: np.ndarray) -> np.ndarray:
+    return np.column_stack((rows[:, :2], 2.0 * np.arctan2(rows[:, 2], rows[:, 3])))
+
+
+def _flags(oscillation: Oscillation, names: List[str], more: Dict[str, bool]) -> List[bool]:
+    return [more[name] if name in more else getattr(oscillation, name) for name in names]
+
+
+def _numbers(oscillation: Oscillation) -> List[float]:
+    since, escape = oscillation.since, oscillation.escape_from
+    return [since.x_m, since.y_m, escape.x_m, escape.y_m, escape.yaw_rad]
+
+
+# -- single ---------------------------------------------------------------------------
+
+
+def _check_single(case: Case, comparison: Comparison) -> None:
+    recorded, meta = case.arrays, case.meta
+    params, oscillation = _params(meta), Oscillation()
+    spec = _spec(meta, meta["origin"])
+    rollout = Rollout(params, spec, recorded["costmap"], recorded["footprint"],
+                      _plan(recorded["plan"]), Pose2D(*recorded["pose"]),
+                      Twist2D(*recorded["velocity"]))
+    comparison.exact("within_robot", rollout.grids.within_robot, recorded["within_robot"] != 0)
+    comparison.exact("path_dist", rollout.grids.path, recorded["path_dist"])
+    comparison.exact("goal_dist", rollout.grids.goal, recorded["goal_dist"])
+
+    best = choose_trajectory(rollout, params, oscillation, _period_s(meta))
+    comparison.near("best", [*best.sample, best.cost], recorded["best"], _TOLERANCE)
+    comparison.near("best_points", best.points, recorded["best_points"], _TOLERANCE)
+    command = best.sample if best.cost >= 0.0 else (0.0, 0.0, 0.0)
+    comparison.near("cmd", command, recorded["cmd"], _TOLERANCE)
+    comparison.exact("state_flags", _flags(oscillation, meta["flag_names"], {}),
+                     recorded["state_flags"] != 0)
+    comparison.near("state_nums", _numbers(oscillation), recorded["state_nums"], _TOLERANCE)
+
+    _check_samples(rollout, recorded, comparison)
+    costs = [footprint_cost(spec, recorded["costmap"], recorded["footprint"], Pose2D(*pose))
+             for pose in recorded["footprint_poses"]]
+    comparison.exact("footprint_costs", costs, recorded["footprint_costs"])
+
+
+def _check_samples(rollout: Rollout, recorded: Recorded, comparison: Comparison) -> None:
+    samples, results = recorded["samples"], recorded["sample_results"]
+    costs, ends = rollout.score(samples)
+    comparison.near("sample_results (cost)", costs, results[:, 0], _TOLERANCE)
+    lengths = [len(rollout.trajectory(tuple(sample)).points) for sample in samples]
+    comparison.exact("sample_results (number of points)", lengths, results[:, 1])
+    comparison.near("sample_results (last point)", np.nan_to_num(ends), results[:, 2:], _TOLERANCE)
+
+
+# -- loop -----------------------------------------------------------------------------
+
+
+def _check_loop(case: Case, comparison: Comparison) -> None:
+    recorded, meta = case.arrays, case.meta
+    planner = TrajectoryPlanner(_params(meta), recorded["footprint"], _period_s(meta))
+    local_from_plan = _local_from_plan(meta)
+    plans = {int(step): recorded[f"plan_{j}"] for j, step in enumerate(recorded["plan_set_step"])}
+    for k in range(len(recorded["pose"])):
+        if k in plans:
+            planner.set_plan(_plan(plans[k]))
+        ox, oy = recorded["window_offset"][k]
+        world = recorded["world"][recorded["world_index"][k]]
+        costs = world[oy:oy + meta["size_y"], ox:ox + meta["size_x"]]
+        try:
+            control: Optional[Control] = planner.compute_velocity(
+                _spec(meta, recorded["origin"][k]), costs, Pose2D(*recorded["pose"][k]),
+                Twist2D(*recorded["velocity"][k]), local_from_plan)
+        except ControlError:
+            control = None
+        _check_call(planner, control, recorded, meta, k, comparison)
+
+
+def _local_from_plan(meta: Recorded) -> Pose2D:
+    """The inverse of the recorded frame's pose, to the last bit as tf2 computes it.
+
+    The plan's points lie on cell borders, so the last bit decides about their
+    cells. tf2 turns the translation by two quaternion products, and takes the
+    rotation from quaternion to matrix and back.
+    """
+    frame = meta.get("map_to_costmap_frame")  # pose of the costmap frame in the map frame
+    if frame is None:
+        return Pose2D(0.0, 0.0, 0.0)
+    qx, qy, qz, qw = frame["quaternion_xyzw"]
+    inverse = (-qx, -qy, -qz, qw)
+    translation = multiply_quaternions(
+        multiply_quaternions(inverse, (-frame["x"], -frame["y"], 0.0, 0.0)), (qx, qy, qz, qw))
+    rotation = rotation_from_quaternion(inverse)
+    root = math.sqrt(np.trace(rotation) + 1.0)
+    yaw = 2.0 * math.atan2((rotation[1, 0] - rotation[0, 1]) * (0.5 / root), root * 0.5)
+    return Pose2D(translation[0], translation[1], yaw)
+
+
+def _check_call(planner: TrajectoryPlanner, control: Optional[Control], recorded: Recorded,
+                meta: Recorded, k: int, comparison: Comparison) -> None:
+    exact, near = comparison.exact, comparison.near
+    command = control.command if control else Twist2D()
+    exact(f"ok[{k}]", control is not None, bool(recorded["ok"][k]))
+    near(f"cmd[{k}]", [command.vx_mps, command.vy_mps, command.vyaw_radps], recorded["cmd"][k],
+         _TOLERANCE)
+    exact(f"goal_reached[{k}]", planner.is_goal_reached(), bool(recorded["goal_reached"][k]))
+    state = {"rotating_to_goal": planner.rotating_to_goal,
+             "xy_tolerance_latch": planner.xy_tolerance_latch,
+             "reached_goal": planner.is_goal_reached()}
+    exact(f"state_flags[{k}]", _flags(planner.oscillation, meta["flag_names"], state),
+          recorded["state_flags"][k] != 0)
+    near(f"state_nums[{k}]", _numbers(planner.oscillation), recorded["state_nums"][k], _TOLERANCE)
+    exact(f"plan_lengths[{k}] (global)", len(planner.plan), recorded["plan_lengths"][k, 0])
+    if control is not None:
+        exact(f"goal_mode[{k}]", control.goal_mode, bool(recorded["goal_mode"][k]))
+    if recorded["goal_mode"][k]:
+        return
+    best = planner.best
+    near(f"best_cost[{k}]", np.nan if best is None else best.cost, recorded["best_cost"][k],
+         _TOLERANCE)
+    if control is not None and best is not None:
+        exact(f"best_n_points[{k}]", len(control.local_plan), recorded["best_n_points"][k])
+        near(f"best_vel[{k}]", best.sample, recorded["best_vel"][k], _TOLERANCE)

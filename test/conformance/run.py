@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+"""Compares this package with what the original computed, on any folder of recordings.
+
+    test/conformance/run.py [FOLDER]
+
+Exit status: 0 when every case agrees, 1 when one does not, 2 when the folder or one of
+its cases cannot be used.
+"""
+from __future__ import annotations
+
+import argparse
+import sys
+import traceback
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import List, Tuple
+
+import tabulate
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src"))
+
+from families import DATA, FAMILIES, Difference, Unusable, cases  # noqa: E402
+
+EXIT_AGREES, EXIT_DIFFERS, EXIT_UNUSABLE = 0, 1, 2
+
+
+@dataclass
+class Result:
+    """A family's outcome: the cases that failed, each with its first difference, and the
+    recordings that could not be used."""
+
+    family: str
+    cases: int = 0
+    passed: int = 0
+    failed: List[Tuple[str, Difference]] = field(default_factory=list)
+    unusable: List[str] = field(default_factory=list)
+    note: str = ""
+
+    def row(self) -> List[object]:
+        if self.note:
+            return [self.family, "-", "-", self.note, "", ""]
+        case, difference = self.failed[0] if self.failed else ("", Difference("", ""))
+        return [self.family, self.cases, self.passed, case, difference.field, difference.text]
+
+
+def run_family(family: str, data: Path) -> Result:
+    """Compares every case of a family."""
+    result = Result(family)
+    try:
+        paths = cases(family, data)
+    except Unusable as error:
+        return Result(family, unusable=[str(error)], note="unusable")
+    if not paths:
+        return Result(family, note="not in this folder")
+    for path in paths:
+        result.cases += 1
+        try:
+            differences = FAMILIES[family](path)
+        except Unusable as error:
+            result.unusable.append(f"{path}: {error}")
+            continue
+        except Exception as error:  # what ours raises, whatever it is, is a failure of the case
+            traceback.print_exc()
+            differences = [Difference("(raised)", f"{type(error).__name__}: {error}")]
+        if differences:
+            result.failed.append((path.stem, differences[0]))
+        else:
+            result.passed += 1
+    return result
+
+
+def unknown_families(data: Path) -> List[Result]:
+    """Folders of recordings that nothing here compares."""
+    return [Result(path.name, note="unknown family, not compared")
+            for path in sorted(data.iterdir())
+            if path.name not in FAMILIES and (path / "index.json").is_file()]
+
+
+def run(data: Path) -> int:
+    """Runs all families over a folder, prints the outcome and returns the exit status."""
+    if not data.is_dir():
+        print(f"{data}: no such folder; expected one of recordings", file=sys.stderr)
+        return EXIT_UNUSABLE
+    results = [run_family(family, data) for family in FAMILIES] + unknown_families(data)
+    print(tabulate.tabulate(
+        [result.row() for result in results],
+        ["family", "cases", "passed", "first failure", "field", "difference"],
+        tablefmt="simple", maxcolwidths=[None, None, None, 28, 20, 30],
+        colalign=("left", "right", "right", "left", "left", "left"), disable_numparse=True))
+    total, passed = sum(r.cases for r in results), sum(r.passed for r in results)
+    print(f"\n{passed} of {total} cases agree.")
+    unusable = [line for result in results for line in result.unusable]
+    if not total and not unusable:
+        unusable = [f"{data}: there are no recordings in it that could be compared"]
+    for line in unusable:
+        print(f"unusable: {line}", file=sys.stderr)
+    if unusable:
+        return EXIT_UNUSABLE
+    return EXIT_AGREES if passed == total else EXIT_DIFFERS
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=DATA,
+                        help="recordings: a folder for each family (default: %(default)s)")
+    return run(parser.parse_args().folder)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

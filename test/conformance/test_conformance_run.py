@@ -1,0 +1,152 @@
+"""The command that compares on any folder: what it says and its exit status."""
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from families import DATA, FAMILIES, cases
+from families.case import Unusable, load_case
+from families.comparison import Comparison, Difference
+from run import run
+
+
+def put(folder, family, original, name, **changed):
+    """A recorded case under another name, with some arrays changed."""
+    target = folder / family
+    target.mkdir(exist_ok=True)
+    with np.load(DATA / family / f"{original}.npz") as file:
+        arrays = {**file, **changed}
+    np.savez(target / f"{name}.npz", **{k: v for k, v in arrays.items() if v is not None})
+    index = target / "index.json"
+    entries = json.loads(index.read_text()) if index.exists() else []
+    index.write_text(json.dumps([*entries, {"case": name, "note": "a test's own"}]))
+
+
+def rows(output):
+    """family -> the words of its row."""
+    return {words[0]: words[1:] for words in map(str.split, output.splitlines()) if words}
+
+
+@pytest.fixture
+def occupancy_costs():
+    with np.load(DATA / "occupancy" / "cost_to_occupancy.npz") as file:
+        return file["occupancy"]
+
+
+def test_unseen_cases_that_agree(tmp_path, capsys):
+    put(tmp_path, "occupancy", "cost_to_occupancy", "some name")
+    put(tmp_path, "occupancy", "footprint_00", "another")
+    put(tmp_path, "inflation", "inf_03", "x")
+    assert run(tmp_path) == 0
+    output = capsys.readouterr().out
+    assert rows(output)["occupancy"] == ["2", "2"]
+    assert rows(output)["inflation"] == ["1", "1"]
+    assert rows(output)["navfn"] == ["-", "-", "not", "in", "this", "folder"]
+    assert output.endswith("\n3 of 3 cases agree.\n")
+
+
+def test_first_failure_with_case_field_and_difference(tmp_path, capsys, occupancy_costs):
+    wrong = occupancy_costs.copy()
+    wrong[7] += 1
+    wrong[9] += 1
+    put(tmp_path, "occupancy", "cost_to_occupancy", "good")
+    put(tmp_path, "occupancy", "cost_to_occupancy", "bad", occupancy=wrong)
+    put(tmp_path, "occupancy", "cost_to_occupancy", "worse", occupancy=wrong[:5])
+    assert run(tmp_path) == 1
+    output = capsys.readouterr().out
+    assert rows(output)["occupancy"][:7] == ["3", "1", "bad", "occupancy", "2", "of", "256"]
+    text = " ".join(output.split())
+    assert f"the first at [7]: {occupancy_costs[7]}, recorded {occupancy_costs[7] + 1}" in text
+    assert "worse" not in output
+
+
+def test_what_ours_raises_is_a_failure(tmp_path, capsys, monkeypatch):
+    put(tmp_path, "occupancy", "cost_to_occupancy", "case")
+    monkeypatch.setitem(FAMILIES, "occupancy", lambda path: [][0])
+    assert run(tmp_path) == 1
+    assert rows(capsys.readouterr().out)["occupancy"][2:5] == ["case", "(raised)", "IndexError:"]
+
+
+def test_unknown_family_is_said_and_not_counted(tmp_path, capsys):
+    put(tmp_path, "occupancy", "cost_to_occupancy", "case")
+    shutil.copytree(tmp_path / "occupancy", tmp_path / "teb")
+    (tmp_path / "notes").mkdir()
+    assert run(tmp_path) == 0
+    output = capsys.readouterr().out
+    assert rows(output)["teb"] == ["-", "-", "unknown", "family,", "not", "compared"]
+    assert "notes" not in rows(output)
+
+
+@pytest.mark.parametrize("spoil, said", [
+    (lambda family: (family / "index.json").unlink(), "index.json: cannot be read"),
+    (lambda family: (family / "index.json").write_text("{"), "index.json: cannot be read"),
+    (lambda family: (family / "index.json").write_text("[1]"), "expected a list of {case: "),
+    (lambda family: (family / "index.json").write_text("[]"), "there is no case in it"),
+    (lambda family: (family / "case.npz").unlink(), "files that are not there: case.npz"),
+    (lambda family: (family / "case.npz").write_text("?"), "case.npz: cannot be read"),
+    (lambda family: put(family.parent, "occupancy", "cost_to_occupancy", "other", occupancy=None),
+     "other.npz: there is no 'occupancy'"),
+])
+def test_folders_that_cannot_be_used(tmp_path, capsys, spoil, said):
+    put(tmp_path, "occupancy", "cost_to_occupancy", "case")
+    spoil(tmp_path / "occupancy")
+    assert run(tmp_path) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_no_folder_and_no_recordings(tmp_path, capsys):
+    assert run(tmp_path / "nowhere") == 2
+    assert "no such folder" in capsys.readouterr().err
+    assert run(tmp_path) == 2
+    assert "there are no recordings in it" in capsys.readouterr().err
+
+
+def test_every_family_that_is_compared_is_among_the_recordings():
+    assert [family for family in FAMILIES if not cases(family)] == []
+
+
+def test_missing_keys_within_meta_are_the_recordings_fault(tmp_path):
+    put(tmp_path, "occupancy", "footprint_00", "case", meta=np.array('{"params": {}}'))
+    meta = load_case(tmp_path / "occupancy" / "case.npz").meta
+    with pytest.raises(Unusable, match="there is no 'robot_radius'"):
+        meta["params"]["robot_radius"]
+
+
+@pytest.mark.parametrize("found, recorded, text", [
+    (3, 4, "3, recorded 4"),
+    ([1, 2, 3], [1, 5, 6], "2 of 3 differ, the first at [1]: 2, recorded 5"),
+    ([[0.0, np.nan]], [[0.0, 1.0]], "1 of 2 differ, the first at [0, 1]: nan, recorded 1.0"),
+    (np.zeros((2, 3)), np.zeros((2, 4)), "shape (2, 3), recorded (2, 4)"),
+    (["a"], ["b"], "1 of 1 differ, the first at [0]: a, recorded b"),
+    (True, False, "True, recorded False"),
+])
+def test_exact(found, recorded, text):
+    comparison = Comparison()
+    comparison.exact("field", found, recorded)
+    assert comparison.differences == [Difference("field", text)]
+
+
+@pytest.mark.parametrize("found, recorded, text", [
+    ([1.0, 2.0], [1.0, 2.25], "0.25 apart at [1]: 2.0, recorded 2.25, allowed are 0.1"),
+    (1.0, 1.5, "0.5 apart: 1.0, recorded 1.5, allowed are 0.1"),
+    ([np.nan], [1.0], "inf apart at [0]: nan, recorded 1.0, allowed are 0.1"),
+    ([np.inf], [-np.inf], "inf apart at [0]: inf, recorded -inf, allowed are 0.1"),
+    (np.zeros((0, 2)), np.zeros((1, 2)), "shape (0, 2), recorded (1, 2)"),
+])
+def test_near(found, recorded, text):
+    comparison = Comparison()
+    comparison.near("field", found, recorded, 0.1)
+    assert comparison.differences == [Difference("field", text)]
+
+
+@pytest.mark.parametrize("same", [
+    [1.0, np.nan, np.inf], np.zeros((0, 3)), 5, [True, False], np.array(["obstacle_layer"])])
+def test_agreement(same):
+    comparison = Comparison()
+    comparison.exact("field", same, same)
+    if np.asarray(same).dtype.kind != "U":
+        comparison.near("field", same, same, 0.0)
+        comparison.near("field", np.asarray(same, float), np.asarray(same, float) + 1e-3, 2e-3)
+    assert comparison.differences == []
