@@ -43,8 +43,9 @@ conformance: venv  ## Compare with the original's recordings: make conformance D
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
 
-venv: packages  ## Make the virtual environment
+venv: packages  ## Make the virtual environment, with the command .venv/bin/quad
 	@scripts/make_venv .venv requirements.txt
+	@scripts/make_command .venv
 
 workspace: venv  ## Build the catkin workspace
 	@scripts/build_workspace

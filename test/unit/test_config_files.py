@@ -4,6 +4,7 @@ from __future__ import annotations
 import pytest
 
 from quad_nav.config import load, load_files
+from quad_nav.config.files import PlacedFile
 from quad_nav.errors import InputError
 
 FILES = {
@@ -106,7 +107,7 @@ def test_key_that_is_there_twice_counts_once_and_is_told(folder):
     tree = load_files(folder, {"i": "0"})
     assert tree["local_costmap"]["width"] == 5.0
     assert [str(remark) for remark in load(tree, "").remarks if "twice" in remark.text] == [
-        f"{folder / 'local_costmap_params.yaml'}:4: local_costmap/width is there twice; YAML takes"
+        f"local_costmap/width ({folder / 'local_costmap_params.yaml'}:4): there twice; YAML takes"
         " the last one"]
 
 
@@ -122,3 +123,30 @@ def test_anchors_and_merge_keys(folder):
     tree = load_files(folder, {"i": "0"})
     assert tree["TrajectoryPlannerROS"] == {"max_vel_x": 0.7, "min_vel_x": 0.1}
     assert tree.remarks == []  # a merge key's value under an own one is no duplicate
+
+
+def test_costmaps_own_files_may_leave_the_namespace_to_roslaunch(tmp_path):
+    texts = {"costmap_common.yaml": "width: 1.0\nheight: 2.0\n",
+             "costmap_local.yaml": "width: 3.0\n",
+             "global_costmap_params.yaml": "width: 4.0\n", "planner.yaml": "width: 5.0\n"}
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    tree = load_files([tmp_path / name for name in texts])
+    assert tree == {"local_costmap": {"width": 3.0, "height": 2.0},
+                    "global_costmap": {"width": 4.0, "height": 2.0}, "width": 5.0}
+    assert tree.origins["local_costmap/width"] == f"{tmp_path / 'costmap_local.yaml'}:1"
+
+
+def test_a_file_may_be_placed(tmp_path):
+    (tmp_path / "house.yaml").write_text("width: 3.0\n")
+    placed = PlacedFile(tmp_path / "house.yaml", ("local_costmap",))
+    assert load_files([placed]) == {"local_costmap": {"width": 3.0}}
+
+
+def test_dump_of_a_parameter_server(tmp_path):
+    (tmp_path / "dump.yaml").write_text(
+        "move_base0:\n  controller_frequency: 1.0\nmove_base1:\n  controller_frequency: 2.0\n"
+        "rosversion: '1.15'\n")
+    trees = [load_files([tmp_path / "dump.yaml"], {"i": number}) for number in "01"]
+    assert trees == [{"controller_frequency": 1.0}, {"controller_frequency": 2.0}]
+    assert trees[1].origins == {"controller_frequency": f"{tmp_path / 'dump.yaml'}:4"}

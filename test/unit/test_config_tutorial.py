@@ -79,7 +79,7 @@ def test_only_the_long_update_period_is_remarked_on():
     told = [(remark.kind, remark.text.split()[0]) for remark in remarks]
     assert told == [("caution", "21.0")] * 2  # once for each costmap
     assert remarks[0].place.startswith("/move_base0/global_costmap/base_scan/expected_update")
-    assert remarks[0].place.endswith("costmap_common_params.yaml:12)")
+    assert remarks[0].origin.endswith("costmap_common_params.yaml:12")
 
 
 def test_costmaps():

@@ -21,13 +21,16 @@ LAYERS = [
     {"navigator", "mission"},
     {"config"},
     {"assembly"},
+    {"check"},
     {"offline", "ros"},
+    {"cli"},
 ]
 NOUNS = LAYERS[0]  # they may import one another
 WORLD_USERS = {"sim", "config", "assembly", "offline", "ros"}  # navigation knows no simulator
 
 # Where a third-party package may be imported: that file or folder and nowhere else.
 PLACES = {
+    "click": "cli",
     "numba": "kernels/",
     "pybullet": "sim/body.py",
     "rospy": "ros/",

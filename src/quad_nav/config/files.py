@@ -8,6 +8,7 @@ roslaunch puts the robot's number for ``$(arg i)``.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
 
@@ -20,7 +21,23 @@ COMMON = "costmap_common_params"
 REQUIRED = (COMMON, "local_costmap_params", "global_costmap_params", "base_local_planner_params")
 OPTIONAL = ("move_base_params",)
 _COSTMAPS = ("global_costmap", "local_costmap")
+_NODE = re.compile(r"/?move_base\d*")
 _SUBSTITUTION = re.compile(r"\$\(([^)]*)\)")
+
+
+@dataclass(frozen=True)
+class PlacedFile:
+    """A file and the namespaces below which it is loaded; "" is the node's level.
+
+    Without any, its name and its keys say which: a costmap's own file may leave its
+    namespace to roslaunch.
+    """
+
+    path: Path
+    namespaces: Tuple[str, ...]
+
+
+FileName = Union[str, Path, PlacedFile]
 
 
 class ParameterTree(Dict[str, Any]):
@@ -35,7 +52,7 @@ class ParameterTree(Dict[str, Any]):
         self.remarks: List[Remark] = []
 
 
-def load_files(source: Union[str, Path, Sequence[Union[str, Path]]],
+def load_files(source: Union[str, Path, Sequence[FileName]],
                substitutions: Optional[Mapping[str, str]] = None) -> ParameterTree:
     """The parameter tree of one robot.
 
@@ -51,23 +68,24 @@ def load_files(source: Union[str, Path, Sequence[Union[str, Path]]],
     """
     arguments = {} if substitutions is None else dict(substitutions)
     if isinstance(source, (str, Path)):
-        paths = files_of(Path(source), arguments.get("i"))
+        files = [PlacedFile(path, _COSTMAPS if path.name.startswith(COMMON) else ("",))
+                 for path in files_of(Path(source), arguments.get("i"))]
     else:
-        paths = [Path(path) for path in source]
+        files = [file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ())
+                 for file in source]
     tree = ParameterTree()
     problems: List[str] = []
-    for path in paths:
+    for file in files:
         try:
-            document = _read(path, arguments)
+            document = _read(file.path, arguments)
         except InputError as error:
             problems.extend(error.problems)
             continue
-        prefixes = _COSTMAPS if path.name.startswith("costmap_common") else ("",)
-        for prefix in prefixes:
-            _merge(tree, document, prefix)
+        for namespace in file.namespaces or _namespaces(document):
+            _merge(tree, document, namespace)
         for line, key in document.duplicates:
-            tree.remarks.append(Remark(f"{path}:{line}", CAUTION,
-                                       f"{key} is there twice; YAML takes the last one"))
+            tree.remarks.append(Remark(key, CAUTION, "there twice; YAML takes the last one",
+                                       f"{file.path}:{line}"))
     if problems:
         raise InputError(problems)
     return tree
@@ -97,6 +115,32 @@ def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
     return paths + [own] if own.is_file() else paths
 
 
+def top_level(path: Path, substitutions: Mapping[str, str]) -> Dict[str, Any]:
+    """The names and values at a file's top level; a namespace is {}, whatever is in it.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    document = _read(path, substitutions)
+    values = {path[0]: value for path, value in document.values if len(path) == 1}
+    return {key: values.get(key, {}) for key in document.keys}
+
+
+def costmaps_named(path: Path) -> Tuple[str, ...]:
+    """The costmaps that a file without their namespaces is meant for, by its name."""
+    stem = path.stem.lower()
+    if "costmap" not in stem:
+        return ()
+    named = tuple(name for name in _COSTMAPS if name.split("_")[0] in stem)
+    return _COSTMAPS if not named and "common" in stem else named
+
+
+def _namespaces(document: _Document) -> Tuple[str, ...]:
+    if set(_COSTMAPS).intersection(document.keys):
+        return ("",)
+    return costmaps_named(document.path) or ("",)
+
+
 class _Document:
     """One file: its values, the line of each path, and keys that are there twice."""
 
@@ -105,6 +149,17 @@ class _Document:
         self.values: List[Tuple[Tuple[str, ...], Any]] = []  # leaves, in order
         self.lines: Dict[Tuple[str, ...], int] = {}
         self.duplicates: List[Tuple[int, str]] = []
+
+    @property
+    def keys(self) -> List[str]:
+        """The names at the top level."""
+        return list(dict.fromkeys(path[0] for path, _ in self.values))
+
+    def enter(self, node: str) -> None:
+        """Keeps what is below a node's name, as in a dump of a parameter server."""
+        self.values = [(path[1:], value) for path, value in self.values
+                       if path[0] == node and len(path) > 1]
+        self.lines = {path[1:]: line for path, line in self.lines.items() if path[0] == node}
 
 
 def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
@@ -126,6 +181,10 @@ def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
         raise InputError([_told(error, path)]) from error
     finally:
         loader.dispose()
+    nodes = [key for key in document.keys if _NODE.fullmatch(key)]
+    if nodes:
+        own = f"move_base{arguments.get('i', '')}"
+        document.enter(own if own in nodes else nodes[0])
     return document
 
 

@@ -3,10 +3,11 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import dataclass
-from typing import Dict, Iterable, List, Mapping, Optional
+from typing import Dict, Iterable, List, Mapping, Optional, Sequence
 
 from quad_nav.errors import InputError
 
+ERROR = "error"  # nothing flies with it
 UNKNOWN = "unknown"  # move_base does not know the key either
 UNSUPPORTED = "unsupported"  # move_base knows it, this package does not
 IGNORED = "ignored"  # the original reads past it as well
@@ -17,14 +18,31 @@ CAUTION = "caution"  # legal, and probably not what was meant
 
 @dataclass(frozen=True)
 class Remark:
-    """One line of ``quad check``: where, which kind, what about it."""
+    """One line of ``quad check``: where, which kind, what about it.
+
+    ``origin``: "file:line" where the value was written, when it came from a file.
+    ``nearest``: the known name that an unknown one is most like, if there is one.
+    """
 
     place: str
     kind: str
     text: str
+    origin: str = ""
+    nearest: str = ""
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.text}"
+        where = f"{self.place} ({self.origin})" if self.origin else self.place
+        hint = f"; did you mean {self.nearest}?" if self.nearest else ""
+        return f"{where}: {self.text}{hint}"
+
+
+class ParameterError(InputError):
+    """Parameters that nothing flies with: ``faults``, and ``remarks`` on the others."""
+
+    def __init__(self, faults: Sequence[Remark], remarks: Sequence[Remark]):
+        super().__init__([str(fault) for fault in faults])
+        self.faults = tuple(faults)
+        self.remarks = tuple(remarks)
 
 
 class Notes:
@@ -39,39 +57,37 @@ class Notes:
         self._place = place
         self._origins = origins or {}
         self._moved: Dict[str, str] = {}
-        self.problems: List[str] = []
+        self.faults: List[Remark] = []
         self.remarks: List[Remark] = []
 
     def moved(self, path: str, written_at: str) -> None:
         """The value at ``path`` was written at another place; complaints name that one."""
         self._moved[path] = self._moved.get(written_at, written_at)
 
-    def where(self, path: str) -> str:
-        path = self._moved.get(path, path)
-        place = self._place.rstrip("/") + "/" + path if path else self._place
-        origin = self._origins.get(path)
-        return f"{place} ({origin})" if origin else place
-
     def problem(self, path: str, text: str) -> None:
-        line = f"{self.where(path)}: {text}"
-        if line not in self.problems:
-            self.problems.append(line)
+        fault = self._about(path, ERROR, text)
+        if fault not in self.faults:
+            self.faults.append(fault)
 
-    def remark(self, path: str, kind: str, text: str) -> None:
-        remark = Remark(self.where(path), kind, text)
+    def remark(self, path: str, kind: str, text: str, nearest: str = "") -> None:
+        remark = self._about(path, kind, text, nearest)
         if remark not in self.remarks:
             self.remarks.append(remark)
+
+    def _about(self, path: str, kind: str, text: str, nearest: str = "") -> Remark:
+        path = self._moved.get(path, path)
+        place = self._place.rstrip("/") + "/" + path if path else self._place
+        return Remark(place, kind, text, self._origins.get(path, ""), nearest)
 
     def unknown(self, path: str, name: str, known: Iterable[str]) -> None:
         """A key that nobody reads, with the nearest name that somebody does."""
         nearest = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
-        hint = f"; did you mean {nearest[0]}?" if nearest else ""
-        self.remark(path, UNKNOWN, f"unknown, nothing reads it{hint}")
+        self.remark(path, UNKNOWN, "unknown, nothing reads it", *nearest)
 
     def raise_problems(self) -> None:
-        """Raises InputError when there was any problem."""
-        if self.problems:
-            raise InputError(self.problems)
+        """Raises ParameterError when there was any problem."""
+        if self.faults:
+            raise ParameterError(self.faults, self.remarks)
 
 
 def join(*parts: str) -> str:

@@ -166,9 +166,8 @@ def _check_slow(namespace: Namespace, name: str, planner: str, notes: Notes) -> 
         parameter = namespace.get(key, "")
         if isinstance(parameter, str) and parameter not in ("", original, *known):
             nearest = difflib.get_close_matches(parameter, known, n=1)
-            hint = f"; did you mean {nearest[0]}?" if nearest else ""
             notes.remark(join(name, key), CAUTION,
-                         f"{planner} has no speed of the name {parameter}{hint}")
+                         f"{planner} has no speed of the name {parameter}", *nearest)
 
 
 def _speed_fields(planner: str) -> Dict[str, str]:

@@ -1,0 +1,90 @@
+"""The command line ``quad``."""
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+from typing import List, Optional, Sequence, Tuple
+
+import click
+
+import quad_nav
+from quad_nav.check import Report, check_files, check_folder, counts, report_text
+from quad_nav.config.files import PlacedFile
+from quad_nav.errors import InputError
+
+EXIT_SUCCESS, EXIT_WARNINGS, EXIT_BAD_INPUT = 0, 1, 2
+_NARROWEST, _WIDEST = 80, 100  # columns of tables
+_COSTMAPS = ("global_costmap", "local_costmap")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(quad_nav.__version__, prog_name="quad")
+def main() -> None:
+    """Quadcopters on the ROS navigation stack."""
+
+
+@main.command()
+@click.argument("paths", nargs=-1, required=True, metavar="FOLDER | [COSTMAP=]FILE...")
+@click.option("--robot", type=click.IntRange(min=0), metavar="N",
+              help="Check what robot N flies with: $(arg i) is N, and files with that number go"
+                   " before those without. Otherwise every robot with files of its own.")
+@click.option("--strict", is_flag=True, help="Remarks count: exit status 1.")
+def check(paths: Tuple[str, ...], robot: Optional[int], strict: bool) -> None:
+    """Check move_base's YAML without flying.
+
+    A FOLDER may be laid out as this package's config/default or in any other way: files that
+    belong together are found by their names and contents, in the folders below it too. FILEs
+    are loaded in the order given, each where its name and content say, or below
+    local_costmap or global_costmap with local_costmap=FILE or global_costmap=FILE.
+
+    Exit status: 0, or 1 for remarks with --strict, or 2 for errors.
+    """
+    number = None if robot is None else str(robot)
+    folders = [Path(path) for path in paths if Path(path).is_dir()]
+    files = [_placed(path) for path in paths if not Path(path).is_dir()]
+    reports = [check_files(files, number)] if files else []
+    unused: List[Path] = []
+    empty: List[str] = []
+    for folder in folders:
+        try:
+            found, left = check_folder(folder, number)
+        except InputError as error:
+            empty += error.problems
+        else:
+            reports += found
+            unused += left
+    _show(reports, unused, empty)
+    sys.exit(EXIT_BAD_INPUT if empty else _exit_status(reports, strict))
+
+
+def _show(reports: Sequence[Report], unused: Sequence[Path], empty: Sequence[str]) -> None:
+    terminal = shutil.get_terminal_size((_WIDEST, 24)).columns
+    width = max(_NARROWEST, min(terminal, _WIDEST))
+    click.echo("\n\n".join(report_text(report, width) for report in reports))
+    if unused:
+        click.echo("\nNot among them: " + ", ".join(map(str, unused)))
+    if len(reports) > 1:
+        click.echo(f"\n{len(reports)} configurations: {counts(reports)}")
+    for line in empty:
+        click.echo(line, err=True)
+
+
+def _placed(word: str) -> PlacedFile:
+    """A file, or a costmap's name, "=" and a file."""
+    namespace, equals, name = word.partition("=")
+    if equals and namespace in _COSTMAPS:
+        return PlacedFile(Path(name), (namespace,))
+    return PlacedFile(Path(word), ())
+
+
+def _exit_status(reports: Sequence[Report], strict: bool) -> int:
+    if any(report.errors for report in reports):
+        return EXIT_BAD_INPUT
+    if strict and any(report.warnings for report in reports):
+        return EXIT_WARNINGS
+    return EXIT_SUCCESS
+
+
+if __name__ == "__main__":
+    main(prog_name="quad")
