@@ -119,8 +119,12 @@ def table(lines: Sequence[Remark], root: str, width: int) -> str:
                  else line for line in lines]
     whats = _widest(header[2], [_what(line) for line in lines])
     places = _widest(header[0], [part for line in lines for part in _place(line, root, left)])
-    cells = [_place(line, root, min(places, max(left // 2, left - whats))) for line in lines]
-    left -= _widest(header[0], [part for cell in cells for part in cell])
+    # As wide as its longest piece that cannot be cut, and then as much as fits into that.
+    place = min(places, max(left // 2, left - whats))
+    for _ in range(2):
+        cells = [_place(line, root, place) for line in lines]
+        place = _widest(header[0], [part for cell in cells for part in cell])
+    left -= place
     rows = [["\n".join(cell), line.kind, textwrap.fill(_what(line), max(left, 20)), line.nearest]
             for cell, line in zip(cells, lines)]
     columns = 4 if with_nearest else 3
