@@ -168,7 +168,7 @@ def test_table(tmp_path, monkeypatch):
         **STANDARD, "move_base_params.yaml": "recovery_behaviour_enabled: true\n",
         "base_local_planner_params.yaml":
             "TrajectoryPlannerROS:\n  pdist_scale: 1.0\n  max_vel_x: 25\n",
-        "costmap_common_params.yaml": SEEING + "map_topick: /map\n"})
+        "costmap_common_params.yaml": SEEING + "zzz: 1\n"})
     monkeypatch.chdir(tmp_path)
     status, output = quad(".", "--strict")
     assert status == 1
@@ -185,7 +185,7 @@ TrajectoryPlannerROS/pdist_scale    renamed  called path_distance_bias
   base_local_planner_params.yaml:2           today
 TrajectoryPlannerROS/max_vel_x      clamped  25 becomes 20.0, the largest
   base_local_planner_params.yaml:3           that move_base allows
-*_costmap/map_topick                unknown  nothing reads it
+*_costmap/zzz                       unknown  nothing reads it
   costmap_common_params.yaml:3"""
 
 
