@@ -13,6 +13,8 @@ from quad_nav.costmap.inflation import InflationLayer
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 
+_METRES = 1e-12  # tolerance of radii
+
 
 def check(path: Path) -> List[Difference]:
     comparison = Comparison()
@@ -38,8 +40,7 @@ def _check_costmap(configuration: Configuration, recorded: Recorded,
         "info": {
             "size_x": spec.size_x, "size_y": spec.size_y, "resolution": spec.resolution_m,
             "origin_x": spec.origin_x_m, "origin_y": spec.origin_y_m,
-            "inscribed": costmap.inscribed_radius_m,
-            "circumscribed": costmap.circumscribed_radius_m, "rolling": params.rolling_window,
+            "rolling": params.rolling_window,
             "layers": list(costmap.layers), "default_value": costmap.costs[0, 0],
             "current": costmap.is_current(0.0)},
         "dynamic_parameters": {
@@ -55,6 +56,11 @@ def _check_costmap(configuration: Configuration, recorded: Recorded,
             "combination_method": obstacles.params.combination_method,
             "enabled": obstacles.params.enabled,
             "sources": [source.name for source in obstacles.params.sources]}}
+    info = recorded["info"]
+    comparison.near("costmap_defaults.info.inscribed", costmap.inscribed_radius_m,
+                    info["inscribed"], _METRES)
+    comparison.near("costmap_defaults.info.circumscribed", costmap.circumscribed_radius_m,
+                    info["circumscribed"], _METRES)
     for part, values in found.items():
         _compare(comparison, f"costmap_defaults.{part}", values, recorded[part])
     _compare(comparison, "costmap_defaults.layers.inflation", {

@@ -11,6 +11,8 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 
+_METRES = 1e-12  # tolerance of footprints; grids are exact
+
 
 def check(path: Path) -> List[Difference]:
     replay = Replay(load_case(path))
@@ -31,11 +33,13 @@ class Replay:
         self.sources = list(self.obstacles.buffers)
 
     def check_parameters(self) -> None:
-        exact, costmap, effective = self.comparison.exact, self.costmap, self.meta["effective"]
-        exact("footprint", costmap.footprint, self.recorded["footprint"])
-        exact("inscribed_radius", costmap.inscribed_radius_m, effective["inscribed_radius"])
-        exact("circumscribed_radius", costmap.circumscribed_radius_m,
-              effective["circumscribed_radius"])
+        exact, near = self.comparison.exact, self.comparison.near
+        costmap, effective = self.costmap, self.meta["effective"]
+        near("footprint", costmap.footprint, self.recorded["footprint"], _METRES)
+        near("inscribed_radius", costmap.inscribed_radius_m, effective["inscribed_radius"],
+             _METRES)
+        near("circumscribed_radius", costmap.circumscribed_radius_m,
+             effective["circumscribed_radius"], _METRES)
         exact("size_x", costmap.spec.size_x, effective["size_x"])
         exact("size_y", costmap.spec.size_y, effective["size_y"])
         exact("layers", list(costmap.layers), effective["layers"])
