@@ -9,11 +9,11 @@ from sensor_msgs.msg import PointCloud2
 
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator import Navigator
+from quad_nav.ros.convert import twist_message
 from quad_nav.ros.nav_messages import (
     cost_cloud_message,
     path_message,
     pose_stamped,
-    twist_message,
 )
 from quad_nav.tick import Tick
 
