@@ -41,10 +41,9 @@ class Goals(FlightCase):
 
     def test_new_goal_preempts_the_old_one(self):
         count = self.results[0].count
-        x, y = self.position(0)
-        self.goal_topics[0].publish(goal_pose(x, y + 3.0))
+        self.goal_topics[0].publish(goal_pose(3.0, 6.5))
         self.wait(lambda: self.speed(0) > 0.05, "robot 0 under way")
-        self.goal_topics[0].publish(goal_pose(x, y + 2.0))
+        self.goal_topics[0].publish(goal_pose(4.0, 3.5))
         status = self.result_after(0, count)
         self.assertEqual(status.status, GoalStatus.PREEMPTED)
         self.assertIn("another goal was recieved", status.text)
