@@ -7,6 +7,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from flight_case import FlightCase, Latest, action_goal, goal_pose
 from move_base_msgs.msg import MoveBaseActionResult
 
+FREE_PLACES = (((1.5, 1.5), (3.0, 6.5)), ((10.0, 2.0), (10.5, 10.0)))
 UNFINISHED = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 
 
@@ -32,6 +33,10 @@ class Goals(FlightCase):
         return (message is not None and message.header.stamp > since + rospy.Duration(0.5)
                 and all(s.status not in UNFINISHED for s in message.status_list))
 
+    def far_place(self, i):
+        """A free place on the robot's own side of the arena, metres away from it."""
+        return max(FREE_PLACES[i], key=lambda place: self.distance(i, *place))
+
     def result_after(self, i, count):
         self.wait(lambda: self.results[i].count > count, f"a result of robot {i}")
         return self.results[i].message.status
@@ -53,9 +58,9 @@ class Goals(FlightCase):
 
     def test_new_goal_preempts_the_old_one(self):
         count = self.results[0].count
-        self.goal_topics[0].publish(goal_pose(3.0, 6.5))
+        self.goal_topics[0].publish(goal_pose(*self.far_place(0)))
         self.wait(lambda: self.speed(0) > 0.05, "robot 0 under way")
-        self.goal_topics[0].publish(goal_pose(4.0, 3.5))
+        self.goal_topics[0].publish(goal_pose(4.5, 5.0))
         status = self.result_after(0, count)
         self.assertEqual(status.status, GoalStatus.PREEMPTED)
         self.assertRegex(status.text, "another goal was rec(ei|ie)ved")  # both are about
@@ -64,8 +69,7 @@ class Goals(FlightCase):
     def test_cancelling_one_does_not_stop_the_other(self):
         counts = [result.count for result in self.results]
         for i in (0, 1):
-            x, y = self.position(i)
-            self.goal_topics[i].publish(goal_pose(x, y + 4.0))
+            self.goal_topics[i].publish(goal_pose(*self.far_place(i)))
         self.wait(lambda: all(self.speed(i) > 0.05 for i in (0, 1)), "both under way")
         self.cancel_topics[0].publish(GoalID())
         self.assertEqual(self.result_after(0, counts[0]).status, GoalStatus.PREEMPTED)

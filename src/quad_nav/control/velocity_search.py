@@ -76,7 +76,8 @@ def velocity_window(rollout: Rollout, params: TrajectoryPlannerParams,
     """
     period_s = control_period_s if params.dwa else params.sim_time_s
     vx, _, vtheta = rollout.velocity
-    to_goal_m = math.hypot(rollout.goal_x_m - rollout.pose.x_m, rollout.goal_y_m - rollout.pose.y_m)
+    to_goal_m = float(np.hypot(rollout.goal_x_m - rollout.pose.x_m,
+                               rollout.goal_y_m - rollout.pose.y_m))
     change_x, change_theta = (params.acc_lim_x_mps2 * period_s,
                               params.acc_lim_theta_radps2 * period_s)
     max_vx = min(params.max_vel_x_mps, to_goal_m / params.sim_time_s, vx + change_x)
