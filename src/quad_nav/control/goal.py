@@ -29,6 +29,10 @@ def turning_command(turn_rad: float, velocity: Twist2D, params: TrajectoryPlanne
     In order of strength: at least ``min_in_place_vel_theta`` and at most
     ``max_rotational_vel``; no faster than can be braked, sqrt(2 * acc * turn);
     within the acceleration limit of the current speed.
+
+    ``predict_goal_turn`` is stronger than all of these: the command counts for a
+    whole control period, so a turn that is shorter than that is made slower. At
+    1 Hz and 1 rad/s the original steps over the goal's heading for ever.
     """
     acceleration = params.acc_lim_theta_radps2
     current, change = abs(velocity.vyaw_radps), acceleration * control_period_s
@@ -36,6 +40,8 @@ def turning_command(turn_rad: float, velocity: Twist2D, params: TrajectoryPlanne
     speed = min(max(speed, current - change), current + change)
     speed = min(speed, math.sqrt(2.0 * acceleration * abs(turn_rad)))
     speed = _in_place_speed(speed, params)
+    if params.predict_goal_turn:
+        speed = min(speed, abs(turn_rad) / control_period_s)
     return Twist2D(vyaw_radps=speed if turn_rad > 0.0 else -speed)
 
 

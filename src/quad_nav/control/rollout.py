@@ -75,6 +75,11 @@ class Rollout:
         return self._simulate(_triple(pose), _twist_triple(velocity),
                               _twist_triple(command)).cost >= 0.0
 
+    def is_free(self, pose: Pose2D) -> bool:
+        """Whether the footprint hits nothing at a pose."""
+        return collision.footprint_cost(
+            self.scene.window, self.scene.footprint, *_triple(pose)) >= 0.0
+
     def _simulate(self, pose: Triple, velocity: Triple, sample: Triple) -> Trajectory:
         row = np.array(sample)
         points = np.empty((kernel.step_count(self.rules, row), 3))
