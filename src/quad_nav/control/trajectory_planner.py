@@ -88,7 +88,7 @@ class TrajectoryPlanner:
         best = self._search(spec, costs, pose, velocity)
         if best.cost < 0.0:
             reason = ("the global plan or its end in the local costmap is out of reach"
-                      if best.cost == NO_WAY else "every trajectory hits something, the way back too,")
+                      if best.cost == NO_WAY else "every trajectory hits something")
             raise NoValidTrajectory(f"{reason} from ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
