@@ -30,6 +30,7 @@ from quad_nav.ros.signals import init_node
 from quad_nav.ros.silence import SilenceWatch
 from quad_nav.ros.transforms import Transforms
 from quad_nav.tick import Located, State, Tick
+from quad_nav.warm_up import warm_up
 
 IDLE_POLL_S = 0.05  # how soon a goal for an idle navigator is noticed
 WARN_AGAIN_S = 5.0
@@ -202,6 +203,7 @@ def main() -> int:
         return EXIT_BAD_INPUT
     for warning in configuration.warnings:
         rospy.logwarn("%s", warning)
+    warm_up(configuration)
     node = MoveBaseNode(configuration)
     try:
         node.spin()
