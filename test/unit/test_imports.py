@@ -25,7 +25,8 @@ LAYERS = [
     {"offline", "ros"},
 ]
 NOUNS = LAYERS[0]  # they may import one another
-WORLD_USERS = {"sim", "config", "assembly", "warm_up", "offline", "ros"}  # navigation knows no simulator
+# Navigation knows no simulator.
+WORLD_USERS = {"sim", "config", "assembly", "warm_up", "offline", "ros"}
 
 # Where a third-party package may be imported: that file or folder and nowhere else.
 PLACES = {
