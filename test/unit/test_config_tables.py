@@ -25,7 +25,8 @@ ROTATE = Table(fixed=tables.ROTATE.fixed + tables.ROTATE_FROM_PLANNER)
 # (dataclass, table, fields that are read in another way than from one row)
 PAIRS = [
     (NavigatorParams, tables.NAVIGATOR, {"recovery_behaviors"}),
-    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER, set()),
+    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER,
+     {"refuse_colliding_escape", "predict_goal_turn"}),
     (NavfnParams, tables.NAVFN, set()),
     (ClearCostmapParams, tables.CLEAR_COSTMAP, {"layer_names"}),
     (RotateParams, ROTATE, set()),
