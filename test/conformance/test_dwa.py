@@ -119,7 +119,6 @@ def _check_call(planner, control, recorded, meta, k):
     assert _state(planner, meta["flag_names"]) == [
         bool(flag) for flag in recorded["state_flags"][k]], where
     assert len(planner.plan) == recorded["plan_lengths"][k, 0], where
-    assert len(planner.local_global_plan) == recorded["plan_lengths"][k, 1], where
     if recorded["goal_mode"][k]:
         assert planner.best is None and (control is None or control.goal_mode), where
         return
