@@ -24,9 +24,9 @@ def velocity_samples(params: DwaParams, pose: Pose2D, velocity: Triple, goal: Po
     """
     lowest, highest = _velocity_window(params, pose, velocity, goal, control_period_s)
     counts = params.vx_samples, params.vy_samples, params.vth_samples
-    axes = [spaced(*ends) for ends in zip(lowest, highest, counts)]
+    axes = [spaced(*ends).astype(np.float32) for ends in zip(lowest, highest, counts)]
     grid = np.meshgrid(*axes, indexing="ij")
-    return np.column_stack([axis.ravel() for axis in grid]).astype(np.float32).astype(np.float64)
+    return np.stack(grid, axis=-1).reshape(-1, 3).astype(np.float64)
 
 
 def spaced(start: float, end: float, count: int) -> np.ndarray:

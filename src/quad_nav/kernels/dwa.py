@@ -126,37 +126,47 @@ def _single(value):
 
 @njit(cache=True, nogil=True)
 def is_within_reach(grids, points, count, distances):
-    """Whether path and goal are in reach from every pose, and no pose is off the map.
+    """Whether path and goal are in reach from every pose, and neither it nor its nose off the map.
 
     Writes the last pose's distances to ``distances``, float64[4]; those that do
     not count stay.
     """
-    looks_ahead = grids.follows_goal or grids.aligns
-    size = grids.path.size
-    for k in range(count):
-        x, y = points[k, 0], points[k, 1]
-        if grids.follows_path or grids.follows_goal:
-            cell_x, cell_y = cell_of(grids.window, x, y)
+    if grids.follows_path or grids.follows_goal:
+        for k in range(count):
+            cell_x, cell_y = cell_of(grids.window, points[k, 0], points[k, 1])
             if cell_x < 0 or cell_y < 0:
                 return False
             if grids.follows_path:
                 distances[PATH] = grids.path[cell_y, cell_x]
-                if distances[PATH] >= size:
-                    return False
             if grids.follows_goal:
                 distances[GOAL] = grids.goal[cell_y, cell_x]
-                if distances[GOAL] >= size:
-                    return False
-        if looks_ahead:
-            forward = grids.forward_point_distance_m
-            cell_x, cell_y = cell_of(grids.window, x + forward * math.cos(points[k, 2]),
-                                     y + forward * math.sin(points[k, 2]))
-            if cell_x < 0 or cell_y < 0:
+            if max(distances[PATH], distances[GOAL]) >= grids.path.size:
                 return False
-            if k == count - 1 and grids.follows_goal:
-                distances[GOAL_FRONT] = grids.goal_front[cell_y, cell_x]
-            if k == count - 1 and grids.aligns:
-                distances[ALIGNMENT] = grids.path[cell_y, cell_x]
+    if grids.follows_goal or grids.aligns:
+        return _has_nose_on_map(grids, points, count, distances)
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _has_nose_on_map(grids, points, count, distances):
+    size_y, size_x = grids.path.shape
+    forward = grids.forward_point_distance_m
+    border = abs(forward) + grids.window.resolution_m
+    min_x, min_y = grids.window.origin_x_m + border, grids.window.origin_y_m + border
+    max_x = grids.window.origin_x_m + size_x * grids.window.resolution_m - border
+    max_y = grids.window.origin_y_m + size_y * grids.window.resolution_m - border
+    for k in range(count):
+        x, y = points[k, 0], points[k, 1]
+        if k < count - 1 and min_x < x < max_x and min_y < y < max_y:
+            continue  # too far inside for any heading to matter
+        cell_x, cell_y = cell_of(grids.window, x + forward * math.cos(points[k, 2]),
+                                 y + forward * math.sin(points[k, 2]))
+        if cell_x < 0 or cell_y < 0:
+            return False
+        if grids.follows_goal:
+            distances[GOAL_FRONT] = grids.goal_front[cell_y, cell_x]
+        if grids.aligns:
+            distances[ALIGNMENT] = grids.path[cell_y, cell_x]
     return True
 
 
