@@ -33,7 +33,14 @@ import numpy as np
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.dwa_samples import acceleration_limits, velocity_samples
-from quad_nav.control.rollout import Trajectory, Triple, highest_near, kernel_window, single
+from quad_nav.control.rollout import (
+    Trajectory,
+    Triple,
+    footprint_reach_m,
+    highest_near,
+    kernel_window,
+    single,
+)
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.kernels import dwa as kernel
@@ -71,23 +78,23 @@ class Critics:
         self.grids = self._measure(plan) if grids is None else grids
         self.path_scale = params.path_distance_bias * spec.resolution_m  # per cell
         self.goal_scale = params.goal_distance_bias * spec.resolution_m
-        self._motion = _motion(params)
-        self._map_grids = self._weighed_grids()
+        self.motion = _motion(params)
+        self.map_grids = self._weighed_grids()
 
     def choose(self, oscillation: OscillationCritic, control_period_s: float) -> Trajectory:
         """The cheapest of the sampled trajectories; NO_LEGAL_TRAJECTORY is its cost if none is."""
         goal = Pose2D(*single(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad))
         samples = velocity_samples(self.params, self.pose, self.velocity, goal, control_period_s)
         commands, distances, legal = kernel.travel(
-            self._motion, self._map_grids, self._start, self.velocity, samples)
+            self.motion, self.map_grids, self.start, self.velocity, samples)
         legal &= ~oscillation.forbids(commands)
         scales = footprint_scales(self.params, commands)
         k, cost = kernel.cheapest(
-            self._motion, self._obstacles(scales[legal]), self._start, self.velocity,
-            kernel.Candidates(samples, self._terms(commands, distances), legal, scales))
+            self.motion, self.obstacles(scales[legal]), self.start, self.velocity,
+            kernel.Candidates(samples, self.terms(commands, distances), legal, scales))
         if k < 0:
             return Trajectory((0.0, 0.0, 0.0), NO_LEGAL_TRAJECTORY, np.zeros((0, 3)))
-        points, command = self._simulate(samples[k])
+        points, command = self.simulate(samples[k])
         return Trajectory(command, float(cost), points)
 
     def is_legal(self, sample: Triple) -> bool:
@@ -95,20 +102,22 @@ class Critics:
 
         One outside the speed limits is not simulated, and counts as legal.
         """
-        points, command = self._simulate(np.array(single(*sample)))
+        points, command = self.simulate(np.array(single(*sample)))
         scale = footprint_scales(self.params, np.array([command]))
         if self.params.occdist_scale != 0.0 and kernel.obstacle_cost(
-                self._obstacles(scale), scale[0], points, len(points)) < 0.0:
+                self.obstacles(scale), scale[0], points, len(points)) < 0.0:
             return False
-        return kernel.is_within_reach(self._map_grids, points, len(points), np.zeros(4))
+        return kernel.is_within_reach(self.map_grids, points, len(points), np.zeros(4))
 
     @property
-    def _start(self) -> Triple:
+    def start(self) -> Triple:
+        """x, y, yaw"""
         return self.pose.x_m, self.pose.y_m, self.pose.yaw_rad
 
-    def _simulate(self, sample: np.ndarray) -> Tuple[np.ndarray, Triple]:
-        points = np.empty((kernel.step_count(self._motion, sample), 3))
-        _, command = kernel.simulate(self._motion, self._start, self.velocity, sample, points)
+    def simulate(self, sample: np.ndarray) -> Tuple[np.ndarray, Triple]:
+        """Poses, float64[k, 3], and the command of a sample, float64[3]."""
+        points = np.empty((kernel.step_count(self.motion, sample), 3))
+        _, command = kernel.simulate(self.motion, self.start, self.velocity, sample, points)
         return points, command
 
     def _measure(self, plan: np.ndarray) -> DwaGrids:
@@ -133,7 +142,7 @@ class Critics:
             follows_path=follows_path, follows_goal=self.params.goal_distance_bias != 0.0,
             aligns=follows_path and to_goal_m2 > near_m2)
 
-    def _terms(self, commands: np.ndarray, distances: np.ndarray) -> np.ndarray:
+    def terms(self, commands: np.ndarray, distances: np.ndarray) -> np.ndarray:
         """float64[n, 5]: every critic's part of the cost but the obstacles', in their order."""
         scales = np.zeros(4)
         scales[[kernel.GOAL_FRONT, kernel.GOAL]] = self.goal_scale
@@ -141,11 +150,11 @@ class Critics:
         twirling = self.params.twirling_scale * np.abs(commands[:, 2])
         return np.column_stack((distances * scales, twirling))
 
-    def _obstacles(self, scales: np.ndarray) -> kernel.Obstacles:
+    def obstacles(self, scales: np.ndarray) -> kernel.Obstacles:
         """For trajectories with these footprint scales."""
-        largest = self.footprint * np.max(np.abs(scales), initial=1.0)
+        reach_m = footprint_reach_m(self.footprint) * float(np.max(np.abs(scales), initial=1.0))
         return kernel.Obstacles(
-            self.window, highest_near(self.window, largest), self.footprint,
+            self.window, highest_near(self.window, reach_m), self.footprint,
             scale=float(self.params.occdist_scale), sums=bool(self.params.sum_scores))
 
 

@@ -110,7 +110,7 @@ class DwaPlanner:
         critics, costs = self.critics, self.critics.window.costs
         usable = (critics.grids.path < costs.size) & (costs < INSCRIBED)
         return cost_cloud(critics.spec, costs, critics.grids.path, critics.grids.goal, usable,
-                          critics.path_scale, critics.goal_scale, self.params.occdist_scale)
+                          critics.path_scale, critics.goal_scale, critics.params.occdist_scale)
 
     def _cut_plan(self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D) -> np.ndarray:
         self.local_global_plan = _NO_POSES

@@ -7,7 +7,7 @@ period with ``use_dwa`` (the dynamic window of D. Fox, W. Burgard and S. Thrun
 """
 from __future__ import annotations
 
-from typing import Tuple
+from typing import List, Tuple
 
 import numpy as np
 
@@ -24,23 +24,24 @@ def velocity_samples(params: DwaParams, pose: Pose2D, velocity: Triple, goal: Po
     """
     lowest, highest = _velocity_window(params, pose, velocity, goal, control_period_s)
     counts = params.vx_samples, params.vy_samples, params.vth_samples
-    axes = [spaced(*ends).astype(np.float32) for ends in zip(lowest, highest, counts)]
+    axes = [np.array(spaced(*ends), dtype=np.float32) for ends in zip(lowest, highest, counts)]
     grid = np.meshgrid(*axes, indexing="ij")
     return np.stack(grid, axis=-1).reshape(-1, 3).astype(np.float64)
 
 
-def spaced(start: float, end: float, count: int) -> np.ndarray:
+def spaced(start: float, end: float, count: int) -> List[float]:
     """``count`` values from start to end, at least both ends, and 0 if they step over it."""
     if start == end:
-        return np.array([start])
+        return [start]
     count = max(count, 2)
     step = (end - start) / (count - 1)
-    values = np.full(count - 1, step)
-    values[0] = start
-    # Summed step by step: the last bit of a sample can decide between equal costs.
-    values = np.append(np.add.accumulate(values), end)
-    crossing = np.flatnonzero((values[:-1] < 0.0) & (values[:-1] + step > 0.0))
-    return np.insert(values, crossing + 1, 0.0)
+    values, value = [], start
+    for _ in range(count - 1):
+        values.append(value)
+        if value < 0.0 < value + step:
+            values.append(0.0)
+        value += step  # summed up: the last bit of a sample can decide between equal costs
+    return [*values, end]
 
 
 def acceleration_limits(params: DwaParams) -> Triple:

@@ -60,8 +60,8 @@ class Rollout:
         self.goal_x_m, self.goal_y_m = plan_xy[-1]
         self.grids = distance_grids(window, plan_xy, footprint, self.pose)
         self.scene = kernel.Scene(
-            window, highest_near(window, footprint), footprint, self.grids.path, self.grids.goal,
-            plan_xy)
+            window, highest_near(window, footprint_reach_m(footprint)), footprint, self.grids.path,
+            self.grids.goal, plan_xy)
         self.rules = _rules(params, spec.resolution_m)
 
     def score(self, samples: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -117,13 +117,18 @@ def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray,
     return collision.footprint_cost(kernel_window(spec, costs), footprint, *_triple(pose))
 
 
-def highest_near(window: collision.Window, footprint: np.ndarray) -> np.ndarray:
-    """The highest cost in a square around each cell that holds the footprint at any heading.
+def footprint_reach_m(footprint: np.ndarray) -> float:
+    """The farthest vertex of a footprint, float64[n, 2]."""
+    return float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
+
+
+def highest_near(window: collision.Window, reach_m: float) -> np.ndarray:
+    """The highest cost in a square around each cell that holds a footprint of that reach.
 
     uint8[H, W]; off the map counts as UNKNOWN. Where it is low the outline need
     not be drawn. The square is built up from maxima over two, four, ... cells.
     """
-    reach = int(np.hypot(footprint[:, 0], footprint[:, 1]).max() / window.resolution_m) + 1
+    reach = int(min(reach_m / window.resolution_m, max(window.costs.shape))) + 1
     size_y, size_x = window.costs.shape
     highest = np.full((size_y + 2 * reach, size_x + 2 * reach), UNKNOWN, dtype=np.uint8)
     highest[reach:-reach, reach:-reach] = window.costs
