@@ -152,7 +152,8 @@ class Critics:
 
     def obstacles(self, scales: np.ndarray) -> kernel.Obstacles:
         """For trajectories with these footprint scales."""
-        reach_m = footprint_reach_m(self.footprint) * float(np.max(np.abs(scales), initial=1.0))
+        largest = float(np.max(np.abs(scales[np.isfinite(scales)]), initial=1.0))
+        reach_m = footprint_reach_m(self.footprint) * largest
         return kernel.Obstacles(
             self.window, highest_near(self.window, reach_m), self.footprint,
             scale=float(self.params.occdist_scale), sums=bool(self.params.sum_scores))
@@ -161,13 +162,11 @@ class Critics:
 def footprint_scales(params: DwaParams, commands: np.ndarray) -> np.ndarray:
     """float64[n]: how much larger the footprint counts at commands, float64[n, 3]."""
     speeds = np.hypot(commands[:, 0], commands[:, 1])
-    scales = np.ones(len(speeds))
-    fast = speeds > params.scaling_speed_mps
-    with np.errstate(divide="ignore"):  # an infinite footprint collides
-        excess = (speeds[fast] - params.scaling_speed_mps) / np.float64(
-            params.max_vel_trans_mps - params.scaling_speed_mps)
-    scales[fast] = params.max_scaling_factor * excess + 1.0
-    return scales
+    room_mps = params.max_vel_trans_mps - params.scaling_speed_mps
+    if room_mps == 0.0:
+        return np.where(speeds > params.scaling_speed_mps, np.inf, 1.0)
+    share = (speeds - params.scaling_speed_mps) / room_mps
+    return np.where(speeds > params.scaling_speed_mps, params.max_scaling_factor * share + 1.0, 1.0)
 
 
 def _motion(params: DwaParams) -> kernel.Motion:

@@ -200,6 +200,8 @@ def longest(motion, samples):
 @njit(cache=True, nogil=True)
 def obstacle_cost(obstacles, footprint_scale, points, count):
     """The highest cost under the scaled footprint on the way, or the sum; -1 on collision."""
+    if count > 0 and not math.isfinite(footprint_scale):
+        return -1.0
     footprint = obstacles.footprint * footprint_scale
     total = 0.0
     for k in range(count):
