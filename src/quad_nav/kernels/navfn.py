@@ -6,7 +6,7 @@ All sums are float32 in the order that the recorded potentials demand.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Tuple
+from typing import Tuple
 
 import numpy as np
 from numba import njit
@@ -15,67 +15,24 @@ OBSTACLE = 254            # cells of this cost are never entered
 NOT_REACHED = np.float32(1e10)
 NEUTRAL = 50              # cost of a free cell
 BUCKET_SIZE = 10000       # cells that one bucket holds; further ones are dropped
-CURRENT, AHEAD, LATER = 0, 1, 2
 
 _INVERSE_SQRT2 = 0.707106781
 _THRESHOLD_STEP = np.float32(2 * NEUTRAL)
 _STEP_CELLS = 0.5
 
 
-class Wave(NamedTuple):
-    """The state of a wavefront, changed in place."""
-
-    costs: np.ndarray      # uint8[n], 50..254
-    potential: np.ndarray  # float32[n]
-    pending: np.ndarray    # bool[n], cell is in a bucket
-    buckets: np.ndarray    # int64[3, BUCKET_SIZE], cells to be visited
-    counts: np.ndarray     # int64[3]
-    size_x: int
-
-
 @njit(cache=True, nogil=True)
-def _push(wave, bucket, cell):
-    if (0 <= cell < wave.costs.size and not wave.pending[cell] and wave.costs[cell] < OBSTACLE
-            and wave.counts[bucket] < BUCKET_SIZE):
-        wave.buckets[bucket, wave.counts[bucket]] = cell
-        wave.counts[bucket] += 1
-        wave.pending[cell] = True
-
-
-@njit(cache=True, nogil=True)
-def _arrival(wave, cell):
+def _arrival(cost, left, right, below, above):
     """Potential of a planar wave that arrives over the two lower neighbours."""
-    potential, size_x = wave.potential, wave.size_x
-    horizontal = min(potential[cell - 1], potential[cell + 1])
-    vertical = min(potential[cell - size_x], potential[cell + size_x])
+    horizontal, vertical = min(left, right), min(below, above)
     lower = min(horizontal, vertical)
     gap = np.float32(abs(horizontal - vertical))
-    cost = np.float32(wave.costs[cell])
+    cost = np.float32(cost)
     if gap >= cost:
         return np.float32(lower + cost)
     ratio = np.float64(np.float32(gap / cost))
     factor = np.float32(-0.2301 * ratio * ratio + 0.5307 * ratio + 0.7040)
     return np.float32(lower + np.float32(cost * factor))
-
-
-@njit(cache=True, nogil=True)
-def _visit(wave, cell, start, heuristic, threshold):
-    """Lower one cell's potential; hand on the neighbours that may profit."""
-    if wave.costs[cell] >= OBSTACLE:
-        return
-    arrival = _arrival(wave, cell)
-    if arrival >= wave.potential[cell]:
-        return
-    wave.potential[cell] = arrival
-    priority = arrival
-    if heuristic:
-        priority = np.float32(arrival + _distance_cost(cell, start, wave.size_x))
-    bucket = AHEAD if priority < threshold else LATER
-    for offset in (-1, 1, -wave.size_x, wave.size_x):
-        neighbour = cell + offset
-        crossing = np.float32(_INVERSE_SQRT2 * np.float64(wave.costs[neighbour]))
-        if wave.potential[neighbour] > np.float32(priority + crossing):
-            _push(wave, bucket, neighbour)
 
 
 @njit(cache=True, nogil=True)
@@ -85,38 +42,76 @@ def _distance_cost(cell, other, size_x):
 
 
 @njit(cache=True, nogil=True)
-def _refill(wave, bucket):
-    """Empty a bucket into the current one."""
-    count = wave.counts[bucket]
-    wave.buckets[CURRENT, :count] = wave.buckets[bucket, :count]
-    wave.counts[CURRENT], wave.counts[bucket] = count, 0
+def _first_front(costs, pending, front, source, size_x):
+    """The neighbours of the source; returns how many there are."""
+    count = 0
+    for offset in (1, -1, -size_x, size_x):
+        cell = source + offset
+        if 0 <= cell < costs.size and costs[cell] < OBSTACLE:
+            front[count] = cell
+            pending[cell] = True
+            count += 1
+    return count
 
 
 @njit(cache=True, nogil=True)
-def propagate(wave, source, start, max_cycles, stop_at_start, heuristic):
+def propagate(costs, potential, source, start, size_x, max_cycles, stop_at_start, heuristic):
     """Spread the potential from ``source``, at most ``max_cycles`` fronts.
 
-    Stops early when nothing is left, or, with ``stop_at_start``, when the
-    start cell has a potential. ``heuristic`` makes it A*.
+    ``costs`` uint8[n] (50..254, the outermost ring of cells 254), ``potential``
+    float32[n], filled with NOT_REACHED and lowered in place. Stops early when
+    nothing is left, or, with ``stop_at_start``, when the start cell has a
+    potential. ``heuristic`` makes it A*.
     """
-    wave.potential[source] = 0.0
-    for offset in (1, -1, -wave.size_x, wave.size_x):
-        _push(wave, CURRENT, source + offset)
+    pending = np.zeros(costs.size, dtype=np.bool_)  # cell is in a bucket
+    front = np.empty(BUCKET_SIZE, dtype=np.uint32)
+    ahead = np.empty(BUCKET_SIZE, dtype=np.uint32)  # for the next front
+    later = np.empty(BUCKET_SIZE, dtype=np.uint32)  # for when nothing below the threshold is left
+    in_front, in_ahead, in_later = _first_front(costs, pending, front, source, size_x), 0, 0
+    potential[source] = 0.0
     threshold = np.float32(OBSTACLE)
     if heuristic:
-        threshold = np.float32(threshold + _distance_cost(source, start, wave.size_x))
+        threshold = np.float32(threshold + _distance_cost(source, start, size_x))
+    stride = np.uint32(size_x)  # unsigned indices save the test for a negative one
+    one = np.uint32(1)
     for _ in range(max_cycles):
-        if wave.counts[CURRENT] == 0 and wave.counts[AHEAD] == 0:
+        if in_front == 0 and in_ahead == 0:
             break
-        for k in range(wave.counts[CURRENT]):
-            wave.pending[wave.buckets[CURRENT, k]] = False
-        for k in range(wave.counts[CURRENT]):
-            _visit(wave, wave.buckets[CURRENT, k], start, heuristic, threshold)
-        _refill(wave, AHEAD)
-        if wave.counts[CURRENT] == 0:
+        for k in range(in_front):
+            pending[front[k]] = False
+        for k in range(in_front):
+            cell = front[k]
+            neighbours = (cell - one, cell + one, cell - stride, cell + stride)
+            around = (potential[neighbours[0]], potential[neighbours[1]],
+                      potential[neighbours[2]], potential[neighbours[3]])
+            arrival = _arrival(costs[cell], around[0], around[1], around[2], around[3])
+            if arrival >= potential[cell]:
+                continue
+            potential[cell] = arrival
+            priority = arrival
+            if heuristic:
+                priority = np.float32(
+                    arrival + _distance_cost(np.int64(cell), start, size_x))
+            for j in range(4):
+                cost = costs[neighbours[j]]
+                crossing = np.float32(_INVERSE_SQRT2 * np.float64(cost))
+                if (around[j] <= np.float32(priority + crossing) or cost >= OBSTACLE
+                        or pending[neighbours[j]]):
+                    continue
+                if priority < threshold and in_ahead < BUCKET_SIZE:
+                    ahead[in_ahead] = neighbours[j]
+                    in_ahead += 1
+                elif priority >= threshold and in_later < BUCKET_SIZE:
+                    later[in_later] = neighbours[j]
+                    in_later += 1
+                else:
+                    continue
+                pending[neighbours[j]] = True
+        front, ahead, in_front, in_ahead = ahead, front, in_ahead, 0
+        if in_front == 0:
             threshold = np.float32(threshold + _THRESHOLD_STEP)
-            _refill(wave, LATER)
-        if stop_at_start and wave.potential[start] < NOT_REACHED:
+            front, later, in_front, in_later = later, front, in_later, 0
+        if stop_at_start and potential[start] < NOT_REACHED:
             break
 
 

@@ -146,14 +146,10 @@ def potential_from(nav_costs: np.ndarray, source: Cell, target: Cell, stop_at_ta
     """
     size_y, size_x = nav_costs.shape
     cells = size_x * size_y
-    wave = kernel.Wave(
-        costs=nav_costs.ravel(), potential=np.full(cells, kernel.NOT_REACHED, dtype=np.float32),
-        pending=np.zeros(cells, dtype=np.bool_),
-        buckets=np.zeros((3, kernel.BUCKET_SIZE), dtype=np.int64),
-        counts=np.zeros(3, dtype=np.int64), size_x=size_x)
-    kernel.propagate(wave, _flat(source, size_x), _flat(target, size_x),
-                     max(cells // 20, size_x + size_y), stop_at_target, heuristic)
-    return wave.potential.reshape(nav_costs.shape)
+    potential = np.full(cells, kernel.NOT_REACHED, dtype=np.float32)
+    kernel.propagate(nav_costs.ravel(), potential, _flat(source, size_x), _flat(target, size_x),
+                     size_x, max(cells // 20, size_x + size_y), stop_at_target, heuristic)
+    return potential.reshape(nav_costs.shape)
 
 
 def path_from(potential: np.ndarray, start: Cell, source: Cell) -> Tuple[np.ndarray, bool]:
