@@ -18,8 +18,9 @@ def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
     ``max_cells``, measured along it; both of its ends are freed.
     """
     dx, dy = x1 - x0, y1 - y0
-    length = math.hypot(dx, dy)
-    scale = max_cells / length if length > max_cells else 1.0
+    scale = 1.0
+    if dx * dx + dy * dy > max_cells * max_cells:
+        scale = max_cells / math.hypot(dx, dy)
     along, across = abs(dx), abs(dy)
     step_along = 1 if dx > 0 else -1
     step_across = size_x if dy > 0 else -size_x
@@ -81,6 +82,7 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
     max_cells = max(0.0, math.ceil(range_m / resolution))
     flat_costs = costs.reshape(-1)
     start = np.int32(y0 * size_x + x0)
+    surely_near = (1.0 - 1e-9) * range_m * range_m
     for k in range(points.shape[0]):
         x, y = clip_to_grid(sensor_x, sensor_y, float(points[k, 0]), float(points[k, 1]),
                             origin_x, origin_y, high_x, high_y)
@@ -93,8 +95,10 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
             cleared_from[end] = start
             clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
         dx, dy = x - sensor_x, y - sensor_y
-        length = math.hypot(dx, dy)
-        scale = range_m / length if length > range_m else 1.0
+        scale = 1.0
+        if dx * dx + dy * dy > surely_near:  # hypot is slow, and most points are near
+            length = math.hypot(dx, dy)
+            scale = range_m / length if length > range_m else 1.0
         include(bounds, sensor_x + dx * scale, sensor_y + dy * scale)
     return True
 
