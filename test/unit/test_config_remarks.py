@@ -97,9 +97,9 @@ def test_ordinary_parameters_need_no_remark():
 
 
 def test_old_names_count_unless_the_new_one_is_there():
-    alone = load(planner(gdist_scale=2.0, min_in_place_rotational_vel=0.3), "").trajectory_planner
+    alone = load(planner(gdist_scale=2.0, min_in_place_rotational_vel=0.3), "").local_planner
     assert (alone.goal_distance_bias, alone.min_in_place_vel_theta_radps) == (2.0, 0.3)
-    both = load(planner(gdist_scale=2.0, goal_distance_bias=1.0), "").trajectory_planner
+    both = load(planner(gdist_scale=2.0, goal_distance_bias=1.0), "").local_planner
     assert both.goal_distance_bias == 1.0
 
 

@@ -124,7 +124,8 @@ def start_at_cell(wave, source):
 def start_between_cells(wave, source, dx, dy):
     """The wave begins at a point ``dx``, ``dy`` cells right of and above a cell's centre.
 
-    Both are float32. The four cells around the point share the cost of two free cells by opposite areas.
+    Both are float32. The four cells around the point share the cost of two free
+    cells by the areas opposite to them.
     """
     size_x, twice, one = wave.size_x, np.float32(2 * wave.neutral), np.float32(1.0)
     _seed(wave, source, twice * dx * dy)

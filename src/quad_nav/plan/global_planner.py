@@ -165,7 +165,8 @@ class SearchPlanner:
             wavefront.start_at_cell(wave, source)
         else:
             wavefront.start_between_cells(wave, source, *map(_hundredths, start))
-        arrived = wavefront.propagate(wave, source, _flat(goal, size_x), 2 * costs.size, True, False)
+        arrived = wavefront.propagate(wave, source, _flat(goal, size_x), 2 * costs.size,
+                                      stop_at_target=True, heuristic=False)
         return wave.potential, arrived
 
     def _a_star(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:

@@ -19,11 +19,12 @@ from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.errors import InputError, InvalidGoal, PlanningError
 from quad_nav.geometry import Pose3D, Twist2D
+from quad_nav.plugins import plugin_name
 from quad_nav.ros import sensors, static_maps
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
 from quad_nav.ros.nav_messages import path_message, pose_from_message
-from quad_nav.ros.plan_topics import PlanTopics, plugin_name
+from quad_nav.ros.plan_topics import PlanTopics
 from quad_nav.ros.reconfigure import serve_namespaces
 from quad_nav.ros.silence import SilenceWatch
 from quad_nav.ros.transforms import Transforms

@@ -9,6 +9,7 @@ from sensor_msgs.msg import PointCloud2
 
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator import Navigator
+from quad_nav.plugins import plugin_name
 from quad_nav.ros.nav_messages import (
     cost_cloud_message,
     path_message,
@@ -16,11 +17,6 @@ from quad_nav.ros.nav_messages import (
     twist_message,
 )
 from quad_nav.tick import Tick
-
-
-def plugin_name(plugin: str) -> str:
-    """``navfn/NavfnROS`` has its topics below ``NavfnROS``."""
-    return plugin.replace("::", "/").split("/")[-1]
 
 
 class PlanTopics:
