@@ -57,7 +57,7 @@ SEARCH_PLANNER = Table(
              "Paths as NavfnROS has them, between the lower left corners of cells."),
         flag("allow_unknown", True, "allow_unknown", "Plans may cross unknown space."),
         integer("publish_scale", 100, "publish_scale", "",
-                "The highest value of the published potential.", Domain.POSITIVE)),
+                "The highest value of the published potential.", Domain.POSITIVE, 1, 127)),
     ignored=(
         ("default_tolerance", _UNUSED),
         ("planner_window_x", _UNUSED),

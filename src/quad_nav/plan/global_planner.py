@@ -18,6 +18,8 @@ half a cell less than cell coordinates, as cells' centres stand for cells.
 Dijkstra's wave then begins in the four cells around the robot, but A* and grid
 paths cut the coordinates to whole cells: what lies in the lower or left half of
 a cell belongs to the neighbour's, and when that is an obstacle there is no plan.
+For the gradient's sake every cell within two cells of the goal then gets a
+potential, obstacles as well: so near the goal a path may cut a corner of one.
 """
 from __future__ import annotations
 

@@ -32,6 +32,7 @@ from quad_nav.kernels import navfn as kernel
 from quad_nav.kernels import wave as wavefront
 
 Cell = Tuple[int, int]
+NOT_REACHED = float(wavefront.NOT_REACHED)  # where the wave did not come
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class Navfn:
 
     def _is_reached(self, cell: Optional[Cell]) -> bool:
         assert self.potential is not None
-        return cell is not None and bool(self.potential[cell[1], cell[0]] < wavefront.NOT_REACHED)
+        return cell is not None and bool(self.potential[cell[1], cell[0]] < NOT_REACHED)
 
     def _plan_to(self, spec: GridSpec, start_cell: Cell, end: Pose2D) -> np.ndarray:
         end_cell = spec.cell_of(end.x_m, end.y_m)
