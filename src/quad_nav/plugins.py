@@ -10,7 +10,7 @@ import importlib
 import inspect
 import traceback
 from dataclasses import dataclass, field
-from typing import Any, Iterator, Mapping, Tuple
+from typing import Any, Dict, Iterator, Mapping, Tuple
 
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layer import Layer, LayerParams
@@ -43,24 +43,39 @@ LAYER = Interface("a costmap layer", Layer, ("params", "spec", "rolling_window",
 RECOVERY = Interface("a recovery behaviour", Recovery, ("params",))
 
 
+class Parameters(Dict[str, Any]):
+    """The parameters below a plugin's name, as they were written.
+
+    ``parameters["radius"]`` that nobody wrote is an InputError with its place;
+    ``get`` has a default instead.
+    """
+
+    def __init__(self, written: Mapping[str, Any], place: str):
+        super().__init__(written)
+        self.place = place
+
+    def __missing__(self, name: str) -> Any:
+        raise InputError([f"{self.place}/{name}: missing; expected a value"])
+
+
 @dataclass(frozen=True)
 class Plugin:
-    """A class of the user's, and the parameters below its name as they were written."""
+    """A class of the user's and its parameters."""
 
     plugin_class: Any
-    parameters: Mapping[str, Any]
+    parameters: Parameters
 
     def make(self, *arguments: Any) -> Any:
         """An object of the class; ``arguments`` follow the parameters."""
-        return self.plugin_class(dict(self.parameters), *arguments)
+        return self.plugin_class(self.parameters, *arguments)
 
 
 @dataclass(frozen=True)
-class PluginLayerParams(LayerParams, Mapping):
-    """The parameters of a user's layer: a mapping of what was written below its name."""
+class PluginLayerParams(LayerParams):
+    """The parameters of a user's layer, which gets them like ``Parameters``."""
 
     plugin_class: Any = Layer
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Parameters = field(default_factory=lambda: Parameters({}, ""))
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> Layer:
         return self.plugin_class(self, spec, rolling_window, default_cost)
@@ -68,11 +83,11 @@ class PluginLayerParams(LayerParams, Mapping):
     def __getitem__(self, name: str) -> Any:
         return self.parameters[name]
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.parameters)
+    def __contains__(self, name: str) -> bool:
+        return name in self.parameters
 
-    def __len__(self) -> int:
-        return len(self.parameters)
+    def get(self, name: str, default: Any = None) -> Any:
+        return self.parameters.get(name, default)
 
 
 def is_dotted(name: str) -> bool:

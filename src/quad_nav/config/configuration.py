@@ -92,7 +92,7 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
     listed = _settle(settled, notes)
     notes.raise_problems()
 
-    costmaps = [costmap_params(settled[name]) for name in COSTMAPS]
+    costmaps = [costmap_params(settled, name) for name in COSTMAPS]
     for name, params in zip(COSTMAPS, costmaps):
         remark_on_blindness(params, name, notes)
     _remark_on_rates(settled, notes)

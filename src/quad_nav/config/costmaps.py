@@ -8,7 +8,7 @@ In both styles some parameters of the costmap replace the layer's.
 """
 from __future__ import annotations
 
-from typing import Dict, List, Set, Tuple
+from typing import Any, Dict, List, Mapping, Set, Tuple
 
 from quad_nav.config import costmap_tables as tables
 from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, settle_layer
@@ -53,11 +53,12 @@ def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
     settle(costmap, name, _table_with_misplaced(costmap, known), notes, known)
 
 
-def costmap_params(costmap: Namespace) -> CostmapParams:
-    """The dataclass of a settled costmap."""
+def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
+    """The dataclass of the costmap of that name in a settled tree."""
+    costmap = tree[name]
     layers = []
     for plugin in costmap["plugins"]:
-        params = layer_params(costmap, plugin["name"], plugin["type"])
+        params = layer_params(costmap, name, plugin["name"], plugin["type"])
         if params is not None:
             layers.append((plugin["name"], params))
     return CostmapParams(layers=tuple(layers), **fields(costmap, tables.COSTMAP.parameters))

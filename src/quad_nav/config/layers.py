@@ -13,7 +13,7 @@ from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
-from quad_nav.plugins import LAYER, PluginLayerParams, is_dotted, load_class
+from quad_nav.plugins import LAYER, Parameters, PluginLayerParams, is_dotted, load_class
 
 Chain = Tuple[Tuple[str, Mapping[str, Any]], ...]
 _DATA_TYPES = ("LaserScan", "PointCloud", "PointCloud2")
@@ -69,13 +69,14 @@ def settle_layer(costmap: Namespace, costmap_path: str, name: str, layer_type: s
     settle(layer, path, table, notes, also_known=described.union(sources))
 
 
-def layer_params(costmap: Mapping[str, Any], name: str, layer_type: str) -> Optional[LayerParams]:
+def layer_params(costmap: Mapping[str, Any], costmap_path: str, name: str,
+                 layer_type: str) -> Optional[LayerParams]:
     """The dataclass of a layer of a settled costmap; None for a type that is not here."""
     if layer_type in LAYERS:
         return LAYERS[layer_type].params(costmap, name)
     if not is_dotted(layer_type):
         return None
-    written = costmap[name]
+    written = Parameters(costmap.get(name, {}), join(costmap_path, name))
     return PluginLayerParams(enabled=written.get("enabled", True), parameters=written,
                              plugin_class=load_class(layer_type, LAYER))
 

@@ -20,6 +20,7 @@ from quad_nav.plugins import (
     GLOBAL_PLANNER,
     LOCAL_PLANNER,
     Interface,
+    Parameters,
     Plugin,
     is_dotted,
     load_class,
@@ -138,9 +139,10 @@ def planner_type(tree: Mapping[str, Any], key: str) -> Any:
 def planner_params(tree: Mapping[str, Any], key: str) -> Any:
     """The dataclass of the planner that a settled tree names, or the user's ``Plugin``."""
     own = planner_type(tree, key)
-    namespace = tree.get(plugin_name(tree[key]), {})
+    name = plugin_name(tree[key])
+    namespace = tree.get(name, {})
     if own is None:
-        return Plugin(load_class(tree[key], SLOTS[key].interface), namespace)
+        return Plugin(load_class(tree[key], SLOTS[key].interface), Parameters(namespace, name))
     return own.params(**fields(namespace, own.table.parameters))
 
 

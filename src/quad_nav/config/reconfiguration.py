@@ -102,7 +102,7 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
         return replace(configuration, global_planner=planner_params(tree, "base_global_planner"),
                        local_planner=planner_params(tree, "base_local_planner"))
     costmap = namespace.split("/")[0]
-    params = costmap_params(tree[costmap])
+    params = costmap_params(tree, costmap)
     if costmap == "global_costmap":
         return replace(configuration, global_costmap=params)
     return replace(configuration, local_costmap=params)

@@ -11,7 +11,7 @@ from quad_nav.config.reader import Namespace, check_class, fields, settle, subtr
 from quad_nav.config.spec import Table
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
-from quad_nav.plugins import RECOVERY, Plugin, is_dotted, load_class
+from quad_nav.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
 from quad_nav.recovery import DEFAULT_LAYER_NAMES, ClearCostmapParams, RotateParams
 
 RecoveryParams = Union[ClearCostmapParams, RotateParams, Plugin]
@@ -51,8 +51,7 @@ def recoveries(tree: Mapping[str, Any], listed: Optional[NamedTypes],
                costmaps: Tuple[CostmapParams, ...]) -> Tuple[Tuple[str, RecoveryParams], ...]:
     """(name, parameters) in the order in which they are tried, of a settled tree."""
     sequence = _default_sequence(tree) if listed is None else listed
-    return tuple((name, _params(kind, tree.get(name, {}), tree, costmaps))
-                 for name, kind in sequence)
+    return tuple((name, _params(name, kind, tree, costmaps)) for name, kind in sequence)
 
 
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
@@ -140,13 +139,14 @@ def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
                       " names of layers, as in [obstacle_layer]")
 
 
-def _params(kind: str, namespace: Mapping[str, Any], tree: Mapping[str, Any],
+def _params(name: str, kind: str, tree: Mapping[str, Any],
             costmaps: Tuple[CostmapParams, ...]) -> RecoveryParams:
+    namespace = tree.get(name, {})
     if kind == CLEAR:
         return _clear_params(namespace, costmaps)
     if kind == ROTATE:
         return _rotate_params(namespace, tree.get(TRAJECTORY_PLANNER, {}))
-    return Plugin(load_class(kind, RECOVERY), namespace)
+    return Plugin(load_class(kind, RECOVERY), Parameters(namespace, name))
 
 
 def _clear_params(namespace: Mapping[str, Any],

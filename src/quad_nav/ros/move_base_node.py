@@ -196,13 +196,13 @@ def main() -> int:
     name = rospy.get_name()
     try:
         configuration = config.load(rospy.get_param("~", {}), name)
+        for warning in configuration.warnings:
+            rospy.logwarn("%s", warning)
+        node = MoveBaseNode(configuration)
     except InputError as error:
         rospy.logfatal("%s: its parameters can't be used:\n%s", name, error)
         print(f"{name}: its parameters can't be used:\n{error}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    for warning in configuration.warnings:
-        rospy.logwarn("%s", warning)
-    node = MoveBaseNode(configuration)
     try:
         node.spin()
     except rospy.ROSInterruptException:
