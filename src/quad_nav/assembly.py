@@ -9,6 +9,7 @@ import numpy as np
 from quad_nav.config import Configuration
 from quad_nav.config.recoveries import RecoveryParams
 from quad_nav.control.controller import LocalPlanner
+from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
 from quad_nav.control.rollout import footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.costmap.layer import LayerParams
@@ -31,6 +32,7 @@ GLOBAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray], GlobalPlanner]] = {
 }
 LOCAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray, float], LocalPlanner]] = {
     TrajectoryPlannerParams: TrajectoryPlanner,
+    DwaParams: DwaPlanner,
 }
 
 

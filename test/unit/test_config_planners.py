@@ -4,14 +4,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quad_nav.assembly import GLOBAL_PLANNERS, LOCAL_PLANNERS, apply_configuration, build_navigator
+from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.config import load, planners, reconfigurable, updated, values
+from quad_nav.control.dwa_planner import DwaParams
 from quad_nav.errors import InputError
 from quad_nav.plan.carrot import Carrot, CarrotParams
 from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
 from quad_nav.plan.navfn import Navfn, NavfnParams
 
 SEEING = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}}
+DWA = {"base_local_planner": "dwa_local_planner/DWAPlannerROS"}
 SEARCH = {"base_global_planner": "global_planner/GlobalPlanner"}
 
 
@@ -39,10 +41,16 @@ def test_chosen_planner_is_built_with_its_parameters(name, namespace, planner, p
     assert navigator.planner.params == params
 
 
-def test_every_planner_of_the_configuration_can_be_built():
-    for types, made in ((planners.GLOBAL_PLANNERS, GLOBAL_PLANNERS),
-                        (planners.LOCAL_PLANNERS, LOCAL_PLANNERS)):
-        assert {type(own.params()) for own in types.values()} == set(made)
+@pytest.mark.parametrize("key, name", [
+    (key, name) for key, slot in planners.SLOTS.items() for name in slot.types])
+def test_every_planner_that_can_be_chosen_can_be_built(key, name):
+    configuration = load({key: name})
+    navigator = build_navigator(configuration)
+    made = {"base_global_planner": navigator.planner, "base_local_planner": navigator.controller}
+    chosen = {"base_global_planner": configuration.global_planner,
+              "base_local_planner": configuration.local_planner}
+    assert made[key].params == chosen[key]
+    apply_configuration(navigator, configuration)
 
 
 def test_carrot_has_the_footprint_in_force():
@@ -78,18 +86,33 @@ def test_the_one_remark(tree, kind, line):
     assert told(tree) == [(kind, "/nav/" + line)]
 
 
-def test_turns_take_their_limits_from_the_trajectory_planner_when_it_does_not_fly(monkeypatch):
-    other = planners.PlannerType(planners.tables.NAVFN, NavfnParams)
-    monkeypatch.setitem(planners.LOCAL_PLANNERS, "other/Other", other)
-    tree = {"base_local_planner": "other/Other",
-            "TrajectoryPlannerROS": {"max_vel_theta": 0.4, "max_vel_x": "not read"}}
+def test_dwa_flies_with_its_own_parameters_and_those_at_the_nodes_level():
+    tree = {**DWA, "latch_xy_goal_tolerance": True, "controller_frequency": 5.0,
+            "DWAPlannerROS": {"max_vel_x": 0.3, "controller_frequency": 10.0}}
+
+    configuration = load(tree, "/nav")
+
+    assert configuration.local_planner == DwaParams(
+        max_vel_x_mps=0.3, latch_xy_goal_tolerance=True)
+    assert configuration.local_planner_period_s == 0.1
+    assert [line for kind, line in told(tree)] == [
+        "/nav/DWAPlannerROS/controller_frequency: rollouts reckon with 10.0 Hz, while the loop"
+        " runs at 5.0 Hz"]
+    changed = updated(configuration, "DWAPlannerROS", {"max_vel_x": 0.2})
+    assert changed.local_planner.max_vel_x_mps == 0.2
+    assert list(reconfigurable(changed))[:2] == ["", "DWAPlannerROS"]
+
+
+def test_turns_take_their_limits_from_the_trajectory_planner_when_it_does_not_fly():
+    tree = {**DWA, "TrajectoryPlannerROS": {"max_vel_theta": 0.4, "max_vel_x": "not read"}}
 
     configuration = load(tree, "/nav")
 
     assert dict(configuration.recoveries)["rotate_recovery"].max_vel_theta_radps == 0.4
-    [unused] = [remark for remark in configuration.remarks if remark.kind == "unused"]
-    assert str(unused) == ("/nav/TrajectoryPlannerROS: unused: base_local_planner is other/Other;"
-                           " recoveries that turn take its limits all the same")
+    assert told(tree) == [
+        ("unused", "/nav/TrajectoryPlannerROS: unused: base_local_planner is"
+                   " dwa_local_planner/DWAPlannerROS; recoveries that turn take its limits all the"
+                   " same")]
     assert "TrajectoryPlannerROS" not in reconfigurable(configuration)
     tree["TrajectoryPlannerROS"]["max_vel_theta"] = "fast"
     with pytest.raises(InputError, match="TrajectoryPlannerROS/max_vel_theta: 'fast' is not a"):

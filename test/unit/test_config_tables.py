@@ -27,7 +27,8 @@ ROTATE = Table(fixed=tables.ROTATE.fixed + tables.ROTATE_FROM_PLANNER)
 # (dataclass, table, fields that are read in another way than from one row)
 PAIRS = [
     (NavigatorParams, tables.NAVIGATOR, {"recovery_behaviors"}),
-    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER, set()),
+    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER,
+     {"refuse_colliding_escape", "predict_goal_turn"}),
     (NavfnParams, tables.NAVFN, set()),
     (SearchPlannerParams, global_planner_tables.SEARCH_PLANNER, set()),
     (CarrotParams, global_planner_tables.CARROT, set()),

@@ -21,10 +21,12 @@ LAYERS = [
     {"navigator", "mission"},
     {"config"},
     {"assembly"},
+    {"warm_up"},
     {"offline", "ros"},
 ]
 NOUNS = LAYERS[0]  # they may import one another
-WORLD_USERS = {"sim", "config", "assembly", "offline", "ros"}  # navigation knows no simulator
+# Navigation knows no simulator.
+WORLD_USERS = {"sim", "config", "assembly", "warm_up", "offline", "ros"}
 
 # Where a third-party package may be imported: that file or folder and nowhere else.
 PLACES = {

@@ -11,7 +11,7 @@ from quad_nav.config.notes import CAUTION, Notes, Remark, join
 from quad_nav.config.planners import (
     local_planner_frequency,
     local_planner_period_s,
-    planner_namespaces,
+    planner_keys,
     planner_params,
     settle_planner_names,
     settle_planners,
@@ -121,7 +121,7 @@ def navigator_params(tree: Mapping[str, Any], listed: Optional[NamedTypes],
 def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     """Brings the whole tree into the state in which the original leaves it."""
     settle_planner_names(tree, notes)
-    known = [*COSTMAPS, *planner_namespaces(tree), *_INHERITED, "recovery_behaviors",
+    known = [*COSTMAPS, *planner_keys(tree), *_INHERITED, "recovery_behaviors",
              *listed_names(tree)]
     settle(tree, "", tables.NAVIGATOR, notes, also_known=known)
     settle_planners(tree, notes)

@@ -1,18 +1,23 @@
-"""The trees of the planners: which ones fly, their namespaces, and their old names.
+"""The trees of the planners: which ones fly, and with which namespaces.
 
 A planner of another kind is one line in ``GLOBAL_PLANNERS`` or
 ``LOCAL_PLANNERS``, and one in ``assembly``.
 """
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, Callable, Dict, List, Mapping, Optional
+from dataclasses import dataclass
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
 from quad_nav.config import global_planner_tables, tables
-from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, UNSUPPORTED, UNUSED, Notes, join
+from quad_nav.config.dwa_table import DWA_TABLE, LATCH, dwa_params, settle_dwa
+from quad_nav.config.notes import RENAMED, UNSUPPORTED, UNUSED, Notes
 from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
 from quad_nav.config.spec import Table
-from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.config.trajectory_planner_tree import (
+    TRAJECTORY_PLANNER,
+    settle_trajectory_planner,
+    trajectory_planner_params,
+)
 from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
@@ -27,47 +32,46 @@ from quad_nav.plugins import (
     plugin_name,
 )
 
-TRAJECTORY_PLANNER = "TrajectoryPlannerROS"
+SEARCH_PLANNER = "global_planner/GlobalPlanner"
+CARROT = "carrot_planner/CarrotPlanner"
+DWA_PLANNER = "dwa_local_planner/DWAPlannerROS"
 
 
 @dataclass(frozen=True)
 class PlannerType:
-    """One planner: its table, its dataclass, old names of parameters, and what is odd about it."""
+    """One planner: its table, and what makes of the tree what the original makes of it.
+
+    ``settle`` brings the planner's namespace into the state in which the original
+    leaves it, ``params`` makes the dataclass of a settled tree. ``inherited`` are
+    parameters that may stand at the node's own level as well.
+    """
 
     table: Table
-    params: Callable[..., Any]
-    renamed: Mapping[str, str] = field(default_factory=dict)
-    remark: Optional[Callable[[Namespace, Notes], None]] = None
+    settle: Callable[[Namespace, Notes], None]
+    params: Callable[[Mapping[str, Any]], Any]
+    inherited: Tuple[str, ...] = ()
 
 
-def _trajectory_planner_params(**arguments: Any) -> TrajectoryPlannerParams:
-    arguments["meter_scoring"] = True  # whatever is set, as in the original
-    return TrajectoryPlannerParams(**arguments)
-
-
-def _remark_on_trajectory_planner(planner: Namespace, notes: Notes) -> None:
-    if planner.get("meter_scoring") is False:
-        notes.remark(join(TRAJECTORY_PLANNER, "meter_scoring"), IGNORED,
-                     "ignored by move_base: distances are always scored in metres")
-    if isinstance(planner.get("escape_vel"), float) and planner["escape_vel"] > 0.0:
-        notes.remark(join(TRAJECTORY_PLANNER, "escape_vel"), CAUTION,
-                     "the robot escapes forwards: a velocity below 0 backs up")
+def _plain(plugin: str, table: Table, params: Callable[..., Any]) -> PlannerType:
+    """A planner whose namespace holds what its table says, and nothing else."""
+    name = plugin_name(plugin)
+    return PlannerType(
+        table,
+        settle=lambda tree, notes: settle(subtree(tree, name, "", notes), name, table, notes),
+        params=lambda tree: params(**fields(tree.get(name, {}), table.parameters)))
 
 
 # The first of each flies in the place of planners that are not here.
 GLOBAL_PLANNERS: Dict[str, PlannerType] = {
-    tables.GLOBAL_PLANNER: PlannerType(tables.NAVFN, NavfnParams),
-    "global_planner/GlobalPlanner": PlannerType(
-        global_planner_tables.SEARCH_PLANNER, SearchPlannerParams),
-    "carrot_planner/CarrotPlanner": PlannerType(global_planner_tables.CARROT, CarrotParams),
+    tables.GLOBAL_PLANNER: _plain(tables.GLOBAL_PLANNER, tables.NAVFN, NavfnParams),
+    SEARCH_PLANNER: _plain(
+        SEARCH_PLANNER, global_planner_tables.SEARCH_PLANNER, SearchPlannerParams),
+    CARROT: _plain(CARROT, global_planner_tables.CARROT, CarrotParams),
 }
 LOCAL_PLANNERS: Dict[str, PlannerType] = {
     tables.LOCAL_PLANNER: PlannerType(
-        tables.TRAJECTORY_PLANNER, _trajectory_planner_params,
-        renamed={"pdist_scale": "path_distance_bias",
-                 "gdist_scale": "goal_distance_bias",
-                 "min_in_place_rotational_vel": "min_in_place_vel_theta"},
-        remark=_remark_on_trajectory_planner),
+        tables.TRAJECTORY_PLANNER, settle_trajectory_planner, trajectory_planner_params),
+    DWA_PLANNER: PlannerType(DWA_TABLE, settle_dwa, dwa_params, inherited=(LATCH.name,)),
 }
 
 
@@ -84,16 +88,21 @@ SLOTS: Dict[str, Slot] = {
     "base_global_planner": Slot(GLOBAL_PLANNERS, GLOBAL_PLANNER),
 }
 # Namespaces of planners that people configure beside the one that they fly.
-_OTHER_PLANNERS = ("DWAPlannerROS", "TebLocalPlannerROS", "EBandPlannerROS", "DWBLocalPlanner",
+_OTHER_PLANNERS = ("TebLocalPlannerROS", "EBandPlannerROS", "DWBLocalPlanner",
                    "SBPLLatticePlanner")
 _DEFAULT_RATE_HZ = 20.0
 
 
-def planner_namespaces(tree: Mapping[str, Any]) -> List[str]:
-    """Every namespace that is a planner's, chosen or not."""
-    flyable = [plugin_name(name) for slot in SLOTS.values() for name in slot.types]
-    chosen = [plugin_name(tree[key]) for key in SLOTS if isinstance(tree.get(key), str)]
-    return [*flyable, *chosen, *_OTHER_PLANNERS]
+def planner_keys(tree: Mapping[str, Any]) -> List[str]:
+    """What planners may have at the node's level: namespaces, and what the chosen inherit."""
+    keys = list(_OTHER_PLANNERS)
+    for key, slot in SLOTS.items():
+        keys += map(plugin_name, slot.types)
+        name = tree.get(key)
+        if isinstance(name, str):
+            keys.append(plugin_name(name))
+            keys += slot.types[name].inherited if name in slot.types else ()
+    return keys
 
 
 def settle_planner_names(tree: Namespace, notes: Notes) -> None:
@@ -118,10 +127,11 @@ def settle_planners(tree: Namespace, notes: Notes) -> None:
     """Brings the chosen planners' namespaces into the state in which the original leaves them."""
     chosen = {plugin_name(tree[key]): key for key in SLOTS if isinstance(tree[key], str)}
     for name, key in chosen.items():
-        planner = subtree(tree, name, "", notes)
-        planner_type = SLOTS[key].types.get(tree[key])
-        if planner_type is not None:  # a user's planner knows its parameters itself
-            _settle_planner(planner, name, planner_type, notes)
+        own = planner_type(tree, key)
+        if own is not None:
+            own.settle(tree, notes)
+        else:  # a user's planner knows its parameters itself
+            subtree(tree, name, "", notes)
     flyable = {plugin_name(name): key for key, slot in SLOTS.items() for name in slot.types}
     for name in sorted(set(tree).difference(chosen)):
         if name in flyable:
@@ -131,7 +141,7 @@ def settle_planners(tree: Namespace, notes: Notes) -> None:
             notes.remark(name, UNSUPPORTED, "no such planner flies here, nothing below is read")
 
 
-def planner_type(tree: Mapping[str, Any], key: str) -> Any:
+def planner_type(tree: Mapping[str, Any], key: str) -> Optional[PlannerType]:
     """The type of the planner that a settled tree names, None for a user's."""
     return SLOTS[key].types.get(tree[key])
 
@@ -139,11 +149,11 @@ def planner_type(tree: Mapping[str, Any], key: str) -> Any:
 def planner_params(tree: Mapping[str, Any], key: str) -> Any:
     """The dataclass of the planner that a settled tree names, or the user's ``Plugin``."""
     own = planner_type(tree, key)
+    if own is not None:
+        return own.params(tree)
     name = plugin_name(tree[key])
-    namespace = tree.get(name, {})
-    if own is None:
-        return Plugin(load_class(tree[key], SLOTS[key].interface), Parameters(namespace, name))
-    return own.params(**fields(namespace, own.table.parameters))
+    return Plugin(load_class(tree[key], SLOTS[key].interface),
+                  Parameters(tree.get(name, {}), name))
 
 
 def reconfigurable_planners(tree: Mapping[str, Any]) -> Dict[str, Table]:
@@ -175,15 +185,6 @@ def local_planner_period_s(tree: Mapping[str, Any]) -> float:
     return 1.0 / rate_hz if rate_hz > 0.0 else 1.0 / _DEFAULT_RATE_HZ
 
 
-def _settle_planner(planner: Namespace, name: str, own: PlannerType, notes: Notes) -> None:
-    for old, new in own.renamed.items():
-        if old in planner:
-            _take_old_name(planner, name, old, new, notes)
-    settle(planner, name, own.table, notes, also_known=own.renamed)
-    if own.remark is not None:
-        own.remark(planner, notes)
-
-
 def _settle_unused(tree: Namespace, name: str, reason: str, notes: Notes) -> None:
     if name == TRAJECTORY_PLANNER:
         planner = subtree(tree, name, "", notes)
@@ -191,12 +192,3 @@ def _settle_unused(tree: Namespace, name: str, reason: str, notes: Notes) -> Non
         reason += "; recoveries that turn take its limits all the same"
     notes.remark(name, UNUSED, reason)
 
-
-def _take_old_name(planner: Namespace, name: str, old: str, new: str, notes: Notes) -> None:
-    place = join(name, old)
-    if new in planner:
-        notes.remark(place, IGNORED, f"ignored by move_base: {new} is there as well")
-        return
-    planner[new] = planner[old]
-    notes.moved(join(name, new), place)
-    notes.remark(place, RENAMED, f"called {new} today")

@@ -6,9 +6,9 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 from quad_nav.config import tables
 from quad_nav.config.costmap_tables import COSTMAP
 from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
-from quad_nav.config.planners import TRAJECTORY_PLANNER
 from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
 from quad_nav.config.spec import Table
+from quad_nav.config.trajectory_planner_tree import TRAJECTORY_PLANNER
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import Iterable, List, Tuple
 
 from quad_nav.config import costmap_tables, global_planner_tables, tables
+from quad_nav.config.dwa_table import DWA_TABLE
 from quad_nav.config.spec import Parameter, Table
 
 _HEAD = """# Parameters
@@ -63,6 +64,7 @@ def _sections() -> Iterable[Tuple[str, str, Table]]:
     yield "move_base", "At the node's level.", tables.NAVIGATOR
     yield ("TrajectoryPlannerROS", f"The local planner `{tables.LOCAL_PLANNER}`.",
            tables.TRAJECTORY_PLANNER)
+    yield "DWAPlannerROS", "The local planner `dwa_local_planner/DWAPlannerROS`.", DWA_TABLE
     yield "NavfnROS", f"The global planner `{tables.GLOBAL_PLANNER}`.", tables.NAVFN
     yield ("GlobalPlanner", "The global planner `global_planner/GlobalPlanner`.",
            global_planner_tables.SEARCH_PLANNER)

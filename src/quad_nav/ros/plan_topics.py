@@ -12,12 +12,12 @@ from quad_nav.navigator import Navigator
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
 from quad_nav.plugins import plugin_name
+from quad_nav.ros.convert import twist_message
 from quad_nav.ros.nav_messages import (
     cost_cloud_message,
     path_message,
     pose_stamped,
     potential_message,
-    twist_message,
 )
 from quad_nav.tick import Tick
 
