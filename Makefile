@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint rostest packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 lint rostest bench packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
@@ -35,6 +35,9 @@ lint: venv  ## ruff and mypy
 
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 	@scripts/ros_env scripts/rostests $(TEST)
+
+bench: venv  ## How long the navigator's parts take, beside the original
+	PYTHONPATH=src $(PYTHON) bench/navigation.py
 
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)

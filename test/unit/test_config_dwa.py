@@ -9,6 +9,8 @@ from quad_nav.config.dwa_table import DWA_PLANNER, DWA_TABLE, dwa_params, settle
 from quad_nav.config.notes import CAUTION, CLAMPED, IGNORED, UNKNOWN, Notes
 from quad_nav.control.dwa_planner import DwaParams
 
+MENDS = {"predict_goal_turn"}  # set by the group of that name, not by the planner's own
+
 
 def settled(namespace, **node_level):
     tree, notes = {DWA_PLANNER: namespace, **node_level}, Notes("/move_base0")
@@ -19,7 +21,8 @@ def settled(namespace, **node_level):
 def test_every_field_has_a_spelling_and_the_same_default():
     of_table = {parameter.field: parameter.in_force
                 for parameter in DWA_TABLE.parameters if parameter.field}
-    assert of_table == {field.name: field.default for field in fields(DwaParams)}
+    assert of_table == {field.name: field.default for field in fields(DwaParams)
+                        if field.name not in MENDS}
 
 
 def test_defaults_are_values_that_may_be_written():

@@ -61,6 +61,9 @@ class DwaParams:
     # Global plan
     prune_plan: bool = False
 
+    # Mended fault; False is the original's behaviour
+    predict_goal_turn: bool = False  # turn no farther in one control period than is left
+
     # The turn at the goal has the limits of every turn; ``goal`` has names of its own for them.
     @property
     def max_rotational_vel_radps(self) -> float:

@@ -31,6 +31,9 @@ class GoalLimits(Protocol):
     @property
     def rot_stopped_velocity_radps(self) -> float: ...
 
+    @property
+    def predict_goal_turn(self) -> bool: ...
+
 
 def is_stopped(velocity: Twist2D, params: GoalLimits) -> bool:
     return (abs(velocity.vyaw_radps) <= params.rot_stopped_velocity_radps
