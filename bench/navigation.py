@@ -24,7 +24,7 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator import Navigator
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation import STEPS_PER_S, Simulation
 
 ROOT = Path(__file__).resolve().parents[1]
 GOAL = Pose2D(9.0, 5.5)
@@ -57,16 +57,20 @@ def median_ms(call: Callable[[], object], prepare: Callable[[], object] = lambda
 
 
 def tutorial_navigator() -> Tuple[Navigator, Pose2D]:
-    """A navigator of the tutorial in the arena, with a second of scans in its costmaps."""
+    """A navigator of the tutorial in the arena, with a second's flight in its costmaps."""
     navigator = build_navigator(config.load(
         config.load_files(ROOT / "config" / "tutorial", {"i": "0"})))
     simulation = Simulation(load_scene(ROOT / "scenes" / "arena.yaml"), 2)
-    pose = simulation.state(0).map_from_base
-    for k in range(SCANS):
-        scan = replace(simulation.scan(0), stamp_s=0.05 * k)
-        for costmap in (navigator.global_costmap, navigator.local_costmap):
-            costmap.layers["obstacle_layer"].add_scan(
-                "base_scan", scan, pose.compose(base_from_lidar), 0.05 * k)
+    for k in range(2 * SCANS):  # the first second is for taking up speed
+        simulation.set_command(0, Twist2D(vx_mps=0.3))
+        for _ in range(STEPS_PER_S // 20):
+            simulation.step()
+        pose = simulation.state(0).map_from_base
+        if k >= SCANS:
+            scan = replace(simulation.scan(0), stamp_s=0.05 * (k - SCANS))
+            for costmap in (navigator.global_costmap, navigator.local_costmap):
+                costmap.layers["obstacle_layer"].add_scan(
+                    "base_scan", scan, pose.compose(base_from_lidar), scan.stamp_s)
     simulation.close()
     for costmap in (navigator.global_costmap, navigator.local_costmap):
         costmap.update(1.0, pose.to_2d())

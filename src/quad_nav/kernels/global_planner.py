@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from quad_nav.kernels.descent import leaves_map, step_down
-from quad_nav.kernels.wave import NOT_REACHED, arrival, planar_arrival
+from quad_nav.kernels.wave import NOT_REACHED, arrival_at
 
 
 class Queue(NamedTuple):
@@ -76,11 +76,11 @@ def a_star(step_costs, enterable, potential, size_x, start, goal, neutral, plana
             if not (0 <= following < size and enterable[following]
                     and potential[following] >= NOT_REACHED):
                 continue
-            cost = np.float32(step_costs[following])
+            cost = step_costs[following]
             if planar:
-                potential[following] = planar_arrival(potential, size_x, following, cost)
+                potential[following] = arrival_at(potential, size_x, following, cost, True)
             else:
-                potential[following] = potential[cell] + cost
+                potential[following] = potential[cell] + np.float32(cost)
             blocks = (abs(goal % size_x - following % size_x)
                       + abs(goal // size_x - following // size_x))
             priority = np.float32(potential[following] + np.float32(blocks * neutral))
@@ -99,8 +99,7 @@ def fill_around(step_costs, potential, size_x, centre, planar):
         for dy in range(-2, 3):
             cell = centre + dx + size_x * dy
             if size_x <= cell < potential.size - size_x and potential[cell] >= NOT_REACHED:
-                potential[cell] = arrival(potential, size_x, cell, np.float32(step_costs[cell]),
-                                          planar)
+                potential[cell] = arrival_at(potential, size_x, cell, step_costs[cell], planar)
 
 
 @njit(cache=True, nogil=True)

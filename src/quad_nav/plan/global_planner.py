@@ -33,7 +33,7 @@ from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels import global_planner as kernel
 from quad_nav.kernels import wave as wavefront
-from quad_nav.plan.navfn import new_wave
+from quad_nav.plan.navfn import NOT_REACHED
 from quad_nav.plan.orientations import OrientationMode, with_headings
 
 Point = Tuple[float, float]
@@ -160,20 +160,23 @@ class SearchPlanner:
 
     def _dijkstra(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:
         params, size_x = self.params, costs.shape[1]
-        wave = new_wave(wave_costs(costs, params), params.lethal_cost, params.neutral_cost,
-                        planar=params.use_quadratic)
         source = _flat(start, size_x)
+        potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
         if params.old_navfn_behavior:
-            wavefront.start_at_cell(wave, source)
+            front = wavefront.start_at_cell(potential, source, size_x)
         else:
-            wavefront.start_between_cells(wave, source, *map(_hundredths, start))
-        arrived = wavefront.propagate(wave, source, _flat(goal, size_x), 2 * costs.size,
-                                      stop_at_target=True, heuristic=False)
-        return wave.potential, arrived
+            front = wavefront.start_between_cells(
+                potential, source, size_x, _hundredths(start[0]), _hundredths(start[1]),
+                params.neutral_cost)
+        rules = wavefront.Rules(params.lethal_cost, params.neutral_cost, params.use_quadratic)
+        arrived = wavefront.propagate(
+            wave_costs(costs, params).ravel(), potential, front, rules, source,
+            _flat(goal, size_x), size_x, 2 * costs.size, stop_at_target=True, heuristic=False)
+        return potential, arrived
 
     def _a_star(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:
         params, size_x = self.params, costs.shape[1]
-        potential = np.full(costs.size, wavefront.NOT_REACHED, dtype=np.float32)
+        potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
         arrived = kernel.a_star(byte_costs(costs, params), _enterable(costs, params), potential,
                                 size_x, _flat(start, size_x), _flat(goal, size_x),
                                 params.neutral_cost, params.use_quadratic, 2 * costs.size)

@@ -33,6 +33,7 @@ from quad_nav.kernels import wave as wavefront
 
 Cell = Tuple[int, int]
 NOT_REACHED = float(wavefront.NOT_REACHED)  # where the wave did not come
+_RULES = wavefront.Rules(kernel.OBSTACLE, kernel.NEUTRAL, planar=True)
 
 
 @dataclass(frozen=True)
@@ -148,23 +149,13 @@ def potential_from(nav_costs: np.ndarray, source: Cell, target: Cell, stop_at_ta
     """
     size_y, size_x = nav_costs.shape
     cells = size_x * size_y
-    wave = new_wave(nav_costs, kernel.OBSTACLE, kernel.NEUTRAL)
-    wavefront.start_at_cell(wave, _flat(source, size_x))
-    wavefront.propagate(wave, _flat(source, size_x), _flat(target, size_x),
-                        max(cells // 20, size_x + size_y), stop_at_target, heuristic)
-    return wave.potential.reshape(nav_costs.shape)
-
-
-def new_wave(costs: np.ndarray, obstacle: int, neutral: int,
-             planar: bool = True) -> wavefront.Wave:
-    """A wave that has not begun, over costs[H, W] whose outermost ring are obstacles."""
-    cells = costs.size
-    return wavefront.Wave(
-        costs=costs.ravel(), potential=np.full(cells, wavefront.NOT_REACHED, dtype=np.float32),
-        pending=np.zeros(cells, dtype=np.bool_),
-        buckets=np.zeros((3, wavefront.BUCKET_SIZE), dtype=np.int64),
-        counts=np.zeros(3, dtype=np.int64), size_x=costs.shape[1], obstacle=obstacle,
-        neutral=neutral, planar=planar)
+    source_cell, target_cell = _flat(source, size_x), _flat(target, size_x)
+    potential = np.full(cells, NOT_REACHED, dtype=np.float32)
+    first_front = wavefront.start_at_cell(potential, source_cell, size_x)
+    wavefront.propagate(nav_costs.ravel(), potential, first_front, _RULES, source_cell,
+                        target_cell, size_x, max(cells // 20, size_x + size_y), stop_at_target,
+                        heuristic)
+    return potential.reshape(nav_costs.shape)
 
 
 def path_from(potential: np.ndarray, start: Cell, source: Cell) -> Tuple[np.ndarray, bool]:
