@@ -133,7 +133,7 @@ def settle_planners(tree: Namespace, notes: Notes) -> None:
         else:  # a user's planner knows its parameters itself
             subtree(tree, name, "", notes)
     flyable = {plugin_name(name): key for key, slot in SLOTS.items() for name in slot.types}
-    for name in sorted(set(tree).difference(chosen)):
+    for name in [name for name in tree if name not in chosen]:
         if name in flyable:
             key = flyable[name]
             _settle_unused(tree, name, f"unused: {key} is {tree[key]}", notes)
