@@ -52,10 +52,12 @@ def planner(**parameters):
     ({**planner(controller_frequency=20.0), "controller_frequency": 5.0}, "caution",
      "TrajectoryPlannerROS/controller_frequency: rollouts reckon with 20.0 Hz, while the loop runs"
      " at 5.0 Hz"),
-    ({"DWAPlannerROS": {"max_vel_x": 1.0}}, "unsupported",
-     "DWAPlannerROS: no such planner flies here, nothing below is read"),
-    ({"base_local_planner": "dwa_local_planner/DWAPlannerROS"}, "unsupported",
-     "base_local_planner: dwa_local_planner/DWAPlannerROS is not supported here;"
+    ({"TebLocalPlannerROS": {"max_vel_x": 1.0}}, "unsupported",
+     "TebLocalPlannerROS: no such planner flies here, nothing below is read"),
+    ({"DWAPlannerROS": {"max_vel_x": 1.0}}, "unused",
+     "DWAPlannerROS: unused: base_local_planner is base_local_planner/TrajectoryPlannerROS"),
+    ({"base_local_planner": "teb_local_planner/TebLocalPlannerROS"}, "unsupported",
+     "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported here;"
      " base_local_planner/TrajectoryPlannerROS flies instead"),
     ({"base_global_planner": "NavfnROS"}, "renamed",
      "base_global_planner: NavfnROS is called navfn/NavfnROS today"),
@@ -97,9 +99,9 @@ def test_ordinary_parameters_need_no_remark():
 
 
 def test_old_names_count_unless_the_new_one_is_there():
-    alone = load(planner(gdist_scale=2.0, min_in_place_rotational_vel=0.3), "").trajectory_planner
+    alone = load(planner(gdist_scale=2.0, min_in_place_rotational_vel=0.3), "").local_planner
     assert (alone.goal_distance_bias, alone.min_in_place_vel_theta_radps) == (2.0, 0.3)
-    both = load(planner(gdist_scale=2.0, goal_distance_bias=1.0), "").trajectory_planner
+    both = load(planner(gdist_scale=2.0, goal_distance_bias=1.0), "").local_planner
     assert both.goal_distance_bias == 1.0
 
 

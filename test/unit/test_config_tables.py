@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from quad_nav.config import costmap_tables, tables
+from quad_nav.config import costmap_tables, global_planner_tables, tables
 from quad_nav.config.reference import reference
 from quad_nav.config.spec import Table
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
@@ -16,6 +16,8 @@ from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.navigator import NavigatorParams
+from quad_nav.plan.carrot import CarrotParams
+from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
 from quad_nav.recovery import ClearCostmapParams, RotateParams
 
@@ -28,6 +30,8 @@ PAIRS = [
     (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER,
      {"refuse_colliding_escape", "predict_goal_turn"}),
     (NavfnParams, tables.NAVFN, set()),
+    (SearchPlannerParams, global_planner_tables.SEARCH_PLANNER, set()),
+    (CarrotParams, global_planner_tables.CARROT, set()),
     (ClearCostmapParams, tables.CLEAR_COSTMAP, {"layer_names"}),
     (RotateParams, ROTATE, set()),
     (CostmapParams, costmap_tables.COSTMAP, {"layers"}),

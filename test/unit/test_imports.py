@@ -17,7 +17,7 @@ LAYERS = [
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},
-    {"schedule", "standstill", "tick"},
+    {"plugins", "schedule", "standstill", "tick"},
     {"navigator", "mission"},
     {"config"},
     {"assembly"},

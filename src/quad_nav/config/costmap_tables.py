@@ -10,7 +10,7 @@ from quad_nav.config.texts import polygon_from_text
 
 _ANY, _POSITIVE = Domain.ANY, Domain.POSITIVE
 
-_ENABLED = flag("enabled", True, "enabled", "Whether to apply this plugin or not")
+ENABLED = flag("enabled", True, "enabled", "Whether to apply this plugin or not")
 
 _VOXELS = tuple((name, "voxels are not supported here") for name in (
     "origin_z", "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold",
@@ -61,7 +61,7 @@ COSTMAP = Table(
 
 OBSTACLE_LAYER = Table(
     reconfigurable=(
-        _ENABLED,
+        ENABLED,
         flag("footprint_clearing_enabled", True, "footprint_clearing_enabled",
               "Whether to clear the robot's footprint of lethal obstacles"),
         double("max_obstacle_height", 2.0, "max_obstacle_height_m", "metres",
@@ -109,7 +109,7 @@ SOURCE = Table(fixed=(
           "Beams of a LaserScan that return inf clear up to range_max.")))
 
 INFLATION_LAYER = Table(reconfigurable=(
-    _ENABLED,
+    ENABLED,
     double("cost_scaling_factor", 10.0, "cost_scaling_factor", "1/m",
             "A scaling factor to apply to cost values during inflation.", low=0, high=100),
     double("inflation_radius", 0.55, "inflation_radius_m", "metres",
@@ -118,7 +118,7 @@ INFLATION_LAYER = Table(reconfigurable=(
     flag("inflate_unknown", False, "inflate_unknown", "Whether to inflate unknown cells.")))
 
 STATIC_LAYER = Table(
-    reconfigurable=(_ENABLED,),
+    reconfigurable=(ENABLED,),
     fixed=(
         text("map_topic", "map", "map_topic", "a topic's name", "Where the map comes from."),
         flag("first_map_only", False, "first_map_only", "Later maps are ignored."),

@@ -10,6 +10,7 @@ from quad_nav.errors import InputError
 UNKNOWN = "unknown"  # move_base does not know the key either
 UNSUPPORTED = "unsupported"  # move_base knows it, this package does not
 IGNORED = "ignored"  # the original reads past it as well
+UNUSED = "unused"  # of a planner that does not fly
 CLAMPED = "clamped"  # the value in force is another one
 RENAMED = "renamed"  # an old name, still honoured
 CAUTION = "caution"  # legal, and probably not what was meant

@@ -6,14 +6,15 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 from quad_nav.config import tables
 from quad_nav.config.costmap_tables import COSTMAP
 from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
-from quad_nav.config.planners import TRAJECTORY_PLANNER
-from quad_nav.config.reader import Namespace, fields, settle, subtree
+from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
 from quad_nav.config.spec import Table
+from quad_nav.config.trajectory_planner_tree import TRAJECTORY_PLANNER
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
 from quad_nav.recovery import DEFAULT_LAYER_NAMES, ClearCostmapParams, RotateParams
 
-RecoveryParams = Union[ClearCostmapParams, RotateParams]
+RecoveryParams = Union[ClearCostmapParams, RotateParams, Plugin]
 NamedTypes = Tuple[Tuple[str, str], ...]
 
 CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
@@ -37,6 +38,8 @@ def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         if name not in tree and listed is None:
             continue
         namespace = subtree(tree, name, "", notes)
+        if kind not in _TABLES:
+            continue  # a behaviour of the user's knows its parameters itself
         layers = ("layer_names",) if kind == CLEAR else ()
         settle(namespace, name, _TABLES[kind], notes, also_known=layers)
         if kind == CLEAR:
@@ -48,9 +51,7 @@ def recoveries(tree: Mapping[str, Any], listed: Optional[NamedTypes],
                costmaps: Tuple[CostmapParams, ...]) -> Tuple[Tuple[str, RecoveryParams], ...]:
     """(name, parameters) in the order in which they are tried, of a settled tree."""
     sequence = _default_sequence(tree) if listed is None else listed
-    return tuple((name, _clear_params(tree.get(name, {}), costmaps) if kind == CLEAR
-                  else _rotate_params(tree.get(name, {}), tree[TRAJECTORY_PLANNER]))
-                 for name, kind in sequence)
+    return tuple((name, _params(name, kind, tree, costmaps)) for name, kind in sequence)
 
 
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
@@ -101,6 +102,9 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         else:
             listed[entry["name"]] = _full_type(entry["type"])
     for name in [name for name, kind in listed.items() if kind not in _TABLES]:
+        if is_dotted(listed[name]):
+            check_class(listed[name], RECOVERY, join("recovery_behaviors", name), notes)
+            continue
         notes.remark(join("recovery_behaviors", name), UNSUPPORTED,
                      f"{listed.pop(name)} is not supported here, the behaviour is left out;"
                      f" there are {CLEAR} and {ROTATE}")
@@ -133,6 +137,16 @@ def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
     if not isinstance(layers, list) or not all(isinstance(layer, str) for layer in layers):
         notes.problem(join(name, "layer_names"), f"{layers!r} is no list of names; expected the"
                       " names of layers, as in [obstacle_layer]")
+
+
+def _params(name: str, kind: str, tree: Mapping[str, Any],
+            costmaps: Tuple[CostmapParams, ...]) -> RecoveryParams:
+    namespace = tree.get(name, {})
+    if kind == CLEAR:
+        return _clear_params(namespace, costmaps)
+    if kind == ROTATE:
+        return _rotate_params(namespace, tree.get(TRAJECTORY_PLANNER, {}))
+    return Plugin(load_class(kind, RECOVERY), Parameters(namespace, name))
 
 
 def _clear_params(namespace: Mapping[str, Any],

@@ -19,12 +19,13 @@ from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.errors import InputError, InvalidGoal, PlanningError
 from quad_nav.geometry import Pose3D, Twist2D
+from quad_nav.plugins import plugin_name
 from quad_nav.ros import sensors, static_maps
 from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
 from quad_nav.ros.nav_messages import goal_from_message, path_message
-from quad_nav.ros.plan_topics import PlanTopics, plugin_name
+from quad_nav.ros.plan_topics import PlanTopics
 from quad_nav.ros.reconfigure import serve_namespaces
 from quad_nav.ros.signals import init_node
 from quad_nav.ros.silence import SilenceWatch
@@ -197,14 +198,14 @@ def main() -> int:
     name = rospy.get_name()
     try:
         configuration = config.load(rospy.get_param("~", {}), name)
+        for warning in configuration.warnings:
+            rospy.logwarn("%s", warning)
+        warm_up(configuration)
+        node = MoveBaseNode(configuration)
     except InputError as error:
         rospy.logfatal("%s: its parameters can't be used:\n%s", name, error)
         print(f"{name}: its parameters can't be used:\n{error}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    for warning in configuration.warnings:
-        rospy.logwarn("%s", warning)
-    warm_up(configuration)
-    node = MoveBaseNode(configuration)
     try:
         node.spin()
     except rospy.ROSInterruptException:

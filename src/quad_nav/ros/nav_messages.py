@@ -14,6 +14,7 @@ from quad_nav.costmap.occupancy import occupancy
 from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
+from quad_nav.plan.navfn import NOT_REACHED
 from quad_nav.ros.convert import pose_from_message, pose_message
 
 INVALID_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
@@ -67,6 +68,22 @@ def polygon_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> Polygo
 
 def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Time) -> OccupancyGrid:
     """A costmap's master grid uint8[H, W] in occupancies."""
+    return _occupancy_grid(spec, occupancy(costs), frame, stamp)
+
+
+def potential_message(spec: GridSpec, potential: np.ndarray, scale: int, frame: str,
+                      stamp: rospy.Time) -> OccupancyGrid:
+    """A planner's potential float32[H, W], from 0 to ``scale``; -1 where it did not come."""
+    reached = potential < NOT_REACHED
+    highest = potential[reached].max(initial=0.0)
+    values = np.full(potential.shape, -1, dtype=np.int8)
+    if highest > 0.0:
+        values[reached] = potential[reached] * (scale / highest)
+    return _occupancy_grid(spec, values, frame, stamp)
+
+
+def _occupancy_grid(spec: GridSpec, values: np.ndarray, frame: str,
+                    stamp: rospy.Time) -> OccupancyGrid:
     message = OccupancyGrid()
     message.header.frame_id, message.header.stamp = frame, stamp
     message.info.map_load_time = stamp
@@ -75,7 +92,7 @@ def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Tim
     message.info.origin.position.x = spec.origin_x_m
     message.info.origin.position.y = spec.origin_y_m
     message.info.origin.orientation.w = 1.0
-    message.data = occupancy(costs).ravel().tolist()
+    message.data = values.ravel().tolist()
     return message
 
 
