@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint rostest conformance packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 lint rostest conformance bench packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
@@ -39,6 +39,9 @@ rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 # make itself ends with 2 on any failure and names the command's own exit status in its message.
 conformance: venv  ## Compare with the original's recordings: make conformance DIR=folder
 	@$(PYTHON) test/conformance/run.py $(DIR)
+
+bench: venv  ## How long the navigator's parts take, beside the original
+	PYTHONPATH=src $(PYTHON) bench/navigation.py
 
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)

@@ -2,17 +2,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, Callable, Dict
+
+import numpy as np
 
 from quad_nav.config import Configuration
 from quad_nav.config.recoveries import RecoveryParams
+from quad_nav.control.controller import LocalPlanner
+from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
 from quad_nav.control.rollout import footprint_cost
-from quad_nav.control.trajectory_planner import TrajectoryPlanner
+from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.navigator import NamedRecovery, Navigator
-from quad_nav.plan.navfn import Navfn
+from quad_nav.plan.carrot import Carrot, CarrotParams
+from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
+from quad_nav.plan.navfn import Navfn, NavfnParams
+from quad_nav.plan.planner import GlobalPlanner
+from quad_nav.plugins import Plugin
 from quad_nav.recovery import (
     ClearCostmap,
     ClearCostmapParams,
@@ -22,27 +31,57 @@ from quad_nav.recovery import (
     Rotate,
 )
 
+# The planner that each dataclass of parameters is for.
+GLOBAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray], GlobalPlanner]] = {
+    NavfnParams: lambda params, footprint: Navfn(params),
+    SearchPlannerParams: lambda params, footprint: SearchPlanner(params),
+    CarrotParams: Carrot,
+}
+LOCAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray, float], LocalPlanner]] = {
+    TrajectoryPlannerParams: TrajectoryPlanner,
+    DwaParams: DwaPlanner,
+}
+
 
 def build_navigator(configuration: Configuration) -> Navigator:
     """The navigator that a configuration describes, standing idle."""
     global_costmap = LayeredCostmap(_watched(configuration, configuration.global_costmap))
     local_costmap = LayeredCostmap(_watched(configuration, configuration.local_costmap))
-    controller = TrajectoryPlanner(configuration.trajectory_planner, local_costmap.footprint,
-                                   configuration.local_planner_period_s)
+    planner = _global_planner(configuration.global_planner, global_costmap.footprint)
+    controller = _local_planner(configuration.local_planner, local_costmap.footprint,
+                                configuration.local_planner_period_s)
     recoveries = [NamedRecovery(name, _recovery(params))
                   for name, params in configuration.recoveries]
     return Navigator(configuration.navigator, global_costmap, local_costmap,
-                     Navfn(configuration.navfn), controller, recoveries)
+                     planner, controller, recoveries)
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
     """Takes over every parameter that may change in flight; plan and goal stay."""
+    footprint = navigator.global_costmap.footprint
     navigator.params = configuration.navigator
     navigator.global_costmap.reconfigure(_watched(configuration, configuration.global_costmap))
     navigator.local_costmap.reconfigure(_watched(configuration, configuration.local_costmap))
-    navigator.planner = Navfn(configuration.navfn)
-    navigator.set_controller_params(configuration.trajectory_planner)
+    new_footprint = navigator.global_costmap.footprint
+    # A user's planner has no parameters that change, and may have learnt something.
+    if (not isinstance(configuration.global_planner, Plugin)
+            or not np.array_equal(footprint, new_footprint)):
+        navigator.planner = _global_planner(configuration.global_planner, new_footprint)
+    if not isinstance(configuration.local_planner, Plugin):
+        navigator.set_controller_params(configuration.local_planner)
     navigator.controller.set_footprint(navigator.local_costmap.footprint)
+
+
+def _global_planner(params: Any, footprint: np.ndarray) -> GlobalPlanner:
+    if isinstance(params, Plugin):
+        return params.make(footprint)
+    return GLOBAL_PLANNERS[type(params)](params, footprint)
+
+
+def _local_planner(params: Any, footprint: np.ndarray, control_period_s: float) -> LocalPlanner:
+    if isinstance(params, Plugin):
+        return params.make(footprint, control_period_s)
+    return LOCAL_PLANNERS[type(params)](params, footprint, control_period_s)
 
 
 def _watched(configuration: Configuration, costmap: CostmapParams) -> CostmapParams:
@@ -69,6 +108,8 @@ def _watched_layer(layer: LayerParams, limit_s: float) -> LayerParams:
 
 
 def _recovery(params: RecoveryParams) -> Recovery:
+    if isinstance(params, Plugin):
+        return params.make()
     if isinstance(params, ClearCostmapParams):
         return ClearCostmap(params)
     if isinstance(params, MoveSlowAndClearParams):

@@ -155,7 +155,7 @@ def _wrapped_path(path: str, width: int) -> List[str]:
 
 def _what(line: Remark) -> str:
     """The text without its kind, which stands beside it."""
-    for prefix in (f"{line.kind}, ", f"{line.kind} by move_base: "):
+    for prefix in (f"{line.kind}, ", f"{line.kind}: ", f"{line.kind} by move_base: "):
         if line.text.startswith(prefix):
             return line.text[len(prefix):]
     return line.text

@@ -41,7 +41,7 @@ def radii(footprint: Footprint) -> Tuple[float, float]:
     points = _points(footprint).tolist()
     if len(points) <= 2:
         return 0.0, 0.0
-    corners = [math.hypot(x, y) for x, y in points]
+    corners = [_length(x, y) for x, y in points]
     edges = [_origin_to_segment(a, b) for a, b in zip(points, points[1:] + points[:1])]
     return min(corners + edges), max(corners + edges)
 
@@ -62,6 +62,11 @@ def _origin_to_segment(a: Sequence[float], b: Sequence[float]) -> float:
     dx, dy = bx - ax, by - ay
     length_squared = dx * dx + dy * dy
     if length_squared == 0.0:
-        return math.hypot(ax, ay)
+        return _length(ax, ay)
     along = min(1.0, max(0.0, (-ax * dx - ay * dy) / length_squared))
-    return math.hypot(ax + along * dx, ay + along * dy)
+    return _length(ax + along * dx, ay + along * dy)
+
+
+def _length(x: float, y: float) -> float:
+    """The C library's hypot, as the original has it; Python's own rounds by version."""
+    return float(np.hypot(x, y))

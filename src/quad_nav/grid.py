@@ -31,6 +31,14 @@ class GridSpec:
         """(rows, columns), as numpy wants it."""
         return (self.size_y, self.size_x)
 
+    @property
+    def extent(self) -> str:
+        """Where the grid lies, for messages."""
+        return (f"x {self.origin_x_m:.2f} to "
+                f"{self.origin_x_m + self.size_x * self.resolution_m:.2f}, "
+                f"y {self.origin_y_m:.2f} to "
+                f"{self.origin_y_m + self.size_y * self.resolution_m:.2f} m")
+
     def contains_cell(self, cell_x: int, cell_y: int) -> bool:
         return 0 <= cell_x < self.size_x and 0 <= cell_y < self.size_y
 

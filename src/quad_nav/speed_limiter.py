@@ -4,7 +4,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Optional
 
-from quad_nav.control.controller import LocalPlanner
 from quad_nav.geometry import Pose2D
 from quad_nav.recovery import SpeedLimit
 
@@ -13,10 +12,11 @@ class SpeedLimiter:
     """Sets a controller's parameters: the usual ones, or the usual ones limited.
 
     A limit holds until the robot has moved far enough, whatever becomes of the goal: what
-    makes it necessary is around the robot.
+    makes it necessary is around the robot. The controller has ``params``, a frozen
+    dataclass, and ``set_params``; one that has not cannot be limited.
     """
 
-    def __init__(self, controller: LocalPlanner):
+    def __init__(self, controller: Any):
         self._controller = controller
         self._limit: Optional[SpeedLimit] = None
         self._usual: Any = None  # the parameters without the limit; None while there is none
@@ -32,6 +32,8 @@ class SpeedLimiter:
 
     def impose(self, limit: SpeedLimit, pose: Pose2D) -> None:
         """Begins a limit, in place of one that is in force; ``pose`` is where the robot is."""
+        if not limit.greatest:
+            return
         usual = self._controller.params if self._limit is None else self._usual
         self._limit, self._since = limit, pose
         self.set_params(usual)

@@ -1,6 +1,8 @@
 """What the tests on running nodes share: waiting for conditions, goals, commands."""
 from __future__ import annotations
 
+import json
+import os
 import time
 import unittest
 
@@ -65,6 +67,13 @@ class FlightCase(unittest.TestCase):
         """Lets simulated time pass."""
         end = rospy.get_time() + seconds
         self.wait(lambda: rospy.get_time() >= end, f"{seconds} simulated seconds")
+
+    def read_result(self, path, patience_s=PATIENCE_S):
+        """The sequencer's summary, once it has been written."""
+        self.addCleanup(lambda: os.path.exists(path) and os.remove(path))
+        self.wait(lambda: os.path.exists(path), "the summary", patience_s)
+        with open(path, encoding="utf-8") as file:
+            return json.load(file)
 
     def position(self, i):
         p = self.odometry[i].message.pose.pose.position

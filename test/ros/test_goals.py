@@ -3,9 +3,12 @@
 
 import rospy
 import rostest
-from actionlib_msgs.msg import GoalID, GoalStatus
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from flight_case import FlightCase, Latest, action_goal, goal_pose
 from move_base_msgs.msg import MoveBaseActionResult
+
+FREE_PLACES = (((1.5, 1.5), (3.0, 6.5)), ((10.0, 2.0), (10.5, 10.0)))
+UNFINISHED = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 
 
 class Goals(FlightCase):
@@ -13,12 +16,26 @@ class Goals(FlightCase):
     def setUpClass(cls):
         super().setUpClass()
         cls.results = [Latest(f"/move_base{i}/result", MoveBaseActionResult) for i in (0, 1)]
+        cls.statuses = [Latest(f"/move_base{i}/status", GoalStatusArray) for i in (0, 1)]
         cls.start()
 
     def setUp(self):
-        for client in self.clients:
-            client.cancel_all_goals()
+        for topic in self.cancel_topics:
+            self.wait(lambda t=topic: t.get_num_connections() > 0, f"listener on {topic.name}")
+            topic.publish(GoalID())
+        cancelled = rospy.Time.now()
+        self.wait(lambda: all(self.is_idle(i, cancelled) for i in (0, 1)), "both without a goal")
         self.wait(lambda: all(self.speed(i) < 0.02 for i in (0, 1)), "both standing")
+
+    def is_idle(self, i, since):
+        """Half a second after a time, no goal is waiting or active."""
+        message = self.statuses[i].message
+        return (message is not None and message.header.stamp > since + rospy.Duration(0.5)
+                and all(s.status not in UNFINISHED for s in message.status_list))
+
+    def far_place(self, i):
+        """A free place on the robot's own side of the arena, metres away from it."""
+        return max(FREE_PLACES[i], key=lambda place: self.distance(i, *place))
 
     def result_after(self, i, count):
         self.wait(lambda: self.results[i].count > count, f"a result of robot {i}")
@@ -41,20 +58,18 @@ class Goals(FlightCase):
 
     def test_new_goal_preempts_the_old_one(self):
         count = self.results[0].count
-        x, y = self.position(0)
-        self.goal_topics[0].publish(goal_pose(x, y + 3.0))
+        self.goal_topics[0].publish(goal_pose(*self.far_place(0)))
         self.wait(lambda: self.speed(0) > 0.05, "robot 0 under way")
-        self.goal_topics[0].publish(goal_pose(x, y + 2.0))
+        self.goal_topics[0].publish(goal_pose(4.5, 5.0))
         status = self.result_after(0, count)
         self.assertEqual(status.status, GoalStatus.PREEMPTED)
-        self.assertIn("another goal was recieved", status.text)
+        self.assertRegex(status.text, "another goal was rec(ei|ie)ved")  # both are about
         self.wait(lambda: self.speed(0) > 0.05, "robot 0 under way to the second goal")
 
     def test_cancelling_one_does_not_stop_the_other(self):
         counts = [result.count for result in self.results]
         for i in (0, 1):
-            x, y = self.position(i)
-            self.goal_topics[i].publish(goal_pose(x, y + 4.0))
+            self.goal_topics[i].publish(goal_pose(*self.far_place(i)))
         self.wait(lambda: all(self.speed(i) > 0.05 for i in (0, 1)), "both under way")
         self.cancel_topics[0].publish(GoalID())
         self.assertEqual(self.result_after(0, counts[0]).status, GoalStatus.PREEMPTED)

@@ -1,8 +1,5 @@
 #!/usr/bin/env python3
 """The tutorial's mission, from its launch file to the summary's last number."""
-import json
-import os
-
 import rospy
 import rostest
 from flight_case import FlightCase
@@ -12,11 +9,7 @@ GOALS = ([(3.0, 6.5), (9.0, 5.5), (1.5, 9.0)], [(4.0, 3.5), (2.0, 9.0), (8.5, 5.
 
 class Mission(FlightCase):
     def test_both_quadcopters_reach_all_goals(self):
-        path = rospy.get_param("~result")
-        self.addCleanup(lambda: os.path.exists(path) and os.remove(path))
-        self.wait(lambda: os.path.exists(path), "the summary", patience_s=380.0)
-        with open(path, encoding="utf-8") as file:
-            result = json.load(file)
+        result = self.read_result(rospy.get_param("~result"), patience_s=380.0)
         self.assertEqual(len(result["robots"]), 2)
         for robot, goals in zip(result["robots"], GOALS):
             self.assertEqual([(g["x_m"], g["y_m"]) for g in robot["goals"]], goals)

@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
 """A navigator killed in flight: its quadcopter hovers, the node comes back, the mission goes on."""
-import json
 import os
 import signal
 from xmlrpc.client import ServerProxy
@@ -26,11 +25,7 @@ class Respawn(FlightCase):
         self.wait(lambda: self.speed(0) < 0.02, "robot 0 hovering")
         self.wait(lambda: self.is_back(killed), "the node respawned")
         self.wait(lambda: self.speed(0) > 0.15, "robot 0 under way again")
-        path = rospy.get_param("~result")
-        self.addCleanup(lambda: os.path.exists(path) and os.remove(path))
-        self.wait(lambda: os.path.exists(path), "the summary", patience_s=200.0)
-        with open(path, encoding="utf-8") as file:
-            result = json.load(file)
+        result = self.read_result(rospy.get_param("~result"), patience_s=200.0)
         for robot in result["robots"]:
             self.assertTrue(all(goal["reached"] for goal in robot["goals"]), robot)
 

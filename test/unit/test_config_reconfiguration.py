@@ -53,8 +53,8 @@ def test_types_are_those_of_the_messages(configuration):
 
 def test_change_of_the_planner_leaves_the_rest(configuration):
     changed = updated(configuration, "TrajectoryPlannerROS", {"max_vel_x": 0.5, "dwa": True})
-    assert (changed.trajectory_planner.max_vel_x_mps, changed.trajectory_planner.dwa) == (0.5, True)
-    assert configuration.trajectory_planner.max_vel_x_mps == 0.3
+    assert (changed.local_planner.max_vel_x_mps, changed.local_planner.dwa) == (0.5, True)
+    assert configuration.local_planner.max_vel_x_mps == 0.3
     assert changed.navigator == configuration.navigator
     assert changed.recoveries == configuration.recoveries
     assert values(changed, "TrajectoryPlannerROS")["max_vel_x"] == 0.5
@@ -84,7 +84,7 @@ def test_voxel_layer():
 def test_values_are_clamped(configuration):
     changed = updated(configuration, "TrajectoryPlannerROS",
                       {"max_vel_x": -3.0, "vx_samples": 1000, "min_vel_theta": 0.5})
-    planner = changed.trajectory_planner
+    planner = changed.local_planner
     assert (planner.max_vel_x_mps, planner.min_vel_theta_radps) == (0.0, 0.0)
     assert planner.vx_samples == 300
 
@@ -107,7 +107,7 @@ def test_recoveries_keep_what_they_were_loaded_with(configuration):
 def test_restore_defaults_goes_back_to_what_was_loaded(configuration):
     changed = updated(configuration, "TrajectoryPlannerROS", {"max_vel_x": 0.5, "sim_time": 2.0})
     restored = updated(changed, "TrajectoryPlannerROS", {"restore_defaults": True, "sim_time": 3.0})
-    assert restored.trajectory_planner == configuration.trajectory_planner
+    assert restored.local_planner == configuration.local_planner
     assert restored.to_tree() == configuration.to_tree()
 
 
@@ -120,8 +120,8 @@ def test_changes_that_cannot_be_made_are_all_told_and_none_is_made(configuration
         "controller_frequency: 0.0 cannot be; expected a positive number of Hz",
         "planner_patience: nan is not finite; expected a number of seconds, 0 or more",
         "shutdown_costmaps: 1 is neither true nor false; expected true or false",
-        "base_local_planner: 'dwa_local_planner/DWAPlannerROS' is not supported here; expected"
-        " base_local_planner/TrajectoryPlannerROS"]
+        "base_local_planner: 'dwa_local_planner/DWAPlannerROS' cannot take over in flight;"
+        " expected base_local_planner/TrajectoryPlannerROS"]
     assert configuration.navigator.planner_frequency_hz == 0.0
 
 

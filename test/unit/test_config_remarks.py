@@ -57,10 +57,12 @@ def slow(**parameters):
     ({**planner(controller_frequency=20.0), "controller_frequency": 5.0}, "caution",
      "TrajectoryPlannerROS/controller_frequency: rollouts reckon with 20.0 Hz, while the loop runs"
      " at 5.0 Hz"),
-    ({"DWAPlannerROS": {"max_vel_x": 1.0}}, "unsupported",
-     "DWAPlannerROS: no such planner flies here, nothing below is read"),
-    ({"base_local_planner": "dwa_local_planner/DWAPlannerROS"}, "unsupported",
-     "base_local_planner: dwa_local_planner/DWAPlannerROS is not supported here;"
+    ({"TebLocalPlannerROS": {"max_vel_x": 1.0}}, "unsupported",
+     "TebLocalPlannerROS: no such planner flies here, nothing below is read"),
+    ({"DWAPlannerROS": {"max_vel_x": 1.0}}, "unused",
+     "DWAPlannerROS: unused: base_local_planner is base_local_planner/TrajectoryPlannerROS"),
+    ({"base_local_planner": "teb_local_planner/TebLocalPlannerROS"}, "unsupported",
+     "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported here;"
      " base_local_planner/TrajectoryPlannerROS flies instead"),
     ({"base_global_planner": "NavfnROS"}, "renamed",
      "base_global_planner: NavfnROS is called navfn/NavfnROS today"),
@@ -109,9 +111,9 @@ def test_ordinary_parameters_need_no_remark():
 
 
 def test_old_names_count_unless_the_new_one_is_there():
-    alone = load(planner(gdist_scale=2.0, min_in_place_rotational_vel=0.3), "").trajectory_planner
+    alone = load(planner(gdist_scale=2.0, min_in_place_rotational_vel=0.3), "").local_planner
     assert (alone.goal_distance_bias, alone.min_in_place_vel_theta_radps) == (2.0, 0.3)
-    both = load(planner(gdist_scale=2.0, goal_distance_bias=1.0), "").trajectory_planner
+    both = load(planner(gdist_scale=2.0, goal_distance_bias=1.0), "").local_planner
     assert both.goal_distance_bias == 1.0
 
 
@@ -148,6 +150,17 @@ def test_going_slowly_limits_every_speed_of_the_planner():
         translation_fields=("max_vel_x_mps", "min_vel_x_mps", "escape_vel_mps"),
         rotation_fields=("max_vel_theta_radps", "min_vel_theta_radps",
                          "min_in_place_vel_theta_radps", "max_rotational_vel_radps"))
+
+
+def test_going_slowly_limits_the_local_planner_that_flies():
+    tree = {**slow(planner_namespace="DWAPlannerROS", max_trans_param_name="max_trans_vel"),
+            "base_local_planner": "dwa_local_planner/DWAPlannerROS"}
+    assert remarks(tree) == []
+    ((_, params),) = load(tree, "").recoveries
+    assert params.translation_fields == (
+        "max_vel_trans_mps", "min_vel_trans_mps", "max_vel_x_mps", "min_vel_x_mps",
+        "max_vel_y_mps", "min_vel_y_mps")
+    assert params.rotation_fields == ("max_vel_theta_radps", "min_vel_theta_radps")
 
 
 def test_the_names_of_speeds_may_be_the_originals_or_the_planners():

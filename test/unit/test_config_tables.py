@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from quad_nav.config import costmap_tables, tables
+from quad_nav.config import costmap_tables, global_planner_tables, tables
 from quad_nav.config.reference import reference
 from quad_nav.config.spec import Table
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
@@ -17,6 +17,8 @@ from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.navigator import NavigatorParams
+from quad_nav.plan.carrot import CarrotParams
+from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
 from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
 
@@ -26,8 +28,11 @@ ROTATE = Table(fixed=tables.ROTATE.fixed + tables.ROTATE_FROM_PLANNER)
 # (dataclass, table, fields that are read in another way than from one row)
 PAIRS = [
     (NavigatorParams, tables.NAVIGATOR, {"recovery_behaviors"}),
-    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER, set()),
+    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER,
+     {"refuse_colliding_escape", "predict_goal_turn"}),
     (NavfnParams, tables.NAVFN, set()),
+    (SearchPlannerParams, global_planner_tables.SEARCH_PLANNER, set()),
+    (CarrotParams, global_planner_tables.CARROT, set()),
     (ClearCostmapParams, tables.CLEAR_COSTMAP, {"layer_names"}),
     (RotateParams, ROTATE, set()),
     (MoveSlowAndClearParams, tables.MOVE_SLOW, {"translation_fields", "rotation_fields"}),

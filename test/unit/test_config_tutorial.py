@@ -106,7 +106,7 @@ def test_costmaps():
 
 def test_planner_keeps_the_defaults_that_dynamic_reconfigure_puts_in_force():
     configuration = load(tutorial(), "/move_base0")
-    planner = configuration.trajectory_planner
+    planner = configuration.local_planner
     assert (planner.min_vel_theta_radps, planner.max_vel_theta_radps) == (-1.0, 0.7)
     assert planner.max_rotational_vel_radps == 1.0  # the turn at the goal does not ask the above
     assert planner.goal_distance_bias == 0.8

@@ -404,3 +404,34 @@ def test_new_parameters_keep_the_plan_and_the_state():
 
     assert control.command.vx_mps == pytest.approx(0.2)
     assert planner.oscillation.rotating_left
+
+
+# Mended faults
+
+def test_an_escape_must_lead_out_of_the_collision():
+    params = replace(PARAMS, xy_goal_tolerance_m=0.05, refuse_colliding_escape=True)
+    costs = free()
+    costs[:, 34] = LETHAL  # the wall touches the outline at x = 0.20
+    plan = line(0.0, 0.0, 0.15, 0.0)
+    control = planner_at(plan, params).compute_velocity(WINDOW, costs, ORIGIN, REST)
+    assert control.command == Twist2D(-0.1, 0.0, 0.0)
+
+    costs[:, 24] = LETHAL  # 0.1 m back, the outline touches this one at x = -0.30
+    original = planner_at(plan, replace(params, refuse_colliding_escape=False))
+    assert original.compute_velocity(WINDOW, costs, ORIGIN, REST).command.vx_mps == -0.1
+    mended = planner_at(plan, params)
+    with pytest.raises(NoValidTrajectory, match="hits something"):
+        mended.compute_velocity(WINDOW, costs, ORIGIN, REST)
+    assert not mended.oscillation.escaping
+
+
+@pytest.mark.parametrize("turn_rad, expected_radps", [
+    (0.2, 0.2),     # below min_in_place_vel_theta: what is left in one period of 1 s
+    (-0.06, -0.06),
+    (3.0, 1.0),     # max_rotational_vel
+])
+def test_the_turn_at_the_goal_stops_where_one_period_ends(turn_rad, expected_radps):
+    params = replace(PARAMS, predict_goal_turn=True, min_in_place_vel_theta_radps=1.0)
+    assert turning_command(turn_rad, REST, params, 1.0).vyaw_radps == pytest.approx(expected_radps)
+    at_10_hz = turning_command(turn_rad, REST, params, 0.1)
+    assert abs(at_10_hz.vyaw_radps) * 0.1 <= abs(turn_rad) + 1e-12

@@ -17,16 +17,17 @@ LAYERS = [
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},
-    {"schedule", "speed_limiter", "standstill", "tick"},
+    {"plugins", "schedule", "speed_limiter", "standstill", "tick"},
     {"navigator", "mission"},
     {"config"},
     {"assembly"},
-    {"check"},
+    {"warm_up", "check"},
     {"offline", "ros"},
     {"cli"},
 ]
 NOUNS = LAYERS[0]  # they may import one another
-WORLD_USERS = {"sim", "config", "assembly", "offline", "ros"}  # navigation knows no simulator
+# Navigation knows no simulator.
+WORLD_USERS = {"sim", "config", "assembly", "warm_up", "offline", "ros"}
 
 # Where a third-party package may be imported: that file or folder and nowhere else.
 PLACES = {

@@ -65,7 +65,7 @@ def test_the_square_around_the_robot_is_freed_and_reaches_the_master():
 def test_costmaps_that_cannot_be_cleared_are_told():
     blind = costmap_of(inflation=InflationLayerParams())
     small = full(costmap_of(size_m=3.0))
-    step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
+    step = MoveSlowAndClear(MoveSlowAndClearParams(translation_fields=("max_vel_x_mps",))).step(
         Surroundings(0.0, small, blind, Pose2D(2.75, 1.0), Pose2D(0.5, 0.5)))
     why = "it has no obstacle layer, or ends within 0.5 m of the robot"
     assert step.message.split("; ") == [
@@ -81,6 +81,12 @@ def test_at_an_unknown_pose_nothing_is_done():
     assert step.done and step.speed_limit is None
     assert step.message.count("the robot's pose is unknown") == 2
     assert (costmap.layers["laser"].grid.costs == 254).all()
+
+
+def test_a_planner_without_speeds_is_not_said_to_be_slow():
+    step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
+        Surroundings(0.0, full(costmap_of()), full(costmap_of()), HERE, HERE))
+    assert (step.message, step.speed_limit) == ("", None)
 
 
 def test_the_speeds_become_one_limit():

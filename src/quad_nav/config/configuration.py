@@ -7,12 +7,12 @@ from typing import Any, Dict, Iterable, Mapping, Optional, Tuple
 
 from quad_nav.config import tables
 from quad_nav.config.costmaps import costmap_params, remark_on_blindness, settle_costmap
-from quad_nav.config.notes import CAUTION, UNSUPPORTED, Notes, Remark, join
+from quad_nav.config.notes import CAUTION, Notes, Remark, join
 from quad_nav.config.planners import (
-    NAVFN,
-    OTHER_PLANNERS,
-    TRAJECTORY_PLANNER,
+    local_planner_frequency,
     local_planner_period_s,
+    planner_keys,
+    planner_params,
     settle_planner_names,
     settle_planners,
 )
@@ -25,11 +25,10 @@ from quad_nav.config.recoveries import (
     recoveries,
     settle_recoveries,
 )
-from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.errors import InputError
 from quad_nav.navigator import NavigatorParams
-from quad_nav.plan.navfn import NavfnParams
+from quad_nav.plugins import plugin_name
 
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards, so they may stand at the node's level.
@@ -40,6 +39,8 @@ _INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
 class Configuration:
     """Everything that one navigator is made of.
 
+    ``global_planner`` and ``local_planner`` are the parameters of the planners that
+    ``navigator`` names: the dataclass of a planner, or a ``Plugin`` of the user's.
     ``recoveries`` are (name, parameters) in the order in which they are tried.
     ``local_planner_period_s`` is the control period that rollouts reckon with;
     it may differ from the loop's own, as in the original. ``clearing_radius_m`` is
@@ -49,8 +50,8 @@ class Configuration:
     navigator: NavigatorParams
     global_costmap: CostmapParams
     local_costmap: CostmapParams
-    navfn: NavfnParams
-    trajectory_planner: TrajectoryPlannerParams
+    global_planner: Any
+    local_planner: Any
     recoveries: Tuple[Tuple[str, RecoveryParams], ...]
     local_planner_period_s: float
     clearing_radius_m: float
@@ -91,7 +92,7 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
     listed = _settle(settled, notes)
     notes.raise_problems()
 
-    costmaps = [costmap_params(settled[name]) for name in COSTMAPS]
+    costmaps = [costmap_params(settled, name) for name in COSTMAPS]
     for name, params in zip(COSTMAPS, costmaps):
         remark_on_blindness(params, name, notes)
     _remark_on_rates(settled, notes)
@@ -100,8 +101,8 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
         navigator=navigator_params(settled, listed, given=tree),
         global_costmap=costmaps[0],
         local_costmap=costmaps[1],
-        navfn=NavfnParams(**fields(settled[NAVFN], tables.NAVFN.parameters)),
-        trajectory_planner=trajectory_planner_params(settled[TRAJECTORY_PLANNER]),
+        global_planner=planner_params(settled, "base_global_planner"),
+        local_planner=planner_params(settled, "base_local_planner"),
         recoveries=recoveries(settled, listed, tuple(costmaps)),
         local_planner_period_s=local_planner_period_s(settled),
         clearing_radius_m=settled.get("clearing_radius", circumscribed_radius_m(settled)),
@@ -117,33 +118,24 @@ def navigator_params(tree: Mapping[str, Any], listed: Optional[NamedTypes],
                            **fields(tree, tables.NAVIGATOR.parameters, given))
 
 
-def trajectory_planner_params(namespace: Mapping[str, Any]) -> TrajectoryPlannerParams:
-    """The dataclass of a settled namespace."""
-    arguments = fields(namespace, tables.TRAJECTORY_PLANNER.parameters)
-    arguments["meter_scoring"] = True  # whatever is set, as in the original
-    return TrajectoryPlannerParams(**arguments)
-
-
 def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     """Brings the whole tree into the state in which the original leaves it."""
-    known = [*COSTMAPS, TRAJECTORY_PLANNER, NAVFN, *OTHER_PLANNERS, *_INHERITED,
-             "recovery_behaviors", *listed_names(tree)]
     settle_planner_names(tree, notes)
+    known = [*COSTMAPS, *planner_keys(tree), *_INHERITED, "recovery_behaviors",
+             *listed_names(tree)]
     settle(tree, "", tables.NAVIGATOR, notes, also_known=known)
     settle_planners(tree, notes)
-    for name in OTHER_PLANNERS:
-        if name in tree:
-            notes.remark(name, UNSUPPORTED, "no such planner flies here, nothing below is read")
     for name in COSTMAPS:
         settle_costmap(tree, name, notes)
     return settle_recoveries(tree, notes)
 
 
 def _remark_on_rates(tree: Mapping[str, Any], notes: Notes) -> None:
-    own_hz = tree[TRAJECTORY_PLANNER].get("controller_frequency")
+    own_hz = local_planner_frequency(tree)
     loop_hz = tree["controller_frequency"]
     if own_hz is not None and own_hz != loop_hz:
-        notes.remark(join(TRAJECTORY_PLANNER, "controller_frequency"), CAUTION,
+        planner = plugin_name(tree["base_local_planner"])
+        notes.remark(join(planner, "controller_frequency"), CAUTION,
                      f"rollouts reckon with {own_hz} Hz, while the loop runs at {loop_hz} Hz")
 
 

@@ -10,7 +10,7 @@ from quad_nav.config.texts import polygon_from_text
 
 _ANY, _POSITIVE = Domain.ANY, Domain.POSITIVE
 
-_ENABLED = flag("enabled", True, "enabled", "Whether to apply this plugin or not")
+ENABLED = flag("enabled", True, "enabled", "Whether to apply this plugin or not")
 
 COSTMAP = Table(
     reconfigurable=(
@@ -78,7 +78,7 @@ _SENSORS = (
 
 VOXEL_LAYER = Table(
     reconfigurable=(
-        _ENABLED,
+        ENABLED,
         _FOOTPRINT_CLEARING,
         _MAX_OBSTACLE_HEIGHT,
         double("origin_z", 0.0, "origin_z_m", "metres", "The z origin of the map in meters.",
@@ -104,7 +104,7 @@ VOXEL_PARAMETERS = ("origin_z", "z_resolution", "z_voxels", "unknown_threshold",
                     "publish_voxel_map")
 
 OBSTACLE_LAYER = Table(
-    reconfigurable=(_ENABLED, _FOOTPRINT_CLEARING, _MAX_OBSTACLE_HEIGHT, _COMBINATION_METHOD),
+    reconfigurable=(ENABLED, _FOOTPRINT_CLEARING, _MAX_OBSTACLE_HEIGHT, _COMBINATION_METHOD),
     fixed=_SENSORS,
     ignored=tuple((name, "only a costmap_2d::VoxelLayer reads it") for name in VOXEL_PARAMETERS))
 
@@ -133,7 +133,7 @@ SOURCE = Table(fixed=(
           "Beams of a LaserScan that return inf clear up to range_max.")))
 
 INFLATION_LAYER = Table(reconfigurable=(
-    _ENABLED,
+    ENABLED,
     double("cost_scaling_factor", 10.0, "cost_scaling_factor", "1/m",
             "A scaling factor to apply to cost values during inflation.", low=0, high=100),
     double("inflation_radius", 0.55, "inflation_radius_m", "metres",
@@ -142,7 +142,7 @@ INFLATION_LAYER = Table(reconfigurable=(
     flag("inflate_unknown", False, "inflate_unknown", "Whether to inflate unknown cells.")))
 
 STATIC_LAYER = Table(
-    reconfigurable=(_ENABLED,),
+    reconfigurable=(ENABLED,),
     fixed=(
         text("map_topic", "map", "map_topic", "a topic's name", "Where the map comes from."),
         flag("first_map_only", False, "first_map_only", "Later maps are ignored."),

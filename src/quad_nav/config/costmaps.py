@@ -8,10 +8,10 @@ In both styles some parameters of the costmap replace the layer's.
 """
 from __future__ import annotations
 
-from typing import Dict, List, Set, Tuple
+from typing import Any, Dict, List, Mapping, Set, Tuple
 
 from quad_nav.config import costmap_tables as tables
-from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, settle_layer
+from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, settle_layer
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.reader import Namespace, fields, settle, subtree
 from quad_nav.config.spec import Table
@@ -19,6 +19,7 @@ from quad_nav.config.texts import polygon_from_list, text_from_polygon
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.plugins import PluginLayerParams, is_dotted
 
 OBSTACLE, VOXEL = "costmap_2d::ObstacleLayer", "costmap_2d::VoxelLayer"
 STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
@@ -44,7 +45,7 @@ def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
         _copy_parent_parameters(costmap, name, layer, layer_type, notes)
     chain = ((name, costmap), ("", tree))
     for layer, layer_type in plugins:
-        if layer_type in LAYERS:
+        if layer_type in LAYERS or is_dotted(layer_type):
             settle_layer(costmap, name, layer, layer_type, chain, notes)
     known = {layer for layer, _ in plugins} | {"plugins", *_OLD_STYLE}
     for _, layer_type in plugins:
@@ -52,19 +53,20 @@ def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
     settle(costmap, name, _table_with_misplaced(costmap, known), notes, known)
 
 
-def costmap_params(costmap: Namespace) -> CostmapParams:
-    """The dataclass of a settled costmap."""
+def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
+    """The dataclass of the costmap of that name in a settled tree."""
+    costmap = tree[name]
     layers = []
     for plugin in costmap["plugins"]:
-        layer = LAYERS.get(plugin["type"])
-        if layer is not None:
-            layers.append((plugin["name"], layer.params(costmap, plugin["name"])))
+        params = layer_params(costmap, name, plugin["name"], plugin["type"])
+        if params is not None:
+            layers.append((plugin["name"], params))
     return CostmapParams(layers=tuple(layers), **fields(costmap, tables.COSTMAP.parameters))
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
     """A costmap that nothing writes to is legal, and flies into things."""
-    if not any(isinstance(layer, StaticLayerParams)
+    if not any(isinstance(layer, (StaticLayerParams, PluginLayerParams))
                or isinstance(layer, ObstacleLayerParams) and layer.sources
                for _, layer in params.layers):
         notes.remark(name, CAUTION, "no map and no observation_sources: there are no obstacles in"
@@ -163,7 +165,7 @@ def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[
 
 
 def _remark_on_type(place: str, layer_type: str, notes: Notes) -> None:
-    if layer_type not in LAYERS:
+    if layer_type not in LAYERS and not is_dotted(layer_type):
         notes.remark(place, UNSUPPORTED, f"{layer_type} is not supported here, the layer is left"
                      f" out; there are {', '.join(sorted(LAYERS))}")
 

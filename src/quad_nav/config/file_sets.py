@@ -24,12 +24,12 @@ from quad_nav.config.files import (
     files_of,
     top_level,
 )
-from quad_nav.config.planners import NAVFN, OTHER_PLANNERS, TRAJECTORY_PLANNER
+from quad_nav.config.planners import planner_keys
 from quad_nav.errors import InputError
 
 _COSTMAPS = ("global_costmap", "local_costmap")
 _OF_NODE = {parameter.name for parameter in tables.NAVIGATOR.parameters} | {
-    "recovery_behaviors", TRAJECTORY_PLANNER, NAVFN, *OTHER_PLANNERS, *_COSTMAPS}
+    "recovery_behaviors", *planner_keys({}), *_COSTMAPS}
 _OF_COSTMAP = {parameter.name for table in (
     costmap_tables.COSTMAP, costmap_tables.OBSTACLE_LAYER, costmap_tables.INFLATION_LAYER)
     for parameter in table.parameters} | {"plugins", "map_type", "static_map"}

@@ -2,11 +2,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, Iterable, List, Mapping, Tuple
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple
 
 from quad_nav.config import costmap_tables as tables
 from quad_nav.config.notes import CAUTION, Notes, join
-from quad_nav.config.reader import Namespace, fields, inherited, settle, subtree
+from quad_nav.config.reader import Namespace, check_class, fields, inherited, settle, subtree
 from quad_nav.config.spec import Table
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import LayerParams
@@ -14,6 +14,7 @@ from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
+from quad_nav.plugins import LAYER, Parameters, PluginLayerParams, is_dotted, load_class
 
 Chain = Tuple[Tuple[str, Mapping[str, Any]], ...]
 _DATA_TYPES = ("LaserScan", "PointCloud", "PointCloud2")
@@ -50,6 +51,9 @@ def settle_layer(costmap: Namespace, costmap_path: str, name: str, layer_type: s
     """
     path = join(costmap_path, name)
     layer = subtree(costmap, name, costmap_path, notes)
+    if layer_type not in LAYERS:
+        _settle_plugin(layer, path, costmap_path, name, layer_type, notes)
+        return
     table = LAYERS[layer_type].table
     if table not in (tables.OBSTACLE_LAYER, tables.VOXEL_LAYER):
         settle(layer, path, table, notes)
@@ -63,6 +67,25 @@ def settle_layer(costmap: Namespace, costmap_path: str, name: str, layer_type: s
         _settle_source(layer, path, source, notes)
     _take_ranges_from_above(layer, path, chain, notes)
     settle(layer, path, table, notes, also_known=described.union(sources))
+
+
+def layer_params(costmap: Mapping[str, Any], costmap_path: str, name: str,
+                 layer_type: str) -> Optional[LayerParams]:
+    """The dataclass of a layer of a settled costmap; None for a type that is not here."""
+    if layer_type in LAYERS:
+        return LAYERS[layer_type].params(costmap, name)
+    if not is_dotted(layer_type):
+        return None
+    written = Parameters(costmap.get(name, {}), join(costmap_path, name))
+    return PluginLayerParams(enabled=written.get("enabled", True), parameters=written,
+                             plugin_class=load_class(layer_type, LAYER))
+
+
+def _settle_plugin(layer: Namespace, path: str, costmap_path: str, name: str, layer_type: str,
+                   notes: Notes) -> None:
+    """A layer of the user's knows its parameters itself, but for the switch that all have."""
+    settle(layer, path, Table(fixed=(tables.ENABLED,)), notes, also_known=layer)
+    check_class(layer_type, LAYER, join(costmap_path, "plugins", name), notes)
 
 
 def _source_names(layer: Mapping[str, Any]) -> List[str]:

@@ -11,6 +11,7 @@ ERROR = "error"  # nothing flies with it
 UNKNOWN = "unknown"  # move_base does not know the key either
 UNSUPPORTED = "unsupported"  # move_base knows it, this package does not
 IGNORED = "ignored"  # the original reads past it as well
+UNUSED = "unused"  # of a planner that does not fly
 CLAMPED = "clamped"  # the value in force is another one
 RENAMED = "renamed"  # an old name, still honoured
 CAUTION = "caution"  # legal, and probably not what was meant
@@ -63,6 +64,11 @@ class Notes:
     def moved(self, path: str, written_at: str) -> None:
         """The value at ``path`` was written at another place; complaints name that one."""
         self._moved[path] = self._moved.get(written_at, written_at)
+
+    @property
+    def problems(self) -> List[str]:
+        """The faults as lines."""
+        return list(map(str, self.faults))
 
     def problem(self, path: str, text: str) -> None:
         fault = self._about(path, ERROR, text)

@@ -1,103 +1,194 @@
-"""The trees of the planners: which plugin flies, and TrajectoryPlannerROS's old names."""
+"""The trees of the planners: which ones fly, and with which namespaces.
+
+A planner of another kind is one line in ``GLOBAL_PLANNERS`` or
+``LOCAL_PLANNERS``, and one in ``assembly``.
+"""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Dict, Mapping, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
-from quad_nav.config import tables
-from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, UNSUPPORTED, Notes, join
-from quad_nav.config.reader import Namespace, settle, subtree
+from quad_nav.config import global_planner_tables, tables
+from quad_nav.config.dwa_table import DWA_TABLE, LATCH, dwa_params, settle_dwa
+from quad_nav.config.notes import RENAMED, UNSUPPORTED, UNUSED, Notes
+from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
 from quad_nav.config.spec import Table
+from quad_nav.config.trajectory_planner_tree import (
+    TRAJECTORY_PLANNER,
+    settle_trajectory_planner,
+    trajectory_planner_params,
+)
+from quad_nav.plan.carrot import CarrotParams
+from quad_nav.plan.global_planner import SearchPlannerParams
+from quad_nav.plan.navfn import NavfnParams
+from quad_nav.plugins import (
+    GLOBAL_PLANNER,
+    LOCAL_PLANNER,
+    Interface,
+    Parameters,
+    Plugin,
+    is_dotted,
+    load_class,
+    plugin_name,
+)
 
-TRAJECTORY_PLANNER = "TrajectoryPlannerROS"
-NAVFN = "NavfnROS"
-
-# What flies here, by the parameter that names it; the first one stands in for the others.
-SUPPORTED: Dict[str, str] = {
-    "base_global_planner": tables.GLOBAL_PLANNER,
-    "base_local_planner": tables.LOCAL_PLANNER,
-}
-# Namespaces of planners that people configure beside the one that they fly.
-OTHER_PLANNERS = ("DWAPlannerROS", "GlobalPlanner", "CarrotPlanner", "TebLocalPlannerROS",
-                  "EBandPlannerROS", "DWBLocalPlanner", "SBPLLatticePlanner")
+SEARCH_PLANNER = "global_planner/GlobalPlanner"
+CARROT = "carrot_planner/CarrotPlanner"
+DWA_PLANNER = "dwa_local_planner/DWAPlannerROS"
 
 
 @dataclass(frozen=True)
-class Speeds:
-    """The parameters of a local planner that say how fast the robot may go and turn."""
+class PlannerType:
+    """One planner: its table, and what makes of the tree what the original makes of it.
+
+    ``settle`` brings the planner's namespace into the state in which the original
+    leaves it, ``params`` makes the dataclass of a settled tree. ``inherited`` are
+    parameters that may stand at the node's own level as well.
+    """
 
     table: Table
-    translation: Tuple[str, ...]
-    rotation: Tuple[str, ...]
+    settle: Callable[[Namespace, Notes], None]
+    params: Callable[[Mapping[str, Any]], Any]
+    inherited: Tuple[str, ...] = ()
 
 
-# By the planner's namespace.
-SPEEDS: Dict[str, Speeds] = {
-    TRAJECTORY_PLANNER: Speeds(
-        tables.TRAJECTORY_PLANNER, translation=("max_vel_x", "min_vel_x", "escape_vel"),
-        rotation=("max_vel_theta", "min_vel_theta", "min_in_place_vel_theta",
-                  "max_rotational_vel")),
+def _plain(plugin: str, table: Table, params: Callable[..., Any]) -> PlannerType:
+    """A planner whose namespace holds what its table says, and nothing else."""
+    name = plugin_name(plugin)
+    return PlannerType(
+        table,
+        settle=lambda tree, notes: settle(subtree(tree, name, "", notes), name, table, notes),
+        params=lambda tree: params(**fields(tree.get(name, {}), table.parameters)))
+
+
+# The first of each flies in the place of planners that are not here.
+GLOBAL_PLANNERS: Dict[str, PlannerType] = {
+    tables.GLOBAL_PLANNER: _plain(tables.GLOBAL_PLANNER, tables.NAVFN, NavfnParams),
+    SEARCH_PLANNER: _plain(
+        SEARCH_PLANNER, global_planner_tables.SEARCH_PLANNER, SearchPlannerParams),
+    CARROT: _plain(CARROT, global_planner_tables.CARROT, CarrotParams),
+}
+LOCAL_PLANNERS: Dict[str, PlannerType] = {
+    tables.LOCAL_PLANNER: PlannerType(
+        tables.TRAJECTORY_PLANNER, settle_trajectory_planner, trajectory_planner_params),
+    DWA_PLANNER: PlannerType(DWA_TABLE, settle_dwa, dwa_params, inherited=(LATCH.name,)),
 }
 
-_RENAMED: Dict[str, str] = {
-    "pdist_scale": "path_distance_bias",
-    "gdist_scale": "goal_distance_bias",
-    "min_in_place_rotational_vel": "min_in_place_vel_theta",
+
+@dataclass(frozen=True)
+class Slot:
+    """A parameter that names a planner: which ones there are, and what a user's has to be."""
+
+    types: Mapping[str, PlannerType]
+    interface: Interface
+
+
+SLOTS: Dict[str, Slot] = {
+    "base_local_planner": Slot(LOCAL_PLANNERS, LOCAL_PLANNER),
+    "base_global_planner": Slot(GLOBAL_PLANNERS, GLOBAL_PLANNER),
 }
+# Namespaces of planners that people configure beside the one that they fly.
+_OTHER_PLANNERS = ("TebLocalPlannerROS", "EBandPlannerROS", "DWBLocalPlanner",
+                   "SBPLLatticePlanner")
 _DEFAULT_RATE_HZ = 20.0
+
+
+def planner_keys(tree: Mapping[str, Any]) -> List[str]:
+    """What planners may have at the node's level: namespaces, and what the chosen inherit."""
+    keys = list(_OTHER_PLANNERS)
+    for key, slot in SLOTS.items():
+        keys += map(plugin_name, slot.types)
+        name = tree.get(key)
+        if isinstance(name, str):
+            keys.append(plugin_name(name))
+            keys += slot.types[name].inherited if name in slot.types else ()
+    return keys
 
 
 def settle_planner_names(tree: Namespace, notes: Notes) -> None:
     """Replaces planners that do not fly here by those that do, and says so."""
-    for key, supported in SUPPORTED.items():
+    for key, slot in SLOTS.items():
         name = tree.get(key)
-        if not isinstance(name, str) or name == supported:
+        if not isinstance(name, str) or name in slot.types:
             continue
-        if name == supported.split("/")[1]:
-            notes.remark(key, RENAMED, f"{name} is called {supported} today")
+        if is_dotted(name):
+            check_class(name, slot.interface, key, notes)
+            continue
+        tree[key] = next((known for known in slot.types if plugin_name(known) == name), None)
+        if tree[key] is not None:
+            notes.remark(key, RENAMED, f"{name} is called {tree[key]} today")
         else:
+            tree[key] = next(iter(slot.types))
             notes.remark(key, UNSUPPORTED,
-                         f"{name} is not supported here; {supported} flies instead")
-        tree[key] = supported
+                         f"{name} is not supported here; {tree[key]} flies instead")
 
 
 def settle_planners(tree: Namespace, notes: Notes) -> None:
-    """Brings the planners' namespaces into the state in which the original leaves them."""
-    planner = subtree(tree, TRAJECTORY_PLANNER, "", notes)
-    for old, new in _RENAMED.items():
-        if old in planner:
-            _take_old_name(planner, old, new, notes)
-    settle(planner, TRAJECTORY_PLANNER, tables.TRAJECTORY_PLANNER, notes, also_known=_RENAMED)
-    if planner.get("meter_scoring") is False:
-        notes.remark(join(TRAJECTORY_PLANNER, "meter_scoring"), IGNORED,
-                     "ignored by move_base: distances are always scored in metres")
-    if isinstance(planner.get("escape_vel"), float) and planner["escape_vel"] > 0.0:
-        notes.remark(join(TRAJECTORY_PLANNER, "escape_vel"), CAUTION,
-                     "the robot escapes forwards: a velocity below 0 backs up")
-    settle(subtree(tree, NAVFN, "", notes), NAVFN, tables.NAVFN, notes)
+    """Brings the chosen planners' namespaces into the state in which the original leaves them."""
+    chosen = {plugin_name(tree[key]): key for key in SLOTS if isinstance(tree[key], str)}
+    for name, key in chosen.items():
+        own = planner_type(tree, key)
+        if own is not None:
+            own.settle(tree, notes)
+        else:  # a user's planner knows its parameters itself
+            subtree(tree, name, "", notes)
+    flyable = {plugin_name(name): key for key, slot in SLOTS.items() for name in slot.types}
+    for name in [name for name in tree if name not in chosen]:
+        if name in flyable:
+            key = flyable[name]
+            _settle_unused(tree, name, f"unused: {key} is {tree[key]}", notes)
+        elif name in _OTHER_PLANNERS:
+            notes.remark(name, UNSUPPORTED, "no such planner flies here, nothing below is read")
 
 
-def local_planner_namespace(tree: Mapping[str, Any]) -> str:
-    """The namespace of the local planner that flies, of a settled tree."""
-    return tree["base_local_planner"].split("/")[-1]
+def planner_type(tree: Mapping[str, Any], key: str) -> Optional[PlannerType]:
+    """The type of the planner that a settled tree names, None for a user's."""
+    return SLOTS[key].types.get(tree[key])
+
+
+def planner_params(tree: Mapping[str, Any], key: str) -> Any:
+    """The dataclass of the planner that a settled tree names, or the user's ``Plugin``."""
+    own = planner_type(tree, key)
+    if own is not None:
+        return own.params(tree)
+    name = plugin_name(tree[key])
+    return Plugin(load_class(tree[key], SLOTS[key].interface),
+                  Parameters(tree.get(name, {}), name))
+
+
+def reconfigurable_planners(tree: Mapping[str, Any]) -> Dict[str, Table]:
+    """Namespace -> table of the chosen planners that can be reconfigured, the local one first."""
+    found = {}
+    for key in SLOTS:
+        own = planner_type(tree, key)
+        if own is not None and own.table.reconfigurable:
+            found[plugin_name(tree[key])] = own.table
+    return found
+
+
+def local_planner_frequency(tree: Mapping[str, Any]) -> Any:
+    """The local planner's own ``controller_frequency``, None where there is none."""
+    key = "base_local_planner"
+    if planner_type(tree, key) is None:
+        return None
+    return tree[plugin_name(tree[key])].get("controller_frequency")
 
 
 def local_planner_period_s(tree: Mapping[str, Any]) -> float:
     """The period that rollouts reckon with.
 
-    The original looks for ``controller_frequency`` from TrajectoryPlannerROS
+    The original looks for ``controller_frequency`` from the local planner
     upwards, and assumes 20 Hz when it is missing or not positive.
     """
-    own = tree[TRAJECTORY_PLANNER].get("controller_frequency")
+    own = local_planner_frequency(tree)
     rate_hz = tree["controller_frequency"] if own is None else own
     return 1.0 / rate_hz if rate_hz > 0.0 else 1.0 / _DEFAULT_RATE_HZ
 
 
-def _take_old_name(planner: Namespace, old: str, new: str, notes: Notes) -> None:
-    place = join(TRAJECTORY_PLANNER, old)
-    if new in planner:
-        notes.remark(place, IGNORED, f"ignored by move_base: {new} is there as well")
-        return
-    planner[new] = planner[old]
-    notes.moved(join(TRAJECTORY_PLANNER, new), place)
-    notes.remark(place, RENAMED, f"called {new} today")
+def _settle_unused(tree: Namespace, name: str, reason: str, notes: Notes) -> None:
+    if name == TRAJECTORY_PLANNER:
+        planner = subtree(tree, name, "", notes)
+        settle(planner, name, Table(fixed=tables.ROTATE_FROM_PLANNER), notes, also_known=planner)
+        reason += "; recoveries that turn take its limits all the same"
+    notes.remark(name, UNUSED, reason)
+

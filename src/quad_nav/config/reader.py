@@ -11,6 +11,8 @@ from typing import Any, Dict, Iterable, Mapping, Tuple
 
 from quad_nav.config.notes import CLAMPED, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.spec import Parameter, Table, Unusable
+from quad_nav.errors import InputError
+from quad_nav.plugins import Interface, load_class
 
 Namespace = Dict[str, Any]
 
@@ -92,6 +94,15 @@ def subtree(tree: Namespace, name: str, path: str, notes: Notes) -> Namespace:
         notes.problem(join(path, name), f"{value!r} is a value; expected a namespace of parameters")
         value = tree[name] = {}
     return value
+
+
+def check_class(name: str, interface: Interface, place: str, notes: Notes) -> None:
+    """Problems for everything that keeps a user's class from being what it has to be."""
+    try:
+        load_class(name, interface)
+    except InputError as error:
+        for problem in error.problems:
+            notes.problem(place, problem)
 
 
 def inherited(name: str, chain: Iterable[Tuple[str, Mapping[str, Any]]]) -> Tuple[str, Any]:

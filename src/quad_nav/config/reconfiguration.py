@@ -6,16 +6,11 @@ from dataclasses import replace
 from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config import costmap_tables, tables
-from quad_nav.config.configuration import (
-    COSTMAPS,
-    Configuration,
-    navigator_params,
-    trajectory_planner_params,
-)
+from quad_nav.config.configuration import COSTMAPS, Configuration, navigator_params
 from quad_nav.config.costmaps import costmap_params
 from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
-from quad_nav.config.planners import SUPPORTED, TRAJECTORY_PLANNER
+from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
 from quad_nav.config.spec import Parameter, Unusable
 from quad_nav.errors import InputError
 
@@ -28,7 +23,7 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
 
     Namespaces are relative to the node: "" is move_base itself.
     """
-    namespaces = {"": tables.NAVIGATOR, TRAJECTORY_PLANNER: tables.TRAJECTORY_PLANNER}
+    namespaces = {"": tables.NAVIGATOR, **reconfigurable_planners(configuration.tree)}
     for costmap in COSTMAPS:
         namespaces[costmap] = costmap_tables.COSTMAP
         for layer, table in layer_tables(configuration.tree[costmap]["plugins"]).items():
@@ -58,7 +53,7 @@ def updated(configuration: Configuration, namespace: str,
     if parameters is None:
         names = ", ".join(repr(name) for name in reconfigurable(configuration))
         raise InputError([f"{namespace}: nothing to reconfigure; expected one of {names}"])
-    checked = _checked(parameters, namespace, changes)
+    checked = _checked(parameters, namespace, changes, configuration.tree)
     if checked.get(_RESTORE):
         start = _below(configuration.tree_at_start, namespace)
         checked = {parameter.name: start[parameter.name] for parameter in parameters}
@@ -68,7 +63,7 @@ def updated(configuration: Configuration, namespace: str,
 
 
 def _checked(parameters: Tuple[Parameter, ...], namespace: str,
-             changes: Mapping[str, Any]) -> Dict[str, Any]:
+             changes: Mapping[str, Any], tree: Mapping[str, Any]) -> Dict[str, Any]:
     known = {parameter.name: parameter for parameter in parameters}
     checked: Dict[str, Any] = {}
     problems: List[str] = []
@@ -78,8 +73,8 @@ def _checked(parameters: Tuple[Parameter, ...], namespace: str,
         place = join(namespace, name)
         if name not in known:
             problems.append(f"{place}: unknown; expected one of {', '.join(known)}")
-        elif name in SUPPORTED and value != SUPPORTED[name]:
-            problems.append(f"{place}: {value!r} is not supported here; expected {SUPPORTED[name]}")
+        elif name in SLOTS and value != tree[name]:
+            problems.append(f"{place}: {value!r} cannot take over in flight; expected {tree[name]}")
         else:
             try:
                 checked[name] = _clamped(known[name], value)
@@ -103,11 +98,11 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
     if namespace == "":
         listed = configuration.navigator.recovery_behaviors
         return replace(configuration, navigator=navigator_params(tree, listed, given=tree))
-    if namespace == TRAJECTORY_PLANNER:
-        planner = trajectory_planner_params(tree[TRAJECTORY_PLANNER])
-        return replace(configuration, trajectory_planner=planner)
+    if namespace in reconfigurable_planners(tree):
+        return replace(configuration, global_planner=planner_params(tree, "base_global_planner"),
+                       local_planner=planner_params(tree, "base_local_planner"))
     costmap = namespace.split("/")[0]
-    params = costmap_params(tree[costmap])
+    params = costmap_params(tree, costmap)
     if costmap == "global_costmap":
         return replace(configuration, global_costmap=params)
     return replace(configuration, local_costmap=params)

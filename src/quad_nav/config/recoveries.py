@@ -1,17 +1,18 @@
 """The recovery behaviours: move_base's default sequence, or a list of one's own."""
 from __future__ import annotations
 
-import difflib
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from quad_nav.config import tables
 from quad_nav.config.costmap_tables import COSTMAP
-from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
-from quad_nav.config.planners import SPEEDS, TRAJECTORY_PLANNER, local_planner_namespace
-from quad_nav.config.reader import Namespace, fields, settle, subtree
+from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
+from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
 from quad_nav.config.spec import Table
+from quad_nav.config.speed_limits import check_slow, slow_params
+from quad_nav.config.trajectory_planner_tree import TRAJECTORY_PLANNER
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
 from quad_nav.recovery import (
     DEFAULT_LAYER_NAMES,
     ClearCostmapParams,
@@ -19,7 +20,7 @@ from quad_nav.recovery import (
     RotateParams,
 )
 
-RecoveryParams = Union[ClearCostmapParams, RotateParams, MoveSlowAndClearParams]
+RecoveryParams = Union[ClearCostmapParams, RotateParams, MoveSlowAndClearParams, Plugin]
 NamedTypes = Tuple[Tuple[str, str], ...]
 
 CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
@@ -27,7 +28,6 @@ ROTATE = "rotate_recovery/RotateRecovery"
 MOVE_SLOW = "move_slow_and_clear/MoveSlowAndClear"
 _TABLES: Dict[str, Table] = {
     CLEAR: tables.CLEAR_COSTMAP, ROTATE: tables.ROTATE, MOVE_SLOW: tables.MOVE_SLOW}
-_SPEED_NAMES = {"max_trans_param_name": "max_trans_vel", "max_rot_param_name": "max_rot_vel"}
 _CONSERVATIVE, _AGGRESSIVE, _ROTATE = "conservative_reset", "aggressive_reset", "rotate_recovery"
 _AFFECTED_MAPS = ("local", "global", "both")
 
@@ -46,12 +46,14 @@ def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         if name not in tree and listed is None:
             continue
         namespace = subtree(tree, name, "", notes)
+        if kind not in _TABLES:
+            continue  # a behaviour of the user's knows its parameters itself
         layers = ("layer_names",) if kind == CLEAR else ()
         settle(namespace, name, _TABLES[kind], notes, also_known=layers)
         if kind == CLEAR:
             _check_clearing(namespace, name, notes)
         elif kind == MOVE_SLOW:
-            _check_slow(namespace, name, local_planner_namespace(tree), notes)
+            check_slow(namespace, name, tree["base_local_planner"], notes)
     return listed
 
 
@@ -59,17 +61,7 @@ def recoveries(tree: Mapping[str, Any], listed: Optional[NamedTypes],
                costmaps: Tuple[CostmapParams, ...]) -> Tuple[Tuple[str, RecoveryParams], ...]:
     """(name, parameters) in the order in which they are tried, of a settled tree."""
     sequence = _default_sequence(tree) if listed is None else listed
-    return tuple((name, _params(kind, tree.get(name, {}), tree, costmaps))
-                 for name, kind in sequence)
-
-
-def _params(kind: str, namespace: Mapping[str, Any], tree: Mapping[str, Any],
-            costmaps: Tuple[CostmapParams, ...]) -> RecoveryParams:
-    if kind == CLEAR:
-        return _clear_params(namespace, costmaps)
-    if kind == MOVE_SLOW:
-        return _slow_params(namespace, local_planner_namespace(tree))
-    return _rotate_params(namespace, tree[TRAJECTORY_PLANNER])
+    return tuple((name, _params(name, kind, tree, costmaps)) for name, kind in sequence)
 
 
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
@@ -120,6 +112,9 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         else:
             listed[entry["name"]] = _full_type(entry["type"])
     for name in [name for name, kind in listed.items() if kind not in _TABLES]:
+        if is_dotted(listed[name]):
+            check_class(listed[name], RECOVERY, join("recovery_behaviors", name), notes)
+            continue
         notes.remark(join("recovery_behaviors", name), UNSUPPORTED,
                      f"{listed.pop(name)} is not supported here, the behaviour is left out;"
                      f" there are {', '.join(_TABLES)}")
@@ -154,40 +149,16 @@ def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
                       " names of layers, as in [obstacle_layer]")
 
 
-def _check_slow(namespace: Namespace, name: str, planner: str, notes: Notes) -> None:
-    """Names that fit another planner than the one that flies; its speed is limited anyway."""
-    given = namespace.get("planner_namespace", planner)
-    if isinstance(given, str) and given.strip("/") not in ("", planner):
-        notes.remark(join(name, "planner_namespace"), CAUTION,
-                     f"{given} does not fly here: {planner} is limited")
-        return
-    known = _speed_fields(planner)
-    for key, original in _SPEED_NAMES.items():
-        parameter = namespace.get(key, "")
-        if isinstance(parameter, str) and parameter not in ("", original, *known):
-            nearest = difflib.get_close_matches(parameter, known, n=1)
-            notes.remark(join(name, key), CAUTION,
-                         f"{planner} has no speed of the name {parameter}", *nearest)
-
-
-def _speed_fields(planner: str) -> Dict[str, str]:
-    """Parameter -> field of what a speed limit could be put on."""
-    return {parameter.name: parameter.field for parameter in SPEEDS[planner].table.parameters
-            if parameter.unit in ("m/s", "rad/s") and parameter.kind == "double"}
-
-
-def _slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearParams:
-    """The limits hold for the whole planner: one that is let go backwards fast is not slow."""
-    fields_of, speeds = _speed_fields(planner), SPEEDS[planner]
-
-    def limited(names: Tuple[str, ...], key: str) -> Tuple[str, ...]:
-        names = (*names, namespace.get(key, ""))
-        return tuple(dict.fromkeys(fields_of[name] for name in names if name in fields_of))
-
-    return MoveSlowAndClearParams(
-        translation_fields=limited(speeds.translation, "max_trans_param_name"),
-        rotation_fields=limited(speeds.rotation, "max_rot_param_name"),
-        **fields(namespace, tables.MOVE_SLOW.parameters))
+def _params(name: str, kind: str, tree: Mapping[str, Any],
+            costmaps: Tuple[CostmapParams, ...]) -> RecoveryParams:
+    namespace = tree.get(name, {})
+    if kind == CLEAR:
+        return _clear_params(namespace, costmaps)
+    if kind == MOVE_SLOW:
+        return slow_params(namespace, tree["base_local_planner"])
+    if kind == ROTATE:
+        return _rotate_params(namespace, tree.get(TRAJECTORY_PLANNER, {}))
+    return Plugin(load_class(kind, RECOVERY), Parameters(namespace, name))
 
 
 def _clear_params(namespace: Mapping[str, Any],

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from typing import Iterable, List, Tuple
 
-from quad_nav.config import costmap_tables, tables
+from quad_nav.config import costmap_tables, global_planner_tables, tables
+from quad_nav.config.dwa_table import DWA_TABLE
 from quad_nav.config.spec import Parameter, Table
 
 _HEAD = """# Parameters
@@ -46,7 +47,10 @@ original ignores, old names.
 * `map_type: voxel` makes the `obstacle_layer` of a costmap without `plugins` a
   `costmap_2d::VoxelLayer`. Voxel parameters at the costmap's level, too, replace the layer's own.
 * Layers, planners and behaviours of other packages are left out, or replaced by the ones that fly
-  here.
+  here. Planners, layers and behaviours of your own are named as Python classes: see
+  [plugins](plugins.md).
+* Only the namespaces of the chosen planners are read; a turning recovery takes its limits from
+  `TrajectoryPlannerROS` whatever the local planner.
 """
 
 
@@ -60,8 +64,14 @@ def reference() -> str:
 
 def _sections() -> Iterable[Tuple[str, str, Table]]:
     yield "move_base", "At the node's level.", tables.NAVIGATOR
-    yield "TrajectoryPlannerROS", "The local planner.", tables.TRAJECTORY_PLANNER
-    yield "NavfnROS", "The global planner.", tables.NAVFN
+    yield ("TrajectoryPlannerROS", f"The local planner `{tables.LOCAL_PLANNER}`.",
+           tables.TRAJECTORY_PLANNER)
+    yield "DWAPlannerROS", "The local planner `dwa_local_planner/DWAPlannerROS`.", DWA_TABLE
+    yield "NavfnROS", f"The global planner `{tables.GLOBAL_PLANNER}`.", tables.NAVFN
+    yield ("GlobalPlanner", "The global planner `global_planner/GlobalPlanner`.",
+           global_planner_tables.SEARCH_PLANNER)
+    yield ("CarrotPlanner", "The global planner `carrot_planner/CarrotPlanner`: straight for the"
+           " goal.", global_planner_tables.CARROT)
     yield "Costmaps", "Below `global_costmap` and `local_costmap`.", costmap_tables.COSTMAP
     yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", costmap_tables.OBSTACLE_LAYER)
     yield ("Voxel layer", "`costmap_2d::VoxelLayer`.", costmap_tables.VOXEL_LAYER)

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -30,16 +30,7 @@ class Control:
 
 
 class LocalPlanner(Protocol):
-    """Follows a global plan over the local costmap.
-
-    ``params`` is a frozen dataclass of the planner's own.
-    """
-
-    params: Any
-
-    def set_params(self, params: Any) -> None:
-        """Take other parameters; the plan stays."""
-        ...
+    """Follows a global plan over the local costmap."""
 
     def set_plan(self, plan: np.ndarray) -> None:
         """A new global plan, float64[n, 3] rows x, y, yaw in its own frame."""

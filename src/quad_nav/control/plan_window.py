@@ -30,6 +30,11 @@ def plan_in_window(plan: np.ndarray, spec: GridSpec, pose: Pose2D,
     return _transform(local_from_plan, plan[first:end])
 
 
+def plan_end(plan: np.ndarray, local_from_plan: Pose2D) -> Pose2D:
+    """The last pose of a plan, float64[n, 3] with n >= 1, in the local frame."""
+    return Pose2D(*_transform(local_from_plan, plan[-1:])[0].tolist())
+
+
 def count_passed(plan: np.ndarray, pose: Pose2D) -> int:
     """How many poses at a plan's beginning are 1 m or more away from the robot."""
     near = _distance2(plan, pose) < _PASSED_BEYOND_M

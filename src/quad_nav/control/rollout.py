@@ -23,6 +23,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
+from quad_nav.control.cost_cloud import cost_cloud
 from quad_nav.control.map_grid import distance_grids
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D, Twist2D
@@ -52,15 +53,15 @@ class Rollout:
                  footprint: np.ndarray, plan: np.ndarray, pose: Pose2D, velocity: Twist2D):
         self.spec = spec
         # The original keeps the robot's state in single precision.
-        self.pose = Pose2D(*_single(pose.x_m, pose.y_m, pose.yaw_rad))
-        self.velocity = _single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)
+        self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
+        self.velocity = single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)
         window = kernel_window(spec, costs)
         plan_xy = np.ascontiguousarray(plan[:, :2])
         self.goal_x_m, self.goal_y_m = plan_xy[-1]
         self.grids = distance_grids(window, plan_xy, footprint, self.pose)
         self.scene = kernel.Scene(
-            window, _highest_near(window, footprint), footprint, self.grids.path, self.grids.goal,
-            plan_xy)
+            window, highest_near(window, footprint_reach_m(footprint)), footprint, self.grids.path,
+            self.grids.goal, plan_xy)
         self.rules = _rules(params, spec.resolution_m)
 
     def score(self, samples: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -74,6 +75,11 @@ class Rollout:
         """Whether a command from the given state, in double precision, hits nothing."""
         return self._simulate(_triple(pose), _twist_triple(velocity),
                               _twist_triple(command)).cost >= 0.0
+
+    def is_free(self, pose: Pose2D) -> bool:
+        """Whether the footprint hits nothing at a pose."""
+        return collision.footprint_cost(
+            self.scene.window, self.scene.footprint, *_triple(pose)) >= 0.0
 
     def _simulate(self, pose: Triple, velocity: Triple, sample: Triple) -> Trajectory:
         row = np.array(sample)
@@ -95,14 +101,8 @@ class Rollout:
         """
         costs, path = self.scene.window.costs, self.grids.path
         usable = (path < costs.size) & (costs < INSCRIBED) & ~self.grids.within_robot
-        x, y = np.nonzero(usable.T)
-        centre_x = self.spec.origin_x_m + (x + 0.5) * self.spec.resolution_m
-        centre_y = self.spec.origin_y_m + (y + 0.5) * self.spec.resolution_m
-        parts = path[y, x], self.grids.goal[y, x], costs[y, x]
-        total = (self.rules.path_scale * parts[0] + self.rules.goal_scale * parts[1]
-                 + self.rules.occupancy_scale * parts[2])
-        return np.column_stack((centre_x, centre_y, np.zeros(len(x)), *parts, total)
-                               ).astype(np.float32)
+        return cost_cloud(self.spec, costs, path, self.grids.goal, usable, self.rules.path_scale,
+                          self.rules.goal_scale, self.rules.occupancy_scale)
 
 
 def kernel_window(spec: GridSpec, costs: np.ndarray) -> collision.Window:
@@ -122,13 +122,18 @@ def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray,
     return collision.footprint_cost(kernel_window(spec, costs), footprint, *_triple(pose))
 
 
-def _highest_near(window: collision.Window, footprint: np.ndarray) -> np.ndarray:
-    """The highest cost in a square around each cell that holds the footprint at any heading.
+def footprint_reach_m(footprint: np.ndarray) -> float:
+    """The farthest vertex of a footprint, float64[n, 2]."""
+    return float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
+
+
+def highest_near(window: collision.Window, reach_m: float) -> np.ndarray:
+    """The highest cost in a square around each cell that holds a footprint of that reach.
 
     uint8[H, W]; off the map counts as UNKNOWN. Where it is low the outline need
     not be drawn. The square is built up from maxima over two, four, ... cells.
     """
-    reach = int(np.hypot(footprint[:, 0], footprint[:, 1]).max() / window.resolution_m) + 1
+    reach = int(min(reach_m / window.resolution_m, max(window.costs.shape))) + 1
     size_y, size_x = window.costs.shape
     highest = np.full((size_y + 2 * reach, size_x + 2 * reach), UNKNOWN, dtype=np.uint8)
     highest[reach:-reach, reach:-reach] = window.costs
@@ -159,7 +164,8 @@ def _rules(params: TrajectoryPlannerParams, resolution_m: float) -> kernel.Rules
         simple_attractor=bool(params.simple_attractor))
 
 
-def _single(*values: float) -> Triple:
+def single(*values: float) -> Triple:
+    """Three numbers rounded to single precision."""
     x, y, z = (float(np.float32(value)) for value in values)
     return x, y, z
 

@@ -21,6 +21,7 @@ from quad_nav.control.velocity_search import choose_trajectory
 from quad_nav.errors import NoLocalPlan, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.grid import GridSpec
+from quad_nav.kernels.rollout import NO_WAY
 
 __all__ = ["TrajectoryPlanner", "TrajectoryPlannerParams"]
 
@@ -86,8 +87,9 @@ class TrajectoryPlanner:
             return Control(command, float("nan"), _NO_POSES, plan, goal_mode=True)
         best = self._search(spec, costs, pose, velocity)
         if best.cost < 0.0:
-            raise NoValidTrajectory(f"the global plan or its end in the local costmap is out of "
-                                    f"reach from ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+            reason = ("the global plan or its end in the local costmap is out of reach"
+                      if best.cost == NO_WAY else "every trajectory hits something")
+            raise NoValidTrajectory(f"{reason} from ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
     def cost_cloud(self) -> np.ndarray:

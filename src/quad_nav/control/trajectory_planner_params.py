@@ -62,3 +62,7 @@ class TrajectoryPlannerParams:
 
     # Global plan
     prune_plan: bool = True
+
+    # Mended faults; False is the original's behaviour
+    refuse_colliding_escape: bool = False  # escape backwards only where nothing is hit
+    predict_goal_turn: bool = False  # turn no farther in one control period than is left

@@ -8,7 +8,8 @@ In order, the first stage that yields a legal trajectory wins:
    the goal. While escaping only turns are tried.
 2. sideways, for a holonomic robot, by the same rule.
 3. backwards at ``escape_vel_mps``: taken even if it collides, unless path or
-   goal are out of reach.
+   goal are out of reach. With ``refuse_colliding_escape`` it must lead out of
+   the collision.
 """
 from __future__ import annotations
 
@@ -21,6 +22,7 @@ import numpy as np
 from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.rollout import Rollout, Trajectory, Triple
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.geometry import Pose2D
 from quad_nav.kernels.collision import COLLIDES
 from quad_nav.kernels.rollout import NO_WAY
 
@@ -76,7 +78,8 @@ def velocity_window(rollout: Rollout, params: TrajectoryPlannerParams,
     """
     period_s = control_period_s if params.dwa else params.sim_time_s
     vx, _, vtheta = rollout.velocity
-    to_goal_m = math.hypot(rollout.goal_x_m - rollout.pose.x_m, rollout.goal_y_m - rollout.pose.y_m)
+    to_goal_m = float(np.hypot(rollout.goal_x_m - rollout.pose.x_m,
+                               rollout.goal_y_m - rollout.pose.y_m))
     change_x, change_theta = (params.acc_lim_x_mps2 * period_s,
                               params.acc_lim_theta_radps2 * period_s)
     max_vx = min(params.max_vel_x_mps, to_goal_m / params.sim_time_s, vx + change_x)
@@ -170,12 +173,21 @@ def _escape(rollout: Rollout, params: TrajectoryPlannerParams,
             oscillation: Oscillation) -> Trajectory:
     trajectory = rollout.trajectory((params.escape_vel_mps, 0.0, 0.0))
     oscillation.forget_if_moved(rollout.pose, params.oscillation_reset_dist_m)
-    if trajectory.cost > NO_WAY:
+    is_refused = (params.refuse_colliding_escape and trajectory.cost == COLLIDES
+                  and not _leads_out(rollout, params))
+    if trajectory.cost > NO_WAY and not is_refused:
         oscillation.begin_escape(rollout.pose)
     _end_escape(rollout, params, oscillation)
-    if trajectory.cost == COLLIDES:
+    if trajectory.cost == COLLIDES and not is_refused:
         return Trajectory(trajectory.sample, _ESCAPE_COST, trajectory.points)
     return trajectory
+
+
+def _leads_out(rollout: Rollout, params: TrajectoryPlannerParams) -> bool:
+    """Whether the robot is free where the escape ends. It may begin in contact."""
+    x, y, yaw = rollout.pose.x_m, rollout.pose.y_m, rollout.pose.yaw_rad
+    back_m = math.copysign(params.escape_reset_dist_m, params.escape_vel_mps)
+    return rollout.is_free(Pose2D(x + back_m * math.cos(yaw), y + back_m * math.sin(yaw), yaw))
 
 
 def _settle(rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation,

@@ -1,182 +1,18 @@
-"""Loops of NavFn: the wavefront, and the descent of its potential.
+"""NavFn's own loop: the descent from the goal's cell to the robot's.
 
-Grids are flat arrays, cell = y * size_x + x. The maths is in ``plan/navfn.py``.
-All sums are float32 in the order that the recorded potentials demand.
+The wavefront is in ``wave.py``, the maths in ``plan/navfn.py``.
 """
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
 
+from quad_nav.kernels.descent import leaves_map, step_down
+
 OBSTACLE = 254            # cells of this cost are never entered
-NOT_REACHED = np.float32(1e10)
 NEUTRAL = 50              # cost of a free cell
-BUCKET_SIZE = 10000       # cells that one bucket holds; further ones are dropped
-CURRENT, AHEAD, LATER = 0, 1, 2
-
-_INVERSE_SQRT2 = 0.707106781
-_THRESHOLD_STEP = np.float32(2 * NEUTRAL)
-_STEP_CELLS = 0.5
-
-
-class Wave(NamedTuple):
-    """The state of a wavefront, changed in place."""
-
-    costs: np.ndarray      # uint8[n], 50..254
-    potential: np.ndarray  # float32[n]
-    pending: np.ndarray    # bool[n], cell is in a bucket
-    buckets: np.ndarray    # int64[3, BUCKET_SIZE], cells to be visited
-    counts: np.ndarray     # int64[3]
-    size_x: int
-
-
-@njit(cache=True, nogil=True)
-def _push(wave, bucket, cell):
-    if (0 <= cell < wave.costs.size and not wave.pending[cell] and wave.costs[cell] < OBSTACLE
-            and wave.counts[bucket] < BUCKET_SIZE):
-        wave.buckets[bucket, wave.counts[bucket]] = cell
-        wave.counts[bucket] += 1
-        wave.pending[cell] = True
-
-
-@njit(cache=True, nogil=True)
-def _arrival(wave, cell):
-    """Potential of a planar wave that arrives over the two lower neighbours."""
-    potential, size_x = wave.potential, wave.size_x
-    horizontal = min(potential[cell - 1], potential[cell + 1])
-    vertical = min(potential[cell - size_x], potential[cell + size_x])
-    lower = min(horizontal, vertical)
-    gap = np.float32(abs(horizontal - vertical))
-    cost = np.float32(wave.costs[cell])
-    if gap >= cost:
-        return np.float32(lower + cost)
-    ratio = np.float64(np.float32(gap / cost))
-    factor = np.float32(-0.2301 * ratio * ratio + 0.5307 * ratio + 0.7040)
-    return np.float32(lower + np.float32(cost * factor))
-
-
-@njit(cache=True, nogil=True)
-def _visit(wave, cell, start, heuristic, threshold):
-    """Lower one cell's potential; hand on the neighbours that may profit."""
-    if wave.costs[cell] >= OBSTACLE:
-        return
-    arrival = _arrival(wave, cell)
-    if arrival >= wave.potential[cell]:
-        return
-    wave.potential[cell] = arrival
-    priority = arrival
-    if heuristic:
-        priority = np.float32(arrival + _distance_cost(cell, start, wave.size_x))
-    bucket = AHEAD if priority < threshold else LATER
-    for offset in (-1, 1, -wave.size_x, wave.size_x):
-        neighbour = cell + offset
-        crossing = np.float32(_INVERSE_SQRT2 * np.float64(wave.costs[neighbour]))
-        if wave.potential[neighbour] > np.float32(priority + crossing):
-            _push(wave, bucket, neighbour)
-
-
-@njit(cache=True, nogil=True)
-def _distance_cost(cell, other, size_x):
-    return np.float32(math.hypot(cell % size_x - other % size_x,
-                                 cell // size_x - other // size_x) * NEUTRAL)
-
-
-@njit(cache=True, nogil=True)
-def _refill(wave, bucket):
-    """Empty a bucket into the current one."""
-    count = wave.counts[bucket]
-    wave.buckets[CURRENT, :count] = wave.buckets[bucket, :count]
-    wave.counts[CURRENT], wave.counts[bucket] = count, 0
-
-
-@njit(cache=True, nogil=True)
-def propagate(wave, source, start, max_cycles, stop_at_start, heuristic):
-    """Spread the potential from ``source``, at most ``max_cycles`` fronts.
-
-    Stops early when nothing is left, or, with ``stop_at_start``, when the
-    start cell has a potential. ``heuristic`` makes it A*.
-    """
-    wave.potential[source] = 0.0
-    for offset in (1, -1, -wave.size_x, wave.size_x):
-        _push(wave, CURRENT, source + offset)
-    threshold = np.float32(OBSTACLE)
-    if heuristic:
-        threshold = np.float32(threshold + _distance_cost(source, start, wave.size_x))
-    for _ in range(max_cycles):
-        if wave.counts[CURRENT] == 0 and wave.counts[AHEAD] == 0:
-            break
-        for k in range(wave.counts[CURRENT]):
-            wave.pending[wave.buckets[CURRENT, k]] = False
-        for k in range(wave.counts[CURRENT]):
-            _visit(wave, wave.buckets[CURRENT, k], start, heuristic, threshold)
-        _refill(wave, AHEAD)
-        if wave.counts[CURRENT] == 0:
-            threshold = np.float32(threshold + _THRESHOLD_STEP)
-            _refill(wave, LATER)
-        if stop_at_start and wave.potential[start] < NOT_REACHED:
-            break
-
-
-@njit(cache=True, nogil=True)
-def _gradient(potential, size_x, cell) -> Tuple[float, float]:
-    """Unit vector down the potential at a cell, (0, 0) where there is none."""
-    if cell < size_x or cell > potential.size - size_x - 1:
-        return 0.0, 0.0
-    return _slope(potential, cell, 1), _slope(potential, cell, size_x)
-
-
-@njit(cache=True, nogil=True)
-def _slope(potential, cell, stride):
-    before, here, after = potential[cell - stride], potential[cell], potential[cell + stride]
-    slope = np.float32(0.0)
-    if here >= NOT_REACHED:  # inside an obstacle: towards the reached side
-        if before < NOT_REACHED:
-            return np.float32(-OBSTACLE)
-        if after < NOT_REACHED:
-            return np.float32(OBSTACLE)
-        return slope
-    if before < NOT_REACHED:
-        slope += before - here
-    if after < NOT_REACHED:
-        slope += here - after
-    return np.float32(slope)
-
-
-@njit(cache=True, nogil=True)
-def _unit_gradient(potential, size_x, cell):
-    gx, gy = _gradient(potential, size_x, cell)
-    norm = math.hypot(gx, gy)
-    if norm > 0.0:
-        return np.float32(gx / norm), np.float32(gy / norm)
-    return np.float32(0.0), np.float32(0.0)
-
-
-@njit(cache=True, nogil=True)
-def _interpolated_gradient(potential, size_x, cell, dx, dy):
-    x00, y00 = _unit_gradient(potential, size_x, cell)
-    x10, y10 = _unit_gradient(potential, size_x, cell + 1)
-    x01, y01 = _unit_gradient(potential, size_x, cell + size_x)
-    x11, y11 = _unit_gradient(potential, size_x, cell + size_x + 1)
-    gx = (1.0 - dy) * ((1.0 - dx) * x00 + dx * x10) + dy * ((1.0 - dx) * x01 + dx * x11)
-    gy = (1.0 - dy) * ((1.0 - dx) * y00 + dx * y10) + dy * ((1.0 - dx) * y01 + dx * y11)
-    return np.float32(gx), np.float32(gy)
-
-
-@njit(cache=True, nogil=True)
-def _lowest_around(potential, size_x, cell):
-    """The lowest of a cell and its eight neighbours, and whether all nine are reached."""
-    lowest, all_reached = cell, True
-    for offset_y in (-size_x, 0, size_x):
-        for offset_x in (-1, 0, 1):
-            neighbour = cell + offset_y + offset_x
-            if not 0 <= neighbour < potential.size or potential[neighbour] >= NOT_REACHED:
-                all_reached = False
-            elif potential[neighbour] < potential[lowest]:
-                lowest = neighbour
-    return lowest, all_reached
 
 
 @njit(cache=True, nogil=True)
@@ -185,16 +21,6 @@ def _nearest(cell, dx, dy, size_x, size):
     step_x = int(math.copysign(math.floor(abs(dx) + 0.5), dx))
     step_y = int(math.copysign(math.floor(abs(dy) + 0.5), dy))
     return max(0, min(size - 1, cell + step_x + size_x * step_y))
-
-
-@njit(cache=True, nogil=True)
-def _carry(cell, offset, stride):
-    """Move whole cells of an offset into the cell index."""
-    if offset > 1.0:
-        cell, offset = cell + stride, np.float32(offset - 1.0)
-    if offset < -1.0:
-        cell, offset = cell - stride, np.float32(offset + 1.0)
-    return cell, offset
 
 
 @njit(cache=True, nogil=True)
@@ -209,20 +35,10 @@ def descend(potential, size_x, start, source, path):
         if potential[_nearest(cell, dx, dy, size_x, potential.size)] < NEUTRAL:
             path[k, 0], path[k, 1] = source % size_x, source // size_x
             return k + 1, True
-        if cell < size_x or cell > potential.size - size_x:
+        if leaves_map(potential, size_x, cell):
             return k, False
         path[k, 0], path[k, 1] = cell % size_x + dx, cell // size_x + dy
-        oscillates = k > 1 and path[k, 0] == path[k - 2, 0] and path[k, 1] == path[k - 2, 1]
-        lowest, all_reached = _lowest_around(potential, size_x, cell)
-        if oscillates or not all_reached:
-            cell, dx, dy = lowest, np.float32(0.0), np.float32(0.0)
-            if potential[cell] >= NOT_REACHED:
-                return k + 1, False
-            continue
-        gx, gy = _interpolated_gradient(potential, size_x, cell, dx, dy)
-        if gx == 0.0 and gy == 0.0:
+        goes_on, cell, dx, dy = step_down(potential, size_x, cell, dx, dy, path, k)
+        if not goes_on:
             return k + 1, False
-        scale = np.float32(_STEP_CELLS / math.hypot(gx, gy))
-        cell, dx = _carry(cell, np.float32(dx + gx * scale), 1)
-        cell, dy = _carry(cell, np.float32(dy + gy * scale), size_x)
     return path.shape[0], False

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from quad_nav.grid import FREE, LETHAL
@@ -17,8 +18,9 @@ def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
     ``max_cells``, measured along it; both of its ends are freed.
     """
     dx, dy = x1 - x0, y1 - y0
-    length = math.hypot(dx, dy)
-    scale = max_cells / length if length > max_cells else 1.0
+    scale = 1.0
+    if dx * dx + dy * dy > max_cells * max_cells:
+        scale = max_cells / math.hypot(dx, dy)
     along, across = abs(dx), abs(dy)
     step_along = 1 if dx > 0 else -1
     step_across = size_x if dy > 0 else -size_x
@@ -28,13 +30,13 @@ def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
     cell = y0 * size_x + x0
     error = along // 2
     for _ in range(int(scale * along)):
-        flat_costs[cell] = FREE
+        flat_costs[np.uint64(cell)] = FREE  # unsigned indices save the test for a negative one
         cell += step_along
         error += across
         if error >= along:
             cell += step_across
             error -= along
-    flat_costs[cell] = FREE
+    flat_costs[np.uint64(cell)] = FREE
 
 
 @njit(cache=True, nogil=True)
@@ -61,10 +63,12 @@ def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
 
 @njit(cache=True, nogil=True)
 def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points, range_m,
-               bounds):
+               cleared_from, bounds):
     """Free the cells between the sensor and each point, up to ``range_m``.
 
-    points: float32[n, 3] in the frame of the grid. ``bounds``, float64[4] (min x,
+    points: float32[n, 3] in the frame of the grid. ``cleared_from``, int32[H * W],
+    -1 at first, holds the cell from which the line to a cell has been cleared: a
+    slow robot's scans have most lines in common. ``bounds``, float64[4] (min x,
     min y, max x, max y in metres), grows by what was touched. A sensor outside the
     grid clears nothing: returns False.
     """
@@ -77,7 +81,8 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
     high_x, high_y = origin_x + size_x * resolution, origin_y + size_y * resolution
     max_cells = max(0.0, math.ceil(range_m / resolution))
     flat_costs = costs.reshape(-1)
-    last_x, last_y = -1, -1
+    start = np.int32(y0 * size_x + x0)
+    surely_near = (1.0 - 1e-9) * range_m * range_m
     for k in range(points.shape[0]):
         x, y = clip_to_grid(sensor_x, sensor_y, float(points[k, 0]), float(points[k, 1]),
                             origin_x, origin_y, high_x, high_y)
@@ -85,12 +90,15 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
         y1 = cell_index(y, origin_y, resolution, size_y)
         if x1 < 0 or y1 < 0:
             continue
-        if x1 != last_x or y1 != last_y:
+        end = np.uint64(y1 * size_x + x1)
+        if cleared_from[end] != start:
+            cleared_from[end] = start
             clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
-            last_x, last_y = x1, y1
         dx, dy = x - sensor_x, y - sensor_y
-        length = math.hypot(dx, dy)
-        scale = range_m / length if length > range_m else 1.0
+        scale = 1.0
+        if dx * dx + dy * dy > surely_near:  # hypot is slow, and most points are near
+            length = math.hypot(dx, dy)
+            scale = range_m / length if length > range_m else 1.0
         include(bounds, sensor_x + dx * scale, sensor_y + dy * scale)
     return True
 

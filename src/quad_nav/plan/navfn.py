@@ -29,8 +29,11 @@ from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, INSCRIBED, UNKNOWN, GridSpec
 from quad_nav.kernels import navfn as kernel
+from quad_nav.kernels import wave as wavefront
 
 Cell = Tuple[int, int]
+NOT_REACHED = float(wavefront.NOT_REACHED)  # where the wave did not come
+_RULES = wavefront.Rules(kernel.OBSTACLE, kernel.NEUTRAL, planar=True)
 
 
 @dataclass(frozen=True)
@@ -71,13 +74,13 @@ class Navfn:
         start_cell = spec.cell_of(start.x_m, start.y_m)
         if start_cell is None:
             raise StartOutsideMap(f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
-                                  f"the global costmap, {_extent(spec)}")
+                                  f"the global costmap, {spec.extent}")
         costs[start_cell[1], start_cell[0]] = FREE
         goal_cell = spec.cell_of(goal.x_m, goal.y_m)
         if goal_cell is None:
             if self.params.default_tolerance_m <= 0.0:
                 raise GoalOutsideMap(f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
-                                     f"the global costmap, {_extent(spec)}")
+                                     f"the global costmap, {spec.extent}")
             goal_cell = (0, 0)  # a border cell is never reached, so the wave covers the map
         self.potential = potential_from(navigation_costs(costs, self.params.allow_unknown),
                                         source=start_cell, target=goal_cell, stop_at_target=True)
@@ -104,7 +107,7 @@ class Navfn:
 
     def _is_reached(self, cell: Optional[Cell]) -> bool:
         assert self.potential is not None
-        return cell is not None and bool(self.potential[cell[1], cell[0]] < kernel.NOT_REACHED)
+        return cell is not None and bool(self.potential[cell[1], cell[0]] < NOT_REACHED)
 
     def _plan_to(self, spec: GridSpec, start_cell: Cell, end: Pose2D) -> np.ndarray:
         end_cell = spec.cell_of(end.x_m, end.y_m)
@@ -146,14 +149,13 @@ def potential_from(nav_costs: np.ndarray, source: Cell, target: Cell, stop_at_ta
     """
     size_y, size_x = nav_costs.shape
     cells = size_x * size_y
-    wave = kernel.Wave(
-        costs=nav_costs.ravel(), potential=np.full(cells, kernel.NOT_REACHED, dtype=np.float32),
-        pending=np.zeros(cells, dtype=np.bool_),
-        buckets=np.zeros((3, kernel.BUCKET_SIZE), dtype=np.int64),
-        counts=np.zeros(3, dtype=np.int64), size_x=size_x)
-    kernel.propagate(wave, _flat(source, size_x), _flat(target, size_x),
-                     max(cells // 20, size_x + size_y), stop_at_target, heuristic)
-    return wave.potential.reshape(nav_costs.shape)
+    source_cell, target_cell = _flat(source, size_x), _flat(target, size_x)
+    potential = np.full(cells, NOT_REACHED, dtype=np.float32)
+    first_front = wavefront.start_at_cell(potential, source_cell, size_x)
+    wavefront.propagate(nav_costs.ravel(), potential, first_front, _RULES, source_cell,
+                        target_cell, size_x, max(cells // 20, size_x + size_y), stop_at_target,
+                        heuristic)
+    return potential.reshape(nav_costs.shape)
 
 
 def path_from(potential: np.ndarray, start: Cell, source: Cell) -> Tuple[np.ndarray, bool]:
@@ -171,8 +173,3 @@ def path_from(potential: np.ndarray, start: Cell, source: Cell) -> Tuple[np.ndar
 
 def _flat(cell: Cell, size_x: int) -> int:
     return cell[1] * size_x + cell[0]
-
-
-def _extent(spec: GridSpec) -> str:
-    return (f"x {spec.origin_x_m:.2f} to {spec.origin_x_m + spec.size_x * spec.resolution_m:.2f}, "
-            f"y {spec.origin_y_m:.2f} to {spec.origin_y_m + spec.size_y * spec.resolution_m:.2f} m")

@@ -16,8 +16,9 @@ class GlobalPlanner(Protocol):
                   goal: Pose2D) -> np.ndarray:
         """A plan from start to goal, float64[n, 3] rows x, y, yaw.
 
-        ``costs`` is uint8[H, W] on ``spec``; start, goal and plan are in the
-        costmap's frame. Raises a ``PlanningError`` when there is no plan; a
-        plan returned is never empty.
+        ``costs`` is the global costmap's own uint8[H, W] on ``spec``; start, goal
+        and plan are in its frame. The last row is where the robot is to end, and
+        which way it is to look there. Raises a ``PlanningError`` when there is no
+        plan; a plan returned is never empty.
         """
         ...

@@ -57,9 +57,10 @@ class MoveSlowAndClear:
             elif not costmap.free_obstacles(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m):
                 messages.append(f"{name} costmap not cleared: it has no obstacle layer, or"
                                 f" ends within {params.clearing_distance_m:g} m of the robot")
-        if surroundings.pose_in_global is None:
+        limit = params.speed_limit
+        if surroundings.pose_in_global is None or not limit.greatest:
             return Step(done=True, message="; ".join(messages))
         messages.append(f"not above {params.limited_trans_speed_mps:g} m/s and"
                         f" {params.limited_rot_speed_radps:g} rad/s for the next"
                         f" {params.limited_distance_m:g} m")
-        return Step(done=True, message="; ".join(messages), speed_limit=params.speed_limit)
+        return Step(done=True, message="; ".join(messages), speed_limit=limit)

@@ -20,7 +20,7 @@ from move_base_msgs.msg import (
 from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator import Navigator
-from quad_nav.ros.nav_messages import pose_from_message, pose_stamped
+from quad_nav.ros.nav_messages import goal_from_message, pose_stamped
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
 from quad_nav.tick import Outcome
 
@@ -72,7 +72,7 @@ class GoalServer:
             pose_stamped(pose, self._global_frame, message.header.stamp))
 
     def _in_global_frame(self, message: PoseStamped) -> Pose3D:
-        pose = pose_from_message(message.pose)
+        pose = goal_from_message(message.pose)
         frame = message.header.frame_id
         if frame.lstrip("/") == self._global_frame:
             return pose

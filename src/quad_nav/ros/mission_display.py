@@ -11,12 +11,10 @@ from nav_msgs.msg import Path
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
+from quad_nav.geometry import Pose3D
 from quad_nav.mission.sequencer import Sequencer
-
-# As in rviz/quad_multi.rviz for the first two; then round again.
-COLOURS = ((32, 120, 220), (230, 110, 20), (40, 160, 60), (200, 50, 160),
-           (0, 170, 170), (210, 40, 50), (150, 140, 0), (120, 80, 200))
+from quad_nav.ros.nav_messages import planar_pose, pose_stamped
+from quad_nav.sim.colours import robot_rgba
 
 DIAMETER_M, CURRENT_DIAMETER_M, TEXT_HEIGHT_M = 0.30, 0.45, 0.35
 FLOWN_ALPHA, WAITING_ALPHA = 0.2, 0.75
@@ -55,18 +53,7 @@ def _goal_markers(robot: int, index: int, sequencer: Sequencer, altitude_m: floa
 
 
 def _colour(robot: int, alpha: float) -> ColorRGBA:
-    red, green, blue = COLOURS[robot % len(COLOURS)]
-    return ColorRGBA(red / 255.0, green / 255.0, blue / 255.0, alpha)
-
-
-def pose_stamped(pose: Pose2D, z_m: float, stamp: rospy.Time) -> PoseStamped:
-    """A pose in ``map`` as a message."""
-    message = PoseStamped()
-    message.header.frame_id, message.header.stamp = "map", stamp
-    position, orientation = message.pose.position, message.pose.orientation
-    position.x, position.y, position.z = pose.x_m, pose.y_m, z_m
-    orientation.z, orientation.w = quaternion_from_yaw(pose.yaw_rad)[2:]
-    return message
+    return ColorRGBA(*robot_rgba(robot, alpha))
 
 
 class FlownPath:
@@ -86,7 +73,7 @@ class FlownPath:
         """Take a pose in ``map``; publish when it is time."""
         stamp = rospy.Time.from_sec(stamp_s)
         if not self._poses or _apart_m(pose, self._poses[-1]) >= PATH_SPACING_M:
-            self._poses.append(pose_stamped(pose.to_2d(), pose.z_m, stamp))
+            self._poses.append(pose_stamped(planar_pose(pose.to_2d(), pose.z_m), "map", stamp))
             self._is_news = True
         if self._is_news and stamp_s >= self._next_s:
             self._is_news = False

@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.sequencer import NavigatorReport, Verdict
-from quad_nav.ros.mission_display import pose_stamped
+from quad_nav.ros.nav_messages import planar_pose, pose_stamped
 
 # A goal's id is stamped when the navigator receives it, on a clock that may lag behind ours.
 CLOCK_LAG_S = 0.5
@@ -82,7 +82,7 @@ class RobotLink(rospy.SubscribeListener):
     def send(self, pose: Pose2D) -> None:
         """Send a goal in ``map`` to the navigator."""
         now = rospy.Time.now()
-        self._goal = pose_stamped(pose, 0.0, now)
+        self._goal = pose_stamped(planar_pose(pose), "map", now)
         self._sent_s = now.to_sec()
         self.goals.publish(self._goal)
 

@@ -11,10 +11,12 @@ import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Dict, List, Mapping, Optional, Tuple
 
 import rospkg
 
+from quad_nav import config
 from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Clearance
 from quad_nav.mission.goal_file import (
@@ -72,8 +74,12 @@ def result_path(parameters: Mapping[str, Any]) -> Path:
     return Path(rospkg.get_log_dir()) / "quad" / f"mission-{stamp}-{os.getpid()}.json"
 
 
-def read_setup(parameters: Mapping[str, Any], name: str, result: Path) -> MissionSetup:
+def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
+               all_parameters: Mapping[str, Any] = MappingProxyType({})) -> MissionSetup:
     """The mission that a node's private parameters describe; ``result`` is its summary's place.
+
+    ``all_parameters`` is the whole parameter tree; the navigators' parts of it, ``move_base{i}``,
+    are checked as well, because a navigator that does not start is noticed late.
 
     Raises:
         InputError: every fault in the parameters, the scene and the goal files.
@@ -87,6 +93,7 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path) -> Missio
     radius_m = BODY_RADIUS_M if faults or problems else float(values["robot_radius"])
     check = _place_check(scene, radius_m) if scene else None
     robots = _robots(values, name, check, settings, problems)
+    problems += _navigator_faults(values["robots"], all_parameters)
     if problems:
         raise InputError(problems)
     clearance = _clearance(scene) if scene else None
@@ -151,6 +158,17 @@ def _scene(path: Any, problems: List[str]) -> Optional[Scene]:
     except InputError as error:
         problems += error.problems
         return None
+
+
+def _navigator_faults(count: Any, all_parameters: Mapping[str, Any]) -> List[str]:
+    problems: List[str] = []
+    for index in range(count if isinstance(count, int) else 0):
+        name = f"move_base{index}"
+        try:
+            config.load(all_parameters.get(name, {}), f"/{name}")
+        except InputError as error:
+            problems += error.problems
+    return problems
 
 
 def _clearance(scene: Scene) -> Clearance:

@@ -19,15 +19,19 @@ from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.errors import InputError, InvalidGoal, PlanningError
 from quad_nav.geometry import Pose3D, Twist2D
+from quad_nav.plugins import plugin_name
 from quad_nav.ros import sensors, static_maps
+from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
-from quad_nav.ros.nav_messages import path_message, pose_from_message
-from quad_nav.ros.plan_topics import PlanTopics, plugin_name
+from quad_nav.ros.nav_messages import goal_from_message, path_message
+from quad_nav.ros.plan_topics import PlanTopics
 from quad_nav.ros.reconfigure import serve_namespaces
+from quad_nav.ros.signals import init_node
 from quad_nav.ros.silence import SilenceWatch
 from quad_nav.ros.transforms import Transforms
 from quad_nav.tick import Located, State, Tick
+from quad_nav.warm_up import warm_up
 
 IDLE_POLL_S = 0.05  # how soon a goal for an idle navigator is noticed
 WARN_AGAIN_S = 5.0
@@ -65,8 +69,7 @@ class MoveBaseNode:
     # -- callbacks -----------------------------------------------------------------
 
     def _on_odometry(self, message: Odometry) -> None:
-        twist = message.twist.twist
-        self._velocity = Twist2D(twist.linear.x, twist.linear.y, twist.angular.z)
+        self._velocity = twist_from_message(message.twist.twist)
 
     def _on_reconfigure(self, namespace: str, changes: dict) -> config.Configuration:
         with self._lock:
@@ -100,9 +103,9 @@ class MoveBaseNode:
             raise rospy.ServiceException(
                 f"the goal is in frame '{request.goal.header.frame_id}', expected '{frame}'")
         try:
-            goal = pose_from_message(request.goal.pose).to_2d()
+            goal = goal_from_message(request.goal.pose).to_2d()
             if request.start.header.frame_id:
-                start = pose_from_message(request.start.pose).to_2d()
+                start = goal_from_message(request.start.pose).to_2d()
             else:
                 here = self._locate(self._navigator.global_costmap, rospy.get_time())
                 if here is None:
@@ -191,17 +194,18 @@ class MoveBaseNode:
 
 def main() -> int:
     """Exit status: 0 at shutdown, 2 for parameters that cannot be used."""
-    rospy.init_node("move_base")
+    init_node("move_base")
     name = rospy.get_name()
     try:
         configuration = config.load(rospy.get_param("~", {}), name)
+        for warning in configuration.warnings:
+            rospy.logwarn("%s", warning)
+        warm_up(configuration)
+        node = MoveBaseNode(configuration)
     except InputError as error:
         rospy.logfatal("%s: its parameters can't be used:\n%s", name, error)
         print(f"{name}: its parameters can't be used:\n{error}", file=sys.stderr)
         return EXIT_BAD_INPUT
-    for warning in configuration.warnings:
-        rospy.logwarn("%s", warning)
-    node = MoveBaseNode(configuration)
     try:
         node.spin()
     except rospy.ROSInterruptException:

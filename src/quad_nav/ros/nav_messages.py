@@ -5,46 +5,39 @@ import math
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Point32, PolygonStamped, Pose, PoseStamped, Quaternion, Twist
+from geometry_msgs.msg import Point32, PolygonStamped, Pose, PoseStamped
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid, Path
 from sensor_msgs.msg import PointCloud2, PointField
 
 from quad_nav.costmap.occupancy import occupancy
 from quad_nav.errors import InvalidGoal
-from quad_nav.geometry import (
-    Pose2D,
-    Pose3D,
-    Twist2D,
-    quaternion_from_yaw,
-    rotation_from_quaternion,
-)
+from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
+from quad_nav.plan.navfn import NOT_REACHED
+from quad_nav.ros.convert import pose_from_message, pose_message
+
+INVALID_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
 
 
-def pose_message(pose: Pose3D) -> Pose:
-    message = Pose(orientation=Quaternion(*pose.quaternion))
-    message.position.x, message.position.y, message.position.z = pose.x_m, pose.y_m, pose.z_m
-    return message
-
-
-def pose_from_message(message: Pose) -> Pose3D:
+def goal_from_message(message: Pose) -> Pose3D:
     """A message's pose with its quaternion normalised.
 
     Raises:
         InvalidGoal: not finite, or not a turn about z: with the original's sentence
             for quaternions, and ours for positions.
     """
-    p, q = message.position, message.orientation
-    if not all(map(math.isfinite, (p.x, p.y, p.z))):
+    pose = pose_from_message(message)
+    if not np.isfinite(pose.translation).all():
         raise InvalidGoal("Aborting on goal because its position is not finite")
-    length = math.sqrt(q.x ** 2 + q.y ** 2 + q.z ** 2 + q.w ** 2)
+    length = math.sqrt(sum(part ** 2 for part in pose.quaternion))
     if not math.isfinite(length) or length < 1e-3:
-        raise InvalidGoal("Aborting on goal because it was sent with an invalid quaternion")
-    quaternion = (q.x / length, q.y / length, q.z / length, q.w / length)
-    if abs(rotation_from_quaternion(quaternion)[2, 2] - 1.0) > 1e-3:
-        raise InvalidGoal("Aborting on goal because it was sent with an invalid quaternion")
-    return Pose3D(p.x, p.y, p.z, quaternion)
+        raise InvalidGoal(INVALID_QUATERNION)
+    x, y, z, w = pose.quaternion
+    upright = Pose3D(pose.x_m, pose.y_m, pose.z_m, (x / length, y / length, z / length, w / length))
+    if abs(upright.rotation[2, 2] - 1.0) > 1e-3:
+        raise InvalidGoal(INVALID_QUATERNION)
+    return upright
 
 
 def planar_pose(pose: Pose2D, z_m: float = 0.0) -> Pose3D:
@@ -54,13 +47,6 @@ def planar_pose(pose: Pose2D, z_m: float = 0.0) -> Pose3D:
 def pose_stamped(pose: Pose3D, frame: str, stamp: rospy.Time) -> PoseStamped:
     message = PoseStamped(pose=pose_message(pose))
     message.header.frame_id, message.header.stamp = frame, stamp
-    return message
-
-
-def twist_message(twist: Twist2D) -> Twist:
-    message = Twist()
-    message.linear.x, message.linear.y = twist.vx_mps, twist.vy_mps
-    message.angular.z = twist.vyaw_radps
     return message
 
 
@@ -82,6 +68,22 @@ def polygon_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> Polygo
 
 def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Time) -> OccupancyGrid:
     """A costmap's master grid uint8[H, W] in occupancies."""
+    return _occupancy_grid(spec, occupancy(costs), frame, stamp)
+
+
+def potential_message(spec: GridSpec, potential: np.ndarray, scale: int, frame: str,
+                      stamp: rospy.Time) -> OccupancyGrid:
+    """A planner's potential float32[H, W], from 0 to ``scale``; -1 where it did not come."""
+    reached = potential < NOT_REACHED
+    highest = potential[reached].max(initial=0.0)
+    values = np.full(potential.shape, -1, dtype=np.int8)
+    if highest > 0.0:
+        values[reached] = potential[reached] * (scale / highest)
+    return _occupancy_grid(spec, values, frame, stamp)
+
+
+def _occupancy_grid(spec: GridSpec, values: np.ndarray, frame: str,
+                    stamp: rospy.Time) -> OccupancyGrid:
     message = OccupancyGrid()
     message.header.frame_id, message.header.stamp = frame, stamp
     message.info.map_load_time = stamp
@@ -90,7 +92,7 @@ def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Tim
     message.info.origin.position.x = spec.origin_x_m
     message.info.origin.position.y = spec.origin_y_m
     message.info.origin.orientation.w = 1.0
-    message.data = occupancy(costs).ravel().tolist()
+    message.data = values.ravel().tolist()
     return message
 
 

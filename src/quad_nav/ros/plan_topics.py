@@ -4,23 +4,22 @@ from __future__ import annotations
 import rospy
 from geometry_msgs.msg import Twist
 from move_base_msgs.msg import RecoveryStatus
-from nav_msgs.msg import Path
+from nav_msgs.msg import OccupancyGrid, Path
 from sensor_msgs.msg import PointCloud2
 
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator import Navigator
+from quad_nav.plan.global_planner import SearchPlanner
+from quad_nav.plan.navfn import Navfn
+from quad_nav.plugins import plugin_name
+from quad_nav.ros.convert import twist_message
 from quad_nav.ros.nav_messages import (
     cost_cloud_message,
     path_message,
     pose_stamped,
-    twist_message,
+    potential_message,
 )
 from quad_nav.tick import Tick
-
-
-def plugin_name(plugin: str) -> str:
-    """``navfn/NavfnROS`` has its topics below ``NavfnROS``."""
-    return plugin.replace("::", "/").split("/")[-1]
 
 
 class PlanTopics:
@@ -32,6 +31,8 @@ class PlanTopics:
         controller = plugin_name(navigator.params.base_local_planner)
         self._command = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         self._plan = rospy.Publisher(f"~{planner}/plan", Path, queue_size=2)
+        if isinstance(navigator.planner, SearchPlanner):
+            self._potential = rospy.Publisher(f"~{planner}/potential", OccupancyGrid, queue_size=1)
         self._global_plan = rospy.Publisher(f"~{controller}/global_plan", Path, queue_size=1)
         self._local_plan = rospy.Publisher(f"~{controller}/local_plan", Path, queue_size=1)
         self._cost_cloud = rospy.Publisher(f"~{controller}/cost_cloud", PointCloud2, queue_size=1)
@@ -52,6 +53,8 @@ class PlanTopics:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
             self.plan(tick.plan, now)
+        if tick.plan is not None or tick.planning_failed:
+            self._publish_potential(now)
         if tick.recovery is not None:
             self._recovery.publish(RecoveryStatus(
                 pose_stamped(pose, self._global_frame, now), tick.recovery.index,
@@ -60,12 +63,22 @@ class PlanTopics:
             self._control(tick.control, now)
 
     def plan(self, plan, now: rospy.Time) -> None:
-        """Twice, as the original: what the search found, then with the goal itself."""
+        """NavFn's twice, as the original: what the search found, then with the goal itself."""
         if self._plan.get_num_connections() == 0:
             return
         message = path_message(plan, self._global_frame, now)
-        self._plan.publish(Path(message.header, message.poses[:-1]))
+        if isinstance(self._navigator.planner, Navfn):
+            self._plan.publish(Path(message.header, message.poses[:-1]))
         self._plan.publish(message)
+
+    def _publish_potential(self, now: rospy.Time) -> None:
+        planner = self._navigator.planner
+        if (isinstance(planner, SearchPlanner) and planner.params.publish_potential
+                and planner.potential is not None
+                and self._potential.get_num_connections() > 0):
+            self._potential.publish(potential_message(
+                self._navigator.global_costmap.spec, planner.potential,
+                planner.params.publish_scale, self._global_frame, now))
 
     def _control(self, control, now: rospy.Time) -> None:
         if len(control.global_plan) and self._global_plan.get_num_connections() > 0:

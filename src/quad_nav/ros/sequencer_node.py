@@ -36,6 +36,7 @@ from quad_nav.ros.mission_display import goal_markers
 from quad_nav.ros.mission_robot import MissionRobot
 from quad_nav.ros.mission_setup import MissionSetup, read_setup, result_path
 from quad_nav.ros.readiness import Need
+from quad_nav.ros.signals import init_node
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
 
 START_SERVICE = "/simulation/start"
@@ -254,12 +255,12 @@ def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str])
 
 def main() -> int:
     """Exit status: 0 all goals reached and nothing touched, 1 otherwise, 2 for bad input."""
-    rospy.init_node("sequencer")
+    init_node("sequencer")
     name = rospy.get_name()
     parameters = rospy.get_param("~", {})
     result = result_path(parameters)
     try:
-        setup = read_setup(parameters, name, result)
+        setup = read_setup(parameters, name, result, rospy.get_param("/", {}))
     except InputError as error:
         rospy.logfatal("nothing is flown:\n  %s", "\n  ".join(error.problems))
         _write(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)

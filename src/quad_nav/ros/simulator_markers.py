@@ -14,7 +14,6 @@ from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene
 
-_FLOOR_RGBA = (0.93, 0.93, 0.90, 1.0)
 _WALL_RGBA = (0.55, 0.60, 0.65, 0.35)
 _OBSTACLE_RGBA = (0.62, 0.50, 0.38, 1.0)
 _DARK_RGBA = (0.15, 0.15, 0.17, 1.0)
@@ -26,14 +25,11 @@ _Rgba = Tuple[float, float, float, float]
 
 
 def scene_markers(scene: Scene) -> MarkerArray:
-    """Floor, walls and obstacles in ``map``."""
-    floor = _marker("map", "floor", 0, Marker.CUBE,
-                    (scene.size_x_m / 2, scene.size_y_m / 2, -0.1),
-                    (scene.size_x_m, scene.size_y_m, 0.01), _FLOOR_RGBA)
+    """Walls and obstacles in ``map``. No floor: RViz would draw it over the costmaps."""
     walls = [_solid(wall, "walls", k, _WALL_RGBA) for k, wall in enumerate(scene.wall_boxes())]
     obstacles = [_solid(obstacle, "obstacles", k, _OBSTACLE_RGBA)
                  for k, obstacle in enumerate(scene.obstacles)]
-    return MarkerArray([floor, *walls, *obstacles])
+    return MarkerArray([*walls, *obstacles])
 
 
 def quadcopter_markers(n_robots: int) -> MarkerArray:

@@ -23,7 +23,12 @@ from visualization_msgs.msg import MarkerArray
 from quad_nav.errors import InputError
 from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.simulator_markers import goal_spheres
-from quad_nav.ros.simulator_setup import SimulatorSetup, read_setup
+from quad_nav.ros.simulator_setup import (
+    DEFAULTS,
+    SimulatorSetup,
+    longest_controller_period_s,
+    read_setup,
+)
 from quad_nav.ros.simulator_topics import SimulatorTopics
 from quad_nav.sim.pacing import Pacer, RateMeter
 from quad_nav.sim.simulation import STEP_S, STEPS_PER_S, Simulation
@@ -214,7 +219,10 @@ def main() -> int:
     rospy.init_node("simulator", disable_signals=True)
     name = rospy.get_name().lstrip("/")
     try:
-        node = SimulatorNode(read_setup(rospy.get_param("~", {}), name))
+        parameters = rospy.get_param("~", {})
+        parameters.setdefault("controller_period", longest_controller_period_s(
+            rospy.get_param("/", {}), parameters.get("robots", DEFAULTS["robots"])))
+        node = SimulatorNode(read_setup(parameters, name))
     except InputError as error:
         print(error, file=sys.stderr)
         return 2

@@ -26,7 +26,7 @@ DEFAULTS: Dict[str, Any] = {
     "seed": 0,                  # for noise and jitter
     "jitter": 0.0,              # how far starts are displaced, m
     "command_timeout": 0.5,     # hover after this plus ...
-    "controller_period": 0.05,  # ... this without commands, s
+    "controller_period": 0.05,  # ... this without commands, s; the node asks the navigators
 }
 
 
@@ -65,6 +65,18 @@ def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
     return SimulatorSetup(
         scene, values["robots"], params, values["seed"], float(values["rate"]), values["gui"],
         values["start_paused"], round(STEPS_PER_S / values["lidar_rate"]))
+
+
+def longest_controller_period_s(all_parameters: Mapping[str, Any], robots: Any) -> float:
+    """The slowest navigator's ``controller_frequency`` as a period.
+
+    The watchdog must not take the pause between two commands of a 1 Hz controller
+    for the end of its commands. Navigators without the parameter run at its default.
+    """
+    default = DEFAULTS["controller_period"]
+    names = [f"move_base{i}" for i in range(robots if _is_whole(robots) else 0)]
+    frequencies = [all_parameters.get(name, {}).get("controller_frequency") for name in names]
+    return max((1.0 / f for f in frequencies if _is_number(f) and f > 0), default=default)
 
 
 def _simulation_params(values: Mapping[str, Any]) -> SimulationParams:

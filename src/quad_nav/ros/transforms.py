@@ -8,6 +8,7 @@ import tf2_ros
 
 from quad_nav.errors import NavigationError
 from quad_nav.geometry import Pose3D
+from quad_nav.ros.convert import pose_from_transform
 
 
 class TransformUnavailable(NavigationError):
@@ -53,6 +54,4 @@ class Transforms:
             raise TransformUnavailable(str(error), later=True) from error
         except (tf2_ros.TransformException, ValueError) as error:
             raise TransformUnavailable(str(error)) from error
-        t, q = message.transform.translation, message.transform.rotation
-        pose = Pose3D(t.x, t.y, t.z, (q.x, q.y, q.z, q.w))
-        return pose, message.header.stamp.to_sec()
+        return pose_from_transform(message), message.header.stamp.to_sec()

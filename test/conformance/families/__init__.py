@@ -11,7 +11,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Callable, Dict, List
 
-from families import defaults, inflation, navfn, obstacle, occupancy, trajectory_planner
+from families import (
+    carrot_planner,
+    defaults,
+    dwa,
+    global_planner,
+    inflation,
+    navfn,
+    obstacle,
+    occupancy,
+    trajectory_planner,
+)
 from families.case import Unusable, cases_in
 from families.comparison import Difference
 
@@ -24,6 +34,9 @@ FAMILIES: Dict[str, Check] = {
     "obstacle": obstacle.check,
     "occupancy": occupancy.check,
     "trajectory_planner": trajectory_planner.check,
+    "dwa": dwa.check,
+    "global_planner": global_planner.check,
+    "carrot_planner": carrot_planner.check,
 }
 DATA = Path(__file__).resolve().parents[1] / "data"
 

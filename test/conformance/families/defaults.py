@@ -7,7 +7,7 @@ from typing import Any, Dict, List
 
 from families.case import Recorded, Unusable
 from families.comparison import Comparison, Difference
-from quad_nav.config import Configuration, load
+from quad_nav.config import Configuration, load, values
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayer
 from quad_nav.costmap.layered import LayeredCostmap
@@ -24,8 +24,11 @@ def check(path: Path) -> List[Difference]:
         raise Unusable(f"cannot be read: {error}") from error
     configuration = load({})
     _check_costmap(configuration, recorded["costmap_defaults"], comparison)
-    _check_planner(configuration.trajectory_planner, recorded["trajectory_planner_defaults"],
+    _check_planner(configuration.local_planner, recorded["trajectory_planner_defaults"],
                    comparison)
+    dwa = values(load({"base_local_planner": "dwa_local_planner/DWAPlannerROS"}), "DWAPlannerROS")
+    del dwa["restore_defaults"]  # a button, not recorded
+    _compare(comparison, "dwa_defaults", dwa, recorded["dwa_defaults"])
     return comparison.differences
 
 
@@ -61,8 +64,8 @@ def _check_costmap(configuration: Configuration, recorded: Recorded,
                     info["inscribed"], _METRES)
     comparison.near("costmap_defaults.info.circumscribed", costmap.circumscribed_radius_m,
                     info["circumscribed"], _METRES)
-    for part, values in found.items():
-        _compare(comparison, f"costmap_defaults.{part}", values, recorded[part])
+    for part, fields in found.items():
+        _compare(comparison, f"costmap_defaults.{part}", fields, recorded[part])
     _compare(comparison, "costmap_defaults.layers.inflation", {
         "inflation_radius": inflation.params.inflation_radius_m,
         "cost_scaling_factor": inflation.params.cost_scaling_factor,

@@ -8,14 +8,14 @@ import numpy as np
 
 from families.case import Case, load_case
 from families.comparison import Comparison, Difference
+from families.plans import NO_PLAN, compare_plans
 from quad_nav.config import load
 from quad_nav.errors import PlanningError
-from quad_nav.geometry import Pose2D, yaw_from_quaternion
+from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
 from quad_nav.plan.navfn import Navfn, navigation_costs, path_from, potential_from
 
 _CELLS, _METRES = 1e-4, 1e-5  # tolerances of paths and plans
-_NO_PLAN = np.zeros((0, 3))
 
 
 def check(path: Path) -> List[Difference]:
@@ -31,7 +31,7 @@ def _check_plans(case: Case, comparison: Comparison) -> None:
     """Calls of one planner on one costmap, each on what the one before left."""
     recorded, meta = case.arrays, case.meta
     spec = GridSpec(meta["size_x"], meta["size_y"], meta["resolution"], *meta["origin"])
-    planner = Navfn(load({"NavfnROS": meta["params"]}).navfn)
+    planner = Navfn(load({"NavfnROS": meta["params"]}).global_planner)
     costs = recorded["grid_in"].copy()
     for k, call in enumerate(meta["calls"]):
         suffix = f"_{k}" if k else ""
@@ -39,25 +39,19 @@ def _check_plans(case: Case, comparison: Comparison) -> None:
         try:
             plan = planner.make_plan(spec, costs, Pose2D(*call["start"]), Pose2D(*call["goal"]))
         except PlanningError:
-            plan = _NO_PLAN
+            plan = NO_PLAN
         comparison.exact("found" + suffix, len(plan) > 0, call["found"])
         comparison.exact("grid_after" + suffix, costs, recorded["grid_after" + suffix])
         potential = np.zeros((0, 0)) if planner.potential is None else planner.potential
         comparison.exact("potential" + suffix, potential, recorded["potential" + suffix])
-        _check_plan(plan, recorded["plan" + suffix], "plan" + suffix, comparison)
+        compare_plans(comparison, "plan" + suffix, plan, recorded["plan" + suffix], _METRES,
+                      _METRES)
         if call["found"] and len(plan):
             cells = (plan[:-1, :2] - meta["origin"])[::-1] / spec.resolution_m
             comparison.near("path_cells" + suffix, cells, recorded["path_cells" + suffix], _CELLS)
         if k == 0 and potential.size:
             comparison.exact("navcost", navigation_costs(costs, planner.params.allow_unknown),
                              recorded["navcost"])
-
-
-def _check_plan(plan: np.ndarray, recorded: np.ndarray, field: str,
-                comparison: Comparison) -> None:
-    yaws = [yaw_from_quaternion(quaternion) for quaternion in recorded[:, 3:]]
-    comparison.near(field, plan[:, :2], recorded[:, :2], _METRES)
-    comparison.near(f"{field} (yaw)", plan[:, 2], yaws, _METRES)
 
 
 def _check_core(case: Case, comparison: Comparison) -> None:

@@ -1,24 +1,22 @@
 """The trajectory planner: single searches, and closed loops call by call."""
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Dict, List, Optional
+from typing import Dict, List, Optional
 
 import numpy as np
 
 from families.case import Case, Recorded, Unusable, load_case
 from families.comparison import Comparison, Difference
+from families.loop import period_s, plan_of, replayed, spec_at
 from quad_nav.config import load
 from quad_nav.control.controller import Control
 from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.rollout import Rollout, footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.control.velocity_search import choose_trajectory
-from quad_nav.errors import ControlError
-from quad_nav.geometry import Pose2D, Twist2D, multiply_quaternions, rotation_from_quaternion
-from quad_nav.grid import GridSpec
+from quad_nav.geometry import Pose2D, Twist2D
 
 _TOLERANCE = 1e-9
 
@@ -35,20 +33,8 @@ def check(path: Path) -> List[Difference]:
 
 
 def _params(meta: Recorded) -> TrajectoryPlannerParams:
-    params = load({"TrajectoryPlannerROS": meta["params"]}).trajectory_planner
+    params = load({"TrajectoryPlannerROS": meta["params"]}).local_planner
     return replace(params, meter_scoring=meta["meter_scoring_effective"])
-
-
-def _period_s(meta: Recorded) -> float:
-    return 1.0 / meta["controller_frequency"] if meta["controller_frequency"] else 0.05
-
-
-def _spec(meta: Recorded, origin: Any) -> GridSpec:
-    return GridSpec(meta["size_x"], meta["size_y"], meta["resolution"], *origin)
-
-
-def _plan(rows: np.ndarray) -> np.ndarray:
-    return np.column_stack((rows[:, :2], 2.0 * np.arctan2(rows[:, 2], rows[:, 3])))
 
 
 def _flags(oscillation: Oscillation, names: List[str], more: Dict[str, bool]) -> List[bool]:
@@ -66,15 +52,15 @@ def _numbers(oscillation: Oscillation) -> List[float]:
 def _check_single(case: Case, comparison: Comparison) -> None:
     recorded, meta = case.arrays, case.meta
     params, oscillation = _params(meta), Oscillation()
-    spec = _spec(meta, meta["origin"])
+    spec = spec_at(meta, meta["origin"])
     rollout = Rollout(params, spec, recorded["costmap"], recorded["footprint"],
-                      _plan(recorded["plan"]), Pose2D(*recorded["pose"]),
+                      plan_of(recorded["plan"]), Pose2D(*recorded["pose"]),
                       Twist2D(*recorded["velocity"]))
     comparison.exact("within_robot", rollout.grids.within_robot, recorded["within_robot"] != 0)
     comparison.exact("path_dist", rollout.grids.path, recorded["path_dist"])
     comparison.exact("goal_dist", rollout.grids.goal, recorded["goal_dist"])
 
-    best = choose_trajectory(rollout, params, oscillation, _period_s(meta))
+    best = choose_trajectory(rollout, params, oscillation, period_s(meta))
     comparison.near("best", [*best.sample, best.cost], recorded["best"], _TOLERANCE)
     comparison.near("best_points", best.points, recorded["best_points"], _TOLERANCE)
     command = best.sample if best.cost >= 0.0 else (0.0, 0.0, 0.0)
@@ -102,43 +88,10 @@ def _check_samples(rollout: Rollout, recorded: Recorded, comparison: Comparison)
 
 
 def _check_loop(case: Case, comparison: Comparison) -> None:
-    recorded, meta = case.arrays, case.meta
-    planner = TrajectoryPlanner(_params(meta), recorded["footprint"], _period_s(meta))
-    local_from_plan = _local_from_plan(meta)
-    plans = {int(step): recorded[f"plan_{j}"] for j, step in enumerate(recorded["plan_set_step"])}
-    for k in range(len(recorded["pose"])):
-        if k in plans:
-            planner.set_plan(_plan(plans[k]))
-        ox, oy = recorded["window_offset"][k]
-        world = recorded["world"][recorded["world_index"][k]]
-        costs = world[oy:oy + meta["size_y"], ox:ox + meta["size_x"]]
-        try:
-            control: Optional[Control] = planner.compute_velocity(
-                _spec(meta, recorded["origin"][k]), costs, Pose2D(*recorded["pose"][k]),
-                Twist2D(*recorded["velocity"][k]), local_from_plan)
-        except ControlError:
-            control = None
-        _check_call(planner, control, recorded, meta, k, comparison)
-
-
-def _local_from_plan(meta: Recorded) -> Pose2D:
-    """The inverse of the recorded frame's pose, to the last bit as tf2 computes it.
-
-    The plan's points lie on cell borders, so the last bit decides about their
-    cells. tf2 turns the translation by two quaternion products, and takes the
-    rotation from quaternion to matrix and back.
-    """
-    frame = meta.get("map_to_costmap_frame")  # pose of the costmap frame in the map frame
-    if frame is None:
-        return Pose2D(0.0, 0.0, 0.0)
-    qx, qy, qz, qw = frame["quaternion_xyzw"]
-    inverse = (-qx, -qy, -qz, qw)
-    translation = multiply_quaternions(
-        multiply_quaternions(inverse, (-frame["x"], -frame["y"], 0.0, 0.0)), (qx, qy, qz, qw))
-    rotation = rotation_from_quaternion(inverse)
-    root = math.sqrt(np.trace(rotation) + 1.0)
-    yaw = 2.0 * math.atan2((rotation[1, 0] - rotation[0, 1]) * (0.5 / root), root * 0.5)
-    return Pose2D(translation[0], translation[1], yaw)
+    meta = case.meta
+    planner = TrajectoryPlanner(_params(meta), case.arrays["footprint"], period_s(meta))
+    for k, control in replayed(planner, case):
+        _check_call(planner, control, case.arrays, meta, k, comparison)
 
 
 def _check_call(planner: TrajectoryPlanner, control: Optional[Control], recorded: Recorded,

@@ -1,0 +1,173 @@
+"""The controller ``dwa_local_planner/DWAPlannerROS``: the dynamic window approach.
+
+Each call cuts the global plan to the local window, samples velocities
+(``dwa_samples``) and takes the one whose trajectory the critics like best
+(``dwa_critics``, ``dwa_oscillation``). Within ``xy_goal_tolerance_m`` of the
+global plan's end it stops and turns in place instead (``goal``).
+"""
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Optional
+
+import numpy as np
+
+from quad_nav.control.controller import IDENTITY, Control
+from quad_nav.control.cost_cloud import cost_cloud
+from quad_nav.control.dwa_critics import Critics, DwaGrids
+from quad_nav.control.dwa_oscillation import OscillationCritic
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.dwa_samples import acceleration_limits
+from quad_nav.control.goal import is_stopped, stopping_command, turning_command
+from quad_nav.control.plan_window import count_passed, plan_end, plan_in_window
+from quad_nav.control.rollout import Trajectory
+from quad_nav.errors import NoLocalPlan, NoValidTrajectory
+from quad_nav.geometry import Pose2D, Twist2D, angle_difference
+from quad_nav.grid import INSCRIBED, GridSpec
+
+__all__ = ["DwaParams", "DwaPlanner"]
+
+_NO_POSES = np.zeros((0, 3))
+
+
+class DwaPlanner:
+    """Follows a plan; remembers what it tried from call to call.
+
+    Readable: ``plan`` float64[n, 3] (what is left of the global plan, in its
+    own frame), ``local_global_plan`` float64[m, 3] (its part in the window, in
+    the local frame, also after a failed call), ``oscillation``, and of the last
+    call ``best`` (None if it did not search) and ``critics`` (None if it asked
+    none).
+    """
+
+    def __init__(self, params: DwaParams, footprint: np.ndarray, control_period_s: float):
+        self.control_period_s = control_period_s
+        self.oscillation = OscillationCritic()
+        self.plan = _NO_POSES
+        self.local_global_plan = _NO_POSES
+        self.best: Optional[Trajectory] = None
+        self.critics: Optional[Critics] = None
+        self.rotating_to_goal = False
+        self.xy_tolerance_latch = False
+        self._goal_reached = False
+        self._grids: Optional[DwaGrids] = None  # of the last search
+        self.params = params
+        self.set_footprint(footprint)
+
+    def set_params(self, params: DwaParams) -> None:
+        """Take new parameters; plan and state stay, but the goal is no longer reached."""
+        self.params = params
+        self._goal_reached = False
+
+    def set_footprint(self, footprint: np.ndarray) -> None:
+        """The padded footprint, float64[n, 2] in the robot's frame."""
+        self.footprint = np.array(footprint, dtype=np.float64)
+
+    def set_plan(self, plan: np.ndarray) -> None:
+        """A new global plan, float64[n, 3] rows x, y, yaw; the goal is to be reached anew."""
+        self.plan = np.array(plan, dtype=np.float64).reshape(-1, 3)
+        self.oscillation.reset()
+        self.xy_tolerance_latch = False
+        self._goal_reached = False
+
+    def is_goal_reached(self) -> bool:
+        """Whether the last call found the robot standing at the goal, heading included."""
+        return self._goal_reached
+
+    def compute_velocity(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
+                         local_from_plan: Pose2D = IDENTITY) -> Control:
+        """The command for a robot at ``pose`` on ``costs``, uint8[H, W] on ``spec``.
+
+        ``velocity`` is the odometry's, in the body frame. Raises NoLocalPlan
+        when no part of the plan is near, and NoValidTrajectory when no sampled
+        trajectory is legal or the command at the goal would hit something.
+        """
+        self.best = self.critics = None
+        self._goal_reached = False
+        plan = self._cut_plan(spec, pose, local_from_plan)
+        goal = plan_end(self.plan, local_from_plan)
+        if self._is_at(goal, pose):
+            self.xy_tolerance_latch = True
+            self._goal_reached = (
+                abs(angle_difference(goal.yaw_rad, pose.yaw_rad))
+                <= self.params.yaw_goal_tolerance_rad and is_stopped(velocity, self.params))
+            command = self._command_at_goal(spec, costs, pose, velocity, goal)
+            return Control(command, float("nan"), _NO_POSES, plan, goal_mode=True)
+        best = self._search(spec, costs, pose, velocity)
+        if best.cost < 0.0:
+            raise NoValidTrajectory(f"none of the sampled velocities is legal from "
+                                    f"({pose.x_m:.2f}, {pose.y_m:.2f}) m: all collide, are too "
+                                    f"slow or too fast, or lose the way to the path or its end")
+        return Control(Twist2D(*best.sample), best.cost, best.points, plan)
+
+    def cost_cloud(self) -> np.ndarray:
+        """What each cell that a robot could be in cost in the last call, float32[n, 7].
+
+        Rows as in ``cost_cloud.cost_cloud``; empty if the last call did not search.
+        """
+        if self.best is None or self.critics is None:
+            return np.zeros((0, 7), dtype=np.float32)
+        critics, costs = self.critics, self.critics.window.costs
+        usable = (critics.grids.path < costs.size) & (costs < INSCRIBED)
+        return cost_cloud(critics.spec, costs, critics.grids.path, critics.grids.goal, usable,
+                          critics.path_scale, critics.goal_scale, critics.params.occdist_scale)
+
+    def _cut_plan(self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D) -> np.ndarray:
+        self.local_global_plan = _NO_POSES
+        if not len(self.plan):
+            raise NoLocalPlan("there is no global plan to follow")
+        plan = plan_in_window(self.plan, spec, pose, local_from_plan)
+        if self.params.prune_plan:
+            passed = count_passed(plan, pose)
+            plan, self.plan = plan[passed:], self.plan[passed:]
+        if not len(plan):
+            raise NoLocalPlan(f"the global plan does not come near the robot at "
+                              f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+        self.local_global_plan = plan
+        return plan
+
+    def _is_at(self, goal: Pose2D, pose: Pose2D) -> bool:
+        latched = self.params.latch_xy_goal_tolerance and self.xy_tolerance_latch
+        return latched or pose.distance_to(goal) <= self.params.xy_goal_tolerance_m
+
+    def _command_at_goal(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
+                         goal: Pose2D) -> Twist2D:
+        turn_rad = angle_difference(goal.yaw_rad, pose.yaw_rad)
+        if abs(turn_rad) <= self.params.yaw_goal_tolerance_rad:
+            self.rotating_to_goal = False
+            return Twist2D()
+        params = _in_single_precision(self.params)
+        if not self.rotating_to_goal and not is_stopped(velocity, params):
+            command = stopping_command(velocity, params, self.control_period_s)
+        else:
+            self.rotating_to_goal = True
+            command = turning_command(turn_rad, velocity, params, self.control_period_s)
+        self.oscillation.reset()
+        # The original measures no distances here: it goes on with those of the last search.
+        grids = self._grids
+        if grids is None or grids.path.shape != costs.shape:
+            grids = DwaGrids(*np.zeros((3, *costs.shape), dtype=np.int32))
+        self.critics = Critics(self.params, spec, costs, self.footprint, self.local_global_plan,
+                               pose, velocity, grids)
+        if not self.critics.is_legal((command.vx_mps, command.vy_mps, command.vyaw_radps)):
+            raise NoValidTrajectory(f"no room to stop and turn at the goal, "
+                                    f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+        return command
+
+    def _search(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D,
+                velocity: Twist2D) -> Trajectory:
+        self.critics = Critics(self.params, spec, costs, self.footprint, self.local_global_plan,
+                               pose, velocity)
+        self._grids = self.critics.grids
+        self.best = self.critics.choose(self.oscillation, self.control_period_s)
+        if self.best.cost >= 0.0:
+            self.oscillation.note(
+                self.best.sample, self.critics.pose, self.params.min_vel_trans_mps,
+                self.params.oscillation_reset_dist_m, self.params.oscillation_reset_angle_rad)
+        return self.best
+
+
+def _in_single_precision(params: DwaParams) -> DwaParams:
+    """With the acceleration limits as the original has them."""
+    x, y, theta = acceleration_limits(params)
+    return replace(params, acc_lim_x_mps2=x, acc_lim_y_mps2=y, acc_lim_theta_radps2=theta)

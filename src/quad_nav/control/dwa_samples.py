@@ -1,0 +1,65 @@
+"""The velocities that the dynamic window controller tries.
+
+A grid over the velocities that can be reached and are allowed: in one control
+period with ``use_dwa`` (the dynamic window of D. Fox, W. Burgard and S. Thrun
+1997, "The dynamic window approach to collision avoidance"), else in
+``sim_time_s``, and then no faster than would overshoot the local goal.
+"""
+from __future__ import annotations
+
+from typing import List, Tuple
+
+import numpy as np
+
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.rollout import Triple, single
+from quad_nav.geometry import Pose2D
+
+
+def velocity_samples(params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D,
+                     control_period_s: float) -> np.ndarray:
+    """float64[n, 3] rows vx, vy, vtheta of single precision; vtheta varies fastest.
+
+    ``goal`` is the end of the plan in the local window.
+    """
+    lowest, highest = _velocity_window(params, pose, velocity, goal, control_period_s)
+    counts = params.vx_samples, params.vy_samples, params.vth_samples
+    axes = [np.array(spaced(*ends), dtype=np.float32) for ends in zip(lowest, highest, counts)]
+    grid = np.meshgrid(*axes, indexing="ij")
+    return np.stack(grid, axis=-1).reshape(-1, 3).astype(np.float64)
+
+
+def spaced(start: float, end: float, count: int) -> List[float]:
+    """``count`` values from start to end, at least both ends, and 0 if they step over it."""
+    if start == end:
+        return [start]
+    count = max(count, 2)
+    step = (end - start) / (count - 1)
+    values, value = [], start
+    for _ in range(count - 1):
+        values.append(value)
+        if value < 0.0 < value + step:
+            values.append(0.0)
+        value += step  # summed up: the last bit of a sample can decide between equal costs
+    return [*values, end]
+
+
+def acceleration_limits(params: DwaParams) -> Triple:
+    """x, y and theta, in the single precision in which the original keeps them."""
+    return single(params.acc_lim_x_mps2, params.acc_lim_y_mps2, params.acc_lim_theta_radps2)
+
+
+def _velocity_window(params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D,
+                     control_period_s: float) -> Tuple[Triple, Triple]:
+    fastest_x, fastest_y = params.max_vel_x_mps, params.max_vel_y_mps
+    period_s = control_period_s
+    if not params.use_dwa:
+        period_s = params.sim_time_s
+        no_overshoot_mps = pose.distance_to(goal) / params.sim_time_s
+        fastest_x = max(min(fastest_x, no_overshoot_mps), params.min_vel_x_mps)
+        fastest_y = max(min(fastest_y, no_overshoot_mps), params.min_vel_y_mps)
+    slowest = params.min_vel_x_mps, params.min_vel_y_mps, -params.max_vel_theta_radps
+    fastest = fastest_x, fastest_y, params.max_vel_theta_radps
+    change = [limit * period_s for limit in acceleration_limits(params)]
+    return (single(*(max(a, v - c) for a, v, c in zip(slowest, velocity, change))),
+            single(*(min(a, v + c) for a, v, c in zip(fastest, velocity, change))))

@@ -1,0 +1,114 @@
+"""Loops that descend a potential, half a cell a step.
+
+Grids are flat arrays, cell = y * size_x + x. A position is a cell and an offset
+from its centre, in cells, right (dx) and up (dy).
+"""
+from __future__ import annotations
+
+import math
+from typing import Tuple
+
+import numpy as np
+from numba import njit
+
+from quad_nav.kernels.wave import NOT_REACHED
+
+_OBSTACLE_SLOPE = 254  # of cells inside an obstacle, beside a reached one
+_STEP_CELLS = 0.5
+
+
+@njit(cache=True, nogil=True)
+def _gradient(potential, size_x, cell) -> Tuple[float, float]:
+    """Vector down the potential at a cell, (0, 0) where there is none."""
+    if cell < size_x or cell > potential.size - size_x - 1:
+        return 0.0, 0.0
+    return _slope(potential, cell, 1), _slope(potential, cell, size_x)
+
+
+@njit(cache=True, nogil=True)
+def _slope(potential, cell, stride):
+    before, here, after = potential[cell - stride], potential[cell], potential[cell + stride]
+    slope = np.float32(0.0)
+    if here >= NOT_REACHED:  # inside an obstacle: towards the reached side
+        if before < NOT_REACHED:
+            return np.float32(-_OBSTACLE_SLOPE)
+        if after < NOT_REACHED:
+            return np.float32(_OBSTACLE_SLOPE)
+        return slope
+    if before < NOT_REACHED:
+        slope += before - here
+    if after < NOT_REACHED:
+        slope += here - after
+    return np.float32(slope)
+
+
+@njit(cache=True, nogil=True)
+def _unit_gradient(potential, size_x, cell):
+    gx, gy = _gradient(potential, size_x, cell)
+    norm = math.hypot(gx, gy)
+    if norm > 0.0:
+        return np.float32(gx / norm), np.float32(gy / norm)
+    return np.float32(0.0), np.float32(0.0)
+
+
+@njit(cache=True, nogil=True)
+def _interpolated_gradient(potential, size_x, cell, dx, dy):
+    x00, y00 = _unit_gradient(potential, size_x, cell)
+    x10, y10 = _unit_gradient(potential, size_x, cell + 1)
+    x01, y01 = _unit_gradient(potential, size_x, cell + size_x)
+    x11, y11 = _unit_gradient(potential, size_x, cell + size_x + 1)
+    gx = (1.0 - dy) * ((1.0 - dx) * x00 + dx * x10) + dy * ((1.0 - dx) * x01 + dx * x11)
+    gy = (1.0 - dy) * ((1.0 - dx) * y00 + dx * y10) + dy * ((1.0 - dx) * y01 + dx * y11)
+    return np.float32(gx), np.float32(gy)
+
+
+@njit(cache=True, nogil=True)
+def _lowest_around(potential, size_x, cell):
+    """The lowest of a cell and its eight neighbours, and whether all nine are reached."""
+    lowest, all_reached = cell, True
+    for offset_y in (-size_x, 0, size_x):
+        for offset_x in (-1, 0, 1):
+            neighbour = cell + offset_y + offset_x
+            if not 0 <= neighbour < potential.size or potential[neighbour] >= NOT_REACHED:
+                all_reached = False
+            elif potential[neighbour] < potential[lowest]:
+                lowest = neighbour
+    return lowest, all_reached
+
+
+@njit(cache=True, nogil=True)
+def _carry(cell, offset, stride):
+    """Move whole cells of an offset into the cell index."""
+    if offset > 1.0:
+        cell, offset = cell + stride, np.float32(offset - 1.0)
+    if offset < -1.0:
+        cell, offset = cell - stride, np.float32(offset + 1.0)
+    return cell, offset
+
+
+@njit(cache=True, nogil=True)
+def leaves_map(potential, size_x, cell):
+    """Whether a cell lies in the lowest or highest row, where no descent goes on."""
+    return cell < size_x or cell > potential.size - size_x
+
+
+@njit(cache=True, nogil=True)
+def step_down(potential, size_x, cell, dx, dy, path, last):
+    """The next position: whether there is one, its cell and its offset.
+
+    Half a cell along the gradient where all cells around are reached, otherwise
+    to the centre of the lowest of them; so too when ``path[last]`` is where the
+    path was two points ago.
+    """
+    oscillates = (last > 1 and path[last, 0] == path[last - 2, 0]
+                  and path[last, 1] == path[last - 2, 1])
+    lowest, all_reached = _lowest_around(potential, size_x, cell)
+    if oscillates or not all_reached:
+        return potential[lowest] < NOT_REACHED, lowest, np.float32(0.0), np.float32(0.0)
+    gx, gy = _interpolated_gradient(potential, size_x, cell, dx, dy)
+    if gx == 0.0 and gy == 0.0:
+        return False, cell, dx, dy
+    scale = np.float32(_STEP_CELLS / math.hypot(gx, gy))
+    cell, dx = _carry(cell, np.float32(dx + gx * scale), 1)
+    cell, dy = _carry(cell, np.float32(dy + gy * scale), size_x)
+    return True, cell, dx, dy

@@ -1,0 +1,256 @@
+"""Loops of the dynamic window controller: move along each sample, and take the cheapest.
+
+The maths is in ``control/dwa_critics.py``. Poses and velocities are rounded to
+single precision at every step, as the original keeps them.
+"""
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from quad_nav.kernels.collision import Window, cell_of, footprint_cost
+
+_TOLERANCE = 1e-4
+# Columns of the distances
+GOAL_FRONT, ALIGNMENT, PATH, GOAL = 0, 1, 2, 3
+
+
+class Motion(NamedTuple):
+    """How samples are simulated."""
+
+    sim_time_s: float
+    sim_granularity_m: float
+    angular_sim_granularity_rad: float
+    acceleration_limits: tuple  # x, y, theta
+    min_vel_trans_mps: float
+    max_vel_trans_mps: float
+    min_vel_theta_radps: float
+    accelerates: bool  # approaches the sample as the limits allow; else has its velocity at once
+
+
+class MapGrids(NamedTuple):
+    """The distance grids, int32[H, W], and which of them count."""
+
+    window: Window
+    path: np.ndarray
+    goal: np.ndarray
+    goal_front: np.ndarray
+    forward_point_distance_m: float
+    follows_path: bool
+    follows_goal: bool
+    aligns: bool
+
+
+class Obstacles(NamedTuple):
+    """What the obstacle critic looks at."""
+
+    window: Window
+    highest_near: np.ndarray  # uint8[H, W], no less than the highest cost under any footprint
+    footprint: np.ndarray     # float64[n, 2], robot frame, not scaled
+    scale: float              # 0: obstacles are not looked at
+    sums: bool                # along the trajectory; else the highest counts
+
+
+class Candidates(NamedTuple):
+    """Samples and what is known of them before obstacles are looked at."""
+
+    samples: np.ndarray           # float64[n, 3]
+    terms: np.ndarray             # float64[n, 5], the other critics' parts of the cost
+    legal: np.ndarray             # bool[n]
+    footprint_scales: np.ndarray  # float64[n]
+
+
+@njit(cache=True, nogil=True)
+def step_count(motion, sample):
+    """Into how many steps a sample's simulation is cut; 0 for one outside the speed limits."""
+    speed, turn = math.hypot(sample[0], sample[1]), abs(sample[2])
+    if (0.0 <= motion.min_vel_trans_mps and speed + _TOLERANCE < motion.min_vel_trans_mps
+            and 0.0 <= motion.min_vel_theta_radps
+            and turn + _TOLERANCE < motion.min_vel_theta_radps):
+        return 0
+    if 0.0 <= motion.max_vel_trans_mps < speed - _TOLERANCE:
+        return 0
+    return int(math.ceil(max(speed * motion.sim_time_s / motion.sim_granularity_m,
+                             turn * motion.sim_time_s / motion.angular_sim_granularity_rad)))
+
+
+@njit(cache=True, nogil=True)
+def simulate(motion, pose, velocity, sample, points):
+    """Moves along a sample: (number of poses in ``points`` float64[k, 3], command vx, vy, vtheta).
+
+    The command is the sample, or what comes nearest to it after one step.
+    """
+    steps = step_count(motion, sample)
+    vx, vy, vtheta = sample[0], sample[1], sample[2]
+    command = (vx, vy, vtheta)
+    if steps == 0:
+        return 0, command
+    dt = motion.sim_time_s / steps
+    if motion.accelerates:
+        vx, vy, vtheta = _accelerated(motion, sample, velocity[0], velocity[1], velocity[2], dt)
+        command = (vx, vy, vtheta)
+    x, y, theta = pose
+    for k in range(steps):
+        points[k, 0], points[k, 1], points[k, 2] = x, y, theta
+        if motion.accelerates:
+            vx, vy, vtheta = _accelerated(motion, sample, vx, vy, vtheta, dt)
+        dx, dy = vx * math.cos(theta), vx * math.sin(theta)
+        if vy != 0.0:
+            side = math.pi / 2 + theta
+            dx, dy = dx + vy * math.cos(side), dy + vy * math.sin(side)
+        x, y, theta = _single(x + dx * dt), _single(y + dy * dt), _single(theta + vtheta * dt)
+    return steps, command
+
+
+@njit(cache=True, nogil=True)
+def _accelerated(motion, sample, vx, vy, vtheta, dt):
+    limit_x, limit_y, limit_theta = motion.acceleration_limits
+    return (_approach(sample[0], vx, limit_x * dt), _approach(sample[1], vy, limit_y * dt),
+            _approach(sample[2], vtheta, limit_theta * dt))
+
+
+@njit(cache=True, nogil=True)
+def _approach(wanted, current, max_change):
+    if current < wanted:
+        return _single(min(wanted, current + max_change))
+    return _single(max(wanted, current - max_change))
+
+
+@njit(cache=True, nogil=True)
+def _single(value):
+    return np.float64(np.float32(value))
+
+
+@njit(cache=True, nogil=True)
+def is_within_reach(grids, points, count, distances):
+    """Whether path and goal are in reach from every pose, and neither it nor its nose off the map.
+
+    Writes the last pose's distances to ``distances``, float64[4]; those that do
+    not count stay.
+    """
+    if grids.follows_path or grids.follows_goal:
+        for k in range(count):
+            cell_x, cell_y = cell_of(grids.window, points[k, 0], points[k, 1])
+            if cell_x < 0 or cell_y < 0:
+                return False
+            if grids.follows_path:
+                distances[PATH] = grids.path[cell_y, cell_x]
+            if grids.follows_goal:
+                distances[GOAL] = grids.goal[cell_y, cell_x]
+            if max(distances[PATH], distances[GOAL]) >= grids.path.size:
+                return False
+    if grids.follows_goal or grids.aligns:
+        return _has_nose_on_map(grids, points, count, distances)
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _has_nose_on_map(grids, points, count, distances):
+    size_y, size_x = grids.path.shape
+    forward = grids.forward_point_distance_m
+    border = abs(forward) + grids.window.resolution_m
+    min_x, min_y = grids.window.origin_x_m + border, grids.window.origin_y_m + border
+    max_x = grids.window.origin_x_m + size_x * grids.window.resolution_m - border
+    max_y = grids.window.origin_y_m + size_y * grids.window.resolution_m - border
+    for k in range(count):
+        x, y = points[k, 0], points[k, 1]
+        if k < count - 1 and min_x < x < max_x and min_y < y < max_y:
+            continue  # too far inside for any heading to matter
+        cell_x, cell_y = cell_of(grids.window, x + forward * math.cos(points[k, 2]),
+                                 y + forward * math.sin(points[k, 2]))
+        if cell_x < 0 or cell_y < 0:
+            return False
+        if grids.follows_goal:
+            distances[GOAL_FRONT] = grids.goal_front[cell_y, cell_x]
+        if grids.aligns:
+            distances[ALIGNMENT] = grids.path[cell_y, cell_x]
+    return True
+
+
+@njit(cache=True, nogil=True)
+def travel(motion, grids, pose, velocity, samples):
+    """Moves along samples, float64[n, 3], without looking at obstacles.
+
+    Returns their commands, float64[n, 3], the distances at their ends,
+    float64[n, 4], and whether they are legal, bool[n].
+    """
+    points = np.empty((longest(motion, samples), 3))
+    commands = np.empty((samples.shape[0], 3))
+    distances = np.zeros((samples.shape[0], 4))
+    legal = np.zeros(samples.shape[0], np.bool_)
+    for k in range(samples.shape[0]):
+        count, (vx, vy, vtheta) = simulate(motion, pose, velocity, samples[k], points)
+        commands[k, 0], commands[k, 1], commands[k, 2] = vx, vy, vtheta
+        legal[k] = count > 0 and is_within_reach(grids, points, count, distances[k])
+    return commands, distances, legal
+
+
+@njit(cache=True, nogil=True)
+def longest(motion, samples):
+    """Room for the poses of any sample; at least 1."""
+    steps = 1
+    for k in range(samples.shape[0]):
+        steps = max(steps, step_count(motion, samples[k]))
+    return steps
+
+
+@njit(cache=True, nogil=True)
+def obstacle_cost(obstacles, footprint_scale, points, count):
+    """The highest cost under the scaled footprint on the way, or the sum; -1 on collision."""
+    if count > 0 and not math.isfinite(footprint_scale):
+        return -1.0
+    footprint = obstacles.footprint * footprint_scale
+    total = 0.0
+    for k in range(count):
+        x, y, theta = points[k, 0], points[k, 1], points[k, 2]
+        cell_x, cell_y = cell_of(obstacles.window, x, y)
+        if cell_x < 0 or cell_y < 0:
+            return -1.0
+        if obstacles.highest_near[cell_y, cell_x] <= (0.0 if obstacles.sums else total):
+            continue  # the footprint changes nothing
+        cost = footprint_cost(obstacles.window, footprint, x, y, theta)
+        if cost < 0.0:
+            return -1.0
+        cost = max(cost, float(obstacles.window.costs[cell_y, cell_x]))
+        total = total + cost if obstacles.sums else max(total, cost)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def total_cost(obstacle_term, terms):
+    """Summed in the critics' order: the last bit can decide between samples."""
+    total = obstacle_term
+    for term in terms:
+        total += term
+    return total
+
+
+@njit(cache=True, nogil=True)
+def cheapest(motion, obstacles, pose, velocity, candidates):
+    """(index, cost) of the legal sample of lowest cost, the first of equals; (-1, inf) if none.
+
+    Samples are looked at in the order of what they cost without obstacles, and
+    no longer than one of them can win.
+    """
+    samples, terms, legal = candidates.samples, candidates.terms, candidates.legal
+    floors = np.empty(samples.shape[0])
+    for k in range(samples.shape[0]):
+        floors[k] = total_cost(0.0, terms[k]) if legal[k] else np.inf
+    points = np.empty((longest(motion, samples), 3))
+    best, best_cost = -1, np.inf
+    for k in np.argsort(floors, kind="mergesort"):
+        if not legal[k] or floors[k] > best_cost:
+            break
+        cost = floors[k]
+        if obstacles.scale != 0.0:
+            count, _ = simulate(motion, pose, velocity, samples[k], points)
+            obstacle = obstacle_cost(obstacles, candidates.footprint_scales[k], points, count)
+            if obstacle < 0.0:
+                continue
+            cost = total_cost(obstacles.scale * obstacle, terms[k])
+        if cost < best_cost or (cost == best_cost and k < best):
+            best, best_cost = k, cost
+    return best, best_cost

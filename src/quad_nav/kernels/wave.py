@@ -1,0 +1,165 @@
+"""Loops of a wavefront that spreads a potential over a grid.
+
+Grids are flat arrays, cell = y * size_x + x; the outermost ring of cells must
+be obstacles, which keeps every neighbour inside. The maths is in
+``plan/navfn.py``. All sums are float32 in the order that the recorded
+potentials demand.
+"""
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+NOT_REACHED = np.float32(1e10)
+BUCKET_SIZE = 10000       # cells that one bucket holds; further ones are dropped
+
+_INVERSE_SQRT2 = 0.707106781
+
+
+class Rules(NamedTuple):
+    """What a wave's potentials are made of."""
+
+    obstacle: int  # cells of this cost are never entered
+    neutral: int   # cost of a free cell
+    planar: bool   # as of a planar wave; else a step from the lowest neighbour
+
+
+@njit(cache=True, nogil=True)
+def arrival(cost, left, right, below, above, planar):
+    """Potential of a cell of this cost, float32, by those of its neighbours.
+
+    That of a planar wave which arrives over the two lower ones, or else of a step
+    from the lowest.
+    """
+    horizontal, vertical = min(left, right), min(below, above)
+    lower = min(horizontal, vertical)
+    gap = np.float32(abs(horizontal - vertical))
+    if not planar or gap >= cost:
+        return np.float32(lower + cost)
+    ratio = np.float64(np.float32(gap / cost))
+    factor = np.float32(-0.2301 * ratio * ratio + 0.5307 * ratio + 0.7040)
+    return np.float32(lower + np.float32(cost * factor))
+
+
+@njit(cache=True, nogil=True)
+def arrival_at(potential, size_x, cell, cost, planar):
+    """``arrival`` at a cell that is not of the outermost ring."""
+    return arrival(np.float32(cost), potential[cell - 1], potential[cell + 1],
+                   potential[cell - size_x], potential[cell + size_x], planar)
+
+
+@njit(cache=True, nogil=True)
+def start_at_cell(potential, source, size_x):
+    """Begin with 0 in one cell; returns the first front, int64[4]."""
+    potential[source] = 0.0
+    return np.array([source + 1, source - 1, source - size_x, source + size_x])
+
+
+@njit(cache=True, nogil=True)
+def start_between_cells(potential, source, size_x, dx, dy, neutral):
+    """Begin at a point ``dx``, ``dy`` cells right of and above a cell's centre.
+
+    Both are float32. The four cells around the point share the cost of two free
+    cells by the areas opposite to them. Returns the first front, int64[8].
+    """
+    twice, one = np.float32(2 * neutral), np.float32(1.0)
+    _seed(potential, source, twice * dx * dy)
+    _seed(potential, source + 1, twice * (one - dx) * dy)
+    _seed(potential, source + size_x, twice * dx * (one - dy))
+    _seed(potential, source + size_x + 1, twice * (one - dx) * (one - dy))
+    return np.array([source + 2, source - 1, source + size_x - 1, source + size_x + 2,
+                     source - size_x, source - size_x + 1, source + 2 * size_x,
+                     source + 2 * size_x + 1])
+
+
+@njit(cache=True, nogil=True)
+def _seed(potential, cell, value):
+    if 0 <= cell < potential.size:
+        potential[cell] = value
+
+
+@njit(cache=True, nogil=True)
+def _distance_cost(cell, other, size_x, neutral):
+    return np.float32(math.hypot(cell % size_x - other % size_x,
+                                 cell // size_x - other // size_x) * neutral)
+
+
+@njit(cache=True, nogil=True)
+def _enter_front(costs, pending, front, cells, obstacle):
+    """Put those of the cells that can be entered into a front; returns how many there are."""
+    count = 0
+    for cell in cells:
+        if 0 <= cell < costs.size and costs[cell] < obstacle and not pending[cell]:
+            front[count] = cell
+            pending[cell] = True
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def propagate(costs, potential, first_front, rules, source, target, size_x, max_fronts,
+              stop_at_target, heuristic):
+    """Spread a potential that has begun at ``source``, at most ``max_fronts`` fronts.
+
+    ``costs`` uint8[n] or float32[n], at most ``rules.obstacle``; ``potential``
+    float32[n], NOT_REACHED but where the wave has begun, lowered in place. Stops
+    early when nothing is left, or, with ``stop_at_target``, when the target cell
+    has a potential; returns whether it stopped for that. ``heuristic`` makes it A*.
+    """
+    obstacle, neutral, planar = rules
+    pending = np.zeros(costs.size, dtype=np.bool_)  # cell is in a bucket
+    front = np.empty(BUCKET_SIZE, dtype=np.uint32)
+    ahead = np.empty(BUCKET_SIZE, dtype=np.uint32)  # for the next front
+    later = np.empty(BUCKET_SIZE, dtype=np.uint32)  # for when nothing below the threshold is left
+    in_front = _enter_front(costs, pending, front, first_front, obstacle)
+    in_ahead, in_later = 0, 0
+    threshold = np.float32(obstacle)
+    if heuristic:
+        threshold = np.float32(threshold + _distance_cost(source, target, size_x, neutral))
+    stride = np.uint32(size_x)  # unsigned indices save the test for a negative one
+    one = np.uint32(1)
+    for _ in range(max_fronts):
+        if in_front == 0 and in_ahead == 0:
+            break
+        for k in range(in_front):
+            pending[front[k]] = False
+        for k in range(in_front):
+            cell = front[k]
+            neighbours = (cell - one, cell + one, cell - stride, cell + stride)
+            around = (potential[neighbours[0]], potential[neighbours[1]],
+                      potential[neighbours[2]], potential[neighbours[3]])
+            # Potentials are made of whole costs, the comparison below is of exact ones.
+            here = arrival(np.float32(int(costs[cell])), around[0], around[1], around[2],
+                           around[3], planar)
+            if here >= potential[cell]:
+                continue
+            potential[cell] = here
+            priority = here
+            if heuristic:
+                priority = np.float32(
+                    here + _distance_cost(np.int64(cell), target, size_x, neutral))
+            for j in range(4):
+                cost = costs[neighbours[j]]
+                crossing = np.float32(_INVERSE_SQRT2 * np.float64(cost))
+                if (around[j] <= np.float32(priority + crossing) or cost >= obstacle
+                        or pending[neighbours[j]]):
+                    continue
+                if priority < threshold and in_ahead < BUCKET_SIZE:
+                    ahead[in_ahead] = neighbours[j]
+                    in_ahead += 1
+                elif priority >= threshold and in_later < BUCKET_SIZE:
+                    later[in_later] = neighbours[j]
+                    in_later += 1
+                else:
+                    continue
+                pending[neighbours[j]] = True
+        front, ahead, in_front, in_ahead = ahead, front, in_ahead, 0
+        if in_front == 0:
+            threshold = np.float32(threshold + np.float32(2 * neutral))
+            front, later, in_front, in_later = later, front, in_later, 0
+        if stop_at_target and potential[target] < NOT_REACHED:
+            return True
+    return False

@@ -1,0 +1,225 @@
+"""The planner ``global_planner/GlobalPlanner``: NavFn's successor, with choices.
+
+Dijkstra's search spreads NavFn's wavefront (``navfn``) from the robot to the
+goal; A* instead visits cells in the order of potential + neutral cost * city
+block distance to the goal, and computes each cell's potential only once. A
+cell's potential is that of a planar wave (``use_quadratic``), or its cheapest
+neighbour's plus its own cost. The path follows the gradient down from the goal
+in half-cell steps, or goes from cell to lowest neighbour (``use_grid_path``).
+
+What a cell costs:
+
+    Dijkstra    neutral + factor * cost, at most lethal - 1; an obstacle from lethal - 1 on
+    A*          (neutral + cost) mod 256, in one byte as the original reckons it;
+                an obstacle from lethal on
+
+Unless ``old_navfn_behavior``, positions are real numbers: start and goal are
+half a cell less than cell coordinates, as cells' centres stand for cells.
+Dijkstra's wave then begins in the four cells around the robot, but A* and grid
+paths cut the coordinates to whole cells: what lies in the lower or left half of
+a cell belongs to the neighbour's, and when that is an obstacle there is no plan.
+For the gradient's sake every cell within two cells of the goal then gets a
+potential, obstacles as well: so near the goal a path may cut a corner of one.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional, Tuple
+
+import numpy as np
+
+from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
+from quad_nav.kernels import global_planner as kernel
+from quad_nav.kernels import wave as wavefront
+from quad_nav.plan.navfn import NOT_REACHED
+from quad_nav.plan.orientations import OrientationMode, with_headings
+
+Point = Tuple[float, float]
+_MARGIN = 1  # cells around a map that is not outlined, so that no search leaves it
+
+
+@dataclass(frozen=True)
+class SearchPlannerParams:
+    """Parameters of ``global_planner/GlobalPlanner``.
+
+    ``neutral_cost`` is the cost of a free cell, ``cost_factor`` multiplies costs
+    of the costmap, ``lethal_cost`` is an obstacle's. ``publish_scale`` is the highest
+    value of the potential as it is published. ``orientation_mode`` is one
+    of ``OrientationMode``. ``outline_map`` makes the outermost cells obstacles.
+    """
+
+    use_dijkstra: bool = True
+    use_quadratic: bool = True
+    use_grid_path: bool = False
+    old_navfn_behavior: bool = False
+    allow_unknown: bool = True
+    lethal_cost: int = 253
+    neutral_cost: int = 50
+    cost_factor: float = 3.0
+    orientation_mode: int = OrientationMode.FORWARD
+    orientation_window_size: int = 1
+    outline_map: bool = True
+    publish_potential: bool = True
+    publish_scale: int = 100
+
+
+class SearchPlanner:
+    """The planner ``global_planner/GlobalPlanner``.
+
+    ``potential`` is the last float32[H, W] computed, 1e10 where the search did
+    not come; None before the first plan.
+    """
+
+    def __init__(self, params: SearchPlannerParams = SearchPlannerParams()):
+        self.params = params
+        self.potential: Optional[np.ndarray] = None
+
+    def make_plan(self, spec: GridSpec, costs: np.ndarray, start: Pose2D,
+                  goal: Pose2D) -> np.ndarray:
+        """A plan from start to goal, float64[n, 3] rows x, y, yaw; the last row is the goal.
+
+        ``costs`` is uint8[H, W] on ``spec``; in place, the start's cell is set to
+        FREE and, with ``outline_map``, the outermost cells to LETHAL.
+
+        Raises StartOutsideMap, GoalOutsideMap and NoPath.
+        """
+        start_cell = spec.cell_of(start.x_m, start.y_m)
+        if start_cell is None:
+            raise StartOutsideMap(f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
+                                  f"the global costmap, {spec.extent}")
+        goal_cell = spec.cell_of(goal.x_m, goal.y_m)
+        if goal_cell is None:
+            raise GoalOutsideMap(f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
+                                 f"the global costmap, {spec.extent}")
+        costs[start_cell[1], start_cell[0]] = FREE
+        if self.params.outline_map:
+            _outline(costs)
+            path = self._path(costs, self._point(spec, start), self._point(spec, goal), goal_cell)
+        else:
+            path = self._path_to_the_border(spec, costs, start, goal, goal_cell)
+        if not len(path):
+            raise NoPath(f"no way from ({start.x_m:.2f}, {start.y_m:.2f}) to "
+                         f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap")
+        plan = np.zeros((len(path) + self._goals_appended, 3))
+        plan[:len(path), :2] = ((path[::-1].astype(np.float64) + self._offset) * spec.resolution_m
+                                + (spec.origin_x_m, spec.origin_y_m))
+        plan[len(path):] = goal.x_m, goal.y_m, goal.yaw_rad
+        return with_headings(plan, start.yaw_rad, self.params.orientation_mode,
+                             self.params.orientation_window_size)
+
+    @property
+    def _offset(self) -> float:
+        """From a path's cell coordinates to real ones, in cells."""
+        return 0.0 if self.params.old_navfn_behavior else 0.5
+
+    @property
+    def _goals_appended(self) -> int:
+        """How often the goal's pose follows the path; NavFn's way appends it on its own."""
+        return 2 if self.params.old_navfn_behavior else 1
+
+    def _point(self, spec: GridSpec, pose: Pose2D) -> Point:
+        """A position in the path's cell coordinates."""
+        x = (pose.x_m - spec.origin_x_m) / spec.resolution_m
+        y = (pose.y_m - spec.origin_y_m) / spec.resolution_m
+        if self.params.old_navfn_behavior:
+            return float(int(x)), float(int(y))
+        return x - self._offset, y - self._offset
+
+    def _path_to_the_border(self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D,
+                            goal_cell: Tuple[int, int]) -> np.ndarray:
+        """The path on a map whose outermost cells may be used, with obstacles around them."""
+        padded = np.pad(costs, _MARGIN, constant_values=LETHAL)
+        start_x, start_y = self._point(spec, start)
+        goal_x, goal_y = self._point(spec, goal)
+        path = self._path(padded, (start_x + _MARGIN, start_y + _MARGIN),
+                          (goal_x + _MARGIN, goal_y + _MARGIN),
+                          (goal_cell[0] + _MARGIN, goal_cell[1] + _MARGIN))
+        assert self.potential is not None
+        self.potential = self.potential[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN]
+        return path - _MARGIN
+
+    def _path(self, costs: np.ndarray, start: Point, goal: Point,
+              goal_cell: Tuple[int, int]) -> np.ndarray:
+        """Points float32[n, 2] from goal to start in cell coordinates; none if there is no way."""
+        params, size_x = self.params, costs.shape[1]
+        if params.use_dijkstra:
+            potential, arrived = self._dijkstra(costs, start, goal)
+        else:
+            potential, arrived = self._a_star(costs, start, goal)
+        if not params.old_navfn_behavior:
+            kernel.fill_around(byte_costs(costs, params), potential, size_x,
+                               _flat(goal_cell, size_x), params.use_quadratic)
+        self.potential = potential.reshape(costs.shape)
+        path = np.empty((4 * costs.size, 2), dtype=np.float32)
+        if not arrived:
+            return path[:0]
+        descend = kernel.grid_path if params.use_grid_path else kernel.gradient_path
+        return path[:descend(potential, size_x, *start, *goal, path)]
+
+    def _dijkstra(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:
+        params, size_x = self.params, costs.shape[1]
+        source = _flat(start, size_x)
+        potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
+        if params.old_navfn_behavior:
+            front = wavefront.start_at_cell(potential, source, size_x)
+        else:
+            front = wavefront.start_between_cells(
+                potential, source, size_x, _hundredths(start[0]), _hundredths(start[1]),
+                params.neutral_cost)
+        rules = wavefront.Rules(params.lethal_cost, params.neutral_cost, params.use_quadratic)
+        arrived = wavefront.propagate(
+            wave_costs(costs, params).ravel(), potential, front, rules, source,
+            _flat(goal, size_x), size_x, 2 * costs.size, stop_at_target=True, heuristic=False)
+        return potential, arrived
+
+    def _a_star(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:
+        params, size_x = self.params, costs.shape[1]
+        potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
+        arrived = kernel.a_star(byte_costs(costs, params), _enterable(costs, params), potential,
+                                size_x, _flat(start, size_x), _flat(goal, size_x),
+                                params.neutral_cost, params.use_quadratic, 2 * costs.size)
+        return potential, arrived
+
+
+def wave_costs(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
+    """What Dijkstra's search takes for the cost of each cell, float32[H, W]."""
+    lethal = params.lethal_cost
+    table = np.minimum(np.arange(256) * np.float32(params.cost_factor) + params.neutral_cost,
+                       lethal - 1)
+    passable = np.arange(256) < lethal - 1
+    passable[UNKNOWN] |= params.allow_unknown
+    table = np.where(passable, table, lethal).astype(np.float32)[costs]
+    _outline(table, lethal)
+    return table
+
+
+def byte_costs(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
+    """What A* takes for the cost of a step to each cell, flat uint8[n]."""
+    return (costs + np.uint8(params.neutral_cost)).ravel()
+
+
+def _enterable(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
+    """Which cells A* may visit, flat bool[n]."""
+    enterable = costs < params.lethal_cost
+    if params.allow_unknown:
+        enterable |= costs == UNKNOWN
+    _outline(enterable, False)
+    return enterable.ravel()
+
+
+def _outline(grid: np.ndarray, value: int = LETHAL) -> None:
+    """Sets the outermost ring of cells."""
+    grid[[0, -1], :] = value
+    grid[:, [0, -1]] = value
+
+
+def _hundredths(coordinate: float) -> np.float32:
+    """A coordinate's distance from its whole number, as exact as the original has it."""
+    fraction = np.float32(coordinate - int(coordinate))
+    return np.float32(np.floor(np.float32(fraction * 100 + 0.5)) / 100)
+
+
+def _flat(point: Point, size_x: int) -> int:
+    return int(point[1]) * size_x + int(point[0])

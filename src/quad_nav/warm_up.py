@@ -1,0 +1,61 @@
+"""Compiles a navigator's kernels before it flies.
+
+numba compiles a kernel at its first call, which takes seconds, and keeps the
+result beside the source (or in the user's cache where that cannot be written).
+``python -m quad_nav.warm_up`` fills that cache at set-up; a node warms up its own
+configuration before it takes goals, which is quick when the cache is there.
+"""
+from __future__ import annotations
+
+import math
+from typing import Any, Dict
+
+import numpy as np
+
+from quad_nav import config
+from quad_nav.assembly import build_navigator
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.navigator import Navigator
+from quad_nav.tick import Located
+
+_AHEAD_M = 1.0
+_LIDAR: Dict[str, Any] = {
+    "data_type": "LaserScan", "marking": True, "clearing": True, "inf_is_valid": True,
+    "max_obstacle_height": 2.0}
+_COSTMAP: Dict[str, Any] = {"observation_sources": "scan", "scan": _LIDAR}
+
+
+def warm_up(configuration: config.Configuration) -> None:
+    """Flies a second of a little mission with a navigator of its own."""
+    navigator = build_navigator(configuration)
+    spec = navigator.global_costmap.spec
+    here = Pose2D(spec.origin_x_m + 0.5 * spec.size_x * spec.resolution_m,
+                  spec.origin_y_m + 0.5 * spec.size_y * spec.resolution_m)
+    _look_around(navigator, here)
+    navigator.set_goal(Pose2D(here.x_m + _AHEAD_M, here.y_m), 0.0)
+    for now_s in (0.0, 0.5, 1.0):
+        navigator.tick(now_s, Located(here, here), Twist2D(vx_mps=0.1))
+
+
+def _look_around(navigator: Navigator, here: Pose2D) -> None:
+    """A scan with something 2 m behind the robot for every obstacle layer."""
+    angles = np.linspace(-math.pi, math.pi, 64, endpoint=False)
+    ranges = np.where(np.abs(angles) > 3.0, 2.0, np.inf).astype(np.float32)
+    scan = Scan(0.0, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
+    lidar = Pose3D(here.x_m, here.y_m, 1.0)
+    for costmap in (navigator.global_costmap, navigator.local_costmap):
+        for layer in costmap.layers.values():
+            if isinstance(layer, ObstacleLayer):
+                for source in layer.params.sources:
+                    layer.add_scan(source.name, scan, lidar, 0.0)
+
+
+def main() -> None:
+    warm_up(config.load({
+        "global_costmap": dict(_COSTMAP),
+        "local_costmap": {**_COSTMAP, "rolling_window": True, "width": 3.0, "height": 3.0}}))
+
+
+if __name__ == "__main__":
+    main()

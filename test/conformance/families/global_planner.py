@@ -1,0 +1,36 @@
+"""The planner of ``global_planner``: wave or A*, descent or grid path, orientations."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import List
+
+from families.case import load_case
+from families.comparison import Comparison, Difference
+from families.loop import spec_at
+from families.plans import NO_PLAN, compare_plans
+from quad_nav.config import load
+from quad_nav.errors import PlanningError
+from quad_nav.geometry import Pose2D
+from quad_nav.plan.global_planner import SearchPlanner
+
+_METRES = 1e-5
+# Half a cell apart, two points with that tolerance give a direction to within this.
+_RADIANS = 2e-3
+
+
+def check(path: Path) -> List[Difference]:
+    case, comparison = load_case(path), Comparison()
+    recorded, meta = case.arrays, case.meta
+    configuration = load({"base_global_planner": "global_planner/GlobalPlanner",
+                          "GlobalPlanner": meta["params"]})
+    planner = SearchPlanner(configuration.global_planner)
+    costs = recorded["grid_in"].copy()
+    try:
+        plan = planner.make_plan(spec_at(meta, meta["origin"]), costs, Pose2D(*meta["start"]),
+                                 Pose2D(*meta["goal"]))
+    except PlanningError:
+        plan = NO_PLAN
+    comparison.exact("found", len(plan) > 0, meta["found"])
+    comparison.exact("grid_after", costs, recorded["grid_after"])
+    compare_plans(comparison, "plan", plan, recorded["plan"], _METRES, _RADIANS)
+    return comparison.differences

@@ -1,0 +1,45 @@
+#!/usr/bin/env python3
+"""A launch that cannot be flown is refused before anything starts, with every fault."""
+import json
+import os
+import subprocess
+import tempfile
+import unittest
+
+import rostest
+
+ARGUMENTS = ["--dump-params", "quad", "two_quads.launch", "rviz:=false"]
+
+
+def preflight(*arguments):
+    """(exit status, what was said) for a launch with these arguments."""
+    dump = subprocess.run(["roslaunch", *ARGUMENTS, *arguments], stdout=subprocess.PIPE, check=True)
+    check = subprocess.run(["python3", "-m", "quad_nav.ros.preflight"], input=dump.stdout,
+                           stderr=subprocess.PIPE, check=False)
+    return check.returncode, check.stderr.decode()
+
+
+class Preflight(unittest.TestCase):
+    def test_the_tutorial_can_be_flown(self):
+        self.assertEqual(preflight("config:=tutorial")[0], 0)
+
+    def test_unknown_scene(self):
+        status, said = preflight("scene:=/nowhere.yaml")
+        self.assertEqual(status, 2)
+        self.assertEqual(said.count("/nowhere.yaml: cannot be read"), 1)
+
+    def test_faults_of_all_kinds_are_listed_together(self):
+        with tempfile.TemporaryDirectory() as folder:
+            result = os.path.join(folder, "result.json")
+            status, said = preflight(f"goals:={folder}", "rate:=-1", f"result:={result}")
+            with open(result, encoding="utf-8") as file:
+                written = json.load(file)
+        self.assertEqual(status, 2)
+        self.assertIn("has no quad0_goals.json, quad1_goals.json", said)
+        self.assertIn("simulator: rate: is -1, expected a number above 0", said)
+        self.assertEqual(written["exit_status"], 2)
+        self.assertEqual(len(written["problems"]), 2)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "preflight", Preflight)
