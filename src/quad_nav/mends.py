@@ -1,0 +1,30 @@
+"""The original's faults, mended: one switch each.
+
+What each fault is, and what is done about it, is in ``docs/faults.md``.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Mends:
+    """Which faults of the original are mended. ``ORIGINAL`` has them all.
+
+    ``progress_timeout_s``: seconds within ``progress_distance_m`` before a new plan,
+    and as many again before recoveries; 0 never. ``sensor_timeout_s``: silence of a
+    sensor that stops the robot; 0 leaves it to the sensor's own period.
+    """
+
+    progress_timeout_s: float = 10.0
+    progress_distance_m: float = 0.1
+    sensor_timeout_s: float = 1.0
+    clear_any_obstacle_layer: bool = True
+    refuse_colliding_escape: bool = True
+    predict_goal_turn: bool = True
+    stop_after_rotation: bool = True
+
+
+ORIGINAL = Mends(progress_timeout_s=0.0, sensor_timeout_s=0.0, clear_any_obstacle_layer=False,
+                 refuse_colliding_escape=False, predict_goal_turn=False,
+                 stop_after_rotation=False)
