@@ -16,6 +16,7 @@ from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.geometry import Pose2D
+from quad_nav.mends import Mends
 from quad_nav.navigator import NamedRecovery, Navigator
 from quad_nav.plan.carrot import Carrot, CarrotParams
 from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
@@ -23,12 +24,14 @@ from quad_nav.plan.navfn import Navfn, NavfnParams
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.plugins import Plugin
 from quad_nav.recovery import (
+    ORIGINAL_LAYER_NAMES,
     ClearCostmap,
     ClearCostmapParams,
     MoveSlowAndClear,
     MoveSlowAndClearParams,
     Recovery,
     Rotate,
+    RotateParams,
 )
 
 # The planner that each dataclass of parameters is for.
@@ -48,18 +51,19 @@ def build_navigator(configuration: Configuration) -> Navigator:
     global_costmap = LayeredCostmap(_watched(configuration, configuration.global_costmap))
     local_costmap = LayeredCostmap(_watched(configuration, configuration.local_costmap))
     planner = _global_planner(configuration.global_planner, global_costmap.footprint)
-    controller = _local_planner(configuration.local_planner, local_costmap.footprint,
-                                configuration.local_planner_period_s)
-    recoveries = [NamedRecovery(name, _recovery(params))
+    controller = _local_planner(_mended(configuration.local_planner, configuration.mends),
+                                local_costmap.footprint, configuration.local_planner_period_s)
+    recoveries = [NamedRecovery(name, _recovery(_mended(params, configuration.mends)))
                   for name, params in configuration.recoveries]
     return Navigator(configuration.navigator, global_costmap, local_costmap,
-                     planner, controller, recoveries)
+                     planner, controller, recoveries, configuration.mends)
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
     """Takes over every parameter that may change in flight; plan and goal stay."""
     footprint = navigator.global_costmap.footprint
     navigator.params = configuration.navigator
+    navigator.mends = configuration.mends
     navigator.global_costmap.reconfigure(_watched(configuration, configuration.global_costmap))
     navigator.local_costmap.reconfigure(_watched(configuration, configuration.local_costmap))
     new_footprint = navigator.global_costmap.footprint
@@ -68,7 +72,8 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
             or not np.array_equal(footprint, new_footprint)):
         navigator.planner = _global_planner(configuration.global_planner, new_footprint)
     if not isinstance(configuration.local_planner, Plugin):
-        navigator.set_controller_params(configuration.local_planner)
+        navigator.set_controller_params(
+            _mended(configuration.local_planner, configuration.mends))
     navigator.controller.set_footprint(navigator.local_costmap.footprint)
 
 
@@ -84,13 +89,28 @@ def _local_planner(params: Any, footprint: np.ndarray, control_period_s: float) 
     return LOCAL_PLANNERS[type(params)](params, footprint, control_period_s)
 
 
+def _mended(params: Any, mends: Mends) -> Any:
+    """A local planner's or a recovery's parameters with the switches that concern it."""
+    if isinstance(params, TrajectoryPlannerParams):
+        return replace(params, refuse_colliding_escape=mends.refuse_colliding_escape,
+                       predict_goal_turn=mends.predict_goal_turn)
+    if isinstance(params, DwaParams):
+        return replace(params, predict_goal_turn=mends.predict_goal_turn)
+    if isinstance(params, RotateParams):
+        return replace(params, stop_afterwards=mends.stop_after_rotation)
+    if (isinstance(params, ClearCostmapParams) and params.layer_names is None
+            and not mends.clear_any_obstacle_layer):
+        return replace(params, layer_names=ORIGINAL_LAYER_NAMES)
+    return params
+
+
 def _watched(configuration: Configuration, costmap: CostmapParams) -> CostmapParams:
     """The costmap with no sensor trusted for longer than ``sensor_timeout_s``.
 
     ``expected_update_rate`` is a period in seconds, and people write 21.0 into it
     for a LIDAR of 20 Hz; the robot would fly blind for 21 s.
     """
-    limit_s = configuration.navigator.sensor_timeout_s
+    limit_s = configuration.mends.sensor_timeout_s
     if limit_s <= 0.0:
         return costmap
     layers = tuple((name, _watched_layer(layer, limit_s)) for name, layer in costmap.layers)

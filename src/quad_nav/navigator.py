@@ -22,6 +22,7 @@ from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.mends import Mends
 from quad_nav.plan.near import plan_near
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.recovery import Recovery, Surroundings
@@ -60,11 +61,6 @@ class NavigatorParams:
     make_plan_clear_costmap: bool = True
     make_plan_add_unreachable_goal: bool = True
 
-    # Mended faults; 0 gives the original's behaviour back.
-    progress_timeout_s: float = 10.0
-    progress_distance_m: float = 0.1
-    sensor_timeout_s: float = 1.0
-
     @property
     def control_period_s(self) -> float:
         return 1.0 / self.controller_frequency_hz
@@ -85,8 +81,10 @@ class Navigator:
 
     def __init__(self, params: NavigatorParams, global_costmap: LayeredCostmap,
                  local_costmap: LayeredCostmap, planner: GlobalPlanner, controller: LocalPlanner,
-                 recoveries: Sequence[NamedRecovery]):
+                 recoveries: Sequence[NamedRecovery],
+                 mends: Mends):
         self.params = params
+        self.mends = mends
         self.global_costmap = global_costmap
         self.local_costmap = local_costmap
         self.planner = planner
@@ -347,8 +345,8 @@ class Navigator:
 
         The original takes an in-place turn for valid control for ever.
         """
-        timeout_s = self.params.progress_timeout_s
-        if self._progress.has_moved(tick.now_s, pose, self.params.progress_distance_m):
+        timeout_s = self.mends.progress_timeout_s
+        if self._progress.has_moved(tick.now_s, pose, self.mends.progress_distance_m):
             self._replanned_for_progress = False
         if not self._progress.exceeds(tick.now_s, timeout_s):
             return True

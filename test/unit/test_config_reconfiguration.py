@@ -24,7 +24,7 @@ def test_namespaces_and_the_order_of_parameters(configuration):
     assert list(namespaces) == [
         "", "TrajectoryPlannerROS", "global_costmap", "global_costmap/obstacle_layer",
         "global_costmap/inflation_layer", "local_costmap", "local_costmap/static_layer",
-        "local_costmap/obstacle_layer", "local_costmap/inflation_layer"]
+        "local_costmap/obstacle_layer", "local_costmap/inflation_layer", "mends"]
     names = {namespace: [parameter.name for parameter in parameters]
              for namespace, parameters in namespaces.items()}
     assert names["local_costmap"] == [

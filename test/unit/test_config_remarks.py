@@ -175,12 +175,6 @@ def test_no_rotation_when_it_is_not_allowed():
     assert [name for name, _ in recoveries] == ["conservative_reset", "aggressive_reset"]
 
 
-def test_clearing_covers_obstacle_layers_of_any_name():
-    costmap = {"plugins": [{"name": "laser", "type": "costmap_2d::ObstacleLayer"}]}
-    clear = dict(load({"local_costmap": costmap}, "").recoveries)["conservative_reset"]
-    assert "laser" in clear.layer_names
-
-
 def test_radii_of_move_base_itself():
     tree = {"local_costmap": {"circumscribed_radius": 0.5}}
     configuration = load(tree, "")

@@ -16,6 +16,7 @@ from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
+from quad_nav.mends import Mends
 from quad_nav.navigator import NavigatorParams
 from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
@@ -34,7 +35,8 @@ PAIRS = [
     (SearchPlannerParams, global_planner_tables.SEARCH_PLANNER, set()),
     (CarrotParams, global_planner_tables.CARROT, set()),
     (ClearCostmapParams, tables.CLEAR_COSTMAP, {"layer_names"}),
-    (RotateParams, ROTATE, set()),
+    (RotateParams, ROTATE, {"stop_afterwards"}),
+    (Mends, tables.MENDS, set()),
     (MoveSlowAndClearParams, tables.MOVE_SLOW, {"translation_fields", "rotation_fields"}),
     (CostmapParams, costmap_tables.COSTMAP, {"layers"}),
     (ObstacleLayerParams, costmap_tables.OBSTACLE_LAYER, {"sources", "track_unknown_space"}),

@@ -13,7 +13,7 @@ PACKAGE = "quad_nav"
 
 # A unit (a module or subpackage of quad_nav) imports itself and units of the rows above its own.
 LAYERS = [
-    {"errors", "footprint", "geometry", "grid"},
+    {"errors", "footprint", "geometry", "grid", "mends"},
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},

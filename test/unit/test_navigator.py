@@ -9,6 +9,7 @@ import pytest
 from quad_nav.errors import NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
+from quad_nav.mends import ORIGINAL, Mends
 from quad_nav.navigator import NamedRecovery, Navigator, NavigatorParams
 from quad_nav.plan.near import ring_offsets
 from quad_nav.recovery import Step
@@ -94,13 +95,14 @@ class FakeRecovery:
 class Flight:
     """A navigator, its fakes, and a clock that stops wherever something is due."""
 
-    def __init__(self, recoveries=(), **params):
+    def __init__(self, recoveries=(), mends=ORIGINAL, **params):
         params.setdefault("controller_frequency_hz", 10.0)
         self.global_costmap = FakeCostmap(5.0)
         self.local_costmap = FakeCostmap(4.0)
         self.planner, self.controller = FakePlanner(), FakeController()
         self.navigator = Navigator(NavigatorParams(**params), self.global_costmap,
-                                   self.local_costmap, self.planner, self.controller, recoveries)
+                                   self.local_costmap, self.planner, self.controller,
+                                   recoveries, mends)
         self.now_s = 0.0
         self.pose = HERE
 
@@ -193,7 +195,7 @@ def test_oscillation_timeout_aborts_when_the_robot_stays_within_its_distance():
 
 
 def test_standing_still_is_replanned_then_recovered_then_aborted():
-    flight = Flight([NamedRecovery("r", FakeRecovery())], progress_timeout_s=2.0)
+    flight = Flight([NamedRecovery("r", FakeRecovery())], Mends(progress_timeout_s=2.0))
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(12.0)
     warnings = [warning for tick in ticks for warning in tick.warnings]
@@ -203,7 +205,7 @@ def test_standing_still_is_replanned_then_recovered_then_aborted():
 
 
 def test_with_the_originals_progress_timeout_it_spins_for_ever():
-    flight = Flight(progress_timeout_s=0.0)
+    flight = Flight(mends=ORIGINAL)
     flight.controller.command = Twist2D(vyaw_radps=1.0)
     flight.navigator.set_goal(GOAL, 0.0)
     assert outcomes(flight.until(60.0)) == []

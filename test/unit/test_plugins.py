@@ -156,7 +156,7 @@ def test_planner_is_kept_until_the_footprint_changes(tree):
 def test_nothing_of_a_plugin_is_reconfigurable(tree):
     namespaces = config.reconfigurable(config.load(tree))
     assert list(namespaces) == ["", "global_costmap", "global_costmap/inflation_layer",
-                                "local_costmap", "local_costmap/inflation_layer"]
+                                "local_costmap", "local_costmap/inflation_layer", "mends"]
 
 
 def test_missing_parameter_is_told_with_its_place(tree):

@@ -16,7 +16,7 @@ from quad_nav.config.planners import (
     settle_planner_names,
     settle_planners,
 )
-from quad_nav.config.reader import fields, settle
+from quad_nav.config.reader import fields, settle, subtree
 from quad_nav.config.recoveries import (
     NamedTypes,
     RecoveryParams,
@@ -27,9 +27,11 @@ from quad_nav.config.recoveries import (
 )
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.errors import InputError
+from quad_nav.mends import Mends
 from quad_nav.navigator import NavigatorParams
 from quad_nav.plugins import plugin_name
 
+MENDS = "mends"
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards, so they may stand at the node's level.
 _INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
@@ -48,6 +50,7 @@ class Configuration:
     """
 
     navigator: NavigatorParams
+    mends: Mends
     global_costmap: CostmapParams
     local_costmap: CostmapParams
     global_planner: Any
@@ -99,11 +102,12 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
     pruned = _without_empty(settled)
     return Configuration(
         navigator=navigator_params(settled, listed, given=tree),
+        mends=mends_of(settled),
         global_costmap=costmaps[0],
         local_costmap=costmaps[1],
         global_planner=planner_params(settled, "base_global_planner"),
         local_planner=planner_params(settled, "base_local_planner"),
-        recoveries=recoveries(settled, listed, tuple(costmaps)),
+        recoveries=recoveries(settled, listed),
         local_planner_period_s=local_planner_period_s(settled),
         clearing_radius_m=settled.get("clearing_radius", circumscribed_radius_m(settled)),
         remarks=tuple(notes.remarks),
@@ -118,13 +122,19 @@ def navigator_params(tree: Mapping[str, Any], listed: Optional[NamedTypes],
                            **fields(tree, tables.NAVIGATOR.parameters, given))
 
 
+def mends_of(tree: Mapping[str, Any]) -> Mends:
+    """The switches of a settled tree."""
+    return Mends(**fields(tree[MENDS], tables.MENDS.parameters))
+
+
 def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     """Brings the whole tree into the state in which the original leaves it."""
     settle_planner_names(tree, notes)
-    known = [*COSTMAPS, *planner_keys(tree), *_INHERITED, "recovery_behaviors",
+    known = [*COSTMAPS, MENDS, *planner_keys(tree), *_INHERITED, "recovery_behaviors",
              *listed_names(tree)]
     settle(tree, "", tables.NAVIGATOR, notes, also_known=known)
     settle_planners(tree, notes)
+    settle(subtree(tree, MENDS, "", notes), MENDS, tables.MENDS, notes)
     for name in COSTMAPS:
         settle_costmap(tree, name, notes)
     return settle_recoveries(tree, notes)

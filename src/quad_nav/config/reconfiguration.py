@@ -6,7 +6,13 @@ from dataclasses import replace
 from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config import costmap_tables, tables
-from quad_nav.config.configuration import COSTMAPS, Configuration, navigator_params
+from quad_nav.config.configuration import (
+    COSTMAPS,
+    MENDS,
+    Configuration,
+    mends_of,
+    navigator_params,
+)
 from quad_nav.config.costmaps import costmap_params
 from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
@@ -28,6 +34,7 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
         namespaces[costmap] = costmap_tables.COSTMAP
         for layer, table in layer_tables(configuration.tree[costmap]["plugins"]).items():
             namespaces[join(costmap, layer)] = table
+    namespaces[MENDS] = tables.MENDS
     return {name: table.reconfigurable for name, table in namespaces.items()}
 
 
@@ -98,6 +105,8 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
     if namespace == "":
         listed = configuration.navigator.recovery_behaviors
         return replace(configuration, navigator=navigator_params(tree, listed, given=tree))
+    if namespace == MENDS:
+        return replace(configuration, mends=mends_of(tree))
     if namespace in reconfigurable_planners(tree):
         return replace(configuration, global_planner=planner_params(tree, "base_global_planner"),
                        local_planner=planner_params(tree, "base_local_planner"))

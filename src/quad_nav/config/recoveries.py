@@ -10,11 +10,8 @@ from quad_nav.config.reader import Namespace, check_class, fields, settle, subtr
 from quad_nav.config.spec import Table
 from quad_nav.config.speed_limits import check_slow, slow_params
 from quad_nav.config.trajectory_planner_tree import TRAJECTORY_PLANNER
-from quad_nav.costmap.layered import CostmapParams
-from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
 from quad_nav.recovery import (
-    DEFAULT_LAYER_NAMES,
     ClearCostmapParams,
     MoveSlowAndClearParams,
     RotateParams,
@@ -57,11 +54,11 @@ def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
     return listed
 
 
-def recoveries(tree: Mapping[str, Any], listed: Optional[NamedTypes],
-               costmaps: Tuple[CostmapParams, ...]) -> Tuple[Tuple[str, RecoveryParams], ...]:
+def recoveries(tree: Mapping[str, Any],
+               listed: Optional[NamedTypes]) -> Tuple[Tuple[str, RecoveryParams], ...]:
     """(name, parameters) in the order in which they are tried, of a settled tree."""
     sequence = _default_sequence(tree) if listed is None else listed
-    return tuple((name, _params(name, kind, tree, costmaps)) for name, kind in sequence)
+    return tuple((name, _params(name, kind, tree)) for name, kind in sequence)
 
 
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
@@ -149,11 +146,10 @@ def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
                       " names of layers, as in [obstacle_layer]")
 
 
-def _params(name: str, kind: str, tree: Mapping[str, Any],
-            costmaps: Tuple[CostmapParams, ...]) -> RecoveryParams:
+def _params(name: str, kind: str, tree: Mapping[str, Any]) -> RecoveryParams:
     namespace = tree.get(name, {})
     if kind == CLEAR:
-        return _clear_params(namespace, costmaps)
+        return _clear_params(namespace)
     if kind == MOVE_SLOW:
         return slow_params(namespace, tree["base_local_planner"])
     if kind == ROTATE:
@@ -161,13 +157,9 @@ def _params(name: str, kind: str, tree: Mapping[str, Any],
     return Plugin(load_class(kind, RECOVERY), Parameters(namespace, name))
 
 
-def _clear_params(namespace: Mapping[str, Any],
-                  costmaps: Tuple[CostmapParams, ...]) -> ClearCostmapParams:
-    """Without ``layer_names`` the obstacle layers are cleared, whatever their names."""
-    obstacles = [name for costmap in costmaps for name, layer in costmap.layers
-                 if isinstance(layer, ObstacleLayerParams)]
-    default = tuple(dict.fromkeys([*DEFAULT_LAYER_NAMES, *obstacles]))
-    return ClearCostmapParams(layer_names=tuple(namespace.get("layer_names", default)),
+def _clear_params(namespace: Mapping[str, Any]) -> ClearCostmapParams:
+    names = namespace.get("layer_names")
+    return ClearCostmapParams(layer_names=None if names is None else tuple(names),
                               **fields(namespace, tables.CLEAR_COSTMAP.parameters))
 
 

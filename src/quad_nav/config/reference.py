@@ -72,6 +72,8 @@ def _sections() -> Iterable[Tuple[str, str, Table]]:
            global_planner_tables.SEARCH_PLANNER)
     yield ("CarrotPlanner", "The global planner `carrot_planner/CarrotPlanner`: straight for the"
            " goal.", global_planner_tables.CARROT)
+    yield ("mends", "Not in the original: its faults, mended; see [faults](faults.md).",
+           tables.MENDS)
     yield "Costmaps", "Below `global_costmap` and `local_costmap`.", costmap_tables.COSTMAP
     yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", costmap_tables.OBSTACLE_LAYER)
     yield ("Voxel layer", "`costmap_2d::VoxelLayer`.", costmap_tables.VOXEL_LAYER)

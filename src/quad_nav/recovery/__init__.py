@@ -6,7 +6,6 @@ is done; it never blocks, so a goal can be cancelled in the middle of a turn.
 from __future__ import annotations
 
 from quad_nav.recovery.clear_costmap import (
-    DEFAULT_LAYER_NAMES,
     ORIGINAL_LAYER_NAMES,
     ClearCostmap,
     ClearCostmapParams,
@@ -15,6 +14,6 @@ from quad_nav.recovery.move_slow import MoveSlowAndClear, MoveSlowAndClearParams
 from quad_nav.recovery.recovery import Recovery, SpeedLimit, Step, Surroundings
 from quad_nav.recovery.rotate import FootprintCost, Rotate, RotateParams
 
-__all__ = ["DEFAULT_LAYER_NAMES", "ORIGINAL_LAYER_NAMES", "ClearCostmap", "ClearCostmapParams",
+__all__ = ["ORIGINAL_LAYER_NAMES", "ClearCostmap", "ClearCostmapParams",
            "FootprintCost", "MoveSlowAndClear", "MoveSlowAndClearParams", "Recovery", "Rotate",
            "RotateParams", "SpeedLimit", "Step", "Surroundings"]

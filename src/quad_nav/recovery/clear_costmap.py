@@ -2,22 +2,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Tuple
+from typing import Iterable, Optional, Tuple
 
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.recovery.recovery import Step, Surroundings
 
-# The original clears a layer called "obstacles" by default, a name that its own
-# loader never gives: it calls the layer "obstacle_layer". Both are cleared here.
+# What the original clears by default, a name that its own loader never gives: it
+# calls the layer "obstacle_layer".
 ORIGINAL_LAYER_NAMES = ("obstacles",)
-DEFAULT_LAYER_NAMES = ("obstacles", "obstacle_layer", "obstacles_layer", "voxel_layer")
 
 
 @dataclass(frozen=True)
 class ClearCostmapParams:
-    """Parameters of ``clear_costmap_recovery/ClearCostmapRecovery``."""
+    """Parameters of ``clear_costmap_recovery/ClearCostmapRecovery``.
+
+    ``layer_names`` None means every obstacle layer.
+    """
 
     reset_distance_m: float = 3.0
-    layer_names: Tuple[str, ...] = DEFAULT_LAYER_NAMES
+    layer_names: Optional[Tuple[str, ...]] = None
     invert_area_to_clear: bool = False
     force_updating: bool = False
     affected_maps: str = "both"  # "global", "local" or "both"
@@ -50,7 +54,7 @@ class ClearCostmap:
             if pose is None:
                 skipped.append(name)
                 continue
-            costmap.clear_area(params.layer_names, pose.x_m, pose.y_m,
+            costmap.clear_area(self._names(costmap), pose.x_m, pose.y_m,
                                params.reset_distance_m, keep_inside=not params.invert_area_to_clear)
             if params.force_updating:
                 costmap.update(surroundings.now_s, pose)
@@ -58,3 +62,8 @@ class ClearCostmap:
         if skipped:
             message = "not cleared, the robot's pose is unknown: " + ", ".join(skipped)
         return Step(done=True, message=message)
+
+    def _names(self, costmap: LayeredCostmap) -> Iterable[str]:
+        if self.params.layer_names is not None:
+            return self.params.layer_names
+        return [name for name, layer in costmap.layers.items() if isinstance(layer, ObstacleLayer)]

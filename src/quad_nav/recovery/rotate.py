@@ -22,7 +22,7 @@ class RotateParams:
     acc_lim_theta_radps2: float = 3.2
     max_vel_theta_radps: float = 1.0
     min_in_place_vel_theta_radps: float = 0.4
-    stop_afterwards: bool = True
+    stop_afterwards: bool = False  # a mended fault
 
 
 FootprintCost = Callable[[LayeredCostmap, Pose2D], float]

@@ -1,0 +1,79 @@
+"""Each fault of the original: mended by default, and to be had back."""
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from quad_nav.assembly import apply_configuration, build_navigator
+from quad_nav.config import load, updated
+from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.grid import LETHAL
+from quad_nav.mends import ORIGINAL, Mends
+from quad_nav.recovery import Surroundings
+
+LIDAR = {"data_type": "LaserScan", "marking": True, "clearing": False,
+         "max_obstacle_height": 2.0, "expected_update_rate": 21.0}
+TREE = {name: {"observation_sources": "scan", "scan": LIDAR, "obstacle_range": 5.0}
+        for name in ("global_costmap", "local_costmap")}
+OFF = {"progress_timeout": 0.0, "sensor_timeout": 0.0, "clear_any_obstacle_layer": False,
+       "refuse_colliding_escape": False, "predict_goal_turn": False, "stop_after_rotation": False}
+HERE = Pose2D(5.0, 5.0)
+
+
+def navigator_with(mends):
+    return build_navigator(load({**TREE, "mends": mends}))
+
+
+def see_a_wall_three_metres_ahead(navigator, now_s=0.0):
+    scan = Scan(now_s, 0.0, 0.01, 0.02, 60.0, np.full(2, 3.0, dtype=np.float32))
+    for costmap in (navigator.global_costmap, navigator.local_costmap):
+        costmap.layers["obstacle_layer"].add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), now_s)
+        costmap.update(now_s, HERE)
+
+
+def test_all_are_on_by_default_and_all_can_be_switched_off():
+    assert load({}).mends == Mends()
+    assert load({"mends": OFF}).mends == ORIGINAL
+
+
+@pytest.mark.parametrize("mends, is_left", [({}, False),
+                                            ({"clear_any_obstacle_layer": False}, True)])
+def test_the_default_recovery_clears_the_layer_that_there_is(mends, is_left):
+    navigator = navigator_with(mends)
+    see_a_wall_three_metres_ahead(navigator)
+    grid = navigator.global_costmap.layers["obstacle_layer"].grid.costs
+    assert (grid == LETHAL).any()
+    clear = navigator.recoveries[0].behaviour  # beyond 3 m / 2
+    clear.step(Surroundings(0.0, navigator.global_costmap, navigator.local_costmap, HERE, HERE))
+    assert (grid == LETHAL).any() == is_left
+
+
+@pytest.mark.parametrize("mends, stale_after_s", [({}, 1.0), ({"sensor_timeout": 0.0}, 21.0),
+                                                  ({"sensor_timeout": 3.0}, 3.0)])
+def test_a_silent_sensor_is_missed_after_a_time_that_is_a_time(mends, stale_after_s):
+    navigator = navigator_with(mends)
+    see_a_wall_three_metres_ahead(navigator, 10.0)
+    assert navigator.local_costmap.is_current(10.0 + stale_after_s)
+    assert not navigator.local_costmap.is_current(10.1 + stale_after_s)
+
+
+@pytest.mark.parametrize("mends", [{}, OFF])
+def test_switches_reach_planner_and_recoveries(mends):
+    navigator = navigator_with(mends)
+    on = not mends
+    assert navigator.controller.params.refuse_colliding_escape is on
+    assert navigator.controller.params.predict_goal_turn is on
+    assert navigator.recoveries[1].behaviour.params.stop_afterwards is on
+    dwa = build_navigator(load({"mends": mends, "base_local_planner":
+                                "dwa_local_planner/DWAPlannerROS"}))
+    assert dwa.controller.params.predict_goal_turn is on
+
+
+def test_switches_can_be_thrown_in_flight():
+    configuration = load(TREE)
+    navigator = build_navigator(configuration)
+    configuration = updated(configuration, "mends", {"progress_timeout": 3.0,
+                                                     "predict_goal_turn": False})
+    apply_configuration(navigator, configuration)
+    assert navigator.mends.progress_timeout_s == 3.0
+    assert not navigator.controller.params.predict_goal_turn
