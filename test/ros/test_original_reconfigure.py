@@ -53,9 +53,10 @@ class OriginalReconfigure(OriginalCase):
 
     def test_enumeration_is_what_rqt_reconfigure_parses(self):
         for i in ROBOTS:
-            group, = self.latched(f"/move_base{i}/local_costmap/obstacle_layer/"
-                                  "parameter_descriptions", ConfigDescription).groups
-            method, = [p.edit_method for p in group.parameters if p.name == "combination_method"]
+            client = self.client(f"/move_base{i}/local_costmap/obstacle_layer")
+            group = client.get_group_descriptions(PATIENCE_S)
+            method, = [parameter["edit_method"] for parameter in group["parameters"]
+                       if parameter["name"] == "combination_method"]
             choices = ast.literal_eval(method)
             self.assertEqual(choices["enum_description"], "Method for combining layers enum")
             self.assertEqual(
