@@ -47,11 +47,8 @@ class MoveSlowAndClear:
 
     def step(self, surroundings: Surroundings) -> Step:
         params = self.params
-        targets = (
-            ("global", surroundings.global_costmap, surroundings.pose_in_global),
-            ("local", surroundings.local_costmap, surroundings.pose_in_local))
         messages = []
-        for name, costmap, pose in targets:
+        for name, costmap, pose in surroundings.costmaps:
             if pose is None:
                 messages.append(f"{name} costmap not cleared: the robot's pose is unknown")
             elif not costmap.free_obstacles(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m):

@@ -18,6 +18,12 @@ class Surroundings:
     pose_in_global: Optional[Pose2D]
     pose_in_local: Optional[Pose2D]
 
+    @property
+    def costmaps(self) -> Tuple[Tuple[str, LayeredCostmap, Optional[Pose2D]], ...]:
+        """(name, costmap, the robot's pose on it): global, local."""
+        return (("global", self.global_costmap, self.pose_in_global),
+                ("local", self.local_costmap, self.pose_in_local))
+
 
 @dataclass(frozen=True)
 class ParameterLimit:
