@@ -12,12 +12,15 @@ class Mends:
     """Which faults of the original are mended. ``ORIGINAL`` has them all.
 
     ``progress_timeout_s``: seconds within ``progress_distance_m`` before a new plan,
-    and as many again before recoveries; 0 never. ``sensor_timeout_s``: silence of a
-    sensor that stops the robot; 0 leaves it to the sensor's own period.
+    and as many again before recoveries; 0 never. With the new plan obstacle costs weigh
+    ``stuck_cost_factor`` of what they did, until the robot has got away.
+    ``sensor_timeout_s``: silence of a sensor that stops the robot; 0 leaves it to the
+    sensor's own period.
     """
 
     progress_timeout_s: float = 10.0
     progress_distance_m: float = 0.1
+    stuck_cost_factor: float = 0.1
     sensor_timeout_s: float = 1.0
     clear_any_obstacle_layer: bool = True
     refuse_colliding_escape: bool = True
@@ -25,6 +28,7 @@ class Mends:
     stop_after_rotation: bool = True
 
 
-ORIGINAL = Mends(progress_timeout_s=0.0, sensor_timeout_s=0.0, clear_any_obstacle_layer=False,
-                 refuse_colliding_escape=False, predict_goal_turn=False,
-                 stop_after_rotation=False)
+ORIGINAL = Mends(
+    progress_timeout_s=0.0, stuck_cost_factor=1.0, sensor_timeout_s=0.0,
+    clear_any_obstacle_layer=False, refuse_colliding_escape=False, predict_goal_turn=False,
+    stop_after_rotation=False)

@@ -23,11 +23,11 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.mends import Mends
+from quad_nav.parameter_limiter import ParameterLimiter
 from quad_nav.plan.near import plan_near
 from quad_nav.plan.planner import GlobalPlanner
-from quad_nav.recovery import Recovery, Surroundings
+from quad_nav.recovery import ParameterLimit, Recovery, Surroundings
 from quad_nav.schedule import Schedule
-from quad_nav.speed_limiter import SpeedLimiter
 from quad_nav.standstill import Standstill
 from quad_nav.tick import (
     Located,
@@ -90,7 +90,7 @@ class Navigator:
         self.planner = planner
         self.controller = controller
         self.recoveries = tuple(recoveries)
-        self._speed = SpeedLimiter(controller)
+        self._limiter = ParameterLimiter(controller)
         self.state = State.IDLE
         self.goal: Optional[Pose2D] = None
         self._costmaps: Dict[str, Tuple[LayeredCostmap, Schedule]] = {
@@ -155,7 +155,7 @@ class Navigator:
         self._end_goal()
         for _, schedule in self._costmaps.values():
             schedule.start(now_s)
-        self._speed.lift()
+        self._limiter.lift()
         if goal is not None:
             self.set_goal(goal, now_s)
 
@@ -290,7 +290,7 @@ class Navigator:
             tick.warnings.append("stopped: the robot's pose is unknown")
             tick.command = Twist2D()
             return
-        self._speed.follow(located.in_global)
+        self._limiter.follow(located.in_global)
         if (self._oscillation.has_moved(
                 tick.now_s, located.in_global, self.params.oscillation_distance_m)
                 and self._trigger is Trigger.OSCILLATION):
@@ -358,13 +358,26 @@ class Navigator:
         else:
             tick.warnings.append(where + ": planning anew")
             self._replanned_for_progress = True
+            self._dare_more(pose)
             tick.command = Twist2D()
             self._begin_planning(tick.now_s)
         return False
 
+    def _dare_more(self, pose: Pose2D) -> None:
+        """Obstacle costs count for less until the robot has got away.
+
+        A robot that spins has usually found that they outweigh all progress. What
+        collides stays forbidden.
+        """
+        weight = getattr(getattr(self.controller, "params", None), "occdist_scale", None)
+        if weight is not None and self.mends.stuck_cost_factor < 1.0:
+            limit = ParameterLimit((("occdist_scale", self.mends.stuck_cost_factor * weight),),
+                                   self.params.oscillation_distance_m)
+            self._limiter.impose(limit, pose)
+
     def set_controller_params(self, params: Any) -> None:
         """Other parameters for the controller; a recovery's speed limit stays in force."""
-        self._speed.set_params(params)
+        self._limiter.set_params(params)
 
     # -- recovery ------------------------------------------------------------------
 
@@ -408,8 +421,8 @@ class Navigator:
             tick.command = step.command
         if step.message:
             tick.warnings.append(step.message)
-        if step.speed_limit is not None and located.in_global is not None:
-            self._speed.impose(step.speed_limit, located.in_global)
+        if step.limit is not None and located.in_global is not None:
+            self._limiter.impose(step.limit, located.in_global)
         if step.done:
             self._active = None
             self._recovery_due_s = math.inf

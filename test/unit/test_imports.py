@@ -17,7 +17,7 @@ LAYERS = [
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},
-    {"plugins", "schedule", "speed_limiter", "standstill", "tick"},
+    {"plugins", "schedule", "parameter_limiter", "standstill", "tick"},
     {"navigator", "mission"},
     {"config"},
     {"assembly"},

@@ -15,8 +15,9 @@ LIDAR = {"data_type": "LaserScan", "marking": True, "clearing": False,
          "max_obstacle_height": 2.0, "expected_update_rate": 21.0}
 TREE = {name: {"observation_sources": "scan", "scan": LIDAR, "obstacle_range": 5.0}
         for name in ("global_costmap", "local_costmap")}
-OFF = {"progress_timeout": 0.0, "sensor_timeout": 0.0, "clear_any_obstacle_layer": False,
-       "refuse_colliding_escape": False, "predict_goal_turn": False, "stop_after_rotation": False}
+OFF = {"progress_timeout": 0.0, "stuck_cost_factor": 1.0, "sensor_timeout": 0.0,
+       "clear_any_obstacle_layer": False, "refuse_colliding_escape": False,
+       "predict_goal_turn": False, "stop_after_rotation": False}
 HERE = Pose2D(5.0, 5.0)
 
 

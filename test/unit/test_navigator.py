@@ -58,6 +58,11 @@ class FakePlanner:
         return np.array([[start.x_m, start.y_m, 0.0], [goal.x_m, goal.y_m, goal.yaw_rad]])
 
 
+@dataclass(frozen=True)
+class Weights:
+    occdist_scale: float
+
+
 class FakeController:
     def __init__(self):
         self.fails = False
@@ -67,6 +72,9 @@ class FakeController:
 
     def set_plan(self, plan):
         self.plans.append(plan)
+
+    def set_params(self, params):
+        self.params = params
 
     def is_goal_reached(self):
         return self.reached
@@ -202,6 +210,20 @@ def test_standing_still_is_replanned_then_recovered_then_aborted():
     assert warnings[0] == "no progress for 2 s at (1.00, 1.00): planning anew"
     assert [tick.recovery.name for tick in ticks if tick.recovery] == ["r"]
     assert outcomes(ticks) == [(False, Trigger.OSCILLATION.value)]
+
+
+def test_obstacle_costs_weigh_less_from_the_new_plan_on_until_the_robot_gets_away():
+    flight = Flight(mends=Mends(progress_timeout_s=2.0))
+    weights = flight.controller
+    weights.params = Weights(occdist_scale=0.01)
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.0)
+    assert weights.params.occdist_scale == 0.01
+    flight.until(3.0)
+    assert weights.params.occdist_scale == pytest.approx(0.001)
+    flight.pose = Pose2D(1.6, 1.0)  # oscillation_distance is 0.5
+    flight.until(3.5)
+    assert weights.params.occdist_scale == 0.01
 
 
 def test_with_the_originals_progress_timeout_it_spins_for_ever():

@@ -15,12 +15,12 @@ from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator import Navigator
-from quad_nav.recovery import MoveSlowAndClear, MoveSlowAndClearParams, SpeedLimit, Surroundings
-from quad_nav.speed_limiter import SpeedLimiter
+from quad_nav.parameter_limiter import ParameterLimiter
+from quad_nav.recovery import MoveSlowAndClear, MoveSlowAndClearParams, ParameterLimit, Surroundings
 from quad_nav.tick import Located, State
 
 HERE = Pose2D(2.5, 2.5)
-LIMIT = SpeedLimit((("max_vel_x_mps", 0.25), ("max_vel_theta_radps", 0.45),
+LIMIT = ParameterLimit((("max_vel_x_mps", 0.25), ("max_vel_theta_radps", 0.45),
                     ("min_vel_theta_radps", 0.45)), distance_m=0.3)
 
 
@@ -78,7 +78,7 @@ def test_at_an_unknown_pose_nothing_is_done():
     costmap = full(costmap_of())
     step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
         Surroundings(0.0, costmap, costmap, None, None))
-    assert step.done and step.speed_limit is None
+    assert step.done and step.limit is None
     assert step.message.count("the robot's pose is unknown") == 2
     assert (costmap.layers["laser"].grid.costs == 254).all()
 
@@ -86,18 +86,18 @@ def test_at_an_unknown_pose_nothing_is_done():
 def test_a_planner_without_speeds_is_not_said_to_be_slow():
     step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
         Surroundings(0.0, full(costmap_of()), full(costmap_of()), HERE, HERE))
-    assert (step.message, step.speed_limit) == ("", None)
+    assert (step.message, step.limit) == ("", None)
 
 
 def test_the_speeds_become_one_limit():
     params = MoveSlowAndClearParams(translation_fields=("a", "b"), rotation_fields=("c",))
-    assert params.speed_limit == SpeedLimit((("a", 0.25), ("b", 0.25), ("c", 0.45)), 0.3)
+    assert params.limit == ParameterLimit((("a", 0.25), ("b", 0.25), ("c", 0.45)), 0.3)
 
 
 def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
     usual = TrajectoryPlannerParams(max_vel_x_mps=1.0, min_vel_theta_radps=-2.0)
     controller = Controller(usual)
-    speed = SpeedLimiter(controller)
+    speed = ParameterLimiter(controller)
     speed.impose(LIMIT, HERE)
     limited = controller.params
     assert limited == replace(usual, max_vel_x_mps=0.25, max_vel_theta_radps=0.45,
@@ -110,15 +110,15 @@ def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
 
 def test_a_robot_that_is_slow_already_is_not_made_faster():
     controller = Controller(TrajectoryPlannerParams(max_vel_x_mps=0.1))
-    SpeedLimiter(controller).impose(LIMIT, HERE)
+    ParameterLimiter(controller).impose(LIMIT, HERE)
     assert controller.params.max_vel_x_mps == 0.1
 
 
 def test_a_second_limit_replaces_the_first_and_counts_from_its_own_place():
     controller = Controller(TrajectoryPlannerParams())
-    speed = SpeedLimiter(controller)
+    speed = ParameterLimiter(controller)
     speed.impose(LIMIT, HERE)
-    speed.impose(SpeedLimit((("max_vel_x_mps", 0.4),), 1.0), Pose2D(2.5, 2.7))
+    speed.impose(ParameterLimit((("max_vel_x_mps", 0.4),), 1.0), Pose2D(2.5, 2.7))
     assert controller.params == replace(TrajectoryPlannerParams(), max_vel_x_mps=0.4)
     speed.follow(Pose2D(2.5, 3.0))
     assert controller.params.max_vel_x_mps == 0.4
@@ -128,7 +128,7 @@ def test_a_second_limit_replaces_the_first_and_counts_from_its_own_place():
 
 def test_parameters_that_change_under_a_limit_come_into_force_with_its_end():
     controller = Controller(TrajectoryPlannerParams())
-    speed = SpeedLimiter(controller)
+    speed = ParameterLimiter(controller)
     speed.impose(LIMIT, HERE)
     speed.set_params(TrajectoryPlannerParams(max_vel_x_mps=2.0, sim_time_s=1.0))
     assert (controller.params.max_vel_x_mps, controller.params.sim_time_s) == (0.25, 1.0)

@@ -76,6 +76,9 @@ MENDS = Table(
                 low=0, high=600),
         double("progress_distance", 0.1, "progress_distance_m", "metres",
                 "What counts as progress.", low=0, high=10),
+        double("stuck_cost_factor", 0.1, "stuck_cost_factor", "",
+                "Without progress, occdist_scale is multiplied by this until the robot has moved"
+                " oscillation_distance.", low=0, high=1),
         double("sensor_timeout", 1.0, "sensor_timeout_s", "seconds",
                 "Stop when a sensor has been silent for so long; 0 leaves it to"
                 " expected_update_rate.", low=0, high=600),

@@ -19,60 +19,35 @@ from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.dwa_samples import acceleration_limits
 from quad_nav.control.goal import is_stopped, stopping_command, turning_command
-from quad_nav.control.plan_window import count_passed, plan_end, plan_in_window
+from quad_nav.control.plan_follower import NO_POSES, PlanFollower
+from quad_nav.control.plan_window import plan_end
 from quad_nav.control.rollout import Trajectory
-from quad_nav.errors import NoLocalPlan, NoValidTrajectory
+from quad_nav.errors import NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.grid import INSCRIBED, GridSpec
 
 __all__ = ["DwaParams", "DwaPlanner"]
 
-_NO_POSES = np.zeros((0, 3))
 
-
-class DwaPlanner:
+class DwaPlanner(PlanFollower):
     """Follows a plan; remembers what it tried from call to call.
 
-    Readable: ``plan`` float64[n, 3] (what is left of the global plan, in its
-    own frame), ``local_global_plan`` float64[m, 3] (its part in the window, in
-    the local frame, also after a failed call), ``oscillation``, and of the last
-    call ``best`` (None if it did not search) and ``critics`` (None if it asked
-    none).
+    Readable besides a plan follower's: ``oscillation``, and of the last call
+    ``best`` (None if it did not search) and ``critics`` (None if it asked none).
+    The goal is reached when the last call found the robot standing there.
     """
 
     def __init__(self, params: DwaParams, footprint: np.ndarray, control_period_s: float):
-        self.control_period_s = control_period_s
+        super().__init__(params, footprint, control_period_s)
         self.oscillation = OscillationCritic()
-        self.plan = _NO_POSES
-        self.local_global_plan = _NO_POSES
         self.best: Optional[Trajectory] = None
         self.critics: Optional[Critics] = None
-        self.rotating_to_goal = False
-        self.xy_tolerance_latch = False
-        self._goal_reached = False
         self._grids: Optional[DwaGrids] = None  # of the last search
-        self.params = params
-        self.set_footprint(footprint)
-
-    def set_params(self, params: DwaParams) -> None:
-        """Take new parameters; plan and state stay, but the goal is no longer reached."""
-        self.params = params
-        self._goal_reached = False
-
-    def set_footprint(self, footprint: np.ndarray) -> None:
-        """The padded footprint, float64[n, 2] in the robot's frame."""
-        self.footprint = np.array(footprint, dtype=np.float64)
 
     def set_plan(self, plan: np.ndarray) -> None:
-        """A new global plan, float64[n, 3] rows x, y, yaw; the goal is to be reached anew."""
-        self.plan = np.array(plan, dtype=np.float64).reshape(-1, 3)
+        """As any plan follower; what was tried before is forgotten."""
+        super().set_plan(plan)
         self.oscillation.reset()
-        self.xy_tolerance_latch = False
-        self._goal_reached = False
-
-    def is_goal_reached(self) -> bool:
-        """Whether the last call found the robot standing at the goal, heading included."""
-        return self._goal_reached
 
     def compute_velocity(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
                          local_from_plan: Pose2D = IDENTITY) -> Control:
@@ -92,7 +67,7 @@ class DwaPlanner:
                 abs(angle_difference(goal.yaw_rad, pose.yaw_rad))
                 <= self.params.yaw_goal_tolerance_rad and is_stopped(velocity, self.params))
             command = self._command_at_goal(spec, costs, pose, velocity, goal)
-            return Control(command, float("nan"), _NO_POSES, plan, goal_mode=True)
+            return Control(command, float("nan"), NO_POSES, plan, goal_mode=True)
         best = self._search(spec, costs, pose, velocity)
         if best.cost < 0.0:
             raise NoValidTrajectory(f"none of the sampled velocities is legal from "
@@ -111,20 +86,6 @@ class DwaPlanner:
         usable = (critics.grids.path < costs.size) & (costs < INSCRIBED)
         return cost_cloud(critics.spec, costs, critics.grids.path, critics.grids.goal, usable,
                           critics.path_scale, critics.goal_scale, critics.params.occdist_scale)
-
-    def _cut_plan(self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D) -> np.ndarray:
-        self.local_global_plan = _NO_POSES
-        if not len(self.plan):
-            raise NoLocalPlan("there is no global plan to follow")
-        plan = plan_in_window(self.plan, spec, pose, local_from_plan)
-        if self.params.prune_plan:
-            passed = count_passed(plan, pose)
-            plan, self.plan = plan[passed:], self.plan[passed:]
-        if not len(plan):
-            raise NoLocalPlan(f"the global plan does not come near the robot at "
-                              f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
-        self.local_global_plan = plan
-        return plan
 
     def _is_at(self, goal: Pose2D, pose: Pose2D) -> bool:
         latched = self.params.latch_xy_goal_tolerance and self.xy_tolerance_latch

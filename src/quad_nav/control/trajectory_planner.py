@@ -14,61 +14,32 @@ import numpy as np
 from quad_nav.control.controller import IDENTITY, Control
 from quad_nav.control.goal import is_stopped, stopping_command, turning_command
 from quad_nav.control.oscillation import Oscillation
-from quad_nav.control.plan_window import count_passed, plan_in_window
+from quad_nav.control.plan_follower import NO_POSES, PlanFollower
 from quad_nav.control.rollout import Rollout, Trajectory
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.control.velocity_search import choose_trajectory
-from quad_nav.errors import NoLocalPlan, NoValidTrajectory
+from quad_nav.errors import NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.grid import GridSpec
 from quad_nav.kernels.rollout import NO_WAY
 
 __all__ = ["TrajectoryPlanner", "TrajectoryPlannerParams"]
 
-_NO_POSES = np.zeros((0, 3))
 
-
-class TrajectoryPlanner:
+class TrajectoryPlanner(PlanFollower):
     """Follows a plan; remembers what it tried from call to call.
 
-    Readable: ``plan`` float64[n, 3] (what is left of the global plan, in its
-    own frame), ``local_global_plan`` float64[m, 3] (its part in the window, in
-    the local frame, also after a failed call), ``oscillation``, and of the last
-    call ``best`` and ``rollout`` (None if it did not simulate).
+    Readable besides a plan follower's: ``oscillation``, and of the last call
+    ``best`` and ``rollout`` (None if it did not simulate). The goal is reached when
+    any call since ``set_plan`` has found the robot there.
     """
 
     def __init__(self, params: TrajectoryPlannerParams, footprint: np.ndarray,
                  control_period_s: float):
-        self.control_period_s = control_period_s
+        super().__init__(params, footprint, control_period_s)
         self.oscillation = Oscillation()
-        self.plan = _NO_POSES
-        self.local_global_plan = _NO_POSES
         self.best: Optional[Trajectory] = None
         self.rollout: Optional[Rollout] = None
-        self.rotating_to_goal = False
-        self.xy_tolerance_latch = False
-        self._goal_reached = False
-        self.params = params
-        self.set_footprint(footprint)
-
-    def set_params(self, params: TrajectoryPlannerParams) -> None:
-        """Take new parameters; plan and state stay, but the goal is no longer reached."""
-        self.params = params
-        self._goal_reached = False
-
-    def set_footprint(self, footprint: np.ndarray) -> None:
-        """The padded footprint, float64[n, 2] in the robot's frame."""
-        self.footprint = np.array(footprint, dtype=np.float64)
-
-    def set_plan(self, plan: np.ndarray) -> None:
-        """A new global plan, float64[n, 3] rows x, y, yaw; the goal is to be reached anew."""
-        self.plan = np.array(plan, dtype=np.float64).reshape(-1, 3)
-        self.xy_tolerance_latch = False
-        self._goal_reached = False
-
-    def is_goal_reached(self) -> bool:
-        """Whether a call since ``set_plan`` found the robot at the goal, heading included."""
-        return self._goal_reached
 
     def compute_velocity(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
                          local_from_plan: Pose2D = IDENTITY) -> Control:
@@ -84,7 +55,7 @@ class TrajectoryPlanner:
         if self.xy_tolerance_latch or pose.distance_to(goal) <= self.params.xy_goal_tolerance_m:
             self.xy_tolerance_latch = self.xy_tolerance_latch or self.params.latch_xy_goal_tolerance
             command = self._command_at_goal(spec, costs, pose, velocity, goal)
-            return Control(command, float("nan"), _NO_POSES, plan, goal_mode=True)
+            return Control(command, float("nan"), NO_POSES, plan, goal_mode=True)
         best = self._search(spec, costs, pose, velocity)
         if best.cost < 0.0:
             reason = ("the global plan or its end in the local costmap is out of reach"
@@ -100,20 +71,6 @@ class TrajectoryPlanner:
         if self.rollout is None:
             return np.zeros((0, 7), dtype=np.float32)
         return self.rollout.cost_cloud()
-
-    def _cut_plan(self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D) -> np.ndarray:
-        self.local_global_plan = _NO_POSES
-        if not len(self.plan):
-            raise NoLocalPlan("there is no global plan to follow")
-        plan = plan_in_window(self.plan, spec, pose, local_from_plan)
-        if self.params.prune_plan:
-            passed = count_passed(plan, pose)
-            plan, self.plan = plan[passed:], self.plan[passed:]
-        if not len(plan):
-            raise NoLocalPlan(f"the global plan does not come near the robot at "
-                              f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
-        self.local_global_plan = plan
-        return plan
 
     def _command_at_goal(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
                          goal: Pose2D) -> Twist2D:

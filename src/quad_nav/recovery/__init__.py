@@ -11,9 +11,9 @@ from quad_nav.recovery.clear_costmap import (
     ClearCostmapParams,
 )
 from quad_nav.recovery.move_slow import MoveSlowAndClear, MoveSlowAndClearParams
-from quad_nav.recovery.recovery import Recovery, SpeedLimit, Step, Surroundings
+from quad_nav.recovery.recovery import ParameterLimit, Recovery, Step, Surroundings
 from quad_nav.recovery.rotate import FootprintCost, Rotate, RotateParams
 
 __all__ = ["ORIGINAL_LAYER_NAMES", "ClearCostmap", "ClearCostmapParams",
            "FootprintCost", "MoveSlowAndClear", "MoveSlowAndClearParams", "Recovery", "Rotate",
-           "RotateParams", "SpeedLimit", "Step", "Surroundings"]
+           "RotateParams", "ParameterLimit", "Step", "Surroundings"]

@@ -44,11 +44,8 @@ class ClearCostmap:
 
     def step(self, surroundings: Surroundings) -> Step:
         params = self.params
-        targets = (
-            ("global", surroundings.global_costmap, surroundings.pose_in_global),
-            ("local", surroundings.local_costmap, surroundings.pose_in_local))
         skipped = []
-        for name, costmap, pose in targets:
+        for name, costmap, pose in surroundings.costmaps:
             if params.affected_maps not in (name, "both"):
                 continue
             if pose is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Tuple
 
-from quad_nav.recovery.recovery import SpeedLimit, Step, Surroundings
+from quad_nav.recovery.recovery import ParameterLimit, Step, Surroundings
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,10 @@ class MoveSlowAndClearParams:
     rotation_fields: Tuple[str, ...] = ()
 
     @property
-    def speed_limit(self) -> SpeedLimit:
+    def limit(self) -> ParameterLimit:
         greatest = [(field, self.limited_trans_speed_mps) for field in self.translation_fields]
         greatest += [(field, self.limited_rot_speed_radps) for field in self.rotation_fields]
-        return SpeedLimit(tuple(greatest), self.limited_distance_m)
+        return ParameterLimit(tuple(greatest), self.limited_distance_m)
 
 
 class MoveSlowAndClear:
@@ -47,20 +47,17 @@ class MoveSlowAndClear:
 
     def step(self, surroundings: Surroundings) -> Step:
         params = self.params
-        targets = (
-            ("global", surroundings.global_costmap, surroundings.pose_in_global),
-            ("local", surroundings.local_costmap, surroundings.pose_in_local))
         messages = []
-        for name, costmap, pose in targets:
+        for name, costmap, pose in surroundings.costmaps:
             if pose is None:
                 messages.append(f"{name} costmap not cleared: the robot's pose is unknown")
             elif not costmap.free_obstacles(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m):
                 messages.append(f"{name} costmap not cleared: it has no obstacle layer, or"
                                 f" ends within {params.clearing_distance_m:g} m of the robot")
-        limit = params.speed_limit
+        limit = params.limit
         if surroundings.pose_in_global is None or not limit.greatest:
             return Step(done=True, message="; ".join(messages))
         messages.append(f"not above {params.limited_trans_speed_mps:g} m/s and"
                         f" {params.limited_rot_speed_radps:g} rad/s for the next"
                         f" {params.limited_distance_m:g} m")
-        return Step(done=True, message="; ".join(messages), speed_limit=limit)
+        return Step(done=True, message="; ".join(messages), limit=limit)

@@ -18,10 +18,16 @@ class Surroundings:
     pose_in_global: Optional[Pose2D]
     pose_in_local: Optional[Pose2D]
 
+    @property
+    def costmaps(self) -> Tuple[Tuple[str, LayeredCostmap, Optional[Pose2D]], ...]:
+        """(name, costmap, the robot's pose on it): global, local."""
+        return (("global", self.global_costmap, self.pose_in_global),
+                ("local", self.local_costmap, self.pose_in_local))
+
 
 @dataclass(frozen=True)
-class SpeedLimit:
-    """A controller that has to go slowly until the robot has moved ``distance_m``.
+class ParameterLimit:
+    """What a controller's parameters may be at most until the robot has moved ``distance_m``.
 
     ``greatest``: (field of the controller's parameters, greatest magnitude).
     """
@@ -34,13 +40,13 @@ class SpeedLimit:
 class Step:
     """One step of a recovery: a command to send, if any, and whether it is over.
 
-    ``speed_limit`` holds after the recovery, from where the robot is now.
+    ``limit`` holds after the recovery, from where the robot is now.
     """
 
     command: Optional[Twist2D] = None
     done: bool = False
     message: str = ""
-    speed_limit: Optional[SpeedLimit] = None
+    limit: Optional[ParameterLimit] = None
 
 
 class Recovery(Protocol):

@@ -1,14 +1,14 @@
-"""A controller that goes slowly for a while."""
+"""A controller whose parameters are held down for a while, to go slowly or to dare more."""
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any, Optional
 
 from quad_nav.geometry import Pose2D
-from quad_nav.recovery import SpeedLimit
+from quad_nav.recovery import ParameterLimit
 
 
-class SpeedLimiter:
+class ParameterLimiter:
     """Sets a controller's parameters: the usual ones, or the usual ones limited.
 
     A limit holds until the robot has moved far enough, whatever becomes of the goal: what
@@ -18,7 +18,7 @@ class SpeedLimiter:
 
     def __init__(self, controller: Any):
         self._controller = controller
-        self._limit: Optional[SpeedLimit] = None
+        self._limit: Optional[ParameterLimit] = None
         self._usual: Any = None  # the parameters without the limit; None while there is none
         self._since = Pose2D(0.0, 0.0, 0.0)
 
@@ -30,7 +30,7 @@ class SpeedLimiter:
         self._usual = params
         self._controller.set_params(_limited(params, self._limit))
 
-    def impose(self, limit: SpeedLimit, pose: Pose2D) -> None:
+    def impose(self, limit: ParameterLimit, pose: Pose2D) -> None:
         """Begins a limit, in place of one that is in force; ``pose`` is where the robot is."""
         if not limit.greatest:
             return
@@ -51,7 +51,7 @@ class SpeedLimiter:
             self._usual = None
 
 
-def _limited(params: Any, limit: SpeedLimit) -> Any:
+def _limited(params: Any, limit: ParameterLimit) -> Any:
     return replace(params, **{
         field: max(-greatest, min(getattr(params, field), greatest))
         for field, greatest in limit.greatest})
