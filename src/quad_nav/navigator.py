@@ -309,6 +309,8 @@ class Navigator:
             self._follow(tick, located, velocity)
         elif self.state is State.CLEARING and self._active is None:
             self._start_recovery(tick, located)
+        elif self.state is State.PLANNING:
+            tick.command = Twist2D()  # the command of the goal before is not for this one
 
     def _follow(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
         assert located.in_local is not None and located.in_global is not None

@@ -176,6 +176,16 @@ def test_no_plan_within_patience_runs_all_recoveries_and_aborts():
     assert ended == pytest.approx(3 * 2.0, abs=0.5)  # patience before each of three endings
 
 
+def test_a_goal_without_a_plan_stops_the_flight_to_the_one_before():
+    flight = Flight()
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.0)
+    flight.planner.fails = True
+    flight.navigator.set_goal(Pose2D(20.0, 20.0), flight.now_s)
+    ticks = flight.until(2.0)
+    assert {tick.command for tick in ticks if tick.cycle} == {Twist2D()}
+
+
 def test_retries_end_planning_before_patience():
     flight = Flight(max_planning_retries=3, recovery_behavior_enabled=False)
     flight.planner.fails = True
