@@ -86,7 +86,6 @@ def _occupancy_grid(spec: GridSpec, values: np.ndarray, frame: str,
                     stamp: rospy.Time) -> OccupancyGrid:
     message = OccupancyGrid()
     message.header.frame_id, message.header.stamp = frame, stamp
-    message.info.map_load_time = stamp
     message.info.resolution = spec.resolution_m
     message.info.width, message.info.height = spec.size_x, spec.size_y
     message.info.origin.position.x = spec.origin_x_m
@@ -108,9 +107,15 @@ def update_message(costs: np.ndarray, x0: int, y0: int, frame: str,
 CLOUD_FIELDS = ("x", "y", "z", "path_cost", "goal_cost", "occ_cost", "total_cost")
 
 
-def cost_cloud_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> PointCloud2:
-    """Scored cells float32[n, 7] in the order of ``CLOUD_FIELDS``."""
-    data = np.ascontiguousarray(points, dtype=np.float32)
+def cost_cloud_message(points: np.ndarray, cells: int, frame: str,
+                       stamp: rospy.Time) -> PointCloud2:
+    """Scored cells float32[n, 7] in the order of ``CLOUD_FIELDS``.
+
+    As the original's, the cloud has one point for each of the window's ``cells``, the
+    scored ones first. The points without a score are nan, which viewers leave out.
+    """
+    data = np.full((cells, len(CLOUD_FIELDS)), np.nan, dtype=np.float32)
+    data[:len(points)] = points
     message = PointCloud2()
     message.header.frame_id, message.header.stamp = frame, stamp
     message.height, message.width = 1, len(data)
@@ -118,6 +123,6 @@ def cost_cloud_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> Poi
                       for k, name in enumerate(CLOUD_FIELDS)]
     message.point_step = 4 * len(CLOUD_FIELDS)
     message.row_step = message.point_step * len(data)
-    message.is_dense = True
+    message.is_dense = False
     message.data = data.tobytes()
     return message

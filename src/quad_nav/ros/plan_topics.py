@@ -1,6 +1,7 @@
 """What a tick planned and commanded, as the original's topics."""
 from __future__ import annotations
 
+import numpy as np
 import rospy
 from geometry_msgs.msg import Twist
 from move_base_msgs.msg import RecoveryStatus
@@ -53,6 +54,8 @@ class PlanTopics:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
             self.plan(tick.plan, now)
+        if tick.planning_failed:
+            self._no_plan(now)
         if tick.plan is not None or tick.planning_failed:
             self._publish_potential(now)
         if tick.recovery is not None:
@@ -71,6 +74,11 @@ class PlanTopics:
             self._plan.publish(Path(message.header, message.poses[:-1]))
         self._plan.publish(message)
 
+    def _no_plan(self, now: rospy.Time) -> None:
+        """A failed search takes the old plan off the display."""
+        if self._plan.get_num_connections() > 0:
+            self._plan.publish(path_message(np.zeros((0, 3)), self._global_frame, now))
+
     def _publish_potential(self, now: rospy.Time) -> None:
         planner = self._navigator.planner
         if (isinstance(planner, SearchPlanner) and planner.params.publish_potential
@@ -87,8 +95,14 @@ class PlanTopics:
         if len(control.local_plan) and self._local_plan.get_num_connections() > 0:
             self._local_plan.publish(path_message(control.local_plan, self._local_frame, now))
         if self._cost_cloud.get_num_connections() > 0:
+            self._publish_cost_cloud(now)
+
+    def _publish_cost_cloud(self, now: rospy.Time) -> None:
+        points = self._navigator.controller.cost_cloud()
+        if len(points):
+            spec = self._navigator.local_costmap.spec
             self._cost_cloud.publish(cost_cloud_message(
-                self._navigator.controller.cost_cloud(), self._local_frame, now))
+                points, spec.size_x * spec.size_y, self._local_frame, now))
 
     def stop(self) -> None:
         self._command.publish(Twist())

@@ -1,0 +1,129 @@
+"""What the tests against the recorded original share: the recordings, and messages with times.
+
+What differs on purpose is named where it is tested; the names of the action's topics are in
+``OURS``.
+"""
+from __future__ import annotations
+
+import os
+
+import rospy
+import yaml
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from dynamic_reconfigure.client import Client
+from flight_case import PATIENCE_S, FlightCase, Latest
+from move_base_msgs.msg import MoveBaseActionFeedback, MoveBaseActionResult
+from nav_msgs.msg import OccupancyGrid
+
+FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "original")
+ROBOTS = (0, 1)
+
+# With the tutorial's remaps the robots share the action's topics but for the goal, and a cancel
+# stops them all. On purpose the launch files here give each robot its own.
+OURS = {"/move_base/goal{i}": "/move_base{i}/goal",
+        **{f"/move_base/{name}": f"/move_base{{i}}/{name}"
+           for name in ("cancel", "feedback", "recovery_status", "result", "status")}}
+UNFINISHED = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
+
+
+def recorded_lines(name, i):
+    """The words of each line of a recording, with our names for robot i."""
+    with open(os.path.join(FOLDER, name), encoding="utf-8") as file:
+        rows = [line.split() for line in file]
+    return [[OURS.get(row[0], row[0]).format(i=i), *row[1:]] for row in rows]
+
+
+def recorded_yaml(name, i):
+    with open(os.path.join(FOLDER, name), encoding="utf-8") as file:
+        return yaml.safe_load(file.read().replace("{i}", str(i)))
+
+
+class Record:
+    """Every message of a topic, and when it came in simulated seconds."""
+
+    def __init__(self, topic, message_type):
+        self.topic = topic
+        self.messages = []
+        self.times_s = []
+        self._subscriber = rospy.Subscriber(topic, message_type, self._store, queue_size=1000)
+
+    def _store(self, message):
+        self.times_s.append(rospy.get_time())
+        self.messages.append(message)
+
+    @property
+    def is_connected(self):
+        return self._subscriber.get_num_connections() > 0
+
+    def rate_hz(self):
+        """Between the first and the last message."""
+        return (len(self.times_s) - 1) / (self.times_s[-1] - self.times_s[0])
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+class OriginalCase(FlightCase):
+    """Two quadcopters with the tutorial's parameters, and what their actions say."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.results = [Latest(f"/move_base{i}/result", MoveBaseActionResult) for i in ROBOTS]
+        cls.statuses = [Latest(f"/move_base{i}/status", GoalStatusArray) for i in ROBOTS]
+        cls.feedback = [Latest(f"/move_base{i}/feedback", MoveBaseActionFeedback) for i in ROBOTS]
+        cls.start()
+
+    def rest(self, i):
+        """Takes robot i's goal away and lets it come to a stop."""
+        topic = self.cancel_topics[i]
+        self.wait(lambda: topic.get_num_connections() > 0, f"a listener on {topic.name}")
+        topic.publish(GoalID())
+        cancelled = rospy.Time.now()
+        self.wait(lambda: self.is_idle(i, cancelled), f"robot {i} without a goal")
+        self.wait(lambda: self.speed(i) < 0.02, f"robot {i} standing")
+
+    def is_idle(self, i, since):
+        """Half a second after a time, no goal is waiting or active."""
+        message = self.statuses[i].message
+        return (message is not None and message.header.stamp > since + rospy.Duration(0.5)
+                and all(s.status not in UNFINISHED for s in message.status_list))
+
+    def send(self, i, goal):
+        topic = self.goal_topics[i]
+        self.wait(lambda: topic.get_num_connections() > 0, f"a listener on {topic.name}")
+        topic.publish(goal)
+
+    def result_after(self, i, count, patience_s=PATIENCE_S):
+        """The next result after the first ``count``."""
+        self.wait(lambda: self.results[i].count > count, f"a result of robot {i}", patience_s)
+        return self.results[i].message
+
+    def next_feedback(self, i):
+        """A feedback that has just come, so that a control cycle is just over."""
+        count = self.feedback[i].count
+        self.wait(lambda: self.feedback[i].count > count, f"feedback of robot {i}")
+        return self.feedback[i].message.feedback.base_position
+
+    def record(self, topic, message_type):
+        record = Record(topic, message_type)
+        self.addCleanup(record.close)
+        self.wait(lambda: record.is_connected, f"the publisher of {topic}")
+        return record
+
+    def global_costmap(self, i):
+        """The whole grid, which every new listener is sent."""
+        return rospy.wait_for_message(
+            f"/move_base{i}/global_costmap/costmap", OccupancyGrid, PATIENCE_S)
+
+    def client(self, namespace):
+        client = Client(namespace, timeout=PATIENCE_S)
+        self.addCleanup(client.close)
+        return client
+
+    def reconfigure(self, namespace, **changes):
+        """Changes parameters until the end of the test; what is in force then."""
+        client = self.client(namespace)
+        before = client.get_configuration(PATIENCE_S)
+        self.addCleanup(client.update_configuration, {name: before[name] for name in changes})
+        return client.update_configuration(changes)

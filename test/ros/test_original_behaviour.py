@@ -1,0 +1,225 @@
+#!/usr/bin/env python3
+"""How goals, plans, cancels and recoveries go, beside the recorded original's log.
+
+On purpose ours differs in this:
+
+* a goal in an empty or unknown frame is aborted at once; the original tries it for ever;
+* a goal in another frame is put into the global one at once; the original publishes it as it
+  came in ``current_goal`` until its transform is there;
+* a search that fails is repeated once per control cycle, not as fast as it goes, and empties
+  ``NavfnROS/plan`` for goals off the map too;
+* a refused ``make_plan`` says why;
+* a stop follows a rotation recovery; the original's spins on for the planner's patience.
+"""
+import math
+
+import rospy
+import rostest
+from actionlib_msgs.msg import GoalStatus
+from flight_case import PATIENCE_S, goal_pose
+from geometry_msgs.msg import PoseStamped, Twist
+from move_base_msgs.msg import RecoveryStatus
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan
+from original_case import OriginalCase
+from std_srvs.srv import Empty
+
+FREE_PLACES = ((1.5, 1.5), (1.5, 6.0))  # of robot 0; a wall is near all the way between
+OFF_THE_MAP = (20.0, 20.0)
+PERIOD_S = 1.0  # of control, in the tutorial
+RECOVERIES = [("conservative_reset", 0, 4), ("rotate_recovery", 1, 4),
+              ("aggressive_reset", 2, 4), ("rotate_recovery", 3, 4)]
+
+
+class OriginalBehaviour(OriginalCase):
+    def setUp(self):
+        self.rest(0)
+
+    def far_place(self):
+        return max(FREE_PLACES, key=lambda place: self.distance(0, *place))
+
+    def fly_off(self):
+        """Robot 0 on its way to the farther place, a control cycle just over: its pose."""
+        self.send(0, goal_pose(*self.far_place()))
+        self.wait(lambda: self.speed(0) > 0.05, "robot 0 under way")
+        return self.next_feedback(0)
+
+    def make_plan(self, x, y, tolerance=0.0, service="make_plan"):
+        rospy.wait_for_service(f"/move_base0/{service}", PATIENCE_S)
+        start = goal_pose(*self.position(0))
+        return rospy.ServiceProxy(f"/move_base0/{service}", GetPlan)(
+            start, goal_pose(x, y), tolerance).plan
+
+    def obstacle_cells(self, nearest_m, farthest_m=math.inf):
+        """Centres of the cells of seen obstacles within these distances of robot 0."""
+        grid = self.global_costmap(0)
+        cell_m = grid.info.resolution
+        centres = [((k % grid.info.width + 0.5) * cell_m, (k // grid.info.width + 0.5) * cell_m)
+                   for k, cost in enumerate(grid.data) if cost == 100]
+        return [at for at in centres if nearest_m < self.distance(0, *at) < farthest_m]
+
+    def end_distance(self, path, x, y):
+        last = path.poses[-1].pose.position
+        return math.hypot(last.x - x, last.y - y)
+
+    # -- make_plan -----------------------------------------------------------------
+
+    def test_make_plan_while_idle(self):
+        for service in ("make_plan", "NavfnROS/make_plan"):
+            plans = self.record("/move_base0/NavfnROS/plan", Path)
+            plan = self.make_plan(9.0, 5.5, service=service)
+            self.assertEqual(plan.header.frame_id, "")
+            self.assertGreater(len(plan.poses), 100)
+            self.assertEqual(self.end_distance(plan, 9.0, 5.5), 0.0)
+            self.wait(lambda p=plans: len(p.messages) == 2, "the plan twice")
+            self.assertEqual([len(path.poses) for path in plans.messages],
+                             [len(plan.poses) - 1, len(plan.poses)])
+            plans.close()
+
+    def test_make_plan_off_the_map_is_empty(self):
+        self.assertEqual(self.make_plan(*OFF_THE_MAP).poses, [])
+
+    def test_make_plan_into_an_obstacle_needs_a_tolerance(self):
+        self.wait(lambda: self.obstacle_cells(1.0), "an obstacle")
+        x, y = self.obstacle_cells(1.0)[0]
+        self.assertEqual(self.make_plan(x, y).poses, [])
+        with_goal = self.make_plan(x, y, tolerance=1.0)  # make_plan_add_unreachable_goal
+        self.assertEqual(self.end_distance(with_goal, x, y), 0.0)
+        self.reconfigure("/move_base0", make_plan_add_unreachable_goal=False)
+        near = self.make_plan(x, y, tolerance=1.0)
+        self.assertLess(self.end_distance(near, x, y), 1.0 * math.sqrt(2.0))
+        self.assertGreater(self.end_distance(near, x, y), 0.3)  # the radius is 0.35 m
+
+    def test_make_plan_is_refused_while_a_goal_is_active(self):
+        self.fly_off()
+        with self.assertRaises(rospy.ServiceException):
+            self.make_plan(9.0, 5.5)
+        self.next_feedback(0)  # it flies on
+        self.rest(0)
+        self.assertTrue(self.make_plan(9.0, 5.5).poses)
+
+    # -- clear_costmaps ------------------------------------------------------------
+
+    def test_clear_costmaps_forgets_what_is_out_of_sight(self):
+        """Marked within 2 m, cleared within 6: farther than 2 m only hidden obstacles are left."""
+        beyond_m = 2.3
+        place = self.far_place()  # on the other side of a box
+        self.send(0, goal_pose(*place))
+        self.wait(lambda: self.distance(0, *place) < 0.3, "robot 0 elsewhere")
+        self.rest(0)
+        self.assertTrue(self.obstacle_cells(beyond_m))
+        rospy.wait_for_service("/move_base0/clear_costmaps", PATIENCE_S)
+        rospy.ServiceProxy("/move_base0/clear_costmaps", Empty)()
+        self.wait(lambda: not self.obstacle_cells(beyond_m), "nothing far away")
+        self.wait(lambda: self.obstacle_cells(0.3, beyond_m), "what the LIDAR sees")
+
+    # -- cancel and preempt --------------------------------------------------------
+
+    def assert_on_a_cycle(self, stamp, feedback):
+        """A result is sent at a control cycle, one or two after the feedback."""
+        cycles = (stamp - feedback.header.stamp).to_sec() / PERIOD_S
+        self.assertGreater(cycles, 0.5)
+        self.assertLess(cycles, 2.5)
+        self.assertLess(abs(cycles - round(cycles)), 0.3)
+
+    def test_cancel_takes_effect_at_the_next_cycle(self):
+        feedback = self.fly_off()
+        count = self.results[0].count
+        commands = self.record("/cmd_vel0", Twist)
+        self.cancel_topics[0].publish()
+        result = self.result_after(0, count)
+        self.assertEqual((result.status.status, result.status.text), (GoalStatus.PREEMPTED, ""))
+        self.assert_on_a_cycle(result.header.stamp, feedback)
+        self.wait(lambda: commands.messages and commands.messages[-1] == Twist(), "a stop")
+
+    def test_new_goal_takes_over_at_the_next_cycle(self):
+        feedback = self.fly_off()
+        count = self.results[0].count
+        goals = self.record("/move_base0/current_goal", PoseStamped)
+        plans = self.record("/move_base0/NavfnROS/plan", Path)
+        x, y = self.position(0)
+        self.send(0, goal_pose(x, y + 0.5))
+        result = self.result_after(0, count)
+        self.assertEqual(result.status.status, GoalStatus.PREEMPTED)
+        self.assertIn("because another goal was rec", result.status.text)
+        self.assert_on_a_cycle(result.header.stamp, feedback)
+        self.wait(lambda: len(goals.messages) == 1 and len(plans.messages) == 2, "the new plan")
+        self.assertEqual(self.end_distance(plans.messages[1], x, y + 0.5), 0.0)
+
+    # -- goals that cannot be taken ------------------------------------------------
+
+    def test_goals_that_cannot_be_taken(self):
+        quaternion = "Aborting on goal because it was sent with an invalid quaternion"
+        for keywords, text in (({"w": 0.0}, quaternion), ({"frame": ""}, "its frame ''"),
+                               ({"frame": "nowhere"}, "its frame 'nowhere'")):
+            count = self.results[0].count
+            self.send(0, goal_pose(1.5, 2.5, **keywords))
+            status = self.result_after(0, count).status
+            self.assertEqual(status.status, GoalStatus.ABORTED)
+            self.assertIn(text, status.text)
+
+    def test_goal_in_the_robots_frame(self):
+        goals = self.record("/move_base0/current_goal", PoseStamped)
+        goal = goal_pose(0.5, 0.0, frame="base_link0")
+        self.send(0, goal)
+        self.wait(lambda: goals.messages, "current_goal")
+        current = goals.messages[0]
+        self.assertEqual((current.header.frame_id, current.header.stamp),
+                         ("map", goal.header.stamp))
+        at = current.pose.position
+        self.assertAlmostEqual(self.distance(0, at.x, at.y), 0.5, delta=0.1)
+
+    # -- recoveries ----------------------------------------------------------------
+
+    def test_unreachable_goal(self):
+        """The four recoveries in order, then the abort, after about 44 s at 10 Hz."""
+        self.reconfigure("/move_base0", controller_frequency=10.0)
+        recoveries = self.record("/move_base0/recovery_status", RecoveryStatus)
+        commands = self.record("/cmd_vel0", Twist)
+        count = self.results[0].count
+        self.send(0, goal_pose(*OFF_THE_MAP))
+        result = self.result_after(0, count)
+        self.assertEqual(result.status.status, GoalStatus.ABORTED)
+        self.assertEqual(result.status.text, "Failed to find a valid plan. "
+                                             "Even after executing recovery behaviors.")
+        self.assertEqual([(status.recovery_behavior_name, status.current_recovery_number,
+                           status.total_number_of_recoveries) for status in recoveries.messages],
+                         RECOVERIES)
+        self.assertEqual({status.pose_stamped.header.frame_id for status in recoveries.messages},
+                         {"map"})
+        took_s = (result.header.stamp - result.status.goal_id.stamp).to_sec()
+        self.assertAlmostEqual(took_s, 43.8, delta=4.0)
+        self.assert_two_turns(commands.messages)
+
+    def assert_two_turns(self, commands):
+        """At ``max_vel_theta``, on the spot, each followed by a stop."""
+        turning = [command.angular.z != 0.0 for command in commands]
+        self.assertEqual({(c.linear.x, c.angular.z) for c in commands}, {(0.0, 0.0), (0.0, 0.7)})
+        ends = [before and not after for before, after in zip(turning, turning[1:])]
+        self.assertEqual(sum(ends), 2)
+
+    def test_goal_in_an_obstacle_has_empty_plans(self):
+        self.wait(lambda: self.obstacle_cells(1.0), "an obstacle")
+        plans = self.record("/move_base0/NavfnROS/plan", Path)
+        self.send(0, goal_pose(*self.obstacle_cells(1.0)[0]))
+        self.wait(lambda: len(plans.messages) >= 3, "three plans")
+        for path in plans.messages:
+            self.assertEqual((path.header.frame_id, path.poses), ("map", []))
+
+    def test_oscillation(self):
+        """Within 10 m for two seconds counts as such here: recoveries, or the abort without."""
+        self.reconfigure("/move_base0", oscillation_timeout=2.0, oscillation_distance=10.0)
+        recoveries = self.record("/move_base0/recovery_status", RecoveryStatus)
+        count = self.results[0].count
+        self.send(0, goal_pose(*self.far_place()))
+        self.wait(lambda: recoveries.messages, "a recovery")
+        self.assertEqual(recoveries.messages[0].recovery_behavior_name, "conservative_reset")
+        self.reconfigure("/move_base0", recovery_behavior_enabled=False)
+        status = self.result_after(0, count).status
+        self.assertEqual(status.status, GoalStatus.ABORTED)
+        self.assertEqual(status.text,
+                         "Robot is oscillating. Even after executing recovery behaviors.")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "original_behaviour", OriginalBehaviour)
