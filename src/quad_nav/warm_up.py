@@ -8,7 +8,7 @@ configuration before it takes goals, which is quick when the cache is there.
 from __future__ import annotations
 
 import math
-from typing import Any, Dict
+from typing import Any, Dict, Tuple
 
 import numpy as np
 
@@ -24,6 +24,16 @@ _LIDAR: Dict[str, Any] = {
     "data_type": "LaserScan", "marking": True, "clearing": True, "inf_is_valid": True,
     "max_obstacle_height": 2.0}
 _COSTMAP: Dict[str, Any] = {"observation_sources": "scan", "scan": _LIDAR}
+_VOXELS: Dict[str, Any] = {**_COSTMAP, "map_type": "voxel"}
+# Together they call every planner, both kinds of search and path, and both obstacle layers.
+_MISSIONS: Tuple[Tuple[Dict[str, Any], Dict[str, Any]], ...] = (  # costmap, the node's own
+    (_COSTMAP, {}),
+    (_COSTMAP, {"base_local_planner": "dwa_local_planner/DWAPlannerROS",
+                "base_global_planner": "global_planner/GlobalPlanner"}),
+    (_VOXELS, {"base_global_planner": "global_planner/GlobalPlanner",
+               "GlobalPlanner": {"use_dijkstra": False, "use_grid_path": True}}),
+    (_COSTMAP, {"base_global_planner": "carrot_planner/CarrotPlanner"}),
+)
 
 
 def warm_up(configuration: config.Configuration) -> None:
@@ -52,9 +62,10 @@ def _look_around(navigator: Navigator, here: Pose2D) -> None:
 
 
 def main() -> None:
-    warm_up(config.load({
-        "global_costmap": dict(_COSTMAP),
-        "local_costmap": {**_COSTMAP, "rolling_window": True, "width": 3.0, "height": 3.0}}))
+    for costmap, node in _MISSIONS:
+        warm_up(config.load({
+            **node, "global_costmap": dict(costmap),
+            "local_costmap": {**costmap, "rolling_window": True, "width": 3.0, "height": 3.0}}))
 
 
 if __name__ == "__main__":

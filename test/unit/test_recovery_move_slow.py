@@ -150,8 +150,8 @@ TREE = {
 class Stuck:
     """A navigator that has run its recovery: there was no plan, and now there is one."""
 
-    def __init__(self):
-        self.configuration = load(TREE, "")
+    def __init__(self, tree=TREE):
+        self.configuration = load(tree, "")
         self.navigator: Navigator = build_navigator(self.configuration)
         self.now_s = 0.0
         self.navigator.global_costmap.layers["obstacle_layer"].grid.costs[:, 40] = 254
@@ -216,3 +216,21 @@ def test_reconfiguration_does_not_lift_the_limit(stuck):
     assert stuck.max_vel_x_mps == 0.25
     stuck.fly(Pose2D(2.9, 2.5), 0.5)
     assert stuck.max_vel_x_mps == 0.8
+
+
+def test_dwa_is_limited_in_all_its_speeds_and_flies_below_them():
+    dwa = {"base_local_planner": "dwa_local_planner/DWAPlannerROS",
+           "DWAPlannerROS": {"max_vel_trans": 0.8, "max_vel_x": 0.8, "min_vel_x": -0.6,
+                             "max_vel_y": 0.4, "min_vel_y": -0.4, "max_vel_theta": 2.0,
+                             "min_vel_theta": 0.5}}
+    stuck = Stuck({**TREE, **dwa})
+    usual = build_navigator(stuck.configuration).controller.params
+    slow = replace(usual, max_vel_trans_mps=0.25, max_vel_x_mps=0.25, min_vel_x_mps=-0.25,
+                   max_vel_y_mps=0.25, min_vel_y_mps=-0.25, max_vel_theta_radps=0.45,
+                   min_vel_theta_radps=0.45)
+    assert stuck.navigator.controller.params == slow
+    commands = [tick.command for tick in stuck.fly(Pose2D(2.6, 2.5), 2.0) if tick.control]
+    assert 0.0 < max(np.hypot(command.vx_mps, command.vy_mps) for command in commands) <= 0.25
+    assert max(abs(command.vyaw_radps) for command in commands) <= 0.45
+    stuck.fly(Pose2D(2.9, 2.5), 0.5)
+    assert stuck.navigator.controller.params == usual

@@ -1,26 +1,55 @@
 """The little mission that compiles the kernels."""
 from __future__ import annotations
 
+import pytest
+
 from quad_nav import warm_up
+from quad_nav.assembly import GLOBAL_PLANNERS, LOCAL_PLANNERS
 from quad_nav.config import load
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.costmap.voxel import VoxelLayer
+from quad_nav.plan.global_planner import SearchPlanner
 
 
-def test_every_kernel_of_a_cycle_has_run(monkeypatch):
-    """The mission goes through scans, costmaps, a plan and a control cycle."""
-    ticks = []
+@pytest.fixture
+def missions(monkeypatch):
+    """(navigator, its ticks) of each mission that ``main`` flies."""
+    flown = []
     build = warm_up.build_navigator
 
     def recording(configuration):
-        navigator = build(configuration)
+        navigator, ticks = build(configuration), []
         tick = navigator.tick
         navigator.tick = lambda *arguments: ticks.append(tick(*arguments)) or ticks[-1]
+        flown.append((navigator, ticks))
         return navigator
     monkeypatch.setattr(warm_up, "build_navigator", recording)
     warm_up.main()
-    assert any(tick.plan is not None for tick in ticks)
-    assert any(tick.control is not None for tick in ticks)
-    assert set(ticks[0].windows) == {"global", "local"}
-    assert not ticks[0].windows["local"].is_empty
+    return flown
+
+
+def test_every_kernel_of_a_cycle_has_run(missions):
+    """Each mission goes through scans, costmaps, a plan and a control cycle."""
+    for _, ticks in missions:
+        assert any(tick.plan is not None for tick in ticks)
+        assert any(tick.control is not None for tick in ticks)
+        assert set(ticks[0].windows) == {"global", "local"}
+        assert not ticks[0].windows["local"].is_empty
+
+
+def test_every_planner_and_obstacle_layer_flies(missions):
+    navigators = [navigator for navigator, _ in missions]
+    assert {type(navigator.planner.params) for navigator in navigators} == set(GLOBAL_PLANNERS)
+    assert {type(navigator.controller.params) for navigator in navigators} == set(LOCAL_PLANNERS)
+    layers = {type(navigator.local_costmap.layers["obstacle_layer"]) for navigator in navigators}
+    assert layers == {ObstacleLayer, VoxelLayer}
+
+
+def test_both_searches_and_both_paths_of_the_global_planner(missions):
+    params = [navigator.planner.params for navigator, _ in missions
+              if isinstance(navigator.planner, SearchPlanner)]
+    assert {one.use_dijkstra for one in params} == {True, False}
+    assert {one.use_grid_path for one in params} == {True, False}
 
 
 def test_any_configuration_can_be_warmed_up():

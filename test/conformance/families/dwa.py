@@ -9,6 +9,7 @@ from families.comparison import Comparison, Difference
 from families.loop import period_s, replayed
 from quad_nav.config import load, values
 from quad_nav.control.controller import Control
+from quad_nav.control.dwa_critics import NO_LEGAL_TRAJECTORY
 from quad_nav.control.dwa_planner import DwaPlanner
 from quad_nav.geometry import Twist2D
 
@@ -20,10 +21,12 @@ def check(path: Path) -> List[Difference]:
     recorded, meta = case.arrays, case.meta
     configuration = load({"base_local_planner": "dwa_local_planner/DWAPlannerROS",
                           "DWAPlannerROS": meta["params"]})
-    for name, value in values(configuration, "DWAPlannerROS").items():
-        if name in meta["effective"]:
-            comparison.exact(f"effective.{name}", value, meta["effective"][name])
-    planner = DwaPlanner(configuration.local_planner, recorded["footprint"], period_s(meta))
+    params = configuration.local_planner
+    effective = {**values(configuration, "DWAPlannerROS"), "cheat_factor": params.cheat_factor}
+    del effective["restore_defaults"]  # a button, not recorded
+    for name, value in effective.items():
+        comparison.exact(f"effective.{name}", value, meta["effective"][name])
+    planner = DwaPlanner(params, recorded["footprint"], period_s(meta))
     for k, control in replayed(planner, case):
         _check_call(planner, control, recorded, meta, k, comparison)
     return comparison.differences
@@ -42,11 +45,15 @@ def _check_call(planner: DwaPlanner, control: Optional[Control], recorded: Recor
     exact(f"plan_lengths[{k}] (global)", len(planner.plan), recorded["plan_lengths"][k, 0])
     best, goal_mode = planner.best, bool(recorded["goal_mode"][k])
     exact(f"goal_mode[{k}]", best is None, goal_mode)
+    if control is not None:
+        exact(f"goal_mode[{k}] (of the command)", control.goal_mode, goal_mode)
     if goal_mode or best is None:
         return
     near(f"best_cost[{k}]", best.cost, recorded["best_cost"][k], _TOLERANCE)
     exact(f"best_n_points[{k}]", len(best.points), recorded["best_n_points"][k])
-    if control is not None:
+    if control is None:
+        exact(f"best_cost[{k}] (no legal trajectory)", best.cost, NO_LEGAL_TRAJECTORY)
+    else:
         near(f"best_vel[{k}]", best.sample, recorded["best_vel"][k], _TOLERANCE)
 
 
