@@ -371,7 +371,7 @@ class Navigator:
         A robot that spins has usually found that they outweigh all progress. What
         collides stays forbidden.
         """
-        weight = getattr(getattr(self.controller, "params", None), "occdist_scale", None)
+        weight = getattr(self._limiter.usual, "occdist_scale", None)
         if weight is not None and self.mends.stuck_cost_factor < 1.0:
             limit = ParameterLimit((("occdist_scale", self.mends.stuck_cost_factor * weight),),
                                    self.params.oscillation_distance_m)

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Optional
+from typing import Any, Dict, List, Tuple
 
 from quad_nav.geometry import Pose2D
 from quad_nav.recovery import ParameterLimit
@@ -12,43 +12,54 @@ class ParameterLimiter:
     """Sets a controller's parameters: the usual ones, or the usual ones limited.
 
     A limit holds until the robot has moved far enough, whatever becomes of the goal: what
-    makes it necessary is around the robot. The controller has ``params``, a frozen
-    dataclass, and ``set_params``; one that has not cannot be limited.
+    makes it necessary is around the robot. Limits of different parameters hold side by
+    side; one of the same parameters takes the other's place. The controller has
+    ``params``, a frozen dataclass, and ``set_params``; one that has not cannot be limited.
     """
 
     def __init__(self, controller: Any):
         self._controller = controller
-        self._limit: Optional[ParameterLimit] = None
-        self._usual: Any = None  # the parameters without the limit; None while there is none
-        self._since = Pose2D(0.0, 0.0, 0.0)
+        self._limits: Dict[Tuple[str, ...], Tuple[ParameterLimit, Pose2D]] = {}
+        self._usual: Any = None  # the parameters without limits, while there are any
+
+    @property
+    def usual(self) -> Any:
+        """The controller's parameters without limits; None if it has none."""
+        if self._limits:
+            return self._usual
+        return getattr(self._controller, "params", None)
 
     def set_params(self, params: Any) -> None:
-        """Takes other usual parameters; a limit stays in force."""
-        if self._limit is None:
-            self._controller.set_params(params)
-            return
+        """Takes other usual parameters; limits stay in force."""
         self._usual = params
-        self._controller.set_params(_limited(params, self._limit))
+        for limit, _ in self._limits.values():
+            params = _limited(params, limit)
+        self._controller.set_params(params)
 
     def impose(self, limit: ParameterLimit, pose: Pose2D) -> None:
-        """Begins a limit, in place of one that is in force; ``pose`` is where the robot is."""
+        """Begins a limit; ``pose`` is where the robot is."""
         if not limit.greatest:
             return
-        usual = self._controller.params if self._limit is None else self._usual
-        self._limit, self._since = limit, pose
+        usual = self.usual
+        self._limits[tuple(field for field, _ in limit.greatest)] = limit, pose
         self.set_params(usual)
 
     def follow(self, pose: Pose2D) -> None:
         """To be called with the robot's pose in every control cycle."""
-        if self._limit is not None and pose.distance_to(self._since) >= self._limit.distance_m:
-            self.lift()
+        over = [fields for fields, (limit, since) in self._limits.items()
+                if pose.distance_to(since) >= limit.distance_m]
+        self._lift(over)
 
     def lift(self) -> None:
-        """Ends the limit, if there is one."""
-        if self._limit is not None:
-            self._limit = None
-            self.set_params(self._usual)
-            self._usual = None
+        """Ends all limits."""
+        self._lift(list(self._limits))
+
+    def _lift(self, over: List[Tuple[str, ...]]) -> None:
+        if over:
+            usual = self.usual
+            for fields in over:
+                del self._limits[fields]
+            self.set_params(usual)
 
 
 def _limited(params: Any, limit: ParameterLimit) -> Any:

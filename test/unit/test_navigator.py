@@ -231,8 +231,11 @@ def test_obstacle_costs_weigh_less_from_the_new_plan_on_until_the_robot_gets_awa
     assert weights.params.occdist_scale == 0.01
     flight.until(3.0)
     assert weights.params.occdist_scale == pytest.approx(0.001)
+    flight.navigator.set_goal(GOAL, flight.now_s)
+    flight.until(6.0)
+    assert weights.params.occdist_scale == pytest.approx(0.001)  # not a tenth of a tenth
     flight.pose = Pose2D(1.6, 1.0)  # oscillation_distance is 0.5
-    flight.until(3.5)
+    flight.until(7.0)
     assert weights.params.occdist_scale == 0.01
 
 

@@ -114,12 +114,15 @@ def test_a_robot_that_is_slow_already_is_not_made_faster():
     assert controller.params.max_vel_x_mps == 0.1
 
 
-def test_a_second_limit_replaces_the_first_and_counts_from_its_own_place():
-    controller = Controller(TrajectoryPlannerParams())
+def test_a_limit_of_the_same_parameters_replaces_the_first_and_counts_from_its_own_place():
+    usual = TrajectoryPlannerParams()
+    controller = Controller(usual)
     speed = ParameterLimiter(controller)
     speed.impose(LIMIT, HERE)
-    speed.impose(ParameterLimit((("max_vel_x_mps", 0.4),), 1.0), Pose2D(2.5, 2.7))
-    assert controller.params == replace(TrajectoryPlannerParams(), max_vel_x_mps=0.4)
+    faster = tuple((field, 0.4) for field, _ in LIMIT.greatest)
+    speed.impose(ParameterLimit(faster, 1.0), Pose2D(2.5, 2.7))
+    assert controller.params == replace(usual, max_vel_x_mps=0.4, max_vel_theta_radps=0.4,
+                                        min_vel_theta_radps=-0.4)
     speed.follow(Pose2D(2.5, 3.0))
     assert controller.params.max_vel_x_mps == 0.4
     speed.follow(Pose2D(2.5, 3.8))
@@ -234,3 +237,30 @@ def test_dwa_is_limited_in_all_its_speeds_and_flies_below_them():
     assert max(abs(command.vyaw_radps) for command in commands) <= 0.45
     stuck.fly(Pose2D(2.9, 2.5), 0.5)
     assert stuck.navigator.controller.params == usual
+
+
+def test_limits_of_different_parameters_hold_side_by_side():
+    controller = SimpleController(Params(speed=0.6, weight=0.01))
+    limiter = ParameterLimiter(controller)
+    limiter.impose(ParameterLimit((("speed", 0.25),), 1.0), Pose2D(0.0, 0.0))
+    limiter.impose(ParameterLimit((("weight", 0.001),), 0.5), Pose2D(0.0, 0.0))
+    assert controller.params == Params(0.25, 0.001)
+    assert limiter.usual == Params(0.6, 0.01)
+    limiter.follow(Pose2D(0.6, 0.0))
+    assert controller.params == Params(0.25, 0.01)
+    limiter.follow(Pose2D(1.1, 0.0))
+    assert controller.params == Params(0.6, 0.01)
+
+
+@dataclass(frozen=True)
+class Params:
+    speed: float
+    weight: float
+
+
+class SimpleController:
+    def __init__(self, params):
+        self.params = params
+
+    def set_params(self, params):
+        self.params = params
