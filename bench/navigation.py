@@ -38,7 +38,8 @@ ORIGINAL = {
     "NavfnROS, plan over 240 x 240": 1.0,
     "TrajectoryPlannerROS, 20 x 20 samples of 68 steps": 5.5,
     "TrajectoryPlannerROS, 6 x 20 samples of 1 s": 2.0,
-    "DWAPlannerROS, 3 x 20 samples (vx, vtheta) of 68 steps": 3.9,
+    "TrajectoryPlannerROS with dwa: true, 20 x 20 samples": 3.9,
+    "DWAPlannerROS, 20 x 20 samples": 3.9,
 }
 
 
@@ -95,10 +96,16 @@ def rows() -> List[Tuple[str, float]]:
     assert isinstance(controller, TrajectoryPlanner)
     short = TrajectoryPlanner(replace(controller.params, vx_samples=6, sim_time_s=1.0),
                               controller.footprint, controller.control_period_s)
-    dwa = DwaPlanner(DwaParams(), controller.footprint, 0.1)
+    window = TrajectoryPlanner(replace(controller.params, dwa=True), controller.footprint,
+                               controller.control_period_s)
+    dwa = DwaPlanner(
+        replace(DwaParams(), vx_samples=20, vy_samples=1, vth_samples=20, max_vel_y_mps=0.0,
+                min_vel_y_mps=0.0, max_vel_x_mps=0.3, max_vel_trans_mps=0.3),
+        controller.footprint, controller.control_period_s)
     measured = [update(local), update(globe),
                 median_ms(lambda: navigator.make_plan(pose, GOAL)),
-                control(controller), control(short), control(dwa)]
+                control(controller), control(short), control(window),
+                control(dwa)]
     return list(zip(ORIGINAL, measured))
 
 

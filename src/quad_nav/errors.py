@@ -1,11 +1,11 @@
 """Every error that this package raises on purpose, and what it means to a goal.
 
 A planner's failure is an exception, so that no caller can mistake it for a
-plan. The action result that each one ends in is ``GOAL_RESULTS`` below.
+plan. A goal that ends in one of them is aborted, with its words.
 """
 from __future__ import annotations
 
-from typing import Dict, List, Sequence, Type
+from typing import List, Sequence
 
 
 class QuadError(Exception):
@@ -57,16 +57,3 @@ class NoLocalPlan(ControlError):
 
 class InvalidGoal(NavigationError):
     """The goal's pose cannot be used: not a rotation, not finite, unknown frame."""
-
-
-class StaleSensor(NavigationError):
-    """A sensor that a costmap depends on has been silent for too long."""
-
-
-# What a goal that ends in this error is reported as to an action client.
-GOAL_RESULTS: Dict[Type[NavigationError], str] = {
-    InvalidGoal: "ABORTED",
-    PlanningError: "ABORTED",
-    ControlError: "ABORTED",
-    StaleSensor: "ABORTED",
-}

@@ -61,10 +61,6 @@ class NavigatorParams:
     make_plan_clear_costmap: bool = True
     make_plan_add_unreachable_goal: bool = True
 
-    @property
-    def control_period_s(self) -> float:
-        return 1.0 / self.controller_frequency_hz
-
 
 @dataclass(frozen=True)
 class NamedRecovery:

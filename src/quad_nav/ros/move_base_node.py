@@ -209,5 +209,5 @@ def main() -> int:
     try:
         node.spin()
     except rospy.ROSInterruptException:
-        pass
+        return 0  # a shutdown ends the loop's sleep in this way
     return 0
