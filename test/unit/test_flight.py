@@ -11,9 +11,9 @@ from quad_nav.sim.flight import (
     GRAVITY_MPS2,
     Airframe,
     BodyState,
+    FlightLaw,
     FlightParams,
     limit_command,
-    thrust_and_torque,
 )
 
 AIRFRAME = Airframe(mass_kg=2.0, inertia_kgm2=(0.01, 0.01, 0.02), max_thrust_n=60.0)
@@ -27,7 +27,7 @@ def body(roll=0.0, pitch=0.0, yaw=0.0, z=1.0, velocity=(0.0, 0.0, 0.0),
 
 
 def forces_on(state: BodyState, *command: float, params: FlightParams = PARAMS):
-    forces, torques = thrust_and_torque(state, np.array([command]), 1.0, AIRFRAME, params)
+    forces, torques = FlightLaw(AIRFRAME, params).thrust_and_torque(state, np.array([command]), 1.0)
     return forces[0], torques[0]
 
 
@@ -91,11 +91,11 @@ def test_rows_are_independent():
                        np.array([[0.1, 0.0, 0.0], [0.0, 0.4, -0.1]]),
                        np.array([[0.0, 0.0, 0.2], [0.3, 0.0, -0.5]]))
     commands = np.array([[0.3, 0.0, 0.5], [-0.2, 0.1, 0.0]])
-    both = thrust_and_torque(states, commands, 1.0, AIRFRAME, PARAMS)
+    both = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(states, commands, 1.0)
     for k in range(2):
         one = BodyState(states.positions_m[k:k + 1], states.quaternions[k:k + 1],
                         states.velocities_mps[k:k + 1], states.angular_radps[k:k + 1])
-        alone = thrust_and_torque(one, commands[k:k + 1], 1.0, AIRFRAME, PARAMS)
+        alone = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(one, commands[k:k + 1], 1.0)
         assert both[0][k] == pytest.approx(alone[0][0])
         assert both[1][k] == pytest.approx(alone[1][0])
 

@@ -26,11 +26,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Tuple, Union
+from typing import Tuple
 
 import numpy as np
 
-from quad_nav.geometry import Twist2D, rotation_from_quaternion
+from quad_nav.geometry import Twist2D
+from quad_nav.kernels import flight_law
 
 GRAVITY_MPS2 = 9.81
 
@@ -79,14 +80,9 @@ class BodyState:
     @cached_property
     def rotations(self) -> np.ndarray:
         """float64[n, 3, 3], the body axes as columns."""
-        x, y, z, w = self.quaternions.T
-        return np.moveaxis(rotation_from_quaternion((x, y, z, w)), 2, 0)
-
-    @property
-    def headings(self) -> np.ndarray:
-        """float64[n, 2], the body's x axis seen from above, of length 1."""
-        forward = self.rotations[:, :2, 0]
-        return forward / np.hypot(forward[:, :1], forward[:, 1:])
+        rotations = np.empty((len(self.quaternions), 3, 3))
+        flight_law.rotations_from_quaternions(self.quaternions, rotations)
+        return rotations
 
 
 def limit_command(twist: Twist2D, params: FlightParams) -> Tuple[float, float, float]:
@@ -98,74 +94,27 @@ def limit_command(twist: Twist2D, params: FlightParams) -> Tuple[float, float, f
             min(max(twist.vyaw_radps, -limit), limit))
 
 
-def thrust_and_torque(state: BodyState, commands: np.ndarray, altitude_m: float,
-                      airframe: Airframe, params: FlightParams) -> Tuple[np.ndarray, np.ndarray]:
-    """Forces and torques float64[n, 3] in ``map`` that track the commands.
+class FlightLaw:
+    """The law for one airframe; it has no memory of what it was called with."""
 
-    ``commands`` float64[n, 3] are (vx, vy, vyaw) as from ``limit_command``: m/s
-    ahead and to the left of the heading, rad/s.
-    """
-    up = state.rotations[:, :, 2]
-    vertical = GRAVITY_MPS2 + _altitude_acceleration(state, altitude_m, params)
-    wanted_up = np.empty_like(up)
-    wanted_up[:, :2] = _commanded_acceleration(state, commands, params)
-    wanted_up[:, 2] = GRAVITY_MPS2
-    wanted_up /= np.sqrt(np.sum(wanted_up * wanted_up, axis=1, keepdims=True))
+    def __init__(self, airframe: Airframe, params: FlightParams):
+        limit_mps2 = min(params.max_acceleration_mps2,
+                         GRAVITY_MPS2 * math.tan(params.max_tilt_rad))
+        self._law = (params.velocity_gain_per_s, params.attitude_bandwidth_radps,
+                     params.altitude_bandwidth_radps, params.yaw_rate_gain_per_s, limit_mps2,
+                     params.max_yaw_acceleration_radps2)
+        self._airframe = np.array([airframe.mass_kg, airframe.max_thrust_n,
+                                   *airframe.inertia_kgm2, *airframe.max_torques_nm])
 
-    thrust = airframe.mass_kg * vertical / np.maximum(up[:, 2], 0.5)
-    forces = np.minimum(np.maximum(thrust, 0.0), airframe.max_thrust_n)[:, None] * up
-    torques = _attitude_torque(state, wanted_up, commands[:, 2], airframe, params)
-    return forces, torques
+    def thrust_and_torque(self, state: BodyState, commands: np.ndarray, altitude_m: float
+                          ) -> Tuple[np.ndarray, np.ndarray]:
+        """Forces and torques float64[n, 3] in ``map`` that track the commands.
 
-
-def _commanded_acceleration(state: BodyState, commands: np.ndarray,
-                            params: FlightParams) -> np.ndarray:
-    """Horizontal acceleration float64[n, 2] in ``map``."""
-    forward = state.headings
-    left = _turned_left(forward)
-    wanted = commands[:, 0:1] * forward + commands[:, 1:2] * left
-    turning = state.angular_radps[:, 2:3] * _turned_left(wanted)
-    error = wanted - state.velocities_mps[:, :2]
-    limit = min(params.max_acceleration_mps2, GRAVITY_MPS2 * math.tan(params.max_tilt_rad))
-    return _limit_length(params.velocity_gain_per_s * error + turning, limit)
-
-
-def _altitude_acceleration(state: BodyState, altitude_m: float,
-                           params: FlightParams) -> np.ndarray:
-    w = params.altitude_bandwidth_radps
-    return w * w * (altitude_m - state.positions_m[:, 2]) - 2.0 * w * state.velocities_mps[:, 2]
-
-
-def _attitude_torque(state: BodyState, wanted_up: np.ndarray, yaw_rates: np.ndarray,
-                     airframe: Airframe, params: FlightParams) -> np.ndarray:
-    """Torques float64[n, 3] in ``map``, each body axis within its limit."""
-    w = params.attitude_bandwidth_radps
-    to_body = np.swapaxes(state.rotations, 1, 2)
-    goal = _rotate(to_body, wanted_up)
-    omega = _rotate(to_body, state.angular_radps)
-    angular = np.empty_like(omega)
-    angular[:, 0] = -w * w * goal[:, 1] - 2.0 * w * omega[:, 0]
-    angular[:, 1] = w * w * goal[:, 0] - 2.0 * w * omega[:, 1]
-    angular[:, 2] = _limit(params.yaw_rate_gain_per_s * (yaw_rates - omega[:, 2]),
-                           params.max_yaw_acceleration_radps2)
-    torques = _limit(angular * airframe.inertia_kgm2, airframe.max_torques_nm)
-    return _rotate(state.rotations, torques)
-
-
-def _rotate(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    return (matrices @ vectors[:, :, None])[:, :, 0]
-
-
-def _turned_left(vectors: np.ndarray) -> np.ndarray:
-    """Horizontal vectors float64[n, 2] turned by a quarter, counter-clockwise."""
-    return vectors[:, ::-1] * (-1.0, 1.0)
-
-
-def _limit(values: np.ndarray, limits: Union[float, Tuple[float, ...]]) -> np.ndarray:
-    return np.minimum(np.maximum(values, np.negative(limits)), limits)
-
-
-def _limit_length(vectors: np.ndarray, limit: float) -> np.ndarray:
-    """Vectors float64[n, 2], shortened to the limit where they are longer."""
-    lengths = np.hypot(vectors[:, :1], vectors[:, 1:])
-    return vectors * (limit / np.maximum(lengths, limit))
+        ``commands`` float64[n, 3] are (vx, vy, vyaw) as from ``limit_command``: m/s
+        ahead and to the left of the heading, rad/s.
+        """
+        forces, torques = np.empty_like(commands), np.empty_like(commands)
+        flight_law.fly(state.positions_m, state.velocities_mps, state.angular_radps,
+                       state.rotations, commands, altitude_m, GRAVITY_MPS2, self._airframe,
+                       self._law, forces, torques)
+        return forces, torques

@@ -18,9 +18,9 @@ from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import (
     Airframe,
     BodyState,
+    FlightLaw,
     FlightParams,
     limit_command,
-    thrust_and_torque,
 )
 from quad_nav.sim.lidar import Lidar, LidarParams, base_from_lidar
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
@@ -89,6 +89,9 @@ class Simulation:
         self.seed = seed
         self.step_count = start_step
         self._lidar = Lidar(params.lidar)
+        self._law = FlightLaw(params.airframe, params.flight)
+        self._command_steps = math.floor(
+            (params.command_timeout_s + params.controller_period_s) * STEPS_PER_S + 1e-9)
         self._starts = start_poses(scene, n_robots, params.jitter_m, seed)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
         self._begin()
@@ -96,7 +99,7 @@ class Simulation:
     def _begin(self) -> None:
         n = self.n_robots
         self._commands = np.zeros((n, 3))
-        self._command_step = np.full(n, -math.inf)
+        self._hover_step = np.full(n, -math.inf)  # the last step that a command counts for
         self._contact_log = ContactLog()
         self._noise = [np.random.default_rng([self.seed, 1, robot]) for robot in range(n)]
         self._state = self._world.state()
@@ -133,14 +136,13 @@ class Simulation:
         if not twist.is_finite:
             raise ValueError(f"command for quadcopter {robot} is not finite: {twist}")
         self._commands[robot] = limit_command(twist, self.params.flight)
-        self._command_step[robot] = self.step_count
+        self._hover_step[robot] = self.step_count + self._command_steps
 
     def step(self) -> List[Contact]:
         """Advance by ``STEP_S``; returns the contacts that begin."""
-        params = self.params
-        commands = np.where(self.is_hovering[:, None], 0.0, self._commands)
-        forces, torques = thrust_and_torque(self._state, commands, self.scene.altitude_m,
-                                            params.airframe, params.flight)
+        self._commands[self.step_count > self._hover_step] = 0.0
+        forces, torques = self._law.thrust_and_torque(self._state, self._commands,
+                                                      self.scene.altitude_m)
         self._world.step(self._state.positions_m, forces, torques)
         self.step_count += 1
         self._state = self._world.state()
@@ -154,8 +156,7 @@ class Simulation:
     @property
     def is_hovering(self) -> np.ndarray:
         """bool[n]: no command has come yet or the last one is too old."""
-        age_s = (self.step_count - self._command_step) * STEP_S
-        return age_s > self.params.command_timeout_s + self.params.controller_period_s
+        return self.step_count > self._hover_step
 
     def state(self, robot: int) -> RobotState:
         rotation = self._state.rotations[robot]
