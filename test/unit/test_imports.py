@@ -21,13 +21,13 @@ LAYERS = [
     {"navigator", "mission"},
     {"config"},
     {"assembly"},
-    {"warm_up", "check"},
+    {"warm_up", "check", "scene_check"},
     {"offline", "ros"},
     {"cli"},
 ]
 NOUNS = LAYERS[0]  # they may import one another
 # Navigation knows no simulator.
-WORLD_USERS = {"sim", "config", "assembly", "warm_up", "offline", "ros"}
+WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "offline", "ros"}
 
 # Where a third-party package may be imported: that file or folder and nowhere else.
 PLACES = {

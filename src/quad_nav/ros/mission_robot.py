@@ -11,10 +11,10 @@ from nav_msgs.msg import Odometry
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D
 from quad_nav.mission.flight_log import FlightLog, Leg, RobotLog
+from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import Action, SendGoal, SequenceDone, Sequencer
 from quad_nav.ros.mission_display import FlownPath
 from quad_nav.ros.mission_link import Inbox, RobotLink
-from quad_nav.ros.mission_setup import RobotGoals
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
 
 FILE_POLL_S = 0.5  # wall time: a person edits while the simulation is paused, too

@@ -5,7 +5,6 @@ Everything is read before anything flies, and every fault is listed at once.
 from __future__ import annotations
 
 import difflib
-import itertools
 import math
 import os
 import time
@@ -19,14 +18,9 @@ import rospkg
 from quad_nav import config
 from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Clearance
-from quad_nav.mission.goal_file import (
-    SETTINGS,
-    PlaceCheck,
-    WatchedGoalFile,
-    clearance_check,
-    read_settings,
-)
-from quad_nav.mission.goal_sequence import GoalSequence, SequenceSettings
+from quad_nav.mission.goal_file import SETTINGS, read_settings
+from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
+from quad_nav.scene_check import scene_check
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import load_scene
 
@@ -40,15 +34,6 @@ DEFAULTS: Dict[str, Any] = {
     "exit_when_done": False,
     "result": "",
 }
-
-
-@dataclass(frozen=True)
-class RobotGoals:
-    """One quadcopter's name, its goal file and what that said at the start."""
-
-    name: str
-    file: WatchedGoalFile
-    sequence: GoalSequence
 
 
 @dataclass(frozen=True)
@@ -91,16 +76,18 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
     problems += faults
     scene = _scene(values["scene"], problems)
     radius_m = BODY_RADIUS_M if faults or problems else float(values["robot_radius"])
-    check = _place_check(scene, radius_m) if scene else None
-    robots = _robots(values, name, check, settings, problems)
+    check = scene_check(scene, radius_m) if scene else None
+    paths, missing = _goal_files(values, name)
+    robots, faults = load_robot_goals(paths, check, settings)
+    problems += missing + faults
     problems += _navigator_faults(values["robots"], all_parameters)
     if problems:
         raise InputError(problems)
-    clearance = _clearance(scene) if scene else None
-    return MissionSetup(tuple(robots), radius_m, scene.altitude_m if scene else None, clearance,
+    return MissionSetup(tuple(robots), radius_m, scene.altitude_m if scene else None,
+                        scene.flight_clearance_m if scene else None,
                         values["simulation"], float(values["ready_timeout"]),
                         values["exit_when_done"],
-                        (*_unknown(parameters, name), *_close_ends(robots, radius_m)))
+                        (*_unknown(parameters, name), *close_ends(robots, radius_m)))
 
 
 def _faults(values: Mapping[str, Any], name: str) -> List[str]:
@@ -171,59 +158,15 @@ def _navigator_faults(count: Any, all_parameters: Mapping[str, Any]) -> List[str
     return problems
 
 
-def _clearance(scene: Scene) -> Clearance:
-    return lambda x_m, y_m: scene.clearance_m(x_m, y_m, scene.altitude_m)
-
-
-def _place_check(scene: Scene, robot_radius_m: float) -> PlaceCheck:
-    arena = f"x 0 to {scene.size_x_m:g} m, y 0 to {scene.size_y_m:g} m"
-    return clearance_check(scene.contains, _clearance(scene), robot_radius_m, arena)
-
-
-def _robots(values: Mapping[str, Any], name: str, check: Optional[PlaceCheck],
-            settings: SequenceSettings, problems: List[str]) -> List[RobotGoals]:
-    robots = []
-    for index, path in enumerate(_goal_paths(values, name, problems)):
-        file = WatchedGoalFile(path, check, settings)
-        try:
-            robots.append(RobotGoals(f"quad{index}", file, file.load()))
-        except InputError as error:
-            problems += error.problems
-    return robots
-
-
-def _goal_paths(values: Mapping[str, Any], name: str, problems: List[str]) -> List[Path]:
+def _goal_files(values: Mapping[str, Any], name: str) -> Tuple[List[Path], List[str]]:
+    """The goal files as far as they are there, and what is missing."""
     goals, count = values["goals"], values["robots"]
-    if not goals or not isinstance(count, int):
-        return []
-    if isinstance(goals, list):
-        if len(goals) != count:
-            problems.append(f"{name}: goals: lists {len(goals)} files; expected one for each of "
-                            f"{count} robots")
-        return [Path(path).expanduser() for path in goals if isinstance(path, str)]
-    if not isinstance(goals, str):
-        return []
-    folder = Path(goals).expanduser()
-    if not folder.is_dir():
-        problems.append(f"{name}: goals: there is no folder {folder}; expected one with "
-                        "quad0_goals.json and so on")
-        return []
-    paths = [folder / f"quad{index}_goals.json" for index in range(count)]
-    missing = [path.name for path in paths if not path.exists()]
-    if missing:
-        there = sorted(path.name for path in folder.glob("*.json")) or ["no JSON file"]
-        problems.append(f"{folder}: has no {', '.join(missing)}; expected a goal file for each of "
-                        f"{count} robots; there is {', '.join(there)}")
-    return [path for path in paths if path.exists()]
-
-
-def _close_ends(robots: List[RobotGoals], radius_m: float) -> List[str]:
-    """Quadcopters that stay at their last goals would touch there."""
-    staying = [robot for robot in robots if robot.sequence.settings.loop is False]
-    warnings = []
-    for a, b in itertools.combinations(staying, 2):
-        apart_m = a.sequence.goals[-1].pose.distance_to(b.sequence.goals[-1].pose)
-        if apart_m < 2 * radius_m:
-            warnings.append(f"the last goals of {a.name} and {b.name} are {apart_m:.2f} m apart: "
-                            f"they would touch there (two radii are {2 * radius_m:.2f} m)")
-    return warnings
+    if not isinstance(count, int):
+        return [], []
+    if isinstance(goals, str) and goals:
+        return goal_paths(Path(goals).expanduser(), count)
+    if not isinstance(goals, list):
+        return [], []
+    problems = [] if len(goals) == count else [
+        f"{name}: goals: lists {len(goals)} files; expected one for each of {count} robots"]
+    return [Path(path).expanduser() for path in goals if isinstance(path, str)], problems

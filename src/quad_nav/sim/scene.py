@@ -94,6 +94,10 @@ class Scene:
         """
         return self.nearest(x_m, y_m, z_m).clearance_m(x_m, y_m, z_m)
 
+    def flight_clearance_m(self, x_m: float, y_m: float) -> float:
+        """``clearance_m`` at the flying altitude."""
+        return self.clearance_m(x_m, y_m, self.altitude_m)
+
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Obstacle:
         """The obstacle or wall whose surface is nearest to a point."""
         return min((*self.wall_boxes(), *self.obstacles),
