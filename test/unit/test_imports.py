@@ -13,7 +13,7 @@ PACKAGE = "quad_nav"
 
 # A unit (a module or subpackage of quad_nav) imports itself and units of the rows above its own.
 LAYERS = [
-    {"errors", "footprint", "geometry", "grid", "mends"},
+    {"errors", "footprint", "geometry", "grid", "mends", "shipped", "versions"},
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},
@@ -27,11 +27,12 @@ LAYERS = [
 ]
 NOUNS = LAYERS[0]  # they may import one another
 # Navigation knows no simulator.
-WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "offline", "ros"}
+WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "offline", "ros", "cli"}
 
 # Where a third-party package may be imported: that file or folder and nowhere else.
 PLACES = {
-    "click": "cli",
+    "click": "cli/",
+    "rich": "cli/",
     "numba": "kernels/",
     "pybullet": "sim/body.py",
     "rospy": "ros/",

@@ -138,9 +138,10 @@ def test_the_json_has_the_documented_keys(tmp_path):
                        "reached": True, "time_s": 10.0, "reason": "", "attempts": 1,
                        "path_length_m": 7.0, "straight_length_m": 5.0}],
             "path_length_m": 7.0, "straight_length_m": 5.0, "min_clearance_m": None,
-            "min_separation_m": None, "recoveries": 0, "contacts": 0}],
+            "min_separation_m": None, "recoveries": 0, "contacts": 0, "aborts": 0,
+            "spin_s": 0.0}],
         "contacts": [{"time_s": 5.0, "robot": "quad0", "with": "pillar", "x_m": 1.0, "y_m": 2.0}],
-        "contacts_reported": True,
+        "contacts_reported": True, "min_separation_m": None, "seed": None, "versions": {},
     }
     assert list(path.parent.iterdir()) == [path]
 

@@ -10,7 +10,7 @@ import collections
 from dataclasses import dataclass
 from typing import Callable, Deque, Dict, List, Optional, Sequence, Tuple
 
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, angle_difference
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
 
@@ -19,6 +19,8 @@ Clearance = Callable[[float, float], float]
 
 SAME_CONTACT_S = 1.0
 TRACK_LENGTH = 100
+# A quadcopter that is slower than this and turns faster than this spins.
+SPIN_BELOW_MPS, SPIN_ABOVE_RADPS = 0.05, 0.2
 
 # Reasons of legs that no fault of theirs kept from their end.
 INTERRUPTED = "interrupted"
@@ -77,7 +79,11 @@ class Track:
 
 
 class RobotLog:
-    """What one quadcopter has flown from its first goal to its last."""
+    """What one quadcopter has flown from its first goal to its last.
+
+    ``spin_s`` is how long it turned on the spot, ``aborts`` how many goals its navigator
+    gave up.
+    """
 
     def __init__(self, name: str):
         self.name = name
@@ -87,6 +93,8 @@ class RobotLog:
         self.min_clearance_m: Optional[float] = None
         self.min_separation_m: Optional[float] = None
         self.recoveries = 0
+        self.aborts = 0
+        self.spin_s = 0.0
         self._pose: Optional[Pose2D] = None
         self._stamp_s = 0.0
         self._is_flying = False
@@ -99,10 +107,17 @@ class RobotLog:
             if stamp_s <= self._stamp_s:
                 return False
             if self._is_flying:
-                self.path_length_m += self._pose.distance_to(pose)
+                self._fly(self._pose, pose, stamp_s - self._stamp_s)
         self._pose, self._stamp_s = pose, stamp_s
         self.track.append(stamp_s, pose)
         return True
+
+    def _fly(self, before: Pose2D, after: Pose2D, time_s: float) -> None:
+        length_m = before.distance_to(after)
+        self.path_length_m += length_m
+        turn_rad = abs(angle_difference(after.yaw_rad, before.yaw_rad))
+        if length_m < SPIN_BELOW_MPS * time_s and turn_rad > SPIN_ABOVE_RADPS * time_s:
+            self.spin_s += time_s
 
     def act(self, action: Action) -> Optional[Leg]:
         """Take the sequencer's action; the leg when it ended one."""

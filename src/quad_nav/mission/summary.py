@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import tabulate
 
@@ -28,6 +28,8 @@ class RobotSummary:
     min_separation_m: Optional[float] = None
     recoveries: int = 0
     contacts: int = 0
+    aborts: int = 0
+    spin_s: float = 0.0
 
     @property
     def straight_length_m(self) -> float:
@@ -55,6 +57,8 @@ class MissionSummary:
     reason: str = ""
     problems: Tuple[str, ...] = ()
     contacts_reported: bool = True
+    seed: Optional[int] = None
+    versions: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def success(self) -> bool:
@@ -69,6 +73,12 @@ class MissionSummary:
         return EXIT_SUCCESS if self.success else EXIT_FAILURE
 
     @property
+    def min_separation_m(self) -> Optional[float]:
+        """Least gap between any two quadcopters."""
+        gaps = [robot.min_separation_m for robot in self.robots]
+        return min((gap for gap in gaps if gap is not None), default=None)
+
+    @property
     def real_time_factor(self) -> Optional[float]:
         return self.sim_time_s / self.wall_time_s if self.wall_time_s > 0 else None
 
@@ -76,7 +86,8 @@ class MissionSummary:
 def summarize_robot(log: FlightLog, name: str, legs: Sequence[Leg]) -> RobotSummary:
     robot = log.robots[name]
     return RobotSummary(name, tuple(legs), robot.path_length_m, robot.min_clearance_m,
-                        robot.min_separation_m, robot.recoveries, log.contacts_of(name))
+                        robot.min_separation_m, robot.recoveries, log.contacts_of(name),
+                        robot.aborts, robot.spin_s)
 
 
 def to_json(summary: MissionSummary) -> Dict[str, Any]:
@@ -95,6 +106,9 @@ def to_json(summary: MissionSummary) -> Dict[str, Any]:
                       "with": contact.other, "x_m": _rounded(contact.x_m),
                       "y_m": _rounded(contact.y_m)} for contact in summary.contacts],
         "contacts_reported": summary.contacts_reported,
+        "min_separation_m": _rounded(summary.min_separation_m),
+        "seed": summary.seed,
+        "versions": dict(summary.versions),
     }
 
 
@@ -209,4 +223,6 @@ def _robot_json(robot: RobotSummary) -> Dict[str, Any]:
         "min_separation_m": _rounded(robot.min_separation_m),
         "recoveries": robot.recoveries,
         "contacts": robot.contacts,
+        "aborts": robot.aborts,
+        "spin_s": _rounded(robot.spin_s),
     }

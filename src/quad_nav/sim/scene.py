@@ -10,9 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import List, Tuple, Union
+from typing import Any, List, Tuple, Union
+
+import numpy as np
 
 from quad_nav.geometry import Pose2D
+
+Lengths = Union[float, np.ndarray]
 
 BODY_RADIUS_M = 0.30
 """Radius of the cylinder that a quadcopter touches things with."""
@@ -31,12 +35,12 @@ class Box:
     yaw_rad: float = 0.0
     bottom_m: float = 0.0
 
-    def clearance_m(self, x_m: float, y_m: float, z_m: float) -> float:
-        """Distance from a point to the surface; negative inside."""
+    def clearance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+        """Distance from a point, or from each of many, to the surface; negative inside."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         dx, dy = x_m - self.x_m, y_m - self.y_m
-        outside = (abs(cos * dx + sin * dy) - self.size_x_m / 2.0,
-                   abs(-sin * dx + cos * dy) - self.size_y_m / 2.0,
+        outside = (np.abs(cos * dx + sin * dy) - self.size_x_m / 2.0,
+                   np.abs(-sin * dx + cos * dy) - self.size_y_m / 2.0,
                    _outside_slab(z_m, self.bottom_m, self.height_m))
         return _signed_distance(outside)
 
@@ -52,9 +56,9 @@ class Cylinder:
     height_m: float
     bottom_m: float = 0.0
 
-    def clearance_m(self, x_m: float, y_m: float, z_m: float) -> float:
-        """Distance from a point to the surface; negative inside."""
-        outside = (math.hypot(x_m - self.x_m, y_m - self.y_m) - self.radius_m,
+    def clearance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+        """Distance from a point, or from each of many, to the surface; negative inside."""
+        outside = (np.hypot(x_m - self.x_m, y_m - self.y_m) - self.radius_m,
                    _outside_slab(z_m, self.bottom_m, self.height_m))
         return _signed_distance(outside)
 
@@ -98,6 +102,14 @@ class Scene:
         """``clearance_m`` at the flying altitude."""
         return self.clearance_m(x_m, y_m, self.altitude_m)
 
+    def flight_clearances_m(self, positions_m: np.ndarray) -> np.ndarray:
+        """``flight_clearance_m`` of many points: float64[..., 2] to float64[...]."""
+        x_m, y_m = positions_m[..., 0], positions_m[..., 1]
+        nearest = np.full(x_m.shape, np.inf)
+        for solid in (*self.wall_boxes(), *self.obstacles):
+            np.minimum(nearest, solid.clearance_m(x_m, y_m, self.altitude_m), out=nearest)
+        return nearest
+
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Obstacle:
         """The obstacle or wall whose surface is nearest to a point."""
         return min((*self.wall_boxes(), *self.obstacles),
@@ -120,11 +132,14 @@ def _outside_slab(z_m: float, bottom_m: float, height_m: float) -> float:
     return max(bottom_m - z_m, z_m - bottom_m - height_m)
 
 
-def _signed_distance(outside_m: Tuple[float, ...]) -> float:
+def _signed_distance(outside_m: Tuple[Lengths, ...]) -> Any:
     """Distance to a product of intervals from how far outside each one a point is.
 
     Outside, the positive parts are the legs of a right triangle; inside, the
     nearest face decides.
     """
-    distance_m = math.sqrt(sum(max(d, 0.0) ** 2 for d in outside_m))
-    return distance_m if distance_m > 0.0 else max(outside_m)
+    distance_m = np.sqrt(sum(np.maximum(d, 0.0) ** 2 for d in outside_m))
+    deepest_m = outside_m[0]
+    for d in outside_m[1:]:
+        deepest_m = np.maximum(deepest_m, d)
+    return np.where(distance_m > 0.0, distance_m, deepest_m)[()]

@@ -1,4 +1,4 @@
-"""The command line ``quad``."""
+"""``quad check``: what is to be said about somebody's YAML."""
 from __future__ import annotations
 
 import shutil
@@ -8,23 +8,17 @@ from typing import List, Optional, Sequence, Tuple
 
 import click
 
-import quad_nav
 from quad_nav.check import Report, check_files, check_folder, counts, report_text
+from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS
 from quad_nav.config.files import PlacedFile
 from quad_nav.errors import InputError
 
-EXIT_SUCCESS, EXIT_WARNINGS, EXIT_BAD_INPUT = 0, 1, 2
+EXIT_WARNINGS = 1
 _NARROWEST, _WIDEST = 80, 100  # columns of tables
 _COSTMAPS = ("global_costmap", "local_costmap")
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(quad_nav.__version__, prog_name="quad")
-def main() -> None:
-    """Quadcopters on the ROS navigation stack."""
-
-
-@main.command()
+@click.command()
 @click.argument("paths", nargs=-1, required=True, metavar="FOLDER | [COSTMAP=]FILE...")
 @click.option("--robot", type=click.IntRange(min=0), metavar="N",
               help="Check what robot N flies with: $(arg i) is N, and files with that number go"
@@ -84,7 +78,3 @@ def _exit_status(reports: Sequence[Report], strict: bool) -> int:
     if strict and any(report.warnings for report in reports):
         return EXIT_WARNINGS
     return EXIT_SUCCESS
-
-
-if __name__ == "__main__":
-    main(prog_name="quad")

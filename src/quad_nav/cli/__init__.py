@@ -1,0 +1,37 @@
+"""The command line ``quad``; one file for each command.
+
+A command is imported when it is called, so that none waits for what it does not need.
+"""
+from __future__ import annotations
+
+import importlib
+from typing import List, Optional
+
+import click
+
+import quad_nav
+
+# The exit statuses of every command; 130 after Ctrl-C as from a shell.
+EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
+
+COMMANDS = ("check", "fly")
+
+
+class Commands(click.Group):
+    """Finds the command ``name`` in the module of that name."""
+
+    def list_commands(self, ctx: click.Context) -> List[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> Optional[click.Command]:
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"{__name__}.{cmd_name}")
+        command: click.Command = getattr(module, cmd_name)
+        return command
+
+
+@click.command(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(quad_nav.__version__, prog_name="quad")
+def main() -> None:
+    """Quadcopters on the ROS navigation stack."""

@@ -1,0 +1,6 @@
+"""``python -m quad_nav.cli`` is ``quad``."""
+from __future__ import annotations
+
+from quad_nav.cli import main
+
+main(prog_name="quad")

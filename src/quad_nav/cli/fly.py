@@ -1,0 +1,113 @@
+"""``quad fly``: the mission offline."""
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Callable, Iterator, List, Optional
+
+import click
+
+from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
+from quad_nav.cli.progress import ProgressBar
+from quad_nav.errors import InputError
+from quad_nav.mission.summary import table, to_json, write_json
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.run import INTERRUPTED
+from quad_nav.offline.run import fly as fly_setup
+from quad_nav.offline.setup import FlightOptions, FlightSetup, read_setup
+from quad_nav.shipped import shipped
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.simulation import SimulationParams
+
+_A_FILE = click.Path(dir_okay=False, path_type=Path)
+_POSITIVE = click.FloatRange(min=0.0, min_open=True)
+_AMOUNT = click.FloatRange(min=0.0)
+
+
+@click.command()
+@click.option("--scene", type=_A_FILE, help="Walls, obstacles and start poses. [default: the"
+              " arena that comes with quad]")
+@click.option("--goals", type=click.Path(file_okay=False, path_type=Path),
+              help="The folder with quad0_goals.json and so on. [default: the one that comes with"
+              " quad]")
+@click.option("--config", default="default", show_default=True, metavar="NAME|FOLDER",
+              help="move_base's parameters: 'default', 'tutorial' or a folder of yours.")
+@click.option("--robots", type=click.IntRange(min=1), metavar="N",
+              help="How many quadcopters. [default: as many as there are goal files]")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
+              help="For the jitter and the noise; the same seed gives the same flight.")
+@click.option("--jitter", type=_AMOUNT, default=0.0, metavar="M",
+              help="How far the start positions are displaced at random.")
+@click.option("--time-limit", type=_POSITIVE, default=math.inf, metavar="S",
+              help="End after so many simulated seconds.")
+@click.option("--scan-range", type=_POSITIVE, default=2 * math.pi, metavar="RAD",
+              help="The LIDAR's field of view. [default: all around]")
+@click.option("--beams", type=click.IntRange(min=2), default=512, show_default=True,
+              help="Beams of a scan.")
+@click.option("--lidar-rate", type=_POSITIVE, default=20.0, show_default=True, metavar="HZ",
+              help="Scans per simulated second.")
+@click.option("--range-noise", type=_AMOUNT, default=0.0, metavar="M",
+              help="Standard deviation of the LIDAR's ranges.")
+@click.option("--json", "json_path", type=click.Path(dir_okay=False, allow_dash=True),
+              metavar="FILE", help="Write the summary there; - is the terminal.")
+@click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
+def fly(scene: Optional[Path], goals: Optional[Path], config: str, robots: Optional[int], seed: int,
+        jitter: float, time_limit: float, scan_range: float, beams: int, lidar_rate: float,
+        range_noise: float, json_path: Optional[str], quiet: bool) -> None:
+    """Fly a mission without ROS, as fast as the machine can.
+
+    Ctrl-C ends the flight and keeps what was flown.
+
+    Exit status: 0 when every goal was reached and nothing touched, 1 otherwise, 2 for input that
+    cannot be used, 130 after Ctrl-C.
+    """
+    try:
+        lidar = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
+        setup = read_setup(FlightOptions(
+            scene or shipped("scenes", "arena.yaml"), goals or shipped("goals"), config, robots,
+            seed, time_limit, lidar_rate, SimulationParams(lidar, jitter_m=jitter)))
+    except InputError as error:
+        click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
+        sys.exit(EXIT_BAD_INPUT)
+    if not quiet:
+        for warning in setup.warnings:
+            click.echo(warning, err=True)
+    sys.exit(_fly(setup, json_path, quiet))
+
+
+def _fly(setup: FlightSetup, json_path: Optional[str], quiet: bool) -> int:
+    observers: List[FlightObserver] = []
+    if not quiet:
+        observers.append(ProgressBar())
+    with _stop_on_signal() as is_stopped:
+        summary = fly_setup(setup, observers, is_stopped)
+    to_terminal = json_path == "-"
+    if not quiet:
+        click.echo(table(summary), err=to_terminal)
+    if to_terminal:
+        click.echo(json.dumps(to_json(summary), indent=2, allow_nan=False))
+    elif json_path is not None:
+        write_json(summary, json_path)
+    return EXIT_INTERRUPTED if summary.reason == INTERRUPTED else summary.exit_status
+
+
+@contextmanager
+def _stop_on_signal() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C or a termination was asked for; a second one ends at once."""
+    received: List[int] = []
+
+    def receive(number: int, _frame: object) -> None:
+        received.append(number)
+        signal.signal(number, before[signal.Signals(number)])
+
+    before = {number: signal.signal(number, receive)
+              for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(received)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

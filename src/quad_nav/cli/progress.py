@@ -1,0 +1,50 @@
+"""The progress of a flight in the terminal."""
+from __future__ import annotations
+
+import time
+from typing import Optional
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from quad_nav.mission.sequencer import Action, GoalEnded
+from quad_nav.offline.flight import Flight
+from quad_nav.offline.observer import FlightObserver
+
+_PERIOD_S = 0.1  # wall time between two looks at the clock
+
+
+class ProgressBar(FlightObserver):
+    """Goals, simulated time and speed; on stderr, and only where that is a terminal."""
+
+    def __init__(self) -> None:
+        console = Console(stderr=True)
+        self._progress = Progress(
+            TextColumn("goals"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+            TextColumn("{task.fields[sim]}"), TimeElapsedColumn(), console=console,
+            auto_refresh=False, transient=True, disable=not console.is_terminal)
+        self._task: Optional[TaskID] = None
+        self._ended = 0
+        self._start_s = self._shown_s = 0.0
+
+    def began(self, flight: Flight) -> None:
+        self._start_s = time.monotonic()
+        goals = sum(len(robot.sequencer.sequence.goals) for robot in flight.robots)
+        self._task = self._progress.add_task("", total=goals, sim="")
+        self._progress.start()
+
+    def acted(self, robot: int, now_s: float, action: Action) -> None:
+        self._ended += isinstance(action, GoalEnded)
+
+    def moved(self, flight: Flight) -> None:
+        wall_s = time.monotonic()
+        if wall_s - self._shown_s < _PERIOD_S:
+            return
+        self._shown_s = wall_s
+        assert self._task is not None
+        speed = flight.now_s / max(wall_s - self._start_s, 1e-3)
+        self._progress.update(self._task, completed=self._ended, refresh=True,
+                              sim=f"{flight.now_s:.1f} s simulated, {speed:.0f} x real time")
+
+    def ended(self, flight: Flight) -> None:
+        self._progress.stop()

@@ -1,0 +1,172 @@
+"""The circle scan -> costmap -> plan -> velocity -> body -> scan in one process.
+
+Time goes in the simulation's steps of 1/240 s. Scans are taken and delivered at
+their own steps; every 1/40 s there is odometry, the sequencers look at it, and the
+navigators do what is due. This is what the nodes do on ROS, less the transport.
+Equal setups give equal flights, bit for bit.
+"""
+from __future__ import annotations
+
+import time
+from typing import List, Optional, Sequence, Tuple
+
+from quad_nav.assembly import build_navigator
+from quad_nav.config import Configuration
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.mission.flight_log import RobotLog
+from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.mission.sequencer import (
+    Action,
+    NavigatorReport,
+    SendGoal,
+    Sequencer,
+    Verdict,
+)
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.setup import FlightSetup
+from quad_nav.sim.contacts import Contact
+from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.simulation import STEPS_PER_S, RobotState, Simulation
+from quad_nav.tick import Located, State, Tick
+
+STEPS_PER_ODOMETRY = STEPS_PER_S // 40
+
+
+class FlightRobot:
+    """One quadcopter's navigator and sequencer, and what passes between them."""
+
+    def __init__(self, goals: RobotGoals, configuration: Configuration):
+        self.name = goals.name
+        self.configuration = configuration
+        self.navigator = build_navigator(configuration)
+        self.sequencer = Sequencer(goals.sequence)
+        self.log = RobotLog(goals.name)
+        self.waiting_goal: Optional[Pose2D] = None
+        self._reports: List[NavigatorReport] = []
+        self._sinks: List[Tuple[ObstacleLayer, str]] = [
+            (layer, source.name)
+            for costmap in (self.navigator.global_costmap, self.navigator.local_costmap)
+            for layer in costmap.layers.values() if isinstance(layer, ObstacleLayer)
+            for source in layer.params.sources]
+
+    def see(self, scan: Scan, map_from_lidar: Pose3D) -> None:
+        for layer, source in self._sinks:
+            layer.add_scan(source, scan, map_from_lidar, scan.stamp_s)
+
+    def sequence(self, now_s: float, pose: Pose2D) -> List[Action]:
+        """Lets the sequencer look at the odometry; its actions."""
+        self.log.move(now_s, pose)
+        idle = self.navigator.state is State.IDLE and self.waiting_goal is None
+        actions = self.sequencer.tick(now_s, pose, self._reports, idle)
+        self._reports = []
+        for action in actions:
+            self.log.act(action)
+            if isinstance(action, SendGoal):
+                self.waiting_goal = action.pose
+        return actions
+
+    def navigate(self, now_s: float, state: RobotState) -> Optional[Tuple[Tick, Located]]:
+        """Does what is due; None when nothing is."""
+        navigator = self.navigator
+        if self.waiting_goal is not None and navigator.accepts_goal(now_s):
+            navigator.set_goal(self.waiting_goal, now_s)
+            self.waiting_goal = None
+        if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
+            return None
+        pose = state.map_from_base.to_2d()
+        located = Located(pose, pose)
+        tick = navigator.tick(now_s, located, state.twist)
+        self._take(tick)
+        return tick, located
+
+    def _take(self, tick: Tick) -> None:
+        if tick.recovery is not None:
+            self.log.recoveries += 1
+        if tick.outcome is None:
+            return
+        self.log.aborts += not tick.outcome.succeeded
+        # A goal that waits has replaced the one that ended here.
+        if self.waiting_goal is None:
+            verdict = Verdict.SUCCEEDED if tick.outcome.succeeded else Verdict.ABORTED
+            self._reports.append(NavigatorReport(verdict, tick.outcome.text))
+
+
+class Flight:
+    """A mission from its start, advanced by one period of odometry at a time."""
+
+    def __init__(self, setup: FlightSetup, observers: Sequence[FlightObserver] = ()):
+        self.setup = setup
+        self.simulation = Simulation(setup.scene, len(setup.robots), setup.simulation, setup.seed)
+        self.robots = [FlightRobot(goals, configuration)
+                       for goals, configuration in zip(setup.robots, setup.configurations)]
+        self._observers = tuple(observers)
+        self.states = self._read_states()
+        for observer in self._observers:
+            observer.began(self)
+        self._scan()
+
+    @property
+    def now_s(self) -> float:
+        return self.simulation.now_s
+
+    @property
+    def contacts(self) -> List[Contact]:
+        """Oldest first."""
+        return self.simulation.contacts
+
+    @property
+    def is_done(self) -> bool:
+        return all(robot.sequencer.done for robot in self.robots)
+
+    def advance(self) -> None:
+        """Fly for one period of odometry, 1/40 s."""
+        for _ in range(STEPS_PER_ODOMETRY):
+            for contact in self.simulation.step():
+                for observer in self._observers:
+                    observer.touched(contact)
+            if self.simulation.step_count % self.setup.steps_per_scan == 0:
+                self._scan()
+        self.states = self._read_states()
+        for observer in self._observers:
+            observer.moved(self)
+        self._sequence()
+        self._navigate()
+
+    def end(self) -> None:
+        """Frees the simulation; the observers are told once."""
+        for observer in self._observers:
+            observer.ended(self)
+        self.simulation.close()
+
+    def _read_states(self) -> List[RobotState]:
+        return [self.simulation.state(index) for index in range(len(self.robots))]
+
+    def _scan(self) -> None:
+        for index, robot in enumerate(self.robots):
+            scan = self.simulation.scan(index)
+            map_from_lidar = self.simulation.state(index).map_from_base.compose(base_from_lidar)
+            robot.see(scan, map_from_lidar)
+            for observer in self._observers:
+                observer.scanned(index, scan, map_from_lidar)
+
+    def _sequence(self) -> None:
+        now_s = self.now_s
+        for index, (robot, state) in enumerate(zip(self.robots, self.states)):
+            for action in robot.sequence(now_s, state.map_from_base.to_2d()):
+                for observer in self._observers:
+                    observer.acted(index, now_s, action)
+
+    def _navigate(self) -> None:
+        now_s = self.now_s
+        for index, (robot, state) in enumerate(zip(self.robots, self.states)):
+            start_s = time.perf_counter()
+            done = robot.navigate(now_s, state)
+            if done is None:
+                continue
+            tick, located = done
+            wall_s = time.perf_counter() - start_s
+            if tick.command is not None:
+                self.simulation.set_command(index, tick.command)
+            for observer in self._observers:
+                observer.ticked(index, tick, located, wall_s)

@@ -1,0 +1,59 @@
+"""Flies a setup to its end and sums it up."""
+from __future__ import annotations
+
+import time
+from typing import Callable, Optional, Sequence
+
+from quad_nav.mission import flight_log
+from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.offline.flight import Flight
+from quad_nav.offline.gaps import Gaps
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.setup import FlightSetup
+from quad_nav.sim.contacts import Contact
+from quad_nav.versions import versions
+
+INTERRUPTED = "interrupted"
+
+
+def fly(setup: FlightSetup, observers: Sequence[FlightObserver] = (),
+        is_stopped: Optional[Callable[[], bool]] = None) -> MissionSummary:
+    """Fly until every goal is through, time is up, or ``is_stopped`` says so."""
+    gaps = Gaps(setup.scene, len(setup.robots), setup.robot_radius_m)
+    flight = Flight(setup, (gaps, *observers))
+    start_wall_s = time.perf_counter()
+    reason = ""
+    while not flight.is_done and not reason:
+        flight.advance()
+        if flight.now_s >= setup.time_limit_s and not flight.is_done:
+            reason = f"time limit of {setup.time_limit_s:g} s"
+        elif is_stopped is not None and is_stopped():
+            reason = INTERRUPTED
+    wall_time_s = time.perf_counter() - start_wall_s
+    flight.end()
+    return _summary(flight, gaps, wall_time_s, reason)
+
+
+def _summary(flight: Flight, gaps: Gaps, wall_time_s: float, reason: str) -> MissionSummary:
+    setup = flight.setup
+    contacts = tuple(
+        flight_log.Contact(contact.time_s, f"quad{contact.robot}", _name(contact),
+                           contact.position_m[0], contact.position_m[1])
+        for contact in flight.contacts)
+    robots = tuple(_robot_summary(flight, gaps, index) for index in range(len(flight.robots)))
+    return MissionSummary(robots, contacts, setup.robot_radius_m, flight.now_s, wall_time_s,
+                          reason, seed=setup.seed, versions=versions())
+
+
+def _name(contact: Contact) -> str:
+    return contact.other if contact.other_robot is None else f"quad{contact.other_robot}"
+
+
+def _robot_summary(flight: Flight, gaps: Gaps, index: int) -> RobotSummary:
+    robot, log = flight.robots[index], flight.robots[index].log
+    return RobotSummary(
+        robot.name, tuple(log.all_legs(robot.sequencer, flight.now_s)), log.path_length_m,
+        float(gaps.clearances_m[index]),
+        float(gaps.separations_m[index]) if len(flight.robots) > 1 else None,
+        log.recoveries, sum(contact.involves(index) for contact in flight.contacts), log.aborts,
+        log.spin_s)

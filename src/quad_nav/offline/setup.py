@@ -1,0 +1,178 @@
+"""What is to be flown offline: scene, goals, configurations and sensors, all checked."""
+from __future__ import annotations
+
+import difflib
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Callable, List, Optional, Tuple, TypeVar
+
+from quad_nav import config
+from quad_nav.config import Configuration
+from quad_nav.costmap.layered import CostmapParams
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.errors import InputError
+from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
+from quad_nav.scene_check import scene_check
+from quad_nav.shipped import shipped
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene
+from quad_nav.sim.scene_file import load_scene
+from quad_nav.sim.simulation import STEPS_PER_S, SimulationParams, start_poses
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class FlightOptions:
+    """What a person asks for.
+
+    ``config``: the name of a shipped folder of parameters, or a folder's path.
+    ``robots`` None: as many as there are goal files in ``goals``. ``time_limit_s`` is
+    simulated time.
+    """
+
+    scene: Path
+    goals: Path
+    config: str = "default"
+    robots: Optional[int] = None
+    seed: int = 0
+    time_limit_s: float = math.inf
+    scans_per_s: float = 20.0
+    simulation: SimulationParams = field(default_factory=SimulationParams)
+
+
+@dataclass(frozen=True)
+class FlightSetup:
+    """A flight that can be flown; ``simulation`` has the navigators' control period."""
+
+    scene: Scene
+    robots: Tuple[RobotGoals, ...]
+    configurations: Tuple[Configuration, ...]
+    config_name: str
+    simulation: SimulationParams
+    steps_per_scan: int
+    seed: int = 0
+    time_limit_s: float = math.inf
+    robot_radius_m: float = BODY_RADIUS_M
+    warnings: Tuple[str, ...] = ()
+
+
+def read_setup(options: FlightOptions) -> FlightSetup:
+    """Reads every file that a flight needs.
+
+    Raises:
+        InputError: every fault in options, scene, goal files and parameters.
+    """
+    problems = _faults(options)
+    scene = _tried(lambda: load_scene(options.scene), problems)
+    robots = _read_goals(options, scene, problems)
+    count = options.robots if options.robots is not None else max(len(robots), 1)
+    if scene is not None and not problems:
+        _tried(lambda: start_poses(scene, count, options.simulation.jitter_m, options.seed),
+               problems)
+    configurations = _read_configurations(options.config, count, problems)
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+    assert scene is not None
+    slowest_s = max(1.0 / one.navigator.controller_frequency_hz for one in configurations)
+    warnings = dict.fromkeys(line for one in configurations for line in one.warnings)
+    return FlightSetup(
+        scene, tuple(robots), tuple(configurations), options.config,
+        replace(options.simulation, controller_period_s=slowest_s),
+        round(STEPS_PER_S / options.scans_per_s), options.seed, options.time_limit_s,
+        warnings=(*close_ends(robots, BODY_RADIUS_M), *warnings))
+
+
+def config_folder(name: str) -> Path:
+    """A folder of parameters by its path or, if it is shipped, by its name.
+
+    Raises:
+        InputError: there is neither.
+    """
+    path = Path(name).expanduser()
+    if path.is_dir():
+        return path
+    names = sorted(folder.name for folder in shipped("config").iterdir() if folder.is_dir())
+    if name in names:
+        return shipped("config", name)
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+    raise InputError([f"config: {name}: expected a folder or the name of a shipped one; {hint}"])
+
+
+def _faults(options: FlightOptions) -> List[str]:
+    problems = []
+    steps = STEPS_PER_S / options.scans_per_s if options.scans_per_s > 0 else 0.0
+    if steps < 1 or abs(steps - round(steps)) > 1e-9:
+        problems.append(f"lidar rate: {options.scans_per_s:g}, expected scans per second that "
+                        f"divide {STEPS_PER_S}, such as 10 or 20")
+    if not options.time_limit_s > 0:
+        problems.append(f"time limit: {options.time_limit_s:g}, expected seconds above 0")
+    if options.robots is not None and options.robots < 1:
+        problems.append(f"robots: {options.robots}, expected 1 or more")
+    return problems
+
+
+def _read_goals(options: FlightOptions, scene: Optional[Scene], problems: List[str]
+                ) -> List[RobotGoals]:
+    count = options.robots
+    if count is None:
+        count = 1
+        while (options.goals / f"quad{count}_goals.json").exists():
+            count += 1
+    paths, missing = goal_paths(options.goals, count)
+    robots, faults = load_robot_goals(
+        paths, scene_check(scene, BODY_RADIUS_M) if scene is not None else None)
+    problems += missing + faults
+    return robots
+
+
+def _read_configurations(name: str, count: int, problems: List[str]) -> List[Configuration]:
+    folder = _tried(lambda: config_folder(name), problems)
+    configurations: List[Configuration] = []
+    if folder is None:
+        return configurations
+    for index in range(count):
+        try:
+            configurations.append(_read_configuration(folder, index))
+        except InputError as error:
+            problems += error.problems
+            break  # the other robots' files are mostly the same ones
+    return configurations
+
+
+def _read_configuration(folder: Path, index: int) -> Configuration:
+    tree = config.load_files(folder, {"i": str(index)})
+    configuration = config.load(tree)
+    problems = [fault for costmap in (configuration.global_costmap, configuration.local_costmap)
+                for fault in _unknown_inputs(costmap, index, folder)]
+    if problems:
+        raise InputError(problems)
+    return configuration
+
+
+def _unknown_inputs(costmap: CostmapParams, index: int, folder: Path) -> List[str]:
+    """Frames and sensors that are not there; on ROS the navigator would wait for ever."""
+    known = {"global_frame": ("map", f"odom{index}"), "robot_base_frame": (f"base_link{index}",)}
+    given = {"global_frame": costmap.global_frame, "robot_base_frame": costmap.robot_base_frame}
+    problems = [f"{folder}: {key} of robot {index}: {given[key]}, expected {' or '.join(names)}"
+                for key, names in known.items() if given[key].lstrip("/") not in names]
+    lidar = f"Lidar{index}"
+    for name, layer in costmap.layers:
+        for source in layer.sources if isinstance(layer, ObstacleLayerParams) else ():
+            if source.data_type != "LaserScan":
+                problems.append(f"{folder}: {name}/{source.name} of robot {index}: data_type "
+                                f"{source.data_type}, expected LaserScan, the only sensor here")
+            elif source.sensor_frame.lstrip("/") not in ("", lidar):
+                problems.append(f"{folder}: {name}/{source.name} of robot {index}: sensor_frame "
+                                f"{source.sensor_frame}, expected {lidar} or none")
+    return problems
+
+
+def _tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
+    """What ``read`` returns, or None with its faults added to ``problems``."""
+    try:
+        return read()
+    except InputError as error:
+        problems += error.problems
+        return None
