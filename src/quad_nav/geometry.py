@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Tuple
+from typing import Sequence, Tuple
 
 import numpy as np
 
@@ -72,8 +72,8 @@ class Pose3D:
 
     def compose(self, other: Pose3D) -> Pose3D:
         """``a_from_b.compose(b_from_c)`` is ``a_from_c``."""
-        x, y, z = self.rotation @ other.translation + self.translation
-        return Pose3D(float(x), float(y), float(z),
+        x, y, z = rotate(self.quaternion, (other.x_m, other.y_m, other.z_m))
+        return Pose3D(self.x_m + x, self.y_m + y, self.z_m + z,
                       multiply_quaternions(self.quaternion, other.quaternion))
 
     def inverse(self) -> Pose3D:
@@ -132,6 +132,19 @@ def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
     bx, by, bz, bw = b
     return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
             aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
+
+
+def rotate(quaternion: Quaternion, vector: Sequence[float]) -> Tuple[float, float, float]:
+    """A vector (x, y, z) turned by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v).
+
+    In plain numbers, because arrays of three take ten times as long.
+    """
+    qx, qy, qz, qw = quaternion
+    x, y, z = vector
+    cx, cy, cz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
+    return (x + qw * cx + qy * cz - qz * cy,
+            y + qw * cy + qz * cx - qx * cz,
+            z + qw * cz + qx * cy - qy * cx)
 
 
 def rotation_from_quaternion(quaternion: Quaternion) -> np.ndarray:

@@ -22,8 +22,8 @@ PARAMS = FlightParams()
 
 def body(roll=0.0, pitch=0.0, yaw=0.0, z=1.0, velocity=(0.0, 0.0, 0.0),
          angular=(0.0, 0.0, 0.0)) -> BodyState:
-    return BodyState(np.array([[0.0, 0.0, z]]), np.array([quaternion_from_euler(roll, pitch, yaw)]),
-                     np.array([velocity]), np.array([angular]))
+    return BodyState(np.array([[0.0, 0.0, z, *quaternion_from_euler(roll, pitch, yaw), *velocity,
+                                *angular]]))
 
 
 def forces_on(state: BodyState, *command: float, params: FlightParams = PARAMS):
@@ -85,16 +85,13 @@ def test_acceleration_is_limited_by_the_tilt():
 
 
 def test_rows_are_independent():
-    states = BodyState(np.array([[0.0, 0.0, 1.0], [5.0, 5.0, 0.8]]),
-                       np.array([quaternion_from_euler(0.0, 0.0, 0.3),
-                                 quaternion_from_euler(0.1, -0.1, 2.0)]),
-                       np.array([[0.1, 0.0, 0.0], [0.0, 0.4, -0.1]]),
-                       np.array([[0.0, 0.0, 0.2], [0.3, 0.0, -0.5]]))
+    states = BodyState(np.array([
+        [0.0, 0.0, 1.0, *quaternion_from_euler(0.0, 0.0, 0.3), 0.1, 0.0, 0.0, 0.0, 0.0, 0.2],
+        [5.0, 5.0, 0.8, *quaternion_from_euler(0.1, -0.1, 2.0), 0.0, 0.4, -0.1, 0.3, 0.0, -0.5]]))
     commands = np.array([[0.3, 0.0, 0.5], [-0.2, 0.1, 0.0]])
     both = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(states, commands, 1.0)
     for k in range(2):
-        one = BodyState(states.positions_m[k:k + 1], states.quaternions[k:k + 1],
-                        states.velocities_mps[k:k + 1], states.angular_radps[k:k + 1])
+        one = BodyState(states.rows[k:k + 1])
         alone = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(one, commands[k:k + 1], 1.0)
         assert both[0][k] == pytest.approx(alone[0][0])
         assert both[1][k] == pytest.approx(alone[1][0])
@@ -102,8 +99,9 @@ def test_rows_are_independent():
 
 def test_rotations_of_many_bodies_are_those_of_each():
     quaternions = [quaternion_from_euler(0.1, -0.2, 0.3), quaternion_from_euler(0.0, 0.5, -2.0)]
-    zeros = np.zeros((2, 3))
-    rotations = BodyState(zeros, np.array(quaternions), zeros, zeros).rotations
+    rows = np.zeros((2, 13))
+    rows[:, 3:7] = quaternions
+    rotations = BodyState(rows).rotations
     for k, quaternion in enumerate(quaternions):
         assert rotations[k] == pytest.approx(rotation_from_quaternion(quaternion))
 

@@ -21,13 +21,14 @@ LAYERS = [
     {"navigator", "mission"},
     {"config"},
     {"assembly"},
-    {"warm_up", "check", "scene_check"},
+    {"warm_up", "check", "scene_check", "random_mission"},
     {"offline", "ros"},
     {"cli"},
 ]
 NOUNS = LAYERS[0]  # they may import one another
 # Navigation knows no simulator.
-WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "offline", "ros", "cli"}
+WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "random_mission", "offline",
+               "ros", "cli"}
 
 # Where a third-party package may be imported: that file or folder and nowhere else.
 PLACES = {

@@ -7,9 +7,10 @@ import signal
 import sys
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Callable, Iterator, List, Optional
+from typing import Any, Callable, Iterator, List, Optional, Tuple
 
 import click
+import yaml
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
 from quad_nav.cli.progress import ProgressBar
@@ -36,6 +37,8 @@ _AMOUNT = click.FloatRange(min=0.0)
               " quad]")
 @click.option("--config", default="default", show_default=True, metavar="NAME|FOLDER",
               help="move_base's parameters: 'default', 'tutorial' or a folder of yours.")
+@click.option("--set", "parameters", multiple=True, metavar="PATH=VALUE",
+              help="A parameter on top of the folder's, as global_costmap/width=60; repeatable.")
 @click.option("--robots", type=click.IntRange(min=1), metavar="N",
               help="How many quadcopters. [default: as many as there are goal files]")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
@@ -55,8 +58,8 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option("--json", "json_path", type=click.Path(dir_okay=False, allow_dash=True),
               metavar="FILE", help="Write the summary there; - is the terminal.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def fly(scene: Optional[Path], goals: Optional[Path], config: str, robots: Optional[int], seed: int,
-        jitter: float, time_limit: float, scan_range: float, beams: int, lidar_rate: float,
+def fly(scene: Optional[Path], goals: Optional[Path], config: str, parameters: Tuple[str, ...],
+        robots: Optional[int], seed: int, jitter: float, time_limit: float, scan_range: float, beams: int, lidar_rate: float,
         range_noise: float, json_path: Optional[str], quiet: bool) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
@@ -68,8 +71,9 @@ def fly(scene: Optional[Path], goals: Optional[Path], config: str, robots: Optio
     try:
         lidar = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
         setup = read_setup(FlightOptions(
-            scene or shipped("scenes", "arena.yaml"), goals or shipped("goals"), config, robots,
-            seed, time_limit, lidar_rate, SimulationParams(lidar, jitter_m=jitter)))
+            scene or shipped("scenes", "arena.yaml"), goals or shipped("goals"), config,
+            tuple(map(_parameter, parameters)), robots, seed, time_limit, lidar_rate,
+            SimulationParams(lidar, jitter_m=jitter)))
     except InputError as error:
         click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
@@ -77,6 +81,18 @@ def fly(scene: Optional[Path], goals: Optional[Path], config: str, robots: Optio
         for warning in setup.warnings:
             click.echo(warning, err=True)
     sys.exit(_fly(setup, json_path, quiet))
+
+
+def _parameter(text: str) -> Tuple[str, Any]:
+    """The path and the value of "global_costmap/width=60"; values are written as in YAML."""
+    path, equals, value = text.partition("=")
+    if not equals or not path.strip("/"):
+        raise InputError([f"--set {text}: expected PATH=VALUE, as global_costmap/width=60"])
+    try:
+        return path, yaml.safe_load(value)
+    except yaml.YAMLError as error:
+        raise InputError([f"--set {text}: {value!r} is not YAML, expected a value as in a "
+                          f"parameter file: {error}"]) from error
 
 
 def _fly(setup: FlightSetup, json_path: Optional[str], quiet: bool) -> int:

@@ -91,6 +91,13 @@ def load_files(source: Union[str, Path, Sequence[FileName]],
     return tree
 
 
+def set_value(tree: ParameterTree, path: str, value: Any, origin: str) -> None:
+    """Sets one parameter, as a file loaded last would; ``path`` as ``global_costmap/width``."""
+    keys = tuple(key for key in path.split("/") if key)
+    _namespace(tree, keys[:-1])[keys[-1]] = value
+    tree.origins["/".join(keys)] = origin
+
+
 def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
     """The files of a robot in a folder, in the order in which they are loaded.
 

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import List, Optional
 
 import numpy as np
@@ -38,6 +39,10 @@ class Observation:
     stamp_s: float
     sensor: np.ndarray
     points: np.ndarray
+
+    @cached_property
+    def stamp_ns(self) -> int:
+        return _nanoseconds(self.stamp_s)
 
 
 class ObservationBuffer:
@@ -79,9 +84,9 @@ class ObservationBuffer:
         if persistence_s == 0.0:
             del self.observations[1:]
             return
+        oldest_ns = _nanoseconds(reception_s) - _nanoseconds(persistence_s)
         for k, observation in enumerate(self.observations):
-            age_s = reception_s - observation.stamp_s
-            if _nanoseconds(age_s) > _nanoseconds(persistence_s):
+            if observation.stamp_ns < oldest_ns:
                 del self.observations[k:]
                 return
 

@@ -45,6 +45,7 @@ def _directions(angle_min_rad: float, angle_increment_rad: float, n: int) -> np.
     return np.array([(math.cos(a), math.sin(a)) for a in angles]).reshape(n, 2)
 
 
+@lru_cache(maxsize=64)  # a scan goes into more than one costmap
 def _rotation_float32(quaternion: Quaternion) -> np.ndarray:
     """float32[3, 3], every step rounded to float32."""
     x, y, z, w = np.array(quaternion, dtype=np.float32)

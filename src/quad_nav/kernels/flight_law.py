@@ -8,49 +8,49 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def rotations_from_quaternions(quaternions, rotations):
-    """Fill rotations float64[n, 3, 3], body axes as columns, from quaternions float64[n, 4]."""
-    for k in range(quaternions.shape[0]):
-        x, y, z, w = quaternions[k]
-        rotations[k, 0, 0] = 1 - 2 * (y * y + z * z)
-        rotations[k, 0, 1] = 2 * (x * y - w * z)
-        rotations[k, 0, 2] = 2 * (x * z + w * y)
-        rotations[k, 1, 0] = 2 * (x * y + w * z)
-        rotations[k, 1, 1] = 1 - 2 * (x * x + z * z)
-        rotations[k, 1, 2] = 2 * (y * z - w * x)
-        rotations[k, 2, 0] = 2 * (x * z - w * y)
-        rotations[k, 2, 1] = 2 * (y * z + w * x)
-        rotations[k, 2, 2] = 1 - 2 * (x * x + y * y)
+def rotation_from_quaternion(quaternion, rotation):
+    """Fill rotation float64[3, 3], body axes as columns, from quaternion float64[4]."""
+    x, y, z, w = quaternion
+    rotation[0, 0] = 1 - 2 * (y * y + z * z)
+    rotation[0, 1] = 2 * (x * y - w * z)
+    rotation[0, 2] = 2 * (x * z + w * y)
+    rotation[1, 0] = 2 * (x * y + w * z)
+    rotation[1, 1] = 1 - 2 * (x * x + z * z)
+    rotation[1, 2] = 2 * (y * z - w * x)
+    rotation[2, 0] = 2 * (x * z - w * y)
+    rotation[2, 1] = 2 * (y * z + w * x)
+    rotation[2, 2] = 1 - 2 * (x * x + y * y)
 
 
 @njit(cache=True, nogil=True)
-def fly(positions, velocities, angular, rotations, commands, altitude, gravity, airframe, law,
-        forces, torques):
-    """Fill forces and torques float64[n, 3], in the frame of the positions.
+def fly(rows, commands, altitude, gravity, airframe, law, forces, torques):
+    """Fill forces and torques float64[n, 3], in the frame of the bodies.
 
-    positions, velocities, angular and commands (vx, vy, vyaw): float64[n, 3]; rotations
-    float64[n, 3, 3]. airframe: mass, largest thrust, inertia (3), largest torques (3). law:
-    velocity gain, attitude bandwidth, altitude bandwidth, yaw rate gain, limits of the
-    horizontal and the yaw acceleration.
+    rows: float64[n, 13] as in ``BodyState``; commands: float64[n, 3], (vx, vy, vyaw).
+    airframe: mass, largest thrust, inertia (3), largest torques (3). law: velocity gain,
+    attitude bandwidth, altitude bandwidth, yaw rate gain, limits of the horizontal and
+    the yaw acceleration.
     """
     mass, max_thrust = airframe[0], airframe[1]
     gain, attitude, lift, yaw_gain, max_acceleration, max_yaw_acceleration = law
+    r = np.empty((3, 3))
     omega = np.empty(3)
     body_torque = np.empty(3)
-    for k in range(positions.shape[0]):
-        r = rotations[k]
-        ax, ay = _horizontal_acceleration(r, velocities[k], angular[k, 2], commands[k], gain,
+    for k in range(rows.shape[0]):
+        height, velocity, angular = rows[k, 2], rows[k, 7:10], rows[k, 10:13]
+        rotation_from_quaternion(rows[k, 3:7], r)
+        ax, ay = _horizontal_acceleration(r, velocity, angular[2], commands[k], gain,
                                           max_acceleration)
         length = math.sqrt(ax * ax + ay * ay + gravity * gravity)
         up_x, up_y, up_z = ax / length, ay / length, gravity / length
 
-        az = lift * lift * (altitude - positions[k, 2]) - 2 * lift * velocities[k, 2]
+        az = lift * lift * (altitude - height) - 2 * lift * velocity[2]
         thrust = mass * (gravity + az) / max(r[2, 2], 0.5)
         thrust = min(max(thrust, 0.0), max_thrust)
         for axis in range(3):
             forces[k, axis] = thrust * r[axis, 2]
-            omega[axis] = (r[0, axis] * angular[k, 0] + r[1, axis] * angular[k, 1]
-                           + r[2, axis] * angular[k, 2])
+            omega[axis] = (r[0, axis] * angular[0] + r[1, axis] * angular[1]
+                           + r[2, axis] * angular[2])
 
         goal_x = r[0, 0] * up_x + r[1, 0] * up_y + r[2, 0] * up_z
         goal_y = r[0, 1] * up_x + r[1, 1] * up_y + r[2, 1] * up_z

@@ -5,12 +5,14 @@ import difflib
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Callable, List, Optional, Tuple, TypeVar
+from typing import Any, Callable, List, Optional, Sequence, Tuple, TypeVar
 
 from quad_nav import config
 from quad_nav.config import Configuration
+from quad_nav.config.files import set_value
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
 from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
 from quad_nav.scene_check import scene_check
@@ -26,7 +28,8 @@ T = TypeVar("T")
 class FlightOptions:
     """What a person asks for.
 
-    ``config``: the name of a shipped folder of parameters, or a folder's path.
+    ``config``: the name of a shipped folder of parameters, or a folder's path;
+    ``parameters``: (path, value) on top of it, as ("global_costmap/width", 60.0).
     ``robots`` None: as many as there are goal files in ``goals``. ``time_limit_s`` is
     simulated time.
     """
@@ -34,6 +37,7 @@ class FlightOptions:
     scene: Path
     goals: Path
     config: str = "default"
+    parameters: Tuple[Tuple[str, Any], ...] = ()
     robots: Optional[int] = None
     seed: int = 0
     time_limit_s: float = math.inf
@@ -70,7 +74,8 @@ def read_setup(options: FlightOptions) -> FlightSetup:
     if scene is not None and not problems:
         _tried(lambda: start_poses(scene, count, options.simulation.jitter_m, options.seed),
                problems)
-    configurations = _read_configurations(options.config, count, problems)
+    configurations = _read_configurations(options, count, problems)
+    problems += _goals_off_the_costmap(robots, configurations)
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
     assert scene is not None
@@ -127,28 +132,52 @@ def _read_goals(options: FlightOptions, scene: Optional[Scene], problems: List[s
     return robots
 
 
-def _read_configurations(name: str, count: int, problems: List[str]) -> List[Configuration]:
-    folder = _tried(lambda: config_folder(name), problems)
+def _read_configurations(options: FlightOptions, count: int, problems: List[str]
+                         ) -> List[Configuration]:
+    folder = _tried(lambda: config_folder(options.config), problems)
     configurations: List[Configuration] = []
     if folder is None:
         return configurations
     for index in range(count):
         try:
-            configurations.append(_read_configuration(folder, index))
+            configurations.append(_read_configuration(folder, index, options.parameters))
         except InputError as error:
             problems += error.problems
             break  # the other robots' files are mostly the same ones
     return configurations
 
 
-def _read_configuration(folder: Path, index: int) -> Configuration:
+def _read_configuration(folder: Path, index: int, parameters: Sequence[Tuple[str, Any]]
+                        ) -> Configuration:
     tree = config.load_files(folder, {"i": str(index)})
+    for path, value in parameters:
+        set_value(tree, path, value, "the command line")
     configuration = config.load(tree)
     problems = [fault for costmap in (configuration.global_costmap, configuration.local_costmap)
                 for fault in _unknown_inputs(costmap, index, folder)]
     if problems:
         raise InputError(problems)
     return configuration
+
+
+def _goals_off_the_costmap(robots: Sequence[RobotGoals], configurations: Sequence[Configuration]
+                           ) -> List[str]:
+    """Goals that no plan can lead to, because the global costmap ends before them."""
+    problems = []
+    for robot, configuration in zip(robots, configurations):
+        costmap = configuration.global_costmap
+        if costmap.rolling_window or any(isinstance(layer, StaticLayerParams)
+                                         for _, layer in costmap.layers):
+            continue  # it moves, or takes the size of its map
+        low_x, low_y = costmap.origin_x_m, costmap.origin_y_m
+        high_x, high_y = low_x + costmap.width_m, low_y + costmap.height_m
+        problems += [
+            f"{robot.file.path}: goal {number}: ({goal.x_m:g}, {goal.y_m:g}) is off the global "
+            f"costmap, x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m; expected a "
+            "larger global_costmap/width and height"
+            for number, goal in enumerate(robot.sequence.goals, start=1)
+            if not (low_x <= goal.x_m < high_x and low_y <= goal.y_m < high_y)]
+    return problems
 
 
 def _unknown_inputs(costmap: CostmapParams, index: int, folder: Path) -> List[str]:

@@ -75,24 +75,21 @@ class World:
     def state(self) -> BodyState:
         """Read all bodies."""
         client = self._client
-        poses = [pybullet.getBasePositionAndOrientation(robot, physicsClientId=client)
-                 for robot in self._robots]
-        twists = [pybullet.getBaseVelocity(robot, physicsClientId=client)
-                  for robot in self._robots]
-        return BodyState(np.array([position for position, _ in poses]),
-                         np.array([quaternion for _, quaternion in poses]),
-                         np.array([linear for linear, _ in twists]),
-                         np.array([angular for _, angular in twists]))
+        rows: List[float] = []
+        for robot in self._robots:
+            position, quaternion = pybullet.getBasePositionAndOrientation(robot, client)
+            linear, angular = pybullet.getBaseVelocity(robot, client)
+            rows += (*position, *quaternion, *linear, *angular)
+        return BodyState(np.array(rows).reshape(-1, 13))
 
     def step(self, positions_m: np.ndarray, forces_n: np.ndarray, torques_nm: np.ndarray) -> None:
         """One time step under forces at the bodies' centres and torques, float64[n, 3] in map."""
         client, in_map = self._client, pybullet.WORLD_FRAME
         for robot, position, force, torque in zip(self._robots, positions_m.tolist(),
                                                   forces_n.tolist(), torques_nm.tolist()):
-            pybullet.applyExternalForce(robot, -1, force, position, in_map,
-                                        physicsClientId=client)
-            pybullet.applyExternalTorque(robot, -1, torque, in_map, physicsClientId=client)
-        pybullet.stepSimulation(physicsClientId=client)
+            pybullet.applyExternalForce(robot, -1, force, position, in_map, client)
+            pybullet.applyExternalTorque(robot, -1, torque, in_map, client)
+        pybullet.stepSimulation(client)
 
     def touches(self) -> List[Touch]:
         """What presses on the quadcopters after the last step."""

@@ -68,20 +68,38 @@ class FlightParams:
 class BodyState:
     """Where the bodies are and how they move, in the frame ``map``.
 
-    positions_m, velocities_mps and angular_radps float64[n, 3]; quaternions
-    float64[n, 4], (x, y, z, w).
+    ``rows`` float64[n, 13]: position (3), quaternion (x, y, z, w), velocity (3), angular
+    velocity (3); m, m/s and rad/s.
     """
 
-    positions_m: np.ndarray
-    quaternions: np.ndarray
-    velocities_mps: np.ndarray
-    angular_radps: np.ndarray
+    rows: np.ndarray
+
+    @property
+    def positions_m(self) -> np.ndarray:
+        """float64[n, 3]"""
+        return self.rows[:, 0:3]
+
+    @property
+    def quaternions(self) -> np.ndarray:
+        """float64[n, 4], (x, y, z, w)."""
+        return self.rows[:, 3:7]
+
+    @property
+    def velocities_mps(self) -> np.ndarray:
+        """float64[n, 3]"""
+        return self.rows[:, 7:10]
+
+    @property
+    def angular_radps(self) -> np.ndarray:
+        """float64[n, 3]"""
+        return self.rows[:, 10:13]
 
     @cached_property
     def rotations(self) -> np.ndarray:
         """float64[n, 3, 3], the body axes as columns."""
-        rotations = np.empty((len(self.quaternions), 3, 3))
-        flight_law.rotations_from_quaternions(self.quaternions, rotations)
+        rotations = np.empty((len(self.rows), 3, 3))
+        for row, rotation in zip(self.rows, rotations):
+            flight_law.rotation_from_quaternion(row[3:7], rotation)
         return rotations
 
 
@@ -114,7 +132,6 @@ class FlightLaw:
         ahead and to the left of the heading, rad/s.
         """
         forces, torques = np.empty_like(commands), np.empty_like(commands)
-        flight_law.fly(state.positions_m, state.velocities_mps, state.angular_radps,
-                       state.rotations, commands, altitude_m, GRAVITY_MPS2, self._airframe,
-                       self._law, forces, torques)
+        flight_law.fly(state.rows, commands, altitude_m, GRAVITY_MPS2, self._airframe, self._law,
+                       forces, torques)
         return forces, torques

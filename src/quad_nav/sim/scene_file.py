@@ -53,6 +53,36 @@ def scene_from_document(document: Any, source: str, default_name: str = "scene")
     return scene
 
 
+def scene_document(scene: Scene) -> Dict[str, Any]:
+    """The document that ``scene_from_document`` reads the same scene from."""
+    walls = {"height": scene.walls.height_m, "thickness": scene.walls.thickness_m}
+    return {"name": scene.name, "size": [scene.size_x_m, scene.size_y_m],
+            "altitude": scene.altitude_m, "walls": walls,
+            "obstacles": [_obstacle_document(solid) for solid in scene.obstacles],
+            "starts": [[pose.x_m, pose.y_m, pose.yaw_rad] for pose in scene.starts]}
+
+
+def write_scene(scene: Scene, path: Path) -> None:
+    """Write a file that ``load_scene`` reads the same scene from, one obstacle a line."""
+    document = scene_document(scene)
+    lines = [yaml.safe_dump({key: document[key]}, default_flow_style=None)
+             for key in ("name", "size", "altitude", "walls")]
+    for key in ("obstacles", "starts"):
+        lines.append(f"{key}:\n" if document[key] else f"{key}: []\n")
+        lines += ["  - " + yaml.safe_dump(item, default_flow_style=True, sort_keys=False,
+                                          width=math.inf) for item in document[key]]
+    path.write_text("".join(lines), encoding="utf-8")
+
+
+def _obstacle_document(solid: Obstacle) -> Dict[str, Any]:
+    shape: Dict[str, Any] = (
+        {"shape": "box", "size": [solid.size_x_m, solid.size_y_m], "yaw": solid.yaw_rad}
+        if isinstance(solid, Box) else {"shape": "cylinder", "radius": solid.radius_m})
+    bottom = {"bottom": solid.bottom_m} if solid.bottom_m else {}
+    return {"name": solid.name, "centre": [solid.x_m, solid.y_m], **shape,
+            "height": solid.height_m, **bottom}
+
+
 def _read_scene(check: _Checker, document: Any, default_name: str) -> Optional[Scene]:
     fields = check.mapping(document, "", ["name", "size", "altitude", "walls", "obstacles",
                                           "starts"])

@@ -12,7 +12,7 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from quad_nav.errors import InputError
-from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
 from quad_nav.sim.body import Sphere, World
 from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import (
@@ -159,12 +159,11 @@ class Simulation:
         return self.step_count > self._hover_step
 
     def state(self, robot: int) -> RobotState:
-        rotation = self._state.rotations[robot]
-        x, y, z = self._state.positions_m[robot].tolist()
-        linear = (rotation.T @ self._state.velocities_mps[robot]).tolist()
-        angular = (rotation.T @ self._state.angular_radps[robot]).tolist()
-        qx, qy, qz, qw = self._state.quaternions[robot].tolist()
-        return RobotState(Pose3D(x, y, z, (qx, qy, qz, qw)), tuple(linear), tuple(angular))
+        (x, y, z, qx, qy, qz, qw, *twist) = self._state.rows[robot].tolist()
+        quaternion = (qx, qy, qz, qw)
+        to_base = (-qx, -qy, -qz, qw)
+        return RobotState(Pose3D(x, y, z, quaternion), rotate(to_base, twist[:3]),
+                          rotate(to_base, twist[3:]))
 
     def scan(self, robot: int) -> Scan:
         """What the LIDAR of a quadcopter sees at this instant."""
