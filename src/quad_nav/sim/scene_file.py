@@ -65,8 +65,8 @@ def scene_document(scene: Scene) -> Dict[str, Any]:
 def write_scene(scene: Scene, path: Path) -> None:
     """Write a file that ``load_scene`` reads the same scene from, one obstacle a line."""
     document = scene_document(scene)
-    lines = [yaml.safe_dump({key: document[key]}, default_flow_style=None)
-             for key in ("name", "size", "altitude", "walls")]
+    head = {key: document[key] for key in ("name", "size", "altitude", "walls")}
+    lines = [yaml.safe_dump(head, default_flow_style=None, sort_keys=False)]
     for key in ("obstacles", "starts"):
         lines.append(f"{key}:\n" if document[key] else f"{key}: []\n")
         lines += ["  - " + yaml.safe_dump(item, default_flow_style=True, sort_keys=False,
