@@ -60,7 +60,8 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
 def fly(scene: Optional[Path], goals: Optional[Path], config: str, parameters: Tuple[str, ...],
         robots: Optional[int], seed: int, jitter: float, time_limit: float, scan_range: float,
-        beams: int, lidar_rate: float, range_noise: float, json_path: Optional[str], quiet: bool) -> None:
+        beams: int, lidar_rate: float, range_noise: float, json_path: Optional[str],
+        quiet: bool) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
     Ctrl-C ends the flight and keeps what was flown.
