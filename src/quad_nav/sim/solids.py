@@ -12,7 +12,7 @@ from quad_nav.sim.scene import Box, Obstacle, Scene
 
 _MANY = 500
 """Solids that are projected one by one in as long as beams need to walk through a grid."""
-_LARGE_CELLS = 64
+_LARGE_CELLS = 32
 """Columns that a solid may cover in the grid; a larger one is projected."""
 _MIN_CELL_M = 0.25
 _PADDING_M = 1e-6
