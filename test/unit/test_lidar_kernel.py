@@ -281,6 +281,15 @@ def test_simulations_see_the_same_with_either_caster():
         simulation.close()
 
 
+def test_more_rays_than_the_engine_takes_at_once():
+    world = World(ARENA, ARENA.starts[:1], Airframe(), 1.0 / 240)
+    count = 2 * pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE
+    fractions = world.cast(np.tile([1.0, 1.0, 2.0], (count, 1)),
+                           np.tile([1.0, 1.0, -2.0], (count, 1)))
+    world.close()
+    assert fractions == pytest.approx(np.full(count, 0.5))
+
+
 def test_another_caster_is_refused():
     with pytest.raises(InputError, match="lidar: 'gazebo', expected kernel or bullet"):
         SimulationParams(lidar_caster="gazebo")

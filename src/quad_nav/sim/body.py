@@ -22,7 +22,8 @@ from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, Box, Obstacle, Scene
 
-_MAX_RAYS_PER_CALL = 16384
+_MAX_RAYS_PER_CALL = 16383
+"""One less than ``pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE``: of that many the last is dropped."""
 
 Sphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
 """Centre in metres, radius in metres, RGBA in 0..1."""
