@@ -1,4 +1,4 @@
-"""Compiles a navigator's kernels before it flies.
+"""Compiles the kernels before anything flies.
 
 numba compiles a kernel at its first call, which takes seconds, and keeps the
 result beside the source (or in the user's cache where that cannot be written).
@@ -61,7 +61,19 @@ def _look_around(navigator: Navigator, here: Pose2D) -> None:
                     layer.add_scan(source.name, scan, lidar, 0.0)
 
 
+def simulate() -> None:
+    """A step and a scan of the simulator, which a navigator itself does not need."""
+    from quad_nav.sim.scene import Scene, Walls
+    from quad_nav.sim.simulation import Simulation
+    simulation = Simulation(
+        Scene("warm-up", 10.0, 10.0, 1.0, Walls(), (), (Pose2D(5.0, 5.0),)), 1)
+    simulation.step()
+    simulation.scan(0)
+    simulation.close()
+
+
 def main() -> None:
+    simulate()
     for costmap, node in _MISSIONS:
         warm_up(config.load({
             **node, "global_costmap": dict(costmap),

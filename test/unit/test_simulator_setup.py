@@ -25,6 +25,12 @@ def test_defaults():
     lidar = setup.params.lidar
     assert lidar.beam_count == 512
     assert lidar.scan_range_rad == pytest.approx(2 * math.pi)
+    assert setup.params.lidar_caster == "kernel"
+
+
+def test_the_physics_engine_casts_the_beams_if_asked_to():
+    assert read_setup({"scene": ARENA, "lidar": "bullet"},
+                      "simulator").params.lidar_caster == "bullet"
 
 
 def test_the_tutorials_half_turn_is_one_argument_away():
@@ -47,6 +53,7 @@ def test_every_fault_is_listed():
 @pytest.mark.parametrize("parameters, problem", [
     ({"robots": 9}, "simulator: robots: 9, expected 1 to 8, the start poses of scene arena"),
     ({"robots": True}, "simulator: robots: is True, expected a whole number, 1 or more"),
+    ({"lidar": "gazebo"}, "simulator: lidar: is 'gazebo', expected kernel or bullet"),
     ({"scan_range": 3.0, "step_size": 4.0},
      "simulator: step_size: 4.0, expected an angle that divides scan_range, 3.0, into 2 or more"),
     ({"scan_range": 7.0, "step_size": 0.1},

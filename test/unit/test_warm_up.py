@@ -9,6 +9,7 @@ from quad_nav.config import load
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.voxel import VoxelLayer
 from quad_nav.plan.global_planner import SearchPlanner
+from quad_nav.sim import casters
 
 
 @pytest.fixture
@@ -54,3 +55,10 @@ def test_both_searches_and_both_paths_of_the_global_planner(missions):
 
 def test_any_configuration_can_be_warmed_up():
     warm_up.warm_up(load({"global_costmap": {"static_map": True}}))
+
+
+def test_a_scan_of_the_simulator_is_among_it(monkeypatch):
+    seen = []
+    monkeypatch.setattr(casters, "cast_scans", lambda *arguments: seen.append(arguments))
+    warm_up.simulate()
+    assert len(seen) == 1

@@ -10,7 +10,7 @@ from quad_nav.errors import InputError
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.sim.simulation import STEPS_PER_S, SimulationParams, start_poses
+from quad_nav.sim.simulation import LIDAR_CASTERS, STEPS_PER_S, SimulationParams, start_poses
 
 DEFAULT_BEAMS = 512
 DEFAULTS: Dict[str, Any] = {
@@ -19,6 +19,7 @@ DEFAULTS: Dict[str, Any] = {
     "rate": 1.0,                # simulated seconds per second
     "gui": False,               # pybullet's window
     "start_paused": True,       # until /simulation/start
+    "lidar": "kernel",          # who finds what beams hit: kernel or bullet
     "scan_range": 2 * math.pi,  # LIDAR's field of view, rad
     "step_size": 0.0,           # rad between beams; 0: 512 beams over scan_range
     "lidar_rate": 20.0,         # scans per simulated second
@@ -85,7 +86,7 @@ def _simulation_params(values: Mapping[str, Any]) -> SimulationParams:
                         noise_std_m=float(values["range_noise"]))
     return SimulationParams(lidar, command_timeout_s=float(values["command_timeout"]),
                             controller_period_s=float(values["controller_period"]),
-                            jitter_m=float(values["jitter"]))
+                            jitter_m=float(values["jitter"]), lidar_caster=values["lidar"])
 
 
 def _is_number(value: Any) -> bool:
@@ -114,6 +115,7 @@ _RULES: Dict[str, _Rule] = {
     "rate": (lambda v: _is_number(v) and v > 0, "a number above 0"),
     "gui": _BOOLEAN,
     "start_paused": _BOOLEAN,
+    "lidar": (lambda v: v in LIDAR_CASTERS, " or ".join(LIDAR_CASTERS)),
     "scan_range": _AMOUNT,
     "step_size": _AMOUNT,
     "lidar_rate": (_divides, f"scans per second that divide {STEPS_PER_S}, such as 10 or 20"),

@@ -80,9 +80,10 @@ class SimulatorTopics:
                     (f"odom{i}", f"base_link{i}"), stamp))
 
     def publish_scans(self) -> None:
-        for i, publisher in enumerate(self._scans):
-            if self.lidar_enabled[i] and publisher.get_num_connections():
-                publisher.publish(scan_message(self._simulation.scan(i), f"Lidar{i}"))
+        robots = [i for i, publisher in enumerate(self._scans)
+                  if self.lidar_enabled[i] and publisher.get_num_connections()]
+        for i, scan in zip(robots, self._simulation.scans(robots)):
+            self._scans[i].publish(scan_message(scan, f"Lidar{i}"))
 
     def publish_contact(self, contact: Contact) -> None:
         x, y, _ = contact.position_m

@@ -20,10 +20,10 @@ from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.contacts import Touch
 from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene
+from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, Box, Obstacle, Scene
 
-GUARD_HEIGHT_M = 0.24
-_MAX_RAYS_PER_CALL = 16384
+_MAX_RAYS_PER_CALL = 16383
+"""One less than ``pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE``: of that many the last is dropped."""
 
 Sphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
 """Centre in metres, radius in metres, RGBA in 0..1."""
@@ -103,7 +103,7 @@ class World:
         return [touches[key] for key in sorted(touches)]
 
     def cast(self, starts_m: np.ndarray, ends_m: np.ndarray) -> np.ndarray:
-        """See ``lidar.RayCaster.cast``. A quadcopter's own beams start inside its guard: unseen."""
+        """See ``casters.RayWorld``. A quadcopter's own beams start inside its guard: unseen."""
         starts, ends = starts_m.tolist(), ends_m.tolist()
         hits: List[float] = []
         for k in range(0, len(starts), _MAX_RAYS_PER_CALL):

@@ -1,32 +1,21 @@
-"""The LIDAR: which way its beams look, and the ranges they return.
+"""The LIDAR: where it is, which way its beams look, and the ranges they return.
 
-What the beams hit is somebody else's business: a *caster* takes the beams' ends
-and returns how far along each one something is hit, see ``RayCaster``.
+What the beams hit is somebody else's business, see ``casters.Caster``.
 """
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Optional, Protocol
+from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D, Scan
+from quad_nav.sim.flight import BodyState
 
 MOUNT_HEIGHT_M = 0.06
 base_from_lidar = Pose3D(0.0, 0.0, MOUNT_HEIGHT_M)
-
-
-class RayCaster(Protocol):
-    """Finds what beams hit; the world of bodies is one."""
-
-    def cast(self, starts_m: np.ndarray, ends_m: np.ndarray) -> np.ndarray:
-        """Fraction of the way to the first hit float64[m], +inf for none.
-
-        ``starts_m`` and ``ends_m`` are float64[m, 3] in ``map``. A solid that
-        a beam starts inside of is not hit.
-        """
 
 
 @dataclass(frozen=True)
@@ -74,32 +63,39 @@ class LidarParams:
         return self.angle_min_rad + (self.beam_count - 1) * self.step_size_rad
 
 
-class Lidar:
-    """Turns a pose into a scan; one object serves any number of quadcopters."""
+def beam_directions(params: LidarParams) -> np.ndarray:
+    """Unit vectors float64[beams, 3] in the LIDAR's frame."""
+    angles = params.angle_min_rad + params.step_size_rad * np.arange(params.beam_count)
+    return np.column_stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)])
 
-    def __init__(self, params: LidarParams):
-        self.params = params
-        angles = params.angle_min_rad + params.step_size_rad * np.arange(params.beam_count)
-        self._directions = np.column_stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)])
 
-    def scan(self, stamp_s: float, map_from_lidar: Pose3D, caster: RayCaster,
-             random: Optional[np.random.Generator] = None) -> Scan:
-        """One turn, taken at an instant. ``random`` is needed when there is noise."""
-        params = self.params
-        directions = self._directions @ map_from_lidar.rotation.T
-        origin = map_from_lidar.translation
-        fractions = caster.cast(origin + params.range_min_m * directions,
-                                origin + params.range_max_m * directions)
-        ranges = params.range_min_m + fractions * (params.range_max_m - params.range_min_m)
-        if params.noise_std_m > 0.0:
-            if random is None:
-                raise ValueError("a LIDAR with noise needs a random generator")
-            ranges = self._with_noise(ranges, random)
-        return Scan(stamp_s, params.angle_min_rad, params.step_size_rad, params.range_min_m,
-                    params.range_max_m, ranges.astype(np.float32))
+def lidar_poses(bodies: BodyState, robots: Sequence[int]) -> Tuple[np.ndarray, np.ndarray]:
+    """Where the LIDARs of quadcopters are: float64[n, 3], float64[n, 3, 3] in ``map``.
 
-    def _with_noise(self, ranges_m: np.ndarray, random: np.random.Generator) -> np.ndarray:
-        """Gaussian noise on the hits; a return stays within what the sensor can tell."""
-        noisy = ranges_m + random.normal(0.0, self.params.noise_std_m, len(ranges_m))
-        return np.where(np.isfinite(ranges_m),
-                        np.clip(noisy, self.params.range_min_m, self.params.range_max_m), np.inf)
+    The axes are the rotations' columns.
+    """
+    chosen = list(robots)
+    rotations = bodies.rotations[chosen]
+    return bodies.positions_m[chosen] + rotations @ base_from_lidar.translation, rotations
+
+
+def make_scan(params: LidarParams, stamp_s: float, distances_m: np.ndarray,
+              random: Optional[np.random.Generator] = None) -> Scan:
+    """One turn, taken at an instant, of distances float64[beams], +inf for no hit.
+
+    ``random`` is needed when there is noise.
+    """
+    if params.noise_std_m > 0.0:
+        if random is None:
+            raise ValueError("a LIDAR with noise needs a random generator")
+        distances_m = _with_noise(params, distances_m, random)
+    return Scan(stamp_s, params.angle_min_rad, params.step_size_rad, params.range_min_m,
+                params.range_max_m, distances_m.astype(np.float32))
+
+
+def _with_noise(params: LidarParams, distances_m: np.ndarray,
+                random: np.random.Generator) -> np.ndarray:
+    """Gaussian noise on the hits; a return stays within what the sensor can tell."""
+    noisy = distances_m + random.normal(0.0, params.noise_std_m, len(distances_m))
+    return np.where(np.isfinite(distances_m),
+                    np.clip(noisy, params.range_min_m, params.range_max_m), np.inf)

@@ -20,6 +20,8 @@ Lengths = Union[float, np.ndarray]
 
 BODY_RADIUS_M = 0.30
 """Radius of the cylinder that a quadcopter touches things with."""
+GUARD_HEIGHT_M = 0.24
+"""Its height; its centre is the LIDAR."""
 
 
 @dataclass(frozen=True)

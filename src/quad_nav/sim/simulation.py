@@ -14,6 +14,7 @@ import numpy as np
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
 from quad_nav.sim.body import Sphere, World
+from quad_nav.sim.casters import Caster, KernelCaster, WorldCaster
 from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import (
     Airframe,
@@ -22,11 +23,12 @@ from quad_nav.sim.flight import (
     FlightParams,
     limit_command,
 )
-from quad_nav.sim.lidar import Lidar, LidarParams, base_from_lidar
+from quad_nav.sim.lidar import LidarParams, make_scan
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 STEPS_PER_S = 240
 STEP_S = 1.0 / STEPS_PER_S
+LIDAR_CASTERS = ("kernel", "bullet")
 _START_GAP_M = 0.05
 _START_TRIES = 1000
 
@@ -37,7 +39,8 @@ class SimulationParams:
 
     Commands count for ``command_timeout_s + controller_period_s`` after they
     arrive, then a quadcopter hovers. Starts are displaced at random by up to
-    ``jitter_m``.
+    ``jitter_m``. ``lidar_caster`` is who finds what beams hit, see ``casters``: the
+    "kernel" or the physics engine, "bullet".
     """
 
     lidar: LidarParams = field(default_factory=LidarParams)
@@ -46,6 +49,7 @@ class SimulationParams:
     command_timeout_s: float = 0.5
     controller_period_s: float = 0.05
     jitter_m: float = 0.0
+    lidar_caster: str = "kernel"
 
     def __post_init__(self) -> None:
         problems = [f"{name}: {value}, expected {unit}, 0 or more"
@@ -54,6 +58,9 @@ class SimulationParams:
                         ("controller_period", self.controller_period_s, "seconds"),
                         ("jitter", self.jitter_m, "metres")]
                     if not 0.0 <= value < math.inf]
+        if self.lidar_caster not in LIDAR_CASTERS:
+            problems.append(f"lidar: {self.lidar_caster!r}, expected "
+                            f"{' or '.join(LIDAR_CASTERS)}")
         if problems:
             raise InputError(problems)
 
@@ -88,12 +95,14 @@ class Simulation:
         self.params = params
         self.seed = seed
         self.step_count = start_step
-        self._lidar = Lidar(params.lidar)
         self._law = FlightLaw(params.airframe, params.flight)
         self._command_steps = math.floor(
             (params.command_timeout_s + params.controller_period_s) * STEPS_PER_S + 1e-9)
         self._starts = start_poses(scene, n_robots, params.jitter_m, seed)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
+        self._caster: Caster = (
+            KernelCaster(params.lidar, scene, n_robots) if params.lidar_caster == "kernel"
+            else WorldCaster(params.lidar, self._world))
         self._begin()
 
     def _begin(self) -> None:
@@ -167,8 +176,13 @@ class Simulation:
 
     def scan(self, robot: int) -> Scan:
         """What the LIDAR of a quadcopter sees at this instant."""
-        map_from_lidar = self.state(robot).map_from_base.compose(base_from_lidar)
-        return self._lidar.scan(self.now_s, map_from_lidar, self._world, self._noise[robot])
+        return self.scans([robot])[0]
+
+    def scans(self, robots: Sequence[int]) -> List[Scan]:
+        """What the LIDARs of several quadcopters see at this instant, in one go."""
+        distances_m = self._caster.cast(self._state, robots)
+        return [make_scan(self.params.lidar, self.now_s, row, self._noise[robot])
+                for robot, row in zip(robots, distances_m)]
 
     def show_goals(self, spheres: Sequence[Sphere]) -> None:
         """Draw goals in the window."""

@@ -1,0 +1,76 @@
+"""How long one scan of 512 beams takes, by the kernel and by the physics engine.
+
+    make bench
+
+Microseconds, medians; of several quadcopters in one call, the time for each.
+"""
+from __future__ import annotations
+
+import statistics
+import time
+from pathlib import Path
+from typing import List, Tuple
+
+import numpy as np
+from tabulate import tabulate
+
+from quad_nav.geometry import Pose2D
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.scene import Box, Cylinder, Obstacle, Scene, Walls
+from quad_nav.sim.scene_file import load_scene
+from quad_nav.sim.simulation import LIDAR_CASTERS, Simulation, SimulationParams
+
+ROOT = Path(__file__).resolve().parents[1]
+BEAMS = LidarParams().beam_count
+RUNS = {"kernel": 50, "bullet": 5}
+
+
+def field(obstacles: int, robots: int, size_m: float = 60.0) -> Scene:
+    """Obstacles at random around a square pattern of start poses."""
+    random = np.random.default_rng(0)
+    solids: List[Obstacle] = []
+    for k in range(obstacles):
+        x, y, yaw = random.uniform((0.0, 0.0, 0.0), (size_m, size_m, 3.0)).tolist()
+        solids.append(Box(f"box{k}", x, y, 0.5, 0.5, 2.0, yaw) if k % 2
+                      else Cylinder(f"pillar{k}", x, y, 0.3, 2.0))
+    side = int(np.ceil(np.sqrt(robots)))
+    pitch = size_m / side
+    starts = tuple(Pose2D((k % side + 0.5) * pitch, (k // side + 0.5) * pitch)
+                   for k in range(robots))
+    return Scene("field", size_m, size_m, 1.0, Walls(), tuple(solids), starts)
+
+
+def scan_us(scene: Scene, robots: int, caster: str) -> float:
+    """For each robot, of all in one call."""
+    simulation = Simulation(scene, robots, SimulationParams(lidar_caster=caster))
+    everyone = range(robots)
+    simulation.scans(everyone)
+    times = []
+    for _ in range(RUNS[caster]):
+        begin = time.perf_counter()
+        simulation.scans(everyone)
+        times.append(time.perf_counter() - begin)
+    simulation.close()
+    return 1e6 * statistics.median(times) / robots
+
+
+def main() -> None:
+    arena = load_scene(ROOT / "scenes" / "arena.yaml")
+    cases: List[Tuple[str, Scene, int]] = [
+        ("the tutorial's arena, 1 quadcopter", arena, 1),
+        ("the tutorial's arena, 2 quadcopters", arena, 2),
+        ("60 m, 200 obstacles, 10 quadcopters", field(200, 10), 10),
+        ("60 m, 200 obstacles, 100 quadcopters", field(200, 100), 100),
+        ("60 m, 10000 obstacles, 10 quadcopters", field(10000, 10), 10),
+    ]
+    table = []
+    for name, scene, robots in cases:
+        kernel, bullet = (scan_us(scene, robots, caster) for caster in LIDAR_CASTERS)
+        table.append((f"{BEAMS} beams, {name}", f"{kernel:.0f}", f"{bullet:.0f}",
+                      f"{bullet / kernel:.0f}"))
+    print(tabulate(table, ("", "kernel, us", "bullet, us", "ratio"), disable_numparse=True,
+                   colalign=("left", "right", "right", "right")))
+
+
+if __name__ == "__main__":
+    main()
