@@ -22,7 +22,7 @@ from quad_nav.offline.run import fly as fly_setup
 from quad_nav.offline.setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.shipped import shipped
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.simulation import LIDAR_CASTERS, SimulationParams
 
 _A_FILE = click.Path(dir_okay=False, path_type=Path)
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
@@ -55,12 +55,14 @@ _AMOUNT = click.FloatRange(min=0.0)
               help="Scans per simulated second.")
 @click.option("--range-noise", type=_AMOUNT, default=0.0, metavar="M",
               help="Standard deviation of the LIDAR's ranges.")
+@click.option("--lidar", type=click.Choice(LIDAR_CASTERS), default="kernel", show_default=True,
+              help="Who casts the beams: our kernel, or the physics engine.")
 @click.option("--json", "json_path", type=click.Path(dir_okay=False, allow_dash=True),
               metavar="FILE", help="Write the summary there; - is the terminal.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
 def fly(scene: Optional[Path], goals: Optional[Path], config: str, parameters: Tuple[str, ...],
         robots: Optional[int], seed: int, jitter: float, time_limit: float, scan_range: float,
-        beams: int, lidar_rate: float, range_noise: float, json_path: Optional[str],
+        beams: int, lidar_rate: float, range_noise: float, lidar: str, json_path: Optional[str],
         quiet: bool) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
@@ -70,11 +72,11 @@ def fly(scene: Optional[Path], goals: Optional[Path], config: str, parameters: T
     cannot be used, 130 after Ctrl-C.
     """
     try:
-        lidar = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
+        beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
         setup = read_setup(FlightOptions(
             scene or shipped("scenes", "arena.yaml"), goals or shipped("goals"), config,
             tuple(map(_parameter, parameters)), robots, seed, time_limit, lidar_rate,
-            SimulationParams(lidar, jitter_m=jitter)))
+            SimulationParams(beam_params, jitter_m=jitter, lidar_caster=lidar)))
     except InputError as error:
         click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)

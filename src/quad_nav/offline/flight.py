@@ -143,10 +143,10 @@ class Flight:
         return [self.simulation.state(index) for index in range(len(self.robots))]
 
     def _scan(self) -> None:
-        for index, robot in enumerate(self.robots):
-            scan = self.simulation.scan(index)
+        everybody = range(len(self.robots))
+        for index, scan in zip(everybody, self.simulation.scans(everybody)):
             map_from_lidar = self.simulation.state(index).map_from_base.compose(base_from_lidar)
-            robot.see(scan, map_from_lidar)
+            self.robots[index].see(scan, map_from_lidar)
             for observer in self._observers:
                 observer.scanned(index, scan, map_from_lidar)
 
