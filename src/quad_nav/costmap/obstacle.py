@@ -19,6 +19,8 @@ from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
 from quad_nav.kernels.raytrace import clear_rays, mark_points
 
+_LINES = 4096  # that an update remembers; a scan has some hundreds
+
 COMBINE_OVERWRITE = 0
 COMBINE_MAXIMUM = 1
 
@@ -65,7 +67,7 @@ class ObstacleLayer(GridLayer):
         self._rolling_window = rolling_window
         self._footprint = np.empty((0, 2))
         self._footprint_now = np.empty((0, 2))
-        self._cleared_from = np.empty(0, dtype=np.int32)
+        self._cleared_lines = np.empty(_LINES, dtype=np.int64)
 
     def add_scan(self, source_name: str, scan: Scan, global_from_sensor: Pose3D, now_s: float,
                  global_from_origin: Optional[Pose3D] = None) -> None:
@@ -128,7 +130,7 @@ class ObstacleLayer(GridLayer):
         clearing = [] if overdue else [b for b in self.buffers.values() if b.params.clearing]
         touched = np.array([bounds.min_x_m, bounds.min_y_m, bounds.max_x_m, bounds.max_y_m])
         for buffer in clearing:
-            self._cleared_from = np.full(self.grid.costs.size, -1, dtype=np.int32)
+            self._cleared_lines.fill(-1)
             for observation in buffer.observations:
                 self._clear(observation, self._raytrace_range(buffer.params), touched)
         for buffer in marking:
@@ -156,7 +158,7 @@ class ObstacleLayer(GridLayer):
         spec = self.grid.spec
         clear_rays(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
                    observation.sensor[0], observation.sensor[1], observation.points, range_m,
-                   self._cleared_from, touched)
+                   self._cleared_lines, touched)
 
     def _mark(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
         spec = self.grid.spec

@@ -26,10 +26,15 @@ def inflate(costs, x0, xn, y0, yn, cost_table, rank_table, inflate_unknown):
     A neighbour that already waits at the same or a lower rank is not queued again: it
     would find itself visited. This keeps queues short and changes nothing.
     """
+    radius = rank_table.shape[0] - 2
+    reach = radius + 1  # of the seeds in the window; costs beyond it stay as they are
+    low_x, low_y = max(0, x0 - reach), max(0, y0 - reach)
+    high_x, high_y = min(costs.shape[1], xn + reach), min(costs.shape[0], yn + reach)
+    costs = costs[low_y:high_y, low_x:high_x]
+    x0, xn, y0, yn = x0 - low_x, xn - low_x, y0 - low_y, yn - low_y
     size_y, size_x = costs.shape
     beyond = rank_table.max()
     waiting = np.full((size_y, size_x), beyond, np.int32)
-    radius = rank_table.shape[0] - 2
     # next, x, y, dx, dy; memory is taken from the system as far as it is written to.
     queue = np.empty((_most_entries(costs, x0, xn, y0, yn, radius), 5), np.int32)
     first = np.full(beyond, -1, np.int64)

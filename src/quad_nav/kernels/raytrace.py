@@ -9,6 +9,8 @@ from numba import njit
 from quad_nav.grid import FREE, LETHAL
 from quad_nav.kernels.cells import cell_index
 
+_SPREAD = np.uint64(0x9E3779B97F4A7C15)  # 2 ** 64 / golden ratio: neighbours fall far apart
+
 
 @njit(cache=True, nogil=True)
 def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
@@ -63,12 +65,12 @@ def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
 
 @njit(cache=True, nogil=True)
 def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points, range_m,
-               cleared_from, bounds):
+               cleared, bounds):
     """Free the cells between the sensor and each point, up to ``range_m``.
 
-    points: float32[n, 3] in the frame of the grid. ``cleared_from``, int32[H * W],
-    -1 at first, holds the cell from which the line to a cell has been cleared: a
-    slow robot's scans have most lines in common. ``bounds``, float64[4] (min x,
+    points: float32[n, 3] in the frame of the grid. ``cleared``, int64[2 ** b], -1 at
+    first, remembers lines that have been cleared, the latest of those that fall on one
+    place: a slow robot's scans have most lines in common. ``bounds``, float64[4] (min x,
     min y, max x, max y in metres), grows by what was touched. A sensor outside the
     grid clears nothing: returns False.
     """
@@ -81,7 +83,8 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
     high_x, high_y = origin_x + size_x * resolution, origin_y + size_y * resolution
     max_cells = max(0.0, math.ceil(range_m / resolution))
     flat_costs = costs.reshape(-1)
-    start = np.int32(y0 * size_x + x0)
+    start = y0 * size_x + x0
+    places = np.uint64(cleared.size - 1)
     surely_near = (1.0 - 1e-9) * range_m * range_m
     for k in range(points.shape[0]):
         x, y = clip_to_grid(sensor_x, sensor_y, float(points[k, 0]), float(points[k, 1]),
@@ -90,9 +93,10 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
         y1 = cell_index(y, origin_y, resolution, size_y)
         if x1 < 0 or y1 < 0:
             continue
-        end = np.uint64(y1 * size_x + x1)
-        if cleared_from[end] != start:
-            cleared_from[end] = start
+        line = start * costs.size + y1 * size_x + x1
+        place = (np.uint64(line) * _SPREAD >> np.uint64(32)) & places
+        if cleared[place] != line:
+            cleared[place] = line
             clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
         dx, dy = x - sensor_x, y - sensor_y
         scale = 1.0
