@@ -81,7 +81,6 @@ class Flight:
     pose: Pose2D  # as sent, with the yaw that was chosen
     first_sent_s: float
     sent_s: float  # at the start of this attempt
-    busy_s: float  # when the navigator was last not known to be idle
     attempt: int = 1
     replaced: bool = False  # the navigator flies somebody else's goal
 
@@ -94,6 +93,7 @@ class Sequencer:
         self._index = 0
         self._lap = 1
         self._flight: Optional[Flight] = None
+        self._busy_s = 0.0  # when the navigator was last not known to be idle
         self._done = False
 
     @property
@@ -144,20 +144,33 @@ class Sequencer:
         if self._flight is None:
             return self._next(now_s, pose)
         settings = self._sequence.settings
-        flight = self._flight = _noted(self._flight, now_s, reports, navigator_idle)
+        if not navigator_idle:
+            self._busy_s = now_s
+        if any(report.verdict is Verdict.REPLACED for report in reports):
+            self._flight = dataclasses.replace(self._flight, replaced=True)
+        flight = self._flight
         if pose.distance_to(flight.pose) <= settings.goal_tolerance_m:
             return self._end(flight, now_s, pose, "")
         if any(report.verdict is Verdict.CANCELLED for report in reports):
             return self._end(flight, now_s, pose, "cancelled by another node")
-        lost = _why_lost(flight, now_s, reports)
+        lost = self._why_lost(flight, now_s, reports)
         if lost:
             # The time-out is for an attempt: one that is only repeated keeps its start.
-            return [self._send(dataclasses.replace(flight, busy_s=now_s, replaced=False), lost)]
+            return [self._send(now_s, dataclasses.replace(flight, replaced=False), lost)]
         failure = self._why_failed(flight, now_s, pose, reports)
         if failure and flight.attempt <= settings.retries:
-            return [self._send(dataclasses.replace(flight, sent_s=now_s, busy_s=now_s,
-                                                   attempt=flight.attempt + 1), failure)]
+            return [self._send(now_s, dataclasses.replace(flight, sent_s=now_s,
+                                                          attempt=flight.attempt + 1), failure)]
         return self._end(flight, now_s, pose, failure) if failure else []
+
+    def _why_lost(self, flight: Flight, now_s: float, reports: Sequence[NavigatorReport]) -> str:
+        """Why the navigator is without our goal through no fault of the goal's."""
+        ended = any(report.verdict in (Verdict.SUCCEEDED, Verdict.ABORTED) for report in reports)
+        if flight.replaced and ended:
+            return "the navigator is through with another node's goal"
+        if now_s - self._busy_s >= FORGOTTEN_AFTER_S:
+            return f"the navigator has had no goal for {FORGOTTEN_AFTER_S:.0f} s"
+        return ""
 
     def _why_failed(self, flight: Flight, now_s: float, pose: Pose2D,
                     reports: Sequence[NavigatorReport]) -> str:
@@ -181,10 +194,10 @@ class Sequencer:
                 return [SequenceDone()]
             self._index, self._lap = 0, self._lap + 1
         goal = goals[self._index]
-        return [self._send(Flight(goal, _with_yaw(goal, pose), now_s, now_s, now_s), "")]
+        return [self._send(now_s, Flight(goal, _with_yaw(goal, pose), now_s, now_s), "")]
 
-    def _send(self, flight: Flight, why: str) -> SendGoal:
-        self._flight = flight
+    def _send(self, now_s: float, flight: Flight, why: str) -> SendGoal:
+        self._flight, self._busy_s = flight, now_s
         return SendGoal(self._index, self._lap, flight.pose, flight.attempt, why)
 
     def _end(self, flight: Flight, now_s: float, pose: Pose2D, reason: str) -> List[Action]:
@@ -194,23 +207,6 @@ class Sequencer:
         self._flight = None
         self._index += 1
         return [ended, *self._next(now_s, pose)]
-
-
-def _noted(flight: Flight, now_s: float, reports: Sequence[NavigatorReport], idle: bool) -> Flight:
-    """The flight with what the navigator's state and reports say about it."""
-    replaced = any(report.verdict is Verdict.REPLACED for report in reports)
-    return dataclasses.replace(flight, busy_s=flight.busy_s if idle else now_s,
-                               replaced=flight.replaced or replaced)
-
-
-def _why_lost(flight: Flight, now_s: float, reports: Sequence[NavigatorReport]) -> str:
-    """Why the navigator is without our goal through no fault of the goal's."""
-    ended = any(report.verdict in (Verdict.SUCCEEDED, Verdict.ABORTED) for report in reports)
-    if flight.replaced and ended:
-        return "the navigator is through with another node's goal"
-    if now_s - flight.busy_s >= FORGOTTEN_AFTER_S:
-        return f"the navigator has had no goal for {FORGOTTEN_AFTER_S:.0f} s"
-    return ""
 
 
 def _with_yaw(goal: Goal, start: Pose2D) -> Pose2D:

@@ -109,6 +109,7 @@ class Simulation:
         n = self.n_robots
         self._commands = np.zeros((n, 3))
         self._hover_step = np.full(n, -math.inf)  # the last step that a command counts for
+        self._next_hover_step = math.inf
         self._contact_log = ContactLog()
         self._noise = [np.random.default_rng([self.seed, 1, robot]) for robot in range(n)]
         self._state = self._world.state()
@@ -146,16 +147,24 @@ class Simulation:
             raise ValueError(f"command for quadcopter {robot} is not finite: {twist}")
         self._commands[robot] = limit_command(twist, self.params.flight)
         self._hover_step[robot] = self.step_count + self._command_steps
+        self._next_hover_step = min(self._next_hover_step, self._hover_step[robot])
 
     def step(self) -> List[Contact]:
         """Advance by ``STEP_S``; returns the contacts that begin."""
-        self._commands[self.step_count > self._hover_step] = 0.0
+        if self.step_count > self._next_hover_step:
+            self._hover()
         forces, torques = self._law.thrust_and_torque(self._state, self._commands,
                                                       self.scene.altitude_m)
         self._world.step(self._state.positions_m, forces, torques)
         self.step_count += 1
         self._state = self._world.state()
         return self._contact_log.update(self.now_s, self._world.touches())
+
+    def _hover(self) -> None:
+        """Commands that are too old count for nothing from now on."""
+        is_hovering = self.is_hovering
+        self._commands[is_hovering] = 0.0
+        self._next_hover_step = np.min(self._hover_step[~is_hovering], initial=math.inf)
 
     @property
     def body_state(self) -> BodyState:
