@@ -125,6 +125,16 @@ def test_changes_that_cannot_be_made_are_all_told_and_none_is_made(configuration
     assert configuration.navigator.planner_frequency_hz == 0.0
 
 
+def test_size_that_no_grid_can_have_is_refused(configuration):
+    with pytest.raises(InputError) as caught:
+        updated(configuration, "global_costmap", {"width": 21474836})
+    assert caught.value.problems == [
+        "global_costmap: 21474836 x 10 m cannot be in cells of 0.05 m;"
+        " expected 1 to 100000000 cells"]
+    with pytest.raises(InputError, match="^local_costmap: 10 x 10 m cannot be in cells of 20 m;"):
+        updated(configuration, "local_costmap", {"resolution": 20.0})
+
+
 def test_names_and_namespaces_that_do_not_exist(configuration):
     with pytest.raises(InputError, match="^TrajectoryPlannerROS/speed: unknown; expected one of"):
         updated(configuration, "TrajectoryPlannerROS", {"speed": 1.0})

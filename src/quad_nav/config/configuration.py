@@ -6,7 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any, Dict, Iterable, Mapping, Optional, Tuple
 
 from quad_nav.config import tables
-from quad_nav.config.costmaps import costmap_params, remark_on_blindness, settle_costmap
+from quad_nav.config.costmaps import (
+    costmap_params,
+    remark_on_blindness,
+    settle_costmap,
+    size_problem,
+)
 from quad_nav.config.notes import CAUTION, Notes, Remark, join
 from quad_nav.config.planners import (
     local_planner_frequency,
@@ -98,6 +103,9 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
     costmaps = [costmap_params(settled, name) for name in COSTMAPS]
     for name, params in zip(COSTMAPS, costmaps):
         remark_on_blindness(params, name, notes)
+        if size_problem(params):
+            notes.problem(name, size_problem(params))
+    notes.raise_problems()
     _remark_on_rates(settled, notes)
     pruned = _without_empty(settled)
     return Configuration(

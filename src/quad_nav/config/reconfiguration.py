@@ -13,7 +13,7 @@ from quad_nav.config.configuration import (
     mends_of,
     navigator_params,
 )
-from quad_nav.config.costmaps import costmap_params
+from quad_nav.config.costmaps import costmap_params, size_problem
 from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
@@ -112,6 +112,8 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
                        local_planner=planner_params(tree, "base_local_planner"))
     costmap = namespace.split("/")[0]
     params = costmap_params(tree, costmap)
+    if size_problem(params):
+        raise InputError([f"{costmap}: {size_problem(params)}"])
     if costmap == "global_costmap":
         return replace(configuration, global_costmap=params)
     return replace(configuration, local_costmap=params)
