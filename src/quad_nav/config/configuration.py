@@ -6,12 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, Dict, Iterable, Mapping, Optional, Tuple
 
 from quad_nav.config import tables
-from quad_nav.config.costmaps import (
-    costmap_params,
-    remark_on_blindness,
-    settle_costmap,
-    size_problem,
-)
+from quad_nav.config.costmaps import costmap_params, remark_on_blindness, settle_costmap
 from quad_nav.config.notes import CAUTION, Notes, Remark, join
 from quad_nav.config.planners import (
     local_planner_frequency,
@@ -30,6 +25,7 @@ from quad_nav.config.recoveries import (
     recoveries,
     settle_recoveries,
 )
+from quad_nav.config.workload import workload_problems
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.errors import InputError
 from quad_nav.mends import Mends
@@ -103,12 +99,9 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
     costmaps = [costmap_params(settled, name) for name in COSTMAPS]
     for name, params in zip(COSTMAPS, costmaps):
         remark_on_blindness(params, name, notes)
-        if size_problem(params):
-            notes.problem(name, size_problem(params))
-    notes.raise_problems()
     _remark_on_rates(settled, notes)
     pruned = _without_empty(settled)
-    return Configuration(
+    configuration = Configuration(
         navigator=navigator_params(settled, listed, given=tree),
         mends=mends_of(settled),
         global_costmap=costmaps[0],
@@ -121,6 +114,10 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
         remarks=tuple(notes.remarks),
         tree=pruned,
         tree_at_start=pruned)
+    for name, problem in workload_problems(configuration):
+        notes.problem(name, problem)
+    notes.raise_problems()
+    return configuration
 
 
 def navigator_params(tree: Mapping[str, Any], listed: Optional[NamedTypes],

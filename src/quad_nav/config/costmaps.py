@@ -24,7 +24,6 @@ from quad_nav.plugins import PluginLayerParams, is_dotted
 OBSTACLE, VOXEL = "costmap_2d::ObstacleLayer", "costmap_2d::VoxelLayer"
 STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
 _OLD_STYLE = ("static_map", "map_type")
-MOST_CELLS = 10 ** 8  # of one costmap: some GB with its layers and the planner's potential
 
 
 def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
@@ -63,16 +62,6 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
         if params is not None:
             layers.append((plugin["name"], params))
     return CostmapParams(layers=tuple(layers), **fields(costmap, tables.COSTMAP.parameters))
-
-
-def size_problem(params: CostmapParams) -> str:
-    """Why no grid can be made of this size, "" when one can."""
-    columns = params.width_m / params.resolution_m
-    rows = params.height_m / params.resolution_m
-    if min(columns, rows) >= 1.0 and columns * rows <= MOST_CELLS:
-        return ""
-    return (f"{params.width_m:.15g} x {params.height_m:.15g} m cannot be in cells of"
-            f" {params.resolution_m:g} m; expected 1 to {MOST_CELLS} cells")
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:

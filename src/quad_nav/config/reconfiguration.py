@@ -13,11 +13,12 @@ from quad_nav.config.configuration import (
     mends_of,
     navigator_params,
 )
-from quad_nav.config.costmaps import costmap_params, size_problem
+from quad_nav.config.costmaps import costmap_params
 from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
 from quad_nav.config.spec import Parameter, Unusable
+from quad_nav.config.workload import workload_problems
 from quad_nav.errors import InputError
 
 _GROUPS = "groups"  # dynamic_reconfigure's own bookkeeping among the values
@@ -66,7 +67,11 @@ def updated(configuration: Configuration, namespace: str,
         checked = {parameter.name: start[parameter.name] for parameter in parameters}
     tree = copy.deepcopy(dict(configuration.tree))
     _below(tree, namespace).update(checked)
-    return _remade(replace(configuration, tree=tree), namespace)
+    changed = _remade(replace(configuration, tree=tree), namespace)
+    problems = [f"{name}: {problem}" for name, problem in workload_problems(changed)]
+    if problems:
+        raise InputError(problems)
+    return changed
 
 
 def _checked(parameters: Tuple[Parameter, ...], namespace: str,
@@ -112,8 +117,6 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
                        local_planner=planner_params(tree, "base_local_planner"))
     costmap = namespace.split("/")[0]
     params = costmap_params(tree, costmap)
-    if size_problem(params):
-        raise InputError([f"{costmap}: {size_problem(params)}"])
     if costmap == "global_costmap":
         return replace(configuration, global_costmap=params)
     return replace(configuration, local_costmap=params)
