@@ -95,6 +95,14 @@ class OriginalReconfigure(OriginalCase):
             self.assertEqual(rospy.get_param(f"{namespace}/{name}"), clamped)
             self.doCleanups()
 
+    def test_refused_values_leave_those_in_force(self):
+        """A size that no machine has memory for: rqt_reconfigure's slider reaches so far."""
+        namespace = "/move_base0/global_costmap"
+        in_force = rospy.get_param(f"{namespace}/width")
+        self.assertEqual(self.reconfigure(namespace, width=21474836)["width"], in_force)
+        self.assertEqual(rospy.get_param(f"{namespace}/width"), in_force)
+        self.assertEqual(self.reconfigure(namespace, publish_frequency=3.0)["width"], in_force)
+
     # -- effects -------------------------------------------------------------------
 
     def test_max_vel_x_limits_the_next_commands(self):

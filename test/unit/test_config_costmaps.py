@@ -32,6 +32,19 @@ def test_nothing_set_gives_an_obstacle_and_an_inflation_layer():
     assert (costmap.robot_radius_m, costmap.width_m, costmap.resolution_m) == (0.46, 10.0, 0.05)
 
 
+def test_sizes_that_no_grid_can_have_are_all_told():
+    with pytest.raises(InputError) as caught:
+        load({"global_costmap": {"width": 501, "height": 500, "resolution": 0.05},
+              "local_costmap": {"width": 3, "height": 12, "resolution": 4.0}}, "/nav")
+    assert caught.value.problems == [
+        "/nav/global_costmap: 501 x 500 m cannot be in cells of 0.05 m;"
+        " expected 1 to 100000000 cells",
+        "/nav/local_costmap: 3 x 12 m cannot be in cells of 4 m; expected 1 to 100000000 cells"]
+    assert local_costmap({"width": 50, "height": 50, "resolution": 0.005}).spec.shape == (
+        10000, 10000)
+    assert local_costmap({"width": 4, "height": 4, "resolution": 4.0}).spec.shape == (1, 1)
+
+
 def test_static_map_puts_a_static_layer_first_and_moves_its_parameters():
     costmap = local_costmap({"static_map": True, "map_topic": "/floor", "lethal_cost_threshold": 65,
                              "track_unknown_space": True})

@@ -125,6 +125,40 @@ def test_changes_that_cannot_be_made_are_all_told_and_none_is_made(configuration
     assert configuration.navigator.planner_frequency_hz == 0.0
 
 
+def test_size_that_no_grid_can_have_is_refused(configuration):
+    with pytest.raises(InputError) as caught:
+        updated(configuration, "global_costmap", {"width": 21474836})
+    assert caught.value.problems == [
+        "global_costmap: 21474836 x 10 m cannot be in cells of 0.05 m;"
+        " expected 1 to 100000000 cells"]
+    with pytest.raises(InputError, match="^local_costmap: 10 x 10 m cannot be in cells of 20 m;"):
+        updated(configuration, "local_costmap", {"resolution": 20.0})
+
+
+def test_more_trajectories_than_can_be_looked_at_are_refused(configuration):
+    with pytest.raises(InputError) as caught:
+        updated(configuration, "TrajectoryPlannerROS", {"sim_granularity": 1e-8})
+    # 20 x 20 samples, 0.3 m/s for 1.7 s
+    assert caught.value.problems == [
+        "TrajectoryPlannerROS: 400 trajectories of up to 5.1e+07 points are too many; expected at"
+        " most 100000000 points altogether: fewer samples, less sim_time or speed, or a coarser"
+        " granularity"]
+    with pytest.raises(InputError, match="400 trajectories of up to 1.7e[+]08 points"):
+        updated(configuration, "TrajectoryPlannerROS", {"angular_sim_granularity": 1e-8})
+
+
+@pytest.mark.parametrize("change, told", [
+    ({"vx_samples": 21474836}, "4294967200 trajectories of up to 37.4 points"),
+    ({"sim_time": 1e16}, "600 trajectories of up to 2.2e[+]17 points"),
+    ({"max_vel_trans": 1e9, "max_vel_y": 1e9}, "600 trajectories of up to 6.8e[+]10 points")])
+def test_dwa_planner_is_refused_the_same(change, told):
+    dwa = load({"base_local_planner": "dwa_local_planner/DWAPlannerROS"}, "")
+    with pytest.raises(InputError, match=told):
+        updated(dwa, "DWAPlannerROS", change)
+    changed = updated(dwa, "DWAPlannerROS", {"vx_samples": 300, "max_vel_y": 1e9})
+    assert changed.local_planner.vx_samples == 300
+
+
 def test_names_and_namespaces_that_do_not_exist(configuration):
     with pytest.raises(InputError, match="^TrajectoryPlannerROS/speed: unknown; expected one of"):
         updated(configuration, "TrajectoryPlannerROS", {"speed": 1.0})

@@ -25,6 +25,7 @@ from quad_nav.config.recoveries import (
     recoveries,
     settle_recoveries,
 )
+from quad_nav.config.workload import workload_problems
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.errors import InputError
 from quad_nav.mends import Mends
@@ -100,7 +101,7 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
         remark_on_blindness(params, name, notes)
     _remark_on_rates(settled, notes)
     pruned = _without_empty(settled)
-    return Configuration(
+    configuration = Configuration(
         navigator=navigator_params(settled, listed, given=tree),
         mends=mends_of(settled),
         global_costmap=costmaps[0],
@@ -113,6 +114,10 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
         remarks=tuple(notes.remarks),
         tree=pruned,
         tree_at_start=pruned)
+    for name, problem in workload_problems(configuration):
+        notes.problem(name, problem)
+    notes.raise_problems()
+    return configuration
 
 
 def navigator_params(tree: Mapping[str, Any], listed: Optional[NamedTypes],

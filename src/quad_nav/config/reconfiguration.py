@@ -18,6 +18,7 @@ from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
 from quad_nav.config.spec import Parameter, Unusable
+from quad_nav.config.workload import workload_problems
 from quad_nav.errors import InputError
 
 _GROUPS = "groups"  # dynamic_reconfigure's own bookkeeping among the values
@@ -66,7 +67,11 @@ def updated(configuration: Configuration, namespace: str,
         checked = {parameter.name: start[parameter.name] for parameter in parameters}
     tree = copy.deepcopy(dict(configuration.tree))
     _below(tree, namespace).update(checked)
-    return _remade(replace(configuration, tree=tree), namespace)
+    changed = _remade(replace(configuration, tree=tree), namespace)
+    problems = [f"{name}: {problem}" for name, problem in workload_problems(changed)]
+    if problems:
+        raise InputError(problems)
+    return changed
 
 
 def _checked(parameters: Tuple[Parameter, ...], namespace: str,

@@ -73,7 +73,7 @@ MENDS = Table(
     reconfigurable=(
         double("progress_timeout", 10.0, "progress_timeout_s", "seconds",
                 "Without progress_distance of motion for so long plan anew, then recover; 0 never.",
-                low=0, high=600),
+                low=0, high=100),
         double("progress_distance", 0.1, "progress_distance_m", "metres",
                 "What counts as progress.", low=0, high=10),
         double("stuck_cost_factor", 0.1, "stuck_cost_factor", "",
@@ -81,7 +81,7 @@ MENDS = Table(
                 " oscillation_distance.", low=0, high=1),
         double("sensor_timeout", 1.0, "sensor_timeout_s", "seconds",
                 "Stop when a sensor has been silent for so long; 0 leaves it to"
-                " expected_update_rate.", low=0, high=600),
+                " expected_update_rate.", low=0, high=100),
         flag("clear_any_obstacle_layer", True, "clear_any_obstacle_layer",
               "Clearing recoveries without layer_names clear every obstacle layer, not only one"
               " called obstacles."),

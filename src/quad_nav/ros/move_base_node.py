@@ -73,9 +73,10 @@ class MoveBaseNode:
 
     def _on_reconfigure(self, namespace: str, changes: dict) -> config.Configuration:
         with self._lock:
-            self._configuration = config.updated(self._configuration, namespace, changes)
-            apply_configuration(self._navigator, self._configuration)
-            return self._configuration
+            configuration = config.updated(self._configuration, namespace, changes)
+            apply_configuration(self._navigator, configuration)
+            self._configuration = configuration
+            return configuration
 
     # -- services ------------------------------------------------------------------
 
