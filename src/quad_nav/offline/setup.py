@@ -172,7 +172,7 @@ def _goals_off_the_costmap(robots: Sequence[RobotGoals], configurations: Sequenc
         low_x, low_y = costmap.origin_x_m, costmap.origin_y_m
         high_x, high_y = low_x + costmap.width_m, low_y + costmap.height_m
         problems += [
-            f"{robot.file.path}: goal {number}: ({goal.x_m:g}, {goal.y_m:g}) is off the global "
+            f"{robot.file.path}: goals[{number - 1}] (goal {number}): ({goal.x_m:g}, {goal.y_m:g}) is off the global "
             f"costmap, x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m; expected a "
             "larger global_costmap/width and height"
             for number, goal in enumerate(robot.sequence.goals, start=1)

@@ -1,0 +1,145 @@
+"""Flights offline: the same twice, ended when they should be, refused when they can't be flown."""
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D
+from quad_nav.mission.summary import to_json
+from quad_nav.offline.gaps import Gaps
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.run import fly
+from quad_nav.offline.setup import FlightOptions, read_setup
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.scene import Cylinder, Scene, Walls
+from quad_nav.sim.simulation import SimulationParams
+
+ROOT = Path(__file__).resolve().parents[2]
+FEW_BEAMS = LidarParams(step_size_rad=2 * np.pi / 128, noise_std_m=0.01)
+
+
+def options(**changes) -> FlightOptions:
+    return FlightOptions(**{
+        "scene": ROOT / "scenes" / "arena.yaml", "goals": ROOT / "goals", "config": "tutorial",
+        "seed": 5, "time_limit_s": 4.0,
+        "simulation": SimulationParams(FEW_BEAMS, jitter_m=0.3), **changes})
+
+
+def figures(summary) -> dict:
+    """What does not depend on the machine's speed."""
+    return {key: value for key, value in to_json(summary).items()
+            if key not in ("wall_time_s", "real_time_factor")}
+
+
+def write_goals(folder: Path, *robots) -> Path:
+    folder.mkdir()
+    for index, goals in enumerate(robots):
+        (folder / f"quad{index}_goals.json").write_text(json.dumps({"goals": goals}))
+    return folder
+
+
+class Track(FlightObserver):
+    """Every body at every period of odometry."""
+
+    def __init__(self):
+        self.rows = []
+
+    def moved(self, flight):
+        self.rows.append(flight.simulation.body_state.rows)
+
+
+def test_the_same_seed_gives_the_same_flight_bit_for_bit_and_another_does_not():
+    tracks = []
+    for seed in (5, 5, 6):
+        track = Track()
+        fly(read_setup(options(seed=seed)), [track])
+        tracks.append(np.array(track.rows))
+    assert tracks[0].shape == (160, 2, 13)
+    assert np.array_equal(tracks[0], tracks[1])
+    assert not np.array_equal(tracks[0], tracks[2])
+
+
+def test_the_same_seed_gives_the_same_flight_in_another_process():
+    arguments = ["--config", "tutorial", "--seed", "5", "--jitter", "0.3", "--range-noise", "0.01",
+                 "--beams", "128", "--time-limit", "4", "--quiet", "--json", "-"]
+    done = subprocess.run([sys.executable, "-m", "quad_nav.cli", "fly", *arguments], cwd=ROOT,
+                          env={"PYTHONPATH": "src"}, stdout=subprocess.PIPE, check=False)
+    assert done.returncode == 1  # out of time
+    told = json.loads(done.stdout)
+    here = json.loads(json.dumps(figures(fly(read_setup(options())))))
+    assert {key: told[key] for key in here} == here
+
+
+def test_a_short_mission_is_flown_to_its_end(tmp_path):
+    goals = write_goals(tmp_path / "goals", [[1.5, 3.0]])
+    summary = fly(read_setup(options(goals=goals, time_limit_s=30.0)))
+    assert summary.success and summary.exit_status == 0
+    assert summary.robots[0].legs[0].reached
+    assert summary.robots[0].min_separation_m is None and summary.min_separation_m is None
+    assert 0.0 < summary.robots[0].min_clearance_m < 1.5
+
+
+def test_a_flight_that_is_out_of_time_or_stopped_says_so():
+    assert fly(read_setup(options(time_limit_s=0.5))).reason == "time limit of 0.5 s"
+    stopped = fly(read_setup(options()), is_stopped=lambda: True)
+    assert stopped.reason == "interrupted" and stopped.sim_time_s == pytest.approx(0.025)
+    assert [leg.reason for leg in stopped.robots[0].legs] == ["interrupted", "not sent",
+                                                              "not sent"]
+
+
+def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
+    goals = write_goals(tmp_path / "goals", [[5.9, 5.9]])
+    with pytest.raises(InputError) as error:
+        read_setup(options(goals=goals, config="tutrial", scans_per_s=7.0, robots=2))
+    told = "\n".join(error.value.problems)
+    assert "lidar rate: 7, expected scans per second that divide 240" in told
+    assert "did you mean tutorial?" in told
+    assert "quad1_goals.json" in told
+    assert "is inside an obstacle" in told
+
+
+def test_goals_off_the_global_costmap_are_refused_and_a_parameter_mends_it(tmp_path):
+    goals = write_goals(tmp_path / "goals", [[1.5, 6.0]])
+    small = (("global_costmap/height", 3.0),)
+    with pytest.raises(InputError, match=r"goal 1\): \(1.5, 6\) is off the global costmap, x 0 to 12 m,"
+                                         " y 0 to 3 m"):
+        read_setup(options(goals=goals, parameters=small))
+    assert read_setup(options(goals=goals, parameters=(("global_costmap/height", 7.0),)))
+
+
+def test_frames_that_nobody_publishes_are_refused():
+    with pytest.raises(InputError, match="global_frame of robot 0: world, expected map or odom0"):
+        read_setup(options(parameters=(("local_costmap/global_frame", "world"),)))
+
+
+def test_gaps_are_between_hulls():
+    """A pillar of 0.5 m radius in the middle; two fly past it and each other."""
+    scene = Scene("pillar", 20.0, 20.0, 1.0, Walls(),
+                  (Cylinder("pillar", 10.0, 10.0, 0.5, 2.0),), (Pose2D(1.0, 1.0),))
+    gaps = Gaps(scene, 2, 0.3)
+    for positions in ([[10.0, 12.0, 1.0], [10.0, 17.0, 1.0]], [[13.0, 10.0, 1.0], [17.0, 13.0, 1]]):
+        state = SimpleNamespace(positions_m=np.array(positions))
+        gaps.moved(SimpleNamespace(simulation=SimpleNamespace(body_state=state)))
+    gaps.ended(SimpleNamespace())
+    # To the pillar 2 - 0.5 - 0.3; the second is nearest to the walls, 3 - 0.3 away.
+    assert gaps.clearances_m == pytest.approx([1.2, 2.7])
+    assert gaps.separations_m == pytest.approx([5.0 - 0.6, 5.0 - 0.6])
+
+
+def test_the_kernel_and_the_engine_see_the_same_flight():
+    """Ranges differ by parts of a millimetre, so the flights do not part in a few seconds."""
+    tracks = []
+    for caster in ("kernel", "bullet"):
+        params = dataclasses.replace(options().simulation, lidar_caster=caster)
+        track = Track()
+        fly(read_setup(options(simulation=params)), [track])
+        tracks.append(np.array(track.rows)[:, :, :2])
+    assert np.abs(tracks[0] - tracks[1]).max() < 0.02
