@@ -4,14 +4,22 @@ catkin reads the arguments of this call, so what it needs stands here and not in
 version is package.xml's.
 """
 
+from itertools import groupby
 from pathlib import Path
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
+ROOT = Path(__file__).parent
+# What the package is asked for by name (quad_nav/shipped.py); catkin installs it by CMake.
+SHIPPED = sorted(path.relative_to(ROOT) for folder in ("config", "goals", "scenes")
+                 for path in (ROOT / folder).rglob("*.*") if path.is_file())
+
 setup(
     name="quad-nav",
-    version=ElementTree.parse(Path(__file__).with_name("package.xml")).findtext("version"),
+    version=ElementTree.parse(ROOT / "package.xml").findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
+    data_files=[(f"share/quad/{folder}", list(map(str, paths)))
+                for folder, paths in groupby(SHIPPED, lambda path: path.parent)],
 )

@@ -109,10 +109,18 @@ def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
 def test_goals_off_the_global_costmap_are_refused_and_a_parameter_mends_it(tmp_path):
     goals = write_goals(tmp_path / "goals", [[1.5, 6.0]])
     small = (("global_costmap/height", 3.0),)
-    with pytest.raises(InputError, match=r"goal 1\): \(1.5, 6\) is off the global costmap, x 0 to 12 m,"
-                                         " y 0 to 3 m"):
+    off = r"goal 1\): \(1.5, 6\) is off the global costmap, x 0 to 12 m, y 0 to 3 m"
+    with pytest.raises(InputError, match=off):
         read_setup(options(goals=goals, parameters=small))
     assert read_setup(options(goals=goals, parameters=(("global_costmap/height", 7.0),)))
+
+
+def test_without_files_a_mission_is_made_for_so_many_and_the_costmaps_hold_it():
+    setup = read_setup(options(scene=None, goals=None, robots=10))
+    assert len(setup.robots) == len(setup.scene.starts) == 10
+    assert setup.scene.size_x_m == 19.0
+    assert {one.global_costmap.width_m for one in setup.configurations} == {19.0}
+    assert setup.scene == read_setup(options(scene=None, goals=None, robots=10)).scene
 
 
 def test_frames_that_nobody_publishes_are_refused():

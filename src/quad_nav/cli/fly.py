@@ -6,6 +6,7 @@ import math
 import signal
 import sys
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Callable, Iterator, List, Optional, Tuple
 
@@ -24,6 +25,7 @@ from quad_nav.shipped import shipped
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import LIDAR_CASTERS, SimulationParams
 
+_TUTORIAL_ROBOTS = 2
 _A_FILE = click.Path(dir_okay=False, path_type=Path)
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
 _AMOUNT = click.FloatRange(min=0.0)
@@ -40,19 +42,22 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option("--set", "parameters", multiple=True, metavar="PATH=VALUE",
               help="A parameter on top of the folder's, as global_costmap/width=60; repeatable.")
 @click.option("--robots", type=click.IntRange(min=1), metavar="N",
-              help="How many quadcopters. [default: as many as there are goal files]")
+              help="How many quadcopters. More than two, without --scene and --goals, get a mission"
+              " at random. [default: as many as there are goal files]")
+@click.option("--size", "size_m", type=_AMOUNT, default=0.0, metavar="M",
+              help="The side of a random mission's arena. [default: with room for all]")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
               help="For the jitter and the noise; the same seed gives the same flight.")
 @click.option("--jitter", type=_AMOUNT, default=0.0, metavar="M",
               help="How far the start positions are displaced at random.")
-@click.option("--time-limit", type=_POSITIVE, default=math.inf, metavar="S",
+@click.option("--time-limit", "time_limit_s", type=_POSITIVE, default=math.inf, metavar="S",
               help="End after so many simulated seconds.")
 @click.option("--scan-range", type=_POSITIVE, default=2 * math.pi, metavar="RAD",
               help="The LIDAR's field of view. [default: all around]")
 @click.option("--beams", type=click.IntRange(min=2), default=512, show_default=True,
               help="Beams of a scan.")
-@click.option("--lidar-rate", type=_POSITIVE, default=20.0, show_default=True, metavar="HZ",
-              help="Scans per simulated second.")
+@click.option("--lidar-rate", "scans_per_s", type=_POSITIVE, default=20.0, show_default=True,
+              metavar="HZ", help="Scans per simulated second.")
 @click.option("--range-noise", type=_AMOUNT, default=0.0, metavar="M",
               help="Standard deviation of the LIDAR's ranges.")
 @click.option("--lidar", type=click.Choice(LIDAR_CASTERS), default="kernel", show_default=True,
@@ -60,10 +65,7 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option("--json", "json_path", type=click.Path(dir_okay=False, allow_dash=True),
               metavar="FILE", help="Write the summary there; - is the terminal.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def fly(scene: Optional[Path], goals: Optional[Path], config: str, parameters: Tuple[str, ...],
-        robots: Optional[int], seed: int, jitter: float, time_limit: float, scan_range: float,
-        beams: int, lidar_rate: float, range_noise: float, lidar: str, json_path: Optional[str],
-        quiet: bool) -> None:
+def fly(json_path: Optional[str], quiet: bool, **given: Any) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
     Ctrl-C ends the flight and keeps what was flown.
@@ -72,11 +74,7 @@ def fly(scene: Optional[Path], goals: Optional[Path], config: str, parameters: T
     cannot be used, 130 after Ctrl-C.
     """
     try:
-        beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
-        setup = read_setup(FlightOptions(
-            scene or shipped("scenes", "arena.yaml"), goals or shipped("goals"), config,
-            tuple(map(_parameter, parameters)), robots, seed, time_limit, lidar_rate,
-            SimulationParams(beam_params, jitter_m=jitter, lidar_caster=lidar)))
+        setup = read_setup(_options(**given))
     except InputError as error:
         click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
@@ -84,6 +82,19 @@ def fly(scene: Optional[Path], goals: Optional[Path], config: str, parameters: T
         for warning in setup.warnings:
             click.echo(warning, err=True)
     sys.exit(_fly(setup, json_path, quiet))
+
+
+def _options(scan_range: float, beams: int, range_noise: float, jitter: float, lidar: str,
+             parameters: Tuple[str, ...], **given: Any) -> FlightOptions:
+    """The options as a person gives them."""
+    beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
+    options = FlightOptions(
+        **given, parameters=tuple(map(_parameter, parameters)),
+        simulation=SimulationParams(beam_params, jitter_m=jitter, lidar_caster=lidar))
+    few = (options.robots or 0) <= _TUTORIAL_ROBOTS and not options.size_m
+    if few and options.scene is None and options.goals is None:
+        return replace(options, goals=shipped("goals"))
+    return options
 
 
 def _parameter(text: str) -> Tuple[str, Any]:

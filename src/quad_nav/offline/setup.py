@@ -14,7 +14,10 @@ from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
+from quad_nav.mission.goal_file import WatchedGoalFile
+from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
+from quad_nav.random_mission import random_mission
 from quad_nav.scene_check import scene_check
 from quad_nav.shipped import shipped
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
@@ -31,15 +34,17 @@ class FlightOptions:
     ``config``: the name of a shipped folder of parameters, or a folder's path;
     ``parameters``: (path, value) on top of it, as ("global_costmap/width", 60.0).
     ``robots`` None: as many as there are goal files in ``goals``. ``time_limit_s`` is
-    simulated time.
+    simulated time. Without ``scene`` and ``goals`` there is a random mission for so many,
+    and ``size_m`` is the arena's side, 0 for one that has room for them.
     """
 
-    scene: Path
-    goals: Path
+    scene: Optional[Path]
+    goals: Optional[Path]
     config: str = "default"
     parameters: Tuple[Tuple[str, Any], ...] = ()
     robots: Optional[int] = None
     seed: int = 0
+    size_m: float = 0.0
     time_limit_s: float = math.inf
     scans_per_s: float = 20.0
     simulation: SimulationParams = field(default_factory=SimulationParams)
@@ -68,8 +73,12 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         InputError: every fault in options, scene, goal files and parameters.
     """
     problems = _faults(options)
-    scene = _tried(lambda: load_scene(options.scene), problems)
-    robots = _read_goals(options, scene, problems)
+    if options.scene is None and options.goals is None:
+        options, scene, robots = _random(options, problems)
+    else:
+        scene = _tried(lambda: load_scene(options.scene or shipped("scenes", "arena.yaml")),
+                       problems)
+        robots = _read_goals(options, scene, problems)
     count = options.robots if options.robots is not None else max(len(robots), 1)
     if scene is not None and not problems:
         _tried(lambda: start_poses(scene, count, options.simulation.jitter_m, options.seed),
@@ -118,14 +127,30 @@ def _faults(options: FlightOptions) -> List[str]:
     return problems
 
 
+def _random(options: FlightOptions, problems: List[str]
+            ) -> Tuple[FlightOptions, Optional[Scene], List[RobotGoals]]:
+    """A random mission, and options with global costmaps that hold it."""
+    mission = _tried(lambda: random_mission(options.robots or 1, options.seed, options.size_m),
+                     problems)
+    if mission is None:
+        return options, None, []
+    robots = [RobotGoals(f"quad{index}", WatchedGoalFile(f"quad{index}_goals.json"),
+                         GoalSequence(tuple(Goal(x, y) for x, y in goals)))
+              for index, goals in enumerate(mission.goals)]
+    size = (("global_costmap/width", mission.scene.size_x_m),
+            ("global_costmap/height", mission.scene.size_y_m))
+    return replace(options, parameters=(*size, *options.parameters)), mission.scene, robots
+
+
 def _read_goals(options: FlightOptions, scene: Optional[Scene], problems: List[str]
                 ) -> List[RobotGoals]:
+    folder = options.goals or shipped("goals")
     count = options.robots
     if count is None:
         count = 1
-        while (options.goals / f"quad{count}_goals.json").exists():
+        while (folder / f"quad{count}_goals.json").exists():
             count += 1
-    paths, missing = goal_paths(options.goals, count)
+    paths, missing = goal_paths(folder, count)
     robots, faults = load_robot_goals(
         paths, scene_check(scene, BODY_RADIUS_M) if scene is not None else None)
     problems += missing + faults
@@ -172,9 +197,9 @@ def _goals_off_the_costmap(robots: Sequence[RobotGoals], configurations: Sequenc
         low_x, low_y = costmap.origin_x_m, costmap.origin_y_m
         high_x, high_y = low_x + costmap.width_m, low_y + costmap.height_m
         problems += [
-            f"{robot.file.path}: goals[{number - 1}] (goal {number}): ({goal.x_m:g}, {goal.y_m:g}) is off the global "
-            f"costmap, x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m; expected a "
-            "larger global_costmap/width and height"
+            f"{robot.file.path}: goals[{number - 1}] (goal {number}): ({goal.x_m:g}, "
+            f"{goal.y_m:g}) is off the global costmap, x {low_x:g} to {high_x:g} m, "
+            f"y {low_y:g} to {high_y:g} m; expected a larger global_costmap/width and height"
             for number, goal in enumerate(robot.sequence.goals, start=1)
             if not (low_x <= goal.x_m < high_x and low_y <= goal.y_m < high_y)]
     return problems
