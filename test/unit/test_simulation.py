@@ -12,7 +12,13 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.contacts import SEPARATION_S, ContactLog, Touch
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
-from quad_nav.sim.simulation import STEPS_PER_S, Simulation, SimulationParams, start_poses
+from quad_nav.sim.simulation import (
+    LIDAR_CASTERS,
+    STEPS_PER_S,
+    Simulation,
+    SimulationParams,
+    start_poses,
+)
 
 
 def room(*starts: Pose2D, obstacles=(), size_m: float = 20.0) -> Scene:
@@ -177,8 +183,9 @@ def test_scan_sees_walls_obstacles_and_the_peer_but_not_itself(make):
     assert (west, pillar, peer, box) == pytest.approx((10.0, 3.5, 1.7, 2.5), abs=1e-3)
 
 
-def test_scan_sees_spheres_at_their_height(make):
-    params = SimulationParams(LidarParams(step_size_rad=math.pi / 2))
+@pytest.mark.parametrize("caster", LIDAR_CASTERS)
+def test_scan_sees_spheres_at_their_height(make, caster):
+    params = SimulationParams(LidarParams(step_size_rad=math.pi / 2), lidar_caster=caster)
     scene = room(MIDDLE, obstacles=[Sphere("low", 8.0, 10.0, 0.5, 0.5),
                                     Sphere("ahead", 10.0, 13.0, 1.06, 0.5)])
     west, _, _, ahead = make(scene, 1, params).scan(0).ranges_m
@@ -191,10 +198,12 @@ def row_of_boxes(count: int) -> List[Box]:
             for k in range(count)]
 
 
-def test_thousands_of_boxes_are_seen_and_touched_like_single_ones(make):
+@pytest.mark.parametrize("caster", LIDAR_CASTERS)
+def test_thousands_of_boxes_are_seen_and_touched_like_single_ones(make, caster):
     """They are in few bodies, but a contact still names the box."""
     scene = room(Pose2D(13.0, 10.0), obstacles=row_of_boxes(1000))
-    simulation = make(scene, 1, SimulationParams(LidarParams(step_size_rad=math.pi / 2)))
+    params = SimulationParams(LidarParams(step_size_rad=math.pi / 2), lidar_caster=caster)
+    simulation = make(scene, 1, params)
     _, _, ahead, _ = simulation.scan(0).ranges_m
     assert ahead == pytest.approx(0.8, abs=1e-3)
     fly(simulation, 2.0, Twist2D(0.5, 0.0, 0.0))
