@@ -17,7 +17,7 @@ import numpy as np
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Walls
-from quad_nav.sim.scene_file import write_scene
+from quad_nav.sim.scene_writer import write_scene
 
 AREA_PER_OBSTACLE_M2 = 18.0   # the tutorial's arena: 8 obstacles on 144 m2
 SMALLEST_SIZE_M = 12.0

@@ -7,5 +7,11 @@ from quad_nav.sim.scene import Scene
 
 def scene_check(scene: Scene, robot_radius_m: float) -> PlaceCheck:
     """Tells goals outside the arena, and those nearer to something than the radius."""
-    arena = f"x 0 to {scene.size_x_m:g} m, y 0 to {scene.size_y_m:g} m"
-    return clearance_check(scene.contains, scene.flight_clearance_m, robot_radius_m, arena)
+    return clearance_check(scene.contains, scene.flight_clearance_m, robot_radius_m,
+                           arena_text(scene))
+
+
+def arena_text(scene: Scene) -> str:
+    """Where the arena is, for messages."""
+    return (f"x {scene.origin_x_m:g} to {scene.end_x_m:g} m, "
+            f"y {scene.origin_y_m:g} to {scene.end_y_m:g} m")

@@ -36,6 +36,8 @@ PLACES = {
     "rich": "cli/",
     "numba": "kernels/",
     "pybullet": "sim/body.py",
+    "PIL": "sim/map_image.py",
+    "defusedxml": "sim/xml_tree.py",
     "rospy": "ros/",
     "rosgraph": "ros/",
     "actionlib": "ros/",

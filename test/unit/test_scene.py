@@ -4,12 +4,14 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Walls
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Sphere, Walls
 from quad_nav.sim.scene_file import load_scene, scene_from_document
+from quad_nav.sim.scene_writer import write_scene
 
 ARENA = Path(__file__).parents[2] / "scenes" / "arena.yaml"
 GOALS = [(3.0, 6.5), (9.0, 5.5), (1.5, 9.0), (4.0, 3.5), (2.0, 9.0), (8.5, 5.0)]
@@ -46,6 +48,55 @@ def test_cylinder_clearance_beside_above_and_below_a_lifted_one():
     assert cylinder.clearance_m(1.0, 1.0, 3.2) == pytest.approx(0.2)
     assert cylinder.clearance_m(1.0, 1.0, 1.0) == pytest.approx(1.0)
     assert cylinder.clearance_m(1.1, 1.0, 2.5) == pytest.approx(-0.4)
+
+
+def test_sphere_clearance():
+    sphere = Sphere("s", 1.0, 1.0, 2.0, 0.5)
+    assert sphere.clearance_m(1.0, 4.0, 6.0) == pytest.approx(4.5)
+    assert sphere.clearance_m(1.0, 1.2, 2.0) == pytest.approx(-0.3)
+    assert (sphere.bottom_m, sphere.height_m) == (1.5, 1.0)
+
+
+def test_the_nearest_of_many_solids_is_the_one_with_the_least_clearance():
+    random = np.random.default_rng(0)
+    boxes = [Box(f"b{k}", *random.uniform(0.0, 10.0, 2), *random.uniform(0.1, 2.0, 3),
+                 random.uniform(-4.0, 4.0), random.uniform(0.0, 1.0)) for k in range(50)]
+    scene = Scene("s", 10.0, 10.0, 1.0, Walls(), (*boxes, Sphere("ball", 5.0, 5.0, 1.0, 0.5),
+                                                  Cylinder("pillar", 2.0, 8.0, 0.3, 2.0)), ())
+    solids = [*scene.wall_boxes(), *scene.obstacles]
+    for x, y, z in random.uniform(0.0, 10.0, (200, 3)):
+        nearest = scene.nearest(x, y, z)
+        assert nearest.clearance_m(x, y, z) == min(s.clearance_m(x, y, z) for s in solids)
+        assert scene.clearance_m(x, y, z) == nearest.clearance_m(x, y, z)
+
+
+def test_clearances_of_many_points_are_those_of_each():
+    random = np.random.default_rng(2)
+    boxes = tuple(Box(f"b{k}", *random.uniform(0.0, 40.0, 2), 0.5, 0.8, 2.0) for k in range(300))
+    scene = Scene("s", 40.0, 40.0, 1.0, Walls(), (*boxes, Sphere("ball", 9.0, 9.0, 1.0, 0.5)), ())
+    for centre in random.uniform(1.0, 39.0, (20, 2)):
+        points = centre + random.uniform(-1.0, 1.0, (3, 4, 2))
+        expected = [[scene.flight_clearance_m(x, y) for x, y in row] for row in points]
+        assert scene.flight_clearances_m(points).tolist() == expected
+
+
+def test_a_written_scene_reads_the_same(tmp_path):
+    scene = Scene("hall", 8.0, 6.0, 1.2, Walls(2.5, 0.2), (
+        Box("b", 1.0, 1.0, 0.5, 0.8, 2.0, 0.3, 0.5), Cylinder("c", 0.5, -1.0, 0.3, 2.0),
+        Sphere("s", -3.0, 1.0, 0.25, 0.5)), (Pose2D(-1.0, 0.0, 0.5),), -4.0, -3.0)
+    path = tmp_path / "s.yaml"
+    write_scene(scene, path)
+    assert load_scene(path) == scene
+
+
+def test_an_arena_may_lie_anywhere():
+    scene = scene_from_document(small_document(origin=[-3.0, 10.0], starts=[[-1.0, 12.0]]), "s")
+    assert scene.contains(-2.9, 15.9) and not scene.contains(0.5, 0.5)
+    assert scene.centre == (-1.0, 13.0)
+    assert scene.clearance_m(-2.5, 13.0, 1.0) == pytest.approx(0.5)
+    assert scene.clearance_m(0.75, 13.0, 1.0) == pytest.approx(0.25)
+    assert scene.clearance_m(-1.0, 10.1, 1.0) == pytest.approx(0.1)
+    assert scene.clearance_m(-1.0, 15.8, 1.0) == pytest.approx(0.2)
 
 
 def test_walls_have_their_inner_faces_on_the_border():
@@ -102,7 +153,7 @@ def test_all_faults_are_listed_at_once():
         "s.yaml: altitud: unknown key; did you mean altitude?",
         "s.yaml: obstacles[0].centre[1]: nan, expected a finite number",
         "s.yaml: obstacles[0].size[1]: -1.0, expected a number above 0",
-        "s.yaml: obstacles[1].shape: 'cone', expected box or cylinder",
+        "s.yaml: obstacles[1].shape: 'cone', expected box, cylinder or sphere",
         "s.yaml: obstacles[2].height: 'high', expected a number above 0",
         "s.yaml: obstacles[2].bottom: -1 m is below the floor, expected 0 or more",
         "s.yaml: obstacles[2].radius: True, expected a number above 0",
@@ -129,7 +180,8 @@ FLOOR_PILLAR = {"name": "floor", "shape": "cylinder", "centre": [3.0, 3.0], "rad
 
 
 @pytest.mark.parametrize("document, problem", [
-    (None, "missing, expected a mapping with name, size, altitude, walls, obstacles, starts"),
+    (None, "missing, expected a mapping with name, size, origin, altitude, walls, obstacles, "
+           "starts, world, map, unknown"),
     ({"size": [4.0, 4.0]}, "starts: missing, expected a list"),
     (small_document(starts=[]), "starts: no start pose, expected at least one [x, y, yaw]"),
     (small_document(size=[4.0, math.inf]), "size[1]: inf, expected a number above 0"),

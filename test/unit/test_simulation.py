@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import math
-from typing import Set, Tuple
+from typing import List, Set, Tuple
 
 import numpy as np
 import pytest
@@ -11,8 +11,14 @@ from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.contacts import SEPARATION_S, ContactLog, Touch
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.scene import Box, Cylinder, Scene, Walls
-from quad_nav.sim.simulation import STEPS_PER_S, Simulation, SimulationParams, start_poses
+from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
+from quad_nav.sim.simulation import (
+    LIDAR_CASTERS,
+    STEPS_PER_S,
+    Simulation,
+    SimulationParams,
+    start_poses,
+)
 
 
 def room(*starts: Pose2D, obstacles=(), size_m: float = 20.0) -> Scene:
@@ -175,6 +181,37 @@ def test_scan_sees_walls_obstacles_and_the_peer_but_not_itself(make):
     ranges = make(scene, 2, params).scan(0).ranges_m
     west, pillar, peer, box = ranges
     assert (west, pillar, peer, box) == pytest.approx((10.0, 3.5, 1.7, 2.5), abs=1e-3)
+
+
+@pytest.mark.parametrize("caster", LIDAR_CASTERS)
+def test_scan_sees_spheres_at_their_height(make, caster):
+    params = SimulationParams(LidarParams(step_size_rad=math.pi / 2), lidar_caster=caster)
+    scene = room(MIDDLE, obstacles=[Sphere("low", 8.0, 10.0, 0.5, 0.5),
+                                    Sphere("ahead", 10.0, 13.0, 1.06, 0.5)])
+    west, _, _, ahead = make(scene, 1, params).scan(0).ranges_m
+    assert (west, ahead) == pytest.approx((10.0, 2.5), abs=1e-3)
+
+
+def row_of_boxes(count: int) -> List[Box]:
+    """A wall along y at x = 14 with gaps that no beam of the test looks through."""
+    return [Box(f"b{k}", 14.0, 20.0 * k / count, 0.4, 20.0 / count - 0.001, 2.0)
+            for k in range(count)]
+
+
+@pytest.mark.parametrize("caster", LIDAR_CASTERS)
+def test_thousands_of_boxes_are_seen_and_touched_like_single_ones(make, caster):
+    """They are in few bodies, but a contact still names the box."""
+    scene = room(Pose2D(13.0, 10.0), obstacles=row_of_boxes(1000))
+    params = SimulationParams(LidarParams(step_size_rad=math.pi / 2), lidar_caster=caster)
+    simulation = make(scene, 1, params)
+    _, _, ahead, _ = simulation.scan(0).ranges_m
+    assert ahead == pytest.approx(0.8, abs=1e-3)
+    fly(simulation, 2.0, Twist2D(0.5, 0.0, 0.0))
+    touched = {contact.other for contact in simulation.contacts}
+    assert touched and touched <= {f"b{k}" for k in range(480, 521)}
+    assert simulation.state(0).map_from_base.x_m == pytest.approx(13.5, abs=0.03)
+    simulation.reset()
+    assert simulation.scan(0).ranges_m[2] == pytest.approx(0.8, abs=1e-3)
 
 
 def test_scan_above_low_walls_returns_infinity(make):

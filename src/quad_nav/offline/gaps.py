@@ -44,8 +44,9 @@ class Gaps(FlightObserver):
             return
         positions = np.array(self._waiting)[:, :, :2]
         self._waiting = []
-        clearance_m = self._scene.flight_clearances_m(positions) - self._radius_m
-        self.clearances_m = np.minimum(self.clearances_m, clearance_m.min(axis=0))
+        nearest_m = [self._scene.flight_clearances_m(positions[:, robot]).min()
+                     for robot in range(positions.shape[1])]  # each is near few obstacles
+        self.clearances_m = np.minimum(self.clearances_m, np.array(nearest_m) - self._radius_m)
         apart_m = _nearest_other_m(positions) - 2 * self._radius_m
         self.separations_m = np.minimum(self.separations_m, apart_m)
 

@@ -94,7 +94,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         scene, tuple(robots), tuple(configurations), options.config,
         replace(options.simulation, controller_period_s=slowest_s),
         round(STEPS_PER_S / options.scans_per_s), options.seed, options.time_limit_s,
-        warnings=(*close_ends(robots, BODY_RADIUS_M), *warnings))
+        warnings=(*scene.remarks, *close_ends(robots, BODY_RADIUS_M), *warnings))
 
 
 def config_folder(name: str) -> Path:

@@ -20,6 +20,7 @@ from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Clearance
 from quad_nav.mission.goal_file import SETTINGS, read_settings
 from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
+from quad_nav.ros.costmap_cover import uncovered
 from quad_nav.scene_check import scene_check
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import load_scene
@@ -80,14 +81,15 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
     paths, missing = _goal_files(values, name)
     robots, faults = load_robot_goals(paths, check, settings)
     problems += missing + faults
-    problems += _navigator_faults(values["robots"], all_parameters)
+    navigators = _navigators(values["robots"], all_parameters, problems)
     if problems:
         raise InputError(problems)
     return MissionSetup(tuple(robots), radius_m, scene.altitude_m if scene else None,
                         scene.flight_clearance_m if scene else None,
                         values["simulation"], float(values["ready_timeout"]),
                         values["exit_when_done"],
-                        (*_unknown(parameters, name), *close_ends(robots, radius_m)))
+                        (*_unknown(parameters, name), *close_ends(robots, radius_m),
+                         *(uncovered(scene, navigators) if scene else [])))
 
 
 def _faults(values: Mapping[str, Any], name: str) -> List[str]:
@@ -147,15 +149,16 @@ def _scene(path: Any, problems: List[str]) -> Optional[Scene]:
         return None
 
 
-def _navigator_faults(count: Any, all_parameters: Mapping[str, Any]) -> List[str]:
-    problems: List[str] = []
+def _navigators(count: Any, all_parameters: Mapping[str, Any], problems: List[str]
+                ) -> Dict[str, config.Configuration]:
+    navigators = {}
     for index in range(count if isinstance(count, int) else 0):
         name = f"move_base{index}"
         try:
-            config.load(all_parameters.get(name, {}), f"/{name}")
+            navigators[name] = config.load(all_parameters.get(name, {}), f"/{name}")
         except InputError as error:
             problems += error.problems
-    return problems
+    return navigators
 
 
 def _goal_files(values: Mapping[str, Any], name: str) -> Tuple[List[Path], List[str]]:

@@ -222,10 +222,13 @@ def main() -> int:
         parameters = rospy.get_param("~", {})
         parameters.setdefault("controller_period", longest_controller_period_s(
             rospy.get_param("/", {}), parameters.get("robots", DEFAULTS["robots"])))
-        node = SimulatorNode(read_setup(parameters, name))
+        setup = read_setup(parameters, name)
+        node = SimulatorNode(setup)
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
+    for remark in setup.scene.remarks:
+        rospy.logwarn("%s", remark)
     if not rospy.get_param("/use_sim_time", False):
         rospy.logwarn("/use_sim_time is not set: other nodes will not follow the simulation's "
                       "clock, expected true before they start")

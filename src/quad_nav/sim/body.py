@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from typing import List, Optional, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import pybullet
@@ -20,12 +20,16 @@ from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.contacts import Touch
 from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
-from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, Box, Obstacle, Scene
+from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, Box, Obstacle, Scene, Sphere
 
 _MAX_RAYS_PER_CALL = 16383
 """One less than ``pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE``: of that many the last is dropped."""
+_MANY_BOXES = 256
+_STRIPE_M = 4.0
+_BOXES_PER_BODY = 16
+"""pybullet's limit for the shapes of one collision shape."""
 
-Sphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
+GoalSphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
 """Centre in metres, radius in metres, RGBA in 0..1."""
 
 
@@ -55,9 +59,13 @@ class World:
                                            deterministicOverlappingPairs=1,
                                            physicsClientId=client)
         floor = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-        self._names = {pybullet.createMultiBody(0.0, floor, physicsClientId=client): "floor"}
-        for solid in (*self._scene.wall_boxes(), *self._scene.obstacles):
+        self._names: Dict[int, Optional[str]] = {
+            pybullet.createMultiBody(0.0, floor, physicsClientId=client): "floor"}
+        single, grouped = _by_number((*self._scene.wall_boxes(), *self._scene.obstacles))
+        for solid in single:
             self._names[self._add_obstacle(solid)] = solid.name
+        for group in grouped:
+            self._names[self._add_boxes(group)] = None
         self._robots = [self._add_quadcopter(k, start) for k, start in enumerate(starts)]
         self._goal_ids = []
         pybullet.performCollisionDetection(physicsClientId=client)
@@ -113,7 +121,7 @@ class World:
                                                       physicsClientId=self._client)]
         return np.array(hits)
 
-    def show_goals(self, spheres: Sequence[Sphere]) -> None:
+    def show_goals(self, spheres: Sequence[GoalSphere]) -> None:
         """Draw goals that nothing can touch or see, in place of the last ones."""
         client = self._client
         for goal in self._goal_ids:
@@ -129,11 +137,11 @@ class World:
         """Stop drawing while bodies are added, which is slow otherwise, and go on after it."""
         if not self._gui:
             return
-        client, size_x, size_y = self._client, self._scene.size_x_m, self._scene.size_y_m
+        client, scene = self._client, self._scene
         for option, value in ((pybullet.COV_ENABLE_GUI, 0), (pybullet.COV_ENABLE_RENDERING, on)):
             pybullet.configureDebugVisualizer(option, int(value), physicsClientId=client)
-        pybullet.resetDebugVisualizerCamera(0.9 * max(size_x, size_y), 0.0, -60.0,
-                                            [size_x / 2, size_y / 2, 0.0], physicsClientId=client)
+        pybullet.resetDebugVisualizerCamera(0.9 * max(scene.size_x_m, scene.size_y_m), 0.0, -60.0,
+                                            [*scene.centre, 0.0], physicsClientId=client)
 
     def _touch(self, body_a: int, body_b: int, position: Tuple[float, float, float]) -> Touch:
         numbers = sorted(self._robots.index(body) for body in (body_a, body_b)
@@ -141,7 +149,7 @@ class World:
         other: Optional[int] = numbers[1] if len(numbers) == 2 else None
         name = (f"quadcopter {other}" if other is not None
                 else self._names[body_a if body_a in self._names else body_b])
-        return Touch(numbers[0], name, other, position)
+        return Touch(numbers[0], name or self._scene.nearest(*position).name, other, position)
 
     def _add_obstacle(self, solid: Obstacle) -> int:
         client, height = self._client, solid.height_m
@@ -150,6 +158,10 @@ class World:
             shape = pybullet.createCollisionShape(
                 pybullet.GEOM_BOX, physicsClientId=client,
                 halfExtents=[solid.size_x_m / 2, solid.size_y_m / 2, height / 2])
+        elif isinstance(solid, Sphere):
+            yaw = 0.0
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_SPHERE, radius=solid.radius_m, physicsClientId=client)
         else:
             yaw = 0.0
             shape = pybullet.createCollisionShape(
@@ -158,6 +170,17 @@ class World:
         return int(pybullet.createMultiBody(
             0.0, shape, basePosition=[solid.x_m, solid.y_m, solid.bottom_m + height / 2],
             baseOrientation=quaternion_from_yaw(yaw), physicsClientId=client))
+
+    def _add_boxes(self, boxes: Sequence[Box]) -> int:
+        """Boxes as one body: each step goes through all bodies, which tells from thousands on."""
+        shape = pybullet.createCollisionShapeArray(
+            shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
+            halfExtents=[[b.size_x_m / 2, b.size_y_m / 2, b.height_m / 2] for b in boxes],
+            collisionFramePositions=[[b.x_m, b.y_m, b.bottom_m + b.height_m / 2] for b in boxes],
+            collisionFrameOrientations=[quaternion_from_yaw(b.yaw_rad) for b in boxes],
+            physicsClientId=self._client)
+        return int(pybullet.createMultiBody(0.0, shape, useMaximalCoordinates=1,
+                                            physicsClientId=self._client))
 
     def _add_quadcopter(self, number: int, start: Pose2D) -> int:
         client, offset = self._client, [0.0, 0.0, MOUNT_HEIGHT_M]
@@ -176,6 +199,19 @@ class World:
             body, -1, localInertiaDiagonal=self._airframe.inertia_kgm2, linearDamping=0.0,
             angularDamping=0.0, restitution=0.0, lateralFriction=0.2, physicsClientId=client)
         return body
+
+
+def _by_number(solids: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], List[List[Box]]]:
+    """Solids that get a body each, and groups of near boxes with a body per group.
+
+    A usual scene has no groups, so that each obstacle is a body.
+    """
+    boxes = [solid for solid in solids if isinstance(solid, Box)]
+    if len(boxes) < _MANY_BOXES:
+        return solids, []
+    boxes.sort(key=lambda b: (b.x_m // _STRIPE_M, b.y_m))
+    return ([solid for solid in solids if not isinstance(solid, Box)],
+            [boxes[k:k + _BOXES_PER_BODY] for k in range(0, len(boxes), _BOXES_PER_BODY)])
 
 
 def _connect(gui: bool) -> int:

@@ -1,16 +1,17 @@
 """The place that quadcopters fly in: an arena with walls and obstacles.
 
-Frame ``map`` has its origin at the arena's lower left corner, on the floor; x
-runs along the first size, y along the second, z up. Walls stand outside the
-arena, with their inner faces on its border.
+In frame ``map`` the floor is at z = 0, x runs along the arena's first size, y
+along the second, z up; the arena's lower left corner is at the scene's origin.
+Walls stand outside the arena, with their inner faces on its border.
 
-Scenes are read from YAML by ``scene_file.load_scene``.
+Scenes are read from files by ``scene_file.load_scene``.
 """
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, List, Tuple, Union
+from functools import cached_property
+from typing import Any, List, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -65,7 +66,31 @@ class Cylinder:
         return _signed_distance(outside)
 
 
-Obstacle = Union[Box, Cylinder]
+@dataclass(frozen=True)
+class Sphere:
+    """A ball around (x, y, z)."""
+
+    name: str
+    x_m: float
+    y_m: float
+    z_m: float
+    radius_m: float
+
+    @property
+    def bottom_m(self) -> float:
+        return self.z_m - self.radius_m
+
+    @property
+    def height_m(self) -> float:
+        return 2.0 * self.radius_m
+
+    def clearance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+        """Distance from a point, or from each of many, to the surface; negative inside."""
+        dx, dy, dz = x_m - self.x_m, y_m - self.y_m, z_m - self.z_m
+        return np.sqrt(dx * dx + dy * dy + dz * dz) - self.radius_m
+
+
+Obstacle = Union[Box, Cylinder, Sphere]
 
 
 @dataclass(frozen=True)
@@ -78,7 +103,11 @@ class Walls:
 
 @dataclass(frozen=True)
 class Scene:
-    """Arena, walls, obstacles, flying altitude and where each quadcopter starts."""
+    """Arena, walls, obstacles, flying altitude and where each quadcopter starts.
+
+    ``remarks`` is what whoever flies should know about it: what a file holds that
+    the scene does not, what was chosen where the file says nothing.
+    """
 
     name: str
     size_x_m: float
@@ -87,10 +116,28 @@ class Scene:
     walls: Walls
     obstacles: Tuple[Obstacle, ...]
     starts: Tuple[Pose2D, ...]
+    origin_x_m: float = 0.0
+    origin_y_m: float = 0.0
+    remarks: Tuple[str, ...] = ()
+
+    @property
+    def end_x_m(self) -> float:
+        """x of the arena's upper right corner."""
+        return self.origin_x_m + self.size_x_m
+
+    @property
+    def end_y_m(self) -> float:
+        """y of the arena's upper right corner."""
+        return self.origin_y_m + self.size_y_m
+
+    @property
+    def centre(self) -> Tuple[float, float]:
+        """x and y of the arena's centre."""
+        return (self.origin_x_m + self.size_x_m / 2, self.origin_y_m + self.size_y_m / 2)
 
     def contains(self, x_m: float, y_m: float) -> bool:
         """Whether a point lies on the arena's floor, border excluded."""
-        return 0.0 < x_m < self.size_x_m and 0.0 < y_m < self.size_y_m
+        return self.origin_x_m < x_m < self.end_x_m and self.origin_y_m < y_m < self.end_y_m
 
     def clearance_m(self, x_m: float, y_m: float, z_m: float) -> float:
         """Distance from a point to the nearest obstacle or wall; negative inside one.
@@ -108,25 +155,72 @@ class Scene:
         """``flight_clearance_m`` of many points: float64[..., 2] to float64[...]."""
         x_m, y_m = positions_m[..., 0], positions_m[..., 1]
         nearest = np.full(x_m.shape, np.inf)
-        for solid in (*self.wall_boxes(), *self.obstacles):
+        for solid in self._nearest_to_any(positions_m.reshape(-1, 2)):
             np.minimum(nearest, solid.clearance_m(x_m, y_m, self.altitude_m), out=nearest)
         return nearest
 
+    def _nearest_to_any(self, positions_m: np.ndarray) -> List[Obstacle]:
+        """Everything that can be the nearest to one of these points, float64[n, 2].
+
+        A clearance changes by no more than the way between two points.
+        """
+        x_m, y_m = positions_m[0]
+        reach_m = float(np.hypot(*(positions_m - positions_m[0]).T).max())
+        boxes = self._boxes.within(x_m, y_m, self.altitude_m, 2 * reach_m)
+        return [*boxes, *self._round_obstacles]
+
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Obstacle:
         """The obstacle or wall whose surface is nearest to a point."""
-        return min((*self.wall_boxes(), *self.obstacles),
+        return min((self._boxes.nearest(x_m, y_m, z_m), *self._round_obstacles),
                    key=lambda solid: solid.clearance_m(x_m, y_m, z_m))
 
     def wall_boxes(self) -> List[Box]:
         """The walls as boxes; the ones at the lower and upper y hold the corners."""
         t, h = self.walls.thickness_m, self.walls.height_m
         size_x, size_y = self.size_x_m, self.size_y_m
+        x, y = self.centre
         return [
-            Box("wall_west", -t / 2, size_y / 2, t, size_y, h),
-            Box("wall_east", size_x + t / 2, size_y / 2, t, size_y, h),
-            Box("wall_south", size_x / 2, -t / 2, size_x + 2 * t, t, h),
-            Box("wall_north", size_x / 2, size_y + t / 2, size_x + 2 * t, t, h),
+            Box("wall_west", self.origin_x_m - t / 2, y, t, size_y, h),
+            Box("wall_east", self.end_x_m + t / 2, y, t, size_y, h),
+            Box("wall_south", x, self.origin_y_m - t / 2, size_x + 2 * t, t, h),
+            Box("wall_north", x, self.end_y_m + t / 2, size_x + 2 * t, t, h),
         ]
+
+    @cached_property
+    def _boxes(self) -> _Boxes:
+        return _Boxes([*self.wall_boxes(), *(o for o in self.obstacles if isinstance(o, Box))])
+
+    @cached_property
+    def _round_obstacles(self) -> List[Obstacle]:
+        return [o for o in self.obstacles if not isinstance(o, Box)]
+
+
+class _Boxes:
+    """Many boxes, asked for the nearest one: a map has thousands of them."""
+
+    def __init__(self, boxes: Sequence[Box]):
+        self.boxes = boxes
+        self._centres = np.array([[b.x_m, b.y_m, b.bottom_m + b.height_m / 2] for b in boxes])
+        self._halves = np.array([[b.size_x_m, b.size_y_m, b.height_m] for b in boxes]) / 2
+        self._cos = np.array([math.cos(b.yaw_rad) for b in boxes])
+        self._sin = np.array([math.sin(b.yaw_rad) for b in boxes])
+
+    def nearest(self, x_m: float, y_m: float, z_m: float) -> Box:
+        """The box with the least clearance."""
+        return self.boxes[int(np.argmin(self._clearances_m(x_m, y_m, z_m)))]
+
+    def within(self, x_m: float, y_m: float, z_m: float, margin_m: float) -> List[Box]:
+        """The boxes with up to ``margin_m`` more clearance than the nearest one."""
+        clearances_m = self._clearances_m(x_m, y_m, z_m)
+        near = clearances_m <= clearances_m.min() + margin_m + 1e-9
+        return [self.boxes[k] for k in np.flatnonzero(near)]
+
+    def _clearances_m(self, x_m: float, y_m: float, z_m: float) -> np.ndarray:
+        """Of each box, float64[n]; see ``Box.clearance_m``."""
+        dx, dy, dz = ((x_m, y_m, z_m) - self._centres).T
+        local = (self._cos * dx + self._sin * dy, self._cos * dy - self._sin * dx, dz)
+        outside = np.abs(local).T - self._halves
+        return _signed_distance((outside[:, 0], outside[:, 1], outside[:, 2]))
 
 
 def _outside_slab(z_m: float, bottom_m: float, height_m: float) -> float:

@@ -1,135 +1,191 @@
-"""Scenes in YAML.
+"""Scenes from files: our own YAML, Gazebo worlds and ``map_server`` maps.
 
     name: two rooms                # optional, else the file's name
     size: [12.0, 12.0]             # arena along x and y, m
+    origin: [0.0, 0.0]             # its lower left corner in map, m; default 0, 0
     altitude: 1.0                  # that all quadcopters fly at, m; default 1.0
     walls: {height: 2.0, thickness: 0.1}        # optional; these are the defaults
     obstacles:
       - {name: crate, shape: box, centre: [2.2, 4.0], size: [0.8, 0.8], height: 2.0, yaw: 0.3}
       - {name: pillar, shape: cylinder, centre: [6.0, 6.0], radius: 0.4, height: 2.0}
+      - {name: ball, shape: sphere, centre: [9.0, 3.0], radius: 0.5, bottom: 0.5}
     starts:                        # x, y, yaw of quadcopter 0, 1, ...; yaw may be left out
       - [1.5, 1.5, 0.0]
 
-``bottom`` (default 0) lifts an obstacle off the floor. A file is refused as a
-whole: every fault is listed at once in one ``InputError``.
+``bottom`` (default 0) lifts an obstacle off the floor. Instead of drawing the place itself
+a scene may take it from another file, with its own obstacles on top:
+
+    world: depot.world             # or map: office.yaml; beside this file, or an absolute path
+    unknown: free                  # or occupied: what cells of a map that nobody saw are
+
+Then ``size`` with ``origin`` may be left out, for the extent of the solids or of the map,
+and ``starts``, see ``free_starts``. The world or map by itself is the scene that says
+nothing else. A file is refused as a whole: every fault is listed at once in one
+``InputError``.
 """
 from __future__ import annotations
 
-import difflib
-import math
+import os
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Dict, Hashable, List, Optional, Sequence, Tuple, Union
-
-import yaml
+from typing import Any, Dict, List, Optional, Sequence, Union
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Walls
+from quad_nav.sim.document import Checker, kind, read_yaml
+from quad_nav.sim.free_starts import with_free_starts
+from quad_nav.sim.scene import (
+    BODY_RADIUS_M,
+    Box,
+    Cylinder,
+    Obstacle,
+    Scene,
+    Sphere,
+    Walls,
+)
+from quad_nav.sim.surroundings import Surroundings, from_map, from_world
 
+_KEYS = ["name", "size", "origin", "altitude", "walls", "obstacles", "starts", "world", "map",
+         "unknown"]
 _SHAPE_KEYS = {"box": ["name", "shape", "centre", "size", "height", "yaw", "bottom"],
-               "cylinder": ["name", "shape", "centre", "radius", "height", "bottom"]}
+               "cylinder": ["name", "shape", "centre", "radius", "height", "bottom"],
+               "sphere": ["name", "shape", "centre", "radius", "bottom"]}
+_WORLD_SUFFIXES = (".world", ".sdf")
+_MAX_SIZE_M = 1e5
 
 
 def load_scene(path: Union[str, Path]) -> Scene:
-    """Read and check a scene file. Raises ``InputError`` with one line per fault."""
+    """Read and check a scene file, by what it is: a Gazebo world (``.world``, ``.sdf``), a
+    ``map_server`` map (YAML with the key ``image``) or a scene of ours.
+
+    Raises ``InputError`` with one line per fault.
+    """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError([f"{path}: cannot be read: {error}"]) from error
-    try:
-        document = yaml.load(text, Loader=_Loader)
-    except yaml.YAMLError as error:
-        raise InputError([f"{path}: {_yaml_fault(error)}"]) from error
-    return scene_from_document(document, str(path), path.stem)
+    if path.suffix in _WORLD_SUFFIXES:
+        document: Any = {"world": path.name}
+    else:
+        document = read_yaml(path)
+        if isinstance(document, dict) and "image" in document:
+            document = {"map": path.name}
+    return scene_from_document(document, str(path), path.stem, path.parent)
 
 
-def scene_from_document(document: Any, source: str, default_name: str = "scene") -> Scene:
-    """Check a parsed document; ``source`` names it in messages. Raises ``InputError``."""
-    check = _Checker(source)
-    scene = _read_scene(check, document, default_name)
+def scene_from_document(document: Any, source: str, default_name: str = "scene",
+                        folder: Path = Path()) -> Scene:
+    """Check a parsed document; ``source`` names it in messages, ``folder`` is where the files
+    that it refers to are. Raises ``InputError``."""
+    check = Checker(source)
+    scene = _read_scene(check, document, default_name, folder)
     if scene is None or check.problems:
         raise InputError(check.problems)
     return scene
 
 
-def scene_document(scene: Scene) -> Dict[str, Any]:
-    """The document that ``scene_from_document`` reads the same scene from."""
-    walls = {"height": scene.walls.height_m, "thickness": scene.walls.thickness_m}
-    return {"name": scene.name, "size": [scene.size_x_m, scene.size_y_m],
-            "altitude": scene.altitude_m, "walls": walls,
-            "obstacles": [_obstacle_document(solid) for solid in scene.obstacles],
-            "starts": [[pose.x_m, pose.y_m, pose.yaw_rad] for pose in scene.starts]}
-
-
-def write_scene(scene: Scene, path: Path) -> None:
-    """Write a file that ``load_scene`` reads the same scene from, one obstacle a line."""
-    document = scene_document(scene)
-    head = {key: document[key] for key in ("name", "size", "altitude", "walls")}
-    lines = [yaml.safe_dump(head, default_flow_style=None, sort_keys=False)]
-    for key in ("obstacles", "starts"):
-        lines.append(f"{key}:\n" if document[key] else f"{key}: []\n")
-        lines += ["  - " + yaml.safe_dump(item, default_flow_style=True, sort_keys=False,
-                                          width=math.inf) for item in document[key]]
-    path.write_text("".join(lines), encoding="utf-8")
-
-
-def _obstacle_document(solid: Obstacle) -> Dict[str, Any]:
-    shape: Dict[str, Any] = (
-        {"shape": "box", "size": [solid.size_x_m, solid.size_y_m], "yaw": solid.yaw_rad}
-        if isinstance(solid, Box) else {"shape": "cylinder", "radius": solid.radius_m})
-    bottom = {"bottom": solid.bottom_m} if solid.bottom_m else {}
-    return {"name": solid.name, "centre": [solid.x_m, solid.y_m], **shape,
-            "height": solid.height_m, **bottom}
-
-
-def _read_scene(check: _Checker, document: Any, default_name: str) -> Optional[Scene]:
-    fields = check.mapping(document, "", ["name", "size", "altitude", "walls", "obstacles",
-                                          "starts"])
+def _read_scene(check: Checker, document: Any, default_name: str, folder: Path
+                ) -> Optional[Scene]:
+    fields = check.mapping(document, "", _KEYS)
     if fields is None:
         return None
     faults_before = len(check.problems)
-    size = check.numbers(fields, "size", "", 2, positive=True)
     altitude = check.number(fields, "altitude", "", 1.0, positive=True)
-    walls = check.mapping(fields.get("walls", {}), "walls", ["height", "thickness"]) or {}
-    height = check.number(walls, "height", "walls", 2.0, positive=True)
-    thickness = check.number(walls, "thickness", "walls", 0.1, positive=True)
+    walls = _read_walls(check, fields)
+    around = _read_surroundings(check, fields, folder, walls.height_m)
+    arena = _read_arena(check, fields, around)
     arena_is_sound = len(check.problems) == faults_before
     obstacles = [_read_obstacle(check, entry, k)
                  for k, entry in enumerate(check.sequence(fields, "obstacles", []))]
-    starts = [_read_start(check, entry, f"starts[{k}]")
-              for k, entry in enumerate(check.sequence(fields, "starts"))]
-    if fields.get("starts") == []:
-        check.fault("starts", "no start pose, expected at least one [x, y, yaw]")
-    scene = Scene(check.text(fields, "name", "", default_name), size[0], size[1], altitude,
-                  Walls(height, thickness), tuple(o for o in obstacles if o is not None),
-                  tuple(s for s in starts if s is not None))
+    starts = _read_starts(check, fields, around)
+    scene = Scene(check.text(fields, "name", "", default_name), arena[2], arena[3], altitude,
+                  walls, (*(around.obstacles if around else ()),
+                          *(o for o in obstacles if o is not None)),
+                  tuple(s for s in starts if s is not None), arena[0], arena[1],
+                  around.remarks if around else ())
     _check_names(check, scene)
+    if arena_is_sound and around and "starts" not in fields:
+        return _with_chosen_starts(check, scene, around)
     if arena_is_sound:
         _check_starts(check, scene, starts)
     return scene
 
 
-def _read_obstacle(check: _Checker, entry: Any, number: int) -> Optional[Obstacle]:
+def _read_walls(check: Checker, fields: Dict[str, Any]) -> Walls:
+    walls = check.mapping(fields.get("walls", {}), "walls", ["height", "thickness"]) or {}
+    return Walls(check.number(walls, "height", "walls", 2.0, positive=True),
+                 check.number(walls, "thickness", "walls", 0.1, positive=True))
+
+
+def _read_surroundings(check: Checker, fields: Dict[str, Any], folder: Path, height_m: float
+                       ) -> Optional[Surroundings]:
+    """The world or map that the scene takes its place from, if it does."""
+    unknown = fields.get("unknown", "free")
+    if unknown not in ("free", "occupied"):
+        check.fault("unknown", f"{kind(unknown)}, expected free or occupied")
+    if "unknown" in fields and "map" not in fields:
+        check.fault("unknown", "belongs to a map, expected the key map too")
+    if "world" in fields and "map" in fields:
+        check.fault("map", "is given beside world, expected one of them")
+        return None
+    try:
+        if "world" in fields:
+            return from_world(folder / check.text(fields, "world", "", "."), model_path())
+        if "map" in fields:
+            return from_map(folder / check.text(fields, "map", "", "."), height_m,
+                            unknown == "occupied")
+    except InputError as error:
+        check.problems += error.problems
+    return None
+
+
+def model_path() -> List[Path]:
+    """The folders of the environment variable GAZEBO_MODEL_PATH."""
+    folders = os.environ.get("GAZEBO_MODEL_PATH", "").split(os.pathsep)
+    return [Path(folder) for folder in folders if folder]
+
+
+def _read_arena(check: Checker, fields: Dict[str, Any], around: Optional[Surroundings]
+                ) -> Sequence[float]:
+    """Lower left x and y, and sizes along x and y."""
+    is_elsewhere = "world" in fields or "map" in fields
+    if is_elsewhere and "size" not in fields and "origin" not in fields:
+        if around is None:
+            return (0.0, 0.0, 1.0, 1.0)
+        if around.extent is None:
+            check.fault("size", "missing, and nothing stands in the world that an arena could be "
+                        "drawn around; expected a scene with world, size and origin")
+            return (0.0, 0.0, 1.0, 1.0)
+        x, y, end_x, end_y = around.extent
+        return (x, y, end_x - x, end_y - y)
+    size = check.numbers(fields, "size", "", 2, positive=True)
+    if max(size) > _MAX_SIZE_M:
+        check.fault("size", f"{max(size):g} m, expected {_MAX_SIZE_M:g} m at most")
+    origin = (check.numbers(fields, "origin", "", 2) if "origin" in fields or is_elsewhere
+              else (0.0, 0.0))
+    return (*origin, *size)
+
+
+def _read_obstacle(check: Checker, entry: Any, number: int) -> Optional[Obstacle]:
     faults_before, place = len(check.problems), f"obstacles[{number}]"
     if not isinstance(entry, dict):
-        check.fault(place, f"{_kind(entry)}, expected a mapping that describes an obstacle")
+        check.fault(place, f"{kind(entry)}, expected a mapping that describes an obstacle")
         return None
     shape = entry.get("shape")
     if not isinstance(shape, str) or shape not in _SHAPE_KEYS:
-        check.fault(f"{place}.shape", f"{_kind(shape)}, expected box or cylinder")
+        check.fault(f"{place}.shape", f"{kind(shape)}, expected box, cylinder or sphere")
         return None
     check.mapping(entry, place, _SHAPE_KEYS[shape])
     name = check.text(entry, "name", place, f"obstacle_{number}")
     x, y = check.numbers(entry, "centre", place, 2)
-    height = check.number(entry, "height", place, positive=True)
+    height = 1.0 if shape == "sphere" else check.number(entry, "height", place, positive=True)
     bottom = check.number(entry, "bottom", place, 0.0)
-    if bottom < 0.0:
+    if bottom < 0.0 and shape != "sphere":
         check.fault(f"{place}.bottom", f"{bottom:g} m is below the floor, expected 0 or more")
     obstacle: Obstacle
-    if shape == "cylinder":
+    if shape != "box":
         radius = check.number(entry, "radius", place, positive=True)
-        obstacle = Cylinder(name, x, y, radius, height, bottom)
+        if bottom + 2 * radius <= 0.0:
+            check.fault(f"{place}.bottom", f"{bottom:g} m puts all of it below the floor")
+        obstacle = (Cylinder(name, x, y, radius, height, bottom) if shape == "cylinder"
+                    else Sphere(name, x, y, bottom + radius, radius))
     else:
         size_x, size_y = check.numbers(entry, "size", place, 2, positive=True)
         yaw = check.number(entry, "yaw", place, 0.0)
@@ -137,16 +193,35 @@ def _read_obstacle(check: _Checker, entry: Any, number: int) -> Optional[Obstacl
     return obstacle if len(check.problems) == faults_before else None
 
 
-def _read_start(check: _Checker, entry: Any, place: str) -> Optional[Pose2D]:
+def _read_starts(check: Checker, fields: Dict[str, Any], around: Optional[Surroundings]
+                 ) -> List[Optional[Pose2D]]:
+    is_elsewhere = "world" in fields or "map" in fields
+    starts = check.sequence(fields, "starts", [] if is_elsewhere else None)
+    if fields.get("starts") == []:
+        check.fault("starts", "no start pose, expected at least one [x, y, yaw]")
+    return [_read_start(check, entry, f"starts[{k}]") for k, entry in enumerate(starts)]
+
+
+def _with_chosen_starts(check: Checker, scene: Scene, around: Surroundings) -> Scene:
+    scene = with_free_starts(scene, around.may_start)
+    if not scene.starts:
+        check.fault("starts", "missing, and no free place was found; "
+                    "expected a scene with world or map, and starts")
+    chosen = ", ".join(f"[{start.x_m:.2f}, {start.y_m:.2f}]" for start in scene.starts)
+    remark = f"{check.source}: starts: none are given, quadcopters start at {chosen}"
+    return replace(scene, remarks=(*scene.remarks, remark))
+
+
+def _read_start(check: Checker, entry: Any, place: str) -> Optional[Pose2D]:
     faults_before = len(check.problems)
     if not isinstance(entry, list) or len(entry) not in (2, 3):
-        check.fault(place, f"{_kind(entry)}, expected [x, y] or [x, y, yaw]")
+        check.fault(place, f"{kind(entry)}, expected [x, y] or [x, y, yaw]")
         return None
     start = Pose2D(*[check.as_number(v, f"{place}[{k}]") for k, v in enumerate(entry)])
     return start if len(check.problems) == faults_before else None
 
 
-def _check_names(check: _Checker, scene: Scene) -> None:
+def _check_names(check: Checker, scene: Scene) -> None:
     """Names identify obstacles in contact reports, so they must differ."""
     taken = {wall.name for wall in scene.wall_boxes()} | {"floor"}
     for obstacle in scene.obstacles:
@@ -155,7 +230,7 @@ def _check_names(check: _Checker, scene: Scene) -> None:
         taken.add(obstacle.name)
 
 
-def _check_starts(check: _Checker, scene: Scene, starts: Sequence[Optional[Pose2D]]) -> None:
+def _check_starts(check: Checker, scene: Scene, starts: Sequence[Optional[Pose2D]]) -> None:
     """Every start must be free for a quadcopter; ``starts`` has None where unreadable."""
     readable = [(k, start) for k, start in enumerate(starts) if start is not None]
     for k, start in readable:
@@ -171,8 +246,8 @@ def _check_starts(check: _Checker, scene: Scene, starts: Sequence[Optional[Pose2
 
 def _start_problem(scene: Scene, start: Pose2D) -> Optional[str]:
     if not scene.contains(start.x_m, start.y_m):
-        return (f"is outside the arena, expected 0 < x < {scene.size_x_m:g} "
-                f"and 0 < y < {scene.size_y_m:g}")
+        return (f"is outside the arena, expected {scene.origin_x_m:g} < x < {scene.end_x_m:g} "
+                f"and {scene.origin_y_m:g} < y < {scene.end_y_m:g}")
     point = (start.x_m, start.y_m, scene.altitude_m)
     nearest = scene.nearest(*point)
     clearance_m = nearest.clearance_m(*point)
@@ -180,103 +255,3 @@ def _start_problem(scene: Scene, start: Pose2D) -> Optional[str]:
         return (f"is {clearance_m:.2f} m from {nearest.name}, expected more than "
                 f"a quadcopter's radius, {BODY_RADIUS_M:g} m")
     return None
-
-
-class _Checker:
-    """Reads fields of a document and notes what is wrong with them.
-
-    A faulty field reads as a harmless number, so that the checks go on.
-    """
-
-    def __init__(self, source: str):
-        self.source = source
-        self.problems: List[str] = []
-
-    def fault(self, place: str, problem: str) -> None:
-        self.problems.append(f"{self.source}: {place}: {problem}" if place
-                             else f"{self.source}: {problem}")
-
-    def mapping(self, value: Any, place: str, known: Sequence[str]) -> Optional[Dict[str, Any]]:
-        if not isinstance(value, dict):
-            self.fault(place, f"{_kind(value)}, expected a mapping with {', '.join(known)}")
-            return None
-        for key in value:
-            if key not in known:
-                near = difflib.get_close_matches(str(key), known, 1)
-                hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
-                self.fault(_join(place, key), f"unknown key; {hint}")
-        return value
-
-    def sequence(self, fields: Dict[str, Any], key: str,
-                 default: Optional[List[Any]] = None) -> List[Any]:
-        value = fields.get(key, default)
-        if not isinstance(value, list):
-            self.fault(key, f"{_kind(value)}, expected a list")
-            return []
-        return value
-
-    def text(self, fields: Dict[str, Any], key: str, place: str, default: str) -> str:
-        value = fields.get(key, default)
-        if not isinstance(value, str) or not value:
-            self.fault(_join(place, key), f"{value!r}, expected a text")
-            return default
-        return value
-
-    def number(self, fields: Dict[str, Any], key: str, place: str,
-               default: Optional[float] = None, positive: bool = False) -> float:
-        if key not in fields and default is not None:
-            return default
-        return self.as_number(fields.get(key), _join(place, key), positive)
-
-    def numbers(self, fields: Dict[str, Any], key: str, place: str, count: int,
-                positive: bool = False) -> Tuple[float, ...]:
-        value, where = fields.get(key), _join(place, key)
-        if not isinstance(value, list) or len(value) != count:
-            self.fault(where, f"{_kind(value)}, expected a list of {count} numbers")
-            return (1.0,) * count
-        return tuple(self.as_number(v, f"{where}[{k}]", positive) for k, v in enumerate(value))
-
-    def as_number(self, value: Any, place: str, positive: bool = False) -> float:
-        expected = "expected a number above 0" if positive else "expected a finite number"
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            self.fault(place, f"{_kind(value)}, {expected}")
-            return 1.0
-        if not math.isfinite(value) or (positive and value <= 0):
-            self.fault(place, f"{value}, {expected}")
-            return 1.0
-        return float(value)
-
-
-class _Loader(yaml.SafeLoader):
-    """Refuses a key that is given twice, where YAML would silently keep the last."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False
-                          ) -> Dict[Hashable, Any]:
-        seen = set()
-        for key_node, _ in node.value:
-            if key_node.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key_node.value!r} is given twice", key_node.start_mark)
-            seen.add(key_node.value if isinstance(key_node.value, str) else id(key_node))
-        return super().construct_mapping(node, deep)
-
-
-def _yaml_fault(error: yaml.YAMLError) -> str:
-    mark = getattr(error, "problem_mark", None)
-    problem = getattr(error, "problem", None) or str(error)
-    if mark is None:
-        return f"not YAML: {problem}"
-    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
-
-
-def _kind(value: Any) -> str:
-    """How to call a value that is of the wrong type."""
-    if value is None:
-        return "missing"
-    if isinstance(value, list):
-        return f"a list of {len(value)}"
-    return "a mapping" if isinstance(value, dict) else repr(value)
-
-
-def _join(place: str, key: Any) -> str:
-    return f"{place}.{key}" if place else str(key)

@@ -13,7 +13,7 @@ import numpy as np
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
-from quad_nav.sim.body import Sphere, World
+from quad_nav.sim.body import GoalSphere, World
 from quad_nav.sim.casters import Caster, KernelCaster, WorldCaster
 from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import (
@@ -193,7 +193,7 @@ class Simulation:
         return [make_scan(self.params.lidar, self.now_s, row, self._noise[robot])
                 for robot, row in zip(robots, distances_m)]
 
-    def show_goals(self, spheres: Sequence[Sphere]) -> None:
+    def show_goals(self, spheres: Sequence[GoalSphere]) -> None:
         """Draw goals in the window."""
         self._world.show_goals(spheres)
 

@@ -7,8 +7,8 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from quad_nav.kernels.lidar import SolidGrid, Solids
-from quad_nav.kernels.rays import BOX, CYLINDER
-from quad_nav.sim.scene import Box, Obstacle, Scene
+from quad_nav.kernels.rays import BOX, CYLINDER, SPHERE
+from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
 
 _MANY = 500
 """Solids that are projected one by one in as long as beams need to walk through a grid."""
@@ -58,6 +58,8 @@ def _shape(solid: Obstacle) -> Tuple[int, float, Tuple[float, float, float]]:
     """Kind, yaw and sizes as in ``kernels.rays``."""
     if isinstance(solid, Box):
         return BOX, solid.yaw_rad, (solid.size_x_m / 2, solid.size_y_m / 2, solid.height_m / 2)
+    if isinstance(solid, Sphere):
+        return SPHERE, 0.0, (solid.radius_m, solid.radius_m, solid.radius_m)
     return CYLINDER, 0.0, (solid.radius_m, solid.radius_m, solid.height_m / 2)
 
 

@@ -1,0 +1,123 @@
+"""YAML documents that people write: read with care, checked field by field."""
+from __future__ import annotations
+
+import difflib
+import math
+from pathlib import Path
+from typing import Any, Dict, Hashable, List, Optional, Sequence, Tuple
+
+import yaml
+
+from quad_nav.errors import InputError
+
+
+def read_yaml(path: Path) -> Any:
+    """The document of a file. Raises ``InputError``, with the line if it is not YAML."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError([f"{path}: cannot be read: {error}"]) from error
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise InputError([f"{path}: {_yaml_fault(error)}"]) from error
+
+
+class Checker:
+    """Reads fields of a document and notes what is wrong with them.
+
+    A faulty field reads as a harmless number, so that the checks go on.
+    """
+
+    def __init__(self, source: str):
+        self.source = source
+        self.problems: List[str] = []
+
+    def fault(self, place: str, problem: str) -> None:
+        self.problems.append(f"{self.source}: {place}: {problem}" if place
+                             else f"{self.source}: {problem}")
+
+    def mapping(self, value: Any, place: str, known: Sequence[str]) -> Optional[Dict[str, Any]]:
+        if not isinstance(value, dict):
+            self.fault(place, f"{kind(value)}, expected a mapping with {', '.join(known)}")
+            return None
+        for key in value:
+            if key not in known:
+                near = difflib.get_close_matches(str(key), known, 1)
+                hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+                self.fault(_join(place, key), f"unknown key; {hint}")
+        return value
+
+    def sequence(self, fields: Dict[str, Any], key: str,
+                 default: Optional[List[Any]] = None) -> List[Any]:
+        value = fields.get(key, default)
+        if not isinstance(value, list):
+            self.fault(key, f"{kind(value)}, expected a list")
+            return []
+        return value
+
+    def text(self, fields: Dict[str, Any], key: str, place: str, default: str) -> str:
+        value = fields.get(key, default)
+        if not isinstance(value, str) or not value:
+            self.fault(_join(place, key), f"{value!r}, expected a text")
+            return default
+        return value
+
+    def number(self, fields: Dict[str, Any], key: str, place: str,
+               default: Optional[float] = None, positive: bool = False) -> float:
+        if key not in fields and default is not None:
+            return default
+        return self.as_number(fields.get(key), _join(place, key), positive)
+
+    def numbers(self, fields: Dict[str, Any], key: str, place: str, count: int,
+                positive: bool = False) -> Tuple[float, ...]:
+        value, where = fields.get(key), _join(place, key)
+        if not isinstance(value, list) or len(value) != count:
+            self.fault(where, f"{kind(value)}, expected a list of {count} numbers")
+            return (1.0,) * count
+        return tuple(self.as_number(v, f"{where}[{k}]", positive) for k, v in enumerate(value))
+
+    def as_number(self, value: Any, place: str, positive: bool = False) -> float:
+        expected = "expected a number above 0" if positive else "expected a finite number"
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            self.fault(place, f"{kind(value)}, {expected}")
+            return 1.0
+        if not math.isfinite(value) or (positive and value <= 0):
+            self.fault(place, f"{value}, {expected}")
+            return 1.0
+        return float(value)
+
+
+class _Loader(yaml.SafeLoader):
+    """Refuses a key that is given twice, where YAML would silently keep the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False
+                          ) -> Dict[Hashable, Any]:
+        seen = set()
+        for key_node, _ in node.value:
+            if key_node.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key_node.value!r} is given twice", key_node.start_mark)
+            seen.add(key_node.value if isinstance(key_node.value, str) else id(key_node))
+        return super().construct_mapping(node, deep)
+
+
+def _yaml_fault(error: yaml.YAMLError) -> str:
+    mark = getattr(error, "problem_mark", None)
+    problem = getattr(error, "problem", None) or str(error)
+    if mark is None:
+        return f"not YAML: {problem}"
+    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
+
+
+def kind(value: Any) -> str:
+    """How to call a value that is of the wrong type."""
+    if value is None:
+        return "missing"
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    return "a mapping" if isinstance(value, dict) else repr(value)
+
+
+def _join(place: str, key: Any) -> str:
+    return f"{place}.{key}" if place else str(key)

@@ -1,0 +1,188 @@
+"""Maps of ROS's ``map_server`` as obstacles: a YAML file beside an image.
+
+    image: office.pgm              # beside this file, or an absolute path; PGM or PNG
+    resolution: 0.05               # metres per pixel
+    origin: [-10.0, -10.0, 0.0]    # pose in map of the image's lower left corner
+    negate: 0
+    occupied_thresh: 0.65
+    free_thresh: 0.196
+    mode: trinary                  # or scale, raw; trinary if left out
+
+Occupied cells stand up as boxes, as high as the scene's walls. Cells are read as
+``map_server`` reads them (its ``image_loader.cpp``) and taken for obstacles where
+``costmap_2d``'s static layer has a lethal cost by its default parameters, see
+``occupancy_of``.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, List, Optional, Tuple
+
+import numpy as np
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D
+from quad_nav.kernels.rectangles import cover
+from quad_nav.sim.document import Checker, kind
+from quad_nav.sim.map_image import Pixels, read_pixels
+from quad_nav.sim.scene import Box
+
+FREE, OCCUPIED, UNKNOWN = 0, 100, -1
+MAX_BOXES = 200_000
+_RECTANGLES_AT_ONCE = 65_536
+_KEYS = ["image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode"]
+_MODES = ("trinary", "scale", "raw")
+_NEGATE = {0: False, 1: True}  # also False and True, which are equal to them
+
+
+@dataclass(frozen=True)
+class MapFields:
+    """What the YAML file says."""
+
+    image: Path
+    resolution_m: float
+    origin: Pose2D
+    negate: bool
+    occupied_thresh: float
+    free_thresh: float
+    mode: str
+
+
+@dataclass(frozen=True)
+class OccupancyMap:
+    """``occupancy``, int8[H, W], row 0 at the lower edge; 0 free, 100 occupied, -1 unknown."""
+
+    fields: MapFields
+    occupancy: np.ndarray
+    remarks: Tuple[str, ...] = ()
+
+    def occupied(self, unknown_too: bool) -> np.ndarray:
+        """bool[H, W]: where obstacles stand."""
+        return ((self.occupancy >= OCCUPIED) | (self.occupancy == UNKNOWN) if unknown_too
+                else self.occupancy >= OCCUPIED)
+
+    def is_free(self, x_m: float, y_m: float) -> bool:
+        """Whether the cell under a point in ``map`` is known to be free."""
+        origin, height_width = self.fields.origin, self.occupancy.shape
+        cos, sin = math.cos(origin.yaw_rad), math.sin(origin.yaw_rad)
+        dx, dy = x_m - origin.x_m, y_m - origin.y_m
+        column = math.floor((cos * dx + sin * dy) / self.fields.resolution_m)
+        row = math.floor((cos * dy - sin * dx) / self.fields.resolution_m)
+        inside = 0 <= row < height_width[0] and 0 <= column < height_width[1]
+        return inside and 0 <= self.occupancy[row, column] < OCCUPIED
+
+    def corners(self) -> List[Tuple[float, float]]:
+        """The image's four corners in ``map``."""
+        height, width = self.occupancy.shape
+        return [self._in_map(x, y) for x in (0.0, width) for y in (0.0, height)]
+
+    def _in_map(self, column: float, row: float) -> Tuple[float, float]:
+        origin, resolution_m = self.fields.origin, self.fields.resolution_m
+        cos, sin = math.cos(origin.yaw_rad), math.sin(origin.yaw_rad)
+        x, y = column * resolution_m, row * resolution_m
+        return (origin.x_m + cos * x - sin * y, origin.y_m + sin * x + cos * y)
+
+    def boxes(self, height_m: float, unknown_too: bool) -> List[Box]:
+        """The occupied cells as few boxes: every one is in exactly one, and no other cell is.
+
+        Raises ``InputError`` when they are too many to fly in.
+        """
+        rectangles = rectangles_of(self.occupied(unknown_too)).tolist()
+        if len(rectangles) > MAX_BOXES:
+            raise InputError([f"{self.fields.image}: occupied cells make {len(rectangles)} boxes, "
+                              f"expected {MAX_BOXES} at most; is it a map without specks?"])
+        resolution_m, yaw_rad = self.fields.resolution_m, self.fields.origin.yaw_rad
+        boxes = []
+        for number, (column, row, width, height) in enumerate(rectangles):
+            x_m, y_m = self._in_map(column + width / 2, row + height / 2)
+            boxes.append(Box(f"map_{number}", x_m, y_m, width * resolution_m,
+                             height * resolution_m, height_m, yaw_rad))
+        return boxes
+
+
+def load_map(document: Any, path: Path) -> OccupancyMap:
+    """Check a map's YAML, given as ``document``, and read its image. Raises ``InputError``."""
+    check = Checker(str(path))
+    fields = _read_fields(check, document, path.parent)
+    if check.problems or fields is None:
+        raise InputError(check.problems)
+    pixels = read_pixels(fields.image, fields.mode == "trinary")
+    remarks = tuple(f"{path}: {key}: is not read, map_server has no such key"
+                    for key in document if key not in _KEYS)
+    return OccupancyMap(fields, occupancy_of(pixels, fields), remarks)
+
+
+def occupancy_of(pixels: Pixels, fields: MapFields) -> np.ndarray:
+    """Pixels as ``map_server`` reads them, int8[H, W]; row 0 is the image's last.
+
+    With p = (255 - value) / 255, or value / 255 where negated, a cell is occupied, 100,
+    above ``occupied_thresh``, free, 0, below ``free_thresh``, and unknown, -1, between
+    them. In mode scale what is between is 1 to 99, unless the pixel is transparent; 99
+    is no obstacle yet. In mode raw the value itself counts: obstacles from 100 to 254,
+    and 255 is unknown.
+    """
+    values = np.arange(255 * pixels.channels + 1) / pixels.channels
+    if fields.negate:
+        values = 255.0 - values
+    cells = _cells_of(values, fields)[pixels.sums]
+    if fields.mode == "scale":
+        between = (cells != FREE) & (cells != OCCUPIED)
+        cells[between & ~pixels.opaque] = UNKNOWN
+    return np.ascontiguousarray(cells[::-1])
+
+
+def _cells_of(values: np.ndarray, fields: MapFields) -> np.ndarray:
+    """Cells, int8[n], of opaque pixels with these mean values, 0..255."""
+    if fields.mode == "raw":
+        raw = np.floor(values)
+        return np.where(raw >= 255, UNKNOWN, np.minimum(raw, OCCUPIED)).astype(np.int8)
+    p = (255.0 - values) / 255.0
+    occupied, free = p > fields.occupied_thresh, p < fields.free_thresh
+    between = np.full(p.shape, float(UNKNOWN))
+    if fields.mode == "scale" and fields.occupied_thresh > fields.free_thresh:
+        span = fields.occupied_thresh - fields.free_thresh
+        between = np.clip(1.0 + 98.0 * (p - fields.free_thresh) / span, 1.0, 99.0)
+    return np.select([occupied, free], [OCCUPIED, FREE], between).astype(np.int8)
+
+
+def rectangles_of(marked: np.ndarray) -> np.ndarray:
+    """Few disjoint rectangles that cover the true cells of bool[H, W] and no others.
+
+    int64[n, 4], each row first column, first row, width, height.
+    """
+    left = marked.copy()
+    parts, row = [], 0
+    while row < len(left):
+        part = np.empty((_RECTANGLES_AT_ONCE, 4), np.int64)
+        count, row = cover(left, part, row)
+        parts.append(part[:count])
+    return np.concatenate(parts)
+
+
+def _read_fields(check: Checker, document: Any, folder: Path) -> Optional[MapFields]:
+    if not isinstance(document, dict):
+        check.fault("", f"{kind(document)}, expected a mapping with {', '.join(_KEYS)}")
+        return None
+    image = check.text(document, "image", "", "")
+    resolution_m = check.number(document, "resolution", "", positive=True)
+    origin = Pose2D(*check.numbers(document, "origin", "", 3))
+    negate = document.get("negate")
+    if not isinstance(negate, int) or negate not in _NEGATE:
+        check.fault("negate", f"{kind(negate)}, expected 0 or 1")
+    occupied, free = (_threshold(check, document, key) for key in ("occupied_thresh",
+                                                                  "free_thresh"))
+    if free > occupied:
+        check.fault("free_thresh", f"{free:g} is above occupied_thresh, {occupied:g}")
+    mode = document.get("mode", "trinary")
+    if mode not in _MODES:
+        check.fault("mode", f"{kind(mode)}, expected {', '.join(_MODES)}")
+    return MapFields(folder / image, resolution_m, origin, bool(negate), occupied, free, mode)
+
+
+def _threshold(check: Checker, document: Any, key: str) -> float:
+    value = check.number(document, key, "")
+    if not 0.0 <= value <= 1.0:
+        check.fault(key, f"{value:g}, expected a share from 0 to 1")
+    return value

@@ -1,0 +1,64 @@
+"""Images of maps as numbers, the only file that imports pillow."""
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from quad_nav.errors import InputError
+
+MAX_CELLS = 10_000 * 10_000
+_FORMATS = ("PPM", "PNG")  # PPM stands for the whole family, PGM among it
+_PALETTE_MODES = {"1": "L", "P": "RGBA", "PA": "RGBA", "CMYK": "RGB", "La": "LA", "RGBa": "RGBA"}
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """Sums over ``channels`` channels of 0..255 each; row 0 is the uppermost.
+
+    ``sums`` is uint16[H, W], ``opaque`` bool[H, W].
+    """
+
+    sums: np.ndarray
+    channels: int
+    opaque: np.ndarray
+
+
+def read_pixels(path: Path, alpha_counts: bool) -> Pixels:
+    """The sum of each pixel's channels; with ``alpha_counts`` alpha is one of them.
+
+    Raises ``InputError`` when it is no PGM or PNG image, broken, or too large.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # MAX_CELLS is ours
+            with Image.open(path, formats=_FORMATS) as image:
+                _check_size(path, image)
+                return _pixels(image, alpha_counts)
+    except UnidentifiedImageError:
+        raise InputError([f"{path}: is no PGM or PNG image"]) from None
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise InputError([f"{path}: cannot be read: {error}"]) from error
+
+
+def _check_size(path: Path, image: Image.Image) -> None:
+    width, height = image.size
+    if width * height > MAX_CELLS:
+        raise InputError([f"{path}: is {width} x {height} pixels, "
+                          f"expected {MAX_CELLS:g} pixels at most"])
+
+
+def _pixels(image: Image.Image, alpha_counts: bool) -> Pixels:
+    if image.mode in _PALETTE_MODES:
+        image = image.convert(_PALETTE_MODES[image.mode])
+    array = np.asarray(image)
+    if array.dtype != np.uint8:  # 16 bits a channel, of which the upper 8 count
+        array = (array.astype(np.uint32) >> 8).astype(np.uint8)
+    channels = array if array.ndim == 3 else array[:, :, None]
+    has_alpha = channels.shape[2] in (2, 4)
+    opaque = channels[:, :, -1] > 0 if has_alpha else np.ones(channels.shape[:2], bool)
+    counted = channels if alpha_counts or not has_alpha else channels[:, :, :-1]
+    return Pixels(counted.sum(axis=2, dtype=np.uint16), counted.shape[2], opaque)

@@ -1,0 +1,87 @@
+"""Shapes of SDF collisions as obstacles, if ours can stand where and as they do."""
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Optional, Union
+
+import numpy as np
+
+from quad_nav.geometry import Pose3D
+from quad_nav.sim.scene import Box, Cylinder, Obstacle, Sphere
+from quad_nav.sim.sdf_values import NotRepresented, SdfReader
+from quad_nav.sim.xml_tree import Element
+
+UPRIGHT_RAD = 1e-3
+"""How far a vertical axis may lean: saved worlds hold the traces of numerical physics."""
+
+FLOOR_M = 1e-3
+"""Planes and solids that end less than this above the floor are part of it."""
+
+
+def obstacle_of(reader: SdfReader, geometry: Element, name: str, map_from_shape: Pose3D
+                ) -> Optional[Obstacle]:
+    """The obstacle, or None where it is the floor or faulty. Raises ``NotRepresented``."""
+    if not geometry.children:
+        raise NotRepresented("geometry without a shape")
+    shape = geometry.children[0]
+    make = {"box": _box, "cylinder": _cylinder, "sphere": _sphere, "plane": _plane,
+            "empty": _nothing}.get(shape.tag)
+    if make is None:
+        raise NotRepresented(shape.tag)
+    faults_before = len(reader.problems)
+    obstacle = make(reader, shape, name, map_from_shape)
+    if obstacle is None or len(reader.problems) > faults_before:
+        return None
+    if obstacle.bottom_m + obstacle.height_m <= FLOOR_M:
+        raise NotRepresented("nothing above the floor")
+    return obstacle if isinstance(obstacle, Sphere) else _above_floor(obstacle)
+
+
+def _above_floor(obstacle: Union[Box, Cylinder]) -> Obstacle:
+    """The part of it that can be seen."""
+    sunk_m = max(0.0, -obstacle.bottom_m)
+    return replace(obstacle, bottom_m=obstacle.bottom_m + sunk_m,
+                   height_m=obstacle.height_m - sunk_m)
+
+
+def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
+    """A box may lie on any of its sides."""
+    sizes = reader.lengths(shape, "size", 3, "three numbers of metres")
+    rotation = pose.rotation
+    up = [axis for axis in range(3) if _lean_rad(rotation[:, axis]) <= UPRIGHT_RAD]
+    if not up:
+        raise NotRepresented("tilted box")
+    along, across = (up[0] + 1) % 3, (up[0] + 2) % 3
+    yaw_rad = math.atan2(rotation[1, along], rotation[0, along])
+    return Box(name, pose.x_m, pose.y_m, sizes[along], sizes[across], sizes[up[0]], yaw_rad,
+               pose.z_m - sizes[up[0]] / 2)
+
+
+def _cylinder(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
+    radius_m, length_m = reader.length(shape, "radius"), reader.length(shape, "length")
+    if _lean_rad(pose.rotation[:, 2]) > UPRIGHT_RAD:
+        raise NotRepresented("tilted cylinder")
+    return Cylinder(name, pose.x_m, pose.y_m, radius_m, length_m, pose.z_m - length_m / 2)
+
+
+def _sphere(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
+    return Sphere(name, pose.x_m, pose.y_m, pose.z_m, reader.length(shape, "radius"))
+
+
+def _plane(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> None:
+    """Horizontal at z = 0 and seen from above it is the floor."""
+    element = shape.first("normal")
+    given = reader.numbers(element, 3, "three numbers") if element else None
+    normal = pose.rotation @ (given or (0.0, 0.0, 1.0))
+    if _lean_rad(normal) > UPRIGHT_RAD or normal[2] <= 0.0 or abs(pose.z_m) > FLOOR_M:
+        raise NotRepresented("plane that is not the floor")
+
+
+def _nothing(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> None:
+    return None
+
+
+def _lean_rad(axis: np.ndarray) -> float:
+    """Angle between a line and the vertical."""
+    return math.atan2(math.hypot(axis[0], axis[1]), abs(axis[2]))

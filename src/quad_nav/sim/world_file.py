@@ -1,0 +1,188 @@
+"""Gazebo worlds as obstacles: ``.world`` and ``.sdf`` files.
+
+Boxes, cylinders and spheres of the models' collisions become obstacles, a plane at
+z = 0 is the floor. Everything else that could be touched is left out by name, with the
+reason. Poses are composed along world, models in models, link and collision; a saved
+``<state>`` has the last word on where models and links are, as in Gazebo.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Dict, List, Optional, Sequence, Tuple
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose3D
+from quad_nav.sim.model_folders import find_model
+from quad_nav.sim.scene import Obstacle
+from quad_nav.sim.sdf_shapes import obstacle_of
+from quad_nav.sim.sdf_values import IDENTITY, NotRepresented, SdfReader, is_true
+from quad_nav.sim.xml_tree import Element, read_xml
+
+MAX_OBSTACLES = 100_000
+MAX_INCLUDES = 16
+"""Files inside each other; one that includes itself would never end."""
+
+_OTHER_SOLIDS = ("actor", "population", "road")
+
+
+@dataclass(frozen=True)
+class GazeboWorld:
+    """What stands in a world, and remarks on what of it does not stand in ours."""
+
+    obstacles: Tuple[Obstacle, ...]
+    remarks: Tuple[str, ...]
+
+
+@dataclass
+class _Findings:
+    obstacles: List[Obstacle] = field(default_factory=list)
+    left_out: Dict[str, List[str]] = field(default_factory=dict)
+    not_static: List[str] = field(default_factory=list)
+    problems: List[str] = field(default_factory=list)
+
+    def leave_out(self, name: str, reason: str) -> None:
+        self.left_out.setdefault(reason, []).append(name)
+
+
+def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
+    """Read a world, or a file with models only.
+
+    ``<include>`` finds ``model://`` beside the file, in a folder ``models`` there or one
+    up, and in the folders of ``model_path``. Raises ``InputError`` with every fault.
+    """
+    root = read_xml(path)
+    if root.tag not in ("sdf", "gazebo"):
+        raise InputError([f"{path}: line {root.line}: <{root.tag}>, expected <sdf>"])
+    worlds = list(root.all("world"))
+    if len(worlds) > 1:
+        raise InputError([f"{path}: line {worlds[1].line}: a second <world>, expected one"])
+    findings = _Findings()
+    folders = (path.parent, path.parent / "models", path.parent.parent / "models", *model_path)
+    walk = _Walk(SdfReader(path, findings.problems), findings, folders)
+    world = worlds[0] if worlds else root
+    walk.models(world, IDENTITY, "", world.first("state"))
+    for tag in _OTHER_SOLIDS:
+        for element in world.all(tag):
+            findings.leave_out(element.attributes.get("name", tag), tag)
+    if len(findings.obstacles) > MAX_OBSTACLES:
+        findings.problems.append(f"{path}: {len(findings.obstacles)} shapes, expected "
+                                 f"{MAX_OBSTACLES} at most")
+    if findings.problems:
+        raise InputError(findings.problems)
+    return GazeboWorld(tuple(findings.obstacles), tuple(_remarks(path, findings)))
+
+
+def _remarks(path: Path, findings: _Findings) -> List[str]:
+    remarks = [f"{path}: left out, {reason}: {', '.join(names)}"
+               for reason, names in findings.left_out.items()]
+    if findings.not_static:
+        remarks.append(f"{path}: not static in Gazebo, stands fixed here: "
+                       f"{', '.join(findings.not_static)}")
+    return remarks
+
+
+@dataclass(frozen=True)
+class _Walk:
+    """Through the models of one file; included files get a walk of their own."""
+
+    reader: SdfReader
+    findings: _Findings
+    folders: Sequence[Path]
+    depth: int = 0
+
+    def models(self, parent: Element, map_from_parent: Pose3D, prefix: str,
+               state: Optional[Element]) -> None:
+        """Everything in a world or model that is a model itself."""
+        for child in parent.children:
+            if child.tag not in ("model", "include"):
+                continue
+            name = prefix + _name_of(child)
+            try:
+                if child.tag == "include":
+                    self._include(child, map_from_parent, prefix, state)
+                else:
+                    self._model(child, map_from_parent, prefix, state)
+            except NotRepresented as reason:
+                self.findings.leave_out(name, str(reason))
+
+    def _model(self, model: Element, map_from_parent: Pose3D, prefix: str,
+               state: Optional[Element], included_as: Optional[Element] = None) -> None:
+        name = _name_of(included_as or model, _name_of(model))
+        source = model
+        if included_as is not None and included_as.first("pose") is not None:
+            source = included_as
+        if model.attributes.get("placement_frame"):
+            raise NotRepresented("placed by a named frame")
+        map_from_model = map_from_parent.compose(self.reader.pose(source))
+        saved = _state_of(state, "model", name)
+        if saved is not None:
+            if set(saved.text_of("scale", "1").split()) - {"1", "1.0"}:
+                raise NotRepresented("scaled in <state>")
+            map_from_model = self.reader.pose(saved, map_from_model)
+        static = (included_as.text_of("static") if included_as else "") or model.text_of("static")
+        if not prefix and not is_true(static):
+            self.findings.not_static.append(name)
+        for link in model.all("link"):
+            self._link(link, map_from_model, f"{prefix}{name}/", saved)
+        self.models(model, map_from_model, f"{prefix}{name}/", saved)
+
+    def _include(self, include: Element, map_from_parent: Pose3D, prefix: str,
+                 state: Optional[Element]) -> None:
+        uri = include.text_of("uri")
+        if uri == "model://sun":
+            return
+        if self.depth >= MAX_INCLUDES:
+            self.reader.fault(include, f"more than {MAX_INCLUDES} files inside each other")
+            return
+        path = find_model(uri, self.folders)
+        if path is None:
+            if uri == "model://ground_plane":
+                return
+            raise NotRepresented(f"<include> of {uri or 'nothing'}, not found")
+        root = read_xml(path)
+        walk = _Walk(SdfReader(path, self.findings.problems), self.findings, self.folders,
+                     self.depth + 1)
+        for model in root.all("model"):
+            walk._model(model, map_from_parent, prefix, state, include)
+
+    def _link(self, link: Element, map_from_model: Pose3D, prefix: str,
+              state: Optional[Element]) -> None:
+        name = prefix + _name_of(link)
+        collisions = list(link.all("collision"))
+        if not collisions and link.first("visual") is not None:
+            self.findings.leave_out(name, "looks without a collision")
+        try:
+            map_from_link = map_from_model.compose(self.reader.pose(link))
+            saved = _state_of(state, "link", _name_of(link))
+            if saved is not None:
+                map_from_link = self.reader.pose(saved, map_from_link)
+        except NotRepresented as reason:
+            self.findings.leave_out(name, str(reason))
+            return
+        for collision in collisions:
+            self._collision(collision, map_from_link, f"{name}/")
+
+    def _collision(self, collision: Element, map_from_link: Pose3D, prefix: str) -> None:
+        name = prefix + _name_of(collision)
+        try:
+            map_from_shape = map_from_link.compose(self.reader.pose(collision))
+            geometry = collision.first("geometry") or Element("geometry", {}, collision.line)
+            obstacle = obstacle_of(self.reader, geometry, name, map_from_shape)
+        except NotRepresented as reason:
+            self.findings.leave_out(name, str(reason))
+            return
+        if obstacle is not None:
+            self.findings.obstacles.append(obstacle)
+
+
+def _state_of(state: Optional[Element], tag: str, name: str) -> Optional[Element]:
+    """What a saved state says on a model or link."""
+    if state is None:
+        return None
+    return next((e for e in state.all(tag) if e.attributes.get("name") == name), None)
+
+
+def _name_of(element: Element, default: str = "") -> str:
+    given = element.text_of("name") if element.tag == "include" else element.attributes.get("name")
+    return given or default or element.text_of("uri").split("/")[-1] or element.tag
