@@ -32,8 +32,7 @@ def look(params: LidarParams, map_from_lidar: Pose3D, plane: Plane, stamp_s: flo
          random=None):
     """The scan of a LIDAR at a pose, on a quadcopter that hangs below it."""
     pose = map_from_lidar.compose(base_from_lidar.inverse())
-    bodies = BodyState(pose.translation[None], np.array([pose.quaternion]), np.zeros((1, 3)),
-                       np.zeros((1, 3)))
+    bodies = BodyState(np.array([[*pose.translation, *pose.quaternion, *np.zeros(6)]]))
     distances, = WorldCaster(params, plane).cast(bodies, [0])
     return make_scan(params, stamp_s, distances, random)
 

@@ -144,13 +144,17 @@ def test_a_pillar_is_seen_at_every_bearing_that_the_lidar_has(bearing, span):
     assert np.isfinite(ranges).tolist() == (off < math.asin(0.1)).tolist()
 
 
-def test_the_grid_gives_the_same_ranges():
-    """Obstacles of any size, tilted LIDARs inside and outside of what the grid holds."""
+@pytest.mark.parametrize("span, count", [(2 * math.pi, 128), (1.0, 101), (math.pi, 130)])
+def test_the_grid_gives_the_same_ranges(span, count):
+    """Obstacles of any size, tilted LIDARs inside and outside of what the grid holds.
+
+    The grid tries every solid near a beam: a sector that is too narrow shows.
+    """
     random = np.random.default_rng(3)
     solids = solids_of(list(forest(random, 300, 30.0)))
-    pattern = beams(*np.linspace(-math.pi, math.pi, 128, endpoint=False))
+    pattern = beams(*np.linspace(-span / 2, span / 2, count, endpoint=False))
     solids_seen = 0
-    for _ in range(40):
+    for _ in range(60):
         origin = random.uniform((-5.0, -5.0, 0.3), (35.0, 35.0, 3.0))
         pitch = random.uniform(-0.35, 0.35)
         projected = cast(solids, origin, pattern, pitch_rad=pitch)

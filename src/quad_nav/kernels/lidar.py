@@ -16,6 +16,8 @@ from numba import njit
 from quad_nav.kernels.rays import dot, enter_solid, through_slab, triple, turn
 from quad_nav.kernels.sectors import sector_of
 
+_ROUNDING = 1e-6  # of a beam's number
+
 
 class Solids(NamedTuple):
     """Kinds and sizes as in ``rays``, and where they are in ``map``, metres."""
@@ -126,15 +128,25 @@ def _cast_at_solid(row, origin, rotation, beams, solids, solid):
     first_rad, width_rad = sector_of(kind, eye, ahead, left, up, sizes)
     if width_rad < 0.0:
         return
-    # Beams first .. last, counted on beyond a full turn; the sector is widened by rounding.
-    turn_rad = 2.0 * math.pi
-    first = ((first_rad - beams.first_rad) % turn_rad) / beams.step_rad
-    last = first + width_rad / beams.step_rad
-    per_turn = turn_rad / beams.step_rad
-    _shorten(row, int(first), int(last) + 1, kind, eye, ahead, left, sizes, beams)
-    if last + 1.0 >= per_turn:
-        _shorten(row, 0, min(int(last - per_turn) + 1, int(first) - 1), kind, eye, ahead, left,
+    first, last = _beams_of(first_rad, width_rad, beams)
+    first_beam = int(math.ceil(first))
+    _shorten(row, first_beam, int(math.floor(last)), kind, eye, ahead, left, sizes, beams)
+    last -= 2.0 * math.pi / beams.step_rad  # what is left of it after a full turn
+    if last >= 0.0:
+        _shorten(row, 0, min(int(math.floor(last)), first_beam - 1), kind, eye, ahead, left,
                  sizes, beams)
+
+
+@njit(cache=True, nogil=True)
+def _beams_of(first_rad, width_rad, beams):
+    """A sector in numbers of beams, with fractions; its end may be a turn further on."""
+    offset_rad = first_rad - beams.first_rad  # within a turn and a half; a modulo is slow
+    if offset_rad < 0.0:
+        offset_rad += 2.0 * math.pi
+    elif offset_rad >= 2.0 * math.pi:
+        offset_rad -= 2.0 * math.pi
+    first = offset_rad / beams.step_rad
+    return first - _ROUNDING, first + width_rad / beams.step_rad + _ROUNDING
 
 
 @njit(cache=True, nogil=True)

@@ -30,7 +30,7 @@ def sector_of(kind, eye, ahead, left, up, sizes):
             return EMPTY
         return _box_sector(eye, ahead, left, up, sizes)
     if kind == CYLINDER:
-        if height > abs(up[2]) * sizes[2] + math.hypot(up[0], up[1]) * sizes[0]:
+        if height > abs(up[2]) * sizes[2] + math.sqrt(up[0] * up[0] + up[1] * up[1]) * sizes[0]:
             return EMPTY
         return _cylinder_sector(eye, ahead, left, up, sizes)
     if height > sizes[0]:
@@ -82,7 +82,7 @@ def _cylinder_sector(eye, ahead, left, up, sizes):
 @njit(cache=True, nogil=True)
 def _disc_sector(x, y, radius):
     """A disc around (x, y) seen from (0, 0)."""
-    distance = math.hypot(x, y)
+    distance = math.sqrt(x * x + y * y)
     if distance <= radius:
         return FULL
     half = math.asin(radius / distance)
