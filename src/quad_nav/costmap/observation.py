@@ -45,6 +45,18 @@ class Observation:
         return _nanoseconds(self.stamp_s)
 
 
+@dataclass(frozen=True)
+class ObservationStack:
+    """Observations in one piece, for kernels: sensors float64[k, 3], points float32[n, 3].
+
+    Observation i has the points from ``ends[i - 1]``, or 0, to ``ends[i]``, int64[k].
+    """
+
+    sensors: np.ndarray
+    points: np.ndarray
+    ends: np.ndarray
+
+
 class ObservationBuffer:
     """The observations of one source, newest first.
 
@@ -56,10 +68,19 @@ class ObservationBuffer:
         self.params = params
         self.observations: List[Observation] = []
         self._last_reception_s: Optional[float] = None
+        self._stack: Optional[ObservationStack] = None
+
+    @property
+    def stack(self) -> ObservationStack:
+        """All that is kept, newest first."""
+        if self._stack is None:
+            self._stack = _stacked(self.observations)
+        return self._stack
 
     def add(self, observation: Observation, now_s: float) -> None:
         """Keep an observation that arrived now; drop those that are too old now."""
         self.observations.insert(0, observation)
+        self._stack = None
         self.restart_clock(now_s)
 
     def start_clock(self, now_s: float) -> None:
@@ -83,12 +104,23 @@ class ObservationBuffer:
         persistence_s = self.params.observation_persistence_s
         if persistence_s == 0.0:
             del self.observations[1:]
+            self._stack = None
             return
         oldest_ns = _nanoseconds(reception_s) - _nanoseconds(persistence_s)
         for k, observation in enumerate(self.observations):
             if observation.stamp_ns < oldest_ns:
                 del self.observations[k:]
+                self._stack = None
                 return
+
+
+def _stacked(observations: List[Observation]) -> ObservationStack:
+    if not observations:
+        return ObservationStack(np.empty((0, 3)), np.empty((0, 3), np.float32),
+                                np.empty(0, np.int64))
+    return ObservationStack(np.array([one.sensor for one in observations]),
+                            np.concatenate([one.points for one in observations]),
+                            np.cumsum([len(one.points) for one in observations]))
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -17,7 +17,7 @@ from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceP
 from quad_nav.costmap.projection import scan_points, transform_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
-from quad_nav.kernels.raytrace import clear_rays, mark_points
+from quad_nav.kernels.raytrace import clear_all_rays, mark_all_points
 
 _LINES = 4096  # that an update remembers; a scan has some hundreds
 
@@ -130,12 +130,9 @@ class ObstacleLayer(GridLayer):
         clearing = [] if overdue else [b for b in self.buffers.values() if b.params.clearing]
         touched = np.array([bounds.min_x_m, bounds.min_y_m, bounds.max_x_m, bounds.max_y_m])
         for buffer in clearing:
-            self._cleared_lines.fill(-1)
-            for observation in buffer.observations:
-                self._clear(observation, self._raytrace_range(buffer.params), touched)
+            self._clear(buffer, self._raytrace_range(buffer.params), touched)
         for buffer in marking:
-            for observation in buffer.observations:
-                self._mark(observation, self._obstacle_range(buffer.params), touched)
+            self._mark(buffer, self._obstacle_range(buffer.params), touched)
         bounds = Bounds(*touched.tolist())
         self._footprint_now = footprints.oriented(self._footprint, robot)
         if self.params.footprint_clearing_enabled and len(self._footprint_now):
@@ -154,17 +151,18 @@ class ObstacleLayer(GridLayer):
     def _centre_on(self, robot: Pose2D) -> None:
         self.grid.centre_on(robot.x_m, robot.y_m)
 
-    def _clear(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
-        spec = self.grid.spec
-        clear_rays(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
-                   observation.sensor[0], observation.sensor[1], observation.points, range_m,
-                   self._cleared_lines, touched)
+    def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
+        spec, seen = self.grid.spec, buffer.stack
+        self._cleared_lines.fill(-1)
+        clear_all_rays(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
+                       seen.sensors, seen.points, seen.ends, range_m, self._cleared_lines,
+                       touched)
 
-    def _mark(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
-        spec = self.grid.spec
-        mark_points(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
-                    observation.sensor, observation.points, range_m,
-                    self.params.max_obstacle_height_m, touched)
+    def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
+        spec, seen = self.grid.spec, buffer.stack
+        mark_all_points(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
+                        seen.sensors, seen.points, seen.ends, range_m,
+                        self.params.max_obstacle_height_m, touched)
 
     def _raytrace_range(self, source: SourceParams) -> float:
         range_m = source.raytrace_range_m

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quad_nav.costmap.cost_grid import shift
-from quad_nav.costmap.observation import Observation
+from quad_nav.costmap.observation import ObservationBuffer
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import LETHAL, UNKNOWN, GridSpec
@@ -96,15 +96,17 @@ class VoxelLayer(ObstacleLayer):
         if move_x or move_y:
             shift(self.voxels, move_x, move_y, UNKNOWN)
 
-    def _clear(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
+    def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         params = self.params
-        clear_voxel_rays(self.voxels, self.grid.costs, self._origin, self._voxel_size,
-                         observation.sensor, observation.points, range_m,
-                         params.max_obstacle_height_m, params.unknown_threshold,
-                         params.mark_threshold, touched)
+        for observation in buffer.observations:
+            clear_voxel_rays(self.voxels, self.grid.costs, self._origin, self._voxel_size,
+                             observation.sensor, observation.points, range_m,
+                             params.max_obstacle_height_m, params.unknown_threshold,
+                             params.mark_threshold, touched)
 
-    def _mark(self, observation: Observation, range_m: float, touched: np.ndarray) -> None:
+    def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         params = self.params
-        mark_voxels(self.voxels, self.grid.costs, self._origin, self._voxel_size,
-                    observation.sensor, observation.points, range_m,
-                    params.max_obstacle_height_m, params.mark_threshold, touched)
+        for observation in buffer.observations:
+            mark_voxels(self.voxels, self.grid.costs, self._origin, self._voxel_size,
+                        observation.sensor, observation.points, range_m,
+                        params.max_obstacle_height_m, params.mark_threshold, touched)

@@ -108,6 +108,31 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
 
 
 @njit(cache=True, nogil=True)
+def clear_all_rays(costs, origin_x, origin_y, resolution, sensors, points, ends, range_m, cleared,
+                   bounds):
+    """``clear_rays`` of several observations, in order.
+
+    Observation k has sensors[k], float64[3], and points from ends[k - 1], or 0, to ends[k].
+    """
+    begin = 0
+    for k in range(len(ends)):
+        clear_rays(costs, origin_x, origin_y, resolution, sensors[k, 0], sensors[k, 1],
+                   points[begin:ends[k]], range_m, cleared, bounds)
+        begin = ends[k]
+
+
+@njit(cache=True, nogil=True)
+def mark_all_points(costs, origin_x, origin_y, resolution, sensors, points, ends, range_m,
+                    max_height_m, bounds):
+    """``mark_points`` of several observations, as in ``clear_all_rays``."""
+    begin = 0
+    for k in range(len(ends)):
+        mark_points(costs, origin_x, origin_y, resolution, sensors[k], points[begin:ends[k]],
+                    range_m, max_height_m, bounds)
+        begin = ends[k]
+
+
+@njit(cache=True, nogil=True)
 def mark_points(costs, origin_x, origin_y, resolution, sensor, points, range_m, max_height_m,
                 bounds):
     """Make lethal the cell of each point nearer than ``range_m`` and not too high.
