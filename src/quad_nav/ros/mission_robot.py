@@ -12,7 +12,7 @@ from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D
 from quad_nav.mission.flight_log import FlightLog, Leg, RobotLog
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import Action, SendGoal, SequenceDone, Sequencer
+from quad_nav.mission.sequencer import Action, SendGoal, SequenceDone, Sequencer, Verdict
 from quad_nav.ros.mission_display import FlownPath
 from quad_nav.ros.mission_link import Inbox, RobotLink
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
@@ -67,6 +67,8 @@ class MissionRobot:
             rospy.logwarn("%s: recovery %d of %d: %s", self.name,
                           recovery.current_recovery_number + 1,
                           recovery.total_number_of_recoveries, recovery.recovery_behavior_name)
+        log.robots[self.name].aborts += sum(report.verdict is Verdict.ABORTED
+                                            for report in inbox.reports)
         for newcomer in inbox.newcomers:
             if self.link.send_to(newcomer):
                 rospy.loginfo("%s: %s sent to a node that began to listen", self.name,

@@ -38,6 +38,7 @@ from quad_nav.ros.mission_setup import MissionSetup, read_setup, result_path
 from quad_nav.ros.readiness import Need
 from quad_nav.ros.signals import init_node
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
+from quad_nav.versions import versions
 
 START_SERVICE = "/simulation/start"
 WAIT_S = 0.2  # wall time; how soon a thread sees that it shall end
@@ -55,6 +56,7 @@ class Mission:
         self.robots = [MissionRobot(index, goals, self._transforms)
                        for index, goals in enumerate(setup.robots)]
         self._log = self._new_log()
+        self._seed: Optional[int] = rospy.get_param("/simulator/seed", None)
         self._now_s = self._start_s = 0.0
         self._start_wall_s = 0.0
         self._goals = rospy.Publisher("/goals", MarkerArray, queue_size=1, latch=True)
@@ -114,7 +116,7 @@ class Mission:
             return MissionSummary(
                 tuple(robots), tuple(self._log.contacts), self._setup.robot_radius_m,
                 self._now_s - self._start_s, time.monotonic() - self._start_wall_s, reason,
-                contacts_reported=self._setup.simulation)
+                contacts_reported=self._setup.simulation, seed=self._seed, versions=versions())
 
     def _begin(self, now_s: float) -> None:
         self._log = self._new_log()
