@@ -24,6 +24,7 @@ from quad_nav.mission.sequencer import (
     Verdict,
 )
 from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.scene_map import SceneMaps
 from quad_nav.offline.setup import FlightSetup
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
@@ -100,6 +101,7 @@ class Flight:
         self.simulation = Simulation(setup.scene, len(setup.robots), setup.simulation, setup.seed)
         self.robots = [FlightRobot(goals, configuration)
                        for goals, configuration in zip(setup.robots, setup.configurations)]
+        self._give_maps()
         self._observers = tuple(observers)
         self.states = self._read_states()
         for observer in self._observers:
@@ -138,6 +140,12 @@ class Flight:
         for observer in self._observers:
             observer.ended(self)
         self.simulation.close()
+
+    def _give_maps(self) -> None:
+        maps = SceneMaps(self.setup.scene)
+        for robot in self.robots:
+            maps.give_to(robot.navigator.global_costmap)
+            maps.give_to(robot.navigator.local_costmap)
 
     def _read_states(self) -> List[RobotState]:
         return [self.simulation.state(index) for index in range(len(self.robots))]
