@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError
+from quad_nav.face.flight_info import FLIGHT_TOPIC, mission_info, to_text
 from quad_nav.face.goal_markers import goal_markers
 from quad_nav.mission.flight_log import FlightLog, unflown
 from quad_nav.mission.summary import (
