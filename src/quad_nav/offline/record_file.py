@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 from typing import Any, Dict, Protocol
 
+import lz4.frame
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer
@@ -62,6 +63,7 @@ class BagFile:
         self._path, self._active = path, active
         self._writer = Writer(active)
         self._writer.set_compression(Writer.CompressionFormat.LZ4)
+        self._writer.compressor = _compressed
         self._writer.open()
 
     def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
@@ -97,6 +99,13 @@ class BagFile:
             with contextlib.suppress(OSError):
                 writer.close()
                 return
+
+
+def _compressed(data: bytes) -> bytes:
+    """The only kind of LZ4 that ROS reads; rosbags' own is refused by ``rosbag play``."""
+    packed: bytes = lz4.frame.compress(data, block_linked=False, content_checksum=True,
+                                       store_size=False)
+    return packed
 
 
 class McapFile:
