@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 from pathlib import Path
-from typing import Any, Dict, Protocol
+from typing import Any, Dict, Optional, Protocol
 
 import lz4.frame
 from mcap.writer import CompressionType
@@ -31,7 +31,7 @@ class RecordFile(Protocol):
         ...
 
     def close(self) -> None:
-        """Completes the file. When that fails, what was written before stays readable."""
+        """Completes the file. It raises when a part was lost; the rest is readable then."""
 
 
 def create(path: Path) -> RecordFile:
@@ -64,6 +64,7 @@ class BagFile:
         self._writer = Writer(active)
         self._writer.set_compression(Writer.CompressionFormat.LZ4)
         self._writer.compressor = _compressed
+        self._error: Optional[OSError] = None
         self._writer.open()
 
     def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
@@ -72,14 +73,23 @@ class BagFile:
                                            callerid=node, latching=int(latched))
 
     def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
-        self._writer.write(handle, stamp_ns, data)
+        try:
+            self._writer.write(handle, stamp_ns, data)
+        except OSError as error:
+            self._error = error
+            raise
 
     def close(self) -> None:
         try:
-            self._writer.close()
-        except OSError:
+            if self._error is None:
+                self._writer.close()
+        except OSError as error:
+            self._error = error
+        if self._error is not None:
             self._close_shortened()
         os.replace(self._active, self._path)
+        if self._error is not None:
+            raise self._error
 
     def _close_shortened(self) -> None:
         """On a full disk: give up the newest chunks until there is room for the index."""

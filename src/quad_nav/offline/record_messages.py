@@ -203,3 +203,9 @@ def _marker(one: Marker) -> Any:
                    vector(*one.size_m), message("std_msgs/ColorRGBA", *one.rgba),
                    message("builtin_interfaces/Duration", 0, 0), one.frame_locked, empty, empty,
                    one.text, "", False)
+
+
+def pose_from(position: Any, orientation: Any) -> Pose3D:
+    """A pose from a message's point or vector and its quaternion."""
+    return Pose3D(position.x, position.y, position.z,
+                  (orientation.x, orientation.y, orientation.z, orientation.w))

@@ -29,7 +29,8 @@ def fly(setup: FlightSetup, observers: Sequence[FlightObserver] = (),
         raise
     wall_time_s = time.perf_counter() - start_wall_s
     flight.end(reason)
-    return _summary(flight, gaps, wall_time_s, reason or flight.stop_reason)
+    reasons = dict.fromkeys(why for why in (reason, flight.stop_reason) if why)
+    return _summary(flight, gaps, wall_time_s, "; ".join(reasons))
 
 
 def _advance_to_end(flight: Flight, is_stopped: Optional[Callable[[], bool]]) -> str:
