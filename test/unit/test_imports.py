@@ -44,6 +44,7 @@ PLACES = {
     "dynamic_reconfigure": "ros/",
     "tf2_ros": "ros/",
     "matplotlib": "offline/report",
+    "rerun": "offline/view",
     "lz4": "offline/",
     "rosbags": "offline/",
     "mcap": "offline/",

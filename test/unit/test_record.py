@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import resource
 
 import numpy as np
@@ -197,7 +198,7 @@ def test_added_definitions_have_the_sums_that_ros_knows_them_by(kind, digest):
     assert messages.definition(kind)[1] == digest
 
 
-@pytest.mark.parametrize("plan", [np.zeros((0, 3)), np.array([[1.5, -2.0, 0.3], [4.0, 0.1, -3.1]])])
+@pytest.mark.parametrize("plan", [np.zeros((0, 3)), np.array([[1.5, -2.0, 0.0], [4.0, 0.1, 0.0]])])
 def test_paths_have_the_bytes_of_their_messages(plan):
     poses = [messages.planar_pose(Pose2D(*row)) for row in plan.tolist()]
     stamp = 3_000_000_007
@@ -206,6 +207,14 @@ def test_paths_have_the_bytes_of_their_messages(plan):
     assert plan_bytes(plan, "odom0", stamp) == messages.encode(path)
     parts = [pose_bytes(pose, "odom0", stamp) for pose in poses]
     assert path_bytes(parts, "odom0", stamp) == messages.encode(path)
+
+
+def test_a_plan_s_headings_are_quaternions():
+    path = messages.decode(plan_bytes(np.array([[1.0, 2.0, 0.3], [3.0, 4.0, -3.1]]), "map", 1),
+                           "nav_msgs/Path")
+    for pose, yaw in zip(path.poses, (0.3, -3.1)):
+        turn = pose.pose.orientation
+        assert (turn.z, turn.w) == pytest.approx((math.sin(yaw / 2), math.cos(yaw / 2)), abs=1e-15)
 
 
 def test_mcap_holds_the_same_messages(recorded, tmp_path):

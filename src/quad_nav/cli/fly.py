@@ -27,6 +27,7 @@ from quad_nav.sim.simulation import LIDAR_CASTERS, SimulationParams
 
 _TUTORIAL_ROBOTS = 2
 _A_FILE = click.Path(dir_okay=False, path_type=Path)
+_LIVE = "live"
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
 _AMOUNT = click.FloatRange(min=0.0)
 
@@ -66,8 +67,11 @@ _AMOUNT = click.FloatRange(min=0.0)
               metavar="FILE", help="Write the summary there; - is the terminal.")
 @click.option("--record", type=_A_FILE, metavar="FILE.bag|FILE.mcap",
               help="Record the topics of the ROS face, for rosbag play and RViz.")
+@click.option("--view", is_flag=False, flag_value=_LIVE, metavar="[FILE.rrd]",
+              help="Show the flight in rerun's 3D viewer as it is flown, or save it for that.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def fly(json_path: Optional[str], record: Optional[Path], quiet: bool, **given: Any) -> None:
+def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str], quiet: bool,
+        **given: Any) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
     Ctrl-C ends the flight and keeps what was flown.
@@ -77,7 +81,7 @@ def fly(json_path: Optional[str], record: Optional[Path], quiet: bool, **given: 
     """
     try:
         setup = read_setup(_options(**given))
-        watchers = _watchers(record)
+        watchers = _watchers(record, view)
     except InputError as error:
         click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
@@ -112,12 +116,15 @@ def _parameter(text: str) -> Tuple[str, Any]:
                           f"parameter file: {error}"]) from error
 
 
-def _watchers(record: Optional[Path]) -> List[FlightObserver]:
-    """Imported here: who does not record need not wait for it."""
+def _watchers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
+    """Imported here: who neither records nor looks need not wait for it."""
     watchers: List[FlightObserver] = []
     if record is not None:
         from quad_nav.offline.record import Recorder
         watchers.append(Recorder(record))
+    if view is not None:
+        from quad_nav.offline.view import View
+        watchers.append(View(None if view == _LIVE else Path(view)))
     return watchers
 
 

@@ -42,8 +42,7 @@ def _store() -> Any:
     store = get_typestore(Stores.ROS1_NOETIC)
     types: Dict[str, Any] = {}
     for name, text in _DEFINITIONS.items():
-        if name not in store.fielddefs:
-            types.update(get_types_from_msg(text, name))
+        types.update(get_types_from_msg(text, name))
     store.register(types)
     return store
 
@@ -196,13 +195,13 @@ def marker_array(shown: Sequence[Marker], replaces_all: bool = False) -> Any:
 
 
 def _marker(one: Marker) -> Any:
-    at = Pose3D(*one.place_m, quaternion_from_yaw(one.yaw_rad))
-    empty: List[Any] = []
+    place = Pose3D(*one.place_m, quaternion_from_yaw(one.yaw_rad))
+    colours: List[Any] = []
     return message("visualization_msgs/Marker", header(one.frame, 0), one.namespace, one.number,
-                   one.kind, constant("visualization_msgs/Marker", "ADD"), pose(at),
+                   one.kind, constant("visualization_msgs/Marker", "ADD"), pose(place),
                    vector(*one.size_m), message("std_msgs/ColorRGBA", *one.rgba),
-                   message("builtin_interfaces/Duration", 0, 0), one.frame_locked, empty, empty,
-                   one.text, "", False)
+                   message("builtin_interfaces/Duration", 0, 0), one.frame_locked,
+                   [point(*at) for at in one.points_m], colours, one.text, "", False)
 
 
 def pose_from(position: Any, orientation: Any) -> Pose3D:
