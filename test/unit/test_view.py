@@ -58,6 +58,8 @@ def rerun(monkeypatch):
     fake = FakeRerun()
     monkeypatch.setitem(sys.modules, "rerun", fake)
     monkeypatch.setitem(sys.modules, "rerun.blueprint", fake.blueprint)
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setenv("PATH", "/bin")  # put back afterwards
     return fake
 
 
@@ -119,6 +121,23 @@ def test_without_a_file_the_viewer_is_opened(rerun):
     View()
     assert ("spawn",) in rerun.calls
     assert "save" not in [call[0] for call in rerun.calls]
+
+
+def test_without_a_display_no_viewer_is_opened(rerun, monkeypatch):
+    monkeypatch.delenv("DISPLAY")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(InputError, match="no display for the viewer; expected one, or --view FILE"):
+        View()
+
+
+def test_a_viewer_that_does_not_start_is_told(rerun, monkeypatch):
+    def spawn():
+        raise RuntimeError("no viewer.\nmore")
+
+    rerun.spawn = spawn
+    with pytest.raises(InputError, match="viewer does not start: no viewer. expected a display"):
+        View()
 
 
 @pytest.mark.parametrize("name, problem", [

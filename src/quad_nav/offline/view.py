@@ -5,6 +5,8 @@ rerun is an optional extra, ``pip install 'quad-nav[view]'``.
 from __future__ import annotations
 
 import importlib
+import os
+import sys
 from pathlib import Path
 from typing import Any, List, Optional, Tuple
 
@@ -43,7 +45,7 @@ class View(FlightObserver):
             _check(path)
         self._rr.init("quad")
         if path is None:
-            self._rr.spawn()
+            _spawn(self._rr)
         else:
             self._rr.save(path)
         layout = importlib.import_module("rerun.blueprint")
@@ -143,6 +145,21 @@ def _rerun() -> Any:
         raise InputError([f"--view: needs rerun ({error}); install it with "
                           "pip install 'quad-nav[view]', in a checkout with "
                           ".venv/bin/pip install '.[view]'"]) from error
+
+
+def _spawn(rr: Any) -> None:
+    """Opens the viewer; pip puts it beside Python, where an unactivated environment's PATH
+    does not look."""
+    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
+        raise InputError(["--view: there is no display for the viewer; expected one, or "
+                          "--view FILE.rrd to look at later"])
+    beside = str(Path(sys.executable).parent)
+    os.environ["PATH"] = os.pathsep.join((os.environ.get("PATH", os.defpath), beside))
+    try:
+        rr.spawn()
+    except RuntimeError as error:
+        raise InputError([f"--view: the viewer does not start: {str(error).splitlines()[0]} "
+                          "expected a display, or --view FILE.rrd to look at later"]) from error
 
 
 def _check(path: Path) -> None:
