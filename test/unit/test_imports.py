@@ -21,14 +21,14 @@ LAYERS = [
     {"navigator", "mission"},
     {"config"},
     {"assembly"},
-    {"warm_up", "check", "scene_check", "random_mission"},
+    {"warm_up", "check", "scene_check", "random_mission", "face"},
     {"offline", "ros"},
     {"cli"},
 ]
 NOUNS = LAYERS[0]  # they may import one another
 # Navigation knows no simulator.
-WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "random_mission", "offline",
-               "ros", "cli"}
+WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "random_mission", "face",
+               "offline", "ros", "cli"}
 
 # Where a third-party package may be imported: that file or folder and nowhere else.
 PLACES = {
@@ -44,6 +44,10 @@ PLACES = {
     "dynamic_reconfigure": "ros/",
     "tf2_ros": "ros/",
     "matplotlib": "offline/report",
+    "rerun": "offline/view",
+    "lz4": "offline/",
+    "rosbags": "offline/",
+    "mcap": "offline/",
 }
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")
 

@@ -8,7 +8,7 @@ import sys
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Callable, Iterator, List, Optional, Tuple
+from typing import Any, Callable, Iterator, List, Optional, Sequence, Tuple
 
 import click
 import yaml
@@ -27,6 +27,7 @@ from quad_nav.sim.simulation import LIDAR_CASTERS, SimulationParams
 
 _TUTORIAL_ROBOTS = 2
 _A_FILE = click.Path(dir_okay=False, path_type=Path)
+_LIVE = "live"
 _POSITIVE = click.FloatRange(min=0.0, min_open=True)
 _AMOUNT = click.FloatRange(min=0.0)
 
@@ -64,8 +65,13 @@ _AMOUNT = click.FloatRange(min=0.0)
               help="Who casts the beams: our kernel, or the physics engine.")
 @click.option("--json", "json_path", type=click.Path(dir_okay=False, allow_dash=True),
               metavar="FILE", help="Write the summary there; - is the terminal.")
+@click.option("--record", type=_A_FILE, metavar="FILE.bag|FILE.mcap",
+              help="Record the topics of the ROS face, for rosbag play and RViz.")
+@click.option("--view", is_flag=False, flag_value=_LIVE, metavar="[FILE.rrd]",
+              help="Show the flight in rerun's 3D viewer as it is flown, or save it for that.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def fly(json_path: Optional[str], quiet: bool, **given: Any) -> None:
+def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str], quiet: bool,
+        **given: Any) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
     Ctrl-C ends the flight and keeps what was flown.
@@ -75,13 +81,14 @@ def fly(json_path: Optional[str], quiet: bool, **given: Any) -> None:
     """
     try:
         setup = read_setup(_options(**given))
+        watchers = _watchers(record, view)
     except InputError as error:
         click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
     if not quiet:
         for warning in setup.warnings:
             click.echo(warning, err=True)
-    sys.exit(_fly(setup, json_path, quiet))
+    sys.exit(_fly(setup, watchers, json_path, quiet))
 
 
 def _options(scan_range: float, beams: int, range_noise: float, jitter: float, lidar: str,
@@ -109,10 +116,21 @@ def _parameter(text: str) -> Tuple[str, Any]:
                           f"parameter file: {error}"]) from error
 
 
-def _fly(setup: FlightSetup, json_path: Optional[str], quiet: bool) -> int:
-    observers: List[FlightObserver] = []
-    if not quiet:
-        observers.append(ProgressBar())
+def _watchers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
+    """Imported here: who neither records nor looks need not wait for it."""
+    watchers: List[FlightObserver] = []
+    if record is not None:
+        from quad_nav.offline.record import Recorder
+        watchers.append(Recorder(record))
+    if view is not None:
+        from quad_nav.offline.view import View
+        watchers.append(View(None if view == _LIVE else Path(view)))
+    return watchers
+
+
+def _fly(setup: FlightSetup, watchers: Sequence[FlightObserver], json_path: Optional[str],
+         quiet: bool) -> int:
+    observers = [*watchers] if quiet else [*watchers, ProgressBar()]
     with _stop_on_signal() as is_stopped:
         summary = fly_setup(setup, observers, is_stopped)
     to_terminal = json_path == "-"

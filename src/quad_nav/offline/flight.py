@@ -102,6 +102,7 @@ class Flight:
         self.robots = [FlightRobot(goals, configuration)
                        for goals, configuration in zip(setup.robots, setup.configurations)]
         self._give_maps()
+        self.reason = ""  # why it ended before its goals did, if it did
         self._observers = tuple(observers)
         self.states = self._read_states()
         for observer in self._observers:
@@ -121,6 +122,11 @@ class Flight:
     def is_done(self) -> bool:
         return all(robot.sequencer.done for robot in self.robots)
 
+    @property
+    def stop_reason(self) -> str:
+        """Why an observer wants it to end, "" when none does."""
+        return next((o.stop_reason for o in self._observers if o.stop_reason), "")
+
     def advance(self) -> None:
         """Fly for one period of odometry, 1/40 s."""
         for _ in range(STEPS_PER_ODOMETRY):
@@ -135,8 +141,9 @@ class Flight:
         self._sequence()
         self._navigate()
 
-    def end(self) -> None:
+    def end(self, reason: str = "") -> None:
         """Frees the simulation; the observers are told once."""
+        self.reason = reason
         for observer in self._observers:
             observer.ended(self)
         self.simulation.close()

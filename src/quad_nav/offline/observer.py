@@ -18,6 +18,11 @@ class FlightObserver:
     ``robot`` is the quadcopter's number. What is handed over must not be changed.
     """
 
+    @property
+    def stop_reason(self) -> str:
+        """Why the flight must end, "" while it may go on."""
+        return ""
+
     def began(self, flight: Flight) -> None:
         """Everything is in place at time 0 and nothing has moved yet."""
 

@@ -22,16 +22,29 @@ def fly(setup: FlightSetup, observers: Sequence[FlightObserver] = (),
     gaps = Gaps(setup.scene, len(setup.robots), setup.robot_radius_m)
     flight = Flight(setup, (gaps, *observers))
     start_wall_s = time.perf_counter()
-    reason = ""
+    try:
+        reason = _advance_to_end(flight, is_stopped)
+    except BaseException as error:  # what was flown is not lost with a fault of ours
+        flight.end(f"ended by {type(error).__name__}")
+        raise
+    wall_time_s = time.perf_counter() - start_wall_s
+    flight.end(reason)
+    reasons = dict.fromkeys(why for why in (reason, flight.stop_reason) if why)
+    return _summary(flight, gaps, wall_time_s, "; ".join(reasons))
+
+
+def _advance_to_end(flight: Flight, is_stopped: Optional[Callable[[], bool]]) -> str:
+    """Why it ended early, "" when every goal is through."""
+    time_limit_s = flight.setup.time_limit_s
+    reason = flight.stop_reason
     while not flight.is_done and not reason:
         flight.advance()
-        if flight.now_s >= setup.time_limit_s and not flight.is_done:
-            reason = f"time limit of {setup.time_limit_s:g} s"
+        reason = flight.stop_reason
+        if flight.now_s >= time_limit_s and not flight.is_done:
+            reason = reason or f"time limit of {time_limit_s:g} s"
         elif is_stopped is not None and is_stopped():
-            reason = INTERRUPTED
-    wall_time_s = time.perf_counter() - start_wall_s
-    flight.end()
-    return _summary(flight, gaps, wall_time_s, reason)
+            reason = reason or INTERRUPTED
+    return reason
 
 
 def _summary(flight: Flight, gaps: Gaps, wall_time_s: float, reason: str) -> MissionSummary:

@@ -1,23 +1,20 @@
 """A costmap's topics: the full grid, its updates and the footprint.
 
-The rules are the original's: nothing is published without a listener; the full
-grid when the map moved or changed its size, else only the window that changed;
-one full grid for every new listener; with a publish frequency of 0 that is all.
+The rules are the original's: nothing is published without a listener; what ``CostmapNews``
+says; one full grid for every new listener; with a publish frequency of 0 that is all.
 """
 from __future__ import annotations
-
-from typing import Optional
 
 import rospy
 from geometry_msgs.msg import PolygonStamped
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
 
-from quad_nav.costmap.cost_grid import NO_CELLS, Window
+from quad_nav.costmap.cost_grid import Window
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.face.costmap_news import CostmapNews
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
-from quad_nav.grid import GridSpec
 from quad_nav.ros.nav_messages import grid_message, polygon_message, update_message
 from quad_nav.ros.voxel_publisher import voxel_publishers
 
@@ -36,9 +33,7 @@ class CostmapPublisher:
     def __init__(self, name: str, costmap: LayeredCostmap, lock):
         self._costmap = costmap
         self._lock = lock
-        self._changed = NO_CELLS
-        self._published: Optional[GridSpec] = None
-        self._last_s = 0.0
+        self._news = CostmapNews(costmap)
         self._footprint = rospy.Publisher(f"~{name}/footprint", PolygonStamped, queue_size=1)
         self._updates = rospy.Publisher(
             f"~{name}/costmap_updates", OccupancyGridUpdate, queue_size=10)
@@ -55,21 +50,15 @@ class CostmapPublisher:
                 oriented(self._costmap.footprint, pose), params.global_frame, stamp))
         for voxels in self._voxels:
             voxels.publish(params.global_frame, stamp)
-        self._changed = self._changed.union(window)
-        period_s = 1.0 / params.publish_frequency_hz if params.publish_frequency_hz > 0.0 else None
-        if period_s is None or now_s < self._last_s + period_s - 1e-6:
-            return
-        self._last_s = now_s
-        self._publish(stamp)
+        if self._news.note(now_s, window):
+            self._publish(stamp)
 
     def _publish(self, stamp: rospy.Time) -> None:
-        costmap, changed = self._costmap, self._changed
-        self._changed = NO_CELLS
+        costmap, changed = self._costmap, self._news.take()
         if self._grid.get_num_connections() == 0 and self._updates.get_num_connections() == 0:
             return
-        if costmap.params.always_send_full_costmap or costmap.spec != self._published:
+        if self._news.wants_full_grid():
             self._grid.publish(self._full(stamp))
-            self._published = costmap.spec
         elif not changed.is_empty:
             part = costmap.costs[changed.slices]
             self._updates.publish(update_message(

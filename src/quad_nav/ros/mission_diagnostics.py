@@ -1,12 +1,12 @@
 """The mission's progress as ``diagnostic_msgs``."""
 from __future__ import annotations
 
-import re
 from typing import Sequence
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from quad_nav.face.contacts import contact_from_values
 from quad_nav.mission.flight_log import Contact, FlightLog
 from quad_nav.ros.mission_robot import MissionRobot
 
@@ -48,12 +48,5 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
 
 def contact_from_message(status: DiagnosticStatus) -> Contact:
     """A contact as the simulator reports it. Raises ValueError for what cannot be read."""
-    values = {pair.key: pair.value for pair in status.values}
-    try:
-        # The simulator writes "quadcopter 1"; robots[].robot in our summary is "quad1".
-        other = re.sub(r"^quadcopter (\d+)$", r"quad\1", values["with"])
-        return Contact(float(values["time_s"]), status.hardware_id, other,
-                       float(values["x_m"]), float(values["y_m"]))
-    except (KeyError, ValueError) as error:
-        raise ValueError(f"a contact without a readable {error}; expected the values time_s, "
-                         "with, x_m, y_m") from error
+    return contact_from_values(status.hardware_id,
+                               {pair.key: pair.value for pair in status.values})

@@ -7,14 +7,16 @@ from typing import Optional
 
 import rospy
 from nav_msgs.msg import Odometry
+from std_msgs.msg import String
 
 from quad_nav.errors import InputError
+from quad_nav.face.flight_info import EVENTS_TOPIC, event, to_text
 from quad_nav.geometry import Pose3D
 from quad_nav.mission.flight_log import FlightLog, Leg, RobotLog
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import Action, SendGoal, SequenceDone, Sequencer, Verdict
-from quad_nav.ros.mission_display import FlownPath
 from quad_nav.ros.mission_link import Inbox, RobotLink
+from quad_nav.ros.path_publisher import PathPublisher
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
 
 FILE_POLL_S = 0.5  # wall time: a person edits while the simulation is paused, too
@@ -41,7 +43,9 @@ class MissionRobot:
         self._file = goals.file
         self._next_poll_s = 0.0
         self._transforms = transforms
-        self._path = FlownPath(f"/path{index}")
+        self._index = index
+        self._events = rospy.Publisher(EVENTS_TOPIC, String, queue_size=100)
+        self._path = PathPublisher(f"/path{index}")
 
     def begin(self, now_s: float) -> None:
         """From the first goal: at the start, and after the simulation was reset."""
@@ -79,7 +83,7 @@ class MissionRobot:
         actions = self.sequencer.tick(now_s, self.pose.to_2d(), inbox.reports,
                                       self.link.navigator_is_idle(now_s))
         for action in actions:
-            self._do(action, log.robots[self.name])
+            self._do(action, now_s, log.robots[self.name])
         return changed or bool(actions)
 
     def map_from(self, frame: str) -> Pose3D:
@@ -126,7 +130,8 @@ class MissionRobot:
                       len(sequence.goals), min(self.sequencer.index, len(sequence.goals)))
         return True
 
-    def _do(self, action: Action, log: RobotLog) -> None:
+    def _do(self, action: Action, now_s: float, log: RobotLog) -> None:
+        self._events.publish(to_text(event(self._index, now_s, action)))
         leg = log.act(action)
         if isinstance(action, SendGoal):
             self.link.send(action.pose)

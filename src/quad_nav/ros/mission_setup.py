@@ -39,7 +39,7 @@ DEFAULTS: Dict[str, Any] = {
 
 @dataclass(frozen=True)
 class MissionSetup:
-    """A mission that can be flown."""
+    """A mission that can be flown; ``parameters`` are the navigators' trees, {} if unknown."""
 
     robots: Tuple[RobotGoals, ...]
     robot_radius_m: float
@@ -49,6 +49,7 @@ class MissionSetup:
     ready_timeout_s: float
     exit_when_done: bool
     warnings: Tuple[str, ...]
+    parameters: Tuple[Mapping[str, Any], ...] = ()
 
 
 def result_path(parameters: Mapping[str, Any]) -> Path:
@@ -89,7 +90,9 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
                         values["simulation"], float(values["ready_timeout"]),
                         values["exit_when_done"],
                         (*_unknown(parameters, name), *close_ends(robots, radius_m),
-                         *(uncovered(scene, navigators) if scene else [])))
+                         *(uncovered(scene, navigators) if scene else [])),
+                        tuple(navigators[name].to_tree() if name in all_parameters else {}
+                              for name in navigators))
 
 
 def _faults(values: Mapping[str, Any], name: str) -> List[str]:

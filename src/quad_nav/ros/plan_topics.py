@@ -1,12 +1,15 @@
 """What a tick planned and commanded, as the original's topics."""
 from __future__ import annotations
 
+from typing import Optional
+
 import numpy as np
 import rospy
 from geometry_msgs.msg import Twist
 from move_base_msgs.msg import RecoveryStatus
 from nav_msgs.msg import OccupancyGrid, Path
 from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
 
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator import Navigator
@@ -20,7 +23,7 @@ from quad_nav.ros.nav_messages import (
     pose_stamped,
     potential_message,
 )
-from quad_nav.tick import Tick
+from quad_nav.tick import State, Tick
 
 
 class PlanTopics:
@@ -37,6 +40,8 @@ class PlanTopics:
         self._global_plan = rospy.Publisher(f"~{controller}/global_plan", Path, queue_size=1)
         self._local_plan = rospy.Publisher(f"~{controller}/local_plan", Path, queue_size=1)
         self._cost_cloud = rospy.Publisher(f"~{controller}/cost_cloud", PointCloud2, queue_size=1)
+        self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
+        self._told_state: Optional[State] = None
         self._recovery = rospy.Publisher(
             "move_base/recovery_status", RecoveryStatus, queue_size=1)
 
@@ -50,6 +55,9 @@ class PlanTopics:
 
     def publish(self, tick: Tick, pose: Pose3D) -> None:
         now = rospy.Time.from_sec(tick.now_s)
+        if tick.state is not self._told_state:
+            self._told_state = tick.state
+            self._state.publish(tick.state.value)
         if tick.command is not None:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:

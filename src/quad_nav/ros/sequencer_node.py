@@ -16,10 +16,13 @@ from typing import Iterator, List, Optional
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError
+from quad_nav.face.flight_info import FLIGHT_TOPIC, mission_info, to_text
+from quad_nav.face.goal_markers import goal_markers
 from quad_nav.mission.flight_log import FlightLog, unflown
 from quad_nav.mission.summary import (
     EXIT_BAD_INPUT,
@@ -31,8 +34,8 @@ from quad_nav.mission.summary import (
     write_json,
 )
 from quad_nav.ros import readiness
+from quad_nav.ros.marker_messages import only_markers
 from quad_nav.ros.mission_diagnostics import contact_from_message, progress
-from quad_nav.ros.mission_display import goal_markers
 from quad_nav.ros.mission_robot import MissionRobot
 from quad_nav.ros.mission_setup import MissionSetup, read_setup, result_path
 from quad_nav.ros.readiness import Need
@@ -63,6 +66,10 @@ class Mission:
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
         self._contacts = rospy.Subscriber("/simulation/contacts", DiagnosticStatus,
                                           self._on_contact)
+        self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
+        self._flight.publish(to_text(mission_info(
+            {robot.name: robot.sequence for robot in setup.robots}, setup.parameters,
+            setup.robot_radius_m)))
         self._show_goals()
 
     @property
@@ -134,7 +141,8 @@ class Mission:
         altitude_m = self._setup.altitude_m
         if altitude_m is None:
             altitude_m = heights[0] if heights else 0.0
-        self._goals.publish(goal_markers([robot.sequencer for robot in self.robots], altitude_m))
+        self._goals.publish(only_markers(
+            goal_markers([robot.sequencer for robot in self.robots], altitude_m)))
 
     def _on_contact(self, message: DiagnosticStatus) -> None:
         if message.name != "contact":

@@ -22,7 +22,7 @@ from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError
 from quad_nav.ros.convert import twist_from_message
-from quad_nav.ros.simulator_markers import goal_spheres
+from quad_nav.ros.marker_messages import goal_spheres
 from quad_nav.ros.simulator_setup import (
     DEFAULTS,
     SimulatorSetup,

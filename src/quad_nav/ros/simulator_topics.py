@@ -1,16 +1,20 @@
 """What the simulator tells: clock, transforms, odometry, scans, contacts, health."""
 from __future__ import annotations
 
-from typing import List, Sequence
+from typing import List, Mapping
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
+from quad_nav.face.contacts import NAME, contact_values, text_values
+from quad_nav.face.flight_info import FLIGHT_TOPIC, simulation_info, to_text
+from quad_nav.face.markers import quadcopter_markers, scene_markers
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.convert import (
     odometry_message,
@@ -18,7 +22,7 @@ from quad_nav.ros.convert import (
     time_message,
     transform_message,
 )
-from quad_nav.ros.simulator_markers import quadcopter_markers, scene_markers
+from quad_nav.ros.marker_messages import marker_array
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.simulation import Simulation
@@ -52,8 +56,10 @@ class SimulatorTopics:
         self._scene = rospy.Publisher("/simulation/scene", MarkerArray, queue_size=1, latch=True)
         self._quadcopters = rospy.Publisher("/simulation/quadcopters", MarkerArray, queue_size=1,
                                             latch=True)
-        self._scene.publish(scene_markers(simulation.scene))
-        self._quadcopters.publish(quadcopter_markers(simulation.n_robots))
+        self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
+        self._flight.publish(to_text(simulation_info(simulation.scene, simulation.seed)))
+        self._scene.publish(marker_array(scene_markers(simulation.scene)))
+        self._quadcopters.publish(marker_array(quadcopter_markers(simulation.n_robots)))
 
     def publish_clock(self) -> None:
         self._clock.publish(Clock(time_message(self._simulation.now_s)))
@@ -89,10 +95,8 @@ class SimulatorTopics:
         x, y, _ = contact.position_m
         rospy.logwarn("%s at (%.2f, %.2f) m, time %.2f s", contact, x, y, contact.time_s)
         self._contacts.publish(DiagnosticStatus(
-            level=DiagnosticStatus.WARN, name="contact", hardware_id=f"quad{contact.robot}",
-            message=str(contact),
-            values=_values(time_s=contact.time_s, robot=contact.robot,
-                           **{"with": contact.other}, x_m=x, y_m=y)))
+            level=DiagnosticStatus.WARN, name=NAME, hardware_id=f"quad{contact.robot}",
+            message=str(contact), values=_pairs(contact_values(contact, contact.time_s))))
 
     def publish_health(self, paused: bool, rate: float, factor: float) -> None:
         """``factor`` is the real-time factor reached of the ``rate`` asked for."""
@@ -111,8 +115,8 @@ class SimulatorTopics:
         return DiagnosticStatus(
             level=DiagnosticStatus.WARN if lags else DiagnosticStatus.OK,
             name="simulator: clock", hardware_id="simulator", message=message,
-            values=_values(real_time_factor=factor, rate=rate,
-                           contacts=len(self._simulation.contacts)))
+            values=_pairs(text_values(real_time_factor=factor, rate=rate,
+                           contacts=len(self._simulation.contacts))))
 
     def _robots_health(self) -> List[DiagnosticStatus]:
         simulation = self._simulation
@@ -121,11 +125,10 @@ class SimulatorTopics:
             name=f"simulator: quadcopter {i}", hardware_id=f"quad{i}",
             message=("hovering, no commands" if hovering else "flying")
             + ("" if self.lidar_enabled[i] else ", LIDAR switched off"),
-            values=_values(contacts=sum(c.involves(i) for c in simulation.contacts),
-                           lidar=self.lidar_enabled[i]))
+            values=_pairs(text_values(contacts=sum(c.involves(i) for c in simulation.contacts),
+                                      lidar=self.lidar_enabled[i])))
             for i, hovering in enumerate(simulation.is_hovering)]
 
 
-def _values(**entries: object) -> Sequence[KeyValue]:
-    return [KeyValue(key, f"{value:.6g}" if isinstance(value, float) else str(value))
-            for key, value in entries.items()]
+def _pairs(values: Mapping[str, str]) -> List[KeyValue]:
+    return [KeyValue(key, value) for key, value in values.items()]

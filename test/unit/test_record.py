@@ -1,0 +1,354 @@
+"""Recordings: the flight stays as it is, and the file holds what happened, to the bit."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import resource
+
+import numpy as np
+import pytest
+from recorded_flight import flown, setup
+
+from quad_nav.costmap.occupancy import occupancy
+from quad_nav.errors import InputError
+from quad_nav.face.flight_info import FLIGHT_TOPIC
+from quad_nav.geometry import Pose2D
+from quad_nav.offline import record_messages as messages
+from quad_nav.offline.bag_file import read_messages
+from quad_nav.offline.flight import Flight
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.record import Recorder
+from quad_nav.offline.record_file import create
+from quad_nav.offline.record_path import path_bytes, plan_bytes, pose_bytes
+from quad_nav.offline.run import INTERRUPTED, fly
+from quad_nav.offline.setup import FlightOptions, read_setup
+from quad_nav.shipped import shipped
+from quad_nav.sim.scene_file import scene_from_document
+
+
+class Notes(FlightObserver):
+    """Keeps what is handed over, to be compared with what was written."""
+
+    def __init__(self):
+        self.scans, self.states, self.windows = [], [], []
+
+    def began(self, flight):
+        self._flight = flight
+        self.moved(flight)
+
+    def scanned(self, robot, scan, map_from_lidar):
+        self.scans.append((robot, scan))
+
+    def moved(self, flight):
+        self.states.append((flight.now_s, list(flight.states)))
+
+    def ticked(self, robot, tick, located, wall_s):
+        for name in tick.windows:
+            navigator = self._flight.robots[robot].navigator
+            costs = {"global": navigator.global_costmap, "local": navigator.local_costmap}[name]
+            self.windows.append((robot, name, tick.now_s, occupancy(costs.costs)))
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flight")
+    path, notes = folder / "flight.bag", Notes()
+    flight_setup = setup(folder)
+    return path, notes, flown(flight_setup, [notes, Recorder(path, "short")]), flown(flight_setup)
+
+
+def read(path, *topics):
+    return list(read_messages(path, lambda topic, kind: topic in topics))
+
+
+def test_recording_changes_no_bit_of_the_flight(recorded):
+    _, _, with_recorder, without = recorded
+    assert with_recorder.summary.success
+    assert with_recorder.summary.robots == without.summary.robots
+    for one, other in zip(with_recorder.trace.robots, without.trace.robots):
+        for field in ("times_s", "positions_m", "quaternions", "velocities", "commands"):
+            assert np.array_equal(getattr(one, field), getattr(other, field)), field
+        assert one.goals == other.goals
+
+
+def test_the_same_flight_makes_the_same_file(recorded, tmp_path):
+    path = recorded[0]
+    again = tmp_path / "again.bag"
+    fly(setup(tmp_path), [Recorder(again, "short")])
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_odometry_is_the_simulation_s_to_the_bit(recorded):
+    path, notes, *_ = recorded
+    found = read(path, "/odom1")
+    assert len(found) == len(notes.states)
+    for message, (now_s, states) in zip(found, notes.states):
+        odometry, state = message.content, states[1]
+        assert messages.stamp_ns(odometry.header.stamp) == message.stamp_ns
+        assert message.stamp_ns == round(now_s * 1e9) + 10**9
+        assert messages.pose_from(odometry.pose.pose.position,
+                                  odometry.pose.pose.orientation) == state.map_from_base
+        linear = odometry.twist.twist.linear
+        assert (linear.x, linear.y, linear.z) == state.linear_mps
+        assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom1", "base_link1")
+
+
+def test_transforms_are_a_chain_from_the_map_to_the_lidar(recorded):
+    path, notes, *_ = recorded
+    last = read(path, "/tf")[-1].content.transforms
+    links = [(one.header.frame_id, one.child_frame_id) for one in last]
+    assert links == [("map", "odom0"), ("odom0", "base_link0"), ("base_link0", "Lidar0"),
+                     ("map", "odom1"), ("odom1", "base_link1"), ("base_link1", "Lidar1")]
+    assert messages.pose_from(last[4].transform.translation, last[4].transform.rotation) \
+        == notes.states[-1][1][1].map_from_base
+
+
+def test_scans_are_the_lidar_s_to_the_bit(recorded):
+    path, notes, *_ = recorded
+    scans = [scan for robot, scan in notes.scans if robot == 0]
+    found = read(path, "/scan0")
+    assert len(found) == len(scans)
+    for message, scan in zip(found, scans):
+        assert message.content.ranges.tobytes() == scan.ranges_m.tobytes()
+        assert message.stamp_ns == round(scan.stamp_s * 1e9) + 10**9
+        assert message.content.header.frame_id == "Lidar0"
+
+
+@pytest.mark.parametrize("name", ["global", "local"])
+def test_costmaps_are_what_the_navigator_has(recorded, name):
+    """A full grid is all of it, an update the window that changed."""
+    path, notes, *_ = recorded
+    grids = {round(now_s * 1e9) + 10**9: grid for robot, which, now_s, grid in notes.windows
+             if robot == 0 and which == name}
+    topic = f"/move_base0/{name}_costmap/costmap"
+    found = read(path, topic, f"{topic}_updates")
+    assert found[0].topic == topic
+    for message in found:
+        content, grid = message.content, grids[message.stamp_ns]
+        if message.topic == topic:
+            assert content.data.tobytes() == grid.tobytes()
+            assert (content.info.height, content.info.width) == grid.shape
+        else:
+            part = grid[content.y:content.y + content.height, content.x:content.x + content.width]
+            assert content.data.tobytes() == part.tobytes()
+
+
+def test_a_costmap_is_told_as_often_as_its_parameters_say(recorded):
+    path, _, flight, _ = recorded
+    topic = "/move_base0/global_costmap/costmap"
+    stamps = [message.stamp_ns for message in read(path, topic, f"{topic}_updates")]
+    assert len(stamps) > 2
+    assert np.diff(stamps[1:]).min() == 10**9  # publish_frequency 1.0
+
+
+def test_goals_are_sent_taken_and_ended_as_by_the_action_server(recorded):
+    path = recorded[0]
+    sent = read(path, "/move_base_simple/goal0")
+    taken = read(path, "/move_base0/current_goal")
+    assert [(one.content.pose.position.x, one.content.pose.position.y) for one in sent] == \
+        [(2.1, 1.9), (2.6, 2.3)]
+    assert [one.content for one in taken] == [one.content for one in sent]
+    results = [one.content.status for one in read(path, "/move_base0/result")]
+    assert [one.status for one in results[:1]] == [2]  # PREEMPTED: the next goal came before
+    names = [one.content.status.goal_id.id for one in read(path, "/move_base0/feedback")]
+    assert len(set(names)) == 2
+
+
+def test_the_flight_is_described_with_its_end(recorded):
+    path, _, flight, _ = recorded
+    first, last = [json.loads(one.content.data) for one in read(path, FLIGHT_TOPIC)]
+    assert first == last
+    assert (last["title"], last["seed"], last["config"]) == ("short", 0, "default")
+    assert scene_from_document(last["scene"], "it") == flight.trace.scene
+    assert last["robots"][0]["goals"] == [[2.1, 1.9], [2.6, 2.3, 0.5]]
+    assert last["robots"][1]["parameters"] == flight.trace.robots[1].parameters
+
+
+def test_markers_show_every_solid_quadcopter_and_goal(recorded):
+    path, _, flight, _ = recorded
+    scene, = read(path, "/simulation/scene")
+    assert len(scene.content.markers) == 4 + len(flight.trace.scene.obstacles)
+    quadcopters, = read(path, "/simulation/quadcopters")
+    assert {one.header.frame_id for one in quadcopters.content.markers} == \
+        {"base_link0", "base_link1"}
+    goals = read(path, "/goals")[0].content.markers
+    assert goals[0].action == 3  # DELETEALL
+    assert [one.text for one in goals if one.text] == ["1", "2", "1"]
+
+
+def test_chunks_are_compressed_as_ros_reads_them(recorded):
+    """Independent blocks, a checksum of the content, no size: flags 0x64 of an LZ4 frame."""
+    data = recorded[0].read_bytes()
+    magic = b"\x04\x22\x4d\x18"
+    flags = {data[at + 4] for at in range(len(data)) if data.startswith(magic, at)}
+    assert flags == {0x64}
+
+
+@pytest.mark.parametrize("kind, digest", [
+    ("tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec"),
+    ("map_msgs/OccupancyGridUpdate", "b295be292b335c34718bd939deebe1c9"),
+    ("move_base_msgs/RecoveryStatus", "a2488e0805e1529a31044786ee1a2623"),
+    ("move_base_msgs/MoveBaseActionGoal", "660d6895a1b9a16dce51fbdd9a64a56b"),
+    ("move_base_msgs/MoveBaseActionFeedback", "7d1870ff6e0decea702b943b5af0b42e"),
+    ("move_base_msgs/MoveBaseActionResult", "1eb06eeff08fa7ea874431638cb52332"),
+])
+def test_added_definitions_have_the_sums_that_ros_knows_them_by(kind, digest):
+    assert messages.definition(kind)[1] == digest
+
+
+@pytest.mark.parametrize("plan", [np.zeros((0, 3)), np.array([[1.5, -2.0, 0.0], [4.0, 0.1, 0.0]])])
+def test_paths_have_the_bytes_of_their_messages(plan):
+    poses = [messages.planar_pose(Pose2D(*row)) for row in plan.tolist()]
+    stamp = 3_000_000_007
+    path = messages.message("nav_msgs/Path", messages.header("odom0", stamp),
+                            [messages.pose_stamped(pose, "odom0", stamp) for pose in poses])
+    assert plan_bytes(plan, "odom0", stamp) == messages.encode(path)
+    parts = [pose_bytes(pose, "odom0", stamp) for pose in poses]
+    assert path_bytes(parts, "odom0", stamp) == messages.encode(path)
+
+
+def test_a_plan_s_headings_are_quaternions():
+    path = messages.decode(plan_bytes(np.array([[1.0, 2.0, 0.3], [3.0, 4.0, -3.1]]), "map", 1),
+                           "nav_msgs/Path")
+    for pose, yaw in zip(path.poses, (0.3, -3.1)):
+        turn = pose.pose.orientation
+        assert (turn.z, turn.w) == pytest.approx((math.sin(yaw / 2), math.cos(yaw / 2)), abs=1e-15)
+
+
+def test_mcap_holds_the_same_messages(recorded, tmp_path):
+    path = tmp_path / "flight.mcap"
+    fly(setup(tmp_path, time_limit_s=1.0), [Recorder(path, "short")])
+    for ours, theirs in zip(read(path, "/odom0", "/tf", "/quad/events"),
+                            read(recorded[0], "/odom0", "/tf", "/quad/events")):
+        assert (ours.topic, ours.stamp_ns) == (theirs.topic, theirs.stamp_ns)
+        assert messages.encode(ours.content) == messages.encode(theirs.content)
+
+
+@pytest.mark.parametrize("name, problem", [
+    ("flight.txt", "expected a name that ends with .bag or .mcap"),
+    ("file/flight.bag", "cannot be recorded to: "),
+    ("folder.bag", "is a folder"),
+])
+def test_a_file_that_cannot_be_made_is_refused_at_once(tmp_path, name, problem):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    (tmp_path / "folder.bag").mkdir()
+    with pytest.raises(InputError, match=problem):
+        Recorder(tmp_path / name)
+
+
+def test_an_older_recording_stays_until_the_new_one_is_complete(tmp_path):
+    path = tmp_path / "flight.bag"
+    path.write_bytes(b"older")
+    flight = Flight(setup(tmp_path), [Recorder(path)])
+    flight.advance()
+    assert path.read_bytes() == b"older"
+    flight.end("enough")
+    assert len(read(path, "/odom0")) == 2
+    assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == "enough"
+    assert not path.with_name("flight.bag.active").exists()
+
+
+def test_an_interrupted_flight_leaves_a_recording(tmp_path):
+    path = tmp_path / "flight.bag"
+    summary = fly(setup(tmp_path), [Recorder(path)], lambda: True)
+    assert summary.reason == INTERRUPTED
+    assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == INTERRUPTED
+
+
+def test_a_flight_that_fails_leaves_a_recording(tmp_path):
+    class Faulty(FlightObserver):
+        def moved(self, flight):
+            raise ZeroDivisionError
+
+    path = tmp_path / "flight.bag"
+    with pytest.raises(ZeroDivisionError):
+        fly(setup(tmp_path), [Recorder(path), Faulty()])
+    reason = json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"]
+    assert reason == "ended by ZeroDivisionError"
+
+
+class SizeLimit:
+    """No file can grow beyond so many bytes, as if the disk were full."""
+
+    def __init__(self, size):
+        self._size = size
+
+    def __enter__(self):
+        self._before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (self._size, self._before[1]))
+
+    def __exit__(self, *_):
+        resource.setrlimit(resource.RLIMIT_FSIZE, self._before)
+
+
+def test_a_full_disk_ends_the_flight_and_what_was_recorded_is_readable(tmp_path):
+    path = tmp_path / "flight.bag"
+    long_flight = read_setup(FlightOptions(shipped("scenes", "arena.yaml"), shipped("goals")))
+    with SizeLimit(500_000):
+        summary = fly(long_flight, [Recorder(path)])
+    assert summary.reason == "the recording cannot be written: File too large"
+    assert summary.exit_status == 1
+    assert path.stat().st_size <= 500_000
+    assert 40 < len(read(path, "/odom0")) < summary.sim_time_s * 40
+
+
+def test_a_disk_that_is_full_at_the_end_is_told_too(tmp_path):
+    path = tmp_path / "flight.bag"
+    with SizeLimit(450_000):
+        summary = fly(setup(tmp_path), [Recorder(path)])
+    assert all(robot.reached == len(robot.legs) for robot in summary.robots)
+    assert summary.reason == "the recording cannot be written: File too large"
+    assert len(read(path, "/odom0")) > 40
+
+
+def noise_bag(path, size):
+    """Writes until the limit is hit: a message of 1.05 MB that does not compress to a chunk."""
+    noise = np.random.default_rng(0).bytes(1_050_000)
+    data = len(noise).to_bytes(4, "little") + noise
+    file = create(path)
+    with SizeLimit(size):
+        topic = file.add_topic("/noise", "std_msgs/String", False, "/test")
+        with pytest.raises(OSError):
+            for k in range(1, 9):
+                file.write(topic, k * 10**9, data)
+        with pytest.raises(OSError):
+            file.close()
+    found = list(_raw(path))
+    assert all(content == data for _, content in found)
+    return [stamp // 10**9 for stamp, _ in found]
+
+
+def test_as_many_chunks_stay_as_there_is_room_for(tmp_path):
+    path = tmp_path / "flight.bag"
+    assert noise_bag(path, 3_300_000) == [1, 2, 3]
+    size = path.stat().st_size
+    assert noise_bag(path, size) == [1, 2, 3]
+    assert noise_bag(path, size - 1) == [1, 2]  # no room for the index of three
+
+
+def test_without_room_for_anything_the_flight_says_so(tmp_path):
+    path = tmp_path / "flight.bag"
+    with SizeLimit(5_000):
+        summary = fly(setup(tmp_path, time_limit_s=0.1), [Recorder(path)])
+    assert summary.reason == ("time limit of 0.1 s; the recording cannot be written: "
+                              "no room for a single chunk")
+    assert not path.exists()
+
+
+def _raw(path):
+    from rosbags.rosbag1 import Reader
+
+    with Reader(path) as reader:
+        for _, stamp, content in reader.messages():
+            yield stamp, bytes(content)
+
+
+def test_a_stop_reason_of_an_observer_ends_the_flight(tmp_path):
+    class Tired(FlightObserver):
+        stop_reason = "tired"
+
+    summary = fly(setup(tmp_path), [Tired()])
+    assert (summary.reason, summary.sim_time_s) == ("tired", 0.0)
+    assert dataclasses.replace(summary, reason="").success is False
