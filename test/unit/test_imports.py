@@ -43,7 +43,8 @@ PLACES = {
     "actionlib": "ros/",
     "dynamic_reconfigure": "ros/",
     "tf2_ros": "ros/",
-    "matplotlib": "offline/report",
+    "matplotlib": "offline/report/",
+    "jinja2": "offline/report/",
 }
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")
 

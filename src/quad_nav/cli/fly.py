@@ -14,6 +14,7 @@ import click
 import yaml
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
+from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import table, to_json, write_json
@@ -64,8 +65,13 @@ _AMOUNT = click.FloatRange(min=0.0)
               help="Who casts the beams: our kernel, or the physics engine.")
 @click.option("--json", "json_path", type=click.Path(dir_okay=False, allow_dash=True),
               metavar="FILE", help="Write the summary there; - is the terminal.")
+@click.option("--report", type=_A_FILE, metavar="FILE.html",
+              help="Write a page with pictures of the flight.")
+@click.option("--animate", type=_A_FILE, metavar="FILE",
+              help="Write an animation: .gif, or .mp4 where there is ffmpeg.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def fly(json_path: Optional[str], quiet: bool, **given: Any) -> None:
+def fly(json_path: Optional[str], report: Optional[Path], animate: Optional[Path], quiet: bool,
+        **given: Any) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
     Ctrl-C ends the flight and keeps what was flown.
@@ -75,13 +81,14 @@ def fly(json_path: Optional[str], quiet: bool, **given: Any) -> None:
     """
     try:
         setup = read_setup(_options(**given))
+        pictures = FlightPictures(setup, report, animate)
     except InputError as error:
         click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
     if not quiet:
         for warning in setup.warnings:
             click.echo(warning, err=True)
-    sys.exit(_fly(setup, json_path, quiet))
+    sys.exit(_fly(setup, json_path, pictures, quiet))
 
 
 def _options(scan_range: float, beams: int, range_noise: float, jitter: float, lidar: str,
@@ -109,8 +116,9 @@ def _parameter(text: str) -> Tuple[str, Any]:
                           f"parameter file: {error}"]) from error
 
 
-def _fly(setup: FlightSetup, json_path: Optional[str], quiet: bool) -> int:
-    observers: List[FlightObserver] = []
+def _fly(setup: FlightSetup, json_path: Optional[str], pictures: FlightPictures, quiet: bool
+         ) -> int:
+    observers: List[FlightObserver] = list(pictures.observers)
     if not quiet:
         observers.append(ProgressBar())
     with _stop_on_signal() as is_stopped:
@@ -122,6 +130,8 @@ def _fly(setup: FlightSetup, json_path: Optional[str], quiet: bool) -> int:
         click.echo(json.dumps(to_json(summary), indent=2, allow_nan=False))
     elif json_path is not None:
         write_json(summary, json_path)
+    for line in pictures.write(summary):
+        click.echo(line, err=True)
     return EXIT_INTERRUPTED if summary.reason == INTERRUPTED else summary.exit_status
 
 
