@@ -5,7 +5,9 @@ import colorsys
 from typing import Tuple
 
 ROBOT_COLOURS = ((32, 120, 220), (230, 110, 20), (40, 160, 60), (200, 50, 160),
-                 (0, 170, 170), (210, 40, 50), (150, 140, 0), (120, 80, 200))
+                 (0, 170, 170), (210, 40, 50), (150, 140, 0), (120, 80, 200),
+                 (110, 60, 20), (20, 45, 110), (240, 130, 170), (120, 200, 50),
+                 (0, 85, 80), (120, 10, 60), (120, 185, 250), (235, 180, 20))
 """RGB in 0..255 of quadcopter 0, 1, ...; the colours of further ones are computed."""
 
 _GOLDEN = 0.618034  # steps of this part of a turn never come near an earlier hue soon

@@ -136,13 +136,12 @@ class _MovingRobot:
                                 ha="center", va="center_baseline", zorder=8)
 
     def show(self, among: Tracks, time_s: float) -> None:
-        now = among.index_at(time_s)
-        here = among.positions_m[self._number, now]
-        there = bool(np.isfinite(here).all())
+        now = among.index_at(time_s) if len(among.times_s) else None
+        there = now is not None and bool(np.isfinite(among.yaws_rad[self._number, now]))
         for artist in (self._hull, self._nose, self._trail, self._label):
             artist.set_visible(there)
-        if there:
-            self._show_body(among, now, here)
+        if now is not None and there:
+            self._show_body(among, now, among.positions_m[self._number, now])
         goal = self._goal_at(time_s)
         self._goal.set_data(*(([], []) if goal is None else ([goal[0]], [goal[1]])))
 

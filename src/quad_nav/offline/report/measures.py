@@ -30,7 +30,7 @@ class Tracks:
     yaws_rad: np.ndarray
 
     def index_at(self, time_s: float) -> int:
-        """The sample nearest to a time."""
+        """The sample nearest to a time, of at least one."""
         return int(np.argmin(np.abs(self.times_s - time_s)))
 
 
@@ -91,6 +91,13 @@ def clearances_m(among: Tracks, scene: Optional[Scene], radius_m: float) -> np.n
     if scene is None or among.positions_m.size == 0:
         return np.full(among.yaws_rad.shape, np.nan)
     return scene.flight_clearances_m(among.positions_m) - radius_m
+
+
+def span_s(trace: FlightTrace) -> Span:
+    """From the first sample to the last; never shorter than a second."""
+    ends = [float(robot.times_s[k]) for robot in trace.robots if len(robot.times_s)
+            for k in (0, -1)] or [0.0]
+    return min(ends), max(max(ends), min(ends) + 1.0)
 
 
 def flying_span(robot: RobotTrace) -> Optional[Span]:

@@ -38,6 +38,7 @@ def paths_picture(trace: FlightTrace, among: Tracks, marked: Sequence[Encounter]
     for letter, one in zip(letters(), marked):
         axes.annotate(letter, (one.x_m, one.y_m), (9, 9), textcoords="offset points",
                       fontsize=10, fontweight="bold", color=QUIET, path_effects=_HALO, zorder=12,
+                      annotation_clip=True,
                       arrowprops={"arrowstyle": "-", "color": QUIET, "lw": 0.8, "shrinkB": 0})
     axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x, m", ylabel="y, m")
     robot_legend(figure, [robot.name for robot in trace.robots], _symbols(trace, bool(marked)))
@@ -57,14 +58,14 @@ def _draw_path(axes: Axes, number: int, robot: RobotTrace) -> None:
         _draw_direction(axes, number, robot, 0.5 * (goal.sent_s + end_s(goal, robot)))
     axes.plot(x_m[0], y_m[0], "s", ms=12, color=colour(number), mec="white", zorder=8)
     axes.text(x_m[0], y_m[0], str(number), color="white", fontsize=7.5, fontweight="bold",
-              ha="center", va="center_baseline", zorder=9)
+              ha="center", va="center_baseline", zorder=9, clip_on=True)
 
 
 def _draw_direction(axes: Axes, number: int, robot: RobotTrace, time_s: float) -> None:
     """An arrowhead on the path, where it was at a time; none where it stood."""
     tail, head = position_m(robot, time_s - 0.5), position_m(robot, time_s + 0.5)
     if np.hypot(*(head - tail)) > 0.02:
-        axes.annotate("", tuple(head), tuple(tail), zorder=5,
+        axes.annotate("", tuple(head), tuple(tail), zorder=5, annotation_clip=True,
                       arrowprops={"arrowstyle": "-|>", "color": colour(number), "lw": 0,
                                   "mutation_scale": 15, "shrinkA": 0, "shrinkB": 0})
 
@@ -77,7 +78,8 @@ def _draw_goals(axes: Axes, number: int, robot: RobotTrace) -> None:
         axes.plot(goal.pose.x_m, goal.pose.y_m, "o", ms=15, color=face, mec=colour(number),
                   mew=1.8, zorder=9)
         axes.text(goal.pose.x_m, goal.pose.y_m, str(goal.index + 1), color=ink, fontsize=9,
-                  fontweight="bold", ha="center", va="center_baseline", zorder=10)
+                  fontweight="bold", ha="center", va="center_baseline", zorder=10,
+                  clip_on=True)
 
 
 def _symbols(trace: FlightTrace, lettered: bool) -> List[Any]:

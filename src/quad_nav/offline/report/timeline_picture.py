@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
 
-from quad_nav.offline.report.measures import end_s, spins
-from quad_nav.offline.report.style import ALARM, colour, new_figure, robot_legend, time_axis
+from quad_nav.offline.report.measures import end_s, span_s, spins
+from quad_nav.offline.report.style import ALARM, QUIET, colour, new_figure, robot_legend, time_axis
 from quad_nav.offline.trace import FlightTrace, RobotTrace
 from quad_nav.tick import State
 
@@ -27,20 +28,19 @@ def timeline_picture(trace: FlightTrace) -> Figure:
     figure = new_figure(1.0 + 0.5 * min(rows, 8) + 0.32 * max(rows - 8, 0))
     axes = figure.subplots()
     axes.grid(axis="y", visible=False)
-    duration_s = max((float(robot.times_s[-1]) for robot in trace.robots if len(robot.times_s)),
-                     default=1.0)
+    first_s, last_s = span_s(trace)
     for k, robot in enumerate(trace.robots):
-        _draw_goals(axes, k, robot, duration_s)
-        _draw_states(axes, k, robot, duration_s)
-        for first, last in spins(robot):
-            axes.barh(k + _BAR / 2 + _STRIP / 2, last - first, _STRIP, first, color=_SPIN)
+        _draw_goals(axes, k, robot, last_s - first_s)
+        _draw_states(axes, k, robot, last_s)
+        for begin_s, end in spins(robot):
+            axes.barh(k + _BAR / 2 + _STRIP / 2, end - begin_s, _STRIP, begin_s, color=_SPIN)
         for time_s, _ in robot.recoveries:
             axes.plot(time_s, k - _BAR / 2 - _STRIP, clip_on=False, zorder=6, **_RECOVERY)
         for contact in trace.contacts:
             if robot.name in (contact.robot, contact.other):
                 axes.plot(contact.time_s, k, zorder=7, **_CONTACT)
     axes.set(yticks=range(len(trace.robots)), ylim=(rows - 0.4, -0.6),
-             yticklabels=[robot.name for robot in trace.robots], xlim=(0, duration_s))
+             yticklabels=[robot.name for robot in trace.robots], xlim=(first_s, last_s))
     axes.tick_params(axis="y", length=0)
     time_axis(axes)
     robot_legend(figure, (), _symbols(trace))
@@ -57,19 +57,25 @@ def _draw_goals(axes: Axes, row: int, robot: RobotTrace, duration_s: float) -> N
         if length_s > _NARROW * duration_s:
             axes.text(goal.sent_s + length_s / 2, row, str(goal.index + 1), ha="center",
                       va="center_baseline", fontsize=8.5, fontweight="bold",
-                      color="white" if k % 2 == 0 else "black", clip_on=True)
+                      color="white" if k % 2 == 0 else "black", clip_on=True,
+                      path_effects=[] if goal.reached else _halo(row, k))
 
 
-def _draw_states(axes: Axes, row: int, robot: RobotTrace, duration_s: float) -> None:
+def _halo(row: int, k: int) -> List[Any]:
+    """Keeps the hatching away from a number."""
+    return [withStroke(linewidth=4, foreground=colour(row) if k % 2 == 0 else "white")]
+
+
+def _draw_states(axes: Axes, row: int, robot: RobotTrace, last_s: float) -> None:
     """A strip above the bar where the navigator planned without moving, or recovered."""
-    for time_s, state, until_s in _periods(robot, duration_s):
+    for time_s, state, until_s in _periods(robot, last_s):
         if state in _STATE:
             axes.barh(row - _BAR / 2 - _STRIP / 2, until_s - time_s, _STRIP, time_s,
                       color=_STATE[state])
 
 
-def _periods(robot: RobotTrace, duration_s: float) -> List[Tuple[float, State, float]]:
-    ends = [*(time_s for time_s, _ in robot.states[1:]), duration_s]
+def _periods(robot: RobotTrace, last_s: float) -> List[Tuple[float, State, float]]:
+    ends = [*(time_s for time_s, _ in robot.states[1:]), last_s]
     return [(time_s, state, end) for (time_s, state), end in zip(robot.states, ends)]
 
 
@@ -77,8 +83,11 @@ def _symbols(trace: FlightTrace) -> List[Any]:
     """Legends for what is in the picture."""
     robots = trace.robots
     found: List[Any] = []
-    if any(not goal.reached for robot in robots for goal in robot.goals):
-        found.append(Patch(facecolor="white", edgecolor=ALARM, hatch="//", label="not reached"))
+    goals = [goal for robot in robots for goal in robot.goals]
+    if any(goal.ended_s is None for goal in goals):
+        found.append(Patch(facecolor=QUIET, edgecolor="white", hatch="//", label="not over"))
+    if any(goal.ended_s is not None and not goal.reached for goal in goals):
+        found.append(Patch(facecolor=QUIET, edgecolor=ALARM, hatch="//", label="given up"))
     if any(spins(robot) for robot in robots):
         found.append(Patch(color=_SPIN, label="turns on the spot"))
     if any(state is State.PLANNING for robot in robots for _, state in robot.states):
