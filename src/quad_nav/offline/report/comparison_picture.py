@@ -33,7 +33,7 @@ def grouped(flights: Sequence[FlightFigures]) -> Dict[str, List[FlightFigures]]:
 
 
 def comparison_picture(flights: Sequence[FlightFigures]) -> Figure:
-    """Each flight is a dot, red and crossed when it failed."""
+    """Each flight is a dot, those that failed a red cross."""
     groups = grouped(flights)
     figure = new_figure(5.2)
     for axes, (title, value) in zip(figure.subplots(2, 3).flat, PANELS):
@@ -66,5 +66,5 @@ def _draw_group(axes: Axes, column: int, values: Sequence[Tuple[FlightFigures, O
     places = column + (np.linspace(-0.2, 0.2, len(known)) if len(known) > 1 else np.zeros(1))
     for place, (one, value) in zip(places, known):
         axes.plot(place, value, "o" if one.success else "X", ms=5.5 if one.success else 7.5,
-                  color=colour(column) if one.success else ALARM, mec="white", mew=0.6,
+                  color=colour(0) if one.success else ALARM, mec="white", mew=0.6,
                   alpha=0.9, zorder=5)

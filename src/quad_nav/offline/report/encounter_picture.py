@@ -4,6 +4,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch
 
 from quad_nav.offline.report.encounters import Encounter, gap_text
 from quad_nav.offline.report.measures import Tracks, pair_gap_m
@@ -85,6 +86,6 @@ def _draw_robot(axes: Axes, among: Tracks, robot: int, now: int, radius_m: float
         return
     way = (among.positions_m[robot, after] - among.positions_m[robot, before]) / time_s * _ARROW_S
     if np.hypot(*way) > 0.05:
-        axes.annotate("", here + way, here, annotation_clip=True, zorder=8, arrowprops={
-            "arrowstyle": "-|>", "color": "black", "lw": 1.1, "mutation_scale": 9,
-            "shrinkA": 0, "shrinkB": 0})
+        axes.add_patch(FancyArrowPatch(tuple(here), tuple(here + way), arrowstyle="-|>",
+                                       color="black", lw=1.1, mutation_scale=9, shrinkA=0,
+                                       shrinkB=0, zorder=8))

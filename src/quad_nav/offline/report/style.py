@@ -25,7 +25,8 @@ RC: Dict[Any, Any] = {
     "axes.labelcolor": "#303840", "axes.grid": True, "grid.color": "#e4e8ec",
     "grid.linewidth": 0.7, "axes.axisbelow": True, "axes.spines.top": False,
     "axes.spines.right": False, "xtick.color": "#505860", "ytick.color": "#505860",
-    "legend.frameon": False, "lines.linewidth": 1.4, "figure.facecolor": "white",
+    "legend.frameon": False, "lines.linewidth": 1.4, "hatch.linewidth": 0.6,
+    "figure.facecolor": "white",
 }
 
 
