@@ -14,7 +14,7 @@ _HERE = Path(__file__).resolve()
 _PLACES = (
     _HERE.parents[2],
     Path(sys.prefix) / "share" / "quad",
-    *(parent / "share" / "quad" for parent in _HERE.parents[3:6]),
+    *(parent / "share" / "quad" for parent in list(_HERE.parents)[3:6]),
 )
 
 
