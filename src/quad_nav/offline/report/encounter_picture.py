@@ -52,14 +52,15 @@ def frame_times(trace: FlightTrace, among: Tracks, one: Encounter) -> np.ndarray
 def _draw_frame(axes: Axes, trace: FlightTrace, among: Tracks, one: Encounter, time_s: float
                 ) -> None:
     now = among.index_at(time_s)
-    draw_scene(axes, trace.scene)
+    shown = (one.x_m - _HALF_SIZE_M, one.x_m + _HALF_SIZE_M,
+             one.y_m - _HALF_SIZE_M, one.y_m + _HALF_SIZE_M)
+    draw_scene(axes, trace.scene, shown)
     for k in range(len(trace.robots)):
         _draw_robot(axes, among, k, now, trace.robot_radius_m)
     nearest = abs(time_s - one.time_s) < 1e-9
     if nearest and one.other is None:
         axes.plot(one.x_m, one.y_m, "X", color=ALARM, mec="white", ms=10, zorder=9)
-    axes.set(xlim=(one.x_m - _HALF_SIZE_M, one.x_m + _HALF_SIZE_M), xticks=[],
-             ylim=(one.y_m - _HALF_SIZE_M, one.y_m + _HALF_SIZE_M), yticks=[])
+    axes.set(xlim=shown[:2], ylim=shown[2:], xticks=[], yticks=[])
     axes.set_title(f"{time_s:.1f} s", loc="center", fontsize=9,
                    color=ALARM if nearest else "black")
     axes.set_xlabel(_gap(trace, among, one, now), fontsize=8.5, labelpad=3,

@@ -1,6 +1,7 @@
 """The scene from above, and quadcopters to scale in it."""
 from __future__ import annotations
 
+import math
 from typing import List, Optional, Tuple
 
 import numpy as np
@@ -16,8 +17,11 @@ Extent = Tuple[float, float, float, float]
 _SOLID, _EDGE = "#b9bfc6", "#7c858e"
 
 
-def draw_scene(axes: Axes, scene: Optional[Scene]) -> None:
-    """Obstacles and walls; those that quadcopters fly over or under are only outlined."""
+def draw_scene(axes: Axes, scene: Optional[Scene], near: Optional[Extent] = None) -> None:
+    """Obstacles and walls; those that quadcopters fly over or under are only outlined.
+
+    ``near``: what the picture shows, where that is a small part of the scene.
+    """
     axes.set_aspect("equal")
     if scene is None:
         return
@@ -25,12 +29,22 @@ def draw_scene(axes: Axes, scene: Optional[Scene]) -> None:
     solids: List[Patch] = []
     passed: List[Patch] = []
     for solid in (*scene.wall_boxes(), *scene.obstacles):
+        if near is not None and not _reaches(solid, near):
+            continue
         meets = solid.bottom_m <= z_m <= solid.bottom_m + solid.height_m
         (solids if meets else passed).append(_outline(solid))
     axes.add_collection(PatchCollection(solids, facecolor=_SOLID, edgecolor=_EDGE, lw=0.8,
                                         zorder=1))
     axes.add_collection(PatchCollection(passed, facecolor="none", edgecolor=_EDGE, lw=0.8,
                                         linestyle=":", zorder=1))
+
+
+def _reaches(solid: Obstacle, near: Extent) -> bool:
+    x0, x1, y0, y1 = near
+    reach_m = (solid.radius_m if not isinstance(solid, Box)
+               else math.hypot(solid.size_x_m, solid.size_y_m) / 2)
+    return (x0 - reach_m <= solid.x_m <= x1 + reach_m
+            and y0 - reach_m <= solid.y_m <= y1 + reach_m)
 
 
 def _outline(solid: Obstacle) -> Patch:
