@@ -8,3 +8,11 @@ Nothing outside this package imports matplotlib or jinja2, and commands import t
 package only when a report is asked for: that takes longer than to start a flight.
 """
 from __future__ import annotations
+
+import warnings
+
+# ROS desktops have an older matplotlib among the system's packages, which takes the place of ours
+# for pictures in 3D. There are none here, and people should not read a warning about them.
+with warnings.catch_warnings():
+    warnings.filterwarnings("ignore", "Unable to import Axes3D")
+    import matplotlib.projections  # noqa: F401
