@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from quad_nav.offline.report.encounters import CLOSE_M, Encounter
+from quad_nav.offline.report.encounters import CLOSE_M, LETTERS, Encounter
 from quad_nav.offline.report.measures import Tracks, clearances_m, separations_m
 from quad_nav.offline.report.style import ALARM, QUIET, colour, new_figure, robot_legend, time_axis
 from quad_nav.offline.trace import FlightTrace
@@ -60,9 +60,9 @@ def _draw_gaps(axes: Axes, title: str, times_s: np.ndarray, gaps_m: np.ndarray) 
 
 
 def _draw_letters(axes: Axes, marked: Sequence[Encounter]) -> None:
-    for k, one in enumerate(marked):
+    for letter, one in zip(LETTERS, marked):
         if one.other is not None:
             axes.plot(one.time_s, one.gap_m, "o", ms=5, color="none", mec="black", zorder=8)
-            axes.annotate(chr(ord("A") + k), (one.time_s, one.gap_m), (0, 9), ha="center",
+            axes.annotate(letter, (one.time_s, one.gap_m), (0, 9), ha="center",
                           textcoords="offset points", fontsize=9, fontweight="bold")
     axes.axhline(CLOSE_M, color=QUIET, lw=0.8, ls=":")

@@ -80,7 +80,8 @@ def _draw_robot(axes: Axes, among: Tracks, robot: int, now: int, radius_m: float
     trail = among.positions_m[robot, first:now + 1]
     axes.plot(*trail.T, color=(*colour(robot), 0.6), lw=1.2, zorder=3)
     here = among.positions_m[robot, now]
-    draw_hull(axes, robot, here, among.yaws_rad[robot, now], radius_m)
+    draw_hull(axes, robot, here, among.yaws_rad[robot, now], radius_m,
+              numbered=len(among.yaws_rad) > 2)
     before, after = max(now - 4, 0), min(now + 4, len(among.times_s) - 1)
     time_s = among.times_s[after] - among.times_s[before]
     if time_s <= 0:

@@ -12,6 +12,8 @@ from quad_nav.offline.trace import FlightTrace
 
 CLOSE_M = 0.5
 """Two hulls that are less than this apart have a close encounter."""
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+"""Names of encounters in pictures, the first ones' in order."""
 SAME_ENCOUNTER_S = 3.0
 """What comes again within this time is the same encounter still."""
 

@@ -14,12 +14,18 @@ from quad_nav.offline.report.comparison_picture import comparison_picture, group
 from quad_nav.offline.report.cycle_picture import cycle_picture, has_walls
 from quad_nav.offline.report.distance_picture import distance_picture
 from quad_nav.offline.report.encounter_picture import encounter_picture
-from quad_nav.offline.report.encounters import CLOSE_M, Encounter, encounters, gap_text
+from quad_nav.offline.report.encounters import (
+    CLOSE_M,
+    LETTERS,
+    Encounter,
+    encounters,
+    gap_text,
+)
 from quad_nav.offline.report.figures import FlightFigures, figures
 from quad_nav.offline.report.measures import Tracks, tracks
 from quad_nav.offline.report.motion_picture import motion_picture
 from quad_nav.offline.report.parameter_table import parameter_rows
-from quad_nav.offline.report.paths_picture import letters, paths_picture
+from quad_nav.offline.report.paths_picture import paths_picture
 from quad_nav.offline.report.timeline_picture import timeline_picture
 from quad_nav.offline.trace import FlightTrace
 
@@ -100,13 +106,13 @@ def _encounters(trace: FlightTrace, among: Tracks, met: Sequence[Encounter],
                        "hull, and no obstacle was touched.")
     caption = (f"Contacts with obstacles, and whenever two hulls came within {CLOSE_M:g} m: the "
                "closest moment is framed in red. Discs are to scale, the line in them is the nose, "
-               f"arrows are the way of the next 1.5 s. Each frame is 3.2 m wide.")
+               "arrows are the way of 1.5 s. Each frame is 3.2 m wide.")
     if len(met) > len(shown):
         caption += (f" The {len(shown)} closest are shown, {len(met) - len(shown)} more are not.")
     pictures = tuple(_picture(f"encounter_{letter}", note, encounter_picture(trace, among, one))
-                     for letter, note, one in zip(letters(), map(_note, shown), shown))
+                     for letter, note, one in zip(LETTERS, map(_note, shown), shown))
     return Section("encounters", "Close encounters", caption, pictures,
-                   tuple(f"{letter}: {_note(one)}" for letter, one in zip(letters(), shown)))
+                   tuple(f"{letter}: {_note(one)}" for letter, one in zip(LETTERS, shown)))
 
 
 def _note(one: Encounter) -> str:

@@ -69,13 +69,17 @@ def extent(scene: Optional[Scene], among: Tracks) -> Extent:
     return (float(x0), float(x1), float(y0), float(y1))
 
 
-def draw_hull(axes: Axes, robot: int, position_m: np.ndarray, yaw_rad: float, radius_m: float
-              ) -> None:
+def draw_hull(axes: Axes, robot: int, position_m: np.ndarray, yaw_rad: float, radius_m: float,
+              numbered: bool = False) -> None:
     """A disc to scale with a line that shows where the nose is."""
     if not np.isfinite(position_m).all():
         return
     axes.add_patch(Circle(tuple(position_m), radius_m, facecolor=(*colour(robot), 0.35),
                           edgecolor=colour(robot), lw=1.2, zorder=6))
-    nose = position_m + radius_m * np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
-    axes.plot(*np.transpose([position_m, nose]), color=colour(robot), lw=1.6, zorder=7,
-              solid_capstyle="round")
+    ahead = radius_m * np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+    axes.plot(*np.transpose([position_m, position_m + ahead]), color=colour(robot), lw=1.6,
+              zorder=7, solid_capstyle="round")
+    if numbered:
+        x_m, y_m = position_m - 0.5 * ahead
+        axes.text(x_m, y_m, str(robot), fontsize=6.5, fontweight="bold", color=colour(robot),
+                  ha="center", va="center_baseline", zorder=9, clip_on=True)
