@@ -12,11 +12,10 @@ import pytest
 from hand_made_traces import TIMES_S, fleet, flight, goal, robot
 from PIL import Image
 
-from quad_nav.errors import InputError
-from quad_nav.offline.report.animation import animate_flight, check_animation
+from quad_nav.offline.report.animation import animate_flight, animation_faults
 from quad_nav.offline.report.figures import figures
 from quad_nav.offline.report.page import MOST_STRIPS, Page, comparison_page, flight_page
-from quad_nav.offline.report.write import write_report
+from quad_nav.offline.report.write import write_comparison, write_report
 
 SECTIONS = ["paths", "encounters", "gaps", "timeline", "motion", "cycles", "goal-table",
             "parameters"]
@@ -127,11 +126,11 @@ def test_comparison_of_flights():
 
 
 def test_files_of_one_and_of_several(tmp_path):
-    write_report([fleet(2)], tmp_path / "new" / "one.html", tmp_path / "pictures")
+    write_report(fleet(2), tmp_path / "new" / "one.html", tmp_path / "pictures")
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["one.html"]
     assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == sorted(
         f"{name}.png" for name in [*PICTURES, "encounter_A", "encounter_B"])
-    write_report([fleet(2), fleet(2)], tmp_path / "two.html", tmp_path / "compared")
+    write_comparison([figures(fleet(2))] * 2, tmp_path / "two.html", tmp_path / "compared")
     assert [path.name for path in (tmp_path / "compared").iterdir()] == ["comparison.png"]
 
 
@@ -155,11 +154,10 @@ def test_animation_of_an_empty_flight(tmp_path):
 
 
 def test_animations_that_cannot_be_written(tmp_path, monkeypatch):
-    check_animation(tmp_path / "flight.gif")
-    with pytest.raises(InputError, match="expected a name that ends in .gif or .mp4"):
-        check_animation(tmp_path / "flight.avi")
-    with pytest.raises(InputError, match="2 flights, expected one"):
-        check_animation(tmp_path / "flight.gif", 2)
+    assert animation_faults(tmp_path / "flight.gif") == []
+    several, suffix = animation_faults(tmp_path / "flight.avi", 2)
+    assert "2 flights, expected one" in several
+    assert "expected a name that ends in .gif or .mp4" in suffix
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(InputError, match="needs the program ffmpeg"):
-        check_animation(tmp_path / "flight.mp4")
+    (missing,) = animation_faults(tmp_path / "flight.mp4")
+    assert "needs the program ffmpeg" in missing

@@ -4,6 +4,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Iterator, Optional, Tuple
 
+from quad_nav.errors import InputError
 from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.setup import FlightSetup
@@ -23,8 +24,10 @@ class FlightPictures:
         self._observer = TraceObserver(
             f"{setup.scene.name}, {count} quadcopter{'s' * (count > 1)}, {setup.config_name}")
         if animation is not None:
-            from quad_nav.offline.report.animation import check_animation
-            check_animation(animation)
+            from quad_nav.offline.report.animation import animation_faults
+            faults = animation_faults(animation)
+            if faults:
+                raise InputError(faults)
 
     @property
     def observers(self) -> Tuple[FlightObserver, ...]:
@@ -37,7 +40,7 @@ class FlightPictures:
         trace = self._observer.trace(summary.contacts, summary.reason)
         if self._report is not None:
             from quad_nav.offline.report.write import write_report
-            write_report([trace], self._report, wall_time_s=summary.wall_time_s)
+            write_report(trace, self._report, wall_time_s=summary.wall_time_s)
             yield f"report: {self._report}"
         if self._animation is not None:
             from quad_nav.offline.report.animation import animate_flight

@@ -4,12 +4,19 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Optional, Tuple
+from typing import TYPE_CHECKING, Callable, List, Optional, Sequence, Tuple, TypeVar
 
 import click
+from rich.console import Console
+from rich.progress import track
 
 from quad_nav.cli import EXIT_BAD_INPUT
 from quad_nav.errors import InputError
+
+if TYPE_CHECKING:
+    from quad_nav.offline.trace import FlightTrace
+
+T = TypeVar("T")
 
 
 @click.command()
@@ -30,27 +37,44 @@ def report(flights: Tuple[Path, ...], output: Path, png: Optional[Path],
 
     Exit status: 0, or 2 for input that cannot be used.
     """
-    from quad_nav.offline.bag_trace import read_trace
-    from quad_nav.offline.report.animation import animate_flight, check_animation
-    from quad_nav.offline.report.write import write_report
+    from quad_nav.offline.report.animation import animate_flight, animation_faults
+    from quad_nav.offline.report.figures import figures
+    from quad_nav.offline.report.write import write_comparison, write_report
 
-    problems = []
-    traces = []
     try:
-        if animate is not None:
-            check_animation(animate, len(flights))
+        faults = animation_faults(animate, len(flights)) if animate is not None else []
+        if len(flights) == 1:
+            (trace,) = _read(flights, lambda trace: trace, faults)
+            write_report(trace, output, png)
+        else:
+            write_comparison(_read(flights, figures, faults), output, png)
     except InputError as error:
-        problems += error.problems
-    for path in flights:
+        click.echo("no report:\n  " + "\n  ".join(error.problems), err=True)
+        sys.exit(EXIT_BAD_INPUT)
+    click.echo(f"report: {output}")
+    if animate is not None:
+        animate_flight(trace, animate)
+        click.echo(f"animation: {animate}")
+
+
+def _read(flights: Sequence[Path], reduce: Callable[[FlightTrace], T], faults: Sequence[str]
+          ) -> List[T]:
+    """What ``reduce`` makes of each flight's trace; traces of many would fill the memory.
+
+    Raises:
+        InputError: the ``faults`` that were known before, and a line for every flight that cannot
+            be read.
+    """
+    from quad_nav.offline.bag_trace import read_trace
+    console = Console(stderr=True)
+    found: List[T] = []
+    problems = list(faults)
+    for path in track(flights, "reading", console=console, transient=True,
+                      disable=not console.is_terminal):
         try:
-            traces.append(replace(read_trace(path), title=path.name))
+            found.append(reduce(replace(read_trace(path), title=path.name)))
         except InputError as error:
             problems += error.problems
     if problems:
-        click.echo("no report:\n  " + "\n  ".join(problems), err=True)
-        sys.exit(EXIT_BAD_INPUT)
-    write_report(traces, output, png)
-    click.echo(f"report: {output}")
-    if animate is not None:
-        animate_flight(traces[0], animate)
-        click.echo(f"animation: {animate}")
+        raise InputError(problems)
+    return found

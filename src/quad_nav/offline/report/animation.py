@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from PIL import Image
 
-from quad_nav.errors import InputError
 from quad_nav.offline.report.measures import Tracks, tracks
 from quad_nav.offline.report.scene_drawing import draw_scene, extent
 from quad_nav.offline.report.style import ALARM, colour, styled
@@ -28,12 +27,8 @@ _CONTACT_S = 2.0  # how long a contact is shown
 _COLOURS = 128
 
 
-def check_animation(path: Path, flights: int = 1) -> None:
-    """Refuses early what could not be written.
-
-    Raises:
-        InputError: there are several flights, the suffix is unknown or ffmpeg is missing.
-    """
+def animation_faults(path: Path, flights: int = 1) -> List[str]:
+    """Why it could not be written: several flights, an unknown suffix, ffmpeg is missing."""
     problems = []
     if flights != 1:
         problems.append(f"animation: {flights} flights, expected one")
@@ -42,12 +37,11 @@ def check_animation(path: Path, flights: int = 1) -> None:
     elif path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         problems.append(f"animation: {path} needs the program ffmpeg, which is not in the PATH;"
                         " install it or write a .gif")
-    if problems:
-        raise InputError(problems)
+    return problems
 
 
 def animate_flight(trace: FlightTrace, path: Path) -> None:
-    """Write the animation; its suffix has passed ``check_animation``."""
+    """Write the animation; ``animation_faults`` has found none."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with styled():
         view = _View(trace)

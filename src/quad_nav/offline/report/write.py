@@ -1,27 +1,31 @@
-"""Reports, pictures and animations as files."""
+"""Reports and pictures as files."""
 from __future__ import annotations
 
 import os
 from pathlib import Path
 from typing import Optional, Sequence
 
-from quad_nav.offline.report.figures import figures
+from quad_nav.offline.report.figures import FlightFigures
 from quad_nav.offline.report.page import Page, comparison_page, flight_page
 from quad_nav.offline.trace import FlightTrace
 
 
-def write_report(traces: Sequence[FlightTrace], path: Path, pictures: Optional[Path] = None,
+def write_report(trace: FlightTrace, path: Path, pictures: Optional[Path] = None,
                  wall_time_s: Optional[float] = None) -> None:
-    """The report of one flight, or the comparison of several, with its folders.
+    """The report of one flight, with its folders.
 
     ``pictures``: the folder that gets every picture as a PNG file, None for none.
     """
-    page = (flight_page(traces[0], wall_time_s) if len(traces) == 1
-            else comparison_page([figures(trace) for trace in traces]))
-    write_page(page, path, pictures)
+    _write(flight_page(trace, wall_time_s), path, pictures)
 
 
-def write_page(page: Page, path: Path, pictures: Optional[Path] = None) -> None:
+def write_comparison(flights: Sequence[FlightFigures], path: Path,
+                     pictures: Optional[Path] = None) -> None:
+    """The report of several flights, written as ``write_report`` does."""
+    _write(comparison_page(flights), path, pictures)
+
+
+def _write(page: Page, path: Path, pictures: Optional[Path]) -> None:
     """A reader never sees half of the HTML."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
