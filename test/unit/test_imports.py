@@ -30,24 +30,25 @@ NOUNS = LAYERS[0]  # they may import one another
 WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "random_mission", "face",
                "offline", "ros", "cli"}
 
-# Where a third-party package may be imported: that file or folder and nowhere else.
+# Where a third-party package may be imported: those files or folders and nowhere else.
 PLACES = {
     "click": "cli/",
     "rich": "cli/",
     "numba": "kernels/",
     "pybullet": "sim/body.py",
-    "PIL": "sim/map_image.py",
     "defusedxml": "sim/xml_tree.py",
     "rospy": "ros/",
     "rosgraph": "ros/",
     "actionlib": "ros/",
     "dynamic_reconfigure": "ros/",
     "tf2_ros": "ros/",
-    "matplotlib": "offline/report",
     "rerun": "offline/view",
     "lz4": "offline/",
     "rosbags": "offline/",
     "mcap": "offline/",
+    "matplotlib": "offline/report/",
+    "jinja2": "offline/report/",
+    "PIL": ("sim/map_image.py", "offline/report/"),
 }
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")
 

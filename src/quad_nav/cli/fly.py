@@ -14,6 +14,7 @@ import click
 import yaml
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
+from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import table, to_json, write_json
@@ -69,8 +70,13 @@ _AMOUNT = click.FloatRange(min=0.0)
               help="Record the topics of the ROS face, for rosbag play and RViz.")
 @click.option("--view", is_flag=False, flag_value=_LIVE, metavar="[FILE.rrd]",
               help="Show the flight in rerun's 3D viewer as it is flown, or save it for that.")
+@click.option("--report", type=_A_FILE, metavar="FILE.html",
+              help="Write a page with pictures of the flight.")
+@click.option("--animate", type=_A_FILE, metavar="FILE",
+              help="Write an animation: .gif, or .mp4 where there is ffmpeg.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str], quiet: bool,
+def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str],
+        report: Optional[Path], animate: Optional[Path], quiet: bool,
         **given: Any) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
@@ -81,6 +87,7 @@ def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str], q
     """
     try:
         setup = read_setup(_options(**given))
+        pictures = FlightPictures(setup, report, animate)
         watchers = _watchers(record, view)
     except InputError as error:
         click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
@@ -88,7 +95,7 @@ def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str], q
     if not quiet:
         for warning in setup.warnings:
             click.echo(warning, err=True)
-    sys.exit(_fly(setup, watchers, json_path, quiet))
+    sys.exit(_fly(setup, watchers, json_path, pictures, quiet))
 
 
 def _options(scan_range: float, beams: int, range_noise: float, jitter: float, lidar: str,
@@ -129,8 +136,10 @@ def _watchers(record: Optional[Path], view: Optional[str]) -> List[FlightObserve
 
 
 def _fly(setup: FlightSetup, watchers: Sequence[FlightObserver], json_path: Optional[str],
-         quiet: bool) -> int:
-    observers = [*watchers] if quiet else [*watchers, ProgressBar()]
+         pictures: FlightPictures, quiet: bool) -> int:
+    observers = [*watchers, *pictures.observers]
+    if not quiet:
+        observers.append(ProgressBar())
     with _stop_on_signal() as is_stopped:
         summary = fly_setup(setup, observers, is_stopped)
     to_terminal = json_path == "-"
@@ -140,6 +149,8 @@ def _fly(setup: FlightSetup, watchers: Sequence[FlightObserver], json_path: Opti
         click.echo(json.dumps(to_json(summary), indent=2, allow_nan=False))
     elif json_path is not None:
         write_json(summary, json_path)
+    for line in pictures.write(summary):
+        click.echo(line, err=True)
     return EXIT_INTERRUPTED if summary.reason == INTERRUPTED else summary.exit_status
 
 

@@ -23,7 +23,7 @@ NamedTypes = Tuple[Tuple[str, str], ...]
 CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
 ROTATE = "rotate_recovery/RotateRecovery"
 MOVE_SLOW = "move_slow_and_clear/MoveSlowAndClear"
-_TABLES: Dict[str, Table] = {
+TABLES: Dict[str, Table] = {
     CLEAR: tables.CLEAR_COSTMAP, ROTATE: tables.ROTATE, MOVE_SLOW: tables.MOVE_SLOW}
 _CONSERVATIVE, _AGGRESSIVE, _ROTATE = "conservative_reset", "aggressive_reset", "rotate_recovery"
 _AFFECTED_MAPS = ("local", "global", "both")
@@ -43,10 +43,10 @@ def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         if name not in tree and listed is None:
             continue
         namespace = subtree(tree, name, "", notes)
-        if kind not in _TABLES:
+        if kind not in TABLES:
             continue  # a behaviour of the user's knows its parameters itself
         layers = ("layer_names",) if kind == CLEAR else ()
-        settle(namespace, name, _TABLES[kind], notes, also_known=layers)
+        settle(namespace, name, TABLES[kind], notes, also_known=layers)
         if kind == CLEAR:
             _check_clearing(namespace, name, notes)
         elif kind == MOVE_SLOW:
@@ -107,14 +107,14 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
             notes.problem("recovery_behaviors",
                           f"{entry['name']!r} is there twice; expected a name for each")
         else:
-            listed[entry["name"]] = _full_type(entry["type"])
-    for name in [name for name, kind in listed.items() if kind not in _TABLES]:
+            listed[entry["name"]] = full_type(entry["type"])
+    for name in [name for name, kind in listed.items() if kind not in TABLES]:
         if is_dotted(listed[name]):
             check_class(listed[name], RECOVERY, join("recovery_behaviors", name), notes)
             continue
         notes.remark(join("recovery_behaviors", name), UNSUPPORTED,
                      f"{listed.pop(name)} is not supported here, the behaviour is left out;"
-                     f" there are {', '.join(_TABLES)}")
+                     f" there are {', '.join(TABLES)}")
     return tuple(listed.items())
 
 
@@ -127,9 +127,9 @@ def listed_names(tree: Mapping[str, Any]) -> List[str]:
     return [*names, _CONSERVATIVE, _AGGRESSIVE, _ROTATE]
 
 
-def _full_type(kind: str) -> str:
+def full_type(kind: str) -> str:
     """Old configurations leave the package away."""
-    for known in _TABLES:
+    for known in TABLES:
         if kind == known.split("/")[1]:
             return known
     return kind

@@ -1,0 +1,48 @@
+"""Report and animation of a flight that is flown now."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Iterator, Optional, Tuple
+
+from quad_nav.errors import InputError
+from quad_nav.mission.summary import MissionSummary
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.setup import FlightSetup
+from quad_nav.offline.trace import TraceObserver
+
+
+class FlightPictures:
+    """What ``--report`` and ``--animate`` ask for; nothing is imported or traced for None.
+
+    Raises:
+        InputError: the animation could not be written.
+    """
+
+    def __init__(self, setup: FlightSetup, report: Optional[Path], animation: Optional[Path]):
+        self._report, self._animation = report, animation
+        count = len(setup.robots)
+        self._observer = TraceObserver(
+            f"{setup.scene.name}, {count} quadcopter{'s' * (count > 1)}, {setup.config_name}")
+        if animation is not None:
+            from quad_nav.offline.report.animation import animation_faults
+            faults = animation_faults(animation)
+            if faults:
+                raise InputError(faults)
+
+    @property
+    def observers(self) -> Tuple[FlightObserver, ...]:
+        return (self._observer,) if self._report or self._animation else ()
+
+    def write(self, summary: MissionSummary) -> Iterator[str]:
+        """Writes what was asked for; yields a line for each file that is there now."""
+        if not self.observers:
+            return
+        trace = self._observer.trace(summary.contacts, summary.reason)
+        if self._report is not None:
+            from quad_nav.offline.report.write import write_report
+            write_report(trace, self._report, wall_time_s=summary.wall_time_s)
+            yield f"report: {self._report}"
+        if self._animation is not None:
+            from quad_nav.offline.report.animation import animate_flight
+            animate_flight(trace, self._animation)
+            yield f"animation: {self._animation}"

@@ -1,0 +1,78 @@
+"""What a parameter tree sets otherwise than the original would have it."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Dict, Iterator, Mapping, Tuple
+
+from quad_nav.config import costmap_tables, tables
+from quad_nav.config.configuration import COSTMAPS, MENDS
+from quad_nav.config.layers import LAYERS
+from quad_nav.config.notes import join
+from quad_nav.config.planners import SLOTS, planner_type
+from quad_nav.config.recoveries import TABLES as RECOVERY_TABLES
+from quad_nav.config.recoveries import full_type
+from quad_nav.config.spec import Table
+from quad_nav.plugins import plugin_name
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A parameter that has another value than the default; ``path`` from the node's level."""
+
+    path: str
+    value: Any
+    default: Any
+    unit: str = ""
+
+
+def differences(tree: Mapping[str, Any]) -> Tuple[Difference, ...]:
+    """Every parameter of a settled tree (``Configuration.to_tree``) that is not at its default.
+
+    Parameters of the user's own planners, layers and behaviours have no known
+    default and are left out, and so are the distances of the default recoveries,
+    which follow from other parameters.
+    """
+    return tuple(difference for path, table, namespace in _namespaces(tree)
+                 for difference in _differences(path, table, namespace))
+
+
+def _differences(path: str, table: Table, namespace: Mapping[str, Any]) -> Iterator[Difference]:
+    for parameter in table.parameters:
+        value = namespace.get(parameter.name, parameter.in_force)
+        if value not in (parameter.in_force, parameter.default):
+            unit = "" if parameter.kind == "str" else parameter.unit
+            yield Difference(join(path, parameter.name), value, parameter.in_force, unit)
+
+
+def _namespaces(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
+    """(path, table, parameters) of each namespace whose parameters are known."""
+    yield "", tables.NAVIGATOR, tree
+    for key in SLOTS:
+        planner = planner_type(tree, key) if key in tree else None
+        if planner is not None:
+            name = plugin_name(tree[key])
+            yield name, planner.table, _below(tree, name)
+    for costmap in COSTMAPS:
+        yield costmap, costmap_tables.COSTMAP, _below(tree, costmap)
+        yield from _layers(costmap, _below(tree, costmap))
+    for entry in tree.get("recovery_behaviors", ()):
+        table = RECOVERY_TABLES.get(full_type(entry["type"]))
+        if table is not None:
+            yield entry["name"], table, _below(tree, entry["name"])
+    yield MENDS, tables.MENDS, _below(tree, MENDS)
+
+
+def _layers(path: str, costmap: Mapping[str, Any]
+            ) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
+    for plugin in costmap.get("plugins", ()):
+        if plugin["type"] not in LAYERS:
+            continue
+        place, layer = join(path, plugin["name"]), _below(costmap, plugin["name"])
+        yield place, LAYERS[plugin["type"]].table, layer
+        for source in str(layer.get("observation_sources", "")).split():
+            yield join(place, source), costmap_tables.SOURCE, _below(layer, source)
+
+
+def _below(tree: Mapping[str, Any], name: str) -> Dict[str, Any]:
+    namespace = tree.get(name)
+    return namespace if isinstance(namespace, dict) else {}

@@ -1,0 +1,37 @@
+"""Reports and pictures as files."""
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Optional, Sequence
+
+from quad_nav.offline.report.figures import FlightFigures
+from quad_nav.offline.report.page import Page, comparison_page, flight_page
+from quad_nav.offline.trace import FlightTrace
+
+
+def write_report(trace: FlightTrace, path: Path, pictures: Optional[Path] = None,
+                 wall_time_s: Optional[float] = None) -> None:
+    """The report of one flight, with its folders.
+
+    ``pictures``: the folder that gets every picture as a PNG file, None for none.
+    """
+    _write(flight_page(trace, wall_time_s), path, pictures)
+
+
+def write_comparison(flights: Sequence[FlightFigures], path: Path,
+                     pictures: Optional[Path] = None) -> None:
+    """The report of several flights, written as ``write_report`` does."""
+    _write(comparison_page(flights), path, pictures)
+
+
+def _write(page: Page, path: Path, pictures: Optional[Path]) -> None:
+    """A reader never sees half of the HTML."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    partial.write_text(page.html, encoding="utf-8")
+    partial.replace(path)
+    if pictures is not None:
+        pictures.mkdir(parents=True, exist_ok=True)
+        for picture in page.pictures:
+            (pictures / f"{picture.name}.png").write_bytes(picture.png)

@@ -1,0 +1,73 @@
+"""What differs from the original's defaults, and how the report tells it."""
+
+from __future__ import annotations
+
+import pytest
+from hand_made_traces import flight, robot
+
+from quad_nav import config
+from quad_nav.config.differences import Difference, differences
+from quad_nav.offline.report.parameter_table import ParameterRow, parameter_rows
+from quad_nav.shipped import shipped
+
+
+def tree_of(number: int, **changes):
+    tree = config.load_files(shipped("config", "tutorial"), {"i": str(number)})
+    return config.load({**tree, **changes}).to_tree()
+
+
+def test_nothing_set_is_no_difference():
+    assert differences(config.load({}).to_tree()) == ()
+    assert differences({}) == ()
+
+
+def test_the_default_is_the_one_in_force_at_start():
+    assert differences(config.load({"controller_patience": 15.0}).to_tree()) == ()
+    assert differences(config.load({"controller_frequency": 10.0}).to_tree()) == (
+        Difference("controller_frequency", 10.0, 20.0, "Hz"),)
+
+
+@pytest.mark.parametrize("tree, expected", [
+    ({"TrajectoryPlannerROS": {"max_vel_x": 0.3}},
+     [Difference("TrajectoryPlannerROS/max_vel_x", 0.3, 0.55, "m/s")]),
+    ({"TrajectoryPlannerROS": {"holonomic_robot": False}},
+     [Difference("TrajectoryPlannerROS/holonomic_robot", False, True)]),
+    ({"mends": {"sensor_timeout": 0.0}}, [Difference("mends/sensor_timeout", 0.0, 1.0, "seconds")]),
+    ({"local_costmap": {"inflation_radius": 0.8}},
+     [Difference("local_costmap/inflation_layer/inflation_radius", 0.8, 0.55, "metres")]),
+    ({"recovery_behaviors": [{"name": "turn", "type": "RotateRecovery"}],
+      "turn": {"sim_granularity": 0.1}},
+     [Difference("turn/sim_granularity", 0.1, 0.017, "radians")]),
+])
+def test_each_namespace(tree, expected):
+    assert list(differences(config.load(tree).to_tree())) == expected
+
+
+def test_every_difference_of_the_tutorial_is_found():
+    found = {one.path: (one.value, one.default) for one in differences(tree_of(0))}
+    assert found["controller_frequency"] == (1.0, 20.0)
+    assert found["global_costmap/obstacle_layer/base_scan/topic"] == ("scan0", "")
+    assert found["local_costmap/obstacle_layer/base_scan/expected_update_rate"] == (21.0, 0.0)
+    assert "TrajectoryPlannerROS/sim_time" not in found
+
+
+def test_costmaps_and_robots_share_rows():
+    rows = parameter_rows(flight(*(robot(k, (1.0 + k, 1.0), parameters=tree_of(k))
+                                   for k in range(2))))
+    assert ParameterRow("*_costmap/robot_base_frame", "base_link{i}", "base_link", "") in rows
+    assert ParameterRow("*_costmap/robot_radius", "0.35", "0.46", "metres") in rows
+    assert ParameterRow("global_costmap/width", "12", "10", "metres") in rows
+    assert not any(row.who for row in rows)
+    assert len(rows) == len(set(row.path for row in rows))
+
+
+def test_what_one_robot_alone_has_names_it():
+    rows = parameter_rows(flight(
+        robot(0, (1.0, 1.0), parameters=tree_of(0)),
+        robot(1, (2.0, 1.0), parameters=tree_of(1, controller_frequency=5.0))))
+    assert [(row.value, row.who) for row in rows if row.path == "controller_frequency"] == [
+        ("1", "quad0"), ("5", "quad1")]
+
+
+def test_unknown_parameters_make_no_rows():
+    assert parameter_rows(flight(robot(0, (1.0, 1.0)))) == ()

@@ -1,0 +1,83 @@
+"""Close encounters: when, where, how close, and in which frames they are shown."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hand_made_traces import TIMES_S, flight, robot
+
+from quad_nav.mission.flight_log import Contact
+from quad_nav.offline.report.encounter_picture import frame_times
+from quad_nav.offline.report.encounters import encounters, gap_text
+from quad_nav.offline.report.measures import tracks
+
+
+def found_in(trace, **options):
+    return encounters(trace, tracks(trace), **options)
+
+
+def passing(offset_m: float):
+    """They pass each other at 5 s, ``offset_m`` apart sideways."""
+    return flight(robot(0, (1.0, 2.0), (0.5, 0.0)), robot(1, (6.0, 2.0 + offset_m), (-0.5, 0.0)))
+
+
+def test_two_pass_each_other():
+    (one,) = found_in(passing(1.0))
+    assert (one.robot, one.other, one.names) == (0, 1, ("quad0", "quad1"))
+    assert (one.time_s, one.gap_m) == (pytest.approx(5.0), pytest.approx(0.4))
+    assert (one.x_m, one.y_m) == (pytest.approx(3.5), pytest.approx(2.5))
+
+
+def test_farther_than_the_threshold_is_no_encounter():
+    assert found_in(passing(1.2)) == ()
+    assert len(found_in(passing(1.2), below_m=0.7)) == 1
+
+
+def test_what_repeats_soon_is_one_encounter():
+    """The gap swings between 0.1 m and 1.1 m."""
+    def swinging(period_s):
+        other = robot(1, (2.2, 1.0))
+        swing = 0.5 * (1.0 - np.cos(2.0 * math.pi * TIMES_S / period_s))
+        other.positions_m[:, 0] = 1.0 + 0.7 + swing
+        return flight(robot(0, (1.0, 1.0)), other)
+
+    assert len(found_in(swinging(2.5))) == 1
+    assert [one.time_s for one in found_in(swinging(10.0))] == [pytest.approx(0.0),
+                                                               pytest.approx(10.0)]
+
+
+def test_contacts_with_obstacles_come_first_and_the_closest_next():
+    trace = flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0)), robot(2, (1.0, 1.8)), contacts=[
+        Contact(2.0, "quad2", "pillar", 5.0, 5.0), Contact(3.0, "quad2", "pillar", 5.0, 5.0),
+        Contact(8.0, "quad2", "pillar", 5.0, 5.0), Contact(1.0, "quad0", "quad1", 1.5, 1.0)])
+    found = found_in(trace)
+    assert [(one.names, one.time_s) for one in found[:2]] == [
+        (("quad2", "pillar"), 2.0), (("quad2", "pillar"), 8.0)]
+    assert found[0].other is None and (found[0].x_m, found[0].y_m) == (5.0, 5.0)
+    assert [one.names for one in found[2:]] == [("quad0", "quad2"), ("quad0", "quad1")]
+
+
+def test_nobody_meets_alone():
+    assert found_in(flight(robot(0, (1.0, 1.0)))) == ()
+    assert found_in(flight()) == ()
+
+
+def test_frames_are_a_way_of_45_cm_apart():
+    trace = passing(1.0)
+    (one,) = found_in(trace)
+    assert frame_times(trace, tracks(trace), one) == pytest.approx([3.2, 4.1, 5.0, 5.9, 6.8])
+
+
+def test_frames_of_those_that_stand_and_at_the_begin():
+    trace = flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0)))
+    (one,) = found_in(trace)
+    assert one.time_s == 0.0
+    assert frame_times(trace, tracks(trace), one) == pytest.approx([0.0, 1.5, 3.0])
+
+
+@pytest.mark.parametrize("gap_m, text", [(0.4, "gap 0.40 m"), (-0.02, "overlap 0.02 m"),
+                                         (-0.004, "touching"), (0.004, "touching")])
+def test_gaps_in_words(gap_m, text):
+    assert gap_text(gap_m) == text

@@ -1,0 +1,163 @@
+"""The page of a report: complete, self-contained, for any number of quadcopters."""
+
+from __future__ import annotations
+
+import io
+import re
+from functools import lru_cache
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from hand_made_traces import TIMES_S, fleet, flight, goal, robot
+from PIL import Image
+
+from quad_nav.offline.report.animation import animate_flight, animation_faults
+from quad_nav.offline.report.figures import figures
+from quad_nav.offline.report.page import MOST_STRIPS, Page, comparison_page, flight_page
+from quad_nav.offline.report.write import write_comparison, write_report
+
+SECTIONS = ["paths", "encounters", "gaps", "timeline", "motion", "cycles", "goal-table",
+            "parameters"]
+PICTURES = ["paths", "distances", "timeline", "motion", "cycles"]
+NOBODY = np.empty(0)
+
+
+class Parsed(HTMLParser):
+    """Every attribute that could load something, the sections and the open elements."""
+
+    LOADING = {"src", "href", "srcset", "data", "action", "poster", "background"}
+    VOID = {"meta", "img", "br", "link", "input"}
+
+    def __init__(self, html: str):
+        super().__init__()
+        self.loads, self.sections, self._open = [], [], []
+        self.feed(html)
+        assert self._open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.loads += [value for name, value in attributes if name in self.LOADING]
+        self.sections += [value for name, value in attributes if tag == "section" and name == "id"]
+        if tag not in self.VOID:
+            self._open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self._open.pop() == tag
+
+
+def assert_loads_nothing(html: str) -> None:
+    assert all(value.startswith("data:image/png;base64,") for value in Parsed(html).loads)
+    assert not re.search(r"url\(|@import|<script|<link|<iframe", html)
+
+
+@lru_cache(maxsize=None)
+def page_of(count: int) -> Page:
+    return flight_page(fleet(count), wall_time_s=2.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 10, 20])
+@pytest.mark.filterwarnings("error")
+def test_page_of_so_many(count):
+    page = page_of(count)
+    assert Parsed(page.html).sections == SECTIONS
+    assert_loads_nothing(page.html)
+    names = [picture.name for picture in page.pictures]
+    assert [name for name in names if not name.startswith("encounter")] == PICTURES
+    strips = [name for name in names if name.startswith("encounter")]
+    assert len(strips) == min(count, MOST_STRIPS)  # a contact, and neighbours 0.4 m apart
+    for picture in page.pictures:
+        image = Image.open(io.BytesIO(picture.png))
+        image.load()
+        assert image.width == 1120
+    assert "5.0 ×" in page.html  # ten seconds in two
+
+
+def test_figures_in_the_head():
+    html = page_of(2).html
+    assert "Mission failed" in html
+    assert "1 of 4 goals not reached; 1 contact" in html
+    assert "3 of 4" in html and "real-time factor" in html
+
+
+def test_what_is_left_out_is_told():
+    html = page_of(20).html
+    assert f"The {MOST_STRIPS} closest are shown, 14 more are not." in html
+    assert "The 16 quadcopters that came closest to anything are shown, 4 more are not." in html
+
+
+def test_a_good_flight():
+    good = flight(robot(0, (1.0, 1.0), (0.3, 0.0), goals=(goal(0, (4.0, 1.0), 0.0, 10.0),)))
+    html = flight_page(good).html
+    assert "Mission flown" in html and "real-time factor" not in html
+    assert "No other quadcopter came within 0.5 m" in html
+
+
+@pytest.mark.parametrize("trace", [
+    flight(),
+    flight(robot(0, (1.0, 1.0), times_s=NOBODY), reason="interrupted"),
+    flight(robot(0, (1.0, 1.0), times_s=TIMES_S[:1], goals=(goal(0, (2.0, 2.0), 0.0),)),
+           robot(1, (1.0, 2.0), times_s=NOBODY), reason="interrupted"),
+    flight(robot(0, (1.0, 1.0), (0.1, 0.1)), robot(1, (3.0, 1.0)), scene=None, seed=None,
+           config_name="", versions={}),
+], ids=["no robots", "no samples", "one sample", "no scene"])
+@pytest.mark.filterwarnings("error")
+def test_flights_that_hold_little(trace):
+    page = flight_page(trace)
+    assert Parsed(page.html).sections == SECTIONS
+    assert "Mission failed" in page.html
+
+
+def test_text_is_escaped():
+    trace = flight(robot(0, (1.0, 1.0)), config_name="<script>", reason="a < b")
+    html = flight_page(trace).html
+    assert "&lt;script&gt;" in html and "a &lt; b" in html
+    assert_loads_nothing(html)
+
+
+def test_comparison_of_flights():
+    flights = [figures(fleet(2)), figures(flight(
+        robot(0, (1.0, 1.0), (0.3, 0.0), goals=(goal(0, (4.0, 1.0), 0.0, 10.0),)),
+        config_name="mine"))]
+    page = comparison_page([*flights, flights[1]])
+    assert Parsed(page.html).sections == ["comparison", "flights"]
+    assert_loads_nothing(page.html)
+    rows = re.sub(r"<[^>]*>|\s+", " ", page.html)
+    assert re.search(r"default +1 +0 +\(0 %\) +mine +2 +2 +\(100 %\)", rows)
+
+
+def test_files_of_one_and_of_several(tmp_path):
+    write_report(fleet(2), tmp_path / "new" / "one.html", tmp_path / "pictures")
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["one.html"]
+    assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == sorted(
+        f"{name}.png" for name in [*PICTURES, "encounter_A", "encounter_B"])
+    write_comparison([figures(fleet(2))] * 2, tmp_path / "two.html", tmp_path / "compared")
+    assert [path.name for path in (tmp_path / "compared").iterdir()] == ["comparison.png"]
+
+
+def test_size_of_the_page():
+    assert len(page_of(2).html) < 1e6
+
+
+def test_animation(tmp_path):
+    animate_flight(fleet(2), tmp_path / "flight.gif")
+    image = Image.open(tmp_path / "flight.gif")
+    assert image.n_frames == 101  # ten seconds at ten frames a second, and the last one
+    first = image.convert("RGB")
+    image.seek(100)
+    assert first.getpixel((300, 300)) == (254, 254, 254)
+    assert first.tobytes() != image.convert("RGB").tobytes()
+
+
+def test_animation_of_an_empty_flight(tmp_path):
+    animate_flight(flight(robot(0, (1.0, 1.0), times_s=NOBODY), scene=None), tmp_path / "no.gif")
+    assert Image.open(tmp_path / "no.gif").n_frames == 1
+
+
+def test_animations_that_cannot_be_written(tmp_path, monkeypatch):
+    assert animation_faults(tmp_path / "flight.gif") == []
+    several, suffix = animation_faults(tmp_path / "flight.avi", 2)
+    assert "2 flights, expected one" in several
+    assert "expected a name that ends in .gif or .mp4" in suffix
+    monkeypatch.setenv("PATH", "")
+    (missing,) = animation_faults(tmp_path / "flight.mp4")
+    assert "needs the program ffmpeg" in missing
