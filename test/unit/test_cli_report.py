@@ -2,67 +2,70 @@
 
 from __future__ import annotations
 
-import sys
+import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
-from hand_made_traces import fleet
 
 from quad_nav.cli import main
-from quad_nav.errors import InputError
 
 
-def read_trace(path: Path):
-    """Stands for the reader of bags: "good" is a flight of two."""
-    if "good" not in path.name:
-        raise InputError([f"{path.name}: is no recording"])
-    return fleet(2)
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory) -> Path:
+    """Half a second of the tutorial's mission."""
+    path = tmp_path_factory.mktemp("flight") / "good.bag"
+    CliRunner().invoke(main, ["fly", "--quiet", "--time-limit", "0.5", "--beams", "64",
+                              "--config", "tutorial", "--record", str(path)])
+    return path
 
 
 @pytest.fixture
-def report(monkeypatch, tmp_path):
-    """Runs ``quad report`` with arguments in an empty folder."""
-    monkeypatch.setitem(sys.modules, "quad_nav.offline.bag_trace",
-                        SimpleNamespace(read_trace=read_trace))
-    monkeypatch.chdir(tmp_path)
+def report(bag, monkeypatch, tmp_path):
+    """Runs ``quad report`` in a folder with two good bags and two others, beside an empty one."""
+    for name in ("good.bag", "good2.bag"):
+        shutil.copy(bag, tmp_path / name)
+    for name in ("bad.bag", "worse.bag"):
+        (tmp_path / name).write_text("no recording")
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path / "out")
     return lambda *arguments: CliRunner().invoke(main, ["report", *arguments])
 
 
 def test_one_flight(report, tmp_path):
-    result = report("good.bag")
+    result = report("../good.bag")
     assert (result.exit_code, result.output) == (0, "report: report.html\n")
-    html = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "<h1>good.bag</h1>" in html
-    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<h1>good.bag</h1>" in html and "0 of 2" in html
+    assert "it ended early (time limit of 0.5 s)" in html
+    assert "TrajectoryPlannerROS/max_vel_x" in html
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["report.html"]
 
 
 def test_pictures_and_animation(report, tmp_path):
-    result = report("good.bag", "-o", "new/one.html", "--png", "png", "--animate", "new/one.gif")
+    result = report("../good.bag", "-o", "new/one.html", "--png", "png", "--animate", "new/one.gif")
     assert result.output == "report: new/one.html\nanimation: new/one.gif\n"
-    assert (tmp_path / "png" / "paths.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "new" / "one.gif").read_bytes().startswith(b"GIF89a")
+    assert (tmp_path / "out" / "png" / "paths.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "out" / "new" / "one.gif").read_bytes().startswith(b"GIF89a")
 
 
 def test_several_flights(report, tmp_path):
-    assert report("good1.bag", "good2.bag", "-o", "both.html").exit_code == 0
-    html = (tmp_path / "both.html").read_text(encoding="utf-8")
-    assert "2 flights compared" in html and "good1.bag" in html and "good2.bag" in html
+    assert report("../good.bag", "../good2.bag", "-o", "both.html").exit_code == 0
+    html = (tmp_path / "out" / "both.html").read_text(encoding="utf-8")
+    assert "2 flights compared" in html
+    assert "<td>good.bag</td><td>tutorial</td>" in html and "<td>good2.bag</td>" in html
 
 
 def test_every_fault_is_told_and_nothing_written(report, tmp_path):
-    result = report("good.bag", "bad.bag", "worse.bag", "--animate", "one.avi")
+    result = report("../good.bag", "../bad.bag", "../worse.bag", "--animate", "one.avi")
     assert result.exit_code == 2
-    assert result.output == (
-        "no report:\n"
-        "  animation: 3 flights, expected one\n"
-        "  animation: one.avi, expected a name that ends in .gif or .mp4\n"
-        "  bad.bag: is no recording\n"
-        "  worse.bag: is no recording\n")
-    assert list(tmp_path.iterdir()) == []
+    lines = result.output.splitlines()
+    assert lines[:3] == ["no report:", "  animation: 3 flights, expected one",
+                         "  animation: one.avi, expected a name that ends in .gif or .mp4"]
+    assert [line.split(":")[0] for line in lines[3:]] == ["  ../bad.bag", "  ../worse.bag"]
+    assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_a_good_flight_with_a_bad_animation_writes_nothing(report, tmp_path):
-    assert report("good.bag", "--animate", "one.avi").exit_code == 2
-    assert list(tmp_path.iterdir()) == []
+    assert report("../good.bag", "--animate", "one.avi").exit_code == 2
+    assert list((tmp_path / "out").iterdir()) == []

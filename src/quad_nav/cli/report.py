@@ -32,8 +32,8 @@ def report(flights: Tuple[Path, ...], output: Path, png: Optional[Path],
            animate: Optional[Path]) -> None:
     """Make a page with pictures of a recorded flight, or compare several.
 
-    A FLIGHT is a bag, from quad fly --record or from rosbag record during roslaunch. The page is
-    one HTML file that needs no network.
+    A FLIGHT is a bag or MCAP of quad fly --record, or a bag of rosbag record during roslaunch. The
+    page is one HTML file that needs no network.
 
     Exit status: 0, or 2 for input that cannot be used.
     """
