@@ -6,11 +6,15 @@ import dataclasses
 import json
 import math
 import resource
+import sys
+import types
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from recorded_flight import flown, setup
 
+from quad_nav.cli import main
 from quad_nav.costmap.occupancy import occupancy
 from quad_nav.errors import InputError
 from quad_nav.face.flight_info import FLIGHT_TOPIC
@@ -352,3 +356,24 @@ def test_a_stop_reason_of_an_observer_ends_the_flight(tmp_path):
     summary = fly(setup(tmp_path), [Tired()])
     assert (summary.reason, summary.sim_time_s) == ("tired", 0.0)
     assert dataclasses.replace(summary, reason="").success is False
+
+
+# The command line.
+
+
+@pytest.mark.parametrize("option, problem", [
+    (["--record", "flight.txt"], "flight.txt: cannot be recorded to; expected a name that ends"),
+    (["--view", "flight.bag"], "flight.bag: cannot be saved to; expected a name that ends"),
+])
+def test_a_bad_file_ends_with_status_2_before_anything_flies(monkeypatch, option, problem):
+    monkeypatch.setitem(sys.modules, "rerun", types.ModuleType("rerun"))
+    result = CliRunner().invoke(main, ["fly", "-q", *option])
+    assert result.exit_code == 2
+    assert f"nothing is flown:\n  {problem}" in result.output
+
+
+def test_the_command_records(tmp_path):
+    path = tmp_path / "flights" / "flight.bag"
+    result = CliRunner().invoke(main, ["fly", "-q", "--time-limit", "0.5", "--record", str(path)])
+    assert result.exit_code == 1  # the time was not enough for the goals
+    assert len(read(path, "/odom0")) == 21

@@ -6,6 +6,7 @@ of the definition.
 """
 from __future__ import annotations
 
+import functools
 from typing import Any, Dict, List, Mapping, Sequence, Tuple
 
 import numpy as np
@@ -63,7 +64,12 @@ def definition(kind: str) -> Tuple[str, str]:
 
 
 def message(kind: str, *fields: Any) -> Any:
-    return _STORE.types[long_name(kind)](*fields)
+    return _message_class(kind)(*fields)
+
+
+@functools.lru_cache(maxsize=None)
+def _message_class(kind: str) -> Any:
+    return _STORE.types[long_name(kind)]
 
 
 def encode(content: Any) -> bytes:
