@@ -13,6 +13,8 @@ from quad_nav.offline.observer import FlightObserver
 
 _PERIOD_S = 0.1  # wall time between two looks at the clock
 
+_STARTING = "starting; the first flight after an install compiles its kernels, half a minute"
+
 
 class ProgressBar(FlightObserver):
     """Goals, simulated time and speed; on stderr, and only where that is a terminal."""
@@ -30,8 +32,9 @@ class ProgressBar(FlightObserver):
     def began(self, flight: Flight) -> None:
         self._start_s = time.monotonic()
         goals = sum(len(robot.sequencer.sequence.goals) for robot in flight.robots)
-        self._task = self._progress.add_task("", total=goals, sim="")
+        self._task = self._progress.add_task("", total=goals, sim=_STARTING)
         self._progress.start()
+        self._progress.refresh()
 
     def acted(self, robot: int, now_s: float, action: Action) -> None:
         self._ended += isinstance(action, GoalEnded)
