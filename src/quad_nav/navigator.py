@@ -24,20 +24,26 @@ from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.mends import Mends
 from quad_nav.parameter_limiter import ParameterLimiter
+from quad_nav.peers import Intention, Peer
 from quad_nav.plan.near import plan_near
 from quad_nav.plan.planner import GlobalPlanner
-from quad_nav.recovery import ParameterLimit, Recovery, Surroundings
+from quad_nav.recovering import NamedRecovery, Recovering
+from quad_nav.recovery import ParameterLimit, Surroundings
 from quad_nav.schedule import Schedule
 from quad_nav.standstill import Standstill
 from quad_nav.tick import (
     Located,
     Outcome,
-    RecoveryStart,
     State,
     Tick,
     Trigger,
     local_from_global,
 )
+
+from quad_nav.traffic import Traffic
+from quad_nav.yielding import Yielding
+
+PEER_WATCH_HZ = 4.0  # how often an idle robot looks whether it is in the way
 
 
 @dataclass(frozen=True)
@@ -62,12 +68,6 @@ class NavigatorParams:
     make_plan_add_unreachable_goal: bool = True
 
 
-@dataclass(frozen=True)
-class NamedRecovery:
-    name: str
-    behaviour: Recovery
-
-
 class Navigator:
     """One robot's move_base.
 
@@ -78,14 +78,16 @@ class Navigator:
     def __init__(self, params: NavigatorParams, global_costmap: LayeredCostmap,
                  local_costmap: LayeredCostmap, planner: GlobalPlanner, controller: LocalPlanner,
                  recoveries: Sequence[NamedRecovery],
-                 mends: Mends):
+                 mends: Mends, number: int = 0):
         self.params = params
         self.mends = mends
         self.global_costmap = global_costmap
         self.local_costmap = local_costmap
         self.planner = planner
         self.controller = controller
-        self.recoveries = tuple(recoveries)
+        self._recovering = Recovering(recoveries)
+        self._yielding = Yielding(Traffic(global_costmap, local_costmap), number)
+        self._watch = Schedule(PEER_WATCH_HZ)
         self._limiter = ParameterLimiter(controller)
         self.state = State.IDLE
         self.goal: Optional[Pose2D] = None
@@ -101,6 +103,10 @@ class Navigator:
         self._progress = Standstill()
         self._reset_recovery()
 
+    @property
+    def recoveries(self) -> Tuple[NamedRecovery, ...]:
+        return self._recovering.recoveries
+
     # -- goals ---------------------------------------------------------------------
 
     def accepts_goal(self, now_s: float) -> bool:
@@ -112,6 +118,10 @@ class Navigator:
 
     def set_goal(self, goal: Pose2D, now_s: float) -> None:
         """Heads for a pose in the global costmap's frame, from this cycle on."""
+        self._yielding.set_out(goal, now_s)
+        self._set_goal(goal, now_s)
+
+    def _set_goal(self, goal: Pose2D, now_s: float) -> None:
         if self.state is State.IDLE:
             self._cycle.start(now_s)
         self.goal = goal
@@ -135,9 +145,11 @@ class Navigator:
         if not self._costmaps_rest:
             due += [schedule.due_s for _, schedule in self._costmaps.values()]
         if self.state is not State.IDLE:
-            due += [self._cycle.due_s, self._recovery_due_s]
+            due += [self._cycle.due_s, self._recovering.due_s]
         if self.state is State.CONTROLLING:
             due.append(self._replan.due_s)
+        elif self.state is State.IDLE and self._yielding.concerns:
+            due.append(self._watch.due_s)
         return min(due)
 
     @property
@@ -147,38 +159,48 @@ class Navigator:
 
     def restart(self, now_s: float) -> None:
         """For a clock that has jumped back: schedules and patience begin anew."""
-        goal = self.goal
+        goal = None if self._yielding.is_errand else self.goal
         self._end_goal()
+        self._watch.start(now_s)
+        self._yielding.traffic.restart()
         for _, schedule in self._costmaps.values():
             schedule.start(now_s)
         self._limiter.lift()
         if goal is not None:
             self.set_goal(goal, now_s)
 
-    def tick(self, now_s: float, located: Located, velocity: Twist2D) -> Tick:
+    def tick(self, now_s: float, located: Located, velocity: Twist2D,
+             peers: Sequence[Peer] = ()) -> Tick:
         """Does what is due.
 
-        ``velocity`` is the odometry's twist in the robot's frame.
+        ``velocity`` is the odometry's twist in the robot's frame; ``peers`` are the other
+        robots as far as they are known.
         """
         if not self._started:
             self._started = True
+            self._watch.start(now_s)
             for _, schedule in self._costmaps.values():
                 schedule.start(now_s)
         tick = Tick(now_s)
+        self._see_peers(tick, located, peers)
         self._update_costmaps(tick, located)
         if self._stop_wanted:
             self._stop_wanted = False
             tick.command = Twist2D()
+        if self.state is State.IDLE and self._watch.take(now_s):
+            self._run_errand(tick, located.in_global)
         if self.state is not State.IDLE:
             self._cycle.follow(self.params.controller_frequency_hz, now_s)
             self._replan.follow(self.params.planner_frequency_hz, now_s)
             self._plan(tick, located.in_global)
-            if self._active is not None:
+            if self._recovering.is_running:
                 self._step_recovery(tick, located)
             if self._cycle.take(now_s):
                 tick.cycle = True
                 self._control_cycle(tick, located, velocity)
+        self._hold_off(tick, located.in_global, velocity)
         tick.state = self.state
+        tick.giving_way = self._yielding.now
         return tick
 
     # -- costmaps ------------------------------------------------------------------
@@ -252,17 +274,21 @@ class Navigator:
             # A failed search is repeated once per control cycle: the costs it
             # depends on change no faster.
             again = tick.now_s >= self._cycle.due_s - 1e-9
-        if not again or self.goal is None:
-            return
+        if again and self.goal is not None:
+            self._search(tick, start)
+
+    def _search(self, tick: Tick, start: Optional[Pose2D]) -> None:
+        target = self._yielding.target(self.goal)
         try:
-            if start is None:
+            if start is None or target is None:
                 raise PlanningError("the robot's pose is unknown")
-            tick.plan = self._plan_between(start, self.goal)
+            tick.plan = self._plan_between(start, target)
         except PlanningError as error:
             tick.planning_failed = str(error)
             self._planning_failed(tick)
             return
         self._new_plan = tick.plan
+        self._yielding.follow(tick.plan)
         self._last_valid_plan_s = tick.now_s
         self._planning_retries = 0
         self._plan_wanted = False
@@ -271,6 +297,8 @@ class Navigator:
             self.state = State.CONTROLLING
 
     def _planning_failed(self, tick: Tick) -> None:
+        if self._yielding.refuge is not None:
+            self._yielding.refuse_refuge()
         if self.state is not State.PLANNING:
             return
         self._planning_retries += 1
@@ -287,23 +315,23 @@ class Navigator:
             tick.command = Twist2D()
             return
         self._limiter.follow(located.in_global)
-        if (self._oscillation.has_moved(
-                tick.now_s, located.in_global, self.params.oscillation_distance_m)
-                and self._trigger is Trigger.OSCILLATION):
-            self._recovery_index = 0
+        if self._oscillation.has_moved(
+                tick.now_s, located.in_global, self.params.oscillation_distance_m):
+            self._recovering.works_again(Trigger.OSCILLATION)
         out_of_date = self._out_of_date(tick.now_s)
         if out_of_date:
             tick.warnings.append("stopped: " + out_of_date)
             tick.command = Twist2D()
             return
+        if self._gives_way(tick, located.in_global):
+            return
         if self._new_plan is not None:
             self.controller.set_plan(self._new_plan)
             self._new_plan = None
-            if self._trigger is Trigger.PLANNING:
-                self._recovery_index = 0
+            self._recovering.works_again(Trigger.PLANNING)
         if self.state is State.CONTROLLING:
             self._follow(tick, located, velocity)
-        elif self.state is State.CLEARING and self._active is None:
+        elif self.state is State.CLEARING and not self._recovering.is_running:
             self._start_recovery(tick, located)
         elif self.state is State.PLANNING:
             tick.command = Twist2D()  # the command of the goal before is not for this one
@@ -328,8 +356,7 @@ class Navigator:
             return
         tick.command = tick.control.command
         self._last_valid_control_s = tick.now_s
-        if self._trigger is Trigger.CONTROLLING:
-            self._recovery_index = 0
+        self._recovering.works_again(Trigger.CONTROLLING)
 
     def _control_failed(self, tick: Tick) -> None:
         if tick.now_s > self._last_valid_control_s + self.params.controller_patience_s:
@@ -377,44 +404,94 @@ class Navigator:
         """Other parameters for the controller; a recovery's speed limit stays in force."""
         self._limiter.set_params(params)
 
+    # -- peers ---------------------------------------------------------------------
+
+    @property
+    def intention(self) -> Intention:
+        """What the peers may know of this robot."""
+        return self._yielding.intention
+
+    def _see_peers(self, tick: Tick, located: Located, peers: Sequence[Peer]) -> None:
+        traffic, had_some = self._yielding.traffic, bool(self._yielding.traffic.peers)
+        tick.notes += traffic.see(tick.now_s, located.in_global, peers, self.mends)
+        if (traffic.peers or had_some) and located.in_global and located.in_local:
+            traffic.tell_costmaps(tick.now_s, located.in_global, local_from_global(located),
+                                  self._yielding.rank_s)
+
+    def _gives_way(self, tick: Tick, here: Pose2D) -> bool:
+        """Whether it stands still for a peer; to a refuge it flies as to a goal."""
+        yielding = self._yielding
+        if (not yielding.concerns or self.goal is None
+                or self.state not in (State.PLANNING, State.CONTROLLING)):
+            return False
+        before = yielding.refuge
+        tick.notes += yielding.decide(tick.now_s, here, self.goal)
+        if yielding.refuge != before:
+            self._begin_planning(tick.now_s)
+            self._search(tick, here)
+        if yielding.now is not None:
+            self._excuse(tick.now_s)
+        if not yielding.waits_at(here):
+            return False
+        tick.command = Twist2D()
+        return True
+
+    def _excuse(self, now_s: float) -> None:
+        """No progress for a peer's sake is no fault."""
+        self._progress.restart(now_s)
+        self._oscillation.restart(now_s)
+        self._last_valid_control_s = now_s
+
+    def _hold_off(self, tick: Tick, pose: Optional[Pose2D], velocity: Twist2D) -> None:
+        """Whatever the command comes from, it leads to nobody."""
+        if tick.command is None or pose is None:
+            return
+        held = self._yielding.traffic.held(pose, velocity, tick.command,
+                                           1.0 / self.params.controller_frequency_hz)
+        tick.command, tick.held_by = held.command, held.by
+        if held.by:
+            self._excuse(tick.now_s)
+            if self.state is State.CONTROLLING and self._yielding.is_held_up(tick.now_s, pose):
+                self._begin_planning(tick.now_s)  # the peer may stand on the plan
+
+    def _run_errand(self, tick: Tick, here: Optional[Pose2D]) -> None:
+        """Without a goal: out of a peer's way, or back again."""
+        home = self._yielding.errand(tick.now_s, here, self.mends) if here is not None else None
+        if home is not None:
+            self._set_goal(home, tick.now_s)
+            tick.notes.append(str(self._yielding.now or "returns to its place"))
+
     # -- recovery ------------------------------------------------------------------
 
     def _reset_recovery(self) -> None:
-        self._recovery_index = 0
-        self._trigger: Optional[Trigger] = None
-        self._active: Optional[Recovery] = None
-        self._recovery_due_s = math.inf
+        self._recovering.reset()
         self._oscillation = Standstill()
         self._progress = Standstill()
         self._replanned_for_progress = False
         self._stop_wanted = False
 
     def _enter_clearing(self, tick: Tick, trigger: Trigger) -> None:
+        if self._yielding.is_errand:
+            self._finish(tick, Outcome(False, trigger.value))
+            return
         self.state = State.CLEARING
         self._plan_wanted = False
-        self._trigger = trigger
+        self._recovering.trigger = trigger
         tick.command = Twist2D()
 
     def _start_recovery(self, tick: Tick, located: Located) -> None:
-        assert self._trigger is not None
-        enabled = self.params.recovery_behavior_enabled
-        if not enabled or self._recovery_index >= len(self.recoveries):
-            self._finish(tick, Outcome(False, self._trigger.value))
-            return
-        named = self.recoveries[self._recovery_index]
-        tick.recovery = RecoveryStart(
-            named.name, self._recovery_index, len(self.recoveries), self._trigger)
-        self._active = named.behaviour
-        self._recovery_due_s = tick.now_s
-        named.behaviour.start(self._surroundings(tick.now_s, located))
-        self._step_recovery(tick, located)
+        assert self._recovering.trigger is not None
+        if self.params.recovery_behavior_enabled:
+            tick.recovery = self._recovering.start(self._surroundings(tick.now_s, located))
+        if tick.recovery is None:
+            self._finish(tick, Outcome(False, self._recovering.trigger.value))
+        else:
+            self._step_recovery(tick, located)
 
     def _step_recovery(self, tick: Tick, located: Located) -> None:
-        assert self._active is not None
-        if tick.now_s < self._recovery_due_s - 1e-9:
+        step = self._recovering.step(self._surroundings(tick.now_s, located))
+        if step is None:
             return
-        step = self._active.step(self._surroundings(tick.now_s, located))
-        self._recovery_due_s = tick.now_s + self._active.period_s
         if step.command is not None:
             tick.command = step.command
         if step.message:
@@ -422,9 +499,6 @@ class Navigator:
         if step.limit is not None and located.in_global is not None:
             self._limiter.impose(step.limit, located.in_global)
         if step.done:
-            self._active = None
-            self._recovery_due_s = math.inf
-            self._recovery_index += 1
             self._oscillation.restart(tick.now_s)
             self._progress.restart(tick.now_s)
             self._replanned_for_progress = False
@@ -437,7 +511,12 @@ class Navigator:
     # -- the end of a goal ---------------------------------------------------------
 
     def _finish(self, tick: Tick, outcome: Outcome) -> None:
-        tick.outcome = outcome
+        if not self._yielding.is_errand:
+            tick.outcome = outcome
+        else:
+            tick.notes.append("is back in its place" if outcome.succeeded else outcome.text)
+            if outcome.succeeded:
+                self._yielding.home = None
         tick.command = Twist2D()
         self._end_goal()
 
@@ -446,5 +525,6 @@ class Navigator:
         self.goal = None
         self._plan_wanted = False
         self._new_plan = None
-        self._active = None
+        self._recovering.stop()
+        self._yielding.stand()
         self._cycle.due_s = math.inf
