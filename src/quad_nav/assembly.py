@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Callable, Dict
+from typing import Any, Callable, Dict, Optional
 
 import numpy as np
 
@@ -12,9 +12,9 @@ from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
 from quad_nav.control.rollout import footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
+from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
-from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.peers import PeerLayerParams
 from quad_nav.geometry import Pose2D
@@ -52,10 +52,10 @@ LOCAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray, float], LocalPlanner]] = {
 _PEERS = ("peer_layer", PeerLayerParams())
 
 
-def build_navigator(configuration: Configuration, number: int = 0) -> Navigator:
+def build_navigator(configuration: Configuration, number: Optional[int] = None) -> Navigator:
     """The navigator that a configuration describes, standing idle.
 
-    ``number`` is the robot's among its peers.
+    ``number`` is the robot's among its peers if it is not the configuration's ``robot``.
     """
     global_costmap = LayeredCostmap(_global_costmap(configuration))
     local_costmap = LayeredCostmap(_local_costmap(configuration))
@@ -65,7 +65,8 @@ def build_navigator(configuration: Configuration, number: int = 0) -> Navigator:
     recoveries = [NamedRecovery(name, _recovery(_mended(params, configuration.mends)))
                   for name, params in configuration.recoveries]
     return Navigator(configuration.navigator, global_costmap, local_costmap,
-                     planner, controller, recoveries, configuration.mends, number)
+                     planner, controller, recoveries, configuration.mends,
+                     configuration.robot if number is None else number)
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:

@@ -39,7 +39,6 @@ from quad_nav.tick import (
     Trigger,
     local_from_global,
 )
-
 from quad_nav.traffic import Traffic
 from quad_nav.yielding import Yielding
 

@@ -6,7 +6,7 @@ it is going (``Intention``); from that and its velocity follows where it will be
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from quad_nav.geometry import Pose2D, Twist2D
 NO_WAY_POINTS = np.zeros((0, 2))
 IDLE_RANK_S = 4.0e9  # later than any time; a ROS stamp can still hold it
 _NUMBER_S = 0.01
+_STANDS_MPS = 0.05
+_GOES_ON_S = 5.0
 
 
 def rank_of(since_s: float, number: int) -> float:
@@ -67,8 +69,12 @@ class Peer:
     def moved_to(self, now_s: float) -> Peer:
         """The peer now, if it has kept its velocity."""
         age_s = now_s - self.stamp_s
-        return Peer(self.name, self.x_m + self.vx_mps * age_s, self.y_m + self.vy_mps * age_s,
-                    self.vx_mps, self.vy_mps, now_s, self.intention)
+        return replace(self, x_m=self.x_m + self.vx_mps * age_s,
+                       y_m=self.y_m + self.vy_mps * age_s, stamp_s=now_s)
+
+    def intending(self, intention: Intention) -> Peer:
+        """The same with another intention."""
+        return replace(self, intention=intention)
 
 
 def peer_at(name: str, pose: Pose2D, velocity: Twist2D, stamp_s: float,
@@ -77,6 +83,23 @@ def peer_at(name: str, pose: Pose2D, velocity: Twist2D, stamp_s: float,
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     return Peer(name, pose.x_m, pose.y_m, cos * velocity.vx_mps - sin * velocity.vy_mps,
                 sin * velocity.vx_mps + cos * velocity.vy_mps, stamp_s, intention)
+
+
+def unknown_intention(peer: Peer) -> Intention:
+    """Of one that tells nothing: it goes on as it does, and before everybody else."""
+    if peer.speed_mps < _STANDS_MPS:
+        return Intention()
+    ahead = peer.position + _GOES_ON_S * np.array([peer.vx_mps, peer.vy_mps])
+    return Intention(0.0, np.array([peer.position, ahead]))
+
+
+def thinned(way: np.ndarray, spacing_m: float) -> np.ndarray:
+    """A way, float64[n, 2], with a point about every ``spacing_m`` and both of its ends."""
+    if len(way) < 2:
+        return way
+    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
+    at = np.linspace(0.0, lengths[-1], 2 + int(lengths[-1] / spacing_m))
+    return np.column_stack((np.interp(at, lengths, way[:, 0]), np.interp(at, lengths, way[:, 1])))
 
 
 def positions_ahead(start: np.ndarray, way: np.ndarray, speed_mps: float,

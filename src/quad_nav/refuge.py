@@ -9,6 +9,7 @@ import numpy as np
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import INSCRIBED, GridSpec
 from quad_nav.kernels.discs import nearest_cell, raise_discs
+from quad_nav.peers import thinned
 
 
 def find_refuge(spec: GridSpec, costs: np.ndarray, here: Pose2D, ways: Sequence[np.ndarray],
@@ -31,18 +32,9 @@ def find_refuge(spec: GridSpec, costs: np.ndarray, here: Pose2D, ways: Sequence[
         raise_discs(blocked, *grid, other[None, :], near_m, 1)
         raise_discs(unwanted, *grid, other[None, :], apart_m, 1)
     for way in ways:
-        raise_discs(unwanted, *grid, _thinned(way, spec.resolution_m), apart_m, 1)
+        raise_discs(unwanted, *grid, thinned(way, 2.0 * spec.resolution_m), apart_m, 1)
     cell_x, cell_y = nearest_cell(blocked, unwanted, *start)
     if cell_x < 0:
         return None
     x_m, y_m = spec.centre_of(cell_x, cell_y)
     return Pose2D(x_m, y_m, math.atan2(y_m - here.y_m, x_m - here.x_m))
-
-
-def _thinned(way: np.ndarray, spacing_m: float) -> np.ndarray:
-    """A way's points about ``spacing_m`` apart, with its ends; gaps in it are filled."""
-    if len(way) < 2:
-        return np.ascontiguousarray(way)
-    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
-    at = np.linspace(0.0, lengths[-1], 2 + int(lengths[-1] / (2.0 * spacing_m)))
-    return np.column_stack((np.interp(at, lengths, way[:, 0]), np.interp(at, lengths, way[:, 1])))

@@ -12,7 +12,7 @@ import numpy as np
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mends import Mends
-from quad_nav.peers import IDLE_RANK_S, NO_WAY_POINTS, Intention, rank_of
+from quad_nav.peers import IDLE_RANK_S, NO_WAY_POINTS, Intention, rank_of, thinned
 from quad_nav.right_of_way import GivingWay, Manner
 from quad_nav.standstill import Standstill
 from quad_nav.traffic import Traffic
@@ -21,6 +21,7 @@ TURN_AFTER_S = 15.0  # one that gets no farther for so long lets the others go f
 REPLAN_AFTER_S = 3.0  # one that is slowed down on the spot looks for another plan
 _FARTHER_M = 0.2
 _AT_REFUGE_M = 0.15
+_SPACING_M = 0.1  # of the way that peers are told
 
 
 class Yielding:
@@ -73,7 +74,7 @@ class Yielding:
 
     def follow(self, plan: np.ndarray) -> None:
         """The plan that is flown, float64[n, 3]."""
-        self._way = np.ascontiguousarray(plan[:, :2])
+        self._way = thinned(plan[:, :2], _SPACING_M)
 
     def stand(self) -> None:
         """It has no goal any more. A home that it has not reached stays its home."""

@@ -66,7 +66,11 @@ NAVIGATOR = Table(
     fixed=(
         double("clearing_radius", 0.46, "", "metres",
                 "Half the side of the square that make_plan clears around the robot; when unset,"
-                " local_costmap/circumscribed_radius."),))
+                " local_costmap/circumscribed_radius."),
+        integer("robot", 0, "", "", "This robot's number among those that fly together. Not in the"
+                " original; see peers.md.", low=0),
+        integer("robots", 1, "", "", "How many fly together: the peers are the other numbers below"
+                " this. Not in the original; see peers.md.", low=1)))
 
 # Not in the original: its faults, mended. See docs/faults.md.
 MENDS = Table(
