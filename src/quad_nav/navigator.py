@@ -39,7 +39,7 @@ from quad_nav.tick import (
     Trigger,
     local_from_global,
 )
-from quad_nav.traffic import Traffic
+from quad_nav.traffic import CRUISING_MPS, Traffic
 from quad_nav.yielding import Yielding
 
 PEER_WATCH_HZ = 4.0  # how often an idle robot looks whether it is in the way
@@ -147,7 +147,7 @@ class Navigator:
             due += [self._cycle.due_s, self._recovering.due_s]
         if self.state is State.CONTROLLING:
             due.append(self._replan.due_s)
-        elif self.state is State.IDLE and self._yielding.concerns:
+        elif self.state is State.IDLE and self.mends.keep_off_peers:
             due.append(self._watch.due_s)
         return min(due)
 
@@ -412,6 +412,7 @@ class Navigator:
 
     def _see_peers(self, tick: Tick, located: Located, peers: Sequence[Peer]) -> None:
         traffic, had_some = self._yielding.traffic, bool(self._yielding.traffic.peers)
+        traffic.cruising_mps = getattr(self._limiter.usual, "max_vel_x_mps", CRUISING_MPS)
         tick.notes += traffic.see(tick.now_s, located.in_global, peers, self.mends)
         if (traffic.peers or had_some) and located.in_global and located.in_local:
             traffic.tell_costmaps(tick.now_s, located.in_global, local_from_global(located),

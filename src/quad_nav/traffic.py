@@ -19,29 +19,39 @@ from quad_nav.grid import LETHAL
 from quad_nav.mends import Mends
 from quad_nav.peers import Peer
 from quad_nav.refuge import find_refuge
-from quad_nav.right_of_way import GivingWay, Manner, comes_near, gives_way, track
+from quad_nav.right_of_way import (
+    HORIZON_S,
+    GivingWay,
+    Manner,
+    comes_near,
+    gives_way,
+    track,
+)
 from quad_nav.separation import Held, within_cell
 from quad_nav.standstill import Standstill
 
-CRUISING_MPS = 0.3
+CRUISING_MPS = 0.3  # of a robot whose controller names no max_vel_x
 LATENCY_S = 0.15  # how much later than due the next command may come
 PARKED_AFTER_S = 8.0  # one that does not get on is gone round, whatever its plan
 _SPARE_M = 0.1
 _SEEN_AROUND_M = 0.15  # a LIDAR's point so far from a peer's circle is the peer's
 _STOOD_M = 0.1
 _WAIT_AT_LEAST_S = 1.0
-_IN_SIGHT_M = 12.0  # peers farther away do not matter now
 _PARKED_COST, _WAY_COST = 120, 100
 _WAY_AHEAD_S = np.arange(0.0, 5.01, 0.25)
 _BEHIND_M = 8.0  # how far a peer's plan is kept clear of when a refuge is looked for
 
 
 class Traffic:
-    """The peers around one robot. Readable: ``peers``, fresh ones only."""
+    """The peers around one robot. Readable: ``peers``, fresh ones only.
+
+    ``cruising_mps`` is the speed that robots are expected to fly at.
+    """
 
     def __init__(self, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap):
         self.peers: List[Peer] = []
         self._global, self._local = global_costmap, local_costmap
+        self.cruising_mps = CRUISING_MPS
         self._radius_m = 0.0
         self._margin_m = 0.0
         self._wait_until_s = -math.inf
@@ -62,8 +72,6 @@ class Traffic:
             return []
         if not mends.keep_off_peers or here is None:
             peers = ()
-        peers = [peer for peer in peers if here is None or math.hypot(
-            peer.x_m - here.x_m, peer.y_m - here.y_m) < _IN_SIGHT_M]
         fresh = [p for p in peers if now_s - p.stamp_s <= mends.peer_timeout_s]
         lost = [p.name for p in peers if now_s - p.stamp_s > mends.peer_timeout_s]
         news = [f"nothing from {name} for {mends.peer_timeout_s:g} s: only the LIDAR sees it"
@@ -71,13 +79,20 @@ class Traffic:
         news += [f"{name} is heard of again" for name in self._lost
                  if any(p.name == name for p in fresh)]
         self._lost = lost
-        self.peers = [peer.moved_to(now_s) for peer in fresh]
         self._radius_m = self._local.circumscribed_radius_m
         self._margin_m = mends.peer_margin_m
+        self.peers = [peer.moved_to(now_s) for peer in fresh if self._matters(peer, here)]
+        self._standing = {p.name: self._standing.get(p.name, Standstill()) for p in self.peers}
         for peer in self.peers:
-            self._standing.setdefault(peer.name, Standstill()).has_moved(
-                now_s, Pose2D(peer.x_m, peer.y_m), _STOOD_M)
+            self._standing[peer.name].has_moved(now_s, Pose2D(peer.x_m, peer.y_m), _STOOD_M)
         return news
+
+    def _matters(self, peer: Peer, here: Optional[Pose2D]) -> bool:
+        """Whether the two could meet within what is looked ahead."""
+        if here is None:
+            return False
+        reach_m = 2.0 * (self.cruising_mps * HORIZON_S + self.apart_m)
+        return math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m) < reach_m
 
     @property
     def keep_off_m(self) -> float:
@@ -108,7 +123,7 @@ class Traffic:
                     solid.append(PeerArea(_moved(peer.position[None, :], local_from_global),
                                           radius_m, LETHAL))
             elif peer.intention.rank_s < rank_s:
-                areas.append(PeerArea(track(peer, CRUISING_MPS, _WAY_AHEAD_S), self.apart_m,
+                areas.append(PeerArea(track(peer, self.cruising_mps, _WAY_AHEAD_S), self.apart_m,
                                       _WAY_COST))
         for costmap, points, shown in ((self._global, positions, areas),
                                        (self._local, _moved(positions, local_from_global), solid)):
@@ -149,7 +164,7 @@ class Traffic:
                 rank_s: float) -> Optional[GivingWay]:
         position = np.array([here.x_m, here.y_m])
         moving = [peer for peer in self.peers if not self.is_parked(peer, now_s)]
-        to = gives_way(position, way, rank_s, moving, self.apart_m, CRUISING_MPS)
+        to = gives_way(position, way, rank_s, moving, self.apart_m, self.cruising_mps)
         if to is None:
             return None
         peer, manner = to
@@ -186,8 +201,8 @@ class Traffic:
         """To the nearest place off all the peer's way; failing that, off its next stretch."""
         first = [p for p in self.peers if p.intention.rank_s < rank_s and not p.is_parked]
         others = np.array([p.position for p in self.peers])
-        nearby = [track(p, CRUISING_MPS) for p in first if p is not peer]
-        for way in (_ahead(peer), track(peer, CRUISING_MPS)):
+        nearby = [track(p, self.cruising_mps) for p in first if p is not peer]
+        for way in (_ahead(peer), track(peer, self.cruising_mps)):
             refuge = find_refuge(self._global.spec, self._global.costs, here, [way, *nearby],
                                  others, self.apart_m + 2.0 * _SPARE_M)
             if refuge is not None:

@@ -158,12 +158,12 @@ class MoveBaseNode:
         for sensor in self._sensors:
             sensor.deliver(self._transforms)
         self._goals.poll(navigator, now_s)
+        self._peers.tell(navigator.intention, now_s)
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
             return
         in_global = self._locate(navigator.global_costmap, now_s)
         located = self._located(in_global, now_s)
         tick = navigator.tick(now_s, located, self._velocity, self._peers.peers(now_s))
-        self._peers.tell(navigator.intention, now_s)
         self._publish(tick, in_global, located)
 
     def _locate(self, costmap, now_s: float) -> Optional[Pose3D]:
