@@ -20,6 +20,7 @@ from quad_nav.mends import Mends
 from quad_nav.peers import Peer
 from quad_nav.refuge import find_refuge
 from quad_nav.right_of_way import (
+    EARLIER_LATER_S,
     HORIZON_S,
     GivingWay,
     Manner,
@@ -38,7 +39,7 @@ _SEEN_AROUND_M = 0.15  # a LIDAR's point so far from a peer's circle is the peer
 _STOOD_M = 0.1
 _WAIT_AT_LEAST_S = 1.0
 _PARKED_COST, _WAY_COST = 120, 100
-_WAY_AHEAD_S = np.arange(0.0, 5.01, 0.25)
+_WAY_AHEAD_S = np.arange(0.0, HORIZON_S + EARLIER_LATER_S, 0.25)
 _BEHIND_M = 8.0  # how far a peer's plan is kept clear of when a refuge is looked for
 
 
@@ -123,8 +124,8 @@ class Traffic:
                     solid.append(PeerArea(_moved(peer.position[None, :], local_from_global),
                                           radius_m, LETHAL))
             elif peer.intention.rank_s < rank_s:
-                areas.append(PeerArea(track(peer, self.cruising_mps, _WAY_AHEAD_S), self.apart_m,
-                                      _WAY_COST))
+                areas.append(PeerArea(track(peer, self.cruising_mps, _WAY_AHEAD_S),
+                                      self.apart_m + _SPARE_M, _WAY_COST))
         for costmap, points, shown in ((self._global, positions, areas),
                                        (self._local, _moved(positions, local_from_global), solid)):
             for layer in costmap.layers.values():
