@@ -13,22 +13,24 @@ oscillates, and then PLANNING again. What differs, and why, is in
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, Dict, Optional, Sequence, Tuple
+from typing import Any, Optional, Sequence, Tuple
 
 import numpy as np
 
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap_updates import CostmapUpdates
 from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.mends import Mends
+from quad_nav.navigator_params import NavigatorParams
 from quad_nav.parameter_limiter import ParameterLimiter
 from quad_nav.peers import Intention, Peer
 from quad_nav.plan.near import plan_near
 from quad_nav.plan.planner import GlobalPlanner
+from quad_nav.progress import ProgressWatch, Remedy, daring
 from quad_nav.recovering import NamedRecovery, Recovering
-from quad_nav.recovery import ParameterLimit, Surroundings
+from quad_nav.recovery import Surroundings
 from quad_nav.schedule import Schedule
 from quad_nav.standstill import Standstill
 from quad_nav.tick import (
@@ -42,29 +44,9 @@ from quad_nav.tick import (
 from quad_nav.traffic import CRUISING_MPS, Traffic
 from quad_nav.yielding import Yielding
 
+__all__ = ["Navigator", "NavigatorParams"]
+
 PEER_WATCH_HZ = 4.0  # how often an idle robot looks whether it is in the way
-
-
-@dataclass(frozen=True)
-class NavigatorParams:
-    """move_base's own parameters, and the limits that mend its faults."""
-
-    base_global_planner: str = "navfn/NavfnROS"
-    base_local_planner: str = "base_local_planner/TrajectoryPlannerROS"
-    recovery_behaviors: Optional[Tuple[Tuple[str, str], ...]] = None  # (name, type); None: default
-    controller_frequency_hz: float = 20.0
-    planner_frequency_hz: float = 0.0
-    planner_patience_s: float = 5.0
-    controller_patience_s: float = 15.0
-    max_planning_retries: int = -1
-    oscillation_timeout_s: float = 0.0
-    oscillation_distance_m: float = 0.5
-    conservative_reset_dist_m: float = 3.0
-    recovery_behavior_enabled: bool = True
-    clearing_rotation_allowed: bool = True
-    shutdown_costmaps: bool = False
-    make_plan_clear_costmap: bool = True
-    make_plan_add_unreachable_goal: bool = True
 
 
 class Navigator:
@@ -90,16 +72,14 @@ class Navigator:
         self._limiter = ParameterLimiter(controller)
         self.state = State.IDLE
         self.goal: Optional[Pose2D] = None
-        self._costmaps: Dict[str, Tuple[LayeredCostmap, Schedule]] = {
-            "global": (global_costmap, Schedule(global_costmap.params.update_frequency_hz)),
-            "local": (local_costmap, Schedule(local_costmap.params.update_frequency_hz))}
+        self._updates = CostmapUpdates(global_costmap, local_costmap)
         self._cycle = Schedule(params.controller_frequency_hz)
         self._replan = Schedule(params.planner_frequency_hz)
         self._started = False
         self._plan_wanted = False
         self._new_plan: Optional[np.ndarray] = None
         self._oscillation = Standstill()
-        self._progress = Standstill()
+        self._progress = ProgressWatch()
         self._reset_recovery()
 
     @property
@@ -142,7 +122,7 @@ class Navigator:
             return -math.inf
         due = [math.inf]
         if not self._costmaps_rest:
-            due += [schedule.due_s for _, schedule in self._costmaps.values()]
+            due.append(self._updates.due_s)
         if self.state is not State.IDLE:
             due += [self._cycle.due_s, self._recovering.due_s]
         if self.state is State.CONTROLLING:
@@ -162,8 +142,7 @@ class Navigator:
         self._end_goal()
         self._watch.start(now_s)
         self._yielding.traffic.restart()
-        for _, schedule in self._costmaps.values():
-            schedule.start(now_s)
+        self._updates.start(now_s)
         self._limiter.lift()
         if goal is not None:
             self.set_goal(goal, now_s)
@@ -178,11 +157,11 @@ class Navigator:
         if not self._started:
             self._started = True
             self._watch.start(now_s)
-            for _, schedule in self._costmaps.values():
-                schedule.start(now_s)
+            self._updates.start(now_s)
         tick = Tick(now_s)
         self._see_peers(tick, located, peers)
-        self._update_costmaps(tick, located)
+        if not self._costmaps_rest:
+            self._updates.update(tick, located)
         if self._stop_wanted:
             self._stop_wanted = False
             tick.command = Twist2D()
@@ -208,20 +187,6 @@ class Navigator:
     def _costmaps_rest(self) -> bool:
         return self.params.shutdown_costmaps and self.state is State.IDLE
 
-    def _update_costmaps(self, tick: Tick, located: Located) -> None:
-        if self._costmaps_rest:
-            return
-        poses = {"global": located.in_global, "local": located.in_local}
-        for name, (costmap, schedule) in self._costmaps.items():
-            schedule.follow(costmap.params.update_frequency_hz, tick.now_s)
-            if not schedule.take(tick.now_s):
-                continue
-            pose = poses[name]
-            if pose is None:
-                tick.warnings.append(f"{name} costmap not updated: the robot's pose is unknown")
-                continue
-            tick.windows[name] = costmap.update(tick.now_s, pose)
-
     def clear_costmaps(self, now_s: float) -> None:
         """Forgets everything that was observed, as ``~clear_costmaps`` does."""
         self.global_costmap.reset_layers(now_s)
@@ -233,14 +198,6 @@ class Navigator:
                               (self.local_costmap, located.in_local)):
             if pose is not None:
                 costmap.free_square(pose.x_m, pose.y_m, 2.0 * radius_m)
-
-    def _out_of_date(self, now_s: float) -> str:
-        """Why the local costmap is not to be driven by, "" when it is."""
-        if self.local_costmap.is_current(now_s):
-            return ""
-        stale = [f"nothing from {name} for {age_s:.1f} s"
-                 for name, age_s in self.local_costmap.stale_sources(now_s)]
-        return "; ".join(stale) or "the local costmap is out of date"
 
     # -- planning ------------------------------------------------------------------
 
@@ -317,7 +274,7 @@ class Navigator:
         if self._oscillation.has_moved(
                 tick.now_s, located.in_global, self.params.oscillation_distance_m):
             self._recovering.works_again(Trigger.OSCILLATION)
-        out_of_date = self._out_of_date(tick.now_s)
+        out_of_date = self._updates.out_of_date(tick.now_s)
         if out_of_date:
             tick.warnings.append("stopped: " + out_of_date)
             tick.command = Twist2D()
@@ -338,7 +295,10 @@ class Navigator:
     def _follow(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
         assert located.in_local is not None and located.in_global is not None
         if self.controller.is_goal_reached():
-            self._finish(tick, Outcome(True, "Goal reached."))
+            if self._yielding.refuge is None:
+                self._finish(tick, Outcome(True, "Goal reached."))
+            else:
+                tick.command = Twist2D()
             return
         if self._oscillation.exceeds(tick.now_s, self.params.oscillation_timeout_s):
             self._enter_clearing(tick, Trigger.OSCILLATION)
@@ -365,39 +325,23 @@ class Navigator:
             self._begin_planning(tick.now_s)
 
     def _is_progressing(self, tick: Tick, pose: Pose2D) -> bool:
-        """Whether the robot has moved lately; if not, a new plan, then recoveries.
-
-        The original takes an in-place turn for valid control for ever.
-        """
-        timeout_s = self.mends.progress_timeout_s
-        if self._progress.has_moved(tick.now_s, pose, self.mends.progress_distance_m):
-            self._replanned_for_progress = False
-        if not self._progress.exceeds(tick.now_s, timeout_s):
+        """Whether the robot has moved lately; if not, a new plan, then recoveries."""
+        remedy = self._progress.look(tick.now_s, pose, self.mends)
+        if remedy is Remedy.NONE:
             return True
-        self._progress.restart(tick.now_s)
-        where = f"no progress for {timeout_s:g} s at ({pose.x_m:.2f}, {pose.y_m:.2f})"
-        if self._replanned_for_progress:
+        where = (f"no progress for {self.mends.progress_timeout_s:g} s at "
+                 f"({pose.x_m:.2f}, {pose.y_m:.2f})")
+        if remedy is Remedy.RECOVERIES:
             tick.warnings.append(where + " with a new plan either: trying recoveries")
             self._enter_clearing(tick, Trigger.OSCILLATION)
-        else:
-            tick.warnings.append(where + ": planning anew")
-            self._replanned_for_progress = True
-            self._dare_more(pose)
-            tick.command = Twist2D()
-            self._begin_planning(tick.now_s)
-        return False
-
-    def _dare_more(self, pose: Pose2D) -> None:
-        """Obstacle costs count for less until the robot has got away.
-
-        A robot that spins has usually found that they outweigh all progress. What
-        collides stays forbidden.
-        """
-        weight = getattr(self._limiter.usual, "occdist_scale", None)
-        if weight is not None and self.mends.stuck_cost_factor < 1.0:
-            limit = ParameterLimit((("occdist_scale", self.mends.stuck_cost_factor * weight),),
-                                   self.params.oscillation_distance_m)
+            return False
+        tick.warnings.append(where + ": planning anew")
+        limit = daring(self._limiter.usual, self.mends, self.params.oscillation_distance_m)
+        if limit is not None:
             self._limiter.impose(limit, pose)
+        tick.command = Twist2D()
+        self._begin_planning(tick.now_s)
+        return False
 
     def set_controller_params(self, params: Any) -> None:
         """Other parameters for the controller; a recovery's speed limit stays in force."""
@@ -466,8 +410,7 @@ class Navigator:
     def _reset_recovery(self) -> None:
         self._recovering.reset()
         self._oscillation = Standstill()
-        self._progress = Standstill()
-        self._replanned_for_progress = False
+        self._progress = ProgressWatch()
         self._stop_wanted = False
 
     def _enter_clearing(self, tick: Tick, trigger: Trigger) -> None:
@@ -500,8 +443,7 @@ class Navigator:
             self._limiter.impose(step.limit, located.in_global)
         if step.done:
             self._oscillation.restart(tick.now_s)
-            self._progress.restart(tick.now_s)
-            self._replanned_for_progress = False
+            self._progress.begin_anew(tick.now_s)
             self._begin_planning(tick.now_s)
 
     def _surroundings(self, now_s: float, located: Located) -> Surroundings:

@@ -20,7 +20,7 @@ LAYERS = [
     {"plugins", "schedule", "parameter_limiter", "standstill", "refuge", "right_of_way",
      "separation"},
     {"tick", "traffic"},
-    {"recovering", "yielding"},
+    {"costmap_updates", "navigator_params", "progress", "recovering", "yielding"},
     {"navigator", "mission"},
     {"config"},
     {"assembly"},
