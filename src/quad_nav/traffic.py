@@ -37,6 +37,7 @@ PARKED_AFTER_S = 8.0  # one that does not get on is gone round, whatever its pla
 _SPARE_M = 0.1
 _SEEN_AROUND_M = 0.15  # a LIDAR's point so far from a peer's circle is the peer's
 _STOOD_M = 0.1
+_OUTSIDE_M = 0.05
 _WAIT_AT_LEAST_S = 1.0
 _PARKED_COST, _WAY_COST = 120, 100
 _WAY_AHEAD_S = np.arange(0.0, HORIZON_S + EARLIER_LATER_S, 0.25)
@@ -113,27 +114,37 @@ class Traffic:
                       rank_s: float) -> None:
         """The peers, for the layers: who stays, who goes first and where."""
         positions = np.array([peer.position for peer in self.peers]).reshape(-1, 2)
-        areas, solid = [], []
+        areas: List[PeerArea] = []
         for peer in self.peers:
             if self.is_parked(peer, now_s):
                 areas.append(PeerArea(peer.position[None, :], self.apart_m + _SPARE_M,
                                       _PARKED_COST))
-                away_m = float(np.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m))
-                radius_m = min(2.0 * self.keep_off_m, away_m - 0.05) - self._radius_m
-                if radius_m > 0.0:
-                    solid.append(PeerArea(_moved(peer.position[None, :], local_from_global),
-                                          radius_m, LETHAL))
             elif peer.intention.rank_s < rank_s:
                 areas.append(PeerArea(track(peer, self.cruising_mps, _WAY_AHEAD_S),
                                       self.apart_m + _SPARE_M, _WAY_COST))
         for costmap, points, shown in ((self._global, positions, areas),
-                                       (self._local, _moved(positions, local_from_global), solid)):
+                                       (self._local, _moved(positions, local_from_global),
+                                        self._solid(here, local_from_global))):
             for layer in costmap.layers.values():
                 if isinstance(layer, PeerLayer):
                     layer.see(shown)
                 elif isinstance(layer, ObstacleLayer):
                     layer.left_out = np.column_stack(
                         (points, np.full(len(points), self._radius_m + _SEEN_AROUND_M)))
+
+    def _solid(self, here: Pose2D, local_from_global: Pose2D) -> List[PeerArea]:
+        """Obstacles for the rollouts: who means to stay, as wide as they are to keep off.
+
+        Never so wide that the robot itself is in one, because then nothing is legal.
+        """
+        solid = []
+        for peer in self.peers:
+            away_m = math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m)
+            radius_m = min(2.0 * self.keep_off_m, away_m - _OUTSIDE_M) - self._radius_m
+            if peer.is_parked and radius_m > 0.0:
+                solid.append(PeerArea(_moved(peer.position[None, :], local_from_global), radius_m,
+                                      LETHAL))
+        return solid
 
     # -- what to do ------------------------------------------------------------------
 
