@@ -74,8 +74,8 @@ class Traffic:
             return []
         if not mends.keep_off_peers or here is None:
             peers = ()
-        fresh = [p for p in peers if now_s - p.stamp_s <= mends.peer_timeout_s]
-        lost = [p.name for p in peers if now_s - p.stamp_s > mends.peer_timeout_s]
+        fresh = [p for p in peers if abs(now_s - p.stamp_s) <= mends.peer_timeout_s]
+        lost = [p.name for p in peers if abs(now_s - p.stamp_s) > mends.peer_timeout_s]
         news = [f"nothing from {name} for {mends.peer_timeout_s:g} s: only the LIDAR sees it"
                 for name in lost if name not in self._lost]
         news += [f"{name} is heard of again" for name in self._lost

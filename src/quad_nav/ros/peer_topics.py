@@ -7,7 +7,8 @@ means that the robot is to stay where it is.
 """
 from __future__ import annotations
 
-from typing import Any, Callable, Dict, List, Optional
+from functools import partial
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 import rospy
@@ -29,17 +30,24 @@ class PeerTopics:
         self._transforms = transforms
         self._frame = global_frame
         self._odometry: Dict[int, Odometry] = {}
-        self._paths: Dict[int, Path] = {}
+        self._said: Dict[int, Tuple[float, Intention]] = {}  # when, and what
         others = [j for j in range(robots) if j != number]
         self.subscribers = [
-            rospy.Subscriber(f"/odom{j}", Odometry, _keeper(self._odometry, j), queue_size=1)
+            rospy.Subscriber(f"/odom{j}", Odometry, partial(self._keep_odometry, j), queue_size=1)
             for j in others]
         self._intentions = [
-            rospy.Subscriber(f"/move_base{j}/intention", Path, _keeper(self._paths, j),
+            rospy.Subscriber(f"/move_base{j}/intention", Path, partial(self._keep_intention, j),
                              queue_size=1) for j in others]
         self._publisher = rospy.Publisher("~intention", Path, queue_size=1)
         self._told: Optional[Intention] = None
         self._told_s = 0.0
+
+    def _keep_odometry(self, number: int, message: Odometry) -> None:
+        self._odometry[number] = message
+
+    def _keep_intention(self, number: int, message: Path) -> None:
+        self._said[number] = (message.header.stamp.to_sec(),
+                              intention_from_message(message, number))
 
     def peers(self, now_s: float) -> List[Peer]:
         """Every robot whose place is known, however old that is."""
@@ -56,12 +64,12 @@ class PeerTopics:
         odom_from_base, velocity = odometry_from_message(odometry)
         pose = map_from_odom.compose(odom_from_base).to_2d()
         peer = peer_at(name, pose, velocity, odometry.header.stamp.to_sec())
-        path = self._paths.get(number)
-        if path is None:
+        if number not in self._said:
             return peer.intending(unknown_intention(peer))
-        if now_s - path.header.stamp.to_sec() > WORD_COUNTS_S:
+        said_s, intention = self._said[number]
+        if now_s - said_s > WORD_COUNTS_S:
             return peer.intending(Intention(rank_of(IDLE_RANK_S, number)))
-        return peer.intending(intention_from_message(path, number))
+        return peer.intending(intention)
 
     def tell(self, intention: Intention, now_s: float) -> None:
         """What this robot is up to: at once when it changes, else every ``REPEAT_S``."""
@@ -71,12 +79,6 @@ class PeerTopics:
             return
         self._told, self._told_s = intention, now_s
         self._publisher.publish(intention_message(intention, self._frame, now_s))
-
-
-def _keeper(store: Dict[int, Any], number: int) -> Callable[[Any], None]:
-    def keep(message: Any) -> None:
-        store[number] = message
-    return keep
 
 
 def intention_message(intention: Intention, frame: str, now_s: float) -> Path:
