@@ -15,8 +15,9 @@ still carries, ``COASTING_S * v``: a velocity loop of unit gain answers like a l
 after the lag has died away it has covered just that much more.
 
 Where the arc leaves the cell it is flown more slowly, so that it ends before. The path
-stays the one that the planner has checked; where nothing of it is left the robot
-turns on the spot.
+stays the one that the planner has checked. Where nothing of it is left the robot turns
+on the spot, as it was to or else away from the peer: otherwise one that grazes a cell's
+border would stand there for ever. Of two that meet head-on each turns to its right.
 """
 from __future__ import annotations
 
@@ -26,12 +27,13 @@ from typing import Sequence
 
 import numpy as np
 
-from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.peers import Peer
 
 COASTING_S = 0.35
 _PARTS = 20
 _SLOWEST_PART = 0.15  # slower than that is standing
+_TURN_RADPS = 0.4
 
 
 @dataclass(frozen=True)
@@ -54,18 +56,28 @@ def within_cell(pose: Pose2D, velocity: Twist2D, command: Twist2D, peers: Sequen
     coasting = COASTING_S * _turned(np.array([[velocity.vx_mps, velocity.vy_mps]]),
                                     pose.yaw_rad)[0]
     arc = _turned(_arc(command, hold_s), pose.yaw_rad)
-    fraction, by = 1.0, ""
+    fraction, nearest = 1.0, None
     for peer in peers:
         allowed = _allowed_fraction(arc, coasting, peer.x_m - pose.x_m, peer.y_m - pose.y_m,
                                     keep_off_m)
         if allowed < fraction:
-            fraction, by = allowed, peer.name
-    if not by:
+            fraction, nearest = allowed, peer
+    if nearest is None:
         return Held(command)
     if fraction < _SLOWEST_PART:
-        return Held(Twist2D(0.0, 0.0, command.vyaw_radps), by)
+        return Held(_turn_instead(pose, command, nearest), nearest.name)
     return Held(Twist2D(fraction * command.vx_mps, fraction * command.vy_mps,
-                        fraction * command.vyaw_radps), by)
+                        fraction * command.vyaw_radps), nearest.name)
+
+
+def _turn_instead(pose: Pose2D, command: Twist2D, peer: Peer) -> Twist2D:
+    """The commanded turn, or if that is hardly one, a turn that takes the course off the peer."""
+    if abs(command.vyaw_radps) >= _TURN_RADPS:
+        return Twist2D(0.0, 0.0, command.vyaw_radps)
+    course_rad = pose.yaw_rad + math.atan2(command.vy_mps, command.vx_mps)
+    bearing_rad = angle_difference(
+        math.atan2(peer.y_m - pose.y_m, peer.x_m - pose.x_m), course_rad)
+    return Twist2D(0.0, 0.0, _TURN_RADPS if bearing_rad < -1e-6 else -_TURN_RADPS)
 
 
 def room_towards(dx_m: float, dy_m: float, coasting: np.ndarray, keep_off_m: float) -> float:

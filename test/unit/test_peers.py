@@ -77,6 +77,16 @@ def test_too_near_it_only_turns():
     assert held.command == Twist2D(0.0, 0.0, 0.5)
 
 
+@pytest.mark.parametrize("yaw_rad, vx_mps, turn_radps", [
+    (0.0, 0.4, -0.4),  # head-on: to the right
+    (0.8, 0.4, 0.4), (-0.8, 0.4, -0.4),  # the peer is to the right, to the left
+    (math.pi + 0.8, -0.4, 0.4)])  # it backs, with the peer to the right of its course
+def test_too_near_and_straight_it_turns_away(yaw_rad, vx_mps, turn_radps):
+    held = within_cell(Pose2D(0.0, 0.0, yaw_rad), STANDING, Twist2D(vx_mps), [peer(0.7, 0.0)],
+                       KEEP_OFF_M, 1.0)
+    assert held.command == Twist2D(0.0, 0.0, turn_radps)
+
+
 def test_the_nearest_of_several_peers_decides():
     peers = [peer(2.0, 0.0, name="far"), peer(1.2, 0.0, name="near"),
              peer(-0.9, 0.0, name="behind")]
