@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Callable, Dict
+from typing import Any, Callable, Dict, Optional
 
 import numpy as np
 
@@ -12,17 +12,20 @@ from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
 from quad_nav.control.rollout import footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
+from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.peers import PeerLayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.mends import Mends
-from quad_nav.navigator import NamedRecovery, Navigator
+from quad_nav.navigator import Navigator
 from quad_nav.plan.carrot import Carrot, CarrotParams
 from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
 from quad_nav.plan.navfn import Navfn, NavfnParams
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.plugins import Plugin
+from quad_nav.recovering import NamedRecovery
 from quad_nav.recovery import (
     ORIGINAL_LAYER_NAMES,
     ClearCostmap,
@@ -46,17 +49,24 @@ LOCAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray, float], LocalPlanner]] = {
 }
 
 
-def build_navigator(configuration: Configuration) -> Navigator:
-    """The navigator that a configuration describes, standing idle."""
-    global_costmap = LayeredCostmap(_watched(configuration, configuration.global_costmap))
-    local_costmap = LayeredCostmap(_watched(configuration, configuration.local_costmap))
+_PEERS = ("peer_layer", PeerLayerParams())
+
+
+def build_navigator(configuration: Configuration, number: Optional[int] = None) -> Navigator:
+    """The navigator that a configuration describes, standing idle.
+
+    ``number`` is the robot's among its peers if it is not the configuration's ``robot``.
+    """
+    global_costmap = LayeredCostmap(_global_costmap(configuration))
+    local_costmap = LayeredCostmap(_local_costmap(configuration))
     planner = _global_planner(configuration.global_planner, global_costmap.footprint)
     controller = _local_planner(_mended(configuration.local_planner, configuration.mends),
                                 local_costmap.footprint, configuration.local_planner_period_s)
     recoveries = [NamedRecovery(name, _recovery(_mended(params, configuration.mends)))
                   for name, params in configuration.recoveries]
     return Navigator(configuration.navigator, global_costmap, local_costmap,
-                     planner, controller, recoveries, configuration.mends)
+                     planner, controller, recoveries, configuration.mends,
+                     configuration.robot if number is None else number)
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
@@ -64,8 +74,8 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
     footprint = navigator.global_costmap.footprint
     navigator.params = configuration.navigator
     navigator.mends = configuration.mends
-    navigator.global_costmap.reconfigure(_watched(configuration, configuration.global_costmap))
-    navigator.local_costmap.reconfigure(_watched(configuration, configuration.local_costmap))
+    navigator.global_costmap.reconfigure(_global_costmap(configuration))
+    navigator.local_costmap.reconfigure(_local_costmap(configuration))
     new_footprint = navigator.global_costmap.footprint
     # A user's planner has no parameters that change, and may have learnt something.
     if (not isinstance(configuration.global_planner, Plugin)
@@ -102,6 +112,20 @@ def _mended(params: Any, mends: Mends) -> Any:
             and not mends.clear_any_obstacle_layer):
         return replace(params, layer_names=ORIGINAL_LAYER_NAMES)
     return params
+
+
+def _global_costmap(configuration: Configuration) -> CostmapParams:
+    """Peers are no obstacles there, so their layer comes after the one that inflates."""
+    costmap = _watched(configuration, configuration.global_costmap)
+    return replace(costmap, layers=(*costmap.layers, _PEERS))
+
+
+def _local_costmap(configuration: Configuration) -> CostmapParams:
+    """Peers are obstacles there, so their layer comes before the first that inflates."""
+    costmap = _watched(configuration, configuration.local_costmap)
+    kinds = [isinstance(layer, InflationLayerParams) for _, layer in costmap.layers]
+    place = kinds.index(True) if any(kinds) else len(kinds)
+    return replace(costmap, layers=(*costmap.layers[:place], _PEERS, *costmap.layers[place:]))
 
 
 def _watched(configuration: Configuration, costmap: CostmapParams) -> CostmapParams:

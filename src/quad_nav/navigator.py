@@ -13,59 +13,40 @@ oscillates, and then PLANNING again. What differs, and why, is in
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, Dict, Optional, Sequence, Tuple
+from typing import Any, Optional, Sequence, Tuple
 
 import numpy as np
 
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap_updates import CostmapUpdates
 from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.mends import Mends
+from quad_nav.navigator_params import NavigatorParams
 from quad_nav.parameter_limiter import ParameterLimiter
+from quad_nav.peers import Intention, Peer
 from quad_nav.plan.near import plan_near
 from quad_nav.plan.planner import GlobalPlanner
-from quad_nav.recovery import ParameterLimit, Recovery, Surroundings
+from quad_nav.progress import ProgressWatch, Remedy, daring
+from quad_nav.recovering import NamedRecovery, Recovering
+from quad_nav.recovery import Surroundings
 from quad_nav.schedule import Schedule
 from quad_nav.standstill import Standstill
 from quad_nav.tick import (
     Located,
     Outcome,
-    RecoveryStart,
     State,
     Tick,
     Trigger,
     local_from_global,
 )
+from quad_nav.traffic import CRUISING_MPS, Traffic
+from quad_nav.yielding import Yielding
 
+__all__ = ["Navigator", "NavigatorParams"]
 
-@dataclass(frozen=True)
-class NavigatorParams:
-    """move_base's own parameters, and the limits that mend its faults."""
-
-    base_global_planner: str = "navfn/NavfnROS"
-    base_local_planner: str = "base_local_planner/TrajectoryPlannerROS"
-    recovery_behaviors: Optional[Tuple[Tuple[str, str], ...]] = None  # (name, type); None: default
-    controller_frequency_hz: float = 20.0
-    planner_frequency_hz: float = 0.0
-    planner_patience_s: float = 5.0
-    controller_patience_s: float = 15.0
-    max_planning_retries: int = -1
-    oscillation_timeout_s: float = 0.0
-    oscillation_distance_m: float = 0.5
-    conservative_reset_dist_m: float = 3.0
-    recovery_behavior_enabled: bool = True
-    clearing_rotation_allowed: bool = True
-    shutdown_costmaps: bool = False
-    make_plan_clear_costmap: bool = True
-    make_plan_add_unreachable_goal: bool = True
-
-
-@dataclass(frozen=True)
-class NamedRecovery:
-    name: str
-    behaviour: Recovery
+PEER_WATCH_HZ = 4.0  # how often an idle robot looks whether it is in the way
 
 
 class Navigator:
@@ -78,28 +59,32 @@ class Navigator:
     def __init__(self, params: NavigatorParams, global_costmap: LayeredCostmap,
                  local_costmap: LayeredCostmap, planner: GlobalPlanner, controller: LocalPlanner,
                  recoveries: Sequence[NamedRecovery],
-                 mends: Mends):
+                 mends: Mends, number: int = 0):
         self.params = params
         self.mends = mends
         self.global_costmap = global_costmap
         self.local_costmap = local_costmap
         self.planner = planner
         self.controller = controller
-        self.recoveries = tuple(recoveries)
+        self._recovering = Recovering(recoveries)
+        self._yielding = Yielding(Traffic(global_costmap, local_costmap), number)
+        self._watch = Schedule(PEER_WATCH_HZ)
         self._limiter = ParameterLimiter(controller)
         self.state = State.IDLE
         self.goal: Optional[Pose2D] = None
-        self._costmaps: Dict[str, Tuple[LayeredCostmap, Schedule]] = {
-            "global": (global_costmap, Schedule(global_costmap.params.update_frequency_hz)),
-            "local": (local_costmap, Schedule(local_costmap.params.update_frequency_hz))}
+        self._updates = CostmapUpdates(global_costmap, local_costmap)
         self._cycle = Schedule(params.controller_frequency_hz)
         self._replan = Schedule(params.planner_frequency_hz)
         self._started = False
         self._plan_wanted = False
         self._new_plan: Optional[np.ndarray] = None
         self._oscillation = Standstill()
-        self._progress = Standstill()
+        self._progress = ProgressWatch()
         self._reset_recovery()
+
+    @property
+    def recoveries(self) -> Tuple[NamedRecovery, ...]:
+        return self._recovering.recoveries
 
     # -- goals ---------------------------------------------------------------------
 
@@ -112,6 +97,10 @@ class Navigator:
 
     def set_goal(self, goal: Pose2D, now_s: float) -> None:
         """Heads for a pose in the global costmap's frame, from this cycle on."""
+        self._yielding.set_out(goal, now_s)
+        self._set_goal(goal, now_s)
+
+    def _set_goal(self, goal: Pose2D, now_s: float) -> None:
         if self.state is State.IDLE:
             self._cycle.start(now_s)
         self.goal = goal
@@ -133,11 +122,13 @@ class Navigator:
             return -math.inf
         due = [math.inf]
         if not self._costmaps_rest:
-            due += [schedule.due_s for _, schedule in self._costmaps.values()]
+            due.append(self._updates.due_s)
         if self.state is not State.IDLE:
-            due += [self._cycle.due_s, self._recovery_due_s]
+            due += [self._cycle.due_s, self._recovering.due_s]
         if self.state is State.CONTROLLING:
             due.append(self._replan.due_s)
+        elif self.state is State.IDLE and self.mends.keep_off_peers:
+            due.append(self._watch.due_s)
         return min(due)
 
     @property
@@ -147,38 +138,47 @@ class Navigator:
 
     def restart(self, now_s: float) -> None:
         """For a clock that has jumped back: schedules and patience begin anew."""
-        goal = self.goal
+        goal = None if self._yielding.is_errand else self.goal
         self._end_goal()
-        for _, schedule in self._costmaps.values():
-            schedule.start(now_s)
+        self._watch.start(now_s)
+        self._yielding.traffic.restart()
+        self._updates.start(now_s)
         self._limiter.lift()
         if goal is not None:
             self.set_goal(goal, now_s)
 
-    def tick(self, now_s: float, located: Located, velocity: Twist2D) -> Tick:
+    def tick(self, now_s: float, located: Located, velocity: Twist2D,
+             peers: Sequence[Peer] = ()) -> Tick:
         """Does what is due.
 
-        ``velocity`` is the odometry's twist in the robot's frame.
+        ``velocity`` is the odometry's twist in the robot's frame; ``peers`` are the other
+        robots as far as they are known.
         """
         if not self._started:
             self._started = True
-            for _, schedule in self._costmaps.values():
-                schedule.start(now_s)
+            self._watch.start(now_s)
+            self._updates.start(now_s)
         tick = Tick(now_s)
-        self._update_costmaps(tick, located)
+        self._see_peers(tick, located, peers)
+        if not self._costmaps_rest:
+            self._updates.update(tick, located)
         if self._stop_wanted:
             self._stop_wanted = False
             tick.command = Twist2D()
+        if self.state is State.IDLE and self._watch.take(now_s):
+            self._run_errand(tick, located.in_global)
         if self.state is not State.IDLE:
             self._cycle.follow(self.params.controller_frequency_hz, now_s)
             self._replan.follow(self.params.planner_frequency_hz, now_s)
             self._plan(tick, located.in_global)
-            if self._active is not None:
+            if self._recovering.is_running:
                 self._step_recovery(tick, located)
             if self._cycle.take(now_s):
                 tick.cycle = True
                 self._control_cycle(tick, located, velocity)
+        self._hold_off(tick, located.in_global, velocity)
         tick.state = self.state
+        tick.giving_way = self._yielding.now
         return tick
 
     # -- costmaps ------------------------------------------------------------------
@@ -186,20 +186,6 @@ class Navigator:
     @property
     def _costmaps_rest(self) -> bool:
         return self.params.shutdown_costmaps and self.state is State.IDLE
-
-    def _update_costmaps(self, tick: Tick, located: Located) -> None:
-        if self._costmaps_rest:
-            return
-        poses = {"global": located.in_global, "local": located.in_local}
-        for name, (costmap, schedule) in self._costmaps.items():
-            schedule.follow(costmap.params.update_frequency_hz, tick.now_s)
-            if not schedule.take(tick.now_s):
-                continue
-            pose = poses[name]
-            if pose is None:
-                tick.warnings.append(f"{name} costmap not updated: the robot's pose is unknown")
-                continue
-            tick.windows[name] = costmap.update(tick.now_s, pose)
 
     def clear_costmaps(self, now_s: float) -> None:
         """Forgets everything that was observed, as ``~clear_costmaps`` does."""
@@ -212,14 +198,6 @@ class Navigator:
                               (self.local_costmap, located.in_local)):
             if pose is not None:
                 costmap.free_square(pose.x_m, pose.y_m, 2.0 * radius_m)
-
-    def _out_of_date(self, now_s: float) -> str:
-        """Why the local costmap is not to be driven by, "" when it is."""
-        if self.local_costmap.is_current(now_s):
-            return ""
-        stale = [f"nothing from {name} for {age_s:.1f} s"
-                 for name, age_s in self.local_costmap.stale_sources(now_s)]
-        return "; ".join(stale) or "the local costmap is out of date"
 
     # -- planning ------------------------------------------------------------------
 
@@ -252,17 +230,21 @@ class Navigator:
             # A failed search is repeated once per control cycle: the costs it
             # depends on change no faster.
             again = tick.now_s >= self._cycle.due_s - 1e-9
-        if not again or self.goal is None:
-            return
+        if again and self.goal is not None:
+            self._search(tick, start)
+
+    def _search(self, tick: Tick, start: Optional[Pose2D]) -> None:
+        target = self._yielding.target(self.goal)
         try:
-            if start is None:
+            if start is None or target is None:
                 raise PlanningError("the robot's pose is unknown")
-            tick.plan = self._plan_between(start, self.goal)
+            tick.plan = self._plan_between(start, target)
         except PlanningError as error:
             tick.planning_failed = str(error)
             self._planning_failed(tick)
             return
         self._new_plan = tick.plan
+        self._yielding.follow(tick.plan)
         self._last_valid_plan_s = tick.now_s
         self._planning_retries = 0
         self._plan_wanted = False
@@ -271,6 +253,8 @@ class Navigator:
             self.state = State.CONTROLLING
 
     def _planning_failed(self, tick: Tick) -> None:
+        if self._yielding.refuge is not None:
+            self._yielding.refuse_refuge()
         if self.state is not State.PLANNING:
             return
         self._planning_retries += 1
@@ -287,23 +271,23 @@ class Navigator:
             tick.command = Twist2D()
             return
         self._limiter.follow(located.in_global)
-        if (self._oscillation.has_moved(
-                tick.now_s, located.in_global, self.params.oscillation_distance_m)
-                and self._trigger is Trigger.OSCILLATION):
-            self._recovery_index = 0
-        out_of_date = self._out_of_date(tick.now_s)
+        if self._oscillation.has_moved(
+                tick.now_s, located.in_global, self.params.oscillation_distance_m):
+            self._recovering.works_again(Trigger.OSCILLATION)
+        out_of_date = self._updates.out_of_date(tick.now_s)
         if out_of_date:
             tick.warnings.append("stopped: " + out_of_date)
             tick.command = Twist2D()
             return
+        if self._gives_way(tick, located.in_global):
+            return
         if self._new_plan is not None:
             self.controller.set_plan(self._new_plan)
             self._new_plan = None
-            if self._trigger is Trigger.PLANNING:
-                self._recovery_index = 0
+            self._recovering.works_again(Trigger.PLANNING)
         if self.state is State.CONTROLLING:
             self._follow(tick, located, velocity)
-        elif self.state is State.CLEARING and self._active is None:
+        elif self.state is State.CLEARING and not self._recovering.is_running:
             self._start_recovery(tick, located)
         elif self.state is State.PLANNING:
             tick.command = Twist2D()  # the command of the goal before is not for this one
@@ -311,7 +295,10 @@ class Navigator:
     def _follow(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
         assert located.in_local is not None and located.in_global is not None
         if self.controller.is_goal_reached():
-            self._finish(tick, Outcome(True, "Goal reached."))
+            if self._yielding.refuge is None:
+                self._finish(tick, Outcome(True, "Goal reached."))
+            else:
+                tick.command = Twist2D()
             return
         if self._oscillation.exceeds(tick.now_s, self.params.oscillation_timeout_s):
             self._enter_clearing(tick, Trigger.OSCILLATION)
@@ -328,8 +315,7 @@ class Navigator:
             return
         tick.command = tick.control.command
         self._last_valid_control_s = tick.now_s
-        if self._trigger is Trigger.CONTROLLING:
-            self._recovery_index = 0
+        self._recovering.works_again(Trigger.CONTROLLING)
 
     def _control_failed(self, tick: Tick) -> None:
         if tick.now_s > self._last_valid_control_s + self.params.controller_patience_s:
@@ -339,82 +325,116 @@ class Navigator:
             self._begin_planning(tick.now_s)
 
     def _is_progressing(self, tick: Tick, pose: Pose2D) -> bool:
-        """Whether the robot has moved lately; if not, a new plan, then recoveries.
-
-        The original takes an in-place turn for valid control for ever.
-        """
-        timeout_s = self.mends.progress_timeout_s
-        if self._progress.has_moved(tick.now_s, pose, self.mends.progress_distance_m):
-            self._replanned_for_progress = False
-        if not self._progress.exceeds(tick.now_s, timeout_s):
+        """Whether the robot has moved lately; if not, a new plan, then recoveries."""
+        remedy = self._progress.look(tick.now_s, pose, self.mends)
+        if remedy is Remedy.NONE:
             return True
-        self._progress.restart(tick.now_s)
-        where = f"no progress for {timeout_s:g} s at ({pose.x_m:.2f}, {pose.y_m:.2f})"
-        if self._replanned_for_progress:
+        where = (f"no progress for {self.mends.progress_timeout_s:g} s at "
+                 f"({pose.x_m:.2f}, {pose.y_m:.2f})")
+        if remedy is Remedy.RECOVERIES:
             tick.warnings.append(where + " with a new plan either: trying recoveries")
             self._enter_clearing(tick, Trigger.OSCILLATION)
-        else:
-            tick.warnings.append(where + ": planning anew")
-            self._replanned_for_progress = True
-            self._dare_more(pose)
-            tick.command = Twist2D()
-            self._begin_planning(tick.now_s)
-        return False
-
-    def _dare_more(self, pose: Pose2D) -> None:
-        """Obstacle costs count for less until the robot has got away.
-
-        A robot that spins has usually found that they outweigh all progress. What
-        collides stays forbidden.
-        """
-        weight = getattr(self._limiter.usual, "occdist_scale", None)
-        if weight is not None and self.mends.stuck_cost_factor < 1.0:
-            limit = ParameterLimit((("occdist_scale", self.mends.stuck_cost_factor * weight),),
-                                   self.params.oscillation_distance_m)
+            return False
+        tick.warnings.append(where + ": planning anew")
+        limit = daring(self._limiter.usual, self.mends, self.params.oscillation_distance_m)
+        if limit is not None:
             self._limiter.impose(limit, pose)
+        tick.command = Twist2D()
+        self._begin_planning(tick.now_s)
+        return False
 
     def set_controller_params(self, params: Any) -> None:
         """Other parameters for the controller; a recovery's speed limit stays in force."""
         self._limiter.set_params(params)
 
+    # -- peers ---------------------------------------------------------------------
+
+    @property
+    def intention(self) -> Intention:
+        """What the peers may know of this robot."""
+        return self._yielding.intention
+
+    def _see_peers(self, tick: Tick, located: Located, peers: Sequence[Peer]) -> None:
+        traffic, had_some = self._yielding.traffic, bool(self._yielding.traffic.peers)
+        traffic.cruising_mps = getattr(self._limiter.usual, "max_vel_x_mps", CRUISING_MPS)
+        tick.notes += traffic.see(tick.now_s, located.in_global, peers, self.mends)
+        if (traffic.peers or had_some) and located.in_global and located.in_local:
+            traffic.tell_costmaps(tick.now_s, located.in_global, local_from_global(located),
+                                  self._yielding.rank_s)
+
+    def _gives_way(self, tick: Tick, here: Pose2D) -> bool:
+        """Whether it stands still for a peer; to a refuge it flies as to a goal."""
+        yielding = self._yielding
+        if (not yielding.concerns or self.goal is None
+                or self.state not in (State.PLANNING, State.CONTROLLING)):
+            return False
+        before = yielding.refuge
+        tick.notes += yielding.decide(tick.now_s, here, self.goal)
+        if yielding.refuge != before:
+            self._begin_planning(tick.now_s)
+            self._search(tick, here)
+        if yielding.now is not None:
+            self._excuse(tick.now_s)
+        if not yielding.waits_at(here):
+            return False
+        tick.command = Twist2D()
+        return True
+
+    def _excuse(self, now_s: float) -> None:
+        """No progress for a peer's sake is no fault."""
+        self._progress.restart(now_s)
+        self._oscillation.restart(now_s)
+        self._last_valid_control_s = now_s
+
+    def _hold_off(self, tick: Tick, pose: Optional[Pose2D], velocity: Twist2D) -> None:
+        """Whatever the command comes from, it leads to nobody."""
+        if tick.command is None or pose is None:
+            return
+        held = self._yielding.traffic.held(pose, velocity, tick.command,
+                                           1.0 / self.params.controller_frequency_hz)
+        tick.command, tick.held_by = held.command, held.by
+        if held.by:
+            self._excuse(tick.now_s)
+            if self.state is State.CONTROLLING and self._yielding.is_held_up(tick.now_s, pose):
+                self._begin_planning(tick.now_s)  # the peer may stand on the plan
+
+    def _run_errand(self, tick: Tick, here: Optional[Pose2D]) -> None:
+        """Without a goal: out of a peer's way, or back again."""
+        home = self._yielding.errand(tick.now_s, here, self.mends) if here is not None else None
+        if home is not None:
+            self._set_goal(home, tick.now_s)
+            tick.notes.append(str(self._yielding.now or "returns to its place"))
+
     # -- recovery ------------------------------------------------------------------
 
     def _reset_recovery(self) -> None:
-        self._recovery_index = 0
-        self._trigger: Optional[Trigger] = None
-        self._active: Optional[Recovery] = None
-        self._recovery_due_s = math.inf
+        self._recovering.reset()
         self._oscillation = Standstill()
-        self._progress = Standstill()
-        self._replanned_for_progress = False
+        self._progress = ProgressWatch()
         self._stop_wanted = False
 
     def _enter_clearing(self, tick: Tick, trigger: Trigger) -> None:
+        if self._yielding.is_errand:
+            self._finish(tick, Outcome(False, trigger.value))
+            return
         self.state = State.CLEARING
         self._plan_wanted = False
-        self._trigger = trigger
+        self._recovering.trigger = trigger
         tick.command = Twist2D()
 
     def _start_recovery(self, tick: Tick, located: Located) -> None:
-        assert self._trigger is not None
-        enabled = self.params.recovery_behavior_enabled
-        if not enabled or self._recovery_index >= len(self.recoveries):
-            self._finish(tick, Outcome(False, self._trigger.value))
-            return
-        named = self.recoveries[self._recovery_index]
-        tick.recovery = RecoveryStart(
-            named.name, self._recovery_index, len(self.recoveries), self._trigger)
-        self._active = named.behaviour
-        self._recovery_due_s = tick.now_s
-        named.behaviour.start(self._surroundings(tick.now_s, located))
-        self._step_recovery(tick, located)
+        assert self._recovering.trigger is not None
+        if self.params.recovery_behavior_enabled:
+            tick.recovery = self._recovering.start(self._surroundings(tick.now_s, located))
+        if tick.recovery is None:
+            self._finish(tick, Outcome(False, self._recovering.trigger.value))
+        else:
+            self._step_recovery(tick, located)
 
     def _step_recovery(self, tick: Tick, located: Located) -> None:
-        assert self._active is not None
-        if tick.now_s < self._recovery_due_s - 1e-9:
+        step = self._recovering.step(self._surroundings(tick.now_s, located))
+        if step is None:
             return
-        step = self._active.step(self._surroundings(tick.now_s, located))
-        self._recovery_due_s = tick.now_s + self._active.period_s
         if step.command is not None:
             tick.command = step.command
         if step.message:
@@ -422,12 +442,8 @@ class Navigator:
         if step.limit is not None and located.in_global is not None:
             self._limiter.impose(step.limit, located.in_global)
         if step.done:
-            self._active = None
-            self._recovery_due_s = math.inf
-            self._recovery_index += 1
             self._oscillation.restart(tick.now_s)
-            self._progress.restart(tick.now_s)
-            self._replanned_for_progress = False
+            self._progress.begin_anew(tick.now_s)
             self._begin_planning(tick.now_s)
 
     def _surroundings(self, now_s: float, located: Located) -> Surroundings:
@@ -437,7 +453,12 @@ class Navigator:
     # -- the end of a goal ---------------------------------------------------------
 
     def _finish(self, tick: Tick, outcome: Outcome) -> None:
-        tick.outcome = outcome
+        if not self._yielding.is_errand:
+            tick.outcome = outcome
+        else:
+            tick.notes.append("is back in its place" if outcome.succeeded else outcome.text)
+            if outcome.succeeded:
+                self._yielding.home = None
         tick.command = Twist2D()
         self._end_goal()
 
@@ -446,5 +467,6 @@ class Navigator:
         self.goal = None
         self._plan_wanted = False
         self._new_plan = None
-        self._active = None
+        self._recovering.stop()
+        self._yielding.stand()
         self._cycle.due_s = math.inf

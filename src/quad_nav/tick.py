@@ -11,6 +11,7 @@ import numpy as np
 from quad_nav.control.controller import Control
 from quad_nav.costmap.cost_grid import Window
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.right_of_way import GivingWay
 
 
 class State(enum.Enum):
@@ -68,6 +69,9 @@ class Tick:
     control: Optional[Control] = None
     recovery: Optional[RecoveryStart] = None
     outcome: Optional[Outcome] = None
+    giving_way: Optional[GivingWay] = None  # what it does for a peer just now
+    held_by: str = ""  # the peer that the command was slowed down for
+    notes: List[str] = field(default_factory=list)  # what is worth knowing, and no fault
     warnings: List[str] = field(default_factory=list)
 
 

@@ -17,6 +17,7 @@ from quad_nav.assembly import build_navigator
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.navigator import Navigator
+from quad_nav.peers import Intention, Peer
 from quad_nav.tick import Located
 
 _AHEAD_M = 1.0
@@ -44,8 +45,15 @@ def warm_up(configuration: config.Configuration) -> None:
                   spec.origin_y_m + 0.5 * spec.size_y * spec.resolution_m)
     _look_around(navigator, here)
     navigator.set_goal(Pose2D(here.x_m + _AHEAD_M, here.y_m), 0.0)
-    for now_s in (0.0, 0.5, 1.0):
+    for now_s in (0.0, 0.5):
         navigator.tick(now_s, Located(here, here), Twist2D(vx_mps=0.1))
+    navigator.tick(1.0, Located(here, here), Twist2D(vx_mps=0.1), [_coming(here, 1.0)])
+
+
+def _coming(here: Pose2D, now_s: float) -> Peer:
+    """A peer that goes first and for which the robot has to make room."""
+    way = np.array([[here.x_m + 2.0, here.y_m], [here.x_m, here.y_m]])
+    return Peer("peer", here.x_m + 2.0, here.y_m, 0.0, 0.0, now_s, Intention(-1.0, way))
 
 
 def _look_around(navigator: Navigator, here: Pose2D) -> None:

@@ -8,7 +8,9 @@ import rospy
 import rostest
 
 from quad_nav.geometry import Pose3D, Scan, Twist2D, quaternion_from_euler
+from quad_nav.peers import IDLE_RANK_S, Intention, rank_of
 from quad_nav.ros import convert
+from quad_nav.ros.peer_topics import intention_from_message, intention_message
 
 POSE = Pose3D(1.0, -2.0, 0.5, quaternion_from_euler(0.1, -0.2, 2.0))
 TWIST = Twist2D(0.3, -0.1, 0.7)
@@ -44,6 +46,20 @@ class Convert(unittest.TestCase):
         self.assertEqual(
             (back.stamp_s, back.angle_min_rad, back.angle_increment_rad, back.range_min_m,
              back.range_max_m), (12.25, -math.pi, math.pi / 2, 0.02, 60.0))
+
+    def test_intentions(self):
+        told = Intention(rank_of(1700000012.25, 3), np.array([[1.0, 2.0], [1.5, 2.5]]))
+        message = intention_message(told, "map", 1700000020.5)
+        self.assertEqual((message.header.frame_id, message.header.stamp.to_sec()),
+                         ("map", 1700000020.5))
+        heard = intention_from_message(message, 3)
+        self.assertAlmostEqual(heard.rank_s, told.rank_s, places=6)
+        np.testing.assert_array_equal(heard.way, told.way)
+
+    def test_an_intention_to_stay_is_an_empty_path(self):
+        staying = Intention(rank_of(IDLE_RANK_S, 3))
+        heard = intention_from_message(intention_message(staying, "map", 1.0), 3)
+        self.assertEqual((heard.rank_s, len(heard.way)), (staying.rank_s, 0))
 
     def test_times_are_rounded_to_the_nanosecond(self):
         self.assertEqual(convert.time_message(1.0 + 1.0 / 240), rospy.Time(1, 4166667))

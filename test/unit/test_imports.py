@@ -13,11 +13,14 @@ PACKAGE = "quad_nav"
 
 # A unit (a module or subpackage of quad_nav) imports itself and units of the rows above its own.
 LAYERS = [
-    {"errors", "footprint", "geometry", "grid", "mends", "shipped", "versions"},
+    {"errors", "footprint", "geometry", "grid", "mends", "peers", "shipped", "versions"},
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},
-    {"plugins", "schedule", "parameter_limiter", "standstill", "tick"},
+    {"plugins", "schedule", "parameter_limiter", "standstill", "refuge", "right_of_way",
+     "separation"},
+    {"tick", "traffic"},
+    {"costmap_updates", "navigator_params", "progress", "recovering", "yielding"},
     {"navigator", "mission"},
     {"config"},
     {"assembly"},

@@ -10,8 +10,9 @@ from quad_nav.errors import NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.mends import ORIGINAL, Mends
-from quad_nav.navigator import NamedRecovery, Navigator, NavigatorParams
+from quad_nav.navigator import Navigator, NavigatorParams
 from quad_nav.plan.near import ring_offsets
+from quad_nav.recovering import NamedRecovery
 from quad_nav.recovery import Step
 from quad_nav.schedule import Schedule
 from quad_nav.tick import Located, State, Trigger, local_from_global

@@ -38,6 +38,11 @@ def test_every_kernel_of_a_cycle_has_run(missions):
         assert not ticks[0].windows["local"].is_empty
 
 
+def test_each_mission_makes_room_for_a_peer(missions):
+    for _, ticks in missions:
+        assert ticks[-1].giving_way is not None and ticks[-1].giving_way.refuge is not None
+
+
 def test_every_planner_and_obstacle_layer_flies(missions):
     navigators = [navigator for navigator, _ in missions]
     assert {type(navigator.planner.params) for navigator in navigators} == set(GLOBAL_PLANNERS)

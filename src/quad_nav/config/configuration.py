@@ -47,7 +47,8 @@ class Configuration:
     ``recoveries`` are (name, parameters) in the order in which they are tried.
     ``local_planner_period_s`` is the control period that rollouts reckon with;
     it may differ from the loop's own, as in the original. ``clearing_radius_m`` is
-    half the side of the square that ``make_plan`` clears around the robot.
+    half the side of the square that ``make_plan`` clears around the robot. ``robot`` is
+    the robot's number among the ``robots`` that fly together.
     """
 
     navigator: NavigatorParams
@@ -59,6 +60,8 @@ class Configuration:
     recoveries: Tuple[Tuple[str, RecoveryParams], ...]
     local_planner_period_s: float
     clearing_radius_m: float
+    robot: int = 0
+    robots: int = 1
     remarks: Tuple[Remark, ...] = ()
     tree: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     tree_at_start: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -111,6 +114,8 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
         recoveries=recoveries(settled, listed),
         local_planner_period_s=local_planner_period_s(settled),
         clearing_radius_m=settled.get("clearing_radius", circumscribed_radius_m(settled)),
+        robot=settled.get("robot", 0),
+        robots=settled.get("robots", 1),
         remarks=tuple(notes.remarks),
         tree=pruned,
         tree_at_start=pruned)

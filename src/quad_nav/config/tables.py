@@ -66,7 +66,11 @@ NAVIGATOR = Table(
     fixed=(
         double("clearing_radius", 0.46, "", "metres",
                 "Half the side of the square that make_plan clears around the robot; when unset,"
-                " local_costmap/circumscribed_radius."),))
+                " local_costmap/circumscribed_radius."),
+        integer("robot", 0, "", "", "This robot's number among those that fly together. Not in the"
+                " original; see peers.md.", low=0),
+        integer("robots", 1, "", "", "How many fly together: the peers are the other numbers below"
+                " this. Not in the original; see peers.md.", low=1)))
 
 # Not in the original: its faults, mended. See docs/faults.md.
 MENDS = Table(
@@ -91,6 +95,15 @@ MENDS = Table(
               "Turn no farther in one control period than is left to the goal's heading."),
         flag("stop_after_rotation", True, "stop_after_rotation",
               "Send a stop after a rotation recovery."),
+        flag("keep_off_peers", True, "keep_off_peers",
+              "Keep off the other robots whose poses are known, and give way by rule."),
+        double("peer_margin", 0.05, "peer_margin_m", "metres",
+                "How far each of two robots keeps its footprint from the middle between them.",
+                low=0, high=2),
+        double("peer_timeout", 0.5, "peer_timeout_s", "seconds",
+                "A peer that was not heard of for so long is left to the LIDAR.", low=0, high=60),
+        flag("make_room_when_idle", True, "make_room_when_idle",
+              "A robot without a goal gets out of a peer's way, and comes back."),
         _RESTORE))
 
 TRAJECTORY_PLANNER = Table(

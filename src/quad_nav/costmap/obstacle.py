@@ -55,6 +55,8 @@ class ObstacleLayer(GridLayer):
     """Sensors write with ``add_scan`` and ``add_cloud``; ``grid`` holds the outcome.
 
     The sources are fixed at construction; ``reconfigure`` changes the other parameters.
+    Points within the circles ``left_out``, float64[n, 3] rows x, y, radius in the global
+    frame, are ignored: something else knows what is there.
     """
 
     params: ObstacleLayerParams
@@ -68,6 +70,7 @@ class ObstacleLayer(GridLayer):
         self._footprint = np.empty((0, 2))
         self._footprint_now = np.empty((0, 2))
         self._cleared_lines = np.empty(_LINES, dtype=np.int64)
+        self.left_out = np.empty((0, 3))
 
     def add_scan(self, source_name: str, scan: Scan, global_from_sensor: Pose3D, now_s: float,
                  global_from_origin: Optional[Pose3D] = None) -> None:
@@ -91,6 +94,9 @@ class ObstacleLayer(GridLayer):
         buffer = self.buffers[source_name]
         points = transform_points(points, global_from_sensor, buffer.params.min_obstacle_height_m,
                                   buffer.params.max_obstacle_height_m)
+        for x_m, y_m, radius_m in self.left_out:
+            inside = np.hypot(points[:, 0] - x_m, points[:, 1] - y_m) <= radius_m
+            points = points[~inside]
         origin = global_from_origin or global_from_sensor
         buffer.add(Observation(stamp_s, origin.translation, points), now_s)
 

@@ -26,6 +26,7 @@ from quad_nav.mission.sequencer import (
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.scene_map import SceneMaps
 from quad_nav.offline.setup import FlightSetup
+from quad_nav.peers import Peer, peer_at
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.simulation import STEPS_PER_S, RobotState, Simulation
@@ -37,10 +38,10 @@ STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 class FlightRobot:
     """One quadcopter's navigator and sequencer, and what passes between them."""
 
-    def __init__(self, goals: RobotGoals, configuration: Configuration):
+    def __init__(self, goals: RobotGoals, configuration: Configuration, number: int):
         self.name = goals.name
         self.configuration = configuration
-        self.navigator = build_navigator(configuration)
+        self.navigator = build_navigator(configuration, number)
         self.sequencer = Sequencer(goals.sequence)
         self.log = RobotLog(goals.name)
         self.waiting_goal: Optional[Pose2D] = None
@@ -67,7 +68,8 @@ class FlightRobot:
                 self.waiting_goal = action.pose
         return actions
 
-    def navigate(self, now_s: float, state: RobotState) -> Optional[Tuple[Tick, Located]]:
+    def navigate(self, now_s: float, state: RobotState,
+                 peers: Sequence[Peer]) -> Optional[Tuple[Tick, Located]]:
         """Does what is due; None when nothing is."""
         navigator = self.navigator
         if self.waiting_goal is not None and navigator.accepts_goal(now_s):
@@ -77,7 +79,7 @@ class FlightRobot:
             return None
         pose = state.map_from_base.to_2d()
         located = Located(pose, pose)
-        tick = navigator.tick(now_s, located, state.twist)
+        tick = navigator.tick(now_s, located, state.twist, peers)
         self._take(tick)
         return tick, located
 
@@ -99,8 +101,8 @@ class Flight:
     def __init__(self, setup: FlightSetup, observers: Sequence[FlightObserver] = ()):
         self.setup = setup
         self.simulation = Simulation(setup.scene, len(setup.robots), setup.simulation, setup.seed)
-        self.robots = [FlightRobot(goals, configuration)
-                       for goals, configuration in zip(setup.robots, setup.configurations)]
+        self.robots = [FlightRobot(goals, configuration, number) for number, (goals, configuration)
+                       in enumerate(zip(setup.robots, setup.configurations))]
         self._give_maps()
         self.reason = ""  # why it ended before its goals did, if it did
         self._observers = tuple(observers)
@@ -174,9 +176,12 @@ class Flight:
 
     def _navigate(self) -> None:
         now_s = self.now_s
+        peers = [peer_at(robot.name, state.map_from_base.to_2d(), state.twist, now_s,
+                         robot.navigator.intention)
+                 for robot, state in zip(self.robots, self.states)]
         for index, (robot, state) in enumerate(zip(self.robots, self.states)):
             start_s = time.perf_counter()
-            done = robot.navigate(now_s, state)
+            done = robot.navigate(now_s, state, peers[:index] + peers[index + 1:])
             if done is None:
                 continue
             tick, located = done

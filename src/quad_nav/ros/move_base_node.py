@@ -25,6 +25,7 @@ from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
 from quad_nav.ros.nav_messages import goal_from_message, path_message
+from quad_nav.ros.peer_topics import PeerTopics
 from quad_nav.ros.plan_topics import PlanTopics
 from quad_nav.ros.reconfigure import serve_namespaces
 from quad_nav.ros.signals import init_node
@@ -53,11 +54,14 @@ class MoveBaseNode:
             "global": CostmapPublisher("global_costmap", navigator.global_costmap, self._lock),
             "local": CostmapPublisher("local_costmap", navigator.local_costmap, self._lock)}
         self._topics = PlanTopics(navigator)
+        self._peers = PeerTopics(configuration.robot, configuration.robots, self._transforms,
+                                 navigator.global_costmap.params.global_frame)
         self._odometry = rospy.Subscriber("odom", Odometry, self._on_odometry, queue_size=1)
         self._sensors = sensors.connect(costmaps)
         self._maps = static_maps.connect(costmaps, self._lock)
         self._silence = SilenceWatch(
-            [self._odometry] + [sensor.subscriber for sensor in self._sensors])
+            [self._odometry, *self._peers.subscribers,
+             *(sensor.subscriber for sensor in self._sensors)])
         self._reconfigure = serve_namespaces(configuration, self._on_reconfigure)
         planner = plugin_name(navigator.params.base_global_planner)
         self._services = [
@@ -154,11 +158,12 @@ class MoveBaseNode:
         for sensor in self._sensors:
             sensor.deliver(self._transforms)
         self._goals.poll(navigator, now_s)
+        self._peers.tell(navigator.intention, now_s)
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
             return
         in_global = self._locate(navigator.global_costmap, now_s)
         located = self._located(in_global, now_s)
-        tick = navigator.tick(now_s, located, self._velocity)
+        tick = navigator.tick(now_s, located, self._velocity, self._peers.peers(now_s))
         self._publish(tick, in_global, located)
 
     def _locate(self, costmap, now_s: float) -> Optional[Pose3D]:
@@ -174,6 +179,8 @@ class MoveBaseNode:
     def _publish(self, tick: Tick, in_global: Optional[Pose3D], located: Located) -> None:
         for warning in tick.warnings:
             rospy.logwarn_throttle_identical(WARN_AGAIN_S, warning)
+        for note in tick.notes:
+            rospy.loginfo("%s", note)
         if tick.planning_failed:
             rospy.logwarn_throttle_identical(WARN_AGAIN_S, "no plan: " + tick.planning_failed)
         if tick.recovery is not None:

@@ -1,0 +1,40 @@
+"""Where a robot goes that is in another's way: the nearest place that is in nobody's."""
+from __future__ import annotations
+
+import math
+from typing import Optional, Sequence
+
+import numpy as np
+
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import INSCRIBED, GridSpec
+from quad_nav.kernels.discs import nearest_cell, raise_discs
+from quad_nav.peers import thinned
+
+
+def find_refuge(spec: GridSpec, costs: np.ndarray, here: Pose2D, ways: Sequence[np.ndarray],
+                others: np.ndarray, apart_m: float) -> Optional[Pose2D]:
+    """The nearest place on the global costmap, uint8[H, W], that is ``apart_m`` from all ways.
+
+    ``ways`` are float64[n, 2] each, the present positions of those who go included.
+    ``others``, float64[k, 2], are the positions of all peers: they are kept off too and
+    not passed through. None when there is no such place that can be reached.
+    """
+    start = spec.cell_of(here.x_m, here.y_m)
+    if start is None:
+        return None
+    blocked = (costs >= INSCRIBED).astype(np.uint8)
+    unwanted = np.zeros(spec.shape, dtype=np.uint8)
+    grid = (spec.origin_x_m, spec.origin_y_m, spec.resolution_m)
+    for other in others:
+        away_m = math.hypot(other[0] - here.x_m, other[1] - here.y_m)
+        near_m = min(apart_m, away_m - 2.0 * spec.resolution_m)  # the way out begins outside
+        raise_discs(blocked, *grid, other[None, :], near_m, 1)
+        raise_discs(unwanted, *grid, other[None, :], apart_m, 1)
+    for way in ways:
+        raise_discs(unwanted, *grid, thinned(way, 2.0 * spec.resolution_m), apart_m, 1)
+    cell_x, cell_y = nearest_cell(blocked, unwanted, *start)
+    if cell_x < 0:
+        return None
+    x_m, y_m = spec.centre_of(cell_x, cell_y)
+    return Pose2D(x_m, y_m, math.atan2(y_m - here.y_m, x_m - here.x_m))

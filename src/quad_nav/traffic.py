@@ -1,0 +1,236 @@
+"""What one robot knows of its peers, and how it gives way to them.
+
+The navigator asks in each control cycle what to do and obeys: fly on, wait, or fly to
+a refuge first. The rules themselves are in ``right_of_way``, ``refuge`` and
+``separation``.
+"""
+from __future__ import annotations
+
+import math
+from typing import Dict, List, Optional, Sequence
+
+import numpy as np
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.costmap.peers import PeerArea, PeerLayer
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import LETHAL
+from quad_nav.mends import Mends
+from quad_nav.peers import Peer
+from quad_nav.refuge import find_refuge
+from quad_nav.right_of_way import (
+    EARLIER_LATER_S,
+    HORIZON_S,
+    GivingWay,
+    Manner,
+    comes_near,
+    gives_way,
+    track,
+)
+from quad_nav.separation import Held, within_cell
+from quad_nav.standstill import Standstill
+
+CRUISING_MPS = 0.3  # of a robot whose controller names no max_vel_x
+LATENCY_S = 0.15  # how much later than due the next command may come
+PARKED_AFTER_S = 8.0  # one that does not get on is gone round, whatever its plan
+_SPARE_M = 0.1
+_SEEN_AROUND_M = 0.15  # a LIDAR's point so far from a peer's circle is the peer's
+_STOOD_M = 0.1
+_OUTSIDE_M = 0.05
+_WAIT_AT_LEAST_S = 1.0
+_PARKED_COST, _WAY_COST = 120, 100
+_WAY_AHEAD_S = np.arange(0.0, HORIZON_S + EARLIER_LATER_S, 0.25)
+_BEHIND_M = 8.0  # how far a peer's plan is kept clear of when a refuge is looked for
+
+
+class Traffic:
+    """The peers around one robot. Readable: ``peers``, fresh ones only.
+
+    ``cruising_mps`` is the speed that robots are expected to fly at.
+    """
+
+    def __init__(self, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap):
+        self.peers: List[Peer] = []
+        self._global, self._local = global_costmap, local_costmap
+        self.cruising_mps = CRUISING_MPS
+        self._radius_m = 0.0
+        self._margin_m = 0.0
+        self._wait_until_s = -math.inf
+        self._lost: List[str] = []
+        self._standing: Dict[str, Standstill] = {}
+
+    def restart(self) -> None:
+        """For a clock that has jumped: forgets what it has seen."""
+        self.peers, self._lost, self._standing = [], [], {}
+        self._wait_until_s = -math.inf
+
+    # -- what is seen ----------------------------------------------------------------
+
+    def see(self, now_s: float, here: Optional[Pose2D], peers: Sequence[Peer],
+            mends: Mends) -> List[str]:
+        """Takes what is known of the peers; returns what is to be said about it."""
+        if not peers and not self.peers and not self._lost:
+            return []
+        if not mends.keep_off_peers or here is None:
+            peers = ()
+        fresh = [p for p in peers if abs(now_s - p.stamp_s) <= mends.peer_timeout_s]
+        lost = [p.name for p in peers if abs(now_s - p.stamp_s) > mends.peer_timeout_s]
+        news = [f"nothing from {name} for {mends.peer_timeout_s:g} s: only the LIDAR sees it"
+                for name in lost if name not in self._lost]
+        news += [f"{name} is heard of again" for name in self._lost
+                 if any(p.name == name for p in fresh)]
+        self._lost = lost
+        self._radius_m = self._local.circumscribed_radius_m
+        self._margin_m = mends.peer_margin_m
+        self.peers = [peer.moved_to(now_s) for peer in fresh if self._matters(peer, here)]
+        self._standing = {p.name: self._standing.get(p.name, Standstill()) for p in self.peers}
+        for peer in self.peers:
+            self._standing[peer.name].has_moved(now_s, Pose2D(peer.x_m, peer.y_m), _STOOD_M)
+        return news
+
+    def _matters(self, peer: Peer, here: Optional[Pose2D]) -> bool:
+        """Whether the two could meet within what is looked ahead."""
+        if here is None:
+            return False
+        reach_m = 2.0 * (self.cruising_mps * HORIZON_S + self.apart_m)
+        return math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m) < reach_m
+
+    @property
+    def keep_off_m(self) -> float:
+        return self._radius_m + self._margin_m
+
+    @property
+    def apart_m(self) -> float:
+        """How far centres are to be from each other where a robot can choose."""
+        return 2.0 * self.keep_off_m + _SPARE_M
+
+    def is_parked(self, peer: Peer, now_s: float) -> bool:
+        return peer.is_parked or self._standing[peer.name].exceeds(now_s, PARKED_AFTER_S)
+
+    # -- costmaps --------------------------------------------------------------------
+
+    def tell_costmaps(self, now_s: float, here: Pose2D, local_from_global: Pose2D,
+                      rank_s: float) -> None:
+        """The peers, for the layers: who stays, who goes first and where."""
+        positions = np.array([peer.position for peer in self.peers]).reshape(-1, 2)
+        areas: List[PeerArea] = []
+        for peer in self.peers:
+            if self.is_parked(peer, now_s):
+                areas.append(PeerArea(peer.position[None, :], self.apart_m + _SPARE_M,
+                                      _PARKED_COST))
+            elif peer.intention.rank_s < rank_s:
+                areas.append(PeerArea(track(peer, self.cruising_mps, _WAY_AHEAD_S),
+                                      self.apart_m + _SPARE_M, _WAY_COST))
+        for costmap, points, shown in ((self._global, positions, areas),
+                                       (self._local, _moved(positions, local_from_global),
+                                        self._solid(here, local_from_global))):
+            for layer in costmap.layers.values():
+                if isinstance(layer, PeerLayer):
+                    layer.see(shown)
+                elif isinstance(layer, ObstacleLayer):
+                    layer.left_out = np.column_stack(
+                        (points, np.full(len(points), self._radius_m + _SEEN_AROUND_M)))
+
+    def _solid(self, here: Pose2D, local_from_global: Pose2D) -> List[PeerArea]:
+        """Obstacles for the rollouts: who means to stay, as wide as they are to keep off.
+
+        Never so wide that the robot itself is in one, because then nothing is legal.
+        """
+        solid = []
+        for peer in self.peers:
+            away_m = math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m)
+            radius_m = min(2.0 * self.keep_off_m, away_m - _OUTSIDE_M) - self._radius_m
+            if peer.is_parked and radius_m > 0.0:
+                solid.append(PeerArea(_moved(peer.position[None, :], local_from_global), radius_m,
+                                      LETHAL))
+        return solid
+
+    # -- what to do ------------------------------------------------------------------
+
+    def held(self, pose: Pose2D, velocity: Twist2D, command: Twist2D, period_s: float) -> Held:
+        """The command, slowed down so that it comes near nobody."""
+        return within_cell(pose, velocity, command, self.peers, self.keep_off_m,
+                           period_s + LATENCY_S)
+
+    def give_way(self, now_s: float, here: Pose2D, way: np.ndarray, goal_way: np.ndarray,
+                 rank_s: float, current: Optional[GivingWay]) -> Optional[GivingWay]:
+        """What to do now for whom; ``current`` is what was decided last, None to fly on.
+
+        ``way``, float64[n, 2], is the robot's own plan, to a refuge if it flies to one;
+        ``goal_way`` is how it would go on to its goal.
+        """
+        if current is not None and current.refuge is not None:
+            going = self._still_leaving(now_s, here, rank_s, current)
+            if going is not None:
+                return going
+            way = goal_way
+        elif current is not None and now_s < self._wait_until_s:
+            return current
+        decision = self._decide(now_s, here, way, rank_s)
+        if decision is not None and decision.manner is Manner.WAIT:
+            self._wait_until_s = now_s + _WAIT_AT_LEAST_S
+        return decision
+
+    def _decide(self, now_s: float, here: Pose2D, way: np.ndarray,
+                rank_s: float) -> Optional[GivingWay]:
+        position = np.array([here.x_m, here.y_m])
+        moving = [peer for peer in self.peers if not self.is_parked(peer, now_s)]
+        to = gives_way(position, way, rank_s, moving, self.apart_m, self.cruising_mps)
+        if to is None:
+            return None
+        peer, manner = to
+        if manner is Manner.WAIT:
+            return GivingWay(peer.name, manner)
+        return self._leave(peer, here, rank_s)
+
+    def is_free(self, place: Pose2D) -> bool:
+        """Whether no peer is at a place or will come through."""
+        at = np.array([place.x_m, place.y_m])
+        points = [np.vstack((peer.position[None, :], peer.intention.way)) for peer in self.peers]
+        return all(np.hypot(*(p - at).T).min() > self.apart_m for p in points)
+
+    def _still_leaving(self, now_s: float, here: Pose2D, rank_s: float,
+                       current: GivingWay) -> Optional[GivingWay]:
+        """The way to a refuge goes on until the peer is past or cannot come."""
+        assert current.refuge is not None
+        peer = next((p for p in self.peers if p.name == current.to), None)
+        if peer is None or peer.intention.rank_s >= rank_s or self.is_parked(peer, now_s):
+            return None
+        ahead = _ahead(peer)
+        nearest_m = float(np.hypot(*(ahead - (here.x_m, here.y_m)).T).min())
+        if nearest_m > self.apart_m + _SPARE_M or not comes_near(
+                np.array([here.x_m, here.y_m]), ahead, self.apart_m + _SPARE_M):
+            return None
+        refuge = np.array([current.refuge.x_m, current.refuge.y_m])
+        others = [p for p in self.peers if p.name != current.to]
+        taken = any(np.hypot(*(p.position - refuge)) < self.apart_m - _SPARE_M for p in others)
+        if taken or np.hypot(*(ahead - refuge).T).min() < self.apart_m - _SPARE_M:
+            return self._leave(peer, here, rank_s)
+        return current
+
+    def _leave(self, peer: Peer, here: Pose2D, rank_s: float) -> GivingWay:
+        """To the nearest place off all the peer's way; failing that, off its next stretch."""
+        first = [p for p in self.peers if p.intention.rank_s < rank_s and not p.is_parked]
+        others = np.array([p.position for p in self.peers])
+        nearby = [track(p, self.cruising_mps) for p in first if p is not peer]
+        for way in (_ahead(peer), track(peer, self.cruising_mps)):
+            refuge = find_refuge(self._global.spec, self._global.costs, here, [way, *nearby],
+                                 others, self.apart_m + 2.0 * _SPARE_M)
+            if refuge is not None:
+                return GivingWay(peer.name, Manner.LEAVE, refuge)
+        return GivingWay(peer.name, Manner.WAIT)
+
+
+def _ahead(peer: Peer) -> np.ndarray:
+    """Where a peer is and what of its plan is still before it, float64[k, 2]."""
+    return track(peer, 1.0, np.arange(0.0, _BEHIND_M, 0.1))
+
+
+def _moved(points: np.ndarray, local_from_global: Pose2D) -> np.ndarray:
+    cos, sin = np.cos(local_from_global.yaw_rad), np.sin(local_from_global.yaw_rad)
+    x, y = points[:, 0], points[:, 1]
+    return np.column_stack((cos * x - sin * y + local_from_global.x_m,
+                            sin * x + cos * y + local_from_global.y_m))
+
+

@@ -1,0 +1,292 @@
+"""Cells, tracks, ranks and refuges, with numbers that can be worked out by hand."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from quad_nav.costmap.cost_grid import NOWHERE, CostGrid
+from quad_nav.costmap.peers import PeerArea, PeerLayer
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
+from quad_nav.kernels.discs import nearest_cell, raise_discs
+from quad_nav.peers import (
+    IDLE_RANK_S,
+    Intention,
+    Peer,
+    peer_at,
+    positions_ahead,
+    rank_of,
+    thinned,
+    unknown_intention,
+)
+from quad_nav.refuge import find_refuge
+from quad_nav.right_of_way import Manner, comes_near, gives_way
+from quad_nav.separation import COASTING_S, within_cell
+
+KEEP_OFF_M = 0.4
+APART_M = 0.9
+CRUISING_MPS = 0.3
+STANDING = Twist2D()
+
+
+def peer(x_m, y_m, vx_mps=0.0, vy_mps=0.0, rank_s=IDLE_RANK_S, way=(), name="other"):
+    return Peer(name, x_m, y_m, vx_mps, vy_mps, 0.0,
+                Intention(rank_s, np.array(way, dtype=np.float64).reshape(-1, 2)))
+
+
+# -- the cell between peers --------------------------------------------------------------
+
+
+def test_a_command_ends_where_the_own_half_ends():
+    # 1.2 m apart: 0.6 m to the middle, less 0.4 m, leaves 0.2 m of the 0.4 m in 1 s.
+    held = within_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
+    assert held.by == "other"
+    assert held.command.vx_mps == pytest.approx(0.2)
+
+
+def test_the_way_that_speed_still_carries_counts():
+    speed = Twist2D(0.1 / COASTING_S)  # carries 0.1 m
+    held = within_cell(Pose2D(0.0, 0.0), speed, Twist2D(0.4), [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
+    assert held.command.vx_mps == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("yaw_rad, other", [
+    (math.pi, (1.2, 0.0)),  # away from it
+    (math.pi / 2, (1.2, 0.0)),  # past it
+    (0.0, (1.6, 0.0)),  # towards it, but no farther than the own half
+])
+def test_what_stays_in_the_cell_is_not_touched(yaw_rad, other):
+    command = Twist2D(0.4)
+    held = within_cell(Pose2D(0.0, 0.0, yaw_rad), STANDING, command, [peer(*other)], KEEP_OFF_M,
+                       1.0)
+    assert held.command == command and held.by == ""
+
+
+def test_the_path_stays_the_same_when_it_is_flown_more_slowly():
+    command = Twist2D(0.4, 0.0, 0.5)
+    held = within_cell(Pose2D(0.0, 0.0), STANDING, command, [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
+    assert 0.0 < held.command.vx_mps < 0.4
+    assert held.command.vyaw_radps / held.command.vx_mps == pytest.approx(0.5 / 0.4)
+
+
+def test_too_near_it_only_turns():
+    held = within_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4, 0.0, 0.5), [peer(0.7, 0.0)],
+                       KEEP_OFF_M, 1.0)
+    assert held.command == Twist2D(0.0, 0.0, 0.5)
+
+
+@pytest.mark.parametrize("yaw_rad, vx_mps, turn_radps", [
+    (0.0, 0.4, -0.4),  # head-on: to the right
+    (0.8, 0.4, 0.4), (-0.8, 0.4, -0.4),  # the peer is to the right, to the left
+    (math.pi + 0.8, -0.4, 0.4)])  # it backs, with the peer to the right of its course
+def test_too_near_and_straight_it_turns_away(yaw_rad, vx_mps, turn_radps):
+    held = within_cell(Pose2D(0.0, 0.0, yaw_rad), STANDING, Twist2D(vx_mps), [peer(0.7, 0.0)],
+                       KEEP_OFF_M, 1.0)
+    assert held.command == Twist2D(0.0, 0.0, turn_radps)
+
+
+def test_the_nearest_of_several_peers_decides():
+    peers = [peer(2.0, 0.0, name="far"), peer(1.2, 0.0, name="near"),
+             peer(-0.9, 0.0, name="behind")]
+    held = within_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), peers, KEEP_OFF_M, 1.0)
+    assert held.by == "near"
+
+
+@pytest.mark.parametrize("stagger, lost_m", [(0, 0.0), (5, 0.025)])
+@pytest.mark.parametrize("seed", range(3))
+def test_point_masses_that_keep_their_cells_never_meet(seed, stagger, lost_m):
+    """Four that all want to the middle, each commanded once a second.
+
+    Commanded at different times they see each other's cells turn, and lose up to
+    ``lost_m`` of the 0.4 m: that is for the margin.
+    """
+    random = np.random.default_rng(seed)
+    at = np.array([[2.0, 0.0], [-2.0, 0.1], [0.0, 2.0], [0.1, -2.0]])
+    at += random.normal(0, 0.1, (4, 2))
+    velocity = np.zeros((4, 2))
+    for step in range(400):
+        seen = [peer(*at[k], *velocity[k]) for k in range(4)]
+        for k in range(4):
+            if step % 20 == stagger * k:
+                yaw = math.atan2(-at[k, 1], -at[k, 0])
+                command = within_cell(Pose2D(*at[k], yaw), STANDING, Twist2D(0.5),
+                                      seen[:k] + seen[k + 1:], KEEP_OFF_M, 1.0).command
+                velocity[k] = command.vx_mps * np.array([math.cos(yaw), math.sin(yaw)])
+        at += 0.05 * velocity
+        gaps = [np.hypot(*(at[i] - at[j])) for i in range(4) for j in range(i)]
+        assert min(gaps) >= 2 * (KEEP_OFF_M - lost_m) - 1e-6
+    assert min(gaps) < 1.0  # they did come as near as they may
+
+
+# -- where they will be ------------------------------------------------------------------
+
+
+def test_a_robot_follows_its_way_at_an_even_speed_and_stays_at_its_end():
+    way = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    ahead = positions_ahead(np.array([0.0, 0.0]), way, 0.5, np.array([0.0, 1.0, 3.0, 9.0]))
+    np.testing.assert_allclose(ahead, [[0.0, 0.0], [0.5, 0.0], [1.0, 0.5], [1.0, 1.0]])
+
+
+def test_what_lies_behind_on_the_way_is_left_out():
+    way = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
+    ahead = positions_ahead(np.array([2.0, 0.1]), way, 1.0, np.array([1.0]))
+    assert ahead[0, 0] > 2.9
+
+
+def test_a_peer_without_a_way_stays():
+    ahead = positions_ahead(np.array([1.0, 2.0]), np.zeros((0, 2)), 0.5, np.array([0.0, 5.0]))
+    np.testing.assert_array_equal(ahead, [[1.0, 2.0], [1.0, 2.0]])
+
+
+def test_velocities_are_turned_into_the_map_and_kept_up():
+    seen = peer_at("a", Pose2D(1.0, 1.0, math.pi / 2), Twist2D(0.4), 10.0)
+    assert (seen.vx_mps, seen.vy_mps) == pytest.approx((0.0, 0.4))
+    later = seen.moved_to(10.5)
+    assert (later.x_m, later.y_m) == pytest.approx((1.0, 1.2))
+
+
+def test_one_that_tells_nothing_is_expected_straight_ahead_and_goes_first():
+    assert unknown_intention(peer(0.0, 0.0, 0.01)).rank_s == IDLE_RANK_S
+    intention = unknown_intention(peer(1.0, 0.0, 0.2))
+    assert intention.rank_s == 0.0
+    np.testing.assert_allclose(intention.way, [[1.0, 0.0], [2.0, 0.0]])
+
+
+def test_a_thinned_way_keeps_its_ends():
+    way = np.column_stack((np.linspace(0.0, 1.0, 41), np.zeros(41)))
+    thin = thinned(way, 0.25)
+    assert len(thin) == 6
+    np.testing.assert_allclose(thin[[0, -1]], way[[0, -1]])
+
+
+# -- the rule of way ---------------------------------------------------------------------
+
+EAST, WEST = [(0.0, 0.0), (6.0, 0.0)], [(6.0, 0.0), (0.0, 0.0)]
+NORTH = [(3.0, -3.0), (3.0, 3.0)]
+
+
+def decide(way, rank_s, others):
+    found = gives_way(np.array(way[0]), np.array(way), rank_s, others, APART_M, CRUISING_MPS)
+    return None if found is None else (found[0].name, found[1])
+
+
+@pytest.mark.parametrize("one, other", [(EAST[:1] + [(3.0, 0.0)], [(3.5, 0.0), (0.0, 0.0)]),
+                                        ([(1.0, 0.0), (6.0, 0.0)], [(3.0, -2.0), (3.0, 3.0)])])
+def test_of_two_exactly_one_gives_way(one, other):
+    first, second = rank_of(0.0, 0), rank_of(0.0, 1)
+    outcomes = [decide(one, first, [peer(*other[0], rank_s=second, way=other)]),
+                decide(other, second, [peer(*one[0], rank_s=first, way=one)])]
+    assert outcomes[0] is None and outcomes[1] is not None
+    swapped = [decide(one, second, [peer(*other[0], rank_s=first, way=other)]),
+               decide(other, first, [peer(*one[0], rank_s=second, way=one)])]
+    assert swapped[0] is not None and swapped[1] is None
+
+
+def test_who_has_been_under_way_longer_goes_first_and_then_the_lower_number():
+    assert rank_of(10.0, 7) < rank_of(11.0, 0) < rank_of(11.0, 1) < rank_of(IDLE_RANK_S, 0)
+
+
+def test_one_that_is_not_in_the_way_waits_and_one_that_is_leaves():
+    first = peer(1.0, 0.0, rank_s=0.0, way=[(1.0, 0.0), (6.0, 0.0)])
+    assert decide([(2.5, -1.2), (2.5, 3.0)], 1.0, [first]) == ("other", Manner.WAIT)
+    assert decide([(2.5, -0.5), (2.5, 3.0)], 1.0, [first]) == ("other", Manner.LEAVE)
+
+
+def test_passing_at_another_time_is_no_conflict():
+    """The one has left the crossing when the other gets there: 0.9 m / 0.3 m/s = 3 s."""
+    crossing = [(3.0, -2.2), (3.0, 3.0)]
+    late = peer(-1.0, 0.0, rank_s=0.0, way=[(-1.0, 0.0), (6.0, 0.0)])
+    assert decide([(3.0, 0.5), (3.0, 3.0)], 1.0, [late]) is None
+    on_time = peer(1.0, 0.0, rank_s=0.0, way=[(1.0, 0.0), (6.0, 0.0)])
+    assert decide(crossing, 1.0, [on_time]) == ("other", Manner.WAIT)
+
+
+def test_following_somebody_is_no_conflict():
+    ahead = peer(1.5, 0.0, 0.3, rank_s=0.0, way=[(1.5, 0.0), (6.0, 0.0)])
+    assert decide(EAST, 1.0, [ahead]) is None
+
+
+def test_for_a_parked_one_nobody_gives_way():
+    assert decide(EAST, rank_of(IDLE_RANK_S, 1), [peer(1.0, 0.0)]) is None
+
+
+def test_a_track_that_leads_away_does_not_come_near():
+    place = np.array([0.0, 0.0])
+    away = np.column_stack((np.linspace(0.5, 3.0, 11), np.zeros(11)))
+    assert not comes_near(place, away, APART_M)
+    assert comes_near(place, away[::-1], APART_M)
+
+
+# -- discs, refuges, the layer -----------------------------------------------------------
+
+SPEC = GridSpec(40, 40, 0.1)
+
+
+def test_a_disc_is_as_wide_as_it_should_be():
+    cells = np.zeros((9, 9), dtype=np.uint8)
+    raise_discs(cells, 0.0, 0.0, 1.0, np.array([[4.5, 4.5]]), 2.0, 7)
+    assert [int((row > 0).sum()) for row in cells] == [0, 0, 1, 3, 5, 3, 1, 0, 0]
+
+
+def test_a_disc_leaves_what_is_higher_and_what_is_off_the_grid():
+    cells = np.full((4, 4), 9, dtype=np.uint8)
+    cells[0, 0] = 1
+    raise_discs(cells, 0.0, 0.0, 1.0, np.array([[-0.5, -0.5]]), 2.0, 7)
+    assert cells[0, 0] == 7 and (cells.ravel()[1:] == 9).all()
+
+
+def test_the_nearest_cell_is_found_round_a_wall():
+    blocked = np.zeros((5, 5), dtype=np.uint8)
+    blocked[0:4, 2] = 1
+    unwanted = np.zeros((5, 5), dtype=np.uint8)
+    unwanted[:, :3] = 1
+    assert tuple(nearest_cell(blocked, unwanted, 0, 0)) == (3, 4)
+    blocked[4, 2] = 1
+    assert tuple(nearest_cell(blocked, unwanted, 0, 0)) == (-1, -1)
+
+
+def test_a_refuge_is_beside_the_way():
+    costs = np.zeros(SPEC.shape, dtype=np.uint8)
+    way = np.array([[0.5, 2.0], [3.5, 2.0]])
+    refuge = find_refuge(SPEC, costs, Pose2D(2.5, 2.2), [way], np.array([[0.5, 2.0]]), APART_M)
+    assert refuge is not None
+    assert refuge.x_m == pytest.approx(2.5, abs=0.11)
+    assert refuge.y_m == pytest.approx(2.0 + APART_M, abs=0.11)
+
+
+def test_in_a_corridor_the_refuge_is_beyond_its_end():
+    costs = np.full(SPEC.shape, LETHAL, dtype=np.uint8)
+    costs[19:22, :] = FREE  # the corridor along x ...
+    costs[:, 34:38] = FREE  # ... opens into a cross-way
+    way = np.array([[0.5, 2.05], [3.8, 2.05]])
+    refuge = find_refuge(SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]), APART_M)
+    assert refuge is not None and refuge.x_m > 3.3 and abs(refuge.y_m - 2.05) > APART_M - 0.1
+
+
+def test_there_may_be_no_refuge():
+    costs = np.full(SPEC.shape, LETHAL, dtype=np.uint8)
+    costs[20, :] = FREE
+    way = np.array([[0.5, 2.05], [4.0, 2.05]])
+    assert find_refuge(SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]),
+                       APART_M) is None
+
+
+def test_the_layer_forgets_where_a_peer_was():
+    layer, master = PeerLayer(), CostGrid(SPEC)
+    for points in ([[1.05, 1.05]], [[3.05, 3.05]]):
+        layer.see([PeerArea(np.array(points), 0.2, 120)])
+        bounds = layer.update_bounds(Pose2D(2.0, 2.0), 0.0, NOWHERE)
+        window = master.window_of(bounds)
+        master.reset(window)
+        layer.update_costs(master, window)
+    assert master.costs[30, 30] == 120
+    assert master.costs[10, 10] == FREE
+
+
+def test_the_layer_without_peers_changes_nothing():
+    layer, master = PeerLayer(), CostGrid(SPEC, UNKNOWN)
+    assert layer.update_bounds(Pose2D(2.0, 2.0), 0.0, NOWHERE) == NOWHERE
+    layer.update_costs(master, master.window_of(NOWHERE.grown(1e31)))
+    assert (master.costs == UNKNOWN).all()

@@ -1,0 +1,190 @@
+"""Navigators among each other: bodies that follow their commands exactly, no walls."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from quad_nav.assembly import apply_configuration, build_navigator
+from quad_nav.config import load, updated
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.grid import LETHAL
+from quad_nav.peers import IDLE_RANK_S, Intention, peer_at
+from quad_nav.tick import Located, State
+
+STEP_S = 0.1
+RADIUS_M = 0.36  # the footprint's, padding included
+TREE = {
+    "controller_frequency": 5.0, "planner_frequency": 1.0,
+    "global_costmap": {"width": 10.0, "height": 10.0, "robot_radius": 0.35,
+                       "resolution": 0.1, "update_frequency": 5.0},
+    "local_costmap": {"width": 3.0, "height": 3.0, "robot_radius": 0.35,
+                      "rolling_window": True, "update_frequency": 5.0},
+    "TrajectoryPlannerROS": {"max_vel_x": 0.3, "min_vel_x": 0.1, "holonomic_robot": False,
+                             "max_vel_theta": 1.0, "yaw_goal_tolerance": 6.3}}
+
+
+class Fleet:
+    """Navigators that know each other, and their bodies."""
+
+    def __init__(self, *poses, mends=None):
+        tree = {**TREE, "mends": mends or {}}
+        self.navigators = [build_navigator(load({**tree, "robot": k})) for k in range(len(poses))]
+        self.poses = list(poses)
+        self.velocities = [Twist2D()] * len(poses)
+        self.now_s = 0.0
+        self.nearest_m = math.inf
+        self.outcomes = [[] for _ in poses]
+        self.notes = [[] for _ in poses]
+        self.gave_way = [False] * len(poses)
+
+    def fly(self, seconds, until=lambda: False):
+        end_s = self.now_s + seconds
+        while self.now_s < end_s and not until():
+            seen = [peer_at(f"quad{k}", pose, velocity, self.now_s, navigator.intention)
+                    for k, (pose, velocity, navigator)
+                    in enumerate(zip(self.poses, self.velocities, self.navigators))]
+            for k in range(len(self.poses)):
+                self._tick(k, seen[:k] + seen[k + 1:])
+            self.poses = [moved(p, v) for p, v in zip(self.poses, self.velocities)]
+            self.now_s += STEP_S
+            self.nearest_m = min([self.nearest_m] + [
+                a.distance_to(b) for i, a in enumerate(self.poses) for b in self.poses[:i]])
+
+    def _tick(self, k, peers):
+        tick = self.navigators[k].tick(self.now_s, Located(self.poses[k], self.poses[k]),
+                                       self.velocities[k], peers)
+        if tick.command is not None:
+            self.velocities[k] = tick.command
+        if tick.outcome is not None:
+            self.outcomes[k].append(tick.outcome)
+        self.notes[k] += tick.notes
+        self.gave_way[k] |= tick.giving_way is not None
+
+
+def moved(pose, velocity):
+    turn, length = velocity.vyaw_radps * STEP_S, velocity.vx_mps * STEP_S
+    yaw = pose.yaw_rad + 0.5 * turn
+    return Pose2D(pose.x_m + length * math.cos(yaw), pose.y_m + length * math.sin(yaw),
+                  pose.yaw_rad + turn)
+
+
+def test_head_on_one_goes_and_the_other_makes_room():
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi))
+    fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
+    fleet.navigators[1].set_goal(Pose2D(2.0, 5.0), 0.0)
+    fleet.fly(90.0, until=lambda: all(fleet.outcomes))
+    assert [[o.succeeded for o in outcomes] for outcomes in fleet.outcomes] == [[True], [True]]
+    assert fleet.gave_way == [False, True]
+    assert fleet.nearest_m > 2 * RADIUS_M
+
+
+def test_without_the_switch_they_do_not_see_each_other():
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), mends={"keep_off_peers": False})
+    fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
+    fleet.navigators[1].set_goal(Pose2D(2.0, 5.0), 0.0)
+    fleet.fly(20.0)
+    assert fleet.gave_way == [False, False]
+    assert fleet.nearest_m < RADIUS_M
+
+
+def test_the_switch_can_be_thrown_in_flight():
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(3.0, 5.0, math.pi))
+    fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
+    fleet.fly(1.0)
+    assert len(fleet.navigators[0]._yielding.traffic.peers) == 1
+    off = updated(load({**TREE, "robot": 0}), "mends", {"keep_off_peers": False})
+    apply_configuration(fleet.navigators[0], off)
+    fleet.fly(0.5)
+    assert fleet.navigators[0]._yielding.traffic.peers == []
+
+
+def test_an_idle_robot_on_a_goal_makes_room_and_comes_back():
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0))
+    fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
+    fleet.fly(60.0, until=lambda: fleet.outcomes[0])
+    assert fleet.outcomes[0][0].succeeded
+    assert fleet.poses[1].distance_to(Pose2D(6.0, 5.0)) > 2 * RADIUS_M
+    fleet.navigators[0].set_goal(Pose2D(2.0, 5.0), fleet.now_s)
+    fleet.fly(60.0, until=lambda: "is back in its place" in fleet.notes[1])
+    assert fleet.poses[1].distance_to(Pose2D(6.0, 5.0)) < 0.2
+    assert fleet.navigators[1].state is State.IDLE
+    assert fleet.outcomes[1] == []  # nobody had given it a goal
+    assert fleet.nearest_m > 2 * RADIUS_M
+
+
+def test_an_idle_robot_that_is_told_to_stay_stays():
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0), mends={"make_room_when_idle": False})
+    fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
+    fleet.fly(25.0)
+    assert fleet.poses[1] == Pose2D(6.0, 5.0)
+    assert fleet.nearest_m > 2 * RADIUS_M
+
+
+def test_a_goal_ends_an_errand():
+    fleet = Fleet(Pose2D(3.5, 5.0), Pose2D(6.0, 5.0))
+    fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
+    fleet.fly(20.0, until=lambda: fleet.gave_way[1])
+    fleet.navigators[1].set_goal(Pose2D(8.0, 8.0), fleet.now_s)
+    fleet.fly(60.0, until=lambda: fleet.outcomes[1])
+    assert fleet.outcomes[1][0].succeeded
+    assert fleet.poses[1].distance_to(Pose2D(8.0, 8.0)) < 0.2
+
+
+def test_one_that_gets_nowhere_lets_the_others_go_first():
+    fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(8.0, 8.0))
+    navigator = fleet.navigators[0]
+    navigator.set_goal(Pose2D(8.0, 5.0), 0.0)
+    rank_s = navigator.intention.rank_s
+    here = fleet.poses[0]
+    while fleet.now_s < 20.0:
+        peers = [peer_at("quad1", fleet.poses[1], Twist2D(), fleet.now_s)]
+        fleet.notes[0] += navigator.tick(fleet.now_s, Located(here, here), Twist2D(), peers).notes
+        fleet.now_s += STEP_S
+    assert navigator.intention.rank_s > rank_s + 15.0
+    assert any("lets the others go first" in note for note in fleet.notes[0])
+
+
+def test_a_lost_peer_is_left_to_the_lidar_and_said_once():
+    fleet = Fleet(Pose2D(5.0, 5.0))
+    navigator = fleet.navigators[0]
+    here = fleet.poses[0]
+    notes = []
+    for k in range(30):  # the frame of 0 s counts for half a second
+        seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 0.0)]
+        notes += navigator.tick(k * STEP_S, Located(here, here), Twist2D(), seen).notes
+    assert notes == ["nothing from quad1 for 0.5 s: only the LIDAR sees it"]
+    seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 3.0)]
+    assert navigator.tick(3.0, Located(here, here), Twist2D(), seen).notes == [
+        "quad1 is heard of again"]
+
+
+@pytest.mark.parametrize("age_s, is_marked", [(0.0, False), (5.0, True)])
+def test_the_lidars_points_on_a_known_peer_are_left_out(age_s, is_marked):
+    source = {"observation_sources": "scan", "obstacle_range": 5.0, "scan": {
+        "data_type": "LaserScan", "marking": True, "max_obstacle_height": 2.0}}
+    navigator = build_navigator(load({"global_costmap": source, "local_costmap": source}))
+    here = Pose2D(5.0, 5.0)
+    seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 10.0 - age_s)]
+    navigator.tick(10.0, Located(here, here), Twist2D(), seen)
+    scan = Scan(10.0, 0.0, 0.01, 0.02, 60.0, np.full(2, 1.7, dtype=np.float32))
+    layer = navigator.global_costmap.layers["obstacle_layer"]
+    layer.add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), 10.0)
+    navigator.global_costmap.update(10.0, here)
+    assert (layer.grid.costs == LETHAL).any() == is_marked
+
+
+def test_what_a_robot_tells_of_itself():
+    navigator = build_navigator(load({**TREE, "robot": 3}))
+    idle = navigator.intention
+    assert idle.rank_s == IDLE_RANK_S + 0.03 and not len(idle.way)
+    here = Pose2D(2.0, 5.0)
+    navigator.set_goal(Pose2D(4.0, 5.0), 7.0)
+    navigator.tick(7.0, Located(here, here), Twist2D())
+    told: Intention = navigator.intention
+    assert told.rank_s == pytest.approx(7.03)
+    assert len(told.way) == pytest.approx(21, abs=2)  # 2 m, a point every 0.1 m
+    np.testing.assert_allclose(told.way[-1], [4.0, 5.0])
+    navigator.cancel()
+    assert not len(navigator.intention.way)
