@@ -354,6 +354,11 @@ class Navigator:
         """What the peers may know of this robot."""
         return self._yielding.intention
 
+    @property
+    def peer_reach_m(self) -> float:
+        """Peers farther away need not be told of."""
+        return self._yielding.traffic.reach_m
+
     def _see_peers(self, tick: Tick, located: Located, peers: Sequence[Peer]) -> None:
         traffic, had_some = self._yielding.traffic, bool(self._yielding.traffic.peers)
         traffic.cruising_mps = getattr(self._limiter.usual, "max_vel_x_mps", CRUISING_MPS)

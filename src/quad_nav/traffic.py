@@ -93,8 +93,12 @@ class Traffic:
         """Whether the two could meet within what is looked ahead."""
         if here is None:
             return False
-        reach_m = 2.0 * (self.cruising_mps * HORIZON_S + self.apart_m)
-        return math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m) < reach_m
+        return math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m) < self.reach_m
+
+    @property
+    def reach_m(self) -> float:
+        """How far away a peer may be and still matter."""
+        return 2.0 * (self.cruising_mps * HORIZON_S + self.apart_m)
 
     @property
     def keep_off_m(self) -> float:

@@ -91,14 +91,29 @@ class ObstacleLayer(GridLayer):
 
         Only points within the source's heights count, for marking and for clearing.
         """
-        buffer = self.buffers[source_name]
-        points = transform_points(points, global_from_sensor, buffer.params.min_obstacle_height_m,
-                                  buffer.params.max_obstacle_height_m)
+        _, low_m, high_m = self.way_of_seeing(source_name)
+        points = transform_points(points, global_from_sensor, low_m, high_m)
         for x_m, y_m, radius_m in self.left_out:
             inside = np.hypot(points[:, 0] - x_m, points[:, 1] - y_m) <= radius_m
             points = points[~inside]
         origin = global_from_origin or global_from_sensor
-        buffer.add(Observation(stamp_s, origin.translation, points), now_s)
+        self.add_observation(source_name, Observation(stamp_s, origin.translation, points), now_s)
+
+    def add_observation(self, source_name: str, observation: Observation, now_s: float) -> None:
+        """Take what another layer has made of the same message, see ``way_of_seeing``."""
+        self.buffers[source_name].add(observation, now_s)
+
+    def newest(self, source_name: str) -> Observation:
+        """The observation that was added last."""
+        return self.buffers[source_name].observations[0]
+
+    def way_of_seeing(self, source_name: str) -> Tuple[bool, float, float]:
+        """Layers and sources that are equal in this make equal observations of a message.
+
+        That is to say in one frame, and if they leave out the same circles.
+        """
+        source = self.buffers[source_name].params
+        return (source.inf_is_valid, source.min_obstacle_height_m, source.max_obstacle_height_m)
 
     def set_footprint(self, footprint: np.ndarray, inscribed_radius_m: float) -> None:
         self._footprint = footprint

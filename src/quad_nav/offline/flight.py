@@ -8,7 +8,9 @@ Equal setups give equal flights, bit for bit.
 from __future__ import annotations
 
 import time
-from typing import List, Optional, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
+
+import numpy as np
 
 from quad_nav.assembly import build_navigator
 from quad_nav.config import Configuration
@@ -46,15 +48,25 @@ class FlightRobot:
         self.log = RobotLog(goals.name)
         self.waiting_goal: Optional[Pose2D] = None
         self._reports: List[NavigatorReport] = []
-        self._sinks: List[Tuple[ObstacleLayer, str]] = [
-            (layer, source.name)
-            for costmap in (self.navigator.global_costmap, self.navigator.local_costmap)
-            for layer in costmap.layers.values() if isinstance(layer, ObstacleLayer)
-            for source in layer.params.sources]
+        self._sinks = self._sorted_sinks()
+
+    def _sorted_sinks(self) -> Dict[Tuple, List[Tuple[ObstacleLayer, str]]]:
+        """The layers and sources that take scans, by the way in which they see them."""
+        sinks: Dict[Tuple, List[Tuple[ObstacleLayer, str]]] = {}
+        for costmap in (self.navigator.global_costmap, self.navigator.local_costmap):
+            for layer in costmap.layers.values():
+                if isinstance(layer, ObstacleLayer):
+                    for source in layer.params.sources:
+                        way = layer.way_of_seeing(source.name)
+                        sinks.setdefault(way, []).append((layer, source.name))
+        return sinks
 
     def see(self, scan: Scan, map_from_lidar: Pose3D) -> None:
-        for layer, source in self._sinks:
+        for sinks in self._sinks.values():
+            layer, source = sinks[0]
             layer.add_scan(source, scan, map_from_lidar, scan.stamp_s)
+            for other, other_source in sinks[1:]:
+                other.add_observation(other_source, layer.newest(source), scan.stamp_s)
 
     def sequence(self, now_s: float, pose: Pose2D) -> List[Action]:
         """Lets the sequencer look at the odometry; its actions."""
@@ -68,18 +80,20 @@ class FlightRobot:
                 self.waiting_goal = action.pose
         return actions
 
-    def navigate(self, now_s: float, state: RobotState,
-                 peers: Sequence[Peer]) -> Optional[Tuple[Tick, Located]]:
-        """Does what is due; None when nothing is."""
+    def is_due(self, now_s: float) -> bool:
+        """Whether the navigator has something to do; a goal that waits is set if it can be."""
         navigator = self.navigator
         if self.waiting_goal is not None and navigator.accepts_goal(now_s):
             navigator.set_goal(self.waiting_goal, now_s)
             self.waiting_goal = None
-        if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
-            return None
+        return navigator.next_due_s <= now_s + 1e-9 or navigator.has_work
+
+    def navigate(self, now_s: float, state: RobotState, peers: Sequence[Peer]
+                 ) -> Tuple[Tick, Located]:
+        """Does what is due."""
         pose = state.map_from_base.to_2d()
         located = Located(pose, pose)
-        tick = navigator.tick(now_s, located, state.twist, peers)
+        tick = self.navigator.tick(now_s, located, state.twist, peers)
         self._take(tick)
         return tick, located
 
@@ -176,17 +190,33 @@ class Flight:
 
     def _navigate(self) -> None:
         now_s = self.now_s
-        peers = [peer_at(robot.name, state.map_from_base.to_2d(), state.twist, now_s,
-                         robot.navigator.intention)
-                 for robot, state in zip(self.robots, self.states)]
-        for index, (robot, state) in enumerate(zip(self.robots, self.states)):
+        due = [index for index, robot in enumerate(self.robots) if robot.is_due(now_s)]
+        peers = self._peers_near(due)
+        for index in due:
+            robot = self.robots[index]
             start_s = time.perf_counter()
-            done = robot.navigate(now_s, state, peers[:index] + peers[index + 1:])
-            if done is None:
-                continue
-            tick, located = done
+            tick, located = robot.navigate(now_s, self.states[index], peers[index])
             wall_s = time.perf_counter() - start_s
             if tick.command is not None:
                 self.simulation.set_command(index, tick.command)
             for observer in self._observers:
                 observer.ticked(index, tick, located, wall_s)
+
+    def _peers_near(self, robots: Sequence[int]) -> Dict[int, List[Peer]]:
+        """For each of some quadcopters the others that it may have to do with."""
+        if len(self.robots) == 1:
+            return {index: [] for index in robots}
+        positions = self.simulation.body_state.positions_m[:, :2]
+        near: Dict[int, List[int]] = {}
+        for index in robots:
+            apart_m = np.hypot(*(positions - positions[index]).T)
+            apart_m[index] = np.inf
+            reach_m = self.robots[index].navigator.peer_reach_m
+            near[index] = np.flatnonzero(apart_m < reach_m).tolist()
+        peers = {index: self._as_peer(index) for index in set().union(*near.values())}
+        return {index: [peers[other] for other in others] for index, others in near.items()}
+
+    def _as_peer(self, index: int) -> Peer:
+        robot, state = self.robots[index], self.states[index]
+        return peer_at(robot.name, state.map_from_base.to_2d(), state.twist, self.now_s,
+                       robot.navigator.intention)
