@@ -48,6 +48,7 @@ def warm_up(configuration: config.Configuration) -> None:
     for now_s in (0.0, 0.5):
         navigator.tick(now_s, Located(here, here), Twist2D(vx_mps=0.1))
     navigator.tick(1.0, Located(here, here), Twist2D(vx_mps=0.1), [_coming(here, 1.0)])
+    _look_around(navigator, here)  # again, with a peer whose points are left out
 
 
 def _coming(here: Pose2D, now_s: float) -> Peer:

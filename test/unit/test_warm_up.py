@@ -38,6 +38,13 @@ def test_every_kernel_of_a_cycle_has_run(missions):
         assert not ticks[0].windows["local"].is_empty
 
 
+def test_a_peer_is_left_out_of_the_last_scans(missions):
+    for navigator, _ in missions:
+        layers = [layer for layer in navigator.local_costmap.layers.values()
+                  if isinstance(layer, ObstacleLayer)]
+        assert layers and all(len(layer.left_out) == 1 for layer in layers)
+
+
 def test_each_mission_makes_room_for_a_peer(missions):
     for _, ticks in missions:
         assert ticks[-1].giving_way is not None and ticks[-1].giving_way.refuge is not None

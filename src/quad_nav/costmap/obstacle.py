@@ -17,6 +17,7 @@ from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceP
 from quad_nav.costmap.projection import scan_points, transform_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
+from quad_nav.kernels.projection import outside_circles
 from quad_nav.kernels.raytrace import clear_all_rays, mark_all_points
 
 _LINES = 4096  # that an update remembers; a scan has some hundreds
@@ -93,9 +94,8 @@ class ObstacleLayer(GridLayer):
         """
         _, low_m, high_m = self.way_of_seeing(source_name)
         points = transform_points(points, global_from_sensor, low_m, high_m)
-        for x_m, y_m, radius_m in self.left_out:
-            inside = np.hypot(points[:, 0] - x_m, points[:, 1] - y_m) <= radius_m
-            points = points[~inside]
+        if len(self.left_out):
+            points = outside_circles(points, self.left_out)
         origin = global_from_origin or global_from_sensor
         self.add_observation(source_name, Observation(stamp_s, origin.translation, points), now_s)
 

@@ -40,3 +40,25 @@ def transform_between_heights(points, rotation, translation, min_z, max_z):
         if min_z <= np.float64(moved[m, 2]) <= max_z:
             m += 1
     return moved[:m].copy()
+
+
+@njit(cache=True, nogil=True)
+def outside_circles(points, circles):
+    """Points float32[m, 3] that lie in none of the circles, seen from above, in order.
+
+    circles: float64[c, 3], rows x, y, radius; what is on a circle lies in it.
+    """
+    kept = np.empty_like(points)
+    m = 0
+    for k in range(len(points)):
+        x, y = np.float64(points[k, 0]), np.float64(points[k, 1])
+        outside = True
+        for c in range(len(circles)):
+            dx, dy, radius = x - circles[c, 0], y - circles[c, 1], circles[c, 2]
+            if dx * dx + dy * dy <= radius * radius:
+                outside = False
+                break
+        if outside:
+            kept[m] = points[k]
+            m += 1
+    return kept[:m].copy()
