@@ -17,7 +17,7 @@ from quad_nav.costmap.peers import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.mends import Mends
-from quad_nav.peers import Peer
+from quad_nav.peers import IDLE_RANK_S, Peer
 from quad_nav.refuge import find_refuge
 from quad_nav.right_of_way import (
     EARLIER_LATER_S,
@@ -112,6 +112,13 @@ class Traffic:
     def is_parked(self, peer: Peer, now_s: float) -> bool:
         return peer.is_parked or self._standing[peer.name].exceeds(now_s, PARKED_AFTER_S)
 
+    def _stays(self, peer: Peer, now_s: float, rank_s: float) -> bool:
+        """Whether a robot of this rank need not give way to a peer, because it stays.
+
+        One without a goal believes what the peer says: it may itself be why that one stands.
+        """
+        return peer.is_parked if rank_s >= IDLE_RANK_S else self.is_parked(peer, now_s)
+
     # -- costmaps --------------------------------------------------------------------
 
     def tell_costmaps(self, now_s: float, here: Pose2D, local_from_global: Pose2D,
@@ -179,7 +186,7 @@ class Traffic:
     def _decide(self, now_s: float, here: Pose2D, way: np.ndarray,
                 rank_s: float) -> Optional[GivingWay]:
         position = np.array([here.x_m, here.y_m])
-        moving = [peer for peer in self.peers if not self.is_parked(peer, now_s)]
+        moving = [peer for peer in self.peers if not self._stays(peer, now_s, rank_s)]
         to = gives_way(position, way, rank_s, moving, self.apart_m, self.cruising_mps)
         if to is None:
             return None
@@ -199,7 +206,8 @@ class Traffic:
         """The way to a refuge goes on until the peer is past or cannot come."""
         assert current.refuge is not None
         peer = next((p for p in self.peers if p.name == current.to), None)
-        if peer is None or peer.intention.rank_s >= rank_s or self.is_parked(peer, now_s):
+        if (peer is None or peer.intention.rank_s >= rank_s
+                or self._stays(peer, now_s, rank_s)):
             return None
         ahead = _ahead(peer)
         nearest_m = float(np.hypot(*(ahead - (here.x_m, here.y_m)).T).min())

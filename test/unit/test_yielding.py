@@ -188,3 +188,16 @@ def test_what_a_robot_tells_of_itself():
     np.testing.assert_allclose(told.way[-1], [4.0, 5.0])
     navigator.cancel()
     assert not len(navigator.intention.way)
+
+
+def test_an_idle_robot_makes_room_for_one_that_it_has_made_stand():
+    """The goal is 0.71 m from the parked one; who stands for long is taken for parked, too."""
+    fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(4.72, 6.2, -1.0), mends={"make_room_when_idle": False})
+    fleet.navigators[1].set_goal(Pose2D(5.5, 5.5), 0.0)
+    fleet.fly(12.0)
+    assert fleet.outcomes[1] == [] and fleet.poses[1].distance_to(Pose2D(4.72, 6.2)) < 0.5
+    configuration = load({**TREE, "robot": 0})
+    apply_configuration(fleet.navigators[0], configuration)
+    fleet.fly(60.0, until=lambda: bool(fleet.outcomes[1]))
+    assert [outcome.succeeded for outcome in fleet.outcomes[1]] == [True]
+    assert fleet.nearest_m > 2 * RADIUS_M
