@@ -16,6 +16,9 @@ import numpy as np
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.goal_file import WatchedGoalFile
+from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, Goal, GoalSequence, SequenceSettings
+from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Walls
 from quad_nav.sim.scene_writer import write_scene
 
@@ -39,6 +42,12 @@ class RandomMission:
 
     scene: Scene
     goals: Tuple[Tuple[Place, ...], ...]
+
+    def robot_goals(self, settings: SequenceSettings = DEFAULT_SETTINGS) -> List[RobotGoals]:
+        """As if they were read from files."""
+        return [RobotGoals(f"quad{index}", WatchedGoalFile(f"quad{index}_goals.json"),
+                           GoalSequence(tuple(Goal(x, y) for x, y in own), settings))
+                for index, own in enumerate(self.goals)]
 
     def write(self, scene_path: Path, goals_folder: Path) -> None:
         """Writes the scene's file and a goal file for each quadcopter."""

@@ -14,8 +14,6 @@ from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
-from quad_nav.mission.goal_file import WatchedGoalFile
-from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
 from quad_nav.random_mission import random_mission
 from quad_nav.scene_check import scene_check
@@ -134,12 +132,9 @@ def _random(options: FlightOptions, problems: List[str]
                      problems)
     if mission is None:
         return options, None, []
-    robots = [RobotGoals(f"quad{index}", WatchedGoalFile(f"quad{index}_goals.json"),
-                         GoalSequence(tuple(Goal(x, y) for x, y in goals)))
-              for index, goals in enumerate(mission.goals)]
     size = (("global_costmap/width", mission.scene.size_x_m),
             ("global_costmap/height", mission.scene.size_y_m))
-    return replace(options, parameters=(*size, *options.parameters)), mission.scene, robots
+    return replace(options, parameters=(*size, *options.parameters)), mission.scene, mission.robot_goals()
 
 
 def _read_goals(options: FlightOptions, scene: Optional[Scene], problems: List[str]

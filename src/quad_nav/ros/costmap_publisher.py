@@ -15,6 +15,7 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.face.costmap_news import CostmapNews
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
+from quad_nav.ros.names import Names, own_node
 from quad_nav.ros.nav_messages import grid_message, polygon_message, update_message
 from quad_nav.ros.voxel_publisher import voxel_publishers
 
@@ -30,17 +31,18 @@ class _NewListener(rospy.SubscribeListener):
 class CostmapPublisher:
     """Publishes one costmap below ``~<name>/``. ``lock`` guards the costmap."""
 
-    def __init__(self, name: str, costmap: LayeredCostmap, lock):
+    def __init__(self, name: str, costmap: LayeredCostmap, lock, names: Names = own_node):
         self._costmap = costmap
         self._lock = lock
         self._news = CostmapNews(costmap)
-        self._footprint = rospy.Publisher(f"~{name}/footprint", PolygonStamped, queue_size=1)
+        self._footprint = rospy.Publisher(
+            names(f"~{name}/footprint"), PolygonStamped, queue_size=1)
         self._updates = rospy.Publisher(
-            f"~{name}/costmap_updates", OccupancyGridUpdate, queue_size=10)
+            names(f"~{name}/costmap_updates"), OccupancyGridUpdate, queue_size=10)
         self._grid = rospy.Publisher(
-            f"~{name}/costmap", OccupancyGrid, queue_size=1,
+            names(f"~{name}/costmap"), OccupancyGrid, queue_size=1,
             subscriber_listener=_NewListener(self._send_full))
-        self._voxels = voxel_publishers(name, costmap)
+        self._voxels = voxel_publishers(names(f"~{name}"), costmap)
 
     def updated(self, now_s: float, pose: Pose2D, window: Window) -> None:
         """To be called after each update of the costmap, with the window it changed."""

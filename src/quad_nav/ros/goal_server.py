@@ -20,7 +20,9 @@ from move_base_msgs.msg import (
 from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator import Navigator
+from quad_nav.ros.names import Names, own_node
 from quad_nav.ros.nav_messages import goal_from_message, pose_stamped
+from quad_nav.schedule import Schedule
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
 from quad_nav.tick import Outcome
 
@@ -28,18 +30,34 @@ from quad_nav.tick import Outcome
 class GoalServer:
     """Hands the newest goal to the navigator when it accepts one."""
 
-    def __init__(self, transforms: Transforms, global_frame: str):
+    def __init__(self, transforms: Transforms, global_frame: str, names: Names = own_node):
         self._transforms = transforms
         self._global_frame = global_frame
-        self._current_goal = rospy.Publisher("~current_goal", PoseStamped, queue_size=1)
+        self._current_goal = rospy.Publisher(names("~current_goal"), PoseStamped, queue_size=1)
         self._server = actionlib.SimpleActionServer(
-            "move_base", MoveBaseAction, auto_start=False)
+            names("move_base"), MoveBaseAction, auto_start=False)
         self._server.register_goal_callback(None)
         self._action_goal = rospy.Publisher(
-            "move_base/goal", MoveBaseActionGoal, queue_size=1)
+            names("move_base/goal"), MoveBaseActionGoal, queue_size=1)
         self._server.start()
+        self._status = Schedule(self._take_over_status())
+        self._status.start(0.0)
         self._simple = rospy.Subscriber(
-            "move_base_simple/goal", PoseStamped, self._forward, queue_size=1)
+            names("move_base_simple/goal"), PoseStamped, self._forward, queue_size=1)
+
+    def _take_over_status(self) -> float:
+        """How often the status is told, in Hz, from now on by ``poll``.
+
+        actionlib has a thread for it that wakes up with every message of ``/clock``.
+        """
+        server = self._server.action_server
+        if server.status_timer is not None:
+            server.status_timer.shutdown()
+        return max(server.status_frequency, 0.0)
+
+    def restart(self, now_s: float) -> None:
+        """For a clock that has jumped back."""
+        self._status.start(now_s)
 
     def _forward(self, message: PoseStamped) -> None:
         """A goal without an action client becomes an action goal, visibly."""
@@ -50,6 +68,8 @@ class GoalServer:
 
     def poll(self, navigator: Navigator, now_s: float) -> None:
         """Passes on a waiting goal or cancel, if this is a moment to take it."""
+        if self._status.take(now_s):
+            self._server.action_server.publish_status()
         if not navigator.accepts_goal(now_s):
             return
         if self._server.is_new_goal_available():

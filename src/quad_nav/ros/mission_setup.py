@@ -18,17 +18,27 @@ import rospkg
 from quad_nav import config
 from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Clearance
-from quad_nav.mission.goal_file import SETTINGS, read_settings
+from quad_nav.mission.goal_file import SETTINGS, PlaceCheck, read_settings
+from quad_nav.mission.goal_sequence import SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
 from quad_nav.ros.costmap_cover import uncovered
+from quad_nav.ros.fleet_setup import (
+    MISSION_RULES,
+    RANDOM,
+    configurations,
+    mission_of,
+    scene_of,
+)
 from quad_nav.scene_check import scene_check
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
-from quad_nav.sim.scene_file import load_scene
 
 DEFAULTS: Dict[str, Any] = {
     "robots": 2,
     "goals": "",
-    "scene": "",
+    "scene": "",   # file, or random
+    "seed": 0,     # of a random mission, as the next
+    "size": 0.0,
+    "config": "",  # folder of a fleet's navigators
     "robot_radius": BODY_RADIUS_M,
     "simulation": True,
     "ready_timeout": 60.0,
@@ -66,7 +76,8 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
     """The mission that a node's private parameters describe; ``result`` is its summary's place.
 
     ``all_parameters`` is the whole parameter tree; the navigators' parts of it, ``move_base{i}``,
-    are checked as well, because a navigator that does not start is noticed late.
+    are checked as well, because a navigator that does not start is noticed late. With ``config``
+    the navigators are a fleet that reads its parameters from that folder itself.
 
     Raises:
         InputError: every fault in the parameters, the scene and the goal files.
@@ -76,13 +87,11 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
     given = {key: values[key] for key in SETTINGS if key in values}
     settings, faults = read_settings(given, name)
     problems += faults
-    scene = _scene(values["scene"], problems)
+    scene = _scene(values, problems)
     radius_m = BODY_RADIUS_M if faults or problems else float(values["robot_radius"])
     check = scene_check(scene, radius_m) if scene else None
-    paths, missing = _goal_files(values, name)
-    robots, faults = load_robot_goals(paths, check, settings)
-    problems += missing + faults
-    navigators = _navigators(values["robots"], all_parameters, problems)
+    robots = _robots(values, name, check, settings, problems)
+    navigators = _navigators(values, all_parameters, problems)
     if problems:
         raise InputError(problems)
     return MissionSetup(tuple(robots), radius_m, scene.altitude_m if scene else None,
@@ -91,8 +100,8 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
                         values["exit_when_done"],
                         (*_unknown(parameters, name), *close_ends(robots, radius_m),
                          *(uncovered(scene, navigators) if scene else [])),
-                        tuple(navigators[name].to_tree() if name in all_parameters else {}
-                              for name in navigators))
+                        tuple(one.to_tree() if values["config"] or name in all_parameters else {}
+                              for name, one in navigators.items()))
 
 
 def _faults(values: Mapping[str, Any], name: str) -> List[str]:
@@ -108,7 +117,9 @@ def _faults(values: Mapping[str, Any], name: str) -> List[str]:
     rules = {
         "robots": (lambda v: is_number(v) and isinstance(v, int), "a whole number, 1 or more"),
         "goals": (is_paths, "a folder with quad0_goals.json and so on, or a list of files"),
-        "scene": (lambda v: isinstance(v, str), "a scene file, or nothing"),
+        "scene": (lambda v: isinstance(v, str), f"a scene file, {RANDOM}, or nothing"),
+        **MISSION_RULES,
+        "config": (lambda v: isinstance(v, str), "a folder of YAML files, or nothing"),
         "robot_radius": (is_number, "a number of metres above 0"),
         "simulation": (lambda v: isinstance(v, bool), "true or false"),
         "ready_timeout": (is_number, "a number of seconds above 0"),
@@ -142,20 +153,46 @@ def _unknown(parameters: Mapping[str, Any], name: str) -> List[str]:
     return warnings
 
 
-def _scene(path: Any, problems: List[str]) -> Optional[Scene]:
-    if not isinstance(path, str) or not path:
+def _scene(values: Mapping[str, Any], problems: List[str]) -> Optional[Scene]:
+    if not isinstance(values["scene"], str) or not values["scene"] or (
+            values["scene"] == RANDOM and problems):
         return None
     try:
-        return load_scene(path)
+        return scene_of(values)
     except InputError as error:
         problems += error.problems
         return None
 
 
-def _navigators(count: Any, all_parameters: Mapping[str, Any], problems: List[str]
+def _robots(values: Mapping[str, Any], name: str, check: Optional[PlaceCheck],
+            settings: SequenceSettings, problems: List[str]) -> List[RobotGoals]:
+    if values["goals"] != RANDOM:
+        paths, missing = _goal_files(values, name)
+        robots, faults = load_robot_goals(paths, check, settings)
+        problems += missing + faults
+        return robots
+    if values["scene"] != RANDOM:
+        problems.append(f"{name}: goals: {RANDOM} with scene {values['scene']!r}; expected a folder "
+                        f"of goal files, or scene {RANDOM}")
+    if problems:
+        return []
+    mission = mission_of(values)
+    assert mission is not None
+    return mission.robot_goals(settings)
+
+
+def _navigators(values: Mapping[str, Any], all_parameters: Mapping[str, Any], problems: List[str]
                 ) -> Dict[str, config.Configuration]:
-    navigators = {}
-    for index in range(count if isinstance(count, int) else 0):
+    navigators: Dict[str, config.Configuration] = {}
+    count = values["robots"] if isinstance(values["robots"], int) else 0
+    if values["config"]:
+        try:
+            fleet = configurations(values["config"], count, mission_of(values))
+            navigators = {f"move_base{index}": one for index, one in enumerate(fleet)}
+        except InputError as error:
+            problems += error.problems
+        return navigators
+    for index in range(count):
         name = f"move_base{index}"
         try:
             navigators[name] = config.load(all_parameters.get(name, {}), f"/{name}")

@@ -8,7 +8,7 @@ means that the robot is to stay where it is.
 from __future__ import annotations
 
 from functools import partial
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 import rospy
@@ -16,6 +16,7 @@ from nav_msgs.msg import Odometry, Path
 
 from quad_nav.peers import IDLE_RANK_S, Intention, Peer, peer_at, rank_of, unknown_intention
 from quad_nav.ros.convert import odometry_from_message, time_message
+from quad_nav.ros.names import Names
 from quad_nav.ros.nav_messages import path_message
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
 
@@ -24,23 +25,29 @@ WORD_COUNTS_S = 2.0  # an older intention is that of a navigator that has died
 
 
 class PeerTopics:
-    """Listens to robots 0 .. ``robots`` - 1 but ``number``, and tells them of this one."""
+    """Robots 0 .. ``robots`` - 1 as seen by those among them that this node flies, ``own``.
 
-    def __init__(self, number: int, robots: int, transforms: Transforms, global_frame: str):
+    Each robot's odometry is heard once, whoever asks for it; what robots of one node
+    intend they tell each other without a topic. Names of ``own`` say what they are called.
+    """
+
+    def __init__(self, own: Mapping[int, Names], robots: int, transforms: Transforms,
+                 global_frame: str):
         self._transforms = transforms
         self._frame = global_frame
         self._odometry: Dict[int, Odometry] = {}
+        self._seen: Dict[int, Tuple[Odometry, Peer]] = {}
         self._said: Dict[int, Tuple[float, Intention]] = {}  # when, and what
-        others = [j for j in range(robots) if j != number]
+        others = [j for j in range(robots) if list(own) != [j]]
         self.subscribers = [
             rospy.Subscriber(f"/odom{j}", Odometry, partial(self._keep_odometry, j), queue_size=1)
             for j in others]
         self._intentions = [
             rospy.Subscriber(f"/move_base{j}/intention", Path, partial(self._keep_intention, j),
-                             queue_size=1) for j in others]
-        self._publisher = rospy.Publisher("~intention", Path, queue_size=1)
-        self._told: Optional[Intention] = None
-        self._told_s = 0.0
+                             queue_size=1) for j in others if j not in own]
+        self._publishers = {number: rospy.Publisher(names("~intention"), Path, queue_size=1)
+                            for number, names in own.items()}
+        self._told: Dict[int, Tuple[float, Intention]] = {}
 
     def _keep_odometry(self, number: int, message: Odometry) -> None:
         self._odometry[number] = message
@@ -49,12 +56,25 @@ class PeerTopics:
         self._said[number] = (message.header.stamp.to_sec(),
                               intention_from_message(message, number))
 
-    def peers(self, now_s: float) -> List[Peer]:
-        """Every robot whose place is known, however old that is."""
-        return [peer for peer in (self._peer(j, odometry, now_s)
-                                  for j, odometry in list(self._odometry.items())) if peer]
+    def refresh(self, now_s: float) -> None:
+        """Takes what has come."""
+        for number, odometry in list(self._odometry.items()):
+            before, peer = self._seen.get(number, (None, None))
+            if odometry is not before:
+                peer = self._located(number, odometry)
+            if peer is None:
+                self._seen.pop(number, None)
+                continue
+            intention = self._word(number, peer, now_s)
+            if intention is not peer.intention:
+                peer = peer.intending(intention)
+            self._seen[number] = odometry, peer
 
-    def _peer(self, number: int, odometry: Odometry, now_s: float) -> Optional[Peer]:
+    def of_others(self, number: int) -> List[Peer]:
+        """Every robot but ``number`` whose place is known, however old that is."""
+        return [peer for other, (_, peer) in self._seen.items() if other != number]
+
+    def _located(self, number: int, odometry: Odometry) -> Optional[Peer]:
         name = f"quad{number}"
         try:
             map_from_odom = self._transforms.lookup(self._frame, odometry.header.frame_id)
@@ -63,22 +83,27 @@ class PeerTopics:
             return None
         odom_from_base, velocity = odometry_from_message(odometry)
         pose = map_from_odom.compose(odom_from_base).to_2d()
-        peer = peer_at(name, pose, velocity, odometry.header.stamp.to_sec())
+        return peer_at(name, pose, velocity, odometry.header.stamp.to_sec())
+
+    def _word(self, number: int, peer: Peer, now_s: float) -> Intention:
         if number not in self._said:
-            return peer.intending(unknown_intention(peer))
+            return unknown_intention(peer)
         said_s, intention = self._said[number]
         if now_s - said_s > WORD_COUNTS_S:
-            return peer.intending(Intention(rank_of(IDLE_RANK_S, number)))
-        return peer.intending(intention)
+            return Intention(rank_of(IDLE_RANK_S, number))
+        return intention
 
-    def tell(self, intention: Intention, now_s: float) -> None:
-        """What this robot is up to: at once when it changes, else every ``REPEAT_S``."""
-        same = self._told is not None and self._told.way is intention.way \
-            and self._told.rank_s == intention.rank_s
-        if same and 0.0 <= now_s - self._told_s < REPEAT_S:
+    def tell(self, number: int, intention: Intention, now_s: float) -> None:
+        """What a robot of this node is up to: at once when it changes, else every ``REPEAT_S``."""
+        self._said[number] = now_s, intention
+        if self._publishers[number].get_num_connections() == 0:
             return
-        self._told, self._told_s = intention, now_s
-        self._publisher.publish(intention_message(intention, self._frame, now_s))
+        told_s, told = self._told.get(number, (0.0, None))
+        same = told is not None and told.way is intention.way and told.rank_s == intention.rank_s
+        if same and 0.0 <= now_s - told_s < REPEAT_S:
+            return
+        self._told[number] = now_s, intention
+        self._publishers[number].publish(intention_message(intention, self._frame, now_s))
 
 
 def intention_message(intention: Intention, frame: str, now_s: float) -> Path:

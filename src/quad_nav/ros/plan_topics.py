@@ -17,6 +17,7 @@ from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
 from quad_nav.plugins import plugin_name
 from quad_nav.ros.convert import twist_message
+from quad_nav.ros.names import Names, own_node
 from quad_nav.ros.nav_messages import (
     cost_cloud_message,
     path_message,
@@ -29,21 +30,21 @@ from quad_nav.tick import State, Tick
 class PlanTopics:
     """Publishers of command, plans, scores and recoveries."""
 
-    def __init__(self, navigator: Navigator):
+    def __init__(self, navigator: Navigator, names: Names = own_node):
         self._navigator = navigator
         planner = plugin_name(navigator.params.base_global_planner)
         controller = plugin_name(navigator.params.base_local_planner)
-        self._command = rospy.Publisher("cmd_vel", Twist, queue_size=1)
-        self._plan = rospy.Publisher(f"~{planner}/plan", Path, queue_size=2)
+        self._command = rospy.Publisher(names("cmd_vel"), Twist, queue_size=1)
+        self._plan = rospy.Publisher(names(f"~{planner}/plan"), Path, queue_size=2)
         if isinstance(navigator.planner, SearchPlanner):
-            self._potential = rospy.Publisher(f"~{planner}/potential", OccupancyGrid, queue_size=1)
-        self._global_plan = rospy.Publisher(f"~{controller}/global_plan", Path, queue_size=1)
-        self._local_plan = rospy.Publisher(f"~{controller}/local_plan", Path, queue_size=1)
-        self._cost_cloud = rospy.Publisher(f"~{controller}/cost_cloud", PointCloud2, queue_size=1)
-        self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
+            self._potential = rospy.Publisher(names(f"~{planner}/potential"), OccupancyGrid, queue_size=1)
+        self._global_plan = rospy.Publisher(names(f"~{controller}/global_plan"), Path, queue_size=1)
+        self._local_plan = rospy.Publisher(names(f"~{controller}/local_plan"), Path, queue_size=1)
+        self._cost_cloud = rospy.Publisher(names(f"~{controller}/cost_cloud"), PointCloud2, queue_size=1)
+        self._state = rospy.Publisher(names("~state"), String, queue_size=10, latch=True)
         self._told_state: Optional[State] = None
         self._recovery = rospy.Publisher(
-            "move_base/recovery_status", RecoveryStatus, queue_size=1)
+            names("move_base/recovery_status"), RecoveryStatus, queue_size=1)
 
     @property
     def _global_frame(self) -> str:

@@ -7,6 +7,7 @@ to be the first that refuses. Exit status 0, or 2 with every fault on stderr.
 """
 from __future__ import annotations
 
+import re
 import sys
 from typing import Any, Dict, List, Mapping
 
@@ -14,9 +15,10 @@ import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import MissionSummary, write_json
-from quad_nav.ros import mission_setup, simulator_setup
+from quad_nav.ros import fleet_setup, mission_setup, simulator_setup
 
 EXIT_BAD_INPUT = 2
+_FLEET = re.compile(r"fleet\d*")
 
 
 def parameter_tree(flat: Mapping[str, Any]) -> Dict[str, Any]:
@@ -32,7 +34,7 @@ def parameter_tree(flat: Mapping[str, Any]) -> Dict[str, Any]:
 
 
 def faults(tree: Mapping[str, Any]) -> List[str]:
-    """What simulator and sequencer would refuse, each fault once."""
+    """What simulator, sequencer and fleet would refuse, each fault once."""
     found: List[str] = []
     if "simulator" in tree:
         try:
@@ -43,6 +45,11 @@ def faults(tree: Mapping[str, Any]) -> List[str]:
         result = mission_setup.result_path(tree["sequencer"])
         try:
             mission_setup.read_setup(tree["sequencer"], "sequencer", result, tree)
+        except InputError as error:
+            found += error.problems
+    for name in sorted(name for name in tree if _FLEET.fullmatch(name)):
+        try:
+            fleet_setup.read_setup(tree[name], name)
         except InputError as error:
             found += error.problems
     return list(dict.fromkeys(found))

@@ -13,6 +13,7 @@ from dynamic_reconfigure.server import Server
 
 from quad_nav import config
 from quad_nav.errors import InputError
+from quad_nav.ros.names import Names, own_node
 
 OnReconfigure = Callable[[str, Dict[str, Any]], config.Configuration]
 
@@ -45,7 +46,7 @@ def config_type(name: str, parameters: Sequence[config.Parameter]) -> Any:
 
 
 def serve_namespaces(configuration: config.Configuration,
-                     on_reconfigure: OnReconfigure) -> List[Server]:
+                     on_reconfigure: OnReconfigure, names: Names = own_node) -> List[Server]:
     """Puts the configuration on the parameter server and serves every namespace of it.
 
     Args:
@@ -53,13 +54,35 @@ def serve_namespaces(configuration: config.Configuration,
             threads; returns the configuration that is then in force. An
             ``InputError`` leaves everything as it is, and is logged.
     """
-    rospy.set_param("~", configuration.to_tree())
+    rospy.set_param(names("~"), configuration.to_tree())
     servers = []
     for namespace, parameters in config.reconfigurable(configuration).items():
         name = (namespace or "move_base").replace("/", "_") + "_config"
         callback = _Callback(namespace, configuration, on_reconfigure)
-        servers.append(Server(config_type(name, parameters), callback, namespace))
+        servers.append(_Server(config_type(name, parameters), callback, names(f"~{namespace}"),
+                               config.values(configuration, namespace)))
     return servers
+
+
+class _Server(Server):
+    """The original's, which talks to the parameter server about every single parameter.
+
+    What is there was put there just before, so only what changes is told: that is a
+    hundred calls fewer for each robot's start.
+    """
+
+    def __init__(self, type_: Any, callback: Any, namespace: str, values: Dict[str, Any]):
+        self._stored = dict(values)
+        super().__init__(type_, callback, namespace)
+
+    def _copy_from_parameter_server(self) -> None:
+        self.config.update(self._stored)
+
+    def _copy_to_parameter_server(self) -> None:
+        for name, stored in self._stored.items():
+            if self.config[name] != stored:
+                rospy.set_param(self.ns + name, self.config[name])
+                self._stored[name] = self.config[name]
 
 
 class _Callback:

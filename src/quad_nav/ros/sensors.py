@@ -18,6 +18,7 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.convert import scan_from_message
+from quad_nav.ros.names import Names, own_node
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
 
 MESSAGE_TYPES = {"LaserScan": LaserScan, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
@@ -101,7 +102,7 @@ def _cloud_points(message) -> np.ndarray:
     return np.array(points, dtype=np.float32).reshape(-1, 3)
 
 
-def connect(costmaps: Sequence[LayeredCostmap]) -> List[Sensor]:
+def connect(costmaps: Sequence[LayeredCostmap], names: Names = own_node) -> List[Sensor]:
     """Subscribes to every source of every obstacle layer, each topic once."""
     sensors: Dict[Tuple[str, str], Sensor] = {}
     for costmap in costmaps:
@@ -109,7 +110,7 @@ def connect(costmaps: Sequence[LayeredCostmap]) -> List[Sensor]:
             if not isinstance(layer, ObstacleLayer):
                 continue
             for source in layer.params.sources:
-                key = (source.topic or source.name, source.data_type)
+                key = (names(source.topic or source.name), source.data_type)
                 if key not in sensors:
                     sensors[key] = Sensor(*key)
                 sensors[key].targets.append((costmap, layer, source.name, source.sensor_frame))

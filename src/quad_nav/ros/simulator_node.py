@@ -220,8 +220,9 @@ def main() -> int:
     name = rospy.get_name().lstrip("/")
     try:
         parameters = rospy.get_param("~", {})
-        parameters.setdefault("controller_period", longest_controller_period_s(
-            rospy.get_param("/", {}), parameters.get("robots", DEFAULTS["robots"])))
+        if not parameters.get("config"):
+            parameters.setdefault("controller_period", longest_controller_period_s(
+                rospy.get_param("/", {}), parameters.get("robots", DEFAULTS["robots"])))
         setup = read_setup(parameters, name)
         node = SimulatorNode(setup)
     except InputError as error:

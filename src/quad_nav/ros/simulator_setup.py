@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from typing import Any, Callable, Dict, List, Mapping, Tuple
 
 from quad_nav.errors import InputError
+from quad_nav.ros.fleet_setup import configurations, mission_of, scene_of
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
-from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import LIDAR_CASTERS, STEPS_PER_S, SimulationParams, start_poses
 
 DEFAULT_BEAMS = 512
 DEFAULTS: Dict[str, Any] = {
-    "scene": "",                # file
+    "scene": "",                # file, or random
+    "size": 0.0,                # a random arena's side, m; 0: room for all
+    "config": "",               # folder of a fleet's navigators
     "robots": 2,
     "rate": 1.0,                # simulated seconds per second
     "gui": False,               # pybullet's window
@@ -57,7 +59,9 @@ def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
                  for key, (accepts, expected) in _RULES.items() if not accepts(values[key])]
     if problems:
         raise InputError(problems)
-    scene = load_scene(values["scene"])
+    scene = scene_of(values)
+    if values["config"] and "controller_period" not in parameters:
+        values["controller_period"] = _fleets_controller_period_s(values)
     try:
         params = _simulation_params(values)
         start_poses(scene, values["robots"], params.jitter_m, values["seed"])
@@ -66,6 +70,16 @@ def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
     return SimulatorSetup(
         scene, values["robots"], params, values["seed"], float(values["rate"]), values["gui"],
         values["start_paused"], round(STEPS_PER_S / values["lidar_rate"]))
+
+
+def _fleets_controller_period_s(values: Mapping[str, Any]) -> float:
+    """The slowest ``controller_frequency`` of a fleet configured from files, as a period.
+
+    Raises:
+        InputError: every fault in the files.
+    """
+    return max(1.0 / one.navigator.controller_frequency_hz for one in configurations(
+        values["config"], values["robots"], mission_of(values)))
 
 
 def longest_controller_period_s(all_parameters: Mapping[str, Any], robots: Any) -> float:
@@ -110,7 +124,10 @@ _Rule = Tuple[Callable[[Any], bool], str]
 _BOOLEAN: _Rule = (lambda v: isinstance(v, bool), "true or false")
 _AMOUNT: _Rule = (_is_number, "a number, 0 or more")
 _RULES: Dict[str, _Rule] = {
-    "scene": (lambda v: isinstance(v, str) and v != "", "a scene file such as scenes/arena.yaml"),
+    "scene": (lambda v: isinstance(v, str) and v != "",
+              "a scene file such as scenes/arena.yaml, or random"),
+    "size": _AMOUNT,
+    "config": (lambda v: isinstance(v, str), "a folder of YAML files, or nothing"),
     "robots": (lambda v: _is_whole(v) and v >= 1, "a whole number, 1 or more"),
     "rate": (lambda v: _is_number(v) and v > 0, "a number above 0"),
     "gui": _BOOLEAN,

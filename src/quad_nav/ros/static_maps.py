@@ -11,17 +11,19 @@ from nav_msgs.msg import OccupancyGrid
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.static import StaticLayer, StaticMap
 from quad_nav.grid import GridSpec
+from quad_nav.ros.names import Names, own_node
 
 
 class MapListener:
     """One static layer's map topic. ``lock`` guards the costmap."""
 
-    def __init__(self, costmap: LayeredCostmap, name: str, layer: StaticLayer, lock):
+    def __init__(self, costmap: LayeredCostmap, name: str, layer: StaticLayer, lock,
+                 names: Names = own_node):
         self._costmap = costmap
         self._name = name
         self._layer = layer
         self._lock = lock
-        topic = layer.params.map_topic
+        topic = names(layer.params.map_topic)
         self._grid = rospy.Subscriber(topic, OccupancyGrid, self._on_map, queue_size=1)
         if layer.params.subscribe_to_updates:
             self._updates = rospy.Subscriber(
@@ -47,7 +49,7 @@ class MapListener:
             self._layer.update_map(part, message.x, message.y)
 
 
-def connect(costmaps: Sequence[LayeredCostmap], lock) -> list:
+def connect(costmaps: Sequence[LayeredCostmap], lock, names: Names = own_node) -> list:
     """Subscribes to the map topic of every static layer."""
-    return [MapListener(costmap, name, layer, lock) for costmap in costmaps
+    return [MapListener(costmap, name, layer, lock, names) for costmap in costmaps
             for name, layer in costmap.layers.items() if isinstance(layer, StaticLayer)]

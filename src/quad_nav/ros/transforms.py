@@ -1,7 +1,7 @@
 """tf2 as the core wants it: ``Pose3D`` between frames, or a reason why not."""
 from __future__ import annotations
 
-from typing import Optional
+from typing import List, Optional, Sequence, Tuple
 
 import rospy
 import tf2_ros
@@ -42,6 +42,12 @@ class Transforms:
         except TransformUnavailable:
             return None
         return pose if now_s - stamp_s <= tolerance_s else None
+
+    def locate_in(self, wanted: Sequence[Tuple[str, str, float]], now_s: float
+                  ) -> List[Optional[Pose3D]]:
+        """``locate`` for several (to_frame, base_frame, tolerance_s); the same ones once."""
+        found = {one: self.locate(one[0], one[1], now_s, one[2]) for one in dict.fromkeys(wanted)}
+        return [found[one] for one in wanted]
 
     def _lookup(self, to_frame: str, from_frame: str, stamp_s: Optional[float]):
         if not to_frame or not from_frame:

@@ -30,9 +30,9 @@ class VoxelPublisher:
             self._publisher.publish(marker_message(self._layer, frame, stamp))
 
 
-def voxel_publishers(costmap_name: str, costmap: LayeredCostmap) -> List[VoxelPublisher]:
-    """One on ``~<costmap>/<layer>/voxel_markers`` for each layer that asks for it."""
-    return [VoxelPublisher(f"~{costmap_name}/{name}/voxel_markers", layer)
+def voxel_publishers(namespace: str, costmap: LayeredCostmap) -> List[VoxelPublisher]:
+    """One on ``<namespace>/<layer>/voxel_markers`` for each layer that asks for it."""
+    return [VoxelPublisher(f"{namespace}/{name}/voxel_markers", layer)
             for name, layer in costmap.layers.items()
             if isinstance(layer, VoxelLayer) and layer.params.publish_voxel_map]
 

@@ -1,0 +1,145 @@
+"""One robot's navigator on ROS: its topics, services, action and parameters.
+
+Callbacks store; ``step`` takes a snapshot, ticks the navigator when it asks for it and
+publishes what the tick says. One lock guards the navigator against services and
+reconfiguration, which run in rospy's threads.
+"""
+from __future__ import annotations
+
+import threading
+from typing import List, Optional, Tuple
+
+import rospy
+from nav_msgs.msg import Odometry
+
+from quad_nav import config
+from quad_nav.assembly import apply_configuration, build_navigator
+from quad_nav.geometry import Pose3D, Twist2D
+from quad_nav.ros import sensors, static_maps
+from quad_nav.ros.convert import twist_from_message
+from quad_nav.ros.costmap_publisher import CostmapPublisher
+from quad_nav.ros.goal_server import GoalServer
+from quad_nav.ros.names import Names, own_node
+from quad_nav.ros.peer_topics import PeerTopics
+from quad_nav.ros.plan_services import PlanServices
+from quad_nav.ros.plan_topics import PlanTopics
+from quad_nav.ros.reconfigure import serve_namespaces
+from quad_nav.ros.transforms import Transforms
+from quad_nav.tick import Located, Tick
+
+POLL_S = 0.05  # how soon a goal for an idle navigator is noticed
+WARN_AGAIN_S = 5.0
+
+
+class RobotNavigator:
+    """Connects a navigator to its topics, services and action.
+
+    ``due_s`` is when ``step`` is to be called next.
+    """
+
+    def __init__(self, configuration: config.Configuration, transforms: Transforms,
+                 peers: PeerTopics, names: Names = own_node):
+        self.number = configuration.robot
+        self.due_s = 0.0
+        self._configuration = configuration
+        self._navigator = navigator = build_navigator(configuration)
+        self._lock = threading.RLock()
+        self._velocity = Twist2D()
+        self._transforms, self._peers = transforms, peers
+        costmaps = (navigator.global_costmap, navigator.local_costmap)
+        self._publishers = {
+            name: CostmapPublisher(f"{name}_costmap", costmap, self._lock, names)
+            for name, costmap in zip(("global", "local"), costmaps)}
+        self._topics = PlanTopics(navigator, names)
+        self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry,
+                                          queue_size=1)
+        self._sensors = sensors.connect(costmaps, names)
+        self._maps = static_maps.connect(costmaps, self._lock, names)
+        self._reconfigure = serve_namespaces(configuration, self._on_reconfigure, names)
+        self._services = PlanServices(navigator, self._topics, self._lock, self._located_now,
+                                      lambda: self._configuration.clearing_radius_m, names)
+        self._goals = GoalServer(transforms, navigator.global_costmap.params.global_frame, names)
+
+    @property
+    def subscribers(self) -> List[rospy.Subscriber]:
+        """Whose silence would be a fault."""
+        return [self._odometry, *(sensor.subscriber for sensor in self._sensors)]
+
+    def step(self, now_s: float) -> None:
+        """Does what is due at a time."""
+        with self._lock:
+            self._step(now_s)
+            self.due_s = min(self._navigator.next_due_s, now_s + POLL_S)
+
+    def restart(self, now_s: float) -> None:
+        """For a clock that has jumped back."""
+        with self._lock:
+            self._navigator.restart(now_s)
+            self._goals.restart(now_s)
+            self.due_s = now_s
+
+    def stop(self) -> None:
+        """Sends a last command: hover."""
+        self._topics.stop()
+
+    # -- callbacks -----------------------------------------------------------------
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._velocity = twist_from_message(message.twist.twist)
+
+    def _on_reconfigure(self, namespace: str, changes: dict) -> config.Configuration:
+        with self._lock:
+            configuration = config.updated(self._configuration, namespace, changes)
+            apply_configuration(self._navigator, configuration)
+            self._configuration = configuration
+            return configuration
+
+    # -- a step --------------------------------------------------------------------
+
+    def _step(self, now_s: float) -> None:
+        navigator = self._navigator
+        for sensor in self._sensors:
+            sensor.deliver(self._transforms)
+        self._goals.poll(navigator, now_s)
+        self._peers.tell(self.number, navigator.intention, now_s)
+        if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
+            return
+        in_global, located = self._locate(now_s)
+        tick = navigator.tick(now_s, located, self._velocity, self._peers.of_others(self.number))
+        self._publish(tick, in_global, located)
+
+    def _locate(self, now_s: float) -> Tuple[Optional[Pose3D], Located]:
+        """The robot's pose in the global costmap's frame, and in both."""
+        costmaps = (self._navigator.global_costmap.params, self._navigator.local_costmap.params)
+        in_global, in_local = self._transforms.locate_in(
+            [(params.global_frame, params.robot_base_frame, params.transform_tolerance_s)
+             for params in costmaps], now_s)
+        return in_global, Located(in_global.to_2d() if in_global else None,
+                                  in_local.to_2d() if in_local else None)
+
+    def _located_now(self) -> Tuple[float, Located]:
+        now_s = rospy.get_time()
+        return now_s, self._locate(now_s)[1]
+
+    def _publish(self, tick: Tick, in_global: Optional[Pose3D], located: Located) -> None:
+        for warning in tick.warnings:
+            rospy.logwarn_throttle_identical(WARN_AGAIN_S, warning)
+        for note in tick.notes:
+            rospy.loginfo("%s", note)
+        if tick.planning_failed:
+            rospy.logwarn_throttle_identical(WARN_AGAIN_S, "no plan: " + tick.planning_failed)
+        if tick.recovery is not None:
+            rospy.logwarn("recovery %d of %d: %s", tick.recovery.index + 1, tick.recovery.total,
+                          tick.recovery.name)
+        if in_global is not None:
+            self._topics.publish(tick, in_global)
+            if tick.cycle:
+                self._goals.feedback(in_global, rospy.Time.from_sec(tick.now_s))
+        elif tick.command is not None:
+            self._topics.stop()
+        poses = {"global": located.in_global, "local": located.in_local}
+        for name, window in tick.windows.items():
+            pose = poses[name]
+            assert pose is not None  # a costmap is updated at a known pose only
+            self._publishers[name].updated(tick.now_s, pose, window)
+        self._goals.finish(tick.outcome)
