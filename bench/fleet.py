@@ -1,0 +1,122 @@
+"""What a fleet costs on ROS: processor time per node and memory, for several sizes.
+
+    scripts/ros_env python3 bench/fleet.py --robots 2 8 20 --hosts 1
+
+Starts ``fleet.launch`` for each size, waits until all fly, and measures for some time of
+the simulation's clock. CPU is in seconds per simulated second: 1.0 keeps one core busy at
+real time. The load average counts other people's processes as well.
+"""
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+from typing import Dict, List, Tuple
+
+TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+SETTLE_S, PATIENCE_S = 5.0, 120.0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", type=int, nargs="+", default=[2, 4, 8, 16, 20, 32, 50])
+    parser.add_argument("--hosts", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=20.0, help="simulated, per size")
+    parser.add_argument("arguments", nargs="*", help="more for the launch file")
+    given = parser.parse_args()
+    for robots in given.robots:
+        context = multiprocessing.get_context("spawn")
+        one = context.Process(target=measure, args=(robots, given.hosts, given.seconds,
+                                                    given.arguments))
+        one.start()
+        one.join()
+
+
+def measure(robots: int, hosts: int, seconds: float, arguments: List[str]) -> None:
+    """One line of the table."""
+    port = free_port()
+    os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+    launch = subprocess.Popen(
+        ["roslaunch", "-p", str(port), "quad", "fleet.launch", f"robots:={robots}",
+         f"hosts:={hosts}", "rviz:=false", *arguments],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        clock = Clock(time.monotonic() + PATIENCE_S)
+        clock.wait_until(1.0 + SETTLE_S)
+        before, wall_s, begin_s = used(port), time.monotonic(), clock.now_s
+        clock.wait_until(begin_s + seconds)
+        flown_s = clock.now_s - begin_s
+        factor = flown_s / (time.monotonic() - wall_s)
+        after = used(port)
+    finally:
+        launch.send_signal(signal.SIGINT)
+        launch.wait()
+    cpu = {name: (after[name][0] - before[name][0]) / flown_s for name in sorted(before)}
+    total = sum(cpu.values())
+    print(f"{robots:4d} robots, {hosts} hosts: real-time factor {factor:.2f}, CPU {total:.2f} "
+          f"({1000 * total / robots:.0f} ms/robot): "
+          + ", ".join(f"{name} {value:.2f} ({after[name][1]:.0f} MB)"
+                      for name, value in cpu.items())
+          + f"; load {os.getloadavg()[0]:.1f}", flush=True)
+
+
+class Clock:
+    """The simulation's clock."""
+
+    def __init__(self, give_up_s: float):
+        import rospy
+        from rosgraph_msgs.msg import Clock as ClockMessage
+        self.now_s, self._give_up_s = 0.0, give_up_s
+        self._wait(lambda: is_listening(int(os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1])))
+        rospy.init_node("bench", disable_signals=True, disable_rosout=True)
+        rospy.Subscriber("/clock", ClockMessage, self._store, queue_size=1)
+
+    def wait_until(self, now_s: float) -> None:
+        self._give_up_s = time.monotonic() + PATIENCE_S
+        self._wait(lambda: self.now_s >= now_s)
+
+    def _wait(self, condition) -> None:
+        while not condition():
+            if time.monotonic() > self._give_up_s:
+                raise SystemExit("the fleet did not fly")
+            time.sleep(0.02)
+
+    def _store(self, message) -> None:
+        self.now_s = message.clock.to_sec()
+
+
+def used(port: int) -> Dict[str, Tuple[float, float]]:
+    """(CPU in s, memory in MB) of every node whose master listens on a port."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (folder / "cmdline").read_bytes().decode().split("\0")
+            names = [word[len("__name:="):] for word in words if word.startswith("__name:=")]
+            environment = (folder / "environ").read_bytes().decode()
+            if names and f"ROS_MASTER_URI=http://localhost:{port}" in environment:
+                fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
+                memory_mb = int((folder / "statm").read_text().split()[1]) * 4096 / 1e6
+                found[names[0]] = ((int(fields[11]) + int(fields[12])) / TICKS_PER_S, memory_mb)
+        except (OSError, UnicodeDecodeError):  # it has just ended
+            continue
+    return found
+
+
+def is_listening(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("localhost", port)) == 0
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("localhost", 0))
+        return probe.getsockname()[1]
+
+
+if __name__ == "__main__":
+    main()
