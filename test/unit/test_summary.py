@@ -4,7 +4,7 @@ import json
 import pytest
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.flight_log import Contact, FlightLog, Leg, Track, unflown
+from quad_nav.mission.flight_log import Contact, FlightLog, Leg, unflown
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.mission.summary import (
@@ -38,15 +38,6 @@ def mission(*legs, **fields):
     return MissionSummary((RobotSummary("quad0", legs or (leg(),), 7.0),), **fields)
 
 
-def test_track_interpolates_between_samples_and_does_not_guess_beyond():
-    track = Track()
-    track.append(1.0, Pose2D(0.0, 0.0))
-    track.append(3.0, Pose2D(4.0, 2.0))
-    assert track.at(1.5) == Pose2D(1.0, 0.5)
-    assert track.at(3.0) == Pose2D(4.0, 2.0)
-    assert track.at(0.9) is None and track.at(3.1) is None
-
-
 def test_legs_measure_the_way_flown_and_the_straight_way():
     log, sequencer = FlightLog(["quad0"], 0.3), Sequencer(GOALS)
     fly(log, "quad0", sequencer, [*DETOUR, (25.0, Pose2D(5, 4))])
@@ -67,23 +58,6 @@ def test_the_path_is_from_the_first_goal_to_the_last_and_by_newer_poses_only():
     fly(log, "quad0", sequencer, [(2.0, Pose2D(3, 4)), (3.0, Pose2D(3.3, 4))])
     assert sequencer.done
     assert log.robots["quad0"].path_length_m == 5.0
-
-
-def test_gaps_are_between_hulls():
-    # A wall along x = 0: the clearance of a centre is its x.
-    log = FlightLog(["quad0", "quad1", "quad2"], 0.3, lambda x, y: x)
-    log.move("quad0", 0.0, Pose2D(2.0, 0.0))
-    log.move("quad0", 1.0, Pose2D(1.0, 0.0))
-    log.move("quad0", 2.0, Pose2D(4.0, 0.0))
-    log.move("quad1", 1.0, Pose2D(4.0, 4.0))
-    robots = log.robots
-    assert robots["quad0"].min_clearance_m == pytest.approx(0.7)
-    # 3-4-5 triangle at 1 s; at 2 s quad0 would be nearer, but quad1 has not told where it is.
-    assert robots["quad0"].min_separation_m == pytest.approx(5.0 - 0.6)
-    assert robots["quad1"].min_separation_m == pytest.approx(5.0 - 0.6)
-    log.move("quad1", 2.0, Pose2D(4.0, 1.0))
-    assert robots["quad0"].min_separation_m == pytest.approx(1.0 - 0.6)
-    assert robots["quad2"].min_separation_m is None
 
 
 def test_one_touch_is_one_contact_from_both_sides_and_while_it_lasts():

@@ -6,19 +6,15 @@ the gap between two quadcopters their centres' distance less both radii.
 """
 from __future__ import annotations
 
-import collections
 from dataclasses import dataclass
-from typing import Callable, Deque, Dict, List, Optional, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence
 
 from quad_nav.geometry import Pose2D, angle_difference
+from quad_nav.mission.gap_log import Clearances, GapLog
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
 
-# Distance in metres from a place in ``map`` to the nearest surface, negative inside.
-Clearance = Callable[[float, float], float]
-
 SAME_CONTACT_S = 1.0
-TRACK_LENGTH = 100
 # A quadcopter that is slower than this and turns faster than this spins.
 SPIN_BELOW_MPS, SPIN_ABOVE_RADPS = 0.05, 0.2
 
@@ -53,31 +49,6 @@ class Contact:
     y_m: float
 
 
-class Track:
-    """Where a quadcopter was lately."""
-
-    def __init__(self) -> None:
-        self._samples: Deque[Tuple[float, Pose2D]] = collections.deque(maxlen=TRACK_LENGTH)
-
-    def append(self, stamp_s: float, pose: Pose2D) -> None:
-        self._samples.append((stamp_s, pose))
-
-    def at(self, stamp_s: float) -> Optional[Pose2D]:
-        """The position at a time that the samples enclose, on the straight line between two."""
-        later: Optional[Tuple[float, Pose2D]] = None
-        for time_s, pose in reversed(self._samples):
-            if time_s == stamp_s:
-                return pose
-            if time_s < stamp_s:
-                if later is None:
-                    return None
-                part = (stamp_s - time_s) / (later[0] - time_s)
-                return Pose2D(pose.x_m + part * (later[1].x_m - pose.x_m),
-                              pose.y_m + part * (later[1].y_m - pose.y_m))
-            later = (time_s, pose)
-        return None
-
-
 class RobotLog:
     """What one quadcopter has flown from its first goal to its last.
 
@@ -87,11 +58,8 @@ class RobotLog:
 
     def __init__(self, name: str):
         self.name = name
-        self.track = Track()
         self.legs: List[Leg] = []
         self.path_length_m = 0.0
-        self.min_clearance_m: Optional[float] = None
-        self.min_separation_m: Optional[float] = None
         self.recoveries = 0
         self.aborts = 0
         self.spin_s = 0.0
@@ -109,7 +77,6 @@ class RobotLog:
             if self._is_flying:
                 self._fly(self._pose, pose, stamp_s - self._stamp_s)
         self._pose, self._stamp_s = pose, stamp_s
-        self.track.append(stamp_s, pose)
         return True
 
     def _fly(self, before: Pose2D, after: Pose2D, time_s: float) -> None:
@@ -156,29 +123,17 @@ class FlightLog:
     """What all quadcopters of a mission have flown."""
 
     def __init__(self, names: Sequence[str], robot_radius_m: float,
-                 clearance_m: Optional[Clearance] = None):
+                 clearances_m: Optional[Clearances] = None):
         self.robots: Dict[str, RobotLog] = {name: RobotLog(name) for name in names}
         self.robot_radius_m = robot_radius_m
         self.contacts: List[Contact] = []
-        self._clearance_m = clearance_m
+        self.gaps = GapLog(names, robot_radius_m, clearances_m)
         self._last_contact_s: Dict[frozenset, float] = {}
 
     def move(self, name: str, stamp_s: float, pose: Pose2D) -> None:
         """Take a quadcopter's pose in ``map``."""
-        robot = self.robots[name]
-        if not robot.move(stamp_s, pose):
-            return
-        if self._clearance_m is not None:
-            gap_m = self._clearance_m(pose.x_m, pose.y_m) - self.robot_radius_m
-            robot.min_clearance_m = _smaller(robot.min_clearance_m, gap_m)
-        for other in self.robots.values():
-            # Messages arrive one by one: compare with where the other was at the same time.
-            # What it has not told yet is measured when it does.
-            there = other.track.at(stamp_s) if other is not robot else None
-            if there is not None:
-                gap_m = pose.distance_to(there) - 2 * self.robot_radius_m
-                robot.min_separation_m = _smaller(robot.min_separation_m, gap_m)
-                other.min_separation_m = _smaller(other.min_separation_m, gap_m)
+        if self.robots[name].move(stamp_s, pose):
+            self.gaps.add(name, stamp_s, pose.x_m, pose.y_m)
 
     def touch(self, contact: Contact) -> bool:
         """Take a contact; False when it is the last one going on, or seen from the other side."""
@@ -198,6 +153,3 @@ def unflown(sequence: GoalSequence) -> List[Leg]:
     """The legs of a mission that never began."""
     return [Leg(index, 1, goal, False, NOT_SENT, 0) for index, goal in enumerate(sequence.goals)]
 
-
-def _smaller(a: Optional[float], b: float) -> float:
-    return b if a is None else min(a, b)

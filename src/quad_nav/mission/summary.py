@@ -85,8 +85,8 @@ class MissionSummary:
 
 def summarize_robot(log: FlightLog, name: str, legs: Sequence[Leg]) -> RobotSummary:
     robot = log.robots[name]
-    return RobotSummary(name, tuple(legs), robot.path_length_m, robot.min_clearance_m,
-                        robot.min_separation_m, robot.recoveries, log.contacts_of(name),
+    return RobotSummary(name, tuple(legs), robot.path_length_m, log.gaps.clearance_m(name),
+                        log.gaps.separation_m(name), robot.recoveries, log.contacts_of(name),
                         robot.aborts, robot.spin_s)
 
 

@@ -134,7 +134,8 @@ def _random(options: FlightOptions, problems: List[str]
         return options, None, []
     size = (("global_costmap/width", mission.scene.size_x_m),
             ("global_costmap/height", mission.scene.size_y_m))
-    return replace(options, parameters=(*size, *options.parameters)), mission.scene, mission.robot_goals()
+    options = replace(options, parameters=(*size, *options.parameters))
+    return options, mission.scene, mission.robot_goals()
 
 
 def _read_goals(options: FlightOptions, scene: Optional[Scene], problems: List[str]

@@ -5,11 +5,26 @@ from typing import Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Pose, Quaternion, Transform, TransformStamped, Twist, Vector3
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
 from nav_msgs.msg import Odometry
+from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Header
 
 from quad_nav.geometry import Pose3D, Scan, Twist2D
+
+_NO_COVARIANCE = [0.0] * 36
+_NO_INTENSITIES = np.empty(0, dtype=np.float32)
 
 
 def time_message(seconds: float) -> rospy.Time:
@@ -28,9 +43,7 @@ def twist_from_message(message: Twist) -> Twist2D:
 
 
 def pose_message(pose: Pose3D) -> Pose:
-    message = Pose(orientation=Quaternion(*pose.quaternion))
-    message.position.x, message.position.y, message.position.z = pose.x_m, pose.y_m, pose.z_m
-    return message
+    return Pose(Point(pose.x_m, pose.y_m, pose.z_m), Quaternion(*pose.quaternion))
 
 
 def pose_from_message(message: Pose) -> Pose3D:
@@ -41,12 +54,13 @@ def pose_from_message(message: Pose) -> Pose3D:
 
 def transform_message(parent_from_child: Pose3D, parent: str, child: str,
                       stamp: rospy.Time) -> TransformStamped:
-    message = TransformStamped(child_frame_id=child)
-    message.header.frame_id, message.header.stamp = parent, stamp
-    message.transform = Transform(
+    return TransformStamped(Header(0, stamp, parent), child, transform(parent_from_child))
+
+
+def transform(parent_from_child: Pose3D) -> Transform:
+    return Transform(
         Vector3(parent_from_child.x_m, parent_from_child.y_m, parent_from_child.z_m),
         Quaternion(*parent_from_child.quaternion))
-    return message
 
 
 def pose_from_transform(message: TransformStamped) -> Pose3D:
@@ -59,11 +73,10 @@ def odometry_message(odom_from_base: Pose3D, linear_mps: Tuple[float, float, flo
                      angular_radps: Tuple[float, float, float], frames: Tuple[str, str],
                      stamp: rospy.Time) -> Odometry:
     """``frames`` are the odometry frame and the body's, which the velocities are in."""
-    message = Odometry(child_frame_id=frames[1])
-    message.header.frame_id, message.header.stamp = frames[0], stamp
-    message.pose.pose = pose_message(odom_from_base)
-    message.twist.twist = Twist(Vector3(*linear_mps), Vector3(*angular_radps))
-    return message
+    twist = Twist(Vector3(*linear_mps), Vector3(*angular_radps))
+    return Odometry(Header(0, stamp, frames[0]), frames[1],
+                    PoseWithCovariance(pose_message(odom_from_base), _NO_COVARIANCE),
+                    TwistWithCovariance(twist, _NO_COVARIANCE))
 
 
 def odometry_from_message(message: Odometry) -> Tuple[Pose3D, Twist2D]:
@@ -71,13 +84,18 @@ def odometry_from_message(message: Odometry) -> Tuple[Pose3D, Twist2D]:
     return pose_from_message(message.pose.pose), twist_from_message(message.twist.twist)
 
 
+ScanMessage = numpy_msg(LaserScan)
+"""A LaserScan whose ranges are an array, which goes over the wire as it is."""
+
+
 def scan_message(scan: Scan, frame: str) -> LaserScan:
     """All beams are of one instant: ``time_increment`` and ``scan_time`` are 0."""
-    message = LaserScan(
+    message = ScanMessage(
         angle_min=scan.angle_min_rad,
         angle_max=scan.angle_min_rad + (len(scan.ranges_m) - 1) * scan.angle_increment_rad,
         angle_increment=scan.angle_increment_rad, range_min=scan.range_min_m,
-        range_max=scan.range_max_m, ranges=scan.ranges_m.tolist())
+        range_max=scan.range_max_m, ranges=scan.ranges_m.astype(np.float32, copy=False),
+        intensities=_NO_INTENSITIES)
     message.header.frame_id, message.header.stamp = frame, time_message(scan.stamp_s)
     return message
 

@@ -70,7 +70,7 @@ def main() -> int:
 
 def _different(setup: FleetSetup) -> List[Configuration]:
     """One configuration for each choice of planners: the others call the same kernels."""
-    kinds = {}
+    kinds: Dict[tuple, Configuration] = {}
     for one in setup.configurations.values():
         layers = tuple(type(layer) for costmap in (one.global_costmap, one.local_costmap)
                        for _, layer in costmap.layers)

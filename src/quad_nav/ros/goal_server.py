@@ -22,8 +22,8 @@ from quad_nav.geometry import Pose3D
 from quad_nav.navigator import Navigator
 from quad_nav.ros.names import Names, own_node
 from quad_nav.ros.nav_messages import goal_from_message, pose_stamped
-from quad_nav.schedule import Schedule
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
+from quad_nav.schedule import Schedule
 from quad_nav.tick import Outcome
 
 

@@ -41,11 +41,15 @@ class Inbox:
 
 
 class RobotLink(rospy.SubscribeListener):
-    """Robot i's odometry and its navigator's results in; its goals out."""
+    """Robot i's odometry and its navigator's results in; its goals out.
 
-    def __init__(self, index: int):
+    ``news`` is set when odometry comes.
+    """
+
+    def __init__(self, index: int, news: threading.Event):
         super().__init__()
-        self._news = threading.Condition()
+        self._news = news
+        self._lock = threading.Lock()
         self._inbox = Inbox()
         self._sent_s = 0.0
         self._busy = True
@@ -67,10 +71,9 @@ class RobotLink(rospy.SubscribeListener):
         """The frame that odometry is in; None while none has come."""
         return self._odometry_frame
 
-    def take(self, timeout_s: float) -> Inbox:
-        """What has come, after waiting for odometry up to a wall time."""
-        with self._news:
-            self._news.wait_for(lambda: self._inbox.odometry, timeout_s)
+    def take(self) -> Inbox:
+        """What has come."""
+        with self._lock:
             inbox, self._inbox = self._inbox, Inbox()
         return inbox
 
@@ -103,14 +106,14 @@ class RobotLink(rospy.SubscribeListener):
 
         By the thread that publishes the goals: rospy's peer_publish is not safe beside publish.
         """
-        with self._news:
+        with self._lock:
             self._inbox.newcomers.append(peer_publish)
 
     def _on_odometry(self, message: Odometry) -> None:
         self._odometry_frame = message.header.frame_id
-        with self._news:
+        with self._lock:
             self._inbox.odometry.append(message)
-            self._news.notify()
+        self._news.set()
 
     def _on_result(self, message: MoveBaseActionResult) -> None:
         status = message.status
@@ -119,7 +122,7 @@ class RobotLink(rospy.SubscribeListener):
             return  # about an earlier goal
         if verdict is Verdict.CANCELLED and "another goal" in status.text:
             verdict = Verdict.REPLACED
-        with self._news:
+        with self._lock:
             self._inbox.reports.append(NavigatorReport(verdict, status.text))
 
     def _on_status(self, message: GoalStatusArray) -> None:
@@ -127,5 +130,5 @@ class RobotLink(rospy.SubscribeListener):
         self._status_s = rospy.get_time()
 
     def _on_recovery(self, message: RecoveryStatus) -> None:
-        with self._news:
+        with self._lock:
             self._inbox.recoveries.append(message)

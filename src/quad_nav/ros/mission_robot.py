@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
-from typing import Optional
+from typing import Optional, Sequence
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -15,6 +16,7 @@ from quad_nav.geometry import Pose3D
 from quad_nav.mission.flight_log import FlightLog, Leg, RobotLog
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import Action, SendGoal, SequenceDone, Sequencer, Verdict
+from quad_nav.ros.convert import pose_from_message
 from quad_nav.ros.mission_link import Inbox, RobotLink
 from quad_nav.ros.path_publisher import PathPublisher
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
@@ -29,12 +31,13 @@ JUMP_M, JUMP_MPS = 1.0, 5.0
 
 
 class MissionRobot:
-    """Flies one quadcopter's goals. ``step`` is called by one thread, under the mission's lock."""
+    """Flies one quadcopter's goals; ``news`` is set when its odometry comes."""
 
-    def __init__(self, index: int, goals: RobotGoals, transforms: Transforms):
+    def __init__(self, index: int, goals: RobotGoals, transforms: Transforms,
+                 news: threading.Event):
         self.name = goals.name
         self.sequencer = Sequencer(goals.sequence)
-        self.link = RobotLink(index)
+        self.link = RobotLink(index, news)
         self.pose: Optional[Pose3D] = None
         self.is_silent = False
         self._odometry: Optional[Odometry] = None
@@ -64,8 +67,7 @@ class MissionRobot:
     def step(self, inbox: Inbox, now_s: float, log: FlightLog) -> bool:
         """Take what has come and act on it; whether the goals or their states changed."""
         changed = self._poll_file()
-        for odometry in inbox.odometry:
-            self._move(odometry, now_s, log)
+        self._move(inbox.odometry, now_s, log)
         for recovery in inbox.recoveries:
             log.robots[self.name].recoveries += 1
             rospy.logwarn("%s: recovery %d of %d: %s", self.name,
@@ -90,22 +92,24 @@ class MissionRobot:
         """Raises TransformUnavailable."""
         return self._transforms.lookup("map", frame) if frame != "map" else Pose3D(0.0, 0.0, 0.0)
 
-    def _move(self, odometry: Odometry, now_s: float, log: FlightLog) -> None:
-        stamp_s = odometry.header.stamp.to_sec()
-        if not self._begun_s <= stamp_s <= now_s + AHEAD_S:
+    def _move(self, messages: Sequence[Odometry], now_s: float, log: FlightLog) -> None:
+        usable = [one for one in messages
+                  if self._begun_s <= one.header.stamp.to_sec() <= now_s + AHEAD_S]
+        if not usable:
             return
-        self._odometry = odometry
+        self._odometry = usable[-1]
         try:
-            map_from_odom = self.map_from(odometry.header.frame_id)
+            map_from_odom = self.map_from(usable[-1].header.frame_id)
         except TransformUnavailable as error:
             rospy.logwarn_throttle(WARN_AGAIN_S, f"{self.name}: its place in map is unknown: "
                                                  f"{error}")
             return
-        p, q = odometry.pose.pose.position, odometry.pose.pose.orientation
-        self.pose = map_from_odom.compose(Pose3D(p.x, p.y, p.z, (q.x, q.y, q.z, q.w)))
         self._heard_s = now_s
-        log.move(self.name, stamp_s, self.pose.to_2d())
-        self._path.add(stamp_s, self.pose)
+        for odometry in usable:
+            stamp_s = odometry.header.stamp.to_sec()
+            self.pose = map_from_odom.compose(pose_from_message(odometry.pose.pose))
+            log.move(self.name, stamp_s, self.pose.to_2d())
+            self._path.add(stamp_s, self.pose)
 
     def _watch_silence(self, now_s: float) -> None:
         was_silent, self.is_silent = self.is_silent, now_s - self._heard_s > ODOMETRY_SILENT_S

@@ -17,7 +17,7 @@ import rospkg
 
 from quad_nav import config
 from quad_nav.errors import InputError
-from quad_nav.mission.flight_log import Clearance
+from quad_nav.mission.gap_log import Clearances
 from quad_nav.mission.goal_file import SETTINGS, PlaceCheck, read_settings
 from quad_nav.mission.goal_sequence import SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
@@ -54,7 +54,7 @@ class MissionSetup:
     robots: Tuple[RobotGoals, ...]
     robot_radius_m: float
     altitude_m: Optional[float]
-    clearance_m: Optional[Clearance]
+    clearances_m: Optional[Clearances]
     simulation: bool
     ready_timeout_s: float
     exit_when_done: bool
@@ -95,7 +95,7 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
     if problems:
         raise InputError(problems)
     return MissionSetup(tuple(robots), radius_m, scene.altitude_m if scene else None,
-                        scene.flight_clearance_m if scene else None,
+                        scene.flight_clearances_m if scene else None,
                         values["simulation"], float(values["ready_timeout"]),
                         values["exit_when_done"],
                         (*_unknown(parameters, name), *close_ends(robots, radius_m),
@@ -172,8 +172,8 @@ def _robots(values: Mapping[str, Any], name: str, check: Optional[PlaceCheck],
         problems += missing + faults
         return robots
     if values["scene"] != RANDOM:
-        problems.append(f"{name}: goals: {RANDOM} with scene {values['scene']!r}; expected a folder "
-                        f"of goal files, or scene {RANDOM}")
+        problems.append(f"{name}: goals: {RANDOM} with scene {values['scene']!r}; expected a "
+                        f"folder of goal files, or scene {RANDOM}")
     if problems:
         return []
     mission = mission_of(values)

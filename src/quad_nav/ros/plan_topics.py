@@ -37,10 +37,13 @@ class PlanTopics:
         self._command = rospy.Publisher(names("cmd_vel"), Twist, queue_size=1)
         self._plan = rospy.Publisher(names(f"~{planner}/plan"), Path, queue_size=2)
         if isinstance(navigator.planner, SearchPlanner):
-            self._potential = rospy.Publisher(names(f"~{planner}/potential"), OccupancyGrid, queue_size=1)
-        self._global_plan = rospy.Publisher(names(f"~{controller}/global_plan"), Path, queue_size=1)
-        self._local_plan = rospy.Publisher(names(f"~{controller}/local_plan"), Path, queue_size=1)
-        self._cost_cloud = rospy.Publisher(names(f"~{controller}/cost_cloud"), PointCloud2, queue_size=1)
+            self._potential = rospy.Publisher(names(f"~{planner}/potential"), OccupancyGrid,
+                                              queue_size=1)
+        of_controller = names(f"~{controller}")
+        self._global_plan = rospy.Publisher(f"{of_controller}/global_plan", Path, queue_size=1)
+        self._local_plan = rospy.Publisher(f"{of_controller}/local_plan", Path, queue_size=1)
+        self._cost_cloud = rospy.Publisher(f"{of_controller}/cost_cloud", PointCloud2,
+                                           queue_size=1)
         self._state = rospy.Publisher(names("~state"), String, queue_size=10, latch=True)
         self._told_state: Optional[State] = None
         self._recovery = rospy.Publisher(

@@ -40,6 +40,7 @@ class RobotNavigator:
     def __init__(self, configuration: config.Configuration, transforms: Transforms,
                  peers: PeerTopics, names: Names = own_node):
         self.number = configuration.robot
+        self._name = "" if names is own_node else f"quad{self.number}: "
         self.due_s = 0.0
         self._configuration = configuration
         self._navigator = navigator = build_navigator(configuration)
@@ -123,14 +124,15 @@ class RobotNavigator:
 
     def _publish(self, tick: Tick, in_global: Optional[Pose3D], located: Located) -> None:
         for warning in tick.warnings:
-            rospy.logwarn_throttle_identical(WARN_AGAIN_S, warning)
+            rospy.logwarn_throttle_identical(WARN_AGAIN_S, self._name + warning)
         for note in tick.notes:
-            rospy.loginfo("%s", note)
+            rospy.loginfo("%s%s", self._name, note)
         if tick.planning_failed:
-            rospy.logwarn_throttle_identical(WARN_AGAIN_S, "no plan: " + tick.planning_failed)
+            rospy.logwarn_throttle_identical(
+                WARN_AGAIN_S, f"{self._name}no plan: {tick.planning_failed}")
         if tick.recovery is not None:
-            rospy.logwarn("recovery %d of %d: %s", tick.recovery.index + 1, tick.recovery.total,
-                          tick.recovery.name)
+            rospy.logwarn("%srecovery %d of %d: %s", self._name, tick.recovery.index + 1,
+                          tick.recovery.total, tick.recovery.name)
         if in_global is not None:
             self._topics.publish(tick, in_global)
             if tick.cycle:

@@ -7,21 +7,21 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Deque, Dict, List, Sequence, Tuple
+from typing import Any, Deque, Dict, List, Sequence, Tuple
 
 import numpy as np
 import rospy
 from sensor_msgs import point_cloud2
-from sensor_msgs.msg import LaserScan, PointCloud, PointCloud2
+from sensor_msgs.msg import PointCloud, PointCloud2
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.geometry import Pose3D
-from quad_nav.ros.convert import scan_from_message
+from quad_nav.ros.convert import ScanMessage, scan_from_message
 from quad_nav.ros.names import Names, own_node
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
 
-MESSAGE_TYPES = {"LaserScan": LaserScan, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
+MESSAGE_TYPES = {"LaserScan": ScanMessage, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
 QUEUE_LENGTH = 50
 
 
@@ -49,7 +49,7 @@ class Sensor:
                     return
                 message, received_s = self.waiting[0]
             try:
-                poses = [self._poses(transforms, message, target) for target in self.targets]
+                poses = self._poses(transforms, message)
             except TransformUnavailable as error:
                 if error.later and self._is_ahead(transforms, message):
                     return
@@ -58,8 +58,7 @@ class Sensor:
                 self._drop(message)
                 continue
             self._drop(message)
-            for target, (points_pose, origin_pose) in zip(self.targets, poses):
-                self._add(message, received_s, target, points_pose, origin_pose)
+            self._hand_over(message, received_s, poses)
 
     def _drop(self, message) -> None:
         with self._lock:
@@ -72,25 +71,30 @@ class Sensor:
         return transforms.locate(costmap.params.global_frame, message.header.frame_id,
                                  message.header.stamp.to_sec(), 0.0) is None
 
-    @staticmethod
-    def _poses(transforms: Transforms, message, target) -> Tuple[Pose3D, Pose3D]:
-        costmap, _, _, sensor_frame = target
-        stamp_s = message.header.stamp.to_sec()
-        frame = message.header.frame_id
-        points_pose = transforms.lookup(costmap.params.global_frame, frame, stamp_s)
-        if sensor_frame in ("", frame):
-            return points_pose, points_pose
-        return points_pose, transforms.lookup(costmap.params.global_frame, sensor_frame, stamp_s)
+    def _poses(self, transforms: Transforms, message) -> List[Tuple[Pose3D, Pose3D]]:
+        """For each target where its points and its origin are; what is the same is asked once."""
+        stamp_s, frame = message.header.stamp.to_sec(), message.header.frame_id
+        known: Dict[Tuple[str, str], Pose3D] = {}
 
-    def _add(self, message, received_s: float, target, points_pose: Pose3D,
-             origin_pose: Pose3D) -> None:
-        _, layer, source, _ = target
-        if self.data_type == "LaserScan":
-            layer.add_scan(source, scan_from_message(message), points_pose, received_s,
-                           origin_pose)
-        else:
-            layer.add_cloud(source, _cloud_points(message), points_pose,
-                            message.header.stamp.to_sec(), received_s, origin_pose)
+        def pose(to_frame: str, from_frame: str) -> Pose3D:
+            if (to_frame, from_frame) not in known:
+                known[to_frame, from_frame] = transforms.lookup(to_frame, from_frame, stamp_s)
+            return known[to_frame, from_frame]
+
+        return [(pose(costmap.params.global_frame, frame),
+                 pose(costmap.params.global_frame, sensor_frame or frame))
+                for costmap, _, _, sensor_frame in self.targets]
+
+    def _hand_over(self, message, received_s: float,
+                   poses: Sequence[Tuple[Pose3D, Pose3D]]) -> None:
+        seen: Any = (scan_from_message(message) if self.data_type == "LaserScan"
+                     else _cloud_points(message))
+        stamp_s = message.header.stamp.to_sec()
+        for (_, layer, source, _), (points_pose, origin_pose) in zip(self.targets, poses):
+            if self.data_type == "LaserScan":
+                layer.add_scan(source, seen, points_pose, received_s, origin_pose)
+            else:
+                layer.add_cloud(source, seen, points_pose, stamp_s, received_s, origin_pose)
 
 
 def _cloud_points(message) -> np.ndarray:

@@ -1,8 +1,8 @@
 """The node ``sequencer``: hands N quadcopters their goals and says how well they flew.
 
 Check everything, wait for everything, start the simulation, fly, sum up. One
-thread per quadcopter takes what its topics brought and ticks its sequencer;
-one lock guards what the quadcopters share: the flight log and the display.
+loop takes what the topics brought and ticks each quadcopter's sequencer; one lock
+guards the flight log against contacts, which come in a thread of rospy's.
 Timers run on simulated time, so they stand still with a paused simulation.
 """
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Iterator, List, Optional
 
@@ -44,9 +43,9 @@ from quad_nav.ros.transforms import Transforms, TransformUnavailable
 from quad_nav.versions import versions
 
 START_SERVICE = "/simulation/start"
-WAIT_S = 0.2  # wall time; how soon a thread sees that it shall end
+WAIT_S = 0.2  # wall time, as the next: how soon it is seen that the node shall end
+GATHER_S = 0.01  # odometry of one instant comes in as many messages as there are quadcopters
 DIAGNOSTICS_PERIOD_S = 1.0  # wall time, so that a paused simulation shows its state
-POLL_S = 0.05
 
 
 class Mission:
@@ -56,7 +55,8 @@ class Mission:
         self._setup = setup
         self._lock = threading.Lock()
         self._transforms = Transforms()
-        self.robots = [MissionRobot(index, goals, self._transforms)
+        self._news = threading.Event()
+        self.robots = [MissionRobot(index, goals, self._transforms, self._news)
                        for index, goals in enumerate(setup.robots)]
         self._log = self._new_log()
         self._seed: Optional[int] = rospy.get_param("/simulator/seed", None)
@@ -94,21 +94,25 @@ class Mission:
         with self._lock:
             self._begin(rospy.get_time())
         for robot in self.robots:
-            robot.link.take(0.0)  # what came while waiting is no part of the flight
+            robot.link.take()  # what came while waiting is no part of the flight
 
-    def fly(self, robot: MissionRobot) -> None:
-        """The thread of one quadcopter."""
-        while not rospy.is_shutdown():
-            inbox = robot.link.take(WAIT_S)
-            with self._lock:
-                now_s = rospy.get_time()
-                if now_s < self._now_s or robot.was_reset(inbox):
-                    rospy.logwarn("the simulation was reset: the mission starts again")
-                    self._begin(now_s)
-                self._now_s = now_s
-                with _topics_may_close():
-                    if robot.step(inbox, now_s, self._log):
-                        self._show_goals()
+    def advance(self) -> None:
+        """Waits for news and acts on what has come."""
+        self._news.wait(WAIT_S)
+        self._news.clear()
+        time.sleep(GATHER_S)
+        inboxes = [robot.link.take() for robot in self.robots]
+        with self._lock, _topics_may_close():
+            now_s = rospy.get_time()
+            if now_s < self._now_s or any(robot.was_reset(inbox) for robot, inbox
+                                          in zip(self.robots, inboxes)):
+                rospy.logwarn("the simulation was reset: the mission starts again")
+                self._begin(now_s)
+            self._now_s = now_s
+            changed = [robot.step(inbox, now_s, self._log)
+                       for robot, inbox in zip(self.robots, inboxes)]
+            if any(changed):
+                self._show_goals()
 
     def publish_progress(self) -> None:
         with self._lock, _topics_may_close():
@@ -134,7 +138,7 @@ class Mission:
 
     def _new_log(self) -> FlightLog:
         return FlightLog([robot.name for robot in self._setup.robots], self._setup.robot_radius_m,
-                         self._setup.clearance_m)
+                         self._setup.clearances_m)
 
     def _show_goals(self) -> None:
         heights = [robot.pose.z_m for robot in self.robots if robot.pose is not None]
@@ -190,14 +194,12 @@ def _robot_needs(robot: MissionRobot) -> List[Need]:
     ]
 
 
-def watch(mission: Mission, threads: List[Future], exit_when_done: bool, result: Path) -> int:
+def watch(mission: Mission, exit_when_done: bool, result: Path) -> int:
     """Until the end: progress once a second, and the summary whenever all goals are flown."""
     status: Optional[int] = None
     next_s = 0.0
     while not rospy.is_shutdown():
-        for thread in threads:
-            if thread.done():
-                thread.result()  # raises what ended it
+        mission.advance()
         if time.monotonic() >= next_s:
             next_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
             mission.publish_progress()
@@ -207,7 +209,6 @@ def watch(mission: Mission, threads: List[Future], exit_when_done: bool, result:
             status = report(mission.summary(), result)
             if exit_when_done:
                 return status
-        time.sleep(POLL_S)
     if status is None:
         status = report(mission.summary("stopped before all goals were flown"), result)
     return status
@@ -243,15 +244,13 @@ def fly(setup: MissionSetup, result: Path) -> int:
     except (rospy.ServiceException, rospy.ROSException) as error:
         return _not_flown(setup, result, "the simulation did not start",
                           [f"{START_SERVICE}: {error}"])
-    with ThreadPoolExecutor(len(mission.robots)) as pool:
-        threads = [pool.submit(mission.fly, robot) for robot in mission.robots]
-        try:
-            return watch(mission, threads, setup.exit_when_done, result)
-        except Exception as error:  # what was flown is not lost with a fault of ours
-            report(mission.summary(f"internal error: {error!r}"), result)
-            raise
-        finally:
-            rospy.signal_shutdown("the sequencer is through")
+    try:
+        return watch(mission, setup.exit_when_done, result)
+    except Exception as error:  # what was flown is not lost with a fault of ours
+        report(mission.summary(f"internal error: {error!r}"), result)
+        raise
+    finally:
+        rospy.signal_shutdown("the sequencer is through")
 
 
 def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:

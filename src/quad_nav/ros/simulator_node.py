@@ -167,8 +167,7 @@ class SimulatorNode:
         if count % self._steps_per_clock == 0:
             self._topics.publish_clock()
         if count % _STEPS_PER_ODOMETRY == 0:
-            self._topics.publish_transforms()
-            self._topics.publish_odometry()
+            self._topics.publish_poses()
         if count % self._setup.steps_per_scan == 0:
             self._topics.publish_scans()
 
@@ -187,14 +186,13 @@ class SimulatorNode:
         if time.monotonic() >= self._next_republish_s:
             self._next_republish_s = time.monotonic() + _PAUSED_PERIOD_S
             self._topics.publish_clock()
-            self._topics.publish_odometry()
+            self._topics.publish_poses(with_transforms=False)
             self._topics.publish_scans()
         time.sleep(_PAUSED_SLEEP_S)
 
     def _publish_all(self) -> None:
         self._topics.publish_clock()
-        self._topics.publish_transforms()
-        self._topics.publish_odometry()
+        self._topics.publish_poses()
         self._topics.publish_scans()
 
     def _report(self) -> None:

@@ -1,14 +1,14 @@
 """What the simulator tells: clock, transforms, odometry, scans, contacts, health."""
 from __future__ import annotations
 
-from typing import List, Mapping
+from typing import List, Mapping, Sequence
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import LaserScan
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -17,17 +17,19 @@ from quad_nav.face.flight_info import FLIGHT_TOPIC, simulation_info, to_text
 from quad_nav.face.markers import quadcopter_markers, scene_markers
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.convert import (
+    ScanMessage,
     odometry_message,
     scan_message,
     time_message,
+    transform,
     transform_message,
 )
 from quad_nav.ros.marker_messages import marker_array
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.simulation import Simulation
+from quad_nav.sim.simulation import RobotState, Simulation
 
-_IDENTITY = Pose3D(0.0, 0.0, 0.0)
+_STAYS, _MOUNT = transform(Pose3D(0.0, 0.0, 0.0)), transform(base_from_lidar)
 _LAGS_BELOW = 0.9
 """Part of the asked-for rate below which the simulation is said to lag."""
 _LAGGING_REPORTS = 3
@@ -50,7 +52,7 @@ class SimulatorTopics:
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, latch=True)
         self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
-        self._scans = [rospy.Publisher(f"/scan{i}", LaserScan, queue_size=10) for i in robots]
+        self._scans = [rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=10) for i in robots]
         self._contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=100)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         self._scene = rospy.Publisher("/simulation/scene", MarkerArray, queue_size=1, latch=True)
@@ -64,23 +66,29 @@ class SimulatorTopics:
     def publish_clock(self) -> None:
         self._clock.publish(Clock(time_message(self._simulation.now_s)))
 
-    def publish_transforms(self) -> None:
-        """``map -> odom{i} -> base_link{i} -> Lidar{i}`` of all quadcopters in one message."""
+    def publish_poses(self, with_transforms: bool = True) -> None:
+        """Transforms, in one message for all, and odometry, as far as somebody listens."""
+        states = [self._simulation.state(i) for i in range(self._simulation.n_robots)]
         stamp = time_message(self._simulation.now_s)
+        if with_transforms:
+            self._publish_transforms(states, stamp)
+        self._publish_odometry(states, stamp)
+
+    def _publish_transforms(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
+        """``map -> odom{i} -> base_link{i} -> Lidar{i}`` of all quadcopters."""
+        header = Header(0, stamp, "map")
         transforms = []
-        for i in range(self._simulation.n_robots):
+        for i, state in enumerate(states):
             odom, base, lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
-            pose = self._simulation.state(i).map_from_base
-            transforms += [transform_message(_IDENTITY, "map", odom, stamp),
-                           transform_message(pose, odom, base, stamp),
-                           transform_message(base_from_lidar, base, lidar, stamp)]
+            transforms += [
+                TransformStamped(header, odom, _STAYS),
+                transform_message(state.map_from_base, odom, base, stamp),
+                TransformStamped(Header(0, stamp, base), lidar, _MOUNT)]
         self._tf.publish(TFMessage(transforms))
 
-    def publish_odometry(self) -> None:
-        stamp = time_message(self._simulation.now_s)
-        for i, publisher in enumerate(self._odometry):
+    def _publish_odometry(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
+        for i, (publisher, state) in enumerate(zip(self._odometry, states)):
             if publisher.get_num_connections():
-                state = self._simulation.state(i)
                 publisher.publish(odometry_message(
                     state.map_from_base, state.linear_mps, state.angular_radps,
                     (f"odom{i}", f"base_link{i}"), stamp))

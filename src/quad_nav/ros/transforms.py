@@ -55,7 +55,7 @@ class Transforms:
         stamp = rospy.Time(0) if stamp_s is None else rospy.Time.from_sec(stamp_s)
         to_frame, from_frame = to_frame.lstrip("/"), from_frame.lstrip("/")
         try:
-            message = self._buffer.lookup_transform(to_frame, from_frame, stamp)
+            message = self._buffer.lookup_transform_core(to_frame, from_frame, stamp)
         except tf2_ros.ExtrapolationException as error:
             raise TransformUnavailable(str(error), later=True) from error
         except (tf2_ros.TransformException, ValueError) as error:
