@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""A fleet in two processes: its ROS face is that of single navigators, and it flies its mission."""
+import dynamic_reconfigure.client
+import rosgraph
+import rospy
+import rosservice
+import rostest
+from flight_case import PATIENCE_S, FlightCase
+from geometry_msgs.msg import PoseStamped
+from move_base_msgs.msg import MoveBaseActionFeedback
+from nav_msgs.msg import OccupancyGrid
+from nav_msgs.srv import GetPlan
+from test_ros_face import SERVICES, SUBSCRIBED, TYPES
+
+from quad_nav.random_mission import random_mission
+
+ROBOTS, SEED = 4, 3
+
+
+def names_of(table, i):
+    return {name.format(i=i): kind for name, kind in table.items()}
+
+
+class Fleet(FlightCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        for i in range(ROBOTS):
+            rospy.wait_for_service(f"/move_base{i}/make_plan", timeout=PATIENCE_S)
+
+    def test_1_every_robot_has_the_whole_face(self):
+        published = dict(rospy.get_published_topics())
+        _, subscriptions, _ = rosgraph.Master("/test").getSystemState()
+        heard = {name for name, _ in subscriptions}
+        for i in range(ROBOTS):
+            for name, kind in names_of(TYPES, i).items():
+                self.assertEqual(published.get(name), kind, name)
+            for name in names_of(SUBSCRIBED, i):
+                self.assertIn(name, heard)
+            for name, kind in names_of(SERVICES, i).items():
+                self.assertEqual(rosservice.get_service_type(name), kind, name)
+
+    def test_2_robots_are_shared_between_the_hosts(self):
+        published, _, _ = rosgraph.Master("/test").getSystemState()
+        nodes = dict(published)
+        for i in range(ROBOTS):
+            self.assertEqual(nodes[f"/cmd_vel{i}"], [f"/fleet{i % 2}"])
+
+    def test_3_parameters_are_on_the_server_and_can_be_changed(self):
+        self.assertEqual(rospy.get_param("/move_base2/controller_frequency"), 10.0)
+        size_m = random_mission(ROBOTS, SEED).scene.size_x_m
+        self.assertEqual(rospy.get_param("/move_base2/global_costmap/width"), size_m)
+        client = dynamic_reconfigure.client.Client("/move_base2/TrajectoryPlannerROS",
+                                                   timeout=PATIENCE_S)
+        self.assertEqual(client.update_configuration({"sim_time": 1.2})["sim_time"], 1.2)
+        self.assertEqual(rospy.get_param("/move_base2/TrajectoryPlannerROS/sim_time"), 1.2)
+        self.assertNotEqual(rospy.get_param("/move_base1/TrajectoryPlannerROS/sim_time"), 1.2)
+
+    def test_4_topics_say_what_they_are_about(self):
+        grid = rospy.wait_for_message("/move_base3/global_costmap/costmap", OccupancyGrid,
+                                      PATIENCE_S)
+        self.assertEqual(grid.header.frame_id, "map")
+        feedback = rospy.wait_for_message("/move_base3/feedback", MoveBaseActionFeedback,
+                                          PATIENCE_S)
+        self.assertEqual(feedback.feedback.base_position.header.frame_id, "map")
+
+    def test_5_a_flying_robot_makes_no_plans_for_others(self):
+        goal = PoseStamped()
+        goal.header.frame_id, goal.pose.orientation.w = "map", 1.0
+        with self.assertRaises(rospy.ServiceException):
+            rospy.ServiceProxy("/move_base0/make_plan", GetPlan)(PoseStamped(), goal, 0.1)
+
+    def test_9_every_goal_is_reached(self):
+        result = self.read_result(rospy.get_param("~result"), patience_s=350.0)
+        mission = random_mission(ROBOTS, SEED)
+        self.assertEqual(len(result["robots"]), ROBOTS)
+        for robot, goals in zip(result["robots"], mission.goals):
+            self.assertEqual([(g["x_m"], g["y_m"]) for g in robot["goals"]], list(goals))
+            self.assertTrue(all(g["reached"] for g in robot["goals"]), robot["name"])
+            self.assertGreater(robot["min_clearance_m"], 0.0)
+            self.assertGreater(robot["min_separation_m"], 0.0)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "fleet", Fleet)
