@@ -78,7 +78,7 @@ def configurations(folder: str, robots: int, mission: Optional[RandomMission]
     """Every navigator's, from a folder's files; global costmaps hold a random arena.
 
     Raises:
-        InputError: every fault in any robot's files.
+        InputError: every fault in any robot's files, once for all that share the file.
     """
     made: List[config.Configuration] = []
     problems: List[str] = []
@@ -87,7 +87,7 @@ def configurations(folder: str, robots: int, mission: Optional[RandomMission]
             tree = config.load_files(Path(folder).expanduser(), {"i": str(number)})
             for path, value in _given(number, robots, mission).items():
                 set_value(tree, path, value, "the fleet")
-            made.append(config.load(tree, f"/move_base{number}"))
+            made.append(config.load(tree))
         except InputError as error:
             problems += error.problems
     if problems:

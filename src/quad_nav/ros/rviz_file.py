@@ -11,12 +11,9 @@ from __future__ import annotations
 import argparse
 import copy
 import math
-import os
 import sys
-from pathlib import Path
-from typing import Any, Dict, List, Sequence
+from typing import Any, Dict, List, Sequence, Tuple
 
-import rospkg
 import yaml
 
 from quad_nav.errors import InputError
@@ -30,7 +27,7 @@ _OF_MANY = ("Global plan", "Trail")
 _GOAL_TOOL = "rviz/SetGoal"
 _NUMBERED_TOOLS = (_GOAL_TOOL, "rviz/SetInitialPose", "rviz/PublishPoint")
 _WINDOW_PX = 750.0  # the shorter side of the view in an ordinary window
-_EXIT_BAD_INPUT = 2
+EXIT_BAD_INPUT = 2
 
 
 def document(robots: int, scene: Scene) -> Dict[str, Any]:
@@ -129,7 +126,8 @@ def _rgb(number: int) -> str:
     return "; ".join(str(round(255 * part)) for part in robot_rgba(number)[:3])
 
 
-def _arguments(words: Sequence[str]) -> tuple:
+def arguments(words: Sequence[str]) -> Tuple[argparse.Namespace, List[str]]:
+    """The command line's, and the words among them that are not ours."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--robots", type=int, required=True)
     parser.add_argument("--scene", default=RANDOM)
@@ -138,28 +136,14 @@ def _arguments(words: Sequence[str]) -> tuple:
     return parser.parse_known_args(words)
 
 
-def show() -> int:
-    """Replaces this process by RViz with a file of its own among ROS's logs."""
-    given, others = _arguments(sys.argv[1:])
-    try:
-        content = document(given.robots, scene_of(vars(given)))
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return _EXIT_BAD_INPUT
-    path = Path(rospkg.get_log_dir()) / "quad" / f"fleet-{os.getpid()}.rviz"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
-    os.execvp("rviz", ["rviz", "-d", str(path), *others])
-
-
 def main() -> int:
     """Prints the file."""
-    given, _ = _arguments(sys.argv[1:])
+    given, _ = arguments(sys.argv[1:])
     try:
         yaml.safe_dump(document(given.robots, scene_of(vars(given))), sys.stdout, sort_keys=False)
     except InputError as error:
         print(error, file=sys.stderr)
-        return _EXIT_BAD_INPUT
+        return EXIT_BAD_INPUT
     return 0
 
 
