@@ -76,7 +76,7 @@ class Fleet(FlightCase):
         self.assertEqual(len(result["robots"]), ROBOTS)
         for robot, goals in zip(result["robots"], mission.goals):
             self.assertEqual([(g["x_m"], g["y_m"]) for g in robot["goals"]], list(goals))
-            self.assertTrue(all(g["reached"] for g in robot["goals"]), robot["name"])
+            self.assertTrue(all(g["reached"] for g in robot["goals"]), robot)
             self.assertGreater(robot["min_clearance_m"], 0.0)
             self.assertGreater(robot["min_separation_m"], 0.0)
 

@@ -14,6 +14,7 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry, Path
 
+from quad_nav.geometry import Pose2D
 from quad_nav.peers import IDLE_RANK_S, Intention, Peer, peer_at, rank_of, unknown_intention
 from quad_nav.ros.convert import odometry_from_message, time_message
 from quad_nav.ros.names import Names
@@ -70,9 +71,16 @@ class PeerTopics:
                 peer = peer.intending(intention)
             self._seen[number] = odometry, peer
 
-    def of_others(self, number: int) -> List[Peer]:
-        """Every robot but ``number`` whose place is known, however old that is."""
-        return [peer for other, (_, peer) in self._seen.items() if other != number]
+    def near(self, number: int, here: Optional[Pose2D], reach_m: float) -> List[Peer]:
+        """Every robot but ``number`` whose place is known, however old that is.
+
+        Of those that are farther from ``here`` than ``reach_m`` some are left out.
+        """
+        others = [peer for other, (_, peer) in self._seen.items() if other != number]
+        if here is None:
+            return others
+        return [peer for peer in others if abs(peer.x_m - here.x_m) < reach_m
+                and abs(peer.y_m - here.y_m) < reach_m]
 
     def _located(self, number: int, odometry: Odometry) -> Optional[Peer]:
         name = f"quad{number}"

@@ -106,7 +106,8 @@ class RobotNavigator:
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
             return
         in_global, located = self._locate(now_s)
-        tick = navigator.tick(now_s, located, self._velocity, self._peers.of_others(self.number))
+        peers = self._peers.near(self.number, located.in_global, navigator.peer_reach_m)
+        tick = navigator.tick(now_s, located, self._velocity, peers)
         self._publish(tick, in_global, located)
 
     def _locate(self, now_s: float) -> Tuple[Optional[Pose3D], Located]:

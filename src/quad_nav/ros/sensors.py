@@ -87,11 +87,16 @@ class Sensor:
 
     def _hand_over(self, message, received_s: float,
                    poses: Sequence[Tuple[Pose3D, Pose3D]]) -> None:
-        seen: Any = (scan_from_message(message) if self.data_type == "LaserScan"
-                     else _cloud_points(message))
-        stamp_s = message.header.stamp.to_sec()
-        for (_, layer, source, _), (points_pose, origin_pose) in zip(self.targets, poses):
-            if self.data_type == "LaserScan":
+        """Layers that see a message in the same way share what the first makes of it."""
+        is_scan, stamp_s = self.data_type == "LaserScan", message.header.stamp.to_sec()
+        seen: Any = scan_from_message(message) if is_scan else _cloud_points(message)
+        made: Dict[tuple, Tuple[ObstacleLayer, str]] = {}
+        for (costmap, layer, source, frame), (points_pose, origin_pose) in zip(self.targets, poses):
+            way = (costmap.params.global_frame, frame, layer.way_of_seeing(source))
+            first, its_source = made.setdefault(way, (layer, source))
+            if first is not layer:
+                layer.add_observation(source, first.newest(its_source), received_s)
+            elif is_scan:
                 layer.add_scan(source, seen, points_pose, received_s, origin_pose)
             else:
                 layer.add_cloud(source, seen, points_pose, stamp_s, received_s, origin_pose)
