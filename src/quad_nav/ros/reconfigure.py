@@ -73,7 +73,7 @@ class _Server(Server):
 
     def __init__(self, type_: Any, callback: Any, namespace: str, values: Dict[str, Any]):
         self._stored = dict(values)
-        super().__init__(type_, callback, namespace)
+        super().__init__(type_, callback, "" if namespace == "~" else namespace)
 
     def _copy_from_parameter_server(self) -> None:
         self.config.update(self._stored)

@@ -44,7 +44,7 @@ from quad_nav.versions import versions
 
 START_SERVICE = "/simulation/start"
 WAIT_S = 0.2  # wall time, as the next: how soon it is seen that the node shall end
-GATHER_S = 0.01  # odometry of one instant comes in as many messages as there are quadcopters
+GATHER_S = 0.02  # odometry of one instant comes in as many messages as there are quadcopters
 DIAGNOSTICS_PERIOD_S = 1.0  # wall time, so that a paused simulation shows its state
 
 
