@@ -42,7 +42,7 @@ def test_the_tutorials_half_turn_is_one_argument_away():
 def test_every_fault_is_listed():
     assert faults_of(scene="", robot=3, rate=0, gui="yes", lidar_rate=7, jitter=float("nan")) == [
         "simulator: robot: is not a parameter of the simulator, expected robots",
-        "simulator: scene: is '', expected a scene file such as scenes/arena.yaml",
+        "simulator: scene: is '', expected a scene file such as scenes/arena.yaml, or random",
         "simulator: rate: is 0, expected a number above 0",
         "simulator: gui: is 'yes', expected true or false",
         "simulator: lidar_rate: is 7, expected scans per second that divide 240, such as 10 or 20",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Any, Deque, Dict, List, Sequence, Tuple
+from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -49,14 +49,14 @@ class Sensor:
                     return
                 message, received_s = self.waiting[0]
             try:
-                poses = self._poses(transforms, message)
+                poses = self._poses_if_known(transforms, message)
             except TransformUnavailable as error:
-                if error.later and self._is_ahead(transforms, message):
-                    return
                 rospy.logwarn_throttle(5.0, "%s: a message in frame '%s' is dropped: %s",
                                        self.topic, message.header.frame_id, error)
                 self._drop(message)
                 continue
+            if poses is None:
+                return
             self._drop(message)
             self._hand_over(message, received_s, poses)
 
@@ -64,6 +64,18 @@ class Sensor:
         with self._lock:
             if self.waiting and self.waiting[0][0] is message:
                 self.waiting.popleft()
+
+    def _poses_if_known(self, transforms: Transforms, message
+                        ) -> Optional[List[Tuple[Pose3D, Pose3D]]]:
+        """None while the transforms may still come."""
+        try:
+            return self._poses(transforms, message)
+        except TransformUnavailable as error:
+            if not error.later:
+                raise
+        if self._is_ahead(transforms, message):
+            return None
+        return self._poses(transforms, message)  # they may have come in this moment
 
     def _is_ahead(self, transforms: Transforms, message) -> bool:
         """Whether the transform may still come: the stamp is younger than tf's latest."""
