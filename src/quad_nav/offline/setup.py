@@ -84,7 +84,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         _tried(lambda: start_poses(scene, count, options.simulation.jitter_m, options.seed),
                problems)
     configurations = _read_configurations(options, count, problems)
-    problems += _goals_off_the_costmap(robots, configurations)
+    problems += goals_off_the_costmap(robots, configurations)
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
     assert scene is not None
@@ -185,8 +185,8 @@ def _read_configuration(folder: Path, index: int, parameters: Sequence[Tuple[str
     return configuration
 
 
-def _goals_off_the_costmap(robots: Sequence[RobotGoals], configurations: Sequence[Configuration]
-                           ) -> List[str]:
+def goals_off_the_costmap(robots: Sequence[RobotGoals], configurations: Sequence[Configuration]
+                          ) -> List[str]:
     """Goals that no plan can lead to, because the global costmap ends before them."""
     problems = []
     for robot, configuration in zip(robots, configurations):
