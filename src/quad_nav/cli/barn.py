@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 import time
 from pathlib import Path
@@ -96,6 +97,8 @@ def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
     runs: List[Run] = []
     interrupted = False
     start_s = time.monotonic()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     try:
         with bar:
             bar.show(runs)

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import csv
 import math
+import textwrap
 from dataclasses import asdict, dataclass
 from typing import Any, Dict, List, Optional, Sequence, TextIO, Tuple
 
@@ -15,6 +16,7 @@ from quad_nav.offline.barn.worlds import ALTITUDE_M, MARGIN_M
 from quad_nav.sim.simulation import STEPS_PER_S
 from quad_nav.versions import versions
 
+_WIDTH = 96
 _HEADER = ["", "worlds", "flights", "success\n%", "95 %\ninterval", "collision\n%", "time-out\n%",
            "mean\ntime, s", "metric"]
 _COLUMNS = ("world", "run", "seed", "outcome", "time_s", "metric", "path_length_m",
@@ -71,19 +73,22 @@ def differences(contestant: Contestant) -> str:
     simulation = contestant.simulation
     flight, lidar = simulation.flight, simulation.lidar
     lines = [
-        f"body: a quadcopter, radius {simulation.airframe.radius_m:.2f} m; limited to the "
+        f"body: a quadcopter, radius {simulation.airframe.radius_m:.2f} m, limited to the "
         f"parameters' {flight.max_speed_mps:.2f} m/s and {flight.max_yaw_rate_radps:.2f} rad/s, "
-        f"and to {flight.max_acceleration_mps2:.1f} m/s2 and "
-        f"{flight.max_yaw_acceleration_radps2:.1f} rad/s2 of its own",
-        f"simulator: pybullet, {STEPS_PER_S} Hz, nothing takes time; exact odometry; the body "
-        f"{ALTITUDE_M:g} m high; any touch is a collision; walls {MARGIN_M:g} m off field and goal",
-        f"LIDAR: as there {math.degrees(lidar.scan_range_rad):.0f} degrees, {lidar.beam_count} "
-        f"beams, {lidar.range_min_m:g} to {lidar.range_max_m:g} m, noise {lidar.noise_std_m:g} m; "
-        f"but {SCANS_PER_S} Hz, not 50, and in the body's middle",
-        "clock: from the goal, not from the first 0.1 m; a goal that the navigator gives up is a "
-        "time-out",
+        f"and to its own {flight.max_acceleration_mps2:.1f} m/s2 and "
+        f"{flight.max_yaw_acceleration_radps2:.1f} rad/s2",
+        f"simulator: pybullet at {STEPS_PER_S} Hz, exact odometry, nothing takes time to arrive; "
+        f"the body flies {ALTITUDE_M:g} m high, any touch is a collision; walls {MARGIN_M:g} m "
+        "off field, start and goal",
+        f"LIDAR: {math.degrees(lidar.scan_range_rad):.0f} degrees, {lidar.beam_count} beams, "
+        f"{lidar.range_min_m:g} to {lidar.range_max_m:g} m, noise {lidar.noise_std_m:g} m, as "
+        f"there; but {SCANS_PER_S} scans a second, not 50, and in the body's middle",
+        "clock: it starts with the goal, not after the first 0.1 m; a goal that the navigator "
+        "gives up is a time-out",
     ]
-    return "Not as in the challenge:\n" + "\n".join("  " + line for line in lines)
+    return "\n".join(["Not as in the challenge:", *(
+        textwrap.fill(line, _WIDTH, initial_indent="  ", subsequent_indent="    ")
+        for line in lines)])
 
 
 def to_json(results: Results) -> Dict[str, Any]:
@@ -94,7 +99,7 @@ def to_json(results: Results) -> Dict[str, Any]:
         "flights_wanted": results.wanted,
         "wall_time_s": round(results.wall_time_s, 3),
         "versions": versions(),
-        "differences": differences(results.contestant).split("\n  ")[1:],
+        "differences": differences(results.contestant),
         "figures": {name: _figures_json(row) for name, row in results.rows},
         "worlds": {name: _figures_json(row) for name, row in results.world_rows},
         "runs": [_run_row(run) for run in results.runs],

@@ -78,7 +78,7 @@ def _read(path: Path) -> Dict[str, np.ndarray]:
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except (OSError, ValueError, AttributeError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, ValueError, AttributeError, zipfile.BadZipFile) as error:
         raise InputError([f"{path}: cannot be read: {error}; expected an .npz with index, "
                           "occupied and path_<index>"]) from error
 
