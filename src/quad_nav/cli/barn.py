@@ -62,9 +62,11 @@ def barn(workers: int, per_world: bool, json_file: Optional[TextIO], csv_file: O
     except InputError as error:
         click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
+    workers = min(workers, setup.wanted)
     if not quiet:
         for warning in setup.warnings:
             click.echo(warning, err=True)
+        click.echo(f"{setup.wanted} flights, {workers} at a time", err=True)
     results, interrupted = _fly(setup, workers, quiet)
     if not quiet:
         click.echo(text(results, per_world), err=_is_terminal(json_file) or _is_terminal(csv_file))
@@ -92,8 +94,7 @@ def _numbers(text: str) -> Tuple[int, ...]:
 
 def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
     """The results, and whether Ctrl-C has cut them short."""
-    wanted = setup.runs * len(setup.worlds)
-    bar = _Bar(wanted, quiet)
+    bar = _Bar(setup.wanted, quiet)
     runs: List[Run] = []
     interrupted = False
     start_s = time.monotonic()
@@ -101,20 +102,24 @@ def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     try:
         with bar:
-            bar.show(runs)
             warm_up(setup.contestant.configuration)  # once, and not in every worker at once
             simulate()
-            for run in fly_all(setup, min(workers, wanted)):
+            for run in fly_all(setup, workers):
                 runs.append(run)
                 bar.show(runs)
     except KeyboardInterrupt:
         interrupted = True
     runs.sort(key=lambda run: (run.world, run.run))
-    return Results(setup.contestant, tuple(runs), wanted, time.monotonic() - start_s), interrupted
+    wall_time_s = time.monotonic() - start_s
+    return Results(setup.contestant, tuple(runs), setup.wanted, wall_time_s), interrupted
 
 
 class _Bar:
-    """Flights, rate and time left; on stderr, and only where that is a terminal."""
+    """Flights, rate and time left; on stderr, and only where that is a terminal.
+
+    It begins with the first flight that is over: until then the workers' libraries may say
+    something of their own.
+    """
 
     def __init__(self, wanted: int, quiet: bool):
         console = Console(stderr=True)
@@ -127,7 +132,6 @@ class _Bar:
         self._start_s = time.monotonic()
 
     def __enter__(self) -> _Bar:
-        self._progress.start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -137,5 +141,6 @@ class _Bar:
         counts = [f"{sum(run.outcome is outcome for run in runs)} {outcome.value}"
                   for outcome in Outcome]
         per_minute = 60.0 * len(runs) / max(time.monotonic() - self._start_s, 1e-3)
-        self._progress.update(self._task, completed=len(runs), told=(
-            f"{', '.join(counts)}; {per_minute:.1f} a minute" if runs else "compiling"))
+        self._progress.update(self._task, completed=len(runs),
+                              told=f"{', '.join(counts)}; {per_minute:.1f} a minute")
+        self._progress.start()

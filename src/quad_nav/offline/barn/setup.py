@@ -78,6 +78,11 @@ class BarnSetup:
     runs: int
 
     @property
+    def wanted(self) -> int:
+        """How many flights there are."""
+        return self.runs * len(self.worlds)
+
+    @property
     def warnings(self) -> Tuple[str, ...]:
         return self.contestant.configuration.warnings
 
