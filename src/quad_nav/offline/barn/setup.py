@@ -117,8 +117,7 @@ def flight_setup(contestant: Contestant, world: BarnWorld, run: int) -> FlightSe
     """One flight; run 0 has the contestant's seed, run 1 the next one, in every world."""
     goals = RobotGoals("quad0", WatchedGoalFile("barn"), _GOALS)
     return FlightSetup(world.scene(), (goals,), (contestant.configuration,), contestant.name,
-                       contestant.simulation, STEPS_PER_S // SCANS_PER_S, contestant.seed + run,
-                       robot_radius_m=contestant.simulation.airframe.radius_m)
+                       contestant.simulation, STEPS_PER_S // SCANS_PER_S, contestant.seed + run)
 
 
 _GOALS = GoalSequence((Goal(*GOAL_M),), SequenceSettings(GOAL_TOLERANCE_M, TIME_LIMIT_S, retries=0))
