@@ -37,6 +37,7 @@ WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "random_mi
 PLACES = {
     "click": "cli/",
     "rich": "cli/",
+    "joblib": "offline/barn/runs.py",
     "numba": "kernels/",
     "pybullet": "sim/body.py",
     "defusedxml": "sim/xml_tree.py",

@@ -10,6 +10,7 @@ import pytest
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.contacts import SEPARATION_S, ContactLog, Touch
+from quad_nav.sim.flight import Airframe
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
 from quad_nav.sim.simulation import (
@@ -293,3 +294,37 @@ def test_bad_parameters_are_listed_together():
     with pytest.raises(InputError) as caught:
         SimulationParams(command_timeout_s=math.nan, jitter_m=-1.0)
     assert [p.split(":")[0] for p in caught.value.problems] == ["command_timeout", "jitter"]
+
+
+@pytest.mark.parametrize("radius_m, touches", [(0.20, False), (0.30, True)])
+def test_a_body_touches_from_its_own_radius_on(make, radius_m, touches):
+    pillar = Cylinder("pillar", 10.6, 10.0, 0.35, 2.0)  # its surface is 0.25 m ahead
+    simulation = make(room(MIDDLE, obstacles=[pillar]), 1,
+                      SimulationParams(airframe=Airframe(radius_m=radius_m)))
+    for _ in range(STEPS_PER_S // 10):
+        simulation.step()
+    assert bool(simulation.contacts) is touches
+
+
+@pytest.mark.parametrize("caster", LIDAR_CASTERS)
+def test_a_body_is_seen_with_its_own_radius(make, caster):
+    simulation = make(room(MIDDLE, Pose2D(12.0, 10.0)), 2, SimulationParams(
+        LidarParams(step_size_rad=math.pi / 2), airframe=Airframe(radius_m=0.2),
+        lidar_caster=caster))
+    assert simulation.scan(0).ranges_m[2] == pytest.approx(1.8, abs=0.01)  # the beam ahead
+
+
+def test_starts_are_as_far_from_things_as_the_body_is_wide():
+    scene = room(MIDDLE, obstacles=[Cylinder("pillar", 10.6, 10.0, 0.35, 2.0)])
+    for seed in range(20):
+        for radius_m in (0.2, 0.5):
+            start, = start_poses(scene, 1, 1.0, seed, radius_m)
+            assert scene.flight_clearance_m(start.x_m, start.y_m) > radius_m
+    with pytest.raises(InputError, match="leaves no free start"):
+        start_poses(scene, 1, 0.2, 0, 0.6)
+
+
+@pytest.mark.parametrize("radius_m", [0.0, -0.2, math.nan, math.inf])
+def test_a_body_needs_a_radius(radius_m):
+    with pytest.raises(InputError, match="body_radius: .* expected metres above 0"):
+        Airframe(radius_m=radius_m)

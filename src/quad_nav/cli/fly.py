@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, Callable, Iterator, List, Optional, Sequence, Tuple
 
 import click
-import yaml
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
+from quad_nav.cli.parameters import parameter
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import InputError
@@ -103,24 +103,12 @@ def _options(scan_range: float, beams: int, range_noise: float, jitter: float, l
     """The options as a person gives them."""
     beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
     options = FlightOptions(
-        **given, parameters=tuple(map(_parameter, parameters)),
+        **given, parameters=tuple(map(parameter, parameters)),
         simulation=SimulationParams(beam_params, jitter_m=jitter, lidar_caster=lidar))
     few = (options.robots or 0) <= _TUTORIAL_ROBOTS and not options.size_m
     if few and options.scene is None and options.goals is None:
         return replace(options, goals=shipped("goals"))
     return options
-
-
-def _parameter(text: str) -> Tuple[str, Any]:
-    """The path and the value of "global_costmap/width=60"; values are written as in YAML."""
-    path, equals, value = text.partition("=")
-    if not equals or not path.strip("/"):
-        raise InputError([f"--set {text}: expected PATH=VALUE, as global_costmap/width=60"])
-    try:
-        return path, yaml.safe_load(value)
-    except yaml.YAMLError as error:
-        raise InputError([f"--set {text}: {value!r} is not YAML, expected a value as in a "
-                          f"parameter file: {error}"]) from error
 
 
 def _watchers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:

@@ -192,7 +192,8 @@ TRAJECTORY_PLANNER = Table(
                 "A slower motion counts as standing."),
         flag("prune_plan", True, "prune_plan", "Forget the part of the plan behind the robot."),
         flag("meter_scoring", True, "meter_scoring",
-              "Distances are scored in metres. The original does so whatever is set here."),
+              "Distances are scored in metres, otherwise in cells. The original never sets its "
+              "flag: there it is chance."),
         flag("publish_cost_grid_pc", False, "publish_cost_grid_pc",
               "Publish the scores of all cells as a point cloud."),
         text("global_frame_id", "odom", "global_frame_id", "a frame's name",

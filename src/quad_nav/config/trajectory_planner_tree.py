@@ -25,8 +25,8 @@ def settle_trajectory_planner(tree: Namespace, notes: Notes) -> None:
             _take_old_name(planner, old, new, notes)
     settle(planner, TRAJECTORY_PLANNER, tables.TRAJECTORY_PLANNER, notes, also_known=_RENAMED)
     if planner.get("meter_scoring") is False:
-        notes.remark(join(TRAJECTORY_PLANNER, "meter_scoring"), IGNORED,
-                     "ignored by move_base: distances are always scored in metres")
+        notes.remark(join(TRAJECTORY_PLANNER, "meter_scoring"), CAUTION,
+                     "distances are scored in cells: with other weights for every resolution")
     if isinstance(planner.get("escape_vel"), float) and planner["escape_vel"] > 0.0:
         notes.remark(join(TRAJECTORY_PLANNER, "escape_vel"), CAUTION,
                      "the robot escapes forwards: a velocity below 0 backs up")
@@ -34,9 +34,8 @@ def settle_trajectory_planner(tree: Namespace, notes: Notes) -> None:
 
 def trajectory_planner_params(tree: Mapping[str, Any]) -> TrajectoryPlannerParams:
     """The dataclass of a settled tree."""
-    arguments = fields(tree[TRAJECTORY_PLANNER], tables.TRAJECTORY_PLANNER.parameters)
-    arguments["meter_scoring"] = True  # whatever is set, as in the original
-    return TrajectoryPlannerParams(**arguments)
+    return TrajectoryPlannerParams(
+        **fields(tree[TRAJECTORY_PLANNER], tables.TRAJECTORY_PLANNER.parameters))
 
 
 def _take_old_name(planner: Namespace, old: str, new: str, notes: Notes) -> None:

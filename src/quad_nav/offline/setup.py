@@ -18,7 +18,7 @@ from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, loa
 from quad_nav.random_mission import random_mission
 from quad_nav.scene_check import scene_check
 from quad_nav.shipped import shipped
-from quad_nav.sim.scene import BODY_RADIUS_M, Scene
+from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import STEPS_PER_S, SimulationParams, start_poses
 
@@ -60,8 +60,12 @@ class FlightSetup:
     steps_per_scan: int
     seed: int = 0
     time_limit_s: float = math.inf
-    robot_radius_m: float = BODY_RADIUS_M
     warnings: Tuple[str, ...] = ()
+
+    @property
+    def robot_radius_m(self) -> float:
+        """The radius of the hulls."""
+        return self.simulation.airframe.radius_m
 
 
 def read_setup(options: FlightOptions) -> FlightSetup:
@@ -71,6 +75,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         InputError: every fault in options, scene, goal files and parameters.
     """
     problems = _faults(options)
+    radius_m = options.simulation.airframe.radius_m
     if options.scene is None and options.goals is None:
         options, scene, robots = _random(options, problems)
     else:
@@ -79,10 +84,11 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         robots = _read_goals(options, scene, problems)
     count = options.robots if options.robots is not None else max(len(robots), 1)
     if scene is not None and not problems:
-        _tried(lambda: start_poses(scene, count, options.simulation.jitter_m, options.seed),
+        _tried(lambda: start_poses(scene, count, options.simulation.jitter_m, options.seed,
+                                   radius_m),
                problems)
     configurations = _read_configurations(options, count, problems)
-    problems += _goals_off_the_costmap(robots, configurations)
+    problems += goals_off_the_costmap(robots, configurations)
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
     assert scene is not None
@@ -92,7 +98,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         scene, tuple(robots), tuple(configurations), options.config,
         replace(options.simulation, controller_period_s=slowest_s),
         round(STEPS_PER_S / options.scans_per_s), options.seed, options.time_limit_s,
-        warnings=(*scene.remarks, *close_ends(robots, BODY_RADIUS_M), *warnings))
+        warnings=(*scene.remarks, *close_ends(robots, radius_m), *warnings))
 
 
 def config_folder(name: str) -> Path:
@@ -148,7 +154,7 @@ def _read_goals(options: FlightOptions, scene: Optional[Scene], problems: List[s
             count += 1
     paths, missing = goal_paths(folder, count)
     robots, faults = load_robot_goals(
-        paths, scene_check(scene, BODY_RADIUS_M) if scene is not None else None)
+        paths, scene_check(scene, options.simulation.airframe.radius_m) if scene else None)
     problems += missing + faults
     return robots
 
@@ -181,8 +187,8 @@ def _read_configuration(folder: Path, index: int, parameters: Sequence[Tuple[str
     return configuration
 
 
-def _goals_off_the_costmap(robots: Sequence[RobotGoals], configurations: Sequence[Configuration]
-                           ) -> List[str]:
+def goals_off_the_costmap(robots: Sequence[RobotGoals], configurations: Sequence[Configuration]
+                          ) -> List[str]:
     """Goals that no plan can lead to, because the global costmap ends before them."""
     problems = []
     for robot, configuration in zip(robots, configurations):

@@ -20,7 +20,7 @@ from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.contacts import Touch
 from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
-from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, Box, Obstacle, Scene, Sphere
+from quad_nav.sim.scene import GUARD_HEIGHT_M, Box, Obstacle, Scene, Sphere
 
 _MAX_RAYS_PER_CALL = 16383
 """One less than ``pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE``: of that many the last is dropped."""
@@ -184,11 +184,12 @@ class World:
 
     def _add_quadcopter(self, number: int, start: Pose2D) -> int:
         client, offset = self._client, [0.0, 0.0, MOUNT_HEIGHT_M]
+        radius = self._airframe.radius_m
         guard = pybullet.createCollisionShape(
-            pybullet.GEOM_CYLINDER, radius=BODY_RADIUS_M, height=GUARD_HEIGHT_M,
+            pybullet.GEOM_CYLINDER, radius=radius, height=GUARD_HEIGHT_M,
             collisionFramePosition=offset, physicsClientId=client)
         looks = pybullet.createVisualShape(
-            pybullet.GEOM_CYLINDER, radius=BODY_RADIUS_M, length=GUARD_HEIGHT_M,
+            pybullet.GEOM_CYLINDER, radius=radius, length=GUARD_HEIGHT_M,
             rgbaColor=robot_rgba(number),
             visualFramePosition=offset, physicsClientId=client)
         body = int(pybullet.createMultiBody(

@@ -60,12 +60,13 @@ class WorldCaster:
 class KernelCaster:
     """Casts at a scene's shapes, the floor and the guards of quadcopters."""
 
-    def __init__(self, params: LidarParams, scene: Scene, n_robots: int):
+    def __init__(self, params: LidarParams, scene: Scene, n_robots: int,
+                 body_radius_m: float = BODY_RADIUS_M):
         directions = np.ascontiguousarray(beam_directions(params)[:, :2])
         self._beams = Beams(directions, params.angle_min_rad, params.step_size_rad,
                             params.range_min_m, params.range_max_m)
         resting, self._grid = split_scene(scene)
-        self._solids = join(resting, _guards(n_robots))
+        self._solids = join(resting, _guards(n_robots, body_radius_m))
         self._guards = slice(len(resting.kinds), None)
 
     def cast(self, bodies: BodyState, robots: Sequence[int]) -> np.ndarray:
@@ -79,8 +80,8 @@ class KernelCaster:
         return distances
 
 
-def _guards(count: int) -> Solids:
+def _guards(count: int, radius_m: float) -> Solids:
     """Cylinders of quadcopters, anywhere."""
-    sizes = (BODY_RADIUS_M, BODY_RADIUS_M, GUARD_HEIGHT_M / 2)
+    sizes = (radius_m, radius_m, GUARD_HEIGHT_M / 2)
     return Solids(np.full(count, CYLINDER, np.int64), np.zeros((count, 3)),
                   np.zeros((count, 3, 3)), np.tile(sizes, (count, 1)))

@@ -30,20 +30,30 @@ from typing import Tuple
 
 import numpy as np
 
+from quad_nav.errors import InputError
 from quad_nav.geometry import Twist2D
 from quad_nav.kernels import flight_law
+from quad_nav.sim.scene import BODY_RADIUS_M
 
 GRAVITY_MPS2 = 9.81
 
 
 @dataclass(frozen=True)
 class Airframe:
-    """Mass properties and limits of a 1 kg quadcopter with 0.2 m arms."""
+    """Mass properties and limits of a 1 kg quadcopter with 0.2 m arms.
+
+    ``radius_m`` is that of the cylinder that it touches things with, see ``scene``.
+    """
 
     mass_kg: float = 1.0
     inertia_kgm2: Tuple[float, float, float] = (0.010, 0.010, 0.020)
     max_thrust_n: float = 2.0 * 9.81
     max_torques_nm: Tuple[float, float, float] = (1.4, 1.4, 0.4)
+    radius_m: float = BODY_RADIUS_M
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.radius_m < math.inf:
+            raise InputError([f"body_radius: {self.radius_m}, expected metres above 0"])
 
 
 @dataclass(frozen=True)

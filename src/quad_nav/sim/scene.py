@@ -20,7 +20,7 @@ from quad_nav.geometry import Pose2D
 Lengths = Union[float, np.ndarray]
 
 BODY_RADIUS_M = 0.30
-"""Radius of the cylinder that a quadcopter touches things with."""
+"""Radius of the cylinder that a quadcopter touches things with, if nothing else is asked for."""
 GUARD_HEIGHT_M = 0.24
 """Its height; its centre is the LIDAR."""
 

@@ -98,10 +98,12 @@ class Simulation:
         self._law = FlightLaw(params.airframe, params.flight)
         self._command_steps = math.floor(
             (params.command_timeout_s + params.controller_period_s) * STEPS_PER_S + 1e-9)
-        self._starts = start_poses(scene, n_robots, params.jitter_m, seed)
+        self._starts = start_poses(scene, n_robots, params.jitter_m, seed,
+                                   params.airframe.radius_m)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
         self._caster: Caster = (
-            KernelCaster(params.lidar, scene, n_robots) if params.lidar_caster == "kernel"
+            KernelCaster(params.lidar, scene, n_robots, params.airframe.radius_m)
+            if params.lidar_caster == "kernel"
             else WorldCaster(params.lidar, self._world))
         self._begin()
 
@@ -198,7 +200,8 @@ class Simulation:
         self._world.show_goals(spheres)
 
 
-def start_poses(scene: Scene, n_robots: int, jitter_m: float, seed: int) -> List[Pose2D]:
+def start_poses(scene: Scene, n_robots: int, jitter_m: float, seed: int,
+                body_radius_m: float = BODY_RADIUS_M) -> List[Pose2D]:
     """Start poses of the first robots, displaced within a disc of radius ``jitter_m``.
 
     Each stays clear of obstacles, walls and the robots before it. Raises
@@ -210,12 +213,12 @@ def start_poses(scene: Scene, n_robots: int, jitter_m: float, seed: int) -> List
     random = np.random.default_rng([seed, 0])
     starts: List[Pose2D] = []
     for robot in range(n_robots):
-        starts.append(_displaced(scene, robot, starts, jitter_m, random))
+        starts.append(_displaced(scene, robot, starts, jitter_m, random, body_radius_m))
     return starts
 
 
 def _displaced(scene: Scene, robot: int, others: Sequence[Pose2D], jitter_m: float,
-               random: np.random.Generator) -> Pose2D:
+               random: np.random.Generator, body_radius_m: float) -> Pose2D:
     start = scene.starts[robot]
     if jitter_m == 0.0:
         return start
@@ -226,8 +229,8 @@ def _displaced(scene: Scene, robot: int, others: Sequence[Pose2D], jitter_m: flo
                     start.y_m + radius_m * math.sin(angle_rad))
         pose = Pose2D(x_m, y_m, start.yaw_rad)
         if (scene.contains(x_m, y_m)
-                and scene.clearance_m(x_m, y_m, scene.altitude_m) > BODY_RADIUS_M + _START_GAP_M
-                and all(pose.distance_to(o) > 2 * BODY_RADIUS_M + _START_GAP_M for o in others)):
+                and scene.clearance_m(x_m, y_m, scene.altitude_m) > body_radius_m + _START_GAP_M
+                and all(pose.distance_to(o) > 2 * body_radius_m + _START_GAP_M for o in others)):
             return pose
     raise InputError([(f"jitter: {jitter_m:g} m leaves no free start for quadcopter {robot} around "
                            f"({start.x_m:g}, {start.y_m:g}), expected a smaller one")])
