@@ -103,7 +103,8 @@ def _mended(params: Any, mends: Mends) -> Any:
     """A local planner's or a recovery's parameters with the switches that concern it."""
     if isinstance(params, TrajectoryPlannerParams):
         return replace(params, refuse_colliding_escape=mends.refuse_colliding_escape,
-                       predict_goal_turn=mends.predict_goal_turn)
+                       predict_goal_turn=mends.predict_goal_turn,
+                       meter_scoring=params.meter_scoring or not mends.heed_meter_scoring)
     if isinstance(params, DwaParams):
         return replace(params, predict_goal_turn=mends.predict_goal_turn)
     if isinstance(params, RotateParams):

@@ -29,6 +29,7 @@ class Mends:
     refuse_colliding_escape: bool = True
     predict_goal_turn: bool = True
     stop_after_rotation: bool = True
+    heed_meter_scoring: bool = False
     keep_off_peers: bool = True
     peer_margin_m: float = 0.05
     peer_timeout_s: float = 0.5

@@ -46,9 +46,9 @@ def slow(**parameters):
      "TrajectoryPlannerROS/pdist_scale: ignored by move_base: path_distance_bias is there as well"),
     (planner(acc_limit_x=2.0), "ignored",
      "TrajectoryPlannerROS/acc_limit_x: ignored by move_base: the name is acc_lim_x"),
-    (planner(meter_scoring=False), "caution",
-     "TrajectoryPlannerROS/meter_scoring: distances are scored in cells: with other weights for"
-     " every resolution"),
+    (planner(meter_scoring=False), "ignored",
+     "TrajectoryPlannerROS/meter_scoring: ignored by move_base: distances are always scored in"
+     " metres"),
     (planner(world_model="costmap"), "unsupported",
      "TrajectoryPlannerROS/world_model: known to move_base but not supported here: the costmap is"
      " the only world model"),

@@ -93,6 +93,8 @@ MENDS = Table(
               "Escape backwards only out of a collision, not into one."),
         flag("predict_goal_turn", True, "predict_goal_turn",
               "Turn no farther in one control period than is left to the goal's heading."),
+        flag("heed_meter_scoring", False, "heed_meter_scoring",
+             "Let meter_scoring count. The original scores in metres whatever is set."),
         flag("stop_after_rotation", True, "stop_after_rotation",
               "Send a stop after a rotation recovery."),
         flag("keep_off_peers", True, "keep_off_peers",
@@ -192,8 +194,8 @@ TRAJECTORY_PLANNER = Table(
                 "A slower motion counts as standing."),
         flag("prune_plan", True, "prune_plan", "Forget the part of the plan behind the robot."),
         flag("meter_scoring", True, "meter_scoring",
-              "Distances are scored in metres, otherwise in cells. The original never sets its "
-              "flag: there it is chance."),
+              "Distances are scored in metres; in cells if it is false and mends/heed_meter_scoring"
+              " is true. The original does not heed it."),
         flag("publish_cost_grid_pc", False, "publish_cost_grid_pc",
               "Publish the scores of all cells as a point cloud."),
         text("global_frame_id", "odom", "global_frame_id", "a frame's name",

@@ -24,12 +24,17 @@ def settle_trajectory_planner(tree: Namespace, notes: Notes) -> None:
         if old in planner:
             _take_old_name(planner, old, new, notes)
     settle(planner, TRAJECTORY_PLANNER, tables.TRAJECTORY_PLANNER, notes, also_known=_RENAMED)
-    if planner.get("meter_scoring") is False:
-        notes.remark(join(TRAJECTORY_PLANNER, "meter_scoring"), CAUTION,
-                     "distances are scored in cells: with other weights for every resolution")
+    if planner.get("meter_scoring") is False and not _is_heeded(tree):
+        notes.remark(join(TRAJECTORY_PLANNER, "meter_scoring"), IGNORED,
+                     "ignored by move_base: distances are always scored in metres")
     if isinstance(planner.get("escape_vel"), float) and planner["escape_vel"] > 0.0:
         notes.remark(join(TRAJECTORY_PLANNER, "escape_vel"), CAUTION,
                      "the robot escapes forwards: a velocity below 0 backs up")
+
+
+def _is_heeded(tree: Namespace) -> bool:
+    mends = tree.get("mends")
+    return isinstance(mends, dict) and mends.get("heed_meter_scoring") is True
 
 
 def trajectory_planner_params(tree: Mapping[str, Any]) -> TrajectoryPlannerParams:
