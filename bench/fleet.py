@@ -4,7 +4,9 @@
 
 Starts ``fleet.launch`` for each size, waits until all fly, and measures for some time of
 the simulation's clock. CPU is in seconds per simulated second: 1.0 keeps one core busy at
-real time. The load average counts other people's processes as well.
+real time. Commands per simulated second and quadcopter are as many as the navigators'
+control rate asks for, or the fleet lags behind the simulation. The load average counts
+other people's processes as well.
 """
 from __future__ import annotations
 
@@ -20,6 +22,7 @@ from typing import Dict, List, Tuple
 
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 SETTLE_S, PATIENCE_S = 5.0, 120.0
+SAMPLED = 5  # quadcopters whose commands are counted
 
 
 def main() -> None:
@@ -49,8 +52,10 @@ def measure(robots: int, hosts: int, seconds: float, arguments: List[str]) -> No
         clock = Clock(time.monotonic() + PATIENCE_S)
         clock.wait_until(1.0 + SETTLE_S)
         before, wall_s, begin_s = used(port), time.monotonic(), clock.now_s
+        commands = Commands(min(robots, SAMPLED))
         clock.wait_until(begin_s + seconds)
         flown_s = clock.now_s - begin_s
+        rate_hz = commands.count / flown_s / min(robots, SAMPLED)
         factor = flown_s / (time.monotonic() - wall_s)
         after = used(port)
     finally:
@@ -58,7 +63,8 @@ def measure(robots: int, hosts: int, seconds: float, arguments: List[str]) -> No
         launch.wait()
     cpu = {name: (after[name][0] - before[name][0]) / flown_s for name in sorted(before)}
     total = sum(cpu.values())
-    print(f"{robots:4d} robots, {hosts} hosts: real-time factor {factor:.2f}, CPU {total:.2f} "
+    print(f"{robots:4d} robots, {hosts} hosts: real-time factor {factor:.2f}, "
+          f"{rate_hz:.1f} commands/s, CPU {total:.2f} "
           f"({1000 * total / robots:.0f} ms/robot): "
           + ", ".join(f"{name} {value:.2f} ({after[name][1]:.0f} MB)"
                       for name, value in cpu.items())
@@ -88,6 +94,19 @@ class Clock:
 
     def _store(self, message) -> None:
         self.now_s = message.clock.to_sec()
+
+
+class Commands:
+    """How many commands come for the first few quadcopters."""
+
+    def __init__(self, robots: int):
+        import rospy
+        self.count = 0
+        for number in range(robots):
+            rospy.Subscriber(f"/cmd_vel{number}", rospy.AnyMsg, self._add)
+
+    def _add(self, _) -> None:
+        self.count += 1
 
 
 def used(port: int) -> Dict[str, Tuple[float, float]]:

@@ -9,6 +9,9 @@ from quad_nav.ros.peer_topics import PeerTopics
 from quad_nav.ros.robot_navigator import POLL_S, RobotNavigator
 from quad_nav.ros.silence import SilenceWatch
 
+LAG_S = 0.2  # two control cycles at 10 Hz
+WARN_AGAIN_S = 15.0  # wall time
+
 
 def serve(robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics],
           period_s: float = 0.001) -> None:
@@ -24,10 +27,12 @@ def serve(robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics],
     while rospy.get_time() == 0.0 and not rospy.is_shutdown():
         silence.check_clock()
         rospy.rostime.wallsleep(0.05)
+    begun_s = rospy.get_time()
     while not rospy.is_shutdown():
         now_s = rospy.get_time()
         for one in peers:
             one.refresh(now_s)
+        _tell_lag(now_s - max(min(robot.due_s for robot in robots), begun_s))
         for robot in robots:
             if robot.due_s <= now_s + 1e-9:
                 robot.step(now_s)
@@ -37,5 +42,13 @@ def serve(robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics],
             rospy.sleep(min(max(due_s - rospy.get_time(), period_s), POLL_S))
         except rospy.exceptions.ROSTimeMovedBackwardsException:
             rospy.logwarn("time moved backwards: the schedule starts anew")
+            begun_s = rospy.get_time()
             for robot in robots:
-                robot.restart(rospy.get_time())
+                robot.restart(begun_s)
+
+
+def _tell_lag(late_s: float) -> None:
+    if late_s > LAG_S:
+        rospy.logwarn_throttle(WARN_AGAIN_S, f"served {late_s:.2f} s late: control cycles are left "
+                               "out; expected fewer robots in this process, a lower rate of the "
+                               "simulation, or more processor time")
