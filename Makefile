@@ -40,9 +40,10 @@ rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 conformance: venv  ## Compare with the original's recordings: make conformance DIR=folder
 	@$(PYTHON) test/conformance/run.py $(DIR)
 
-bench: venv  ## How long the navigator's parts take, beside the original, and the scans
+bench: venv  ## How long the navigator's parts take, beside the original, scans and flights
 	PYTHONPATH=src $(PYTHON) bench/navigation.py
 	PYTHONPATH=src $(PYTHON) bench/lidar.py
+	PYTHONPATH=src $(PYTHON) bench/flight.py
 
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)

@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
 """A flight on ROS and the same one offline: equal outcome, goal times within 5 %."""
+from pathlib import Path
+
 import rospy
 import rostest
 from flight_case import FlightCase
@@ -7,12 +9,12 @@ from flight_case import FlightCase
 from quad_nav.mission.summary import to_json
 from quad_nav.offline.run import fly
 from quad_nav.offline.setup import FlightOptions, read_setup
-from quad_nav.shipped import shipped
 
 
 class Offline(FlightCase):
     def test_goal_times_are_those_of_the_flight_on_ros(self):
-        offline = to_json(fly(read_setup(FlightOptions(None, shipped("goals")))))
+        goals = Path(rospy.get_param("~goals"))
+        offline = to_json(fly(read_setup(FlightOptions(None, goals))))
         on_ros = self.read_result(rospy.get_param("~result"), patience_s=380.0)
         self.assertEqual((on_ros["success"], len(on_ros["contacts"])), (True, 0), on_ros)
         self.assertEqual((offline["success"], len(offline["contacts"])), (True, 0), offline)

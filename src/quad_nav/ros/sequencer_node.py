@@ -169,7 +169,8 @@ def _topics_may_close() -> Iterator[None]:
     try:
         yield
     except rospy.ROSException:
-        if not rospy.is_shutdown():
+        # is_shutdown() turns true only after the topics have been closed.
+        if not rospy.core.is_shutdown_requested():
             raise
 
 
