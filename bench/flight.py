@@ -25,7 +25,7 @@ PARTS: Dict[str, Tuple[str, ...]] = {
     "bodies": ("simulation.py:step",),
     "LIDAR": ("simulation.py:scans",),
     "scans to points": ("flight.py:see",),
-    "costmaps": ("navigator.py:_update_costmaps",),
+    "costmaps": ("layered.py:update",),
     "global plans": ("navigator.py:_plan",),
     "control": ("navigator.py:_control_cycle",),
     "goals": ("flight.py:sequence",),

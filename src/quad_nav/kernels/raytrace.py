@@ -9,8 +9,6 @@ from numba import njit
 from quad_nav.grid import FREE, LETHAL
 from quad_nav.kernels.cells import cell_index
 
-_SPREAD = np.uint64(0x9E3779B97F4A7C15)  # 2 ** 64 / golden ratio: neighbours fall far apart
-
 
 @njit(cache=True, nogil=True)
 def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
@@ -69,8 +67,8 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
     """Free the cells between the sensor and each point, up to ``range_m``.
 
     points: float32[n, 3] in the frame of the grid. ``cleared``, int64[2 ** b], -1 at
-    first, remembers lines that have been cleared, the latest of those that fall on one
-    place: a slow robot's scans have most lines in common. ``bounds``, float64[4] (min x,
+    first, remembers the last line that was cleared to each cell, of large grids to one of
+    several cells: a slow robot's scans have most lines in common. ``bounds``, float64[4] (min x,
     min y, max x, max y in metres), grows by what was touched. A sensor outside the
     grid clears nothing: returns False.
     """
@@ -93,8 +91,9 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
         y1 = cell_index(y, origin_y, resolution, size_y)
         if x1 < 0 or y1 < 0:
             continue
-        line = start * costs.size + y1 * size_x + x1
-        place = (np.uint64(line) * _SPREAD >> np.uint64(32)) & places
+        end = y1 * size_x + x1
+        line = start * costs.size + end
+        place = np.uint64(end) & places
         if cleared[place] != line:
             cleared[place] = line
             clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
