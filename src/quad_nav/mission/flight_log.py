@@ -7,7 +7,7 @@ the gap between two quadcopters their centres' distance less both radii.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Dict, List, Optional, Sequence
+from typing import Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D, angle_difference
 from quad_nav.mission.gap_log import Clearances, GapLog
@@ -49,25 +49,48 @@ class Contact:
     y_m: float
 
 
+@dataclass(frozen=True)
+class Flown:
+    """The figures of one quadcopter up to a moment, for a log that goes on from there.
+
+    ``leg_start`` is where the leg in flight began, ``leg_start_length_m`` how long the path
+    was by then.
+    """
+
+    legs: Tuple[Leg, ...] = ()
+    path_length_m: float = 0.0
+    recoveries: int = 0
+    aborts: int = 0
+    spin_s: float = 0.0
+    leg_start: Optional[Pose2D] = None
+    leg_start_length_m: float = 0.0
+
+
 class RobotLog:
     """What one quadcopter has flown from its first goal to its last.
 
     ``spin_s`` is how long it turned on the spot, ``aborts`` how many goals its navigator
-    gave up.
+    gave up. ``before`` is what it had flown before this log begins.
     """
 
-    def __init__(self, name: str):
+    def __init__(self, name: str, before: Flown = Flown()):
         self.name = name
-        self.legs: List[Leg] = []
-        self.path_length_m = 0.0
-        self.recoveries = 0
-        self.aborts = 0
-        self.spin_s = 0.0
+        self.legs: List[Leg] = list(before.legs)
+        self.path_length_m = before.path_length_m
+        self.recoveries = before.recoveries
+        self.aborts = before.aborts
+        self.spin_s = before.spin_s
         self._pose: Optional[Pose2D] = None
         self._stamp_s = 0.0
         self._is_flying = False
-        self._leg_start: Optional[Pose2D] = None
-        self._leg_start_length_m = 0.0
+        self._leg_start = before.leg_start
+        self._leg_start_length_m = before.leg_start_length_m
+
+    @property
+    def flown(self) -> Flown:
+        """Up to now."""
+        return Flown(tuple(self.legs), self.path_length_m, self.recoveries, self.aborts,
+                     self.spin_s, self._leg_start, self._leg_start_length_m)
 
     def move(self, stamp_s: float, pose: Pose2D) -> bool:
         """Take a pose; False for one that is not newer than the last."""
@@ -144,6 +167,12 @@ class FlightLog:
             return False
         self.contacts.append(contact)
         return True
+
+    def go_on(self, name: str, before: Flown, clearance_m: Optional[float],
+              separation_m: Optional[float]) -> None:
+        """Take over what a quadcopter has flown, and its smallest gaps, from another log."""
+        self.robots[name] = RobotLog(name, before)
+        self.gaps.know(name, clearance_m, separation_m)
 
     def contacts_of(self, name: str) -> int:
         return sum(name in (contact.robot, contact.other) for contact in self.contacts)

@@ -42,6 +42,16 @@ class GapLog:
                 self._compare()
             self._compare_s = stamp_s + BLOCK_S
 
+    def know(self, name: str, clearance_m: Optional[float], separation_m: Optional[float]) -> None:
+        """Take the smallest gaps that another log has seen; None for what it did not know."""
+        for gaps, gap_m in ((self._clearance_m, clearance_m), (self._separation_m, separation_m)):
+            if gap_m is not None:
+                gaps[name] = min(gaps[name], gap_m)
+
+    def so_far_m(self, name: str) -> Tuple[Optional[float], Optional[float]]:
+        """To an obstacle and to another quadcopter, but for the last ``BLOCK_S``, for nothing."""
+        return _known(self._clearance_m[name]), _known(self._separation_m[name])
+
     def clearance_m(self, name: str) -> Optional[float]:
         """Smallest gap to an obstacle or a wall; None when none is known."""
         self._compare()

@@ -85,16 +85,32 @@ class Flight:
     replaced: bool = False  # the navigator flies somebody else's goal
 
 
-class Sequencer:
-    """Which goal next. ``tick`` takes the situation and returns what to do, in order."""
+@dataclass(frozen=True)
+class Stage:
+    """How far a sequence has been flown: the goal in flight or next, and in which round."""
 
-    def __init__(self, sequence: GoalSequence):
+    index: int = 0
+    lap: int = 1
+    flight: Optional[Flight] = None
+
+
+BEGINNING = Stage()
+
+
+class Sequencer:
+    """Which goal next. ``tick`` takes the situation and returns what to do, in order.
+
+    ``stage`` is where another sequencer has left off. The goal that it had in flight is
+    sent again, not counted, unless it has been reached meanwhile.
+    """
+
+    def __init__(self, sequence: GoalSequence, stage: Stage = BEGINNING):
         self._sequence = sequence
-        self._index = 0
-        self._lap = 1
-        self._flight: Optional[Flight] = None
+        self._index, self._lap, self._flight = stage.index, stage.lap, stage.flight
+        self._is_taken_over = stage.flight is not None
         self._busy_s = 0.0  # when the navigator was last not known to be idle
         self._done = False
+        self._drop_other_flight()
 
     @property
     def sequence(self) -> GoalSequence:
@@ -127,7 +143,11 @@ class Sequencer:
         """
         self._sequence = sequence
         self._done = False
-        current = sequence.goals[self._index] if self._index < len(sequence.goals) else None
+        self._drop_other_flight()
+
+    def _drop_other_flight(self) -> None:
+        goals = self._sequence.goals
+        current = goals[self._index] if self._index < len(goals) else None
         if self._flight is not None and self._flight.goal != current:
             self._flight = None
 
@@ -165,6 +185,8 @@ class Sequencer:
 
     def _why_lost(self, flight: Flight, now_s: float, reports: Sequence[NavigatorReport]) -> str:
         """Why the navigator is without our goal through no fault of the goal's."""
+        if self._is_taken_over:
+            return "the sequencer was started again"
         ended = any(report.verdict in (Verdict.SUCCEEDED, Verdict.ABORTED) for report in reports)
         if flight.replaced and ended:
             return "the navigator is through with another node's goal"
@@ -197,7 +219,7 @@ class Sequencer:
         return [self._send(now_s, Flight(goal, _with_yaw(goal, pose), now_s, now_s), "")]
 
     def _send(self, now_s: float, flight: Flight, why: str) -> SendGoal:
-        self._flight, self._busy_s = flight, now_s
+        self._flight, self._busy_s, self._is_taken_over = flight, now_s, False
         return SendGoal(self._index, self._lap, flight.pose, flight.attempt, why)
 
     def _end(self, flight: Flight, now_s: float, pose: Pose2D, reason: str) -> List[Action]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from typing import Optional, Sequence
+from typing import Callable, Optional, Sequence
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -13,9 +13,17 @@ from std_msgs.msg import String
 from quad_nav.errors import InputError
 from quad_nav.face.flight_info import EVENTS_TOPIC, event, to_text
 from quad_nav.geometry import Pose3D
-from quad_nav.mission.flight_log import FlightLog, Leg, RobotLog
+from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import Action, SendGoal, SequenceDone, Sequencer, Verdict
+from quad_nav.mission.sequencer import (
+    BEGINNING,
+    Action,
+    SendGoal,
+    SequenceDone,
+    Sequencer,
+    Stage,
+    Verdict,
+)
 from quad_nav.ros.convert import pose_from_message
 from quad_nav.ros.mission_link import Inbox, RobotLink
 from quad_nav.ros.path_publisher import PathPublisher
@@ -28,6 +36,10 @@ WARN_AGAIN_S = 5.0
 AHEAD_S = 1.0
 # A step of odometry that no flight makes: a simulation's reset.
 JUMP_M, JUMP_MPS = 1.0, 5.0
+
+
+# Takes a robot and the leg that has ended, if one has, before anything else is done.
+Keep = Callable[["MissionRobot", Optional[Leg]], None]
 
 
 class MissionRobot:
@@ -50,9 +62,12 @@ class MissionRobot:
         self._events = rospy.Publisher(EVENTS_TOPIC, String, queue_size=100)
         self._path = PathPublisher(f"/path{index}")
 
-    def begin(self, now_s: float) -> None:
-        """From the first goal: at the start, and after the simulation was reset."""
-        self.sequencer = Sequencer(self.sequencer.sequence)
+    def begin(self, now_s: float, stage: Stage = BEGINNING) -> None:
+        """From the first goal: at the start, and after the simulation was reset.
+
+        With a ``stage``, from where another sequencer left off.
+        """
+        self.sequencer = Sequencer(self.sequencer.sequence, stage)
         self.pose, self.is_silent, self._begun_s, self._heard_s = None, False, now_s, now_s
         self._odometry = None
         self.link.forget()
@@ -64,7 +79,7 @@ class MissionRobot:
         before = [self._odometry, *usable] if self._odometry is not None else usable
         return any(_is_jump(a, b) for a, b in zip(before, before[1:]))
 
-    def step(self, inbox: Inbox, now_s: float, log: FlightLog) -> bool:
+    def step(self, inbox: Inbox, now_s: float, log: FlightLog, keep: Keep) -> bool:
         """Take what has come and act on it; whether the goals or their states changed."""
         changed = self._poll_file()
         self._move(inbox.odometry, now_s, log)
@@ -84,8 +99,11 @@ class MissionRobot:
             return changed
         actions = self.sequencer.tick(now_s, self.pose.to_2d(), inbox.reports,
                                       self.link.navigator_is_idle(now_s))
-        for action in actions:
-            self._do(action, now_s, log.robots[self.name])
+        legs = [log.robots[self.name].act(action) for action in actions]
+        if actions:
+            keep(self, next((leg for leg in legs if leg is not None), None))
+        for action, leg in zip(actions, legs):
+            self._do(action, leg, now_s)
         return changed or bool(actions)
 
     def map_from(self, frame: str) -> Pose3D:
@@ -134,9 +152,8 @@ class MissionRobot:
                       len(sequence.goals), min(self.sequencer.index, len(sequence.goals)))
         return True
 
-    def _do(self, action: Action, now_s: float, log: RobotLog) -> None:
+    def _do(self, action: Action, leg: Optional[Leg], now_s: float) -> None:
         self._events.publish(to_text(event(self._index, now_s, action)))
-        leg = log.act(action)
         if isinstance(action, SendGoal):
             self.link.send(action.pose)
             self._tell_sent(action)

@@ -5,9 +5,11 @@ Everything is read before anything flies, and every fault is listed at once.
 from __future__ import annotations
 
 import difflib
+import json
 import math
 import os
 import time
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -44,6 +46,8 @@ DEFAULTS: Dict[str, Any] = {
     "ready_timeout": 60.0,
     "exit_when_done": False,
     "result": "",
+    "resume": False,
+    "journal": "",
 }
 
 
@@ -59,6 +63,8 @@ class MissionSetup:
     ready_timeout_s: float
     exit_when_done: bool
     warnings: Tuple[str, ...]
+    journal: Path
+    resume: bool
     parameters: Tuple[Mapping[str, Any], ...] = ()
 
 
@@ -69,6 +75,17 @@ def result_path(parameters: Mapping[str, Any]) -> Path:
         return Path(given).expanduser()
     stamp = time.strftime("%Y%m%d-%H%M%S")
     return Path(rospkg.get_log_dir()) / "quad" / f"mission-{stamp}-{os.getpid()}.json"
+
+
+def _journal_path(values: Mapping[str, Any]) -> Path:
+    """Where the journal is; without a name of its own it has one for each mission."""
+    if values["journal"]:
+        return Path(values["journal"]).expanduser()
+    goals = values["goals"] if isinstance(values["goals"], list) else [values["goals"]]
+    paths = [path if path == RANDOM else str(Path(path).expanduser().resolve()) for path in goals]
+    mission = [values["robots"], paths, values["scene"], values["seed"], values["size"]]
+    number = zlib.crc32(json.dumps(mission).encode())
+    return Path(rospkg.get_ros_home()) / "quad" / f"journal-{number:08x}.jsonl"
 
 
 def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
@@ -100,6 +117,7 @@ def read_setup(parameters: Mapping[str, Any], name: str, result: Path,
                         values["exit_when_done"],
                         (*_unknown(parameters, name), *close_ends(robots, radius_m),
                          *(uncovered(scene, navigators) if scene else [])),
+                        _journal_path(values), values["resume"],
                         tuple(one.to_tree() if values["config"] or name in all_parameters else {}
                               for name, one in navigators.items()))
 
@@ -125,6 +143,8 @@ def _faults(values: Mapping[str, Any], name: str) -> List[str]:
         "ready_timeout": (is_number, "a number of seconds above 0"),
         "exit_when_done": (lambda v: isinstance(v, bool), "true or false"),
         "result": (lambda v: isinstance(v, str), "a file to write, or nothing"),
+        "resume": (lambda v: isinstance(v, bool), "true or false"),
+        "journal": (lambda v: isinstance(v, str), "a file to write, or nothing"),
     }
     return [f"{name}: {key}: is {values[key]!r}; expected {expected}"
             for key, (accepts, expected) in rules.items() if not accepts(values[key])]
