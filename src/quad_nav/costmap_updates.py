@@ -44,6 +44,9 @@ class CostmapUpdates:
         """Why the local costmap is not to be driven by, "" when it is."""
         if self._local.is_current(now_s):
             return ""
-        stale = [f"nothing from {name} for {age_s:.1f} s"
-                 for name, age_s in self._local.stale_sources(now_s)]
-        return "; ".join(stale) or "the local costmap is out of date"
+        return self.silence(now_s) or "the local costmap is out of date"
+
+    def silence(self, now_s: float) -> str:
+        """Which of the local costmap's sensors say nothing, "" when all do."""
+        return "; ".join(f"nothing from {name} for {age_s:.1f} s"
+                         for name, age_s in self._local.stale_sources(now_s))

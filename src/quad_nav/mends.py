@@ -15,7 +15,8 @@ class Mends:
     and as many again before recoveries; 0 never. With the new plan obstacle costs weigh
     ``stuck_cost_factor`` of what they did, until the robot has got away.
     ``sensor_timeout_s``: silence of a sensor that stops the robot; 0 leaves it to the
-    sensor's own period.
+    sensor's own period. With ``doubt_scans`` a scan that cannot be true counts as silence,
+    see ``costmap.trust``.
     ``keep_off_peers``: see ``docs/peers.md``. Footprints stay twice ``peer_margin_m`` apart, and a
     peer of which nothing was heard for ``peer_timeout_s`` is not reckoned with. With
     ``make_room_when_idle`` a robot without a goal gets out of the way too, and comes back.
@@ -25,6 +26,7 @@ class Mends:
     progress_distance_m: float = 0.1
     stuck_cost_factor: float = 0.1
     sensor_timeout_s: float = 1.0
+    doubt_scans: bool = True
     clear_any_obstacle_layer: bool = True
     refuse_colliding_escape: bool = True
     predict_goal_turn: bool = True
@@ -37,6 +39,6 @@ class Mends:
 
 
 ORIGINAL = Mends(
-    progress_timeout_s=0.0, stuck_cost_factor=1.0, sensor_timeout_s=0.0,
+    progress_timeout_s=0.0, stuck_cost_factor=1.0, sensor_timeout_s=0.0, doubt_scans=False,
     clear_any_obstacle_layer=False, refuse_colliding_escape=False, predict_goal_turn=False,
     stop_after_rotation=False, keep_off_peers=False, make_room_when_idle=False)

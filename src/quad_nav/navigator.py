@@ -137,12 +137,13 @@ class Navigator:
         return not self._started or self._stop_wanted
 
     def restart(self, now_s: float) -> None:
-        """For a clock that has jumped back: schedules and patience begin anew."""
+        """For a clock that has jumped back: schedules, patience and costmaps begin anew."""
         goal = None if self._yielding.is_errand else self.goal
         self._end_goal()
         self._watch.start(now_s)
         self._yielding.traffic.restart()
         self._updates.start(now_s)
+        self.clear_costmaps(now_s)
         self._limiter.lift()
         if goal is not None:
             self.set_goal(goal, now_s)
@@ -171,7 +172,7 @@ class Navigator:
             self._cycle.follow(self.params.controller_frequency_hz, now_s)
             self._replan.follow(self.params.planner_frequency_hz, now_s)
             self._plan(tick, located.in_global)
-            if self._recovering.is_running:
+            if self._recovering.is_running and not self._updates.silence(now_s):
                 self._step_recovery(tick, located)
             if self._cycle.take(now_s):
                 tick.cycle = True
@@ -267,8 +268,7 @@ class Navigator:
 
     def _control_cycle(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
         if located.in_global is None or located.in_local is None:
-            tick.warnings.append("stopped: the robot's pose is unknown")
-            tick.command = Twist2D()
+            self._stand_blind(tick, located.why_not or "the robot's pose is unknown")
             return
         self._limiter.follow(located.in_global)
         if self._oscillation.has_moved(
@@ -276,8 +276,7 @@ class Navigator:
             self._recovering.works_again(Trigger.OSCILLATION)
         out_of_date = self._updates.out_of_date(tick.now_s)
         if out_of_date:
-            tick.warnings.append("stopped: " + out_of_date)
-            tick.command = Twist2D()
+            self._stand_blind(tick, out_of_date)
             return
         if self._gives_way(tick, located.in_global):
             return
@@ -291,6 +290,11 @@ class Navigator:
             self._start_recovery(tick, located)
         elif self.state is State.PLANNING:
             tick.command = Twist2D()  # the command of the goal before is not for this one
+
+    def _stand_blind(self, tick: Tick, reason: str) -> None:
+        tick.warnings.append("stopped: " + reason)
+        tick.command = Twist2D()
+        self._excuse(tick.now_s)
 
     def _follow(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
         assert located.in_local is not None and located.in_global is not None
@@ -386,7 +390,7 @@ class Navigator:
         return True
 
     def _excuse(self, now_s: float) -> None:
-        """No progress for a peer's sake is no fault."""
+        """No progress for a peer's sake, or blind, is no fault."""
         self._progress.restart(now_s)
         self._oscillation.restart(now_s)
         self._last_valid_control_s = now_s

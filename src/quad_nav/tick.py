@@ -31,10 +31,11 @@ class Trigger(enum.Enum):
 
 @dataclass(frozen=True)
 class Located:
-    """Where the robot is in each costmap's frame; None when it is not known."""
+    """Where the robot is in each costmap's frame; None when it is not known, and why not."""
 
     in_global: Optional[Pose2D]
     in_local: Optional[Pose2D]
+    why_not: str = ""
 
 
 @dataclass(frozen=True)

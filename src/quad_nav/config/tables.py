@@ -86,6 +86,9 @@ MENDS = Table(
         double("sensor_timeout", 1.0, "sensor_timeout_s", "seconds",
                 "Stop when a sensor has been silent for so long; 0 leaves it to"
                 " expected_update_rate.", low=0, high=100),
+        flag("doubt_scans", True, "doubt_scans",
+              "Scans that cannot be true, as of a LIDAR that is frozen, late or half blind, count"
+              " as silence."),
         flag("clear_any_obstacle_layer", True, "clear_any_obstacle_layer",
               "Clearing recoveries without layer_names clear every obstacle layer, not only one"
               " called obstacles."),

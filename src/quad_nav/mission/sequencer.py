@@ -131,6 +131,11 @@ class Sequencer:
         return self._flight
 
     @property
+    def stage(self) -> Stage:
+        """For another sequencer, to go on from."""
+        return Stage(self._index, self._lap, self._flight)
+
+    @property
     def done(self) -> bool:
         return self._done
 

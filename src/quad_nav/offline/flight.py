@@ -15,6 +15,7 @@ import numpy as np
 from quad_nav.assembly import build_navigator
 from quad_nav.config import Configuration
 from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.costmap.trust import ScanTrust
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.mission.flight_log import RobotLog
 from quad_nav.mission.robot_goals import RobotGoals
@@ -49,6 +50,8 @@ class FlightRobot:
         self.waiting_goal: Optional[Pose2D] = None
         self._reports: List[NavigatorReport] = []
         self._sinks = self._sorted_sinks()
+        self._trust = ScanTrust(layer.buffers[source].params for sinks in self._sinks.values()
+                                for layer, source in sinks)
 
     def _sorted_sinks(self) -> Dict[Tuple, List[Tuple[ObstacleLayer, str]]]:
         """The layers and sources that take scans, by the way in which they see them."""
@@ -61,7 +64,10 @@ class FlightRobot:
                         sinks.setdefault(way, []).append((layer, source.name))
         return sinks
 
-    def see(self, scan: Scan, map_from_lidar: Pose3D) -> None:
+    def see(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> None:
+        """Takes a scan that comes now, if it can be true."""
+        if self.navigator.mends.doubt_scans and self._trust.why_not(scan, map_from_lidar, now_s):
+            return
         for sinks in self._sinks.values():
             layer, source = sinks[0]
             layer.add_scan(source, scan, map_from_lidar, scan.stamp_s)
@@ -177,7 +183,7 @@ class Flight:
         everybody = range(len(self.robots))
         for index, scan in zip(everybody, self.simulation.scans(everybody)):
             map_from_lidar = self.simulation.state(index).map_from_base.compose(base_from_lidar)
-            self.robots[index].see(scan, map_from_lidar)
+            self.robots[index].see(scan, map_from_lidar, self.now_s)
             for observer in self._observers:
                 observer.scanned(index, scan, map_from_lidar)
 

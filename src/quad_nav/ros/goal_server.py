@@ -5,7 +5,8 @@ the launch files remap its five topics into the robot's own namespace.
 """
 from __future__ import annotations
 
-from typing import Optional
+from collections import deque
+from typing import Deque, Optional
 
 import actionlib
 import rospy
@@ -40,10 +41,11 @@ class GoalServer:
         self._action_goal = rospy.Publisher(
             names("move_base/goal"), MoveBaseActionGoal, queue_size=1)
         self._server.start()
+        self._simple_goals: Deque[PoseStamped] = deque(maxlen=1)
         self._status = Schedule(self._take_over_status())
         self._status.start(0.0)
         self._simple = rospy.Subscriber(
-            names("move_base_simple/goal"), PoseStamped, self._forward, queue_size=1)
+            names("move_base_simple/goal"), PoseStamped, self._store, queue_size=1)
 
     def _take_over_status(self) -> float:
         """How often the status is told, in Hz, from now on by ``poll``.
@@ -59,15 +61,24 @@ class GoalServer:
         """For a clock that has jumped back."""
         self._status.start(now_s)
 
-    def _forward(self, message: PoseStamped) -> None:
-        """A goal without an action client becomes an action goal, visibly."""
+    def _store(self, message: PoseStamped) -> None:
+        self._simple_goals.append(message)
+
+    def _forward(self) -> None:
+        """A goal without an action client becomes an action goal, visibly.
+
+        The newest only, however many have come.
+        """
+        if not self._simple_goals:
+            return
         goal = MoveBaseActionGoal()
         goal.header.stamp = rospy.Time.now()
-        goal.goal.target_pose = message
+        goal.goal.target_pose = self._simple_goals.pop()
         self._action_goal.publish(goal)
 
     def poll(self, navigator: Navigator, now_s: float) -> None:
         """Passes on a waiting goal or cancel, if this is a moment to take it."""
+        self._forward()
         if self._status.take(now_s):
             self._server.action_server.publish_status()
         if not navigator.accepts_goal(now_s):

@@ -20,7 +20,7 @@ from visualization_msgs.msg import MarkerArray
 from quad_nav.face.flight_info import FLIGHT_TOPIC, mission_info, to_text
 from quad_nav.face.goal_markers import goal_markers
 from quad_nav.mission.flight_log import FlightLog, Leg
-from quad_nav.mission.standing import MissionStanding, on_clock
+from quad_nav.mission.standing import MissionStanding, RobotStanding, on_clock
 from quad_nav.mission.summary import MissionSummary, summarize_robot
 from quad_nav.ros import readiness
 from quad_nav.ros.marker_messages import only_markers
@@ -103,10 +103,14 @@ class Mission:
         inboxes = [robot.link.take() for robot in self.robots]
         with self._lock, _topics_may_close():
             now_s = rospy.get_time()
-            if now_s < self._now_s or any(robot.was_reset(inbox) for robot, inbox
-                                          in zip(self.robots, inboxes)):
+            if any(robot.was_reset(inbox) for robot, inbox in zip(self.robots, inboxes)):
                 rospy.logwarn("the simulation was reset: the mission starts again")
                 self._begin(now_s)
+            elif now_s < self._now_s:
+                rospy.logwarn("the clock went back by %.2f s: the mission goes on",
+                              self._now_s - now_s)
+                self._transforms.forget()
+                self._go_on(self._stands(), now_s)
             self._now_s = now_s
             changed = [robot.step(inbox, now_s, self._log, self._keep)
                        for robot, inbox in zip(self.robots, inboxes)]
@@ -136,9 +140,20 @@ class Mission:
         for robot in self.robots:
             robot.begin(now_s)
 
+    def _stands(self) -> MissionStanding:
+        """For another sequencer, or another clock."""
+        start_s = self._journal.start_s
+        robots = {robot.name: RobotStanding(on_clock(robot.sequencer.stage, -start_s),
+                                            self._log.robots[robot.name].flown,
+                                            *self._log.gaps.so_far_m(robot.name))
+                  for robot in self.robots}
+        contacts = [replace(one, time_s=one.time_s - start_s) for one in self._log.contacts]
+        return MissionStanding(start_s, self._journal.start_epoch_s, self._now_s - start_s,
+                               self._journal.wall_time_s, robots, contacts)
+
     def _go_on(self, before: MissionStanding, now_s: float) -> None:
         """From where another sequencer left off."""
-        self._now_s = now_s
+        self._now_s, self._log = now_s, self._new_log()
         self._journal.go_on(before, now_s, same_clock=self._again)
         start_s = self._journal.start_s
         for robot in self.robots:

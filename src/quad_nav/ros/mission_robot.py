@@ -36,6 +36,8 @@ WARN_AGAIN_S = 5.0
 AHEAD_S = 1.0
 # A step of odometry that no flight makes: a simulation's reset.
 JUMP_M, JUMP_MPS = 1.0, 5.0
+# A smaller one is a fault of the odometry, which may be over soon.
+STEP_M, SETTLE_S = 0.25, 1.0
 
 
 # Takes a robot and the leg that has ended, if one has, before anything else is done.
@@ -54,7 +56,7 @@ class MissionRobot:
         self.is_silent = False
         self._odometry: Optional[Odometry] = None
         self._begun_s = 0.0
-        self._heard_s = 0.0
+        self._heard_s = self._settled_s = 0.0
         self._file = goals.file
         self._next_poll_s = 0.0
         self._transforms = transforms
@@ -69,7 +71,7 @@ class MissionRobot:
         """
         self.sequencer = Sequencer(self.sequencer.sequence, stage)
         self.pose, self.is_silent, self._begun_s, self._heard_s = None, False, now_s, now_s
-        self._odometry = None
+        self._odometry, self._settled_s = None, 0.0
         self.link.forget()
         self._path.clear()
 
@@ -95,7 +97,7 @@ class MissionRobot:
                 rospy.loginfo("%s: %s sent to a node that began to listen", self.name,
                               self._goal(self.sequencer.index, self.sequencer.lap))
         self._watch_silence(now_s)
-        if self.pose is None:
+        if self.pose is None or self._settled_s > now_s:
             return changed
         actions = self.sequencer.tick(now_s, self.pose.to_2d(), inbox.reports,
                                       self.link.navigator_is_idle(now_s))
@@ -115,7 +117,7 @@ class MissionRobot:
                   if self._begun_s <= one.header.stamp.to_sec() <= now_s + AHEAD_S]
         if not usable:
             return
-        self._odometry = usable[-1]
+        before, self._odometry = self._odometry, usable[-1]
         try:
             map_from_odom = self.map_from(usable[-1].header.frame_id)
         except TransformUnavailable as error:
@@ -123,6 +125,10 @@ class MissionRobot:
                                                  f"{error}")
             return
         self._heard_s = now_s
+        if any(_is_jump(a, b, STEP_M) for a, b in zip([before, *usable], usable) if a is not None):
+            rospy.logwarn("%s: its odometry has jumped: nothing counts as reached for %g s",
+                          self.name, SETTLE_S)
+            self._settled_s = now_s + SETTLE_S
         for odometry in usable:
             stamp_s = odometry.header.stamp.to_sec()
             self.pose = map_from_odom.compose(pose_from_message(odometry.pose.pose))
@@ -188,8 +194,8 @@ class MissionRobot:
         return f"{round_}goal {index + 1} of {len(sequence.goals)}"
 
 
-def _is_jump(before: Odometry, after: Odometry) -> bool:
+def _is_jump(before: Odometry, after: Odometry, least_m: float = JUMP_M) -> bool:
     a, b = before.pose.pose.position, after.pose.pose.position
     apart_m = math.hypot(b.x - a.x, b.y - a.y)
     time_s = (after.header.stamp - before.header.stamp).to_sec()
-    return apart_m > max(JUMP_M, JUMP_MPS * time_s)
+    return apart_m > max(least_m, JUMP_MPS * time_s)

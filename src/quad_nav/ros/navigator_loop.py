@@ -1,6 +1,7 @@
 """The loop of a node that flies one robot or many: whoever is due is served."""
 from __future__ import annotations
 
+import time
 from typing import Sequence
 
 import rospy
@@ -9,6 +10,8 @@ from quad_nav.ros.peer_topics import PeerTopics
 from quad_nav.ros.robot_navigator import POLL_S, RobotNavigator
 from quad_nav.ros.silence import SilenceWatch
 
+STALL_S = 0.5  # wall time, as the next
+DRAIN_S = 0.25
 LAG_S = 0.2  # two control cycles at 10 Hz
 WARN_AGAIN_S = 15.0  # wall time
 
@@ -28,8 +31,18 @@ def serve(robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics],
         silence.check_clock()
         rospy.rostime.wallsleep(0.05)
     begun_s = rospy.get_time()
+    now_s, stall = begun_s, Stall(begun_s)
     while not rospy.is_shutdown():
-        now_s = rospy.get_time()
+        before_s, now_s = now_s, rospy.get_time()
+        if now_s < before_s:
+            rospy.logwarn("time moved backwards by %.2f s: the schedule starts anew",
+                          before_s - now_s)
+            begun_s = now_s
+            for robot in robots:
+                robot.restart(now_s)
+        if stall.is_over(now_s):
+            rospy.rostime.wallsleep(DRAIN_S)
+            continue
         for one in peers:
             one.refresh(now_s)
         _tell_lag(now_s - max(min(robot.due_s for robot in robots), begun_s))
@@ -41,10 +54,29 @@ def serve(robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics],
         try:
             rospy.sleep(min(max(due_s - rospy.get_time(), period_s), POLL_S))
         except rospy.exceptions.ROSTimeMovedBackwardsException:
-            rospy.logwarn("time moved backwards: the schedule starts anew")
-            begun_s = rospy.get_time()
-            for robot in robots:
-                robot.restart(begun_s)
+            continue
+
+
+class Stall:
+    """Notices that the clock had stood still for us: a node stopped, a link cut, a pause.
+
+    What has piled up meanwhile is of the past: nobody is to be steered by the first of it.
+    """
+
+    def __init__(self, now_s: float):
+        self._now_s, self._wall_s = now_s, time.monotonic()
+
+    def is_over(self, now_s: float) -> bool:
+        """Whether the clock goes again after ``STALL_S`` or more; so it is said once."""
+        wall_s = time.monotonic()
+        stood_s = wall_s - self._wall_s
+        if now_s == self._now_s:
+            return False
+        self._now_s, self._wall_s = now_s, wall_s
+        if stood_s < STALL_S:
+            return False
+        rospy.loginfo("the clock had stood still for %.1f s", stood_s)
+        return True
 
 
 def _tell_lag(late_s: float) -> None:

@@ -46,6 +46,7 @@ class RobotNavigator:
         self._navigator = navigator = build_navigator(configuration)
         self._lock = threading.RLock()
         self._velocity = Twist2D()
+        self._heard_s: Optional[float] = None  # when the odometry came last
         self._transforms, self._peers = transforms, peers
         costmaps = (navigator.global_costmap, navigator.local_costmap)
         self._publishers = {
@@ -75,6 +76,10 @@ class RobotNavigator:
     def restart(self, now_s: float) -> None:
         """For a clock that has jumped back."""
         with self._lock:
+            self._transforms.forget()
+            for sensor in self._sensors:
+                sensor.forget()
+            self._heard_s = None
             self._navigator.restart(now_s)
             self._goals.restart(now_s)
             self.due_s = now_s
@@ -86,7 +91,9 @@ class RobotNavigator:
     # -- callbacks -----------------------------------------------------------------
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._velocity = twist_from_message(message.twist.twist)
+        velocity = twist_from_message(message.twist.twist)
+        if velocity.is_finite:
+            self._velocity, self._heard_s = velocity, rospy.get_time()
 
     def _on_reconfigure(self, namespace: str, changes: dict) -> config.Configuration:
         with self._lock:
@@ -100,7 +107,7 @@ class RobotNavigator:
     def _step(self, now_s: float) -> None:
         navigator = self._navigator
         for sensor in self._sensors:
-            sensor.deliver(self._transforms)
+            sensor.deliver(self._transforms, navigator.mends.doubt_scans)
         self._goals.poll(navigator, now_s)
         self._peers.tell(self.number, navigator.intention, now_s)
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
@@ -111,13 +118,26 @@ class RobotNavigator:
         self._publish(tick, in_global, located)
 
     def _locate(self, now_s: float) -> Tuple[Optional[Pose3D], Located]:
-        """The robot's pose in the global costmap's frame, and in both."""
+        """The robot's pose in the global costmap's frame, and in both.
+
+        Without odometry it is not known how it moves, so where it is counts for nothing.
+        """
+        silence = self._odometry_silence(now_s)
+        if silence:
+            return None, Located(None, None, silence)
         costmaps = (self._navigator.global_costmap.params, self._navigator.local_costmap.params)
         in_global, in_local = self._transforms.locate_in(
             [(params.global_frame, params.robot_base_frame, params.transform_tolerance_s)
              for params in costmaps], now_s)
         return in_global, Located(in_global.to_2d() if in_global else None,
                                   in_local.to_2d() if in_local else None)
+
+    def _odometry_silence(self, now_s: float) -> str:
+        """Said when there was odometry and is none any more."""
+        limit_s, heard_s = self._navigator.mends.sensor_timeout_s, self._heard_s
+        if limit_s <= 0.0 or heard_s is None or now_s - heard_s <= limit_s:
+            return ""
+        return f"nothing from {self._odometry.resolved_name} for {now_s - heard_s:.1f} s"
 
     def _located_now(self) -> Tuple[float, Located]:
         now_s = rospy.get_time()

@@ -16,6 +16,7 @@ from sensor_msgs.msg import PointCloud, PointCloud2
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.costmap.trust import ScanTrust
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.convert import ScanMessage, scan_from_message
 from quad_nav.ros.names import Names, own_node
@@ -33,6 +34,7 @@ class Sensor:
         self.data_type = data_type
         self.targets: List[Tuple[LayeredCostmap, ObstacleLayer, str, str]] = []
         self.waiting: Deque = deque(maxlen=QUEUE_LENGTH)
+        self._trust: Optional[ScanTrust] = None
         self._lock = threading.Lock()
         self.subscriber = rospy.Subscriber(
             topic, MESSAGE_TYPES[data_type], self._store, queue_size=QUEUE_LENGTH)
@@ -41,8 +43,17 @@ class Sensor:
         with self._lock:
             self.waiting.append((message, rospy.get_time()))
 
-    def deliver(self, transforms: Transforms) -> None:
-        """Hands over every message whose transforms are known."""
+    def forget(self) -> None:
+        """For a clock that has jumped: what waits is of another time."""
+        with self._lock:
+            self.waiting.clear()
+        self._trust = None
+
+    def deliver(self, transforms: Transforms, doubt: bool) -> None:
+        """Hands over every message whose transforms are known.
+
+        With ``doubt`` no scan that cannot be true.
+        """
         while True:
             with self._lock:
                 if not self.waiting:
@@ -58,7 +69,23 @@ class Sensor:
             if poses is None:
                 return
             self._drop(message)
-            self._hand_over(message, received_s, poses)
+            if doubt:
+                # What is seen is as old as its stamp, whenever it comes.
+                received_s = min(received_s, message.header.stamp.to_sec())
+            if not (doubt and self._is_doubtful(message, poses[0][0])):
+                self._hand_over(message, received_s, poses)
+
+    def _is_doubtful(self, message, global_from_sensor: Pose3D) -> bool:
+        if self.data_type != "LaserScan":
+            return False
+        if self._trust is None:
+            self._trust = ScanTrust(layer.buffers[source].params
+                                    for _, layer, source, _ in self.targets)
+        why_not = self._trust.why_not(scan_from_message(message), global_from_sensor,
+                                      rospy.get_time())
+        if why_not:
+            rospy.logwarn_throttle(5.0, "%s: a scan is not believed: %s", self.topic, why_not)
+        return bool(why_not)
 
     def _drop(self, message) -> None:
         with self._lock:

@@ -21,6 +21,7 @@ from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError
+from quad_nav.ros.command_lease import CommandLease
 from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.marker_messages import goal_spheres
 from quad_nav.ros.simulator_setup import (
@@ -36,6 +37,7 @@ from quad_nav.sim.simulation import STEP_S, STEPS_PER_S, Simulation
 _STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 _STEPS_PER_CLOCK = STEPS_PER_S // 120
 _START_STEP = STEPS_PER_S
+_COMMANDS_PER_ROBOT = 20
 _HEALTH_PERIOD_S = 1.0      # wall time, as the next two
 _PAUSED_PERIOD_S = 0.5
 _PAUSED_SLEEP_S = 0.02
@@ -56,7 +58,11 @@ class SimulatorNode:
         self._steps_per_clock = _STEPS_PER_CLOCK if setup.rate <= 1.0 else _STEPS_PER_ODOMETRY
         self._paused, self._stopping = True, False
         self._next_health_s = self._next_republish_s = 0.0
-        self._commands: Deque[Tuple[int, Twist]] = collections.deque()
+        # A node that floods a topic costs no more than this.
+        self._commands: Deque[Tuple[int, Twist]] = collections.deque(
+            maxlen=_COMMANDS_PER_ROBOT * setup.robots)
+        self._lease = CommandLease(setup.params.command_timeout_s
+                                   + setup.params.controller_period_s)
         self._requests: Deque[Tuple[Callable[[], str], Future]] = collections.deque()
         self._goals, self._goals_are_shown = MarkerArray(), True
         self._subscribe()
@@ -147,6 +153,7 @@ class SimulatorNode:
         self._simulation.reset()
         self._simulation.step()
         self._commands.clear()
+        self._lease.clear()
         self._goals_are_shown = False
         self._publish_all()
         rospy.loginfo("simulation reset")
@@ -175,11 +182,18 @@ class SimulatorNode:
         while self._commands:
             robot, message = self._commands.popleft()
             twist = twist_from_message(message)
-            if twist.is_finite:
-                self._simulation.set_command(robot, twist)
-            else:
+            if not twist.is_finite:
                 rospy.logwarn_throttle(5.0, "/cmd_vel%d: dropped, expected finite numbers: %s",
                                        robot, twist)
+                continue
+            node = message._connection_header["callerid"]
+            holder = self._lease.holder(robot, node, self._simulation.now_s)
+            if holder == node:
+                self._simulation.set_command(robot, twist)
+            else:
+                rospy.logwarn_throttle(5.0, "/cmd_vel%d: %s steers this quadcopter; what %s sends "
+                                       "is dropped, expected one node at a time", robot, holder,
+                                       node)
 
     def _stand(self) -> None:
         """Paused: tell late comers what is, but tf, which is latched."""

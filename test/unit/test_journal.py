@@ -1,0 +1,125 @@
+"""The journal: what a sequencer that comes after another one reads in it."""
+from __future__ import annotations
+
+import errno
+import os
+
+import pytest
+
+from quad_nav.errors import InputError
+from quad_nav.mission.journal import Journal
+
+
+def lines(path):
+    return path.read_bytes().splitlines()
+
+
+def journal(path, *records):
+    """A journal with these records, as its writer leaves it when it is killed."""
+    written = Journal(path)
+    written.begin({"head": 1})
+    for record in records:
+        assert written.keep(record) == ""
+    written.close()
+    return path
+
+
+class FullDisk:
+    """os.pwrite on a disk with room for so many bytes more."""
+
+    def __init__(self, monkeypatch, room):
+        self.room = room
+        self._write = os.pwrite
+        monkeypatch.setattr(os, "pwrite", self)
+
+    def __call__(self, file, data, offset):
+        if self.room == 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        done = self._write(file, data[:self.room], offset)
+        self.room -= done
+        return done
+
+
+def test_what_is_kept_is_in_the_file_at_once_and_read_again(tmp_path):
+    path = tmp_path / "folder" / "journal.jsonl"
+    kept = Journal(path)
+    assert kept.begin({"head": 1}) == "" and kept.keep({"goal": 2}) == ""
+    assert lines(path) == [b'{"head": 1}', b'{"goal": 2}']
+    assert Journal(path).go_on() == [{"head": 1}, {"goal": 2}]
+
+
+def test_one_that_begins_forgets_what_was_there(tmp_path):
+    path = journal(tmp_path / "j", {"goal": 1}, {"goal": 2})
+    Journal(path).begin({"head": 2})
+    assert lines(path) == [b'{"head": 2}']
+
+
+def test_one_that_goes_on_writes_behind_what_was_there(tmp_path):
+    path = journal(tmp_path / "j", {"goal": 1})
+    later = Journal(path)
+    later.go_on()
+    later.keep({"goal": 2})
+    assert lines(path) == [b'{"head": 1}', b'{"goal": 1}', b'{"goal": 2}']
+
+
+def test_there_need_be_none(tmp_path):
+    assert Journal(tmp_path / "none").go_on() == []
+
+
+@pytest.mark.parametrize("torn", [b'{"goal', b'{"goal": 2}', b"\x00\x00\x00"])
+def test_a_line_that_was_never_finished_counts_for_nothing(tmp_path, torn):
+    path = journal(tmp_path / "j", {"goal": 1})
+    with path.open("ab") as file:
+        file.write(torn)
+    later = Journal(path)
+    assert later.go_on() == [{"head": 1}, {"goal": 1}]
+    later.keep({"goal": 3})
+    assert lines(path) == [b'{"head": 1}', b'{"goal": 1}', b'{"goal": 3}']
+
+
+@pytest.mark.parametrize("line", [b"nonsense", b"[1, 2]", b"\xff\xfe", b""])
+def test_a_line_that_is_none_is_named(tmp_path, line):
+    path = tmp_path / "j"
+    path.write_bytes(b'{"head": 1}\n' + line + b'\n{"goal": 1}\n')
+    with pytest.raises(InputError, match=r"j:2: is no line of a journal; expected a JSON object"):
+        Journal(path).go_on()
+
+
+def test_what_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+        Journal(tmp_path).go_on()
+
+
+def test_a_full_disk_is_told_once_and_the_journal_catches_up(tmp_path, monkeypatch):
+    path = journal(tmp_path / "j", {"goal": 1})
+    later = Journal(path)
+    later.go_on()
+    disk = FullDisk(monkeypatch, room=5)
+    news = later.keep({"goal": 2})
+    assert news.startswith(f"{path}: cannot be written: No space left on device; the flight goes on")
+    assert later.keep({"goal": 3}) == "" and later.flush() == ""
+    assert lines(path) == [b'{"head": 1}', b'{"goal": 1}']  # and no half line
+    disk.room = 1000
+    assert later.flush() == f"{path}: written again, nothing is missing"
+    assert lines(path)[2:] == [b'{"goal": 2}', b'{"goal": 3}']
+    assert later.flush() == "" and later.keep({"goal": 4}) == ""
+    disk.room = 0
+    assert "cannot be written" in later.keep({"goal": 5})  # the next time it is told again
+
+
+def test_a_folder_that_cannot_be_made_is_a_full_disk(tmp_path):
+    (tmp_path / "file").write_text("")
+    kept = Journal(tmp_path / "file" / "j")
+    assert "cannot be written: " in kept.begin({"head": 1})
+    (tmp_path / "file").unlink()
+    assert kept.flush().endswith("nothing is missing")
+    assert lines(tmp_path / "file" / "j") == [b'{"head": 1}']
+
+
+def test_two_missions_do_not_write_one_journal(tmp_path):
+    first, second = Journal(tmp_path / "j"), Journal(tmp_path / "j")
+    first.begin({"head": 1})
+    assert "another mission that flies now writes it" in second.begin({"head": 2})
+    first.close()
+    assert second.flush().endswith("nothing is missing")
+    assert lines(tmp_path / "j") == [b'{"head": 2}']
