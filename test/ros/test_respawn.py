@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""A navigator killed in flight: its quadcopter hovers, the node comes back, the mission goes on."""
+"""Nodes killed and stopped in flight: hover, come back, and no goal is lost or flown twice."""
+import json
 import os
 import signal
+import time
 from xmlrpc.client import ServerProxy
 
 import rosgraph
@@ -9,32 +11,69 @@ import rosnode
 import rospy
 import rostest
 from flight_case import FlightCase
+from std_msgs.msg import String
+
+STOPPED_S = 5.0  # wall time
 
 
 def pid_of(name):
-    uri = rosnode.get_api_uri(rosgraph.Master("/test"), name, skip_cache=True)
-    return ServerProxy(uri).getPid("/test")[2] if uri else None
+    """None when nobody answers by this name."""
+    try:
+        uri = rosnode.get_api_uri(rosgraph.Master("/test"), name, skip_cache=True)
+        return ServerProxy(uri).getPid("/test")[2] if uri else None
+    except OSError:
+        return None  # the dead node's address is still registered
 
 
 class Respawn(FlightCase):
-    def test_killed_navigator(self):
-        self.wait(lambda: self.odometry[0].message is not None, "odometry")
-        self.wait(lambda: self.speed(0) > 0.15, "robot 0 under way")
-        killed = pid_of("/move_base0")
-        os.kill(killed, signal.SIGKILL)
-        self.wait(lambda: self.speed(0) < 0.02, "robot 0 hovering")
-        self.wait(lambda: self.is_back(killed), "the node respawned")
-        self.wait(lambda: self.speed(0) > 0.15, "robot 0 under way again")
-        result = self.read_result(rospy.get_param("~result"), patience_s=200.0)
-        for robot in result["robots"]:
-            self.assertTrue(all(goal["reached"] for goal in robot["goals"]), robot)
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.events = []
+        cls.subscriber = rospy.Subscriber(
+            "/quad/events", String, lambda message: cls.events.append(json.loads(message.data)))
 
-    @staticmethod
-    def is_back(killed):
-        try:
-            return pid_of("/move_base0") not in (None, killed)
-        except OSError:
-            return False  # the dead node's address is still registered
+    def test_the_mission_survives(self):
+        self.wait(lambda: self.odometry[0].message is not None, "odometry")
+        self.wait_for_flight("at first")
+        self.kill("/sequencer")
+        self.wait_for_flight("after the sequencer's death")
+        self.kill("/move_base0")
+        self.wait(lambda: self.speed(0) < 0.02, "robot 0 hovering without a navigator")
+        self.wait_for_flight("with another navigator")
+        self.stop("/move_base0")
+        self.wait_for_flight("with its navigator awake")
+        result = self.read_result(rospy.get_param("~result"), patience_s=200.0)
+        self.assertTrue(result["success"], result)
+        for robot in result["robots"]:
+            self.assertTrue(all(goal["reached"] and goal["attempts"] == 1
+                                for goal in robot["goals"]), robot)
+        self.assertEqual(sorted(self.told("ended")), [(0, 0), (0, 1), (1, 0)])
+        first_sent = self.told("sent", why="")
+        self.assertEqual(len(first_sent), len(set(first_sent)), first_sent)
+
+    def wait_for_flight(self, when):
+        self.wait(lambda: self.speed(0) > 0.15, f"robot 0 under way {when}")
+
+    def kill(self, name):
+        pid = pid_of(name)
+        os.kill(pid, signal.SIGKILL)
+        self.wait(lambda: pid_of(name) not in (None, pid), f"{name} back")
+
+    def stop(self, name):
+        """Stopped for a while, as by a machine that is busy with something else."""
+        pid = pid_of(name)
+        os.kill(pid, signal.SIGSTOP)
+        self.addCleanup(os.kill, pid, signal.SIGCONT)
+        end = time.monotonic() + STOPPED_S
+        self.wait(lambda: self.speed(0) < 0.02, f"robot 0 hovering with {name} stopped")
+        self.wait(lambda: time.monotonic() >= end, f"{STOPPED_S} s")
+        self.assertLess(self.speed(0), 0.02)
+        os.kill(pid, signal.SIGCONT)
+
+    def told(self, kind, **having):
+        return [(event["robot"], event["goal"]) for event in self.events if event["event"] == kind
+                and all(event[key] == value for key, value in having.items())]
 
 
 if __name__ == "__main__":

@@ -54,7 +54,7 @@ class Flown:
     """The figures of one quadcopter up to a moment, for a log that goes on from there.
 
     ``leg_start`` is where the leg in flight began, ``leg_start_length_m`` how long the path
-    was by then.
+    was by then; ``pose`` is where the quadcopter was last, None when it is somewhere else now.
     """
 
     legs: Tuple[Leg, ...] = ()
@@ -64,13 +64,15 @@ class Flown:
     spin_s: float = 0.0
     leg_start: Optional[Pose2D] = None
     leg_start_length_m: float = 0.0
+    pose: Optional[Pose2D] = None
 
 
 class RobotLog:
     """What one quadcopter has flown from its first goal to its last.
 
     ``spin_s`` is how long it turned on the spot, ``aborts`` how many goals its navigator
-    gave up. ``before`` is what it had flown before this log begins.
+    gave up. ``before`` is what it had flown before this log begins; to the first pose it
+    flew straight.
     """
 
     def __init__(self, name: str, before: Flown = Flown()):
@@ -80,9 +82,9 @@ class RobotLog:
         self.recoveries = before.recoveries
         self.aborts = before.aborts
         self.spin_s = before.spin_s
-        self._pose: Optional[Pose2D] = None
+        self._pose = before.pose
         self._stamp_s = 0.0
-        self._is_flying = False
+        self._is_flying = before.pose is not None
         self._leg_start = before.leg_start
         self._leg_start_length_m = before.leg_start_length_m
 
@@ -90,7 +92,7 @@ class RobotLog:
     def flown(self) -> Flown:
         """Up to now."""
         return Flown(tuple(self.legs), self.path_length_m, self.recoveries, self.aborts,
-                     self.spin_s, self._leg_start, self._leg_start_length_m)
+                     self.spin_s, self._leg_start, self._leg_start_length_m, self._pose)
 
     def move(self, stamp_s: float, pose: Pose2D) -> bool:
         """Take a pose; False for one that is not newer than the last."""

@@ -111,7 +111,8 @@ def _after(before: RobotStanding, record: Mapping[str, Any]) -> RobotStanding:
     if record["leg"] is not None:
         legs = (*legs, Leg(**{**record["leg"], "goal": Goal(**record["leg"]["goal"])}))
     figures = dict(record["flown"])
-    figures["leg_start"] = _made(figures["leg_start"], Pose2D)
+    for key in ("leg_start", "pose"):
+        figures[key] = _made(figures[key], Pose2D)
     flight = record["flight"]
     if flight is not None:
         flight = Flight(**{**flight, "goal": Goal(**flight["goal"]),

@@ -1,9 +1,9 @@
-"""``again COMMAND [ARGUMENT...]``: runs a node, and again when a signal has killed it.
+"""``python3 -m quad_nav.ros.again COMMAND [ARGUMENT...]``: runs a node, and again when killed.
 
 roslaunch's ``respawn`` takes a node that has finished for one that has died, and forbids
 ``required`` beside it. As a ``launch-prefix`` this knows the difference: a node that ends
-by itself has ended, and its exit status is ours. One that was killed is started again, with
-``--again`` behind its arguments.
+by itself has ended, and its exit status is ours. One that a signal killed is started again,
+with ``--again`` behind its arguments.
 """
 from __future__ import annotations
 
@@ -48,3 +48,7 @@ def _start(command: List[str]) -> subprocess.Popen:
 def _end_with_parent() -> None:
     """Nobody would see to a node whose parent was killed."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

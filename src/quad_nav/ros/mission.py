@@ -158,7 +158,8 @@ class Mission:
         start_s = self._journal.start_s
         for robot in self.robots:
             stands = before.robots[robot.name]
-            self._log.go_on(robot.name, stands.flown, stands.clearance_m, stands.separation_m)
+            flown = stands.flown if self._again else replace(stands.flown, pose=None)
+            self._log.go_on(robot.name, flown, stands.clearance_m, stands.separation_m)
             robot.begin(now_s, on_clock(stands.stage, start_s))
             rospy.loginfo("%s: goes on with goal %d of %d, lap %d", robot.name,
                           stands.stage.index + 1, len(robot.sequencer.sequence.goals),

@@ -42,6 +42,7 @@ def serve(robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics],
                 robot.restart(now_s)
         if stall.is_over(now_s):
             rospy.rostime.wallsleep(DRAIN_S)
+            begun_s = rospy.get_time()
             continue
         for one in peers:
             one.refresh(now_s)

@@ -71,7 +71,7 @@ class RobotNavigator:
         """Does what is due at a time."""
         with self._lock:
             self._step(now_s)
-            self.due_s = min(self._navigator.next_due_s, now_s + POLL_S)
+            self.due_s = max(min(self._navigator.next_due_s, now_s + POLL_S), now_s)
 
     def restart(self, now_s: float) -> None:
         """For a clock that has jumped back."""
