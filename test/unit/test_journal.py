@@ -96,7 +96,7 @@ def test_a_full_disk_is_told_once_and_the_journal_catches_up(tmp_path, monkeypat
     later.go_on()
     disk = FullDisk(monkeypatch, room=5)
     news = later.keep({"goal": 2})
-    assert news.startswith(f"{path}: cannot be written: No space left on device; the flight goes on")
+    assert news.startswith(f"{path}: cannot be written: No space left on device; the flight goes")
     assert later.keep({"goal": 3}) == "" and later.flush() == ""
     assert lines(path) == [b'{"head": 1}', b'{"goal": 1}']  # and no half line
     disk.room = 1000

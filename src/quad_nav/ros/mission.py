@@ -83,10 +83,7 @@ class Mission:
 
     def start(self) -> None:
         """Start the simulation. Raises ServiceException when it refuses."""
-        if self._setup.simulation:
-            response = rospy.ServiceProxy(START_SERVICE, Trigger)()
-            if not response.success:
-                raise rospy.ServiceException(response.message or "refused without a reason")
+        self._start_simulation()
         with self._lock:
             if self._before is None:
                 self._begin(rospy.get_time())
@@ -94,6 +91,12 @@ class Mission:
                 self._go_on(self._before, rospy.get_time())
         for robot in self.robots:
             robot.link.take()  # what came while waiting is no part of the flight
+
+    def _start_simulation(self) -> None:
+        if self._setup.simulation:
+            response = rospy.ServiceProxy(START_SERVICE, Trigger)()
+            if not response.success:
+                raise rospy.ServiceException(response.message or "refused without a reason")
 
     def advance(self) -> None:
         """Waits for news and acts on what has come."""
@@ -109,8 +112,8 @@ class Mission:
             elif now_s < self._now_s:
                 rospy.logwarn("the clock went back by %.2f s: the mission goes on",
                               self._now_s - now_s)
-                self._transforms.forget()
                 self._go_on(self._stands(), now_s)
+                self._start_another_simulation()
             self._now_s = now_s
             changed = [robot.step(inbox, now_s, self._log, self._keep)
                        for robot, inbox in zip(self.robots, inboxes)]
@@ -121,6 +124,11 @@ class Mission:
         with self._lock, _topics_may_close():
             self._diagnostics.publish(progress(self.robots, self._log))
             self._journal.flush()
+
+    def why_stopped(self) -> str:
+        """When the node is to end before its mission has."""
+        fault = readiness.why_gone(START_SERVICE, "simulator") if self._setup.simulation else ""
+        return fault or "stopped before all goals were flown"
 
     def summary(self, reason: str = "") -> MissionSummary:
         with self._lock:
@@ -139,6 +147,13 @@ class Mission:
         self._journal.begin(now_s)
         for robot in self.robots:
             robot.begin(now_s)
+
+    def _start_another_simulation(self) -> None:
+        """One that was started again has a new clock, and stands."""
+        try:
+            self._start_simulation()
+        except rospy.ServiceException as error:
+            rospy.logwarn("%s: %s", START_SERVICE, error)
 
     def _stands(self) -> MissionStanding:
         """For another sequencer, or another clock."""

@@ -1,6 +1,7 @@
 """Waits until everything that a node needs is there, and names what is not."""
 from __future__ import annotations
 
+import socket
 import time
 from dataclasses import dataclass
 from typing import Callable, List, Optional, Sequence
@@ -10,6 +11,7 @@ import rospy
 
 WARN_EVERY_S = 10.0
 POLL_S = 0.1
+ALIVE_WITHIN_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,21 @@ def wait_for(needs: Sequence[Need], timeout_s: float) -> List[str]:
 
 def service_is_there(name: str) -> bool:
     return name in _providers(2)
+
+
+def why_gone(service: str, node: str) -> str:
+    """That the master or the node that served something has died; "" when both live."""
+    try:
+        address = rosgraph.Master(rospy.get_name()).lookupService(service)
+    except rosgraph.MasterError:
+        return f"the {node} is gone"
+    except OSError:
+        return "the ROS master has died"
+    try:
+        socket.create_connection(rospy.core.parse_rosrpc_uri(address), ALIVE_WITHIN_S).close()
+    except OSError:
+        return f"the {node} has died"
+    return ""
 
 
 def missing_service(name: str) -> str:

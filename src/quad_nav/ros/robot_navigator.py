@@ -16,6 +16,7 @@ from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.ros import sensors, static_maps
+from quad_nav.ros.complaints import Complaints
 from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
@@ -28,7 +29,6 @@ from quad_nav.ros.transforms import Transforms
 from quad_nav.tick import Located, Tick
 
 POLL_S = 0.05  # how soon a goal for an idle navigator is noticed
-WARN_AGAIN_S = 5.0
 
 
 class RobotNavigator:
@@ -42,6 +42,7 @@ class RobotNavigator:
         self.number = configuration.robot
         self._name = "" if names is own_node else f"quad{self.number}: "
         self.due_s = 0.0
+        self._complaints = Complaints()
         self._configuration = configuration
         self._navigator = navigator = build_navigator(configuration)
         self._lock = threading.RLock()
@@ -76,7 +77,6 @@ class RobotNavigator:
     def restart(self, now_s: float) -> None:
         """For a clock that has jumped back."""
         with self._lock:
-            self._transforms.forget()
             for sensor in self._sensors:
                 sensor.forget()
             self._heard_s = None
@@ -145,12 +145,11 @@ class RobotNavigator:
 
     def _publish(self, tick: Tick, in_global: Optional[Pose3D], located: Located) -> None:
         for warning in tick.warnings:
-            rospy.logwarn_throttle_identical(WARN_AGAIN_S, self._name + warning)
+            self._complaints.say(self._name + warning)
         for note in tick.notes:
             rospy.loginfo("%s%s", self._name, note)
         if tick.planning_failed:
-            rospy.logwarn_throttle_identical(
-                WARN_AGAIN_S, f"{self._name}no plan: {tick.planning_failed}")
+            self._complaints.say(f"{self._name}no plan: {tick.planning_failed}")
         if tick.recovery is not None:
             rospy.logwarn("%srecovery %d of %d: %s", self._name, tick.recovery.index + 1,
                           tick.recovery.total, tick.recovery.name)

@@ -18,6 +18,7 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.trust import ScanTrust
 from quad_nav.geometry import Pose3D
+from quad_nav.ros.complaints import Complaints
 from quad_nav.ros.convert import ScanMessage, scan_from_message
 from quad_nav.ros.names import Names, own_node
 from quad_nav.ros.transforms import Transforms, TransformUnavailable
@@ -35,6 +36,7 @@ class Sensor:
         self.targets: List[Tuple[LayeredCostmap, ObstacleLayer, str, str]] = []
         self.waiting: Deque = deque(maxlen=QUEUE_LENGTH)
         self._trust: Optional[ScanTrust] = None
+        self._complaints = Complaints()
         self._lock = threading.Lock()
         self.subscriber = rospy.Subscriber(
             topic, MESSAGE_TYPES[data_type], self._store, queue_size=QUEUE_LENGTH)
@@ -84,7 +86,7 @@ class Sensor:
         why_not = self._trust.why_not(scan_from_message(message), global_from_sensor,
                                       rospy.get_time())
         if why_not:
-            rospy.logwarn_throttle(5.0, "%s: a scan is not believed: %s", self.topic, why_not)
+            self._complaints.say(f"{self.topic}: a scan is not believed: {why_not}")
         return bool(why_not)
 
     def _drop(self, message) -> None:

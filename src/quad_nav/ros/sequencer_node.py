@@ -47,7 +47,7 @@ def watch(mission: Mission, exit_when_done: bool, result: Path) -> int:
             if exit_when_done:
                 return status
     if status is None:
-        status = report(mission.summary("stopped before all goals were flown"), result)
+        status = report(mission.summary(mission.why_stopped()), result)
     return status
 
 

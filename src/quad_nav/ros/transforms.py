@@ -34,10 +34,6 @@ class Transforms:
         """
         return self._lookup(to_frame, from_frame, stamp_s)[0]
 
-    def forget(self) -> None:
-        """For a clock that has jumped back: what was heard lies in its future."""
-        self._buffer.clear()
-
     def locate(self, to_frame: str, base_frame: str, now_s: float,
                tolerance_s: float) -> Optional[Pose3D]:
         """The robot's latest pose, None when unknown or older than the tolerance."""

@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+"""Senses and commands that go wrong in flight: hover while blind, go on, touch nothing."""
+import math
+import os
+import time
+
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticStatus
+from flight_case import FlightCase, Latest, goal_pose
+from geometry_msgs.msg import Twist
+from senses import Senses
+
+BLINDING = ["no scans", "frozen, new stamps", "frozen, old stamps", "half a second late", "NaN",
+            "zeros", "+inf", "half the beams", "no tf", "old tf", "no odometry"]
+CONTROL_PERIOD_S, BLIND_S = 0.1, 0.5
+TRANSPORT_S = 0.3  # of what is sent and what is heard, on a machine that is busy with other things
+LASTS_S = 3.0
+PLACES = [(1.0, 8.0), (1.0, 2.0)]
+REPORT = os.environ.get("QUAD_FAULTS_REPORT", "")  # where bench/faults.py wants the figures
+
+
+class Faults(FlightCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.senses = Senses()
+        cls.contacts = Latest("/simulation/contacts", DiagnosticStatus)
+        cls.moving_s = 0.0
+        cls.subscriber = rospy.Subscriber("/cmd_vel0", Twist, cls.heed)
+        cls.start()
+        cls.place = 0
+
+    @classmethod
+    def heed(cls, command):
+        """When quadcopter 0 was last told to move."""
+        if command.linear.x or command.linear.y or command.angular.z:
+            cls.moving_s = rospy.get_time()
+
+    def tearDown(self):
+        self.senses.fault = ""
+        self.assertEqual(self.contacts.count, 0, self.contacts.message)
+
+    def fly(self, when="at first"):
+        """Robot 0 under way between its two places."""
+        def flies():
+            x, y = PLACES[self.place]
+            if self.distance(0, x, y) < 1.5:
+                type(self).place = 1 - self.place
+                x, y = PLACES[self.place]
+            now = time.monotonic()
+            if now - self.sent > 2.0:
+                self.sent = now
+                self.goal_topics[0].publish(goal_pose(x, y))
+            return self.speed(0) > 0.2
+        self.sent = 0.0
+        self.wait(flies, f"robot 0 under way {when}")
+
+    def test_blind_it_hovers_and_goes_on(self):
+        for fault in BLINDING:
+            with self.subTest(fault):
+                self.fly(f"before {fault}")
+                begin_s = rospy.get_time()
+                self.senses.fault = fault
+                self.simulated_seconds(LASTS_S)
+                hover_after_s = self.moving_s - begin_s
+                self.senses.fault = ""
+                end_s = rospy.get_time()
+                self.fly(f"after {fault}")
+                self.report(fault, hover_after_s, rospy.get_time() - end_s)
+                self.assertLess(hover_after_s, CONTROL_PERIOD_S + BLIND_S + TRANSPORT_S)
+
+    def test_it_flies_on_when_odometry_jumps(self):
+        self.fly()
+        self.senses.fault = "odometry jumps"
+        self.simulated_seconds(LASTS_S)
+        self.senses.fault = ""
+        self.fly("after the jump back")
+
+    def test_it_goes_on_when_the_clock_goes_back(self):
+        self.fly()
+        before_s = rospy.get_time()
+        self.senses.back_s += 5.0
+        self.wait(lambda: rospy.get_time() < before_s - 4.0, "a clock that has gone back")
+        self.fly("after the clock went back")
+
+    def test_commands_at_a_kilohertz_steer_nobody(self):
+        """Another node's are not heeded, whether they are numbers or not."""
+        self.fly()
+        begin_s = rospy.get_time()
+        flood = [Twist(), Twist()]
+        flood[0].linear.x, flood[1].linear.x = -1.0, math.nan
+        publisher = rospy.Publisher("/cmd_vel0", Twist, queue_size=1000)
+        self.wait(lambda: publisher.get_num_connections() > 0, "the simulator listening")
+        backwards = 0
+        while rospy.get_time() < begin_s + LASTS_S:
+            for command in flood:
+                publisher.publish(command)
+            time.sleep(0.002)
+            backwards += self.odometry[0].message.twist.twist.linear.x < -0.15
+        publisher.unregister()
+        self.assertEqual(backwards, 0)
+
+    def test_goals_at_a_kilohertz(self):
+        """It flies to the last of them."""
+        self.fly()
+        begin_s = rospy.get_time()
+        while rospy.get_time() < begin_s + LASTS_S:
+            self.goal_topics[0].publish(goal_pose(*PLACES[self.place]))
+            time.sleep(0.001)
+        self.wait(lambda: self.speed(0) > 0.1, "robot 0 under way after the flood")
+
+    def report(self, fault, hover_after_s, on_after_s):
+        print(f"fault: {fault}: last moving command after {hover_after_s:.2f} s, "
+              f"under way again after {on_after_s:.2f} s", flush=True)
+        if REPORT:
+            with open(REPORT, "a", encoding="utf-8") as file:
+                file.write(f"{fault}\t{hover_after_s:.3f}\t{on_after_s:.3f}\n")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "faults", Faults)
