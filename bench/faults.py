@@ -29,7 +29,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Callable, Dict, List, Optional, Set, Tuple
+from typing import Callable, Dict, Iterator, List, Optional, Set, Tuple
 from xmlrpc.client import ServerProxy
 
 import tabulate
@@ -41,7 +41,7 @@ SCENE = ROOT / "scenes" / "arena.yaml"
 RATE = 3.0
 MISSION_S = 18.0
 PATIENCE_S = 150.0  # wall time
-STOPPED_S, CUT_S = 5.0, 10.0  # wall time
+STOPPED_S, CUT_S, FULL_S = 5.0, 10.0, 4.0  # wall time
 HOVERS_MPS, FLIES_MPS = 0.05, 0.12
 
 
@@ -65,6 +65,7 @@ KINDS = {kind.name: kind for kind in (
     Kind("simulator", "/simulator", ends_flight=True),
     Kind("roscore", "", ends_flight=True),
     Kind("link", "", flyers=(1,), fleet=True),
+    Kind("disk", ""),
 )}
 
 
@@ -117,7 +118,7 @@ class Launch:
 
     def __init__(self, arguments: List[str], folder: Path, port: Optional[int] = None,
                  prefix: Tuple[str, ...] = (), ip: str = "localhost"):
-        self.port = port or free_port()
+        self.folder, self.port = folder, port or free_port()
         core = ["-p", str(self.port)] if port is None else []
         master = f"http://{'localhost' if ip == 'localhost' else HERE_IP}:{self.port}"
         self.log = (folder / f"launch-{time.monotonic():.3f}.log").open("w")
@@ -161,7 +162,8 @@ def arguments_of(kind: Kind, result: Path, *more: str) -> List[str]:
 def fly(kind: Kind, at_s: float, folder: Path) -> Outcome:
     """One flight with its fault, and a second one where that ends the first."""
     outcome, result = Outcome(at_s), folder / "result.json"
-    more = ["hosts:=2", "only_host:=0"] if kind.name == "link" else []
+    more = {"link": ["hosts:=2", "only_host:=0"],
+            "disk": [f"journal:={folder}/disk/journal"]}.get(kind.name, [])
     launch = Launch(arguments_of(kind, result, *more), folder,
                     ip=HERE_IP if kind.name == "link" else "localhost")
     other = None
@@ -191,6 +193,8 @@ def inject(kind: Kind, launch: Launch, watch: Watch, outcome: Outcome) -> None:
     done, fault_s = watch.done, watch.now_s
     if kind.name == "link":
         Link.cut(CUT_S)
+    elif kind.name == "disk":
+        fill(launch.folder / "disk", watch, outcome)
     else:
         pid = launch.pid_of(kind.node)
         os.kill(pid, kind.number)
@@ -252,6 +256,32 @@ def judge(flown: dict, watch: Watch, kind: Kind, outcome: Outcome) -> None:
         outcome.problems.append(f"a goal has ended twice: {ended}")
 
 
+@contextlib.contextmanager
+def small_disk(folder: Path) -> Iterator[None]:
+    """A file system of 64 KiB."""
+    folder.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)], check=True)
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def fill(disk: Path, watch: Watch, outcome: Outcome) -> None:
+    """Leaves no room, for a while; what the journal has then is complete."""
+    with (disk / "other").open("wb", buffering=0) as other, contextlib.suppress(OSError):
+        while True:
+            other.write(bytes(4096))
+    time.sleep(FULL_S)
+    (disk / "other").unlink()
+    time.sleep(FULL_S)
+    lines = (disk / "journal").read_text().splitlines()
+    legs = sum(json.loads(line).get("leg") is not None for line in lines)
+    ended = sum(event["event"] == "ended" for event in watch.events)
+    if legs != ended:
+        outcome.problems.append(f"{legs} goals in the journal, {ended} flown")
+
+
 def read(result: Path, outcome: Outcome) -> dict:
     if result.exists():
         return json.loads(result.read_text())
@@ -283,7 +313,8 @@ def flown_apart(kind: Kind, at_s: float, pipe) -> None:
     """In a process of its own, because a process has one ROS node."""
     folder = Path(tempfile.mkdtemp(prefix="quad_faults_"))
     try:
-        with Link() if kind.name == "link" else contextlib.nullcontext():
+        with {"link": Link, "disk": lambda: small_disk(folder / "disk")}.get(
+                kind.name, contextlib.nullcontext)():
             outcome = fly(kind, at_s, folder)
     except Exception as error:
         outcome = Outcome(at_s, problems=[repr(error)])
@@ -327,8 +358,8 @@ def main() -> int:
     draw, rows, failed = random.Random(given.seed), [], False
     for name in given.kinds:
         moments_s = [draw.uniform(0.0, MISSION_S) for _ in range(given.each)]
-        if name == "link" and why_no_links():
-            print(f"link: NOT RUN: {why_no_links()}", flush=True)
+        if name in ("link", "disk") and why_no_links():
+            print(f"{name}: NOT RUN: {why_no_links()}", flush=True)
             failed = True
             continue
         outcomes = []

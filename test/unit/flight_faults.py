@@ -8,11 +8,8 @@ from typing import Callable, Optional, Tuple
 import numpy as np
 
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.flight import Flight, FlightRobot
 from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightSetup
 from quad_nav.tick import Located
 
 Seen = Tuple[Scan, Pose3D]
@@ -159,7 +156,3 @@ class ShiftedPose(SenseFault):
     def located_as(self, now_s, state, peers):
         return self._navigate(
             now_s, replace(state, map_from_base=self._shifted(state.map_from_base)), peers)
-
-
-def flown_with(setup: FlightSetup, fault: SenseFault) -> MissionSummary:
-    return fly(setup, [fault])

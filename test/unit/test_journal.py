@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import errno
 import os
+import resource
 
 import pytest
 
@@ -105,6 +106,21 @@ def test_a_full_disk_is_told_once_and_the_journal_catches_up(tmp_path, monkeypat
     assert later.flush() == "" and later.keep({"goal": 4}) == ""
     disk.room = 0
     assert "cannot be written" in later.keep({"goal": 5})  # the next time it is told again
+
+
+def test_a_file_that_may_grow_no_more_keeps_whole_lines(tmp_path):
+    """The operating system's own refusal, in the middle of a line."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    kept = Journal(tmp_path / "j")
+    kept.begin({"head": 1})
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
+    try:
+        assert "cannot be written: File too large" in kept.keep({"goal": 2})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert lines(tmp_path / "j") == [b'{"head": 1}']
+    assert kept.flush().endswith("nothing is missing")
+    assert lines(tmp_path / "j") == [b'{"head": 1}', b'{"goal": 2}']
 
 
 def test_a_folder_that_cannot_be_made_is_a_full_disk(tmp_path):

@@ -1,0 +1,80 @@
+"""Senses that fail in flight: the quadcopter hovers while it is blind, and then flies on."""
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flight_faults import (
+    FrozenScans,
+    LateScans,
+    NoPose,
+    NoScans,
+    OldScans,
+    ScansOf,
+    SenseFault,
+    ShiftedPose,
+)
+
+from quad_nav.offline.run import fly
+from quad_nav.offline.setup import FlightOptions, read_setup
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.simulation import SimulationParams
+
+ROOT = Path(__file__).resolve().parents[2]
+FEW_BEAMS = LidarParams(step_size_rad=2 * np.pi / 128)
+BEGIN_S, END_S = 2.0, 4.0
+CONTROL_PERIOD_S, BLIND_S = 0.1, 0.5
+
+
+def flown_with(fault, folder, config="default", time_limit_s=END_S + 0.5):
+    """One quadcopter that has three metres to fly, 10 s, and as long as it stands."""
+    (folder / "quad0_goals.json").write_text(json.dumps({"goals": [[1.0, 4.5]]}))
+    return fly(read_setup(FlightOptions(
+        ROOT / "scenes" / "arena.yaml", folder, config, time_limit_s=time_limit_s, scans_per_s=10.0,
+        simulation=SimulationParams(FEW_BEAMS))), [fault])
+
+
+def test_without_a_fault_it_flies_all_the_time(tmp_path):
+    harmless = SenseFault(BEGIN_S, END_S)
+    flown_with(harmless, tmp_path)
+    assert harmless.hover_after_s > END_S - BEGIN_S - 2 * CONTROL_PERIOD_S
+
+
+@pytest.mark.parametrize("fault", [
+    NoScans(BEGIN_S, END_S), FrozenScans(BEGIN_S, END_S), OldScans(BEGIN_S, END_S),
+    LateScans(BEGIN_S, END_S), ScansOf(BEGIN_S, END_S, math.nan), ScansOf(BEGIN_S, END_S, 0.0),
+    ScansOf(BEGIN_S, END_S, math.inf), ScansOf(BEGIN_S, END_S, math.nan, first_half=True),
+    ScansOf(BEGIN_S, END_S, math.inf, first_half=True), NoPose(BEGIN_S, END_S),
+], ids=["none", "frozen", "old", "late", "NaN", "zeros", "inf", "half NaN", "half inf", "no pose"])
+def test_blind_it_hovers_and_then_goes_on(fault, tmp_path):
+    summary = flown_with(fault, tmp_path)
+    assert fault.hover_after_s <= CONTROL_PERIOD_S + BLIND_S
+    assert fault.away_s is not None and fault.away_s <= 2 * CONTROL_PERIOD_S + 0.1
+    assert summary.contacts == () and summary.robots[0].recoveries == 0
+
+
+def test_a_mission_with_a_fault_in_it_succeeds_at_the_first_attempt(tmp_path):
+    summary = flown_with(FrozenScans(BEGIN_S, END_S), tmp_path, time_limit_s=40.0)
+    assert summary.success and summary.robots[0].legs[0].attempts == 1, summary
+
+
+def test_a_place_that_is_half_a_metre_off_is_flown_by_its_lidar(tmp_path):
+    summary = flown_with(ShiftedPose(BEGIN_S, END_S), tmp_path, time_limit_s=40.0)
+    assert summary.success, summary
+
+
+def test_the_original_flies_on_by_a_frozen_scan(tmp_path):
+    """What the doubt is for: without it the costmap is cleared by what is not there."""
+    config = tmp_path / "config"
+    config.mkdir()
+    for file in (ROOT / "config" / "default").iterdir():
+        text = file.read_text()
+        if file.name == "move_base_params.yaml":
+            text += "  doubt_scans: false\n"
+        (config / file.name).write_text(text)
+    fault = FrozenScans(BEGIN_S, END_S)
+    flown_with(fault, tmp_path, str(config))
+    assert fault.hover_after_s > CONTROL_PERIOD_S + BLIND_S
