@@ -9,6 +9,7 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
 from flight_case import FlightCase, Latest, goal_pose
 from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
 from senses import Senses
 
 BLINDING = ["no scans", "frozen, new stamps", "frozen, old stamps", "half a second late", "NaN",
@@ -25,6 +26,7 @@ class Faults(FlightCase):
     def setUpClass(cls):
         super().setUpClass()
         cls.senses = Senses()
+        cls.odometry = [Latest(f"/true/odom{i}", Odometry) for i in (0, 1)]
         cls.contacts = Latest("/simulation/contacts", DiagnosticStatus)
         cls.moving_s = 0.0
         cls.subscriber = rospy.Subscriber("/cmd_vel0", Twist, cls.heed)

@@ -1,0 +1,27 @@
+"""One node at a time steers a quadcopter."""
+from quad_nav.ros.command_lease import CommandLease
+
+NAVIGATOR, ROGUE = "/move_base0", "/rogue"
+
+
+def test_the_first_keeps_the_quadcopter_while_its_commands_count():
+    lease = CommandLease(0.6)
+    assert lease.holder(0, NAVIGATOR, 1.0) == NAVIGATOR
+    assert lease.holder(0, ROGUE, 1.5) == NAVIGATOR
+    assert lease.holder(0, NAVIGATOR, 1.55) == NAVIGATOR
+    assert lease.holder(0, ROGUE, 2.14) == NAVIGATOR
+    assert lease.holder(0, ROGUE, 2.15) == ROGUE
+    assert lease.holder(0, NAVIGATOR, 2.2) == ROGUE
+
+
+def test_each_quadcopter_has_its_own():
+    lease = CommandLease(0.6)
+    lease.holder(0, NAVIGATOR, 1.0)
+    assert lease.holder(1, ROGUE, 1.0) == ROGUE
+
+
+def test_after_a_reset_anybody_may_be_first():
+    lease = CommandLease(0.6)
+    lease.holder(0, NAVIGATOR, 1.0)
+    lease.clear()
+    assert lease.holder(0, ROGUE, 1.1) == ROGUE
