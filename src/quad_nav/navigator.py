@@ -172,7 +172,8 @@ class Navigator:
             self._cycle.follow(self.params.controller_frequency_hz, now_s)
             self._replan.follow(self.params.planner_frequency_hz, now_s)
             self._plan(tick, located.in_global)
-            if self._recovering.is_running and not self._updates.silence(now_s):
+            if self._recovering.is_running and not (
+                    self._minds_blindness and self._updates.silence(now_s)):
                 self._step_recovery(tick, located)
             if self._cycle.take(now_s):
                 tick.cycle = True
@@ -294,7 +295,13 @@ class Navigator:
     def _stand_blind(self, tick: Tick, reason: str) -> None:
         tick.warnings.append("stopped: " + reason)
         tick.command = Twist2D()
-        self._excuse(tick.now_s)
+        if self._minds_blindness:
+            self._excuse(tick.now_s)
+
+    @property
+    def _minds_blindness(self) -> bool:
+        """The original goes on recovering while it is blind, and is impatient afterwards."""
+        return self.mends.sensor_timeout_s > 0.0
 
     def _follow(self, tick: Tick, located: Located, velocity: Twist2D) -> None:
         assert located.in_local is not None and located.in_global is not None

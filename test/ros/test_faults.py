@@ -104,7 +104,7 @@ class Faults(FlightCase):
         self.assertEqual(backwards, 0)
 
     def test_goals_at_a_kilohertz(self):
-        """It flies to the last of them."""
+        """The newest counts, and it flies on."""
         self.fly()
         begin_s = rospy.get_time()
         while rospy.get_time() < begin_s + LASTS_S:

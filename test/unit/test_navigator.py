@@ -290,6 +290,31 @@ def test_silent_sensor_stops_the_robot_and_says_which():
     assert FORWARD in {tick.command for tick in flight.until(2.0)}
 
 
+@pytest.mark.parametrize("mends, turns", [(Mends(keep_off_peers=False), False), (ORIGINAL, True)])
+def test_a_rotation_waits_while_the_robot_is_blind(mends, turns):
+    recovery = FakeRecovery(steps=200)
+    flight = Flight([NamedRecovery("rotate", recovery)], mends, planner_patience_s=0.5)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(2.0)
+    assert recovery.started == 1
+    left = recovery.left
+    flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
+    flight.until(4.0)
+    assert (recovery.left < left) is turns
+
+
+def test_standing_blind_is_no_lack_of_progress():
+    flight = Flight(mends=Mends(progress_timeout_s=1.0, keep_off_peers=False))
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
+    flight.until(5.0)
+    flight.local_costmap.stale = []
+    after = flight.until(5.5)
+    assert [tick.warnings for tick in after if tick.warnings] == []
+    assert any("no progress" in line for tick in flight.until(7.0) for line in tick.warnings)
+
+
 def test_unknown_pose_stops_the_robot():
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)
