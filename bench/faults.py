@@ -190,13 +190,13 @@ def fly(kind: Kind, at_s: float, folder: Path) -> Outcome:
 
 
 def inject(kind: Kind, launch: Launch, watch: Watch, outcome: Outcome) -> None:
+    pid = launch.pid_of(kind.node) if kind.name not in ("link", "disk") else 0
     done, fault_s = watch.done, watch.now_s
     if kind.name == "link":
         Link.cut(CUT_S)
     elif kind.name == "disk":
         fill(launch.folder / "disk", watch, outcome)
     else:
-        pid = launch.pid_of(kind.node)
         os.kill(pid, kind.number)
         if kind.number == signal.SIGSTOP:
             time.sleep(STOPPED_S)
