@@ -64,7 +64,7 @@ def test_the_goal_in_flight_is_sent_again_uncounted_and_none_that_was_reached():
     later = mission.taken_over()
     (sent,) = later.fly(120.0, Pose2D(2.9, 1.0))
     assert isinstance(sent, SendGoal)
-    assert (sent.index, sent.attempt, sent.why) == (1, 1, "the sequencer was started again")
+    assert (sent.index, sent.attempt, sent.why) == (1, 1, "the sequencer or its clock began anew")
     assert sent.pose == mission.sequencer.flight.pose
     assert later.fly(121.0, Pose2D(2.9, 1.1)) == []
     ended, after = later.fly(125.0, Pose2D(3.0, 3.9))

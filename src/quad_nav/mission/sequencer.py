@@ -191,7 +191,7 @@ class Sequencer:
     def _why_lost(self, flight: Flight, now_s: float, reports: Sequence[NavigatorReport]) -> str:
         """Why the navigator is without our goal through no fault of the goal's."""
         if self._is_taken_over:
-            return "the sequencer was started again"
+            return "the sequencer or its clock began anew"
         ended = any(report.verdict in (Verdict.SUCCEEDED, Verdict.ABORTED) for report in reports)
         if flight.replaced and ended:
             return "the navigator is through with another node's goal"
