@@ -90,6 +90,13 @@ class World:
             rows += (*position, *quaternion, *linear, *angular)
         return BodyState(np.array(rows).reshape(-1, 13))
 
+    def place(self, state: BodyState) -> None:
+        """Put all quadcopters where something else has moved them."""
+        client = self._client
+        for robot, row in zip(self._robots, state.rows.tolist()):
+            pybullet.resetBasePositionAndOrientation(robot, row[0:3], row[3:7], client)
+            pybullet.resetBaseVelocity(robot, row[7:10], row[10:13], client)
+
     def step(self, positions_m: np.ndarray, forces_n: np.ndarray, torques_nm: np.ndarray) -> None:
         """One time step under forces at the bodies' centres and torques, float64[n, 3] in map."""
         client, in_map = self._client, pybullet.WORLD_FRAME

@@ -33,6 +33,7 @@ import numpy as np
 from quad_nav.errors import InputError
 from quad_nav.geometry import Twist2D
 from quad_nav.kernels import flight_law
+from quad_nav.kernels.rigid_body import step_freely
 from quad_nav.sim.scene import BODY_RADIUS_M
 
 GRAVITY_MPS2 = 9.81
@@ -145,3 +146,19 @@ class FlightLaw:
         flight_law.fly(state.rows, commands, altitude_m, GRAVITY_MPS2, self._airframe, self._law,
                        forces, torques)
         return forces, torques
+
+
+class FreeFlight:
+    """Bodies that nothing touches, as the physics engine moves them, without it."""
+
+    def __init__(self, airframe: Airframe, step_s: float):
+        self._mass_kg = airframe.mass_kg
+        self._inertia_kgm2 = np.array(airframe.inertia_kgm2)
+        self._step_s = step_s
+
+    def step(self, state: BodyState, forces_n: np.ndarray, torques_nm: np.ndarray) -> BodyState:
+        """After one time step under forces at the centres and torques, float64[n, 3] in ``map``."""
+        stepped = np.empty_like(state.rows)
+        step_freely(state.rows, forces_n, torques_nm, self._mass_kg, self._inertia_kgm2,
+                    GRAVITY_MPS2, self._step_s, stepped)
+        return BodyState(stepped)

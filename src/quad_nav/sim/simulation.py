@@ -21,9 +21,11 @@ from quad_nav.sim.flight import (
     BodyState,
     FlightLaw,
     FlightParams,
+    FreeFlight,
     limit_command,
 )
 from quad_nav.sim.lidar import LidarParams, make_scan
+from quad_nav.sim.proximity import Proximity
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 STEPS_PER_S = 240
@@ -101,6 +103,9 @@ class Simulation:
         self._starts = start_poses(scene, n_robots, params.jitter_m, seed,
                                    params.airframe.radius_m)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
+        self._free_flight = FreeFlight(params.airframe, STEP_S)
+        # Who looks into the engine, by its window or its rays, has to find the bodies there.
+        self._engine_is_seen = gui or params.lidar_caster == "bullet"
         self._caster: Caster = (
             KernelCaster(params.lidar, scene, n_robots, params.airframe.radius_m)
             if params.lidar_caster == "kernel"
@@ -115,6 +120,8 @@ class Simulation:
         self._contact_log = ContactLog()
         self._noise = [np.random.default_rng([self.seed, 1, robot]) for robot in range(n)]
         self._state = self._world.state()
+        self._proximity = Proximity(self.scene, n, self.params.airframe.radius_m)
+        self._flies_free = False
 
     @property
     def n_robots(self) -> int:
@@ -157,8 +164,15 @@ class Simulation:
             self._hover()
         forces, torques = self._law.thrust_and_torque(self._state, self._commands,
                                                       self.scene.altitude_m)
-        self._world.step(self._state.positions_m, forces, torques)
         self.step_count += 1
+        if not self._engine_is_seen and not self._proximity.may_touch(self._state):
+            self._state = self._free_flight.step(self._state, forces, torques)
+            self._flies_free = True
+            return []
+        if self._flies_free:
+            self._world.place(self._state)
+            self._flies_free = False
+        self._world.step(self._state.positions_m, forces, torques)
         self._state = self._world.state()
         return self._contact_log.update(self.now_s, self._world.touches())
 

@@ -1,0 +1,90 @@
+"""Loops over quadcopters that touch nothing: their motion, and whether they may touch soon."""
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from quad_nav.kernels.flight_law import rotation_from_quaternion
+
+NOBODY = -1
+A_PAIR = -2
+
+
+@njit(cache=True, nogil=True)
+def step_freely(rows, forces, torques, mass, inertia, gravity, step_s, stepped):
+    """One time step of free bodies, as the physics engine makes it.
+
+    rows and stepped: float64[n, 13] as in ``BodyState``; forces and torques: float64[n, 3]
+    in its frame; inertia: three moments about the bodies' axes. Velocities go first
+    (Newton, and Euler's equations with the gyroscopic term), then positions with the new
+    velocities; a body turns about its angular velocity (Grassia, Practical
+    Parameterization of Rotations Using the Exponential Map, 1998).
+    """
+    r = np.empty((3, 3))
+    omega, torque = np.empty(3), np.empty(3)
+    for k in range(rows.shape[0]):
+        row, out = rows[k], stepped[k]
+        for axis in range(3):
+            acceleration = forces[k, axis] / mass - (gravity if axis == 2 else 0.0)
+            out[7 + axis] = row[7 + axis] + step_s * acceleration
+            out[axis] = row[axis] + step_s * out[7 + axis]
+        rotation_from_quaternion(row[3:7], r)
+        for axis in range(3):
+            omega[axis] = r[0, axis] * row[10] + r[1, axis] * row[11] + r[2, axis] * row[12]
+            torque[axis] = (r[0, axis] * torques[k, 0] + r[1, axis] * torques[k, 1]
+                            + r[2, axis] * torques[k, 2])
+        spin_up_x = (torque[0] - (inertia[2] - inertia[1]) * omega[1] * omega[2]) / inertia[0]
+        spin_up_y = (torque[1] - (inertia[0] - inertia[2]) * omega[2] * omega[0]) / inertia[1]
+        spin_up_z = (torque[2] - (inertia[1] - inertia[0]) * omega[0] * omega[1]) / inertia[2]
+        for axis in range(3):
+            out[10 + axis] = row[10 + axis] + step_s * (
+                r[axis, 0] * spin_up_x + r[axis, 1] * spin_up_y + r[axis, 2] * spin_up_z)
+        _turn(row[3:7], out[10:13], step_s, out[3:7])
+
+
+@njit(cache=True, nogil=True)
+def _turn(quaternion, omega, step_s, turned):
+    """``quaternion`` turned for a time at an angular velocity given in the outer frame."""
+    rate = math.sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2])
+    half = 0.5 * rate * step_s
+    # sin(x) / x is 1 - x^2 / 6 to the last digit at such rates.
+    scale = math.sin(half) / rate if rate > 1e-3 else 0.5 * step_s * (1.0 - half * half / 6.0)
+    ax, ay, az, aw = scale * omega[0], scale * omega[1], scale * omega[2], math.cos(half)
+    bx, by, bz, bw = quaternion
+    turned[0] = aw * bx + ax * bw + ay * bz - az * by
+    turned[1] = aw * by - ax * bz + ay * bw + az * bx
+    turned[2] = aw * bz + ax * by - ay * bx + az * bw
+    turned[3] = aw * bw - ax * bx - ay * by - az * bz
+    turned /= math.sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2]
+                        + turned[3] * turned[3])
+
+
+@njit(cache=True, nogil=True)
+def find_near(rows, mount_m, pair_m, known_m, rooms_m, centres_m):
+    """A quadcopter that may touch something, ``A_PAIR`` of them, or else ``NOBODY``.
+
+    rows: float64[n, 13] as in ``BodyState``. centres_m, float64[n, 3], is filled: points
+    ``mount_m`` above the bodies' origins along their own axes. Two with centres nearer
+    than ``pair_m`` count as a pair. Who is further than rooms_m, float64[n], from its
+    known_m, float64[n, 3], may be near to something else.
+    """
+    for k in range(rows.shape[0]):
+        x, y, z, w = rows[k, 3:7]
+        centres_m[k, 0] = rows[k, 0] + mount_m * 2 * (x * z + w * y)
+        centres_m[k, 1] = rows[k, 1] + mount_m * 2 * (y * z - w * x)
+        centres_m[k, 2] = rows[k, 2] + mount_m * (1 - 2 * (x * x + y * y))
+        if _square_m2(centres_m[k], known_m[k]) >= rooms_m[k] * rooms_m[k]:
+            return k
+    for k in range(rows.shape[0]):
+        for other in range(k):
+            if _square_m2(centres_m[k], centres_m[other]) < pair_m * pair_m:
+                return A_PAIR
+    return NOBODY
+
+
+@njit(cache=True, nogil=True)
+def _square_m2(a, b):
+    dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return dx * dx + dy * dy + dz * dz
