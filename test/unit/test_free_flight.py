@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.kernels.rigid_body import step_freely
 from quad_nav.sim.body import World
-from quad_nav.sim.flight import Airframe, BodyState, FreeFlight
-from quad_nav.sim.proximity import Proximity
+from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState, FlightLaw, FlightParams
+from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.scene import Cylinder, Scene, Walls
 from quad_nav.sim.simulation import STEP_S, Simulation, SimulationParams
 
@@ -16,6 +17,13 @@ SKY = Scene("sky", 40.0, 40.0, 20.0, Walls(), (), (Pose2D(10.0, 20.0, 0.3), Pose
 ROOM = Scene("room", 8.0, 8.0, 1.0, Walls(), (Cylinder("post", 4.0, 4.0, 0.2, 2.0),),
              (Pose2D(1.5, 2.0), Pose2D(1.5, 6.0)))
 ENGINE = SimulationParams(lidar_caster="bullet")
+
+
+def free_step(bodies, forces, torques, airframe, step_s):
+    rows = bodies.rows.copy()
+    step_freely(rows, forces, torques, FlightLaw(airframe, FlightParams()).airframe, GRAVITY_MPS2,
+                step_s)
+    return BodyState(rows)
 
 
 def random_commands(seed, count, speed_mps):
@@ -26,14 +34,13 @@ def random_commands(seed, count, speed_mps):
 
 def test_a_free_step_is_the_engines():
     world = World(SKY, SKY.starts, Airframe(), STEP_S)
-    flight = FreeFlight(Airframe(), STEP_S)
     random = np.random.default_rng(1)
     for _ in range(500):
         forces = random.normal(0.0, 5.0, (2, 3)) + (0.0, 0.0, 9.81)
         torques = random.normal(0.0, 0.5, (2, 3))
         before = world.state()
         world.step(before.positions_m, forces, torques)
-        free, engine = flight.step(before, forces, torques), world.state()
+        free, engine = free_step(before, forces, torques, Airframe(), STEP_S), world.state()
         np.testing.assert_allclose(np.delete(free.rows, range(3, 7), axis=1),
                                    np.delete(engine.rows, range(3, 7), axis=1),
                                    rtol=1e-12, atol=1e-13)
@@ -43,9 +50,9 @@ def test_a_free_step_is_the_engines():
 
 
 def test_falling_for_a_step():
-    falling = FreeFlight(Airframe(mass_kg=2.0), 0.5).step(
+    falling = free_step(
         BodyState(np.array([[0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0, 1.0] + 5 * [0.0]])),
-        np.array([[4.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.02]]))
+        np.array([[4.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.02]]), Airframe(mass_kg=2.0), 0.5)
     # v = (1 + 0.5 4 / 2, 0, -0.5 9.81), x = 0.5 v; the yaw rate is 0.5 0.02 / 0.02.
     half = 0.5 * 0.5 * 0.5
     np.testing.assert_allclose(
@@ -71,13 +78,15 @@ def test_the_same_flight_with_and_without_the_engine():
 def test_nothing_touches_that_was_not_near(seed):
     """Two quadcopters bump about in a small room; each touch has been foreseen."""
     simulation = Simulation(ROOM, 2, replace(ENGINE, jitter_m=0.3), seed)
-    proximity = Proximity(ROOM, 2, simulation.params.airframe.radius_m)
+    free = FreeFlight(ROOM, 2, simulation.params.airframe.radius_m,
+                      FlightLaw(Airframe(), FlightParams()), STEP_S)
+    hover = np.zeros((2, 3))
     foreseen, free_steps = [], 0
     for one, other in zip(random_commands([seed, 0], 30, 1.5), random_commands([seed, 1], 30, 1.5)):
         simulation.set_command(0, one)
         simulation.set_command(1, other)
         for _ in range(120):
-            near = proximity.may_touch(simulation.body_state)
+            near = free.advance(simulation.body_state, hover, 1)[1] == 0
             free_steps += not near
             foreseen += [near for _ in simulation.step()]
     assert foreseen and all(foreseen)

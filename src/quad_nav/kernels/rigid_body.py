@@ -1,4 +1,4 @@
-"""Loops over quadcopters that touch nothing: their motion, and whether they may touch soon."""
+"""Loops over quadcopters that touch nothing: how they move, until one may touch something."""
 from __future__ import annotations
 
 import math
@@ -6,30 +6,49 @@ import math
 import numpy as np
 from numba import njit
 
-from quad_nav.kernels.flight_law import rotation_from_quaternion
+from quad_nav.kernels.flight_law import fly, rotation_from_quaternion
 
 NOBODY = -1
 A_PAIR = -2
 
 
 @njit(cache=True, nogil=True)
-def step_freely(rows, forces, torques, mass, inertia, gravity, step_s, stepped):
-    """One time step of free bodies, as the physics engine makes it.
+def fly_freely(rows, commands, steps, step_s, altitude, gravity, airframe, law, mount_m, pair_m,
+               known_m, rooms_m, centres_m):
+    """Up to so many steps, in place, as long as nothing may be touched.
 
-    rows and stepped: float64[n, 13] as in ``BodyState``; forces and torques: float64[n, 3]
-    in its frame; inertia: three moments about the bodies' axes. Velocities go first
-    (Newton, and Euler's equations with the gyroscopic term), then positions with the new
-    velocities; a body turns about its angular velocity (Grassia, Practical
-    Parameterization of Rotations Using the Exponential Map, 1998).
+    The arguments are those of ``flight_law.fly``, ``step_freely`` and ``find_near``. Returns
+    the steps done and what ``find_near`` found before the next one.
     """
+    forces, torques = np.empty_like(commands), np.empty_like(commands)
+    for done in range(steps):
+        found = find_near(rows, mount_m, pair_m, known_m, rooms_m, centres_m)
+        if found != NOBODY:
+            return done, found
+        fly(rows, commands, altitude, gravity, airframe, law, forces, torques)
+        step_freely(rows, forces, torques, airframe, gravity, step_s)
+    return steps, NOBODY
+
+
+@njit(cache=True, nogil=True)
+def step_freely(rows, forces, torques, airframe, gravity, step_s):
+    """One time step of free bodies, in place, as the physics engine makes it.
+
+    rows: float64[n, 13] as in ``BodyState``; forces and torques: float64[n, 3] in its frame;
+    airframe: as in ``flight_law.fly``. Velocities go first (Newton, and Euler's equations
+    with the gyroscopic term), then positions with the new velocities; a body turns about its
+    angular velocity (Grassia, Practical Parameterization of Rotations Using the Exponential
+    Map, 1998).
+    """
+    mass, inertia = airframe[0], airframe[2:5]
     r = np.empty((3, 3))
     omega, torque = np.empty(3), np.empty(3)
     for k in range(rows.shape[0]):
-        row, out = rows[k], stepped[k]
+        row = rows[k]
         for axis in range(3):
             acceleration = forces[k, axis] / mass - (gravity if axis == 2 else 0.0)
-            out[7 + axis] = row[7 + axis] + step_s * acceleration
-            out[axis] = row[axis] + step_s * out[7 + axis]
+            row[7 + axis] += step_s * acceleration
+            row[axis] += step_s * row[7 + axis]
         rotation_from_quaternion(row[3:7], r)
         for axis in range(3):
             omega[axis] = r[0, axis] * row[10] + r[1, axis] * row[11] + r[2, axis] * row[12]
@@ -39,26 +58,26 @@ def step_freely(rows, forces, torques, mass, inertia, gravity, step_s, stepped):
         spin_up_y = (torque[1] - (inertia[0] - inertia[2]) * omega[2] * omega[0]) / inertia[1]
         spin_up_z = (torque[2] - (inertia[1] - inertia[0]) * omega[0] * omega[1]) / inertia[2]
         for axis in range(3):
-            out[10 + axis] = row[10 + axis] + step_s * (
+            row[10 + axis] += step_s * (
                 r[axis, 0] * spin_up_x + r[axis, 1] * spin_up_y + r[axis, 2] * spin_up_z)
-        _turn(row[3:7], out[10:13], step_s, out[3:7])
+        _turn(row[3:7], row[10:13], step_s)
 
 
 @njit(cache=True, nogil=True)
-def _turn(quaternion, omega, step_s, turned):
-    """``quaternion`` turned for a time at an angular velocity given in the outer frame."""
+def _turn(quaternion, omega, step_s):
+    """Turn a quaternion for a time at an angular velocity given in the outer frame."""
     rate = math.sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2])
     half = 0.5 * rate * step_s
     # sin(x) / x is 1 - x^2 / 6 to the last digit at such rates.
     scale = math.sin(half) / rate if rate > 1e-3 else 0.5 * step_s * (1.0 - half * half / 6.0)
     ax, ay, az, aw = scale * omega[0], scale * omega[1], scale * omega[2], math.cos(half)
     bx, by, bz, bw = quaternion
-    turned[0] = aw * bx + ax * bw + ay * bz - az * by
-    turned[1] = aw * by - ax * bz + ay * bw + az * bx
-    turned[2] = aw * bz + ax * by - ay * bx + az * bw
-    turned[3] = aw * bw - ax * bx - ay * by - az * bz
-    turned /= math.sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2]
-                        + turned[3] * turned[3])
+    quaternion[0] = aw * bx + ax * bw + ay * bz - az * by
+    quaternion[1] = aw * by - ax * bz + ay * bw + az * bx
+    quaternion[2] = aw * bz + ax * by - ay * bx + az * bw
+    quaternion[3] = aw * bw - ax * bx - ay * by - az * bz
+    quaternion /= math.sqrt(quaternion[0] * quaternion[0] + quaternion[1] * quaternion[1]
+                            + quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3])
 
 
 @njit(cache=True, nogil=True)

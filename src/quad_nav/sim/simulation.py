@@ -21,16 +21,17 @@ from quad_nav.sim.flight import (
     BodyState,
     FlightLaw,
     FlightParams,
-    FreeFlight,
     limit_command,
 )
+from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.lidar import LidarParams, make_scan
-from quad_nav.sim.proximity import Proximity
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 STEPS_PER_S = 240
 STEP_S = 1.0 / STEPS_PER_S
 LIDAR_CASTERS = ("kernel", "bullet")
+_STEPS_NEAR = 12
+"""Who is near to something mostly stays so for a while; asking less often is cheaper."""
 _START_GAP_M = 0.05
 _START_TRIES = 1000
 
@@ -103,7 +104,6 @@ class Simulation:
         self._starts = start_poses(scene, n_robots, params.jitter_m, seed,
                                    params.airframe.radius_m)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
-        self._free_flight = FreeFlight(params.airframe, STEP_S)
         # Who looks into the engine, by its window or its rays, has to find the bodies there.
         self._engine_is_seen = gui or params.lidar_caster == "bullet"
         self._caster: Caster = (
@@ -120,8 +120,10 @@ class Simulation:
         self._contact_log = ContactLog()
         self._noise = [np.random.default_rng([self.seed, 1, robot]) for robot in range(n)]
         self._state = self._world.state()
-        self._proximity = Proximity(self.scene, n, self.params.airframe.radius_m)
-        self._flies_free = False
+        self._free_flight = FreeFlight(self.scene, n, self.params.airframe.radius_m, self._law,
+                                       STEP_S)
+        self._engine_is_behind = False
+        self._engine_until_step = math.inf if self._engine_is_seen else 0
 
     @property
     def n_robots(self) -> int:
@@ -160,19 +162,37 @@ class Simulation:
 
     def step(self) -> List[Contact]:
         """Advance by ``STEP_S``; returns the contacts that begin."""
-        if self.step_count > self._next_hover_step:
-            self._hover()
+        return self.advance(1)
+
+    def advance(self, steps: int) -> List[Contact]:
+        """Advance by so many ``STEP_S``; returns the contacts that begin."""
+        end, contacts = self.step_count + steps, []
+        while self.step_count < end:
+            if self.step_count > self._next_hover_step:
+                self._hover()
+            if self.step_count < self._engine_until_step:
+                contacts += self._step_with_engine()
+            else:
+                self._fly_freely(int(min(end, self._next_hover_step + 1)))
+        return contacts
+
+    def _fly_freely(self, end: int) -> None:
+        """Up to a step, or until something may be touched."""
+        self._state, done = self._free_flight.advance(self._state, self._commands,
+                                                      end - self.step_count)
+        self._engine_is_behind |= done > 0
+        self.step_count += done
+        if self.step_count < end:
+            self._engine_until_step = self.step_count + _STEPS_NEAR
+
+    def _step_with_engine(self) -> List[Contact]:
+        if self._engine_is_behind:
+            self._world.place(self._state)
+            self._engine_is_behind = False
         forces, torques = self._law.thrust_and_torque(self._state, self._commands,
                                                       self.scene.altitude_m)
-        self.step_count += 1
-        if not self._engine_is_seen and not self._proximity.may_touch(self._state):
-            self._state = self._free_flight.step(self._state, forces, torques)
-            self._flies_free = True
-            return []
-        if self._flies_free:
-            self._world.place(self._state)
-            self._flies_free = False
         self._world.step(self._state.positions_m, forces, torques)
+        self.step_count += 1
         self._state = self._world.state()
         return self._contact_log.update(self.now_s, self._world.touches())
 
