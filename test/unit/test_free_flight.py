@@ -21,8 +21,8 @@ ENGINE = SimulationParams(lidar_caster="bullet")
 
 def free_step(bodies, forces, torques, airframe, step_s):
     rows = bodies.rows.copy()
-    step_freely(rows, forces, torques, FlightLaw(airframe, FlightParams()).airframe, GRAVITY_MPS2,
-                step_s)
+    step_freely(rows, np.zeros(len(rows), bool), forces, torques,
+                FlightLaw(airframe, FlightParams()).airframe, GRAVITY_MPS2, step_s)
     return BodyState(rows)
 
 
@@ -39,8 +39,8 @@ def test_a_free_step_is_the_engines():
         forces = random.normal(0.0, 5.0, (2, 3)) + (0.0, 0.0, 9.81)
         torques = random.normal(0.0, 0.5, (2, 3))
         before = world.state()
-        world.step(before.positions_m, forces, torques)
-        free, engine = free_step(before, forces, torques, Airframe(), STEP_S), world.state()
+        engine = world.step(before, forces, torques)
+        free = free_step(before, forces, torques, Airframe(), STEP_S)
         np.testing.assert_allclose(np.delete(free.rows, range(3, 7), axis=1),
                                    np.delete(engine.rows, range(3, 7), axis=1),
                                    rtol=1e-12, atol=1e-13)
@@ -80,13 +80,14 @@ def test_nothing_touches_that_was_not_near(seed):
     simulation = Simulation(ROOM, 2, replace(ENGINE, jitter_m=0.3), seed)
     free = FreeFlight(ROOM, 2, simulation.params.airframe.radius_m,
                       FlightLaw(Airframe(), FlightParams()), STEP_S)
-    hover = np.zeros((2, 3))
+    hover, nobody = np.zeros((2, 3)), np.zeros(2, bool)
     foreseen, free_steps = [], 0
     for one, other in zip(random_commands([seed, 0], 30, 1.5), random_commands([seed, 1], 30, 1.5)):
         simulation.set_command(0, one)
         simulation.set_command(1, other)
         for _ in range(120):
-            near = free.advance(simulation.body_state, hover, 1)[1] == 0
+            _, done, _ = free.advance(simulation.body_state, hover, nobody, 1)
+            near = done == 0
             free_steps += not near
             foreseen += [near for _ in simulation.step()]
     assert foreseen and all(foreseen)
@@ -108,3 +109,37 @@ def test_the_engine_takes_over_where_the_free_flight_was():
     (free,), (engine,) = contacts
     assert (free.other, free.time_s) == (engine.other, engine.time_s)
     np.testing.assert_allclose(free.position_m, engine.position_m, atol=1e-6)
+
+
+def test_only_who_is_near_is_in_the_engine():
+    """One bumps along a wall; the other, far away, flies as if it were alone."""
+    starts = (Pose2D(2.0, 1.0), Pose2D(2.0, 6.0))
+    alone = Simulation(replace(ROOM, starts=starts[1:]), 1)
+    both = Simulation(replace(ROOM, starts=starts), 2)
+    for step in range(1200):
+        if step % 60 == 0:
+            alone.set_command(0, Twist2D(0.3, 0.0, 0.1))
+            both.set_command(0, Twist2D(0.1, -0.4, 0.0))
+            both.set_command(1, Twist2D(0.3, 0.0, 0.1))
+        alone.step()
+        both.step()
+    assert [contact.other for contact in both.contacts] == ["wall_south"]
+    np.testing.assert_array_equal(both.body_state.rows[1], alone.body_state.rows[0])
+    both.reset()
+    np.testing.assert_allclose(both.body_state.positions_m[:, :2], [(2.0, 1.0), (2.0, 6.0)])
+    for simulation in (alone, both):
+        simulation.close()
+
+
+def test_who_has_left_the_engine_is_not_in_the_way_there():
+    """One flies away from a post; then another one comes to where it was."""
+    starts = (Pose2D(4.0, 4.56), Pose2D(4.0, 7.0, -math.pi / 2))
+    simulation = Simulation(replace(ROOM, starts=starts), 2)
+    for step in range(2880):
+        if step % 60 == 0:
+            simulation.set_command(0, Twist2D(-0.5 if step < 1200 else 0.0, 0.0, 0.0))
+            simulation.set_command(1, Twist2D(0.4 if step > 960 else 0.0, 0.0, 0.0))
+        simulation.step()
+    (contact,) = simulation.contacts
+    assert (contact.robot, contact.other) == (1, "post")
+    simulation.close()

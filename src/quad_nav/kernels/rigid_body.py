@@ -9,41 +9,43 @@ from numba import njit
 from quad_nav.kernels.flight_law import fly, rotation_from_quaternion
 
 NOBODY = -1
-A_PAIR = -2
 
 
 @njit(cache=True, nogil=True)
-def fly_freely(rows, commands, steps, step_s, altitude, gravity, airframe, law, mount_m, pair_m,
-               known_m, rooms_m, centres_m):
+def fly_freely(rows, commands, held, steps, step_s, altitude, gravity, airframe, law, mount_m,
+               pair_m, known_m, rooms_m, centres_m):
     """Up to so many steps, in place, as long as nothing may be touched.
 
-    The arguments are those of ``flight_law.fly``, ``step_freely`` and ``find_near``. Returns
-    the steps done and what ``find_near`` found before the next one.
+    Those that are held, bool[n], stand still: something else moves them. The other arguments
+    are those of ``flight_law.fly``, ``step_freely`` and ``find_near``. Returns the steps done
+    and what ``find_near`` found before the next one.
     """
     forces, torques = np.empty_like(commands), np.empty_like(commands)
     for done in range(steps):
-        found = find_near(rows, mount_m, pair_m, known_m, rooms_m, centres_m)
+        found, other = find_near(rows, held, mount_m, pair_m, known_m, rooms_m, centres_m)
         if found != NOBODY:
-            return done, found
+            return done, found, other
         fly(rows, commands, altitude, gravity, airframe, law, forces, torques)
-        step_freely(rows, forces, torques, airframe, gravity, step_s)
-    return steps, NOBODY
+        step_freely(rows, held, forces, torques, airframe, gravity, step_s)
+    return steps, NOBODY, NOBODY
 
 
 @njit(cache=True, nogil=True)
-def step_freely(rows, forces, torques, airframe, gravity, step_s):
-    """One time step of free bodies, in place, as the physics engine makes it.
+def step_freely(rows, held, forces, torques, airframe, gravity, step_s):
+    """One time step of the bodies that are not held, in place, as the physics engine makes it.
 
-    rows: float64[n, 13] as in ``BodyState``; forces and torques: float64[n, 3] in its frame;
-    airframe: as in ``flight_law.fly``. Velocities go first (Newton, and Euler's equations
-    with the gyroscopic term), then positions with the new velocities; a body turns about its
-    angular velocity (Grassia, Practical Parameterization of Rotations Using the Exponential
-    Map, 1998).
+    rows: float64[n, 13] as in ``BodyState``; held: bool[n]; forces and torques: float64[n, 3]
+    in the frame of the bodies; airframe: as in ``flight_law.fly``. Velocities go first (Newton,
+    and Euler's equations with the gyroscopic term), then positions with the new velocities; a
+    body turns about its angular velocity (Grassia, Practical Parameterization of Rotations
+    Using the Exponential Map, 1998).
     """
     mass, inertia = airframe[0], airframe[2:5]
     r = np.empty((3, 3))
     omega, torque = np.empty(3), np.empty(3)
     for k in range(rows.shape[0]):
+        if held[k]:
+            continue
         row = rows[k]
         for axis in range(3):
             acceleration = forces[k, axis] / mass - (gravity if axis == 2 else 0.0)
@@ -81,26 +83,29 @@ def _turn(quaternion, omega, step_s):
 
 
 @njit(cache=True, nogil=True)
-def find_near(rows, mount_m, pair_m, known_m, rooms_m, centres_m):
-    """A quadcopter that may touch something, ``A_PAIR`` of them, or else ``NOBODY``.
+def find_near(rows, held, mount_m, pair_m, known_m, rooms_m, centres_m):
+    """A quadcopter that is not held, bool[n], and that may touch something; or ``NOBODY``.
 
-    rows: float64[n, 13] as in ``BodyState``. centres_m, float64[n, 3], is filled: points
-    ``mount_m`` above the bodies' origins along their own axes. Two with centres nearer
-    than ``pair_m`` count as a pair. Who is further than rooms_m, float64[n], from its
-    known_m, float64[n, 3], may be near to something else.
+    Returns its number, and that of another one with its centre nearer than ``pair_m``; the
+    second is ``NOBODY`` if it is further than rooms_m, float64[n], from its known_m,
+    float64[n, 3], so that it may be near to something else. centres_m, float64[n, 3], is
+    filled: points ``mount_m`` above the origins of rows, float64[n, 13] as in ``BodyState``,
+    along the bodies' own axes.
     """
     for k in range(rows.shape[0]):
         x, y, z, w = rows[k, 3:7]
         centres_m[k, 0] = rows[k, 0] + mount_m * 2 * (x * z + w * y)
         centres_m[k, 1] = rows[k, 1] + mount_m * 2 * (y * z - w * x)
         centres_m[k, 2] = rows[k, 2] + mount_m * (1 - 2 * (x * x + y * y))
-        if _square_m2(centres_m[k], known_m[k]) >= rooms_m[k] * rooms_m[k]:
-            return k
+    for k in range(rows.shape[0]):
+        if not held[k] and _square_m2(centres_m[k], known_m[k]) >= rooms_m[k] * rooms_m[k]:
+            return k, NOBODY
     for k in range(rows.shape[0]):
         for other in range(k):
-            if _square_m2(centres_m[k], centres_m[other]) < pair_m * pair_m:
-                return A_PAIR
-    return NOBODY
+            if (_square_m2(centres_m[k], centres_m[other]) < pair_m * pair_m
+                    and not (held[k] and held[other])):
+                return (other, k) if held[k] else (k, other)
+    return NOBODY, NOBODY
 
 
 @njit(cache=True, nogil=True)

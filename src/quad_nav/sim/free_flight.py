@@ -1,17 +1,16 @@
 """Quadcopters far from everything, which fly without the physics engine.
 
-As long as none of them can touch anything, nothing but their own thrust moves them. A
-clearance changes by no more than the way flown since it was taken, so that it is asked
-for only now and then.
+As long as a quadcopter can touch nothing, only its own thrust moves it. A clearance changes
+by no more than the way flown since it was taken, so that it is asked for only now and then.
 """
 from __future__ import annotations
 
 import math
-from typing import Tuple
+from typing import List, Tuple
 
 import numpy as np
 
-from quad_nav.kernels.rigid_body import A_PAIR, NOBODY, fly_freely
+from quad_nav.kernels.rigid_body import NOBODY, fly_freely
 from quad_nav.sim.flight import GRAVITY_MPS2, BodyState, FlightLaw
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
@@ -34,22 +33,25 @@ class FreeFlight:
         self._known_m = np.zeros((n_robots, 3))
         self._rooms_m = np.zeros(n_robots)  # around known_m, no clearance is known yet
 
-    def advance(self, bodies: BodyState, commands: np.ndarray, steps: int
-                ) -> Tuple[BodyState, int]:
-        """Up to so many steps, fewer if something may be touched in the next one.
+    def advance(self, bodies: BodyState, commands: np.ndarray, held: np.ndarray, steps: int
+                ) -> Tuple[BodyState, int, List[int]]:
+        """Move all but those that are held, bool[n], by up to so many steps.
 
-        ``commands`` as for the flight law. Returns the bodies after it and the steps done.
+        ``commands`` as for the flight law. Returns the bodies after it, the steps done, and
+        who may touch something in the next one, which is why they are fewer.
         """
         rows, done = bodies.rows.copy(), 0
         while done < steps:
-            more, found = fly_freely(rows, commands, steps - done, self._step_s,
-                                     self._scene.altitude_m, GRAVITY_MPS2, self._law.airframe,
-                                     self._law.law, MOUNT_HEIGHT_M, 2 * self._reach_m,
-                                     self._known_m, self._rooms_m, self._centres_m)
+            more, found, other = fly_freely(
+                rows, commands, held, steps - done, self._step_s, self._scene.altitude_m,
+                GRAVITY_MPS2, self._law.airframe, self._law.law, MOUNT_HEIGHT_M,
+                2 * self._reach_m, self._known_m, self._rooms_m, self._centres_m)
             done += more
-            if found == A_PAIR or (found != NOBODY and not self._has_room(found)):
-                break
-        return BodyState(rows), done
+            if other != NOBODY:
+                return BodyState(rows), done, [found, other]
+            if found != NOBODY and not self._has_room(found):
+                return BodyState(rows), done, [found]
+        return BodyState(rows), done, []
 
     def _has_room(self, robot: int) -> bool:
         x_m, y_m, z_m = self._centres_m[robot].tolist()

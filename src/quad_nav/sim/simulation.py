@@ -122,8 +122,8 @@ class Simulation:
         self._state = self._world.state()
         self._free_flight = FreeFlight(self.scene, n, self.params.airframe.radius_m, self._law,
                                        STEP_S)
-        self._engine_is_behind = False
-        self._engine_until_step = math.inf if self._engine_is_seen else 0
+        # The step up to which the engine moves a quadcopter.
+        self._engine_until = np.full(n, math.inf if self._engine_is_seen else -math.inf)
 
     @property
     def n_robots(self) -> int:
@@ -166,34 +166,39 @@ class Simulation:
 
     def advance(self, steps: int) -> List[Contact]:
         """Advance by so many ``STEP_S``; returns the contacts that begin."""
-        end, contacts = self.step_count + steps, []
+        end = self.step_count + steps
+        contacts: List[Contact] = []
         while self.step_count < end:
             if self.step_count > self._next_hover_step:
                 self._hover()
-            if self.step_count < self._engine_until_step:
-                contacts += self._step_with_engine()
-            else:
-                self._fly_freely(int(min(end, self._next_hover_step + 1)))
+            in_engine = self._engine_until > self.step_count
+            if not in_engine.any():
+                self._fly_freely(in_engine, int(min(end, self._next_hover_step + 1)))
+            elif in_engine.all() or self._fly_freely(in_engine, self.step_count + 1):
+                contacts += self._step_with_engine(in_engine)
         return contacts
 
-    def _fly_freely(self, end: int) -> None:
-        """Up to a step, or until something may be touched."""
-        self._state, done = self._free_flight.advance(self._state, self._commands,
-                                                      end - self.step_count)
-        self._engine_is_behind |= done > 0
-        self.step_count += done
-        if self.step_count < end:
-            self._engine_until_step = self.step_count + _STEPS_NEAR
+    def _fly_freely(self, in_engine: np.ndarray, end: int) -> bool:
+        """All others up to a step; False if fewer, because the engine has to move more.
 
-    def _step_with_engine(self) -> List[Contact]:
-        if self._engine_is_behind:
-            self._world.place(self._state)
-            self._engine_is_behind = False
+        With somebody in the engine that has to make the same step, time goes on there.
+        """
+        state, done, near = self._free_flight.advance(self._state, self._commands, in_engine,
+                                                      end - self.step_count)
+        if done:
+            self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
+        self._engine_until[near] = self.step_count + done + _STEPS_NEAR
+        self._state = state
+        if not in_engine.any():
+            self.step_count += done
+        return not near
+
+    def _step_with_engine(self, in_engine: np.ndarray) -> List[Contact]:
         forces, torques = self._law.thrust_and_torque(self._state, self._commands,
                                                       self.scene.altitude_m)
-        self._world.step(self._state.positions_m, forces, torques)
+        self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
+        self._state = self._world.step(self._state, forces, torques)
         self.step_count += 1
-        self._state = self._world.state()
         return self._contact_log.update(self.now_s, self._world.touches())
 
     def _hover(self) -> None:
