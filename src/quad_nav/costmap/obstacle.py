@@ -172,12 +172,12 @@ class ObstacleLayer(GridLayer):
     def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         spec, seen = self.grid.spec, buffer.stack
         clear_all_rays(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
-                       seen.sensors, seen.points, seen.ends, range_m, touched)
+                       seen.sensors, seen.points, seen.begins, seen.ends, range_m, touched)
 
     def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         spec, seen = self.grid.spec, buffer.stack
         mark_all_points(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
-                        seen.sensors, seen.points, seen.ends, range_m,
+                        seen.sensors, seen.points, seen.begins, seen.ends, range_m,
                         self.params.max_obstacle_height_m, touched)
 
     def _raytrace_range(self, source: SourceParams) -> float:

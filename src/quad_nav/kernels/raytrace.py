@@ -90,7 +90,7 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
     max_cells = max(0.0, math.ceil(range_m / resolution))
     flat_costs = costs.reshape(-1)
     start = y0 * size_x + x0
-    places = np.uint64(cleared.size - 1)
+    places = np.uint64(max(cleared.size - 1, 0))
     surely_near, surely_far = (1.0 - 1e-9) * range_m * range_m, (1.0 + 1e-9) * range_m * range_m
     for k in range(points.shape[0]):
         x, y = float(points[k, 0]), float(points[k, 1])
@@ -138,10 +138,11 @@ def _range_ends_inside(bounds, x, y, dx, dy, square_m2):
 
 
 @njit(cache=True, nogil=True)
-def clear_all_rays(costs, origin_x, origin_y, resolution, sensors, points, ends, range_m, bounds):
+def clear_all_rays(costs, origin_x, origin_y, resolution, sensors, points, begins, ends, range_m,
+                   bounds):
     """``clear_rays`` of several observations, in order.
 
-    Observation k has sensors[k], float64[3], and points from ends[k - 1], or 0, to ends[k].
+    Observation k has sensors[k], float64[3], and points from begins[k] to ends[k].
 
     A line through nothing but free cells changes nothing. Mostly the first observation
     leaves few cells that are not free; from then on only lines towards those are cleared.
@@ -153,10 +154,8 @@ def clear_all_rays(costs, origin_x, origin_y, resolution, sensors, points, ends,
     obstructed = np.empty(MOST_OBSTRUCTED, dtype=np.int64)
     window = _reached(costs, origin_x, origin_y, resolution, sensors, range_m)
     count = find_obstructed(costs, window, obstructed)
-    begin = 0
     for k in range(len(ends)):
-        seen = points[begin:ends[k]]
-        begin = ends[k]
+        seen = points[begins[k]:ends[k]]
         x, y = sensors[k, 0], sensors[k, 1]
         if count == 0:
             clear_rays(costs, origin_x, origin_y, resolution, x, y, seen, range_m,
@@ -278,14 +277,12 @@ def _power_of_two(cells):
 
 
 @njit(cache=True, nogil=True)
-def mark_all_points(costs, origin_x, origin_y, resolution, sensors, points, ends, range_m,
+def mark_all_points(costs, origin_x, origin_y, resolution, sensors, points, begins, ends, range_m,
                     max_height_m, bounds):
     """``mark_points`` of several observations, as in ``clear_all_rays``."""
-    begin = 0
     for k in range(len(ends)):
-        mark_points(costs, origin_x, origin_y, resolution, sensors[k], points[begin:ends[k]],
-                    range_m, max_height_m, bounds)
-        begin = ends[k]
+        mark_points(costs, origin_x, origin_y, resolution, sensors[k],
+                    points[begins[k]:ends[k]], range_m, max_height_m, bounds)
 
 
 @njit(cache=True, nogil=True)
