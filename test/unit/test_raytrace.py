@@ -46,7 +46,8 @@ def test_the_outcome_is_that_of_all_lines(obstructed, range_m):
     random = np.random.default_rng([obstructed, int(range_m)])
     for _ in range(10):
         costs = np.zeros((80, 90), np.uint8)
-        costs.reshape(-1)[random.permutation(costs.size)[:obstructed]] = random.choice([1, 254, 255])
+        filled = random.permutation(costs.size)[:obstructed]
+        costs.reshape(-1)[filled] = random.choice([1, 254, 255])
         sensors, points, per_scan = scans(random, 6, 4.0)
         sensors += (-1.0, 2.0, 0.0)
         points += np.array((-1.0, 2.0, 0.0), np.float32)
