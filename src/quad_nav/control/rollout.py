@@ -18,6 +18,7 @@ squared distance to the plan's end counts. B. Gerkey and K. Konolige 2008,
 """
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
@@ -64,9 +65,20 @@ class Rollout:
             self.grids.goal, plan_xy)
         self.rules = _rules(params, spec.resolution_m)
 
-    def score(self, samples: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3]."""
-        return kernel.score(self.scene, self.rules, _triple(self.pose), self.velocity, samples)
+    def score(self, samples: np.ndarray, limit: float = math.inf
+              ) -> Tuple[np.ndarray, np.ndarray]:
+        """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3].
+
+        A cost may be infinite if it is above ``limit``.
+        """
+        return kernel.score(self.scene, self.rules, _triple(self.pose), self.velocity, samples,
+                            limit)
+
+    def cheapest(self, samples: np.ndarray) -> Optional[Tuple[int, float]]:
+        """Index and cost of the cheapest legal sample, the first of equals; None if none is."""
+        k, cost = kernel.cheapest(self.scene, self.rules, _triple(self.pose), self.velocity,
+                                  samples)
+        return (k, cost) if k >= 0 else None
 
     def trajectory(self, sample: Triple) -> Trajectory:
         return self._simulate(_triple(self.pose), self.velocity, sample)
@@ -83,8 +95,10 @@ class Rollout:
 
     def _simulate(self, pose: Triple, velocity: Triple, sample: Triple) -> Trajectory:
         row = np.array(sample)
-        points = np.empty((kernel.step_count(self.rules, row), 3))
-        cost, count = kernel.simulate(self.scene, self.rules, pose, velocity, row, points)
+        headings = np.empty((kernel.step_count(self.rules, row), 3))
+        kernel.turn(self.rules, pose[2], velocity[2], sample[2], headings)
+        points = np.empty_like(headings)
+        cost, count = kernel.simulate(self.scene, self.rules, pose, velocity, row, headings, points)
         return Trajectory(sample, cost, points[:count])
 
     def goal_distance_at(self, x_m: float, y_m: float) -> Optional[int]:
