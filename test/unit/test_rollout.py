@@ -47,7 +47,7 @@ def samples():
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_cheapest_is_that_of_all_scores(variant):
     illegal = 0
-    for seed in range(25):
+    for seed in range(12):
         rollout = random_rollout(seed, VARIANTS[variant])
         costs, _ = rollout.score(samples())
         legal = np.where(costs >= 0.0, costs, np.inf)
@@ -55,12 +55,12 @@ def test_the_cheapest_is_that_of_all_scores(variant):
         k = int(np.argmin(legal))
         expected = (k, costs[k]) if costs[k] >= 0.0 else None
         assert rollout.cheapest(samples()) == expected
-    assert illegal > 100
+    assert illegal > 50
 
 
 def test_costs_up_to_a_limit_are_those_without_one():
     left_out = 0
-    for seed in range(25):
+    for seed in range(12):
         rollout = random_rollout(seed, PARAMS)
         costs, ends = rollout.score(samples())
         limit = float(np.median(costs))
@@ -71,4 +71,4 @@ def test_costs_up_to_a_limit_are_those_without_one():
         # Those that collide would have cost more than the limit if they did not.
         assert ((costs[~scored] > limit) | (costs[~scored] < 0.0)).all()
         left_out += np.count_nonzero(~scored)
-    assert left_out > 500
+    assert left_out > 250

@@ -74,8 +74,9 @@ def simulate(scene, rules, pose, velocity, sample, headings, points, with_footpr
     """Cost of one sample and the number of poses written to ``points``, float64[k, 3].
 
     ``headings``, float64[steps, 3], is what ``turn`` gives for the sample. Without the
-    footprint it is what the sample costs if no cell under the footprint does. Negative cost: COLLIDES (or off the map) and NO_WAY; ``points`` then ends
-    before the pose that failed.
+    footprint it is what the sample costs if no cell under the footprint does. Negative
+    cost: COLLIDES (or off the map) and NO_WAY; ``points`` then ends before the pose that
+    failed.
     """
     steps = headings.shape[0]
     dt = rules.sim_time_s / steps
