@@ -12,7 +12,7 @@ from setuptools import find_packages, setup
 
 ROOT = Path(__file__).parent
 # What the package is asked for by name (quad_nav/shipped.py); catkin installs it by CMake.
-SHIPPED = sorted(path.relative_to(ROOT) for folder in ("config", "goals", "scenes")
+SHIPPED = sorted(path.relative_to(ROOT) for folder in ("config", "goals", "scenes", "spaces")
                  for path in (ROOT / folder).rglob("*.*") if path.is_file())
 
 setup(

@@ -1,0 +1,195 @@
+"""Tuning from end to end: search, refinement, and flights that the search never saw."""
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+import optuna
+from optuna.trial import FrozenTrial
+
+from quad_nav import config
+from quad_nav.config.files import set_value
+from quad_nav.config.notes import CLAMPED, IGNORED, UNKNOWN, UNSUPPORTED, UNUSED
+from quad_nav.errors import InputError
+from quad_nav.offline.barn.setup import BarnOptions
+from quad_nav.offline.setup import config_folder
+from quad_nav.plugins import plugin_name
+from quad_nav.shipped import shipped
+from quad_nav.tuning.barn_course import BarnCourse
+from quad_nav.tuning.courses import Case, MissionCourse, MissionOptions, check_missions
+from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
+from quad_nav.tuning.flight_result import FlightResult
+from quad_nav.tuning.parameter_files import base_configuration, base_value
+from quad_nav.tuning.refinement import BASE, Refined, refine
+from quad_nav.tuning.search import SearchOptions, best_first, search
+from quad_nav.tuning.space import Assignments, SearchSpace, costmap_paths, load_space
+from quad_nav.tuning.study import TuneStudy, open_study
+from quad_nav.tuning.workers import Workers
+from quad_nav.versions import versions
+
+_NO_EFFECT = (UNKNOWN, UNSUPPORTED, IGNORED, UNUSED, CLAMPED)
+_SPACES = {"DWAPlannerROS": "dwa.yaml"}
+_DEFAULT_SPACE = "default.yaml"
+
+
+@dataclass(frozen=True)
+class TuneOptions:
+    """What a person asks for. ``space`` None: the shipped one for the base's local planner.
+
+    ``finalists``: the best candidates that fly ``final_flights`` each before one is chosen;
+    ``held_out``: flights that the search never sees, with the base and with the best.
+    """
+
+    course: Union[MissionOptions, BarnOptions]
+    output: Path
+    space: Optional[Path] = None
+    search: SearchOptions = SearchOptions()
+    finalists: int = 4
+    final_flights: int = 16
+    held_out: int = 20
+
+
+@dataclass(frozen=True)
+class TuneSetup:
+    """A study that can be flown; ``base`` is the base's own value of each parameter."""
+
+    options: TuneOptions
+    course: Course
+    space: SearchSpace
+    base: Mapping[str, Any]
+    warnings: Tuple[str, ...]
+
+    @property
+    def base_folder(self) -> Path:
+        return config_folder(self.course.config)
+
+    @property
+    def identity(self) -> Dict[str, Any]:
+        """What the study depends on; with the same one it can be taken up again."""
+        search = self.options.search
+        return {**self.course.identity(), "space": asdict(self.space)["dimensions"],
+                "flights": search.flights, "generation": search.generation, "seed": search.seed,
+                "versions": all_versions()}
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Flights that the search never saw, with the base and with the best, case by case."""
+
+    cases: Tuple[Case, ...]
+    base: Tuple[FlightResult, ...]
+    tuned: Tuple[FlightResult, ...]
+
+
+@dataclass(frozen=True)
+class TuneResult:
+    """What came of it. ``reference`` are the base's flights of the search."""
+
+    setup: TuneSetup
+    trials: Tuple[FrozenTrial, ...]
+    reference: Tuple[FlightResult, ...]
+    refined: Refined
+    held_out: HeldOut
+
+    @property
+    def assignments(self) -> Assignments:
+        """What the best one changes, as move_base has it."""
+        return self.setup.space.assignments(self.refined.values)
+
+
+def read_tune_setup(options: TuneOptions) -> TuneSetup:
+    """Reads and checks everything that a study needs.
+
+    Raises:
+        InputError: every fault.
+    """
+    given = options.course
+    if isinstance(given, BarnOptions):
+        barn = BarnCourse(given)
+        course: Course = barn
+        warnings: Sequence[str] = barn.warnings
+    else:
+        warnings = check_missions(given)
+        course = MissionCourse(given)
+    folder = config_folder(course.config)
+    configuration = base_configuration(folder, course.fixed)
+    space = _space(options.space, configuration).without([path for path, _ in course.fixed])
+    problems = space_faults(space, folder, course.fixed)
+    if not space.dimensions:
+        problems.append(f"{space.name}: every parameter in it is fixed by --set; expected one that "
+                        "is not")
+    if problems:
+        raise InputError(problems)
+    tree = configuration.to_tree()
+    base = {path: base_value(tree, path) for path in space.paths}
+    return TuneSetup(options, course, space, base, tuple(warnings))
+
+
+def space_faults(space: SearchSpace, folder: Path, fixed: Sequence[Tuple[str, Any]]) -> List[str]:
+    """Parameters of a space that change nothing about what flies, or cannot have such values."""
+    problems: List[str] = []
+    for values in space.corners():
+        tree = config.load_files(folder, {"i": "0"})
+        for path, value in (*fixed, *space.assignments(values)):
+            for single in costmap_paths(path):
+                set_value(tree, single, value, space.name)
+        try:
+            remarks = config.load(tree).remarks
+        except InputError as error:
+            problems += error.problems
+        else:
+            problems += [f"{remark}; expected parameters that count in {folder}"
+                         for remark in remarks
+                         if remark.origin == space.name and remark.kind in _NO_EFFECT]
+    return list(dict.fromkeys(problems))
+
+
+def all_versions() -> Dict[str, str]:
+    """What a study depends on besides its options."""
+    return {**versions(), "optuna": optuna.__version__}
+
+
+def run_tune(setup: TuneSetup, workers: Workers, watcher: Watcher) -> TuneResult:
+    """Takes up the study where it was left, and brings it to its end.
+
+    Raises:
+        InputError: the folder holds another study, or somebody works on it.
+        WorkersLost: workers die again and again.
+    """
+    with open_study(setup.options.output, setup.identity) as study:
+        evaluation = Evaluation(setup.course, setup.space, workers, study.journal, watcher)
+        return _run(setup, evaluation, study)
+
+
+def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResult:
+    options, course, watcher = setup.options, setup.course, evaluation.watcher
+    few = course.search_cases(options.search.flights)
+    watcher.expect(len(few))
+    watcher.stage("flying the base")
+    (reference,) = evaluation.flown([BASE], few)
+    search(evaluation, study, start_values(setup.space, setup.base), options.search)
+    trials = study.trials[:options.search.candidates]
+    finalists = [trial.params for trial in best_first(trials)[:options.finalists]]
+    many = course.search_cases(max(options.final_flights, len(few)))
+    refined = refine(evaluation, finalists, setup.base, few, many)
+    held_out = course.held_out_cases(options.held_out)
+    watcher.expect(2 * len(held_out))
+    watcher.stage("flying what was held out")
+    base, tuned = evaluation.flown([BASE, refined.values], held_out)
+    return TuneResult(setup, tuple(trials), tuple(reference), refined,
+                      HeldOut(held_out, tuple(base), tuple(tuned)))
+
+
+def start_values(space: SearchSpace, base: Mapping[str, Any]) -> Dict[str, Any]:
+    """The base's own values, as far as the space has them: the first candidate."""
+    low, _ = space.corners()
+    return {one.path: low[one.path] if base[one.path] is None else one.nearest(base[one.path])
+            for one in space.dimensions}
+
+
+def _space(path: Optional[Path], configuration: config.Configuration) -> SearchSpace:
+    if path is not None:
+        return load_space(path)
+    planner = plugin_name(configuration.navigator.base_local_planner)
+    return load_space(shipped("spaces", _SPACES.get(planner, _DEFAULT_SPACE)))
