@@ -11,7 +11,7 @@ from quad_nav.offline.barn.protocol import SAMPLE_STEP, TIME_LIMIT_S, Outcome, R
 from quad_nav.offline.barn.setup import BarnOptions, Contestant, flight_setup, read_barn_setup
 from quad_nav.offline.barn.worlds import BarnWorld
 from quad_nav.offline.setup import FlightSetup, config_folder
-from quad_nav.tuning.courses import HELD_OUT_SEED, Case, files_digest
+from quad_nav.tuning.courses import HELD_OUT_SEED, LIDAR, Case, files_digest
 from quad_nav.tuning.flight_result import FlightResult, FlightTask
 from quad_nav.tuning.space import Assignments
 
@@ -67,6 +67,9 @@ class BarnCourse:
         Raises:
             InputError: they cannot be flown with.
         """
+        of_world = [path for path, _ in assignments if path.startswith(f"{LIDAR}/")]
+        if of_world:
+            raise InputError([f"{path}: the LIDAR is the benchmark's own" for path in of_world])
         if assignments not in self._contestants:
             options = replace(self.options, only=(self._worlds[case.course].number,),
                               parameters=(*self.options.parameters, *assignments))

@@ -1,7 +1,7 @@
 """Candidates times flights: each flown once, whoever asks for it and however often."""
 from __future__ import annotations
 
-from typing import Any, Dict, Iterable, List, Protocol, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Protocol, Sequence, Set, Tuple
 
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.flight_result import FlightResult, FlightTask
@@ -51,16 +51,20 @@ class Watcher:
 
 
 class Evaluation:
-    """Flies what is not in the journal yet, and keeps it there as it comes."""
+    """Flies what is not in the journal yet, and keeps it there as it comes.
+
+    ``context``: what else tells flights apart in a journal of several studies.
+    """
 
     def __init__(self, course: Course, space: SearchSpace, workers: Workers, journal: Journal,
-                 watcher: Watcher):
+                 watcher: Watcher, context: Optional[Mapping[str, Any]] = None):
         self.course = course
         self.space = space
         self.watcher = watcher
         self._workers = workers
         self._journal = journal
-        self._counted: set = set()
+        self._context = {} if context is None else dict(context)
+        self._counted: Set[Key] = set()
 
     def fly(self, wanted: Iterable[Tuple[Values, Case]]) -> None:
         """Afterwards all of them are in the journal."""
@@ -91,4 +95,5 @@ class Evaluation:
         return [self.flights(values, cases) for values in candidates]
 
     def _key(self, values: Values, case: Case) -> Key:
-        return key_text(dict(self.space.assignments(values))), case.name, case.seed
+        parameters = {**self._context, **dict(self.space.assignments(values))}
+        return key_text(parameters), case.name, case.seed

@@ -3,14 +3,12 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 import optuna
 from optuna.trial import FrozenTrial
 
 from quad_nav import config
-from quad_nav.config.files import set_value
-from quad_nav.config.notes import CLAMPED, IGNORED, UNKNOWN, UNSUPPORTED, UNUSED
 from quad_nav.errors import InputError
 from quad_nav.offline.barn.setup import BarnOptions
 from quad_nav.offline.setup import config_folder
@@ -20,15 +18,15 @@ from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.courses import Case, MissionCourse, MissionOptions, check_missions
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
 from quad_nav.tuning.flight_result import FlightResult
+from quad_nav.tuning.parameter_check import parameter_faults
 from quad_nav.tuning.parameter_files import base_configuration, base_value
 from quad_nav.tuning.refinement import BASE, Refined, refine
 from quad_nav.tuning.search import SearchOptions, best_first, search
-from quad_nav.tuning.space import Assignments, SearchSpace, costmap_paths, load_space
+from quad_nav.tuning.space import Assignments, SearchSpace, load_space
 from quad_nav.tuning.study import TuneStudy, open_study
 from quad_nav.tuning.workers import Workers
 from quad_nav.versions import versions
 
-_NO_EFFECT = (UNKNOWN, UNSUPPORTED, IGNORED, UNUSED, CLAMPED)
 _SPACES = {"DWAPlannerROS": "dwa.yaml"}
 _DEFAULT_SPACE = "default.yaml"
 
@@ -115,34 +113,16 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
     folder = config_folder(course.config)
     configuration = base_configuration(folder, course.fixed)
     space = _space(options.space, configuration).without([path for path, _ in course.fixed])
-    problems = space_faults(space, folder, course.fixed)
+    problems = [line for values in space.corners() for line in parameter_faults(
+        (*course.fixed, *space.assignments(values)), folder, space.name)]
     if not space.dimensions:
         problems.append(f"{space.name}: every parameter in it is fixed by --set; expected one that "
                         "is not")
     if problems:
-        raise InputError(problems)
+        raise InputError(list(dict.fromkeys(problems)))
     tree = configuration.to_tree()
     base = {path: base_value(tree, path) for path in space.paths}
     return TuneSetup(options, course, space, base, tuple(warnings))
-
-
-def space_faults(space: SearchSpace, folder: Path, fixed: Sequence[Tuple[str, Any]]) -> List[str]:
-    """Parameters of a space that change nothing about what flies, or cannot have such values."""
-    problems: List[str] = []
-    for values in space.corners():
-        tree = config.load_files(folder, {"i": "0"})
-        for path, value in (*fixed, *space.assignments(values)):
-            for single in costmap_paths(path):
-                set_value(tree, single, value, space.name)
-        try:
-            remarks = config.load(tree).remarks
-        except InputError as error:
-            problems += error.problems
-        else:
-            problems += [f"{remark}; expected parameters that count in {folder}"
-                         for remark in remarks
-                         if remark.origin == space.name and remark.kind in _NO_EFFECT]
-    return list(dict.fromkeys(problems))
 
 
 def all_versions() -> Dict[str, str]:
