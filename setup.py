@@ -20,7 +20,7 @@ setup(
     version=ElementTree.parse(ROOT / "package.xml").findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
-    package_data={"quad_nav.offline.report": ["*.jinja"]},
+    package_data={"quad_nav.offline.report": ["*.jinja"], "quad_nav.tuning.report": ["*.jinja"]},
     data_files=[(f"share/quad/{folder}", list(map(str, paths)))
                 for folder, paths in groupby(SHIPPED, lambda path: path.parent)],
 )

@@ -47,6 +47,8 @@ from quad_nav.tuning.write import write_result
               help="Flights that decide between them.")
 @click.option("--held-out", type=COUNT, metavar="N", help="Flights with seeds that the search never"
               " sees, for the figures. [default: 20, of BARN 50]")
+@click.option("--against", multiple=True, metavar="NAME|FOLDER", help="Fly these parameters too, as"
+              " they are, where the search never was; repeatable.")
 @click.option("--generation", type=COUNT, default=8, show_default=True, metavar="N",
               help="Candidates at a time. It changes what is found; --workers does not.")
 @worker_options
@@ -79,14 +81,14 @@ def tune(workers: Optional[int], ray_address: Optional[str], output: Path, quiet
 
 
 def _options(output: Path, space: Optional[Path], candidates: int, flights: int, finalists: int,
-             final_flights: int, held_out: Optional[int], generation: int,
-             held_out_scenes: Tuple[Path, ...], held_out_goals: Tuple[Path, ...], **given: Any
-             ) -> TuneOptions:
+             final_flights: int, held_out: Optional[int], against: Tuple[str, ...],
+             generation: int, held_out_scenes: Tuple[Path, ...],
+             held_out_goals: Tuple[Path, ...], **given: Any) -> TuneOptions:
     course = course_of(**given, held_out=missions_of(held_out_scenes, held_out_goals, "held-out-"))
     default = 20 if given["worlds"] is None else 50
     return TuneOptions(course, output, space,
                        SearchOptions(candidates, flights, generation, given["seed"]),
-                       finalists, final_flights, held_out or default)
+                       finalists, final_flights, held_out or default, against)
 
 
 def _announce(setup: TuneSetup, workers: Workers) -> None:

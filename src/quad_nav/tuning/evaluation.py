@@ -3,6 +3,7 @@ from __future__ import annotations
 
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Protocol, Sequence, Set, Tuple
 
+from quad_nav.offline.setup import FlightSetup
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.flight_result import FlightResult, FlightTask
 from quad_nav.tuning.journal import Journal, Key, key_text
@@ -12,6 +13,10 @@ from quad_nav.tuning.workers import Workers, fly_all
 
 class Course(Protocol):
     """What candidates fly; see ``courses`` and ``barn_course``."""
+
+    @property
+    def ends_at_contact(self) -> bool:
+        """Whether a flight is over when something is touched."""
 
     @property
     def config(self) -> str:
@@ -27,8 +32,11 @@ class Course(Protocol):
     def held_out_cases(self, count: int) -> Tuple[Case, ...]:
         """Flights that the search never sees."""
 
+    def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
+        """One flight with parameters on top of the base; InputError if it cannot be."""
+
     def task(self, case: Case, assignments: Assignments) -> FlightTask:
-        """One flight with parameters on top of the base."""
+        """The same as a task with parameters on top of the base."""
 
     def identity(self) -> Dict[str, Any]:
         """What else flights depend on."""
@@ -65,6 +73,10 @@ class Evaluation:
         self._journal = journal
         self._context = {} if context is None else dict(context)
         self._counted: Set[Key] = set()
+
+    def of(self, course: Course, context: Mapping[str, Any]) -> Evaluation:
+        """The same workers and journal for another course."""
+        return Evaluation(course, self.space, self._workers, self._journal, self.watcher, context)
 
     def fly(self, wanted: Iterable[Tuple[Values, Case]]) -> None:
         """Afterwards all of them are in the journal."""

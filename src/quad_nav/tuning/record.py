@@ -6,6 +6,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import tabulate
 
+from quad_nav.offline.barn.figures import Figures as BarnFigures
 from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.figures import Figures, figures
 from quad_nav.tuning.parameter_files import Change
@@ -16,8 +17,8 @@ from quad_nav.tuning.tune import TuneResult, all_versions
 
 _HEADER = ["", "flights", "all goals\nreached", "touched", "mean\ntime, s", "least\ngap, m",
            "roughness\nm/s2", "cost"]
-_BARN_HEADER = ["", "flights", "success\n%", "collision\n%", "time-out\n%", "mean\ntime, s",
-                "metric"]
+_BARN_HEADER = ["", "flights", "success\n%", "95 %\ninterval", "collision\n%", "time-out\n%",
+                "mean\ntime, s", "metric"]
 
 
 def text(result: TuneResult) -> str:
@@ -32,33 +33,44 @@ def text(result: TuneResult) -> str:
 
 def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
     """Figures of flights that the search never saw."""
-    rows = held_out_rows(result)
-    course, held_out = result.setup.course, result.held_out
-    tables = [tabulate.tabulate([figure_row(name, one) for name, one in rows],
-                                _header(_HEADER, tablefmt),
-                                tablefmt=tablefmt, disable_numparse=True,
-                                colalign=("left",) + ("right",) * 7)]
-    if isinstance(course, BarnCourse):
-        found = []
-        for name, flights in ((result.setup.course.config, held_out.base),
-                              ("tuned", held_out.tuned)):
-            one = course.figures(held_out.cases, flights)
-            counts = (one.successes, one.collisions, one.time_outs)
-            found.append([name, str(one.runs), *(f"{100 * k / one.runs:.1f}" for k in counts),
-                          _figure(one.mean_time_s, 1), f"{one.metric:.3f}"])
+    tables = [tabulate.tabulate(
+        [figure_row(name, one) for name, one in held_out_rows(result)],
+        _header(_HEADER, tablefmt), tablefmt=tablefmt, disable_numparse=True,
+        colalign=("left",) + ("right",) * 7)]
+    barn = barn_rows(result)
+    if barn:
         tables.append("As the benchmark counts:\n\n" + tabulate.tabulate(
-            found, _header(_BARN_HEADER, tablefmt), tablefmt=tablefmt, disable_numparse=True,
-            colalign=("left",) + ("right",) * 6))
+            [barn_row(name, one) for name, one in barn], _header(_BARN_HEADER, tablefmt),
+            tablefmt=tablefmt, disable_numparse=True, colalign=("left",) + ("right",) * 7))
     return "\n\n".join(tables)
 
 
 def held_out_rows(result: TuneResult) -> Tuple[Tuple[str, Figures], ...]:
-    """The base's figures and the best one's."""
-    return ((result.setup.course.config, figures(result.held_out.base)),
-            ("tuned", figures(result.held_out.tuned)))
+    """Figures of the base, of what it is compared with, and of the best."""
+    return tuple((name, figures(flights))
+                 for name, flights in result.held_out.sets(result.setup.course.config))
+
+
+def barn_rows(result: TuneResult) -> Tuple[Tuple[str, BarnFigures], ...]:
+    """The same flights as the benchmark counts them; none of other courses."""
+    course, held_out = result.setup.course, result.held_out
+    if not isinstance(course, BarnCourse):
+        return ()
+    return tuple((name, course.figures(held_out.cases, flights))
+                 for name, flights in held_out.sets(course.config))
+
+
+def barn_row(name: str, one: BarnFigures) -> List[str]:
+    """Cells of the benchmark's table."""
+    low, high = one.success_interval
+    rates = [f"{100 * count / one.runs:.1f}"
+             for count in (one.successes, one.collisions, one.time_outs)]
+    return [name, str(one.runs), rates[0], f"{100 * low:.1f}-{100 * high:.1f}", *rates[1:],
+            _figure(one.mean_time_s, 1), f"{one.metric:.3f}"]
 
 
 def figure_row(name: str, one: Figures) -> List[str]:
+    """Cells of the table of figures."""
     return [name, str(one.flights), str(one.completed), str(one.touched),
             _figure(one.mean_time_s, 1), _figure(one.least_gap_m, 2),
             f"{one.roughness_mps2:.2f}", f"{one.cost:.3f}"]
@@ -131,11 +143,12 @@ def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
         "gains": [{**asdict(gain), "cost": gain.cost} for gain in result.refined.gains],
         "held_out": {name: asdict(one) for name, one in held_out_rows(result)},
         "held_out_flights": [
-            {"mission": case.name, "seed": case.seed, "base": asdict(base), "tuned": asdict(tuned)}
-            for case, base, tuned in zip(held_out.cases, held_out.base, held_out.tuned)]}
+            {"mission": case.name, "seed": case.seed,
+             **{name: asdict(flights[k])
+                for name, flights in held_out.sets(setup.course.config)}}
+            for k, case in enumerate(held_out.cases)]}
     if isinstance(setup.course, BarnCourse):
-        found["barn"] = {"base": asdict(setup.course.figures(held_out.cases, held_out.base)),
-                         "tuned": asdict(setup.course.figures(held_out.cases, held_out.tuned))}
+        found["barn"] = {name: asdict(one) for name, one in barn_rows(result)}
     return found
 
 

@@ -91,14 +91,19 @@ def _simplified(evaluation: Evaluation, best: Values, few: Sequence[Case], many:
         best, _costs_without(evaluation, best, few))]
     idle = [path for path, saving in sorted(savings, key=lambda pair: pair[1]) if saving <= TRIFLE]
     limit = mean_cost(evaluation.flights(best, many)) + TRIFLE
-    while idle:
-        simpler = _without(best, idle)
+    simplest = dict(best)
+    waiting = [idle] if idle else []
+    while waiting:  # all at once, then in halves: together they may matter
+        paths = waiting.pop(0)
+        simpler = _without(simplest, paths)
         evaluation.watcher.expect(len(many))
         (flights,) = evaluation.flown([simpler], many)
         if mean_cost(flights) <= limit:
-            return simpler
-        idle = idle[:len(idle) // 2]
-    return dict(best)
+            simplest = simpler
+        elif len(paths) > 1:
+            middle = len(paths) // 2
+            waiting[:0] = [paths[:middle], paths[middle:]]
+    return simplest
 
 
 def _costs_without(evaluation: Evaluation, values: Values, cases: Sequence[Case]) -> List[float]:

@@ -55,7 +55,7 @@ def open_study(folder: Path, identity: Mapping[str, Any]) -> Iterator[TuneStudy]
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(folder / _LOCK, os.O_CREAT | os.O_RDWR)
+        lock = os.open(folder / _LOCK, os.O_CREAT | os.O_RDWR, 0o644)
     except OSError as error:
         raise InputError([f"{folder}: {error.strerror}; expected a folder to write to"]) from error
     try:

@@ -6,22 +6,14 @@ import hashlib
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Sequence, Tuple, Union
+from typing import Any, Dict, List, Sequence, Tuple
 
 import yaml
 
 from quad_nav.errors import InputError
-from quad_nav.offline.barn.setup import BarnOptions
 from quad_nav.offline.setup import config_folder
-from quad_nav.tuning.barn_course import BarnCourse
-from quad_nav.tuning.courses import (
-    LIDAR,
-    Case,
-    MissionCourse,
-    MissionOptions,
-    check_missions,
-    identity_text,
-)
+from quad_nav.tuning.course_reading import CourseOptions, read_course
+from quad_nav.tuning.courses import LIDAR, Case, identity_text
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
 from quad_nav.tuning.figures import Figures, figures
 from quad_nav.tuning.flight_result import FlightResult
@@ -42,7 +34,7 @@ Point = Dict[str, Any]
 class SweepOptions:
     """What a person asks for: ``points``, and how many ``flights`` each flies."""
 
-    course: Union[MissionOptions, BarnOptions]
+    course: CourseOptions
     points: Tuple[Point, ...]
     flights: int = 8
 
@@ -120,14 +112,7 @@ def read_sweep_setup(options: SweepOptions) -> SweepSetup:
     Raises:
         InputError: every fault.
     """
-    given = options.course
-    if isinstance(given, BarnOptions):
-        barn = BarnCourse(given)
-        course: Course = barn
-        warnings: Sequence[str] = barn.warnings
-    else:
-        warnings = check_missions(given)
-        course = MissionCourse(given)
+    course, warnings = read_course(options.course)
     space = space_of(options.points)
     folder = config_folder(course.config)
     (case,) = course.search_cases(1)

@@ -1,21 +1,20 @@
 """Tuning from end to end: search, refinement, and flights that the search never saw."""
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Mapping, Optional, Tuple
 
 import optuna
 from optuna.trial import FrozenTrial
 
 from quad_nav import config
 from quad_nav.errors import InputError
-from quad_nav.offline.barn.setup import BarnOptions
 from quad_nav.offline.setup import config_folder
 from quad_nav.plugins import plugin_name
 from quad_nav.shipped import shipped
-from quad_nav.tuning.barn_course import BarnCourse
-from quad_nav.tuning.courses import Case, MissionCourse, MissionOptions, check_missions
+from quad_nav.tuning.course_reading import CourseOptions, read_course, with_config
+from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.parameter_check import parameter_faults
@@ -27,6 +26,7 @@ from quad_nav.tuning.study import TuneStudy, open_study
 from quad_nav.tuning.workers import Workers
 from quad_nav.versions import versions
 
+TUNED = "tuned"
 _SPACES = {"DWAPlannerROS": "dwa.yaml"}
 _DEFAULT_SPACE = "default.yaml"
 
@@ -36,16 +36,18 @@ class TuneOptions:
     """What a person asks for. ``space`` None: the shipped one for the base's local planner.
 
     ``finalists``: the best candidates that fly ``final_flights`` each before one is chosen;
-    ``held_out``: flights that the search never sees, with the base and with the best.
+    ``held_out``: flights that the search never sees, with the base and with the best, and with
+    the folders of parameters ``against`` as they are.
     """
 
-    course: Union[MissionOptions, BarnOptions]
+    course: CourseOptions
     output: Path
     space: Optional[Path] = None
     search: SearchOptions = SearchOptions()
     finalists: int = 4
     final_flights: int = 16
     held_out: int = 20
+    against: Tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class TuneSetup:
     course: Course
     space: SearchSpace
     base: Mapping[str, Any]
+    against: Tuple[Tuple[str, Course], ...]
     warnings: Tuple[str, ...]
 
     @property
@@ -73,11 +76,19 @@ class TuneSetup:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Flights that the search never saw, with the base and with the best, case by case."""
+    """Flights that the search never saw, with the base and with the best, case by case.
+
+    ``others``: the same with other folders of parameters, by their names.
+    """
 
     cases: Tuple[Case, ...]
     base: Tuple[FlightResult, ...]
     tuned: Tuple[FlightResult, ...]
+    others: Tuple[Tuple[str, Tuple[FlightResult, ...]], ...] = ()
+
+    def sets(self, base: str) -> Tuple[Tuple[str, Tuple[FlightResult, ...]], ...]:
+        """Everything by name, ``base`` being the base's."""
+        return (*self.others, (base, self.base), (TUNED, self.tuned))
 
 
 @dataclass(frozen=True)
@@ -102,14 +113,9 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
     Raises:
         InputError: every fault.
     """
-    given = options.course
-    if isinstance(given, BarnOptions):
-        barn = BarnCourse(given)
-        course: Course = barn
-        warnings: Sequence[str] = barn.warnings
-    else:
-        warnings = check_missions(given)
-        course = MissionCourse(given)
+    course, warnings = read_course(options.course)
+    against = tuple((name, read_course(with_config(options.course, name))[0])
+                    for name in options.against)
     folder = config_folder(course.config)
     configuration = base_configuration(folder, course.fixed)
     space = _space(options.space, configuration).without([path for path, _ in course.fixed])
@@ -122,7 +128,7 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
         raise InputError(list(dict.fromkeys(problems)))
     tree = configuration.to_tree()
     base = {path: base_value(tree, path) for path in space.paths}
-    return TuneSetup(options, course, space, base, tuple(warnings))
+    return TuneSetup(options, course, space, base, against, tuple(warnings))
 
 
 def all_versions() -> Dict[str, str]:
@@ -139,7 +145,10 @@ def run_tune(setup: TuneSetup, workers: Workers, watcher: Watcher) -> TuneResult
     """
     with open_study(setup.options.output, setup.identity) as study:
         evaluation = Evaluation(setup.course, setup.space, workers, study.journal, watcher)
-        return _run(setup, evaluation, study)
+        result = _run(setup, evaluation, study)
+        others = tuple((name, _fly_other(name, course, result, evaluation))
+                       for name, course in setup.against)
+        return replace(result, held_out=replace(result.held_out, others=others))
 
 
 def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResult:
@@ -159,6 +168,16 @@ def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResu
     base, tuned = evaluation.flown([BASE, refined.values], held_out)
     return TuneResult(setup, tuple(trials), tuple(reference), refined,
                       HeldOut(held_out, tuple(base), tuple(tuned)))
+
+
+def _fly_other(name: str, course: Course, result: TuneResult, evaluation: Evaluation
+               ) -> Tuple[FlightResult, ...]:
+    """The flights that were held out with other parameters."""
+    evaluation.watcher.expect(len(result.held_out.cases))
+    evaluation.watcher.stage(f"flying {name}")
+    other = evaluation.of(course, {"config": name, **course.identity()["config"]})
+    (flights,) = other.flown([BASE], result.held_out.cases)
+    return tuple(flights)
 
 
 def start_values(space: SearchSpace, base: Mapping[str, Any]) -> Dict[str, Any]:
