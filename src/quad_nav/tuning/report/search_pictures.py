@@ -17,7 +17,7 @@ from quad_nav.tuning.search import is_complete
 from quad_nav.tuning.space import Dimension, SearchSpace
 
 _COLUMNS = 3
-_LEAST_FOR_IMPORTANCES = 10
+_LEAST_FOR_IMPORTANCES = 20
 _TOP = 1.15  # of the axis, in parts of what most candidates cost
 
 
