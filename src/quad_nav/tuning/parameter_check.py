@@ -19,12 +19,15 @@ def parameter_faults(parameters: Sequence[Tuple[str, Any]], folder: Path, name: 
     ``parameters`` go on top of the ``folder``'s; ``name`` is where they are written.
     """
     tree = config.load_files(folder, {"i": "0"})
+    paths = []
     for path, value in parameters:
         for single in costmap_paths(path):
             set_value(tree, single, value, name)
+            paths.append(f"/{single}/")
     try:
         remarks = config.load(tree).remarks
     except InputError as error:
         return list(error.problems)
     return [f"{remark}; expected a parameter that counts in {folder}" for remark in remarks
-            if remark.origin == name and remark.kind in _NO_EFFECT]
+            if remark.kind in _NO_EFFECT and (remark.origin == name or any(
+                path.startswith(f"{remark.place}/") for path in paths))]
