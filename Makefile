@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint rostest conformance bench packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 lint rostest ray conformance bench packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
@@ -36,6 +36,12 @@ lint: venv  ## ruff and mypy
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 	@scripts/ros_env scripts/rostests $(TEST)
 
+# Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine, on loopback.
+ray: packages  ## The tests with a Ray cluster, in an environment of their own
+	@scripts/make_venv .venv-ray requirements.txt requirements-test.txt
+	@.venv-ray/bin/python3 -m pip install --quiet '.[ray]'
+	PYTHONPATH=src .venv-ray/bin/python3 -m pytest test/ray
+
 # make itself ends with 2 on any failure and names the command's own exit status in its message.
 conformance: venv  ## Compare with the original's recordings: make conformance DIR=folder
 	@$(PYTHON) test/conformance/run.py $(DIR)
@@ -60,4 +66,4 @@ clean:  ## Remove what was built, but not the virtual environments
 	find src test nodes -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean  ## Remove the virtual environments too
-	rm -rf .venv .venv38
+	rm -rf .venv .venv38 .venv-ray

@@ -2,17 +2,20 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, Iterable, Iterator, List, Sequence, Tuple
 
 from quad_nav.offline.setup import FlightSetup
 from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionOptions
+from quad_nav.tuning.evaluation import Evaluation, Watcher
 from quad_nav.tuning.flight_result import FlightResult, FlightTask
-from quad_nav.tuning.search import SearchOptions
+from quad_nav.tuning.search import SearchOptions, search
 from quad_nav.tuning.space import Assignments, Dimension, SearchSpace
-from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup
-from quad_nav.tuning.workers import Numbered, NumberedResult
+from quad_nav.tuning.study import open_study
+from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup, start_values
+from quad_nav.tuning.workers import Numbered, NumberedResult, Workers
 
 SCENE = """\
 name: small
@@ -62,6 +65,34 @@ def told(trials: Sequence[Any]) -> List[Tuple[Any, ...]]:
     """What a study consists of, less the times of day."""
     return [(trial.number, trial.state, trial.value, trial.params, trial.intermediate_values,
              trial.user_attrs) for trial in trials]
+
+
+def searched(setup: TuneSetup, workers: Workers) -> List[Tuple[Any, ...]]:
+    """The trials of the search alone."""
+    with open_study(setup.options.output, setup.identity) as study:
+        evaluation = Evaluation(setup.course, setup.space, workers, study.journal, Watcher())
+        search(evaluation, study, start_values(setup.space, setup.base), setup.options.search)
+        return told(study.trials)
+
+
+def mortal_tasks(marker: Path, deaths: int) -> List[Tuple[int, Any]]:
+    """Six flights on paper, one of which kills its worker so many times."""
+    class Mortal:
+        setup = None
+
+        def __init__(self, kills: bool):
+            self.kills = kills
+
+        @property
+        def refused(self) -> str:
+            if self.kills:
+                with marker.open("a") as file:
+                    file.write("x")
+                if len(marker.read_text()) <= deaths:
+                    os._exit(9)
+            return "flown"
+
+    return [(number, Mortal(number == 3)) for number in range(6)]
 
 
 class PaperCourse:
