@@ -36,7 +36,7 @@ lint: venv  ## ruff and mypy
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 	@scripts/ros_env scripts/rostests $(TEST)
 
-# Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine, on loopback.
+# Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
 ray: packages  ## The tests with a Ray cluster, in an environment of their own
 	@scripts/make_venv .venv-ray requirements.txt requirements-test.txt
 	@.venv-ray/bin/python3 -m pip install --quiet '.[ray]'

@@ -19,9 +19,9 @@ from quad_nav.tuning.workers import LocalWorkers, RayWorkers, fly_all  # noqa: E
 
 @pytest.fixture(scope="module")
 def workers() -> Iterator[RayWorkers]:
-    """Two workers on a cluster of one machine, on loopback."""
+    """Two workers on a cluster of one machine."""
     cluster = Cluster(initialize_head=True, head_node_args={
-        "num_cpus": 2, "node_ip_address": "127.0.0.1", "include_dashboard": False})
+        "num_cpus": 2, "include_dashboard": False})
     yield RayWorkers(cluster.address)
     ray.shutdown()
     cluster.shutdown()

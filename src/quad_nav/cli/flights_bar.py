@@ -38,6 +38,10 @@ class FlightsBar(Watcher):
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
+    def start(self) -> None:
+        """The clock of the rate starts now."""
+        self._start_s = time.monotonic()
+
     @property
     def wall_time_s(self) -> float:
         return time.monotonic() - self._start_s
@@ -46,6 +50,13 @@ class FlightsBar(Watcher):
     def per_minute(self) -> float:
         """Flights flown now, not those kept from before."""
         return 60.0 * self.flights / max(self.wall_time_s, 1e-3)
+
+    @property
+    def words(self) -> str:
+        """What was flown, for the end."""
+        kept = f"; {self.kept} were there already" if self.kept else ""
+        return (f"{self.flights} flights in {self.wall_time_s:.0f} s, {self.per_minute:.1f} a "
+                f"minute{kept}")
 
     def expect(self, flights: int) -> None:
         self._expected += flights

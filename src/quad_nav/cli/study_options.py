@@ -14,11 +14,15 @@ from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
 from quad_nav.cli.parameters import parameter
 from quad_nav.errors import InputError, QuadError
 from quad_nav.offline.barn.setup import BarnOptions
+from quad_nav.offline.setup import config_folder
 from quad_nav.shipped import shipped
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import SimulationParams
 from quad_nav.tuning.courses import Mission, MissionOptions
+from quad_nav.tuning.evaluation import Course
+from quad_nav.tuning.parameter_files import base_configuration
 from quad_nav.tuning.workers import LocalWorkers, RayWorkers, Workers
+from quad_nav.warm_up import simulate, warm_up
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -128,6 +132,12 @@ def workers_of(workers: Optional[int], ray_address: Optional[str]) -> Workers:
         InputError: there is no such cluster.
     """
     return LocalWorkers(workers) if ray_address is None else RayWorkers(ray_address, workers)
+
+
+def compile_kernels(course: Course) -> None:
+    """Once, and not in every worker at once."""
+    warm_up(base_configuration(config_folder(course.config), course.fixed))
+    simulate()
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from quad_nav.cli.study_options import (
     A_FILE,
     A_FOLDER,
     COUNT,
+    compile_kernels,
     course_of,
     faults_told,
     flown_options,
@@ -97,11 +98,16 @@ def _run(setup: SweepSetup, workers: Workers, journal: Journal, quiet: bool) -> 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     with FlightsBar(quiet) as bar:
         try:
-            return run_sweep(setup, workers, journal, bar)
+            compile_kernels(setup.course)
+            bar.start()
+            rows = run_sweep(setup, workers, journal, bar)
         except KeyboardInterrupt:
             bar.__exit__()
             click.echo("interrupted; with --journal, the same command goes on from here", err=True)
             sys.exit(EXIT_INTERRUPTED)
+    if not quiet:
+        click.echo(bar.words, err=True)
+    return rows
 
 
 def _points(over: Sequence[str], points: Optional[Path]) -> Tuple[Point, ...]:

@@ -15,6 +15,7 @@ from quad_nav.cli.study_options import (
     A_FILE,
     A_FOLDER,
     COUNT,
+    compile_kernels,
     course_of,
     faults_told,
     flown_options,
@@ -105,6 +106,8 @@ def _run(setup: TuneSetup, workers: Workers, quiet: bool) -> TuneResult:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     with FlightsBar(quiet) as bar:
         try:
+            compile_kernels(setup.course)
+            bar.start()
             result = run_tune(setup, workers, bar)
         except KeyboardInterrupt:
             bar.__exit__()
@@ -112,6 +115,5 @@ def _run(setup: TuneSetup, workers: Workers, quiet: bool) -> TuneResult:
                        "goes on from here", err=True)
             sys.exit(EXIT_INTERRUPTED)
     if not quiet:
-        click.echo(f"{bar.flights} flights in {bar.wall_time_s:.0f} s, {bar.per_minute:.1f} a "
-                   f"minute; {bar.kept} were there already", err=True)
+        click.echo(bar.words, err=True)
     return result
