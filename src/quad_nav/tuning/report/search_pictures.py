@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any, Dict, List, Sequence, Tuple
 
 import numpy as np
@@ -47,8 +48,11 @@ def importances(trials: Sequence[FrozenTrial], space: SearchSpace) -> Dict[str, 
         return {}
     study = optuna.create_study()
     study.add_trials(complete)
-    found = optuna.importance.get_param_importances(
-        study, evaluator=optuna.importance.PedAnovaImportanceEvaluator(), params=list(space.paths))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+        evaluator = optuna.importance.PedAnovaImportanceEvaluator()
+    found = optuna.importance.get_param_importances(study, evaluator=evaluator,
+                                                    params=list(space.paths))
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 
