@@ -9,7 +9,7 @@ import tabulate
 from quad_nav.offline.barn.figures import Figures as BarnFigures
 from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.figures import Figures, figures
-from quad_nav.tuning.parameter_files import Change
+from quad_nav.tuning.parameter_files import Change, base_configuration, base_value
 from quad_nav.tuning.refinement import Gain
 from quad_nav.tuning.score import TERMS
 from quad_nav.tuning.space import costmap_paths
@@ -108,9 +108,11 @@ def gain_words(gain: Gain) -> str:
 
 
 def changes(result: TuneResult) -> List[Change]:
-    """Everything to be written, each with its remark."""
+    """Everything that is not as in the base's files, each with its remark."""
     gains = {gain.path: gain for gain in result.refined.gains}
-    found = [Change(path, value, "given with --set") for path, value in result.setup.course.fixed]
+    base = base_configuration(result.setup.base_folder, ()).to_tree()
+    found = [Change(path, value, "given with --set") for path, value in result.setup.course.fixed
+             if base_value(base, path) != value]
     for one in result.setup.space.dimensions:
         gain = gains.get(one.path)
         if gain is None:
