@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import Optional, Sequence, Tuple
+from typing import Container, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -51,11 +51,14 @@ class GivingWay:
 
 
 def gives_way(position: np.ndarray, way: np.ndarray, rank_s: float, peers: Sequence[Peer],
-              apart_m: float, speed_mps: float) -> Optional[Tuple[Peer, Manner]]:
+              apart_m: float, speed_mps: float, standing: Container[str] = ()
+              ) -> Optional[Tuple[Peer, Manner]]:
     """To whom a robot gives way, and how; None when it goes.
 
     The robot is at ``position``, float64[2], and follows ``way``, float64[n, 2]; centres
     are to stay ``apart_m`` from each other. Of several peers the first in rank counts.
+    Nobody waits for those ``standing``, by name; but who is in their way makes room, for
+    it may be why they stand.
     """
     own = positions_ahead(position, way, speed_mps, _TIMES_S)
     for peer in sorted(peers, key=lambda peer: peer.intention.rank_s):
@@ -64,7 +67,7 @@ def gives_way(position: np.ndarray, way: np.ndarray, rank_s: float, peers: Seque
         theirs = track(peer, speed_mps)
         if comes_near(position, theirs, apart_m):
             return peer, Manner.LEAVE
-        if _meet(own, theirs, apart_m):
+        if peer.name not in standing and _meet(own, theirs, apart_m):
             return peer, Manner.WAIT
     return None
 

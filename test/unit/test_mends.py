@@ -17,7 +17,7 @@ TREE = {name: {"observation_sources": "scan", "scan": LIDAR, "obstacle_range": 5
         for name in ("global_costmap", "local_costmap")}
 OFF = {"progress_timeout": 0.0, "stuck_cost_factor": 1.0, "sensor_timeout": 0.0,
        "clear_any_obstacle_layer": False, "refuse_colliding_escape": False,
-       "predict_goal_turn": False, "stop_after_rotation": False, "keep_off_peers": False,
+       "leave_contact": False, "predict_goal_turn": False, "stop_after_rotation": False, "keep_off_peers": False,
        "make_room_when_idle": False}
 HERE = Pose2D(5.0, 5.0)
 
