@@ -11,7 +11,6 @@ from quad_nav.grid import INSCRIBED, GridSpec
 from quad_nav.kernels.discs import nearest_cell, raise_discs
 from quad_nav.peers import thinned
 
-
 COMFORTABLE = 128  # who stands where costs are lower has room to turn
 
 

@@ -17,7 +17,7 @@ from quad_nav.costmap.peers import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.mends import Mends
-from quad_nav.peers import IDLE_RANK_S, Peer
+from quad_nav.peers import Peer
 from quad_nav.refuge import can_be_reached, find_refuge
 from quad_nav.right_of_way import (
     EARLIER_LATER_S,
@@ -55,7 +55,6 @@ class Traffic:
         self.peers: List[Peer] = []
         self._global, self._local = global_costmap, local_costmap
         self.cruising_mps = CRUISING_MPS
-        self._radius_m = 0.0
         self._margin_m = 0.0
         self._wait_until_s = -math.inf
         self._look_again_s = -math.inf
@@ -84,7 +83,6 @@ class Traffic:
         news += [f"{name} is heard of again" for name in self._lost
                  if any(p.name == name for p in fresh)]
         self._lost = lost
-        self._radius_m = self._local.circumscribed_radius_m
         self._margin_m = mends.peer_margin_m
         self.peers = [peer.moved_to(now_s) for peer in fresh if self._matters(peer, here)]
         self._newcomers += [p.name for p in self.peers if p.name not in self._standing]
@@ -104,6 +102,10 @@ class Traffic:
         """How far away a peer may be and still matter: to meet it, or to see it by LIDAR."""
         meeting_m = 2.0 * (self.cruising_mps * HORIZON_S + self.apart_m)
         return max(meeting_m, self._marked_up_to_m() + self.apart_m)
+
+    @property
+    def _radius_m(self) -> float:
+        return self._local.circumscribed_radius_m
 
     @property
     def keep_off_m(self) -> float:
@@ -142,8 +144,8 @@ class Traffic:
                     layer.see(shown)
                 elif isinstance(layer, ObstacleLayer):
                     layer.left_out = np.column_stack((points, np.full(len(points), seen_m)))
-                    for k in new:  # until now the LIDAR took it for an obstacle
-                        layer.free_square(*points[k], 2.0 * seen_m)
+                    for x_m, y_m in points[new]:  # until now the LIDAR took it for an obstacle
+                        layer.free_square(float(x_m), float(y_m), 2.0 * seen_m)
 
     def _marked_up_to_m(self) -> float:
         """How far away a LIDAR's point may be and still be marked."""

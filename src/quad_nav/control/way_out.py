@@ -11,8 +11,9 @@ from typing import Optional
 
 import numpy as np
 
+from quad_nav.footprint import radii
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
-from quad_nav.grid import INSCRIBED, GridSpec
+from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
 
 SPEED_MPS, TURN_RADPS = 0.1, 0.4
 _STEPS_M = np.array([0.05, 0.1, 0.15])
@@ -50,11 +51,8 @@ def way_out(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray, pose: Pose
 
 def is_round(footprint: np.ndarray) -> bool:
     """Whether a footprint, float64[n, 2], is nearly a circle around the robot's centre."""
-    if len(footprint) < 3:
-        return True
-    outline = np.vstack((footprint, footprint[:1]))
-    middles = 0.5 * (outline[1:] + outline[:-1])
-    return bool(np.hypot(*middles.T).min() > _ROUND * np.hypot(*footprint.T).max())
+    inscribed_m, circumscribed_m = radii(footprint)
+    return inscribed_m >= _ROUND * circumscribed_m
 
 
 def _costs_around(spec: GridSpec, costs: np.ndarray, pose: Pose2D) -> np.ndarray:
@@ -65,4 +63,4 @@ def _costs_around(spec: GridSpec, costs: np.ndarray, pose: Pose2D) -> np.ndarray
     rows = np.floor((y - spec.origin_y_m) / spec.resolution_m).astype(int)
     inside = (columns >= 0) & (columns < spec.size_x) & (rows >= 0) & (rows < spec.size_y)
     found = costs[np.where(inside, rows, 0), np.where(inside, columns, 0)].astype(int)
-    return np.where(inside, found, 255)
+    return np.where(inside, found, UNKNOWN)
