@@ -52,7 +52,8 @@ class Flown:
     faults: Tuple[str, ...]
 
     def __str__(self) -> str:
-        return f"{self.encounter} seed {self.seed}: " + "; ".join(self.contacts + self.faults)
+        told = self.contacts + self.faults or (f"{sum(self.reached)} goals in {self.time_s:.0f} s",)
+        return f"{self.encounter} seed {self.seed}: " + "; ".join(told)
 
 
 def options_of(encounter: str, seed: int, config: str) -> FlightOptions:
@@ -117,7 +118,7 @@ def main(encounters: Sequence[str], config: str, seeds: int, first_seed: int, jo
     for one in track(_fly_all(tasks, config, jobs), "flights", total=len(tasks),
                      disable=not sys.stderr.isatty()):
         flights.append(one)
-        if one.contacts or one.faults:
+        if one.contacts or one.faults or not sys.stderr.isatty():
             print(one, file=sys.stderr, flush=True)
     rows = [row(name, [one for one in flights if one.encounter == name]) for name in encounters]
     print(f"Encounters offline, config {config}, seeds {first_seed} to {first_seed + seeds - 1}")
