@@ -27,6 +27,7 @@ _TIMES_S = np.arange(0.0, HORIZON_S + 1e-9, _STEP_S)
 _STEPS_APART = np.abs(np.subtract.outer(np.arange(len(_TIMES_S)), np.arange(len(_TIMES_S))))
 _MEETING = _STEPS_APART * _STEP_S <= EARLIER_LATER_S + 1e-9
 _NEARER_M = 0.05  # what counts as coming nearer
+_WHY_IT_STANDS = 2.0  # times apart_m: who is farther away cannot be what a peer stands for
 
 
 class Manner(enum.Enum):
@@ -57,17 +58,20 @@ def gives_way(position: np.ndarray, way: np.ndarray, rank_s: float, peers: Seque
 
     The robot is at ``position``, float64[2], and follows ``way``, float64[n, 2]; centres
     are to stay ``apart_m`` from each other. Of several peers the first in rank counts.
-    Nobody waits for those ``standing``, by name; but who is in their way makes room, for
-    it may be why they stand.
+    Nobody waits for those ``standing``, by name; but who is near and in their way makes
+    room, for it may be why they stand.
     """
     own = positions_ahead(position, way, speed_mps, _TIMES_S)
     for peer in sorted(peers, key=lambda peer: peer.intention.rank_s):
         if peer.intention.rank_s >= rank_s or peer.is_parked:
             continue
+        stands = peer.name in standing
+        if stands and np.hypot(*(peer.position - position)) > _WHY_IT_STANDS * apart_m:
+            continue
         theirs = track(peer, speed_mps)
         if comes_near(position, theirs, apart_m):
             return peer, Manner.LEAVE
-        if peer.name not in standing and _meet(own, theirs, apart_m):
+        if not stands and _meet(own, theirs, apart_m):
             return peer, Manner.WAIT
     return None
 

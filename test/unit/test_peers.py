@@ -214,7 +214,7 @@ def test_for_a_parked_one_nobody_gives_way():
 
 def test_nobody_waits_for_one_that_stands_but_who_is_in_its_way_makes_room():
     standing = peer(1.0, 0.0, rank_s=0.0, way=[(1.0, 0.0), (6.0, 0.0)])
-    for at, manner in ([(2.5, -1.2), None], [(2.5, -0.5), Manner.LEAVE]):
+    for at, manner in ([(2.5, -1.2), None], [(2.5, -0.5), Manner.LEAVE], [(3.0, 0.0), None]):
         found = gives_way(np.array(at), np.array([at, (2.5, 3.0)]), 1.0, [standing], APART_M,
                           CRUISING_MPS, {"other"})
         assert (found and found[1]) == manner
