@@ -22,8 +22,8 @@ def setup_of(goals: str, seed: int = 0, time_limit_s: float = 150.0):
     beams = LidarParams(step_size_rad=LidarParams().scan_range_rad / 256)
     return read_setup(FlightOptions(
         shipped("scenes", f"encounters/{LOOPS.get(goals, goals)}.yaml"),
-        shipped("goals", f"encounters/{goals}"), seed=seed, time_limit_s=time_limit_s, scans_per_s=10.0,
-        simulation=SimulationParams(beams, jitter_m=0.3)))
+        shipped("goals", f"encounters/{goals}"), seed=seed, time_limit_s=time_limit_s,
+        scans_per_s=10.0, simulation=SimulationParams(beams, jitter_m=0.3)))
 
 
 def test_every_scene_has_goals_and_every_goal_a_scene():
