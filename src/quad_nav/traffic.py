@@ -65,7 +65,7 @@ class Traffic:
     def restart(self) -> None:
         """For a clock that has jumped: forgets what it has seen."""
         self.peers, self._lost, self._newcomers, self._standing = [], [], [], {}
-        self._wait_until_s = -math.inf
+        self._wait_until_s = self._look_again_s = -math.inf
 
     # -- what is seen ----------------------------------------------------------------
 
