@@ -9,10 +9,10 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint rostest ray conformance bench packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 lint rostest ray conformance bench bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
-	@sed -nE 's/^([a-z0-9]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
+	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
 
 # make itself ends with 2 on any failure and names the sequencer's own exit status in its message.
 fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
@@ -50,6 +50,9 @@ bench: venv  ## How long the navigator's parts take, beside the original, scans 
 	PYTHONPATH=src $(PYTHON) bench/navigation.py
 	PYTHONPATH=src $(PYTHON) bench/lidar.py
 	PYTHONPATH=src $(PYTHON) bench/flight.py
+
+bench-fleets: venv  ## Whether fleets get through without touching: make bench-fleets ARGS="swap 8in12"
+	PYTHONPATH=src $(PYTHON) bench/encounters.py $(ARGS)
 
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)

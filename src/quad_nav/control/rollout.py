@@ -28,7 +28,7 @@ from quad_nav.control.cost_cloud import cost_cloud
 from quad_nav.control.map_grid import distance_grids
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
+from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels import collision
 from quad_nav.kernels import rollout as kernel
 
@@ -89,9 +89,14 @@ class Rollout:
                               _twist_triple(command)).cost >= 0.0
 
     def is_free(self, pose: Pose2D) -> bool:
-        """Whether the footprint hits nothing at a pose."""
-        return collision.footprint_cost(
-            self.scene.window, self.scene.footprint, *_triple(pose)) >= 0.0
+        """Whether nothing is under the footprint at a pose, within its outline neither."""
+        window, footprint = self.scene.window, self.scene.footprint
+        if collision.footprint_cost(window, footprint, *_triple(pose)) < 0.0:
+            return False
+        inside = np.zeros(window.costs.shape, dtype=np.bool_)
+        if len(footprint) > 2:
+            collision.mark_footprint(window, footprint, *_triple(pose), inside)
+        return not bool((window.costs[inside] >= LETHAL).any())
 
     def _simulate(self, pose: Triple, velocity: Triple, sample: Triple) -> Trajectory:
         row = np.array(sample)
