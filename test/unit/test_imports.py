@@ -13,7 +13,8 @@ PACKAGE = "quad_nav"
 
 # A unit (a module or subpackage of quad_nav) imports itself and units of the rows above its own.
 LAYERS = [
-    {"errors", "footprint", "geometry", "grid", "mends", "peers", "shipped", "versions"},
+    {"errors", "footprint", "geometry", "grid", "mends", "peers", "plain_yaml", "shipped",
+     "user_files", "versions"},
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},

@@ -15,7 +15,7 @@
 ``bottom`` (default 0) lifts an obstacle off the floor. Instead of drawing the place itself
 a scene may take it from another file, with its own obstacles on top:
 
-    world: depot.world             # or map: office.yaml; beside this file, or an absolute path
+    world: depot.world             # or map: office.yaml; in this file's folder or below it
     unknown: free                  # or occupied: what cells of a map that nobody saw are
 
 Then ``size`` with ``origin`` may be left out, for the extent of the solids or of the map,
@@ -44,6 +44,7 @@ from quad_nav.sim.scene import (
     Walls,
 )
 from quad_nav.sim.surroundings import Surroundings, from_map, from_world
+from quad_nav.user_files import named_in
 
 _KEYS = ["name", "size", "origin", "altitude", "walls", "obstacles", "starts", "world", "map",
          "unknown"]
@@ -52,6 +53,7 @@ _SHAPE_KEYS = {"box": ["name", "shape", "centre", "size", "height", "yaw", "bott
                "sphere": ["name", "shape", "centre", "radius", "bottom"]}
 _WORLD_SUFFIXES = (".world", ".sdf")
 _MAX_SIZE_M = 1e5
+MAX_STARTS = 1000
 
 
 def load_scene(path: Union[str, Path]) -> Scene:
@@ -118,7 +120,7 @@ def _read_surroundings(check: Checker, fields: Dict[str, Any], folder: Path, hei
                        ) -> Optional[Surroundings]:
     """The world or map that the scene takes its place from, if it does."""
     unknown = fields.get("unknown", "free")
-    if unknown not in ("free", "occupied"):
+    if not isinstance(unknown, str) or unknown not in ("free", "occupied"):
         check.fault("unknown", f"{kind(unknown)}, expected free or occupied")
     if "unknown" in fields and "map" not in fields:
         check.fault("unknown", "belongs to a map, expected the key map too")
@@ -127,9 +129,10 @@ def _read_surroundings(check: Checker, fields: Dict[str, Any], folder: Path, hei
         return None
     try:
         if "world" in fields:
-            return from_world(folder / check.text(fields, "world", "", "."), model_path())
+            return from_world(named_in(folder, check.text(fields, "world", "", ".")),
+                              model_path())
         if "map" in fields:
-            return from_map(folder / check.text(fields, "map", "", "."), height_m,
+            return from_map(named_in(folder, check.text(fields, "map", "", ".")), height_m,
                             unknown == "occupied")
     except InputError as error:
         check.problems += error.problems
@@ -197,6 +200,9 @@ def _read_starts(check: Checker, fields: Dict[str, Any], around: Optional[Surrou
                  ) -> List[Optional[Pose2D]]:
     is_elsewhere = "world" in fields or "map" in fields
     starts = check.sequence(fields, "starts", [] if is_elsewhere else None)
+    if len(starts) > MAX_STARTS:
+        check.fault("starts", f"{len(starts)} poses, expected {MAX_STARTS} at most")
+        return []
     if fields.get("starts") == []:
         check.fault("starts", "no start pose, expected at least one [x, y, yaw]")
     return [_read_start(check, entry, f"starts[{k}]") for k, entry in enumerate(starts)]
