@@ -7,14 +7,19 @@ the corpus stays small. Ends with 1 at the first fault, whose input is kept besi
 """
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import sys
 import tempfile
 from pathlib import Path
 
 import atheris
 
-with atheris.instrument_imports(include=["quad_nav", "PIL", "yaml", "rosbags", "mcap"],
-                                exclude=["quad_nav.kernels"]):  # numba compiles no hooks
+from quad_nav import kernels
+
+for module in pkgutil.iter_modules(kernels.__path__):  # numba cannot compile atheris's hooks
+    importlib.import_module(f"{kernels.__name__}.{module.name}")
+with atheris.instrument_imports(include=["quad_nav", "PIL", "yaml", "rosbags", "mcap"]):
     from targets import TARGETS, run
 
 

@@ -64,7 +64,7 @@ def world(data: bytes) -> None:
 def parameters(data: bytes) -> None:
     """One of move_base's four files; the others are the tutorial's."""
     for name in REQUIRED:
-        _written(f"{name}.yaml", shipped("config", "tutorial").joinpath(f"{name}.yaml").read_bytes())
+        _written(f"{name}.yaml", shipped("config", f"tutorial/{name}.yaml").read_bytes())
     for name in REQUIRED:
         path = _folder() / f"{name}.yaml"
         usual = path.read_bytes()

@@ -13,6 +13,7 @@ from quad_nav.errors import InputError
 from quad_nav.face.contacts import NAME, contact_from_values
 from quad_nav.face.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC, from_text
 from quad_nav.mission.flight_log import Contact
+from quad_nav.offline.bag_file import Message, read_messages
 from quad_nav.offline.bag_info import (
     LONGEST_S,
     MOST_ROBOTS,
@@ -21,7 +22,6 @@ from quad_nav.offline.bag_info import (
     checked_pose,
     finite,
 )
-from quad_nav.offline.bag_file import Message, read_messages
 from quad_nav.offline.bag_robot import BagRobot
 from quad_nav.offline.record_messages import pose_from, stamp_ns
 from quad_nav.offline.trace import FlightTrace

@@ -37,6 +37,13 @@ class Sensor:
         self.subscriber = rospy.Subscriber(
             topic, MESSAGE_TYPES[data_type], self._store, queue_size=QUEUE_LENGTH)
 
+    @property
+    def expected_period_s(self) -> float:
+        """How often something is to come for every layer to be current, 0 if none minds."""
+        periods_s = [layer.buffers[source].params.expected_update_period_s
+                     for _, layer, source, _ in self.targets]
+        return min((period_s for period_s in periods_s if period_s > 0.0), default=0.0)
+
     def _store(self, message) -> None:
         with self._lock:
             self.waiting.append((message, rospy.get_time()))

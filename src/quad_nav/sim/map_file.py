@@ -183,7 +183,8 @@ def _read_fields(check: Checker, document: Any, folder: Path) -> Optional[MapFie
     if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
         check.fault("resolution", f"{resolution_m:g} m, expected {MIN_RESOLUTION_M:g} to "
                     f"{MAX_RESOLUTION_M:g}")
-    return MapFields(_image_path(check, folder, image), resolution_m, origin, bool(negate), occupied, free, mode)
+    return MapFields(_image_path(check, folder, image), resolution_m, origin, bool(negate),
+                     occupied, free, mode)
 
 
 def _image_path(check: Checker, folder: Path, image: str) -> Path:
