@@ -21,17 +21,22 @@ class PlainLoader(yaml.SafeLoader):
 
     def __init__(self, stream: Any):
         super().__init__(stream)
-        self._levels = 0
+        self._levels = self._nodes = 0
         self._extents: Dict[yaml.Node, Tuple[int, int]] = {}
 
     def compose_node(self, parent: Optional[yaml.Node], index: Any) -> Optional[yaml.Node]:
-        mark = self.peek_event().start_mark
+        mark, is_alias = self.peek_event().start_mark, self.check_event(yaml.AliasEvent)
         self._levels += 1
         if self._levels > MOST_LEVELS:
             raise _refusal(f"more than {MOST_LEVELS} levels inside each other", mark)
+        self._nodes += 1
+        if self._nodes > MOST_NODES:  # without waiting for the end of what they are in
+            raise _refusal(f"more than {MOST_NODES} values", mark)
         node = super().compose_node(parent, index)
         self._levels -= 1
         if node is not None and node not in self._extents:
+            if is_alias:  # of something that has not come to its end yet
+                raise _refusal("an alias stands in what it stands for", mark)
             self._extents[node] = self._extent(node, mark)
         return node
 
@@ -42,8 +47,6 @@ class PlainLoader(yaml.SafeLoader):
         below = list(node.value)
         if isinstance(node, yaml.MappingNode):
             below = [one for pair in node.value for one in pair]
-        if not all(one in self._extents for one in below):
-            raise _refusal("an alias stands in what it stands for", mark)
         extents = [self._extents[one] for one in below]
         nodes = 1 + sum(count for count, _ in extents)
         levels = 1 + max((levels for _, levels in extents), default=0)

@@ -22,20 +22,20 @@ def open_file(path: Path, most_bytes: Optional[int] = None) -> BinaryIO:
     at once, without waiting for it. Raises ``InputError``."""
     try:
         # Without O_NONBLOCK, opening a pipe waits for somebody to write to it.
-        file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb")
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except (OSError, ValueError) as error:  # ValueError: a name with a NUL in it
         why = getattr(error, "strerror", None) or error
         raise InputError([f"{path}: cannot be read: {why}; expected a file"]) from error
-    status = os.fstat(file.fileno())
+    status = os.fstat(descriptor)
     problem = ""
     if not stat.S_ISREG(status.st_mode):
         problem = f"is {_kind(status.st_mode)}; expected a file"
     elif most_bytes is not None and status.st_size > most_bytes:
         problem = f"has {status.st_size} bytes; expected {most_bytes} at most"
     if problem:
-        file.close()
+        os.close(descriptor)
         raise InputError([f"{path}: {problem}"])
-    return file
+    return os.fdopen(descriptor, "rb")
 
 
 def read_bytes(path: Path, most_bytes: int) -> bytes:

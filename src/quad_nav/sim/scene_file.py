@@ -63,13 +63,14 @@ def load_scene(path: Union[str, Path]) -> Scene:
     Raises ``InputError`` with one line per fault.
     """
     path = Path(path)
+    place = path.resolve() if path.is_symlink() else path  # files beside it are looked for there
     if path.suffix in _WORLD_SUFFIXES:
-        document: Any = {"world": path.name}
+        document: Any = {"world": place.name}
     else:
         document = read_yaml(path)
         if isinstance(document, dict) and "image" in document:
-            document = {"map": path.name}
-    return scene_from_document(document, str(path), path.stem, path.parent)
+            document = {"map": place.name}
+    return scene_from_document(document, str(path), path.stem, place.parent)
 
 
 def scene_from_document(document: Any, source: str, default_name: str = "scene",

@@ -18,9 +18,9 @@ from defusedxml.common import DefusedXmlException
 from quad_nav.errors import InputError
 from quad_nav.user_files import read_bytes
 
-MAX_BYTES = 16 * 1024 * 1024
+MAX_BYTES = 32 * 1024 * 1024
 MAX_DEPTH = 100
-MAX_ELEMENTS = 200_000
+MAX_ELEMENTS = 1_000_000
 
 
 @dataclass
