@@ -8,7 +8,13 @@ import pytest
 
 from quad_nav.config.files import load_files
 from quad_nav.errors import MOST_PROBLEMS, InputError
-from quad_nav.mission.goal_file import MOST_BYTES, MOST_GOALS, WatchedGoalFile, load_goals, parse_goals
+from quad_nav.mission.goal_file import (
+    MOST_BYTES,
+    MOST_GOALS,
+    WatchedGoalFile,
+    load_goals,
+    parse_goals,
+)
 from quad_nav.offline.bag_trace import read_trace
 from quad_nav.offline.barn.worlds import load_worlds
 from quad_nav.sim.scene_file import load_scene
@@ -110,8 +116,9 @@ def folder(tmp_path, monkeypatch):
     """Beside a scene of somebody else's that must not be reached from the folder ``given``."""
     monkeypatch.delenv("QUAD_FILES_PATH", raising=False)
     (tmp_path / "secret.world").write_text(
-        '<sdf version="1.6"><model name="m"><pose>1 1 0.5 0 0 0</pose><link name="l"><collision name="c"><geometry><box>'
-        "<size>1 1 1</size></box></geometry></collision></link></model></sdf>")
+        '<sdf version="1.6"><model name="m"><pose>1 1 0.5 0 0 0</pose><link name="l">'
+        '<collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision></link>'
+        "</model></sdf>")
     (tmp_path / "given" / "sub").mkdir(parents=True)
     return tmp_path / "given"
 
@@ -123,8 +130,8 @@ def scene(folder, world):
 
 
 def test_a_link_that_the_user_names_is_followed(folder):
-    (folder / "mine.world").symlink_to(folder.parent / "secret.world")
-    assert load_scene(folder / "mine.world").name == "mine"
+    (folder / "mine.yaml").symlink_to(scene(folder.parent, "secret.world"))
+    assert len(load_scene(folder / "mine.yaml").obstacles) == 1
 
 
 @pytest.mark.parametrize("way", ["../secret.world", "sub/../../secret.world", "{outside}",
@@ -147,8 +154,9 @@ def test_what_the_user_allows_may_be_reached(folder, monkeypatch):
 
 
 def test_an_image_leads_nowhere_outside_its_maps_folder(folder):
-    (folder / "map.yaml").write_text("image: ../../etc/passwd\nresolution: 0.05\norigin: [0, 0, 0]\n"
-                                     "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n")
+    (folder / "map.yaml").write_text(
+        "image: ../../etc/passwd\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.2\n")
     assert "leads out of" in refusal(load_scene, folder / "map.yaml")
 
 
@@ -171,10 +179,10 @@ def test_links_in_a_circle_are_no_file(folder):
 
 
 def test_a_recordings_scene_names_no_file(tmp_path):
+    from quad_nav.geometry import Pose3D
     from quad_nav.offline import record_messages as messages
     from quad_nav.offline.record_file import create
     from quad_nav.offline.record_messages import encode, odometry
-    from quad_nav.geometry import Pose3D
 
     path = tmp_path / "flight.bag"
     file = create(path)
