@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint rostest ray conformance bench bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 lint rostest ray conformance fuzz bench bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
@@ -45,6 +45,10 @@ ray: packages  ## The tests with a Ray cluster, in an environment of their own
 # make itself ends with 2 on any failure and names the command's own exit status in its message.
 conformance: venv  ## Compare with the original's recordings: make conformance DIR=folder
 	@$(PYTHON) test/conformance/run.py $(DIR)
+
+fuzz: venv  ## Feed what reads files with made-up bytes: make fuzz TARGET=scene SECONDS=60
+	@scripts/make_venv .venv requirements-fuzz.txt
+	PYTHONPATH=src $(PYTHON) test/fuzz/run.py $(TARGET) $(SECONDS)
 
 bench: venv  ## How long the navigator's parts take, beside the original, scans and flights
 	PYTHONPATH=src $(PYTHON) bench/navigation.py

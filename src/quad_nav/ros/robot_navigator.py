@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 
 from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
+from quad_nav.face.incoming import twist_problem
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.ros import sensors, static_maps
 from quad_nav.ros.convert import twist_from_message
@@ -95,7 +96,12 @@ class RobotNavigator:
     # -- callbacks -----------------------------------------------------------------
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._velocity = twist_from_message(message.twist.twist)
+        velocity = twist_from_message(message.twist.twist)
+        problem = twist_problem(velocity)
+        if problem:
+            rospy.logwarn_throttle(WARN_AGAIN_S, f"{self._name}odometry is dropped: {problem}")
+        else:
+            self._velocity = velocity
 
     def _on_reconfigure(self, namespace: str, changes: dict) -> config.Configuration:
         with self._lock:

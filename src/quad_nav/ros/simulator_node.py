@@ -21,6 +21,7 @@ from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError
+from quad_nav.face.incoming import twist_problem
 from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.marker_messages import goal_spheres
 from quad_nav.ros.simulator_setup import (
@@ -175,7 +176,7 @@ class SimulatorNode:
         while self._commands:
             robot, message = self._commands.popleft()
             twist = twist_from_message(message)
-            if twist.is_finite:
+            if not twist_problem(twist):
                 self._simulation.set_command(robot, twist)
             else:
                 rospy.logwarn_throttle(5.0, "/cmd_vel%d: dropped, expected finite numbers: %s",
