@@ -29,7 +29,7 @@ def test_scans_that_are_dropped(odd):
 
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(ODD, ODD, ODD, ODD, st.lists(ODD, max_size=20), st.booleans())
-def test_scans_that_are_taken_give_a_point_for_a_beam_at_most(low_rad, step_rad, low_m, high_m, ranges, inf):
+def test_scans_that_are_taken_give_a_point_a_beam(low_rad, step_rad, low_m, high_m, ranges, inf):
     taken = scan(low_rad, step_rad, low_m, high_m, ranges)
     if incoming.scan_problem(taken):
         return

@@ -8,6 +8,7 @@ import pytest
 
 from quad_nav.config.files import load_files
 from quad_nav.errors import MOST_PROBLEMS, InputError
+from quad_nav.geometry import Pose3D
 from quad_nav.mission.goal_file import (
     MOST_BYTES,
     MOST_GOALS,
@@ -15,8 +16,11 @@ from quad_nav.mission.goal_file import (
     load_goals,
     parse_goals,
 )
+from quad_nav.offline import bag_trace
+from quad_nav.offline import record_messages as messages
 from quad_nav.offline.bag_trace import read_trace
 from quad_nav.offline.barn.worlds import load_worlds
+from quad_nav.offline.record_file import create
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.user_files import named_in, open_file, read_bytes, read_text
 
@@ -178,22 +182,33 @@ def test_links_in_a_circle_are_no_file(folder):
     assert "cannot be" in refusal(lambda: open_file(named_in(folder, "a")))
 
 
-def test_a_recordings_scene_names_no_file(tmp_path):
-    from quad_nav.geometry import Pose3D
-    from quad_nav.offline import record_messages as messages
-    from quad_nav.offline.record_file import create
-    from quad_nav.offline.record_messages import encode, odometry
-
-    path = tmp_path / "flight.bag"
+def recording(path, text):
+    """A flight of one instant that is told by ``text``."""
     file = create(path)
     handle = file.add_topic("/quad/flight", "std_msgs/String", True, "/simulator")
-    file.write(handle, 10**9, encode(messages.text('{"scene": {"map": "/etc/map.yaml"}}')))
+    file.write(handle, 10**9, messages.encode(messages.text(text)))
     handle = file.add_topic("/odom0", "nav_msgs/Odometry", False, "/simulator")
-    still = odometry(Pose3D(1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0),
-                     ("odom0", "base_link0"), 10**9)
-    file.write(handle, 10**9, encode(still))
+    still = messages.odometry(Pose3D(1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0),
+                              ("odom0", "base_link0"), 10**9)
+    file.write(handle, 10**9, messages.encode(still))
     file.close()
+    return path
+
+
+def test_a_recordings_scene_names_no_file(tmp_path):
+    path = recording(tmp_path / "flight.bag", '{"scene": {"map": "/etc/map.yaml"}}')
     assert "scene: names another file" in refusal(read_trace, path)
+
+
+@pytest.mark.parametrize("name", ["flight.bag", "flight.mcap"])
+def test_a_recording_that_unpacks_to_far_more_is_refused(tmp_path, monkeypatch, name):
+    path = recording(tmp_path / name, " " * 200_000_000 + "{}")
+    assert path.stat().st_size < 2_000_000
+    monkeypatch.setattr(bag_trace, "MOST_MEMORY_BYTES", 100_000_000)
+    problem = refusal(read_trace, path)  # lz4 says it in its own words
+    assert "needs more than 0.1 GB of memory" in problem or "Failed to resize buffer" in problem
+    monkeypatch.undo()
+    assert len(read_trace(path).robots) == 1
 
 
 def test_worlds_that_include_each_other_come_to_an_end(tmp_path):

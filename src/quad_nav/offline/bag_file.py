@@ -43,6 +43,8 @@ def read_messages(path: Path, wanted: Wanted) -> Iterator[Message]:
                           "recorded flight"]) from error
     except (ReaderError, McapError) as error:
         raise InputError([f"{path}: {_why(error)}"]) from error
+    except MemoryError:
+        raise
     except Exception as error:
         # What the two libraries raise for damaged files is not their own errors alone:
         # struct's, lz4's and AssertionError are among it.

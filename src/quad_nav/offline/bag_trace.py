@@ -23,11 +23,14 @@ from quad_nav.offline.bag_info import (
     finite,
 )
 from quad_nav.offline.bag_robot import BagRobot
+from quad_nav.offline.memory import at_most_more
 from quad_nav.offline.record_messages import pose_from, stamp_ns
 from quad_nav.offline.trace import FlightTrace
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import scene_from_document
 
+MOST_MEMORY_BYTES = 4 * 10 ** 9
+"""For a recording that is read; what is packed in it may be a thousand times larger."""
 LONGEST_FLIGHT_S = 30 * 24 * 3600.0
 """Stamps of two clocks in one recording are decades apart."""
 _CONTACTS_TOPIC = "/simulation/contacts"
@@ -50,6 +53,15 @@ def read_trace(path: Path) -> FlightTrace:
     Raises:
         InputError: no recording, a damaged one, or one without odometry.
     """
+    try:
+        with at_most_more(MOST_MEMORY_BYTES):
+            return _read(path)
+    except MemoryError as error:
+        raise InputError([f"{path}: needs more than {MOST_MEMORY_BYTES / 1e9:g} GB of memory, "
+                          "expected less; `rosbag filter` makes a shorter recording"]) from error
+
+
+def _read(path: Path) -> FlightTrace:
     reading = _Reading()
     for message in read_messages(path, _is_wanted):
         try:

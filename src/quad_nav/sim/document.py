@@ -14,7 +14,7 @@ from quad_nav.user_files import read_text
 
 LARGEST = 1e6
 """No length, height or angle in a scene is beyond it."""
-_LONGEST_TEXT = 200
+LONGEST_TEXT = 200
 
 
 def read_yaml(path: Path) -> Any:
@@ -60,10 +60,10 @@ class Checker:
 
     def text(self, fields: Dict[str, Any], key: str, place: str, default: str) -> str:
         value = fields.get(key, default)
-        if not isinstance(value, str) or not 0 < len(value) <= _LONGEST_TEXT or (
+        if not isinstance(value, str) or not 0 < len(value) <= LONGEST_TEXT or (
                 not value.isprintable()):
             self.fault(_join(place, key), f"{kind(value)}, expected a text of 1 to "
-                       f"{_LONGEST_TEXT} characters that can be printed")
+                       f"{LONGEST_TEXT} characters that can be printed")
             return default
         return value
 
@@ -133,4 +133,4 @@ def _join(place: str, key: Any) -> str:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST_TEXT else text[:_LONGEST_TEXT] + "..."
+    return text if len(text) <= LONGEST_TEXT else text[:LONGEST_TEXT] + "..."

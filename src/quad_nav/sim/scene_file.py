@@ -52,7 +52,7 @@ _SHAPE_KEYS = {"box": ["name", "shape", "centre", "size", "height", "yaw", "bott
                "cylinder": ["name", "shape", "centre", "radius", "height", "bottom"],
                "sphere": ["name", "shape", "centre", "radius", "bottom"]}
 _WORLD_SUFFIXES = (".world", ".sdf")
-_MAX_SIZE_M = 1e5
+MAX_SIZE_M = 1e5
 MAX_STARTS = 1000
 
 
@@ -160,8 +160,8 @@ def _read_arena(check: Checker, fields: Dict[str, Any], around: Optional[Surroun
         x, y, end_x, end_y = around.extent
         return (x, y, end_x - x, end_y - y)
     size = check.numbers(fields, "size", "", 2, positive=True)
-    if max(size) > _MAX_SIZE_M:
-        check.fault("size", f"{max(size):g} m, expected {_MAX_SIZE_M:g} m at most")
+    if max(size) > MAX_SIZE_M:
+        check.fault("size", f"{max(size):g} m, expected {MAX_SIZE_M:g} m at most")
     origin = (check.numbers(fields, "origin", "", 2) if "origin" in fields or is_elsewhere
               else (0.0, 0.0))
     return (*origin, *size)
