@@ -10,6 +10,7 @@ from typing import Any, List, Optional, Sequence, TextIO, Tuple
 import click
 import yaml
 
+from quad_nav import plain_yaml
 from quad_nav.cli import EXIT_INTERRUPTED, EXIT_SUCCESS
 from quad_nav.cli.flights_bar import FlightsBar
 from quad_nav.cli.study_options import (
@@ -127,7 +128,7 @@ def _axis(text: str) -> Tuple[str, List[Any]]:
     """A path and its values, each written as in YAML."""
     path, equals, words = text.partition("=")
     try:
-        values = yaml.safe_load(f"[{words}]") if equals and path.strip("/") else []
+        values = plain_yaml.load(f"[{words}]") if equals and path.strip("/") else []
     except yaml.YAMLError:
         values = []
     if not values or any(isinstance(value, (dict, list)) or value is None for value in values):

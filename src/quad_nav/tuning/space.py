@@ -20,7 +20,9 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import yaml
 
+from quad_nav import plain_yaml
 from quad_nav.errors import InputError
+from quad_nav.user_files import read_text
 
 COSTMAPS = ("global_costmap", "local_costmap")
 BOTH = "*_costmap"
@@ -119,8 +121,8 @@ def load_space(path: Path) -> SearchSpace:
         InputError: every fault in it.
     """
     try:
-        entries = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        entries = plain_yaml.load(read_text(path, plain_yaml.MOST_BYTES))
+    except yaml.YAMLError as error:
         raise InputError([f"{path}: cannot be read: {error}"]) from error
     if not isinstance(entries, dict) or not entries:
         raise InputError([f"{path}: expected parameters with their ranges, as "

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import io
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any, Dict, List, Sequence, Tuple
 
 import yaml
 
+from quad_nav import plain_yaml
 from quad_nav.errors import InputError
 from quad_nav.offline.setup import config_folder
 from quad_nav.tuning.course_reading import CourseOptions, read_course
@@ -21,6 +23,7 @@ from quad_nav.tuning.journal import Journal
 from quad_nav.tuning.parameter_check import parameter_faults
 from quad_nav.tuning.space import Dimension, SearchSpace
 from quad_nav.tuning.workers import Workers
+from quad_nav.user_files import read_text
 from quad_nav.versions import versions
 
 _BASE = "base"
@@ -90,9 +93,9 @@ def read_points(path: Path) -> Tuple[Point, ...]:
         InputError: it is not such a file.
     """
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            lines = [line for line in csv.reader(file, skipinitialspace=True) if line]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        text = io.StringIO(read_text(path, plain_yaml.MOST_BYTES), newline="")
+        lines = [line for line in csv.reader(text, skipinitialspace=True) if line]
+    except csv.Error as error:
         raise InputError([f"{path}: cannot be read: {error}"]) from error
     if len(lines) < 2:
         raise InputError([f"{path}: expected a line of parameters' paths, and one for each point"])
@@ -103,7 +106,11 @@ def read_points(path: Path) -> Tuple[Point, ...]:
         problems.append(f"{path}: a path is there twice, expected each once")
     if problems:
         raise InputError(problems)
-    return tuple({name: yaml.safe_load(word) for name, word in zip(paths, row)} for row in rows)
+    try:
+        return tuple({name: plain_yaml.load(word) for name, word in zip(paths, row)}
+                     for row in rows)
+    except yaml.YAMLError as error:
+        raise InputError([f"{path}: a value is not YAML: {error}"]) from error
 
 
 def read_sweep_setup(options: SweepOptions) -> SweepSetup:
