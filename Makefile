@@ -9,10 +9,10 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint rostest conformance bench packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 lint rostest ray conformance fuzz bench bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
-	@sed -nE 's/^([a-z0-9]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 18
+	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
 
 # make itself ends with 2 on any failure and names the sequencer's own exit status in its message.
 fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
@@ -36,14 +36,27 @@ lint: venv  ## ruff and mypy
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 	@scripts/ros_env scripts/rostests $(TEST)
 
+# Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
+ray: packages  ## The tests with a Ray cluster, in an environment of their own
+	@scripts/make_venv .venv-ray requirements.txt requirements-test.txt
+	@.venv-ray/bin/python3 -m pip install --quiet '.[ray]'
+	PYTHONPATH=src .venv-ray/bin/python3 -m pytest test/ray
+
 # make itself ends with 2 on any failure and names the command's own exit status in its message.
 conformance: venv  ## Compare with the original's recordings: make conformance DIR=folder
 	@$(PYTHON) test/conformance/run.py $(DIR)
+
+fuzz: venv  ## Feed what reads files with made-up bytes: make fuzz TARGET=scene SECONDS=60
+	@scripts/make_venv .venv requirements-fuzz.txt
+	PYTHONPATH=src $(PYTHON) test/fuzz/run.py $(TARGET) $(SECONDS)
 
 bench: venv  ## How long the navigator's parts take, beside the original, scans and flights
 	PYTHONPATH=src $(PYTHON) bench/navigation.py
 	PYTHONPATH=src $(PYTHON) bench/lidar.py
 	PYTHONPATH=src $(PYTHON) bench/flight.py
+
+bench-fleets: venv  ## Whether fleets get through without touching: make bench-fleets ARGS="swap 8in12"
+	PYTHONPATH=src $(PYTHON) bench/encounters.py $(ARGS)
 
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)
@@ -60,4 +73,4 @@ clean:  ## Remove what was built, but not the virtual environments
 	find src test nodes -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean  ## Remove the virtual environments too
-	rm -rf .venv .venv38
+	rm -rf .venv .venv38 .venv-ray

@@ -12,7 +12,7 @@ from setuptools import find_packages, setup
 
 ROOT = Path(__file__).parent
 # What the package is asked for by name (quad_nav/shipped.py); catkin installs it by CMake.
-SHIPPED = sorted(path.relative_to(ROOT) for folder in ("config", "goals", "scenes")
+SHIPPED = sorted(path.relative_to(ROOT) for folder in ("config", "goals", "scenes", "spaces")
                  for path in (ROOT / folder).rglob("*.*") if path.is_file())
 
 setup(
@@ -20,7 +20,7 @@ setup(
     version=ElementTree.parse(ROOT / "package.xml").findtext("version"),
     packages=find_packages("src"),
     package_dir={"": "src"},
-    package_data={"quad_nav.offline.report": ["*.jinja"]},
+    package_data={"quad_nav.offline.report": ["*.jinja"], "quad_nav.tuning.report": ["*.jinja"]},
     data_files=[(f"share/quad/{folder}", list(map(str, paths)))
                 for folder, paths in groupby(SHIPPED, lambda path: path.parent)],
 )

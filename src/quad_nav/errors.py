@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from typing import List, Sequence
 
+MOST_PROBLEMS = 100
+_LONGEST_LINE = 2000
+
 
 class QuadError(Exception):
     """Root of the tree."""
@@ -15,11 +18,14 @@ class QuadError(Exception):
 class InputError(QuadError):
     """Something that a person wrote cannot be used: file, place, what was expected.
 
-    ``problems`` holds one line per fault; nothing is reported one at a time.
+    ``problems`` holds one line per fault; nothing is reported one at a time. What a
+    terminal would take for a command is written as an escape, and lists without an end end.
     """
 
     def __init__(self, problems: Sequence[str]):
-        self.problems: List[str] = list(problems)
+        self.problems: List[str] = [_line(problem) for problem in problems[:MOST_PROBLEMS]]
+        if len(problems) > MOST_PROBLEMS:
+            self.problems.append(f"... and {len(problems) - MOST_PROBLEMS} faults more")
         super().__init__("\n".join(self.problems))
 
 
@@ -57,3 +63,10 @@ class NoLocalPlan(ControlError):
 
 class InvalidGoal(NavigationError):
     """The goal's pose cannot be used: not a rotation, not finite, unknown frame."""
+
+
+def _line(problem: str) -> str:
+    if len(problem) > _LONGEST_LINE:
+        problem = problem[:_LONGEST_LINE] + " ..."
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode()
+                   for c in problem)

@@ -17,6 +17,7 @@ class Mends:
     ``sensor_timeout_s``: silence of a sensor that stops the robot; 0 leaves it to the
     sensor's own period. With ``doubt_scans`` a scan that cannot be true counts as silence,
     see ``costmap.trust``.
+    ``leave_contact``: a round robot that has no legal trajectory goes to where costs are lower.
     ``keep_off_peers``: see ``docs/peers.md``. Footprints stay twice ``peer_margin_m`` apart, and a
     peer of which nothing was heard for ``peer_timeout_s`` is not reckoned with. With
     ``make_room_when_idle`` a robot without a goal gets out of the way too, and comes back.
@@ -29,6 +30,7 @@ class Mends:
     doubt_scans: bool = True
     clear_any_obstacle_layer: bool = True
     refuse_colliding_escape: bool = True
+    leave_contact: bool = True
     predict_goal_turn: bool = True
     stop_after_rotation: bool = True
     heed_meter_scoring: bool = False
@@ -40,5 +42,6 @@ class Mends:
 
 ORIGINAL = Mends(
     progress_timeout_s=0.0, stuck_cost_factor=1.0, sensor_timeout_s=0.0, doubt_scans=False,
-    clear_any_obstacle_layer=False, refuse_colliding_escape=False, predict_goal_turn=False,
-    stop_after_rotation=False, keep_off_peers=False, make_room_when_idle=False)
+    clear_any_obstacle_layer=False, refuse_colliding_escape=False, leave_contact=False,
+    predict_goal_turn=False, stop_after_rotation=False, keep_off_peers=False,
+    make_room_when_idle=False)

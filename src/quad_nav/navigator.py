@@ -18,6 +18,7 @@ from typing import Any, Optional, Sequence, Tuple
 import numpy as np
 
 from quad_nav.control.controller import LocalPlanner
+from quad_nav.control.way_out import way_out
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap_updates import CostmapUpdates
 from quad_nav.errors import ControlError, PlanningError
@@ -322,18 +323,21 @@ class Navigator:
                 local_from_global(located))
         except ControlError as error:
             tick.warnings.append(str(error))
-            self._control_failed(tick)
+            self._control_failed(tick, located.in_local)
             return
         tick.command = tick.control.command
         self._last_valid_control_s = tick.now_s
         self._recovering.works_again(Trigger.CONTROLLING)
 
-    def _control_failed(self, tick: Tick) -> None:
+    def _control_failed(self, tick: Tick, pose: Pose2D) -> None:
         if tick.now_s > self._last_valid_control_s + self.params.controller_patience_s:
             self._enter_clearing(tick, Trigger.CONTROLLING)
-        else:
-            tick.command = Twist2D()
-            self._begin_planning(tick.now_s)
+            return
+        tick.command = Twist2D()
+        if self.mends.leave_contact:
+            local = self.local_costmap
+            tick.command = way_out(local.spec, local.costs, local.footprint, pose) or Twist2D()
+        self._begin_planning(tick.now_s)
 
     def _is_progressing(self, tick: Tick, pose: Pose2D) -> bool:
         """Whether the robot has moved lately; if not, a new plan, then recoveries."""

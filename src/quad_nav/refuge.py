@@ -11,6 +11,8 @@ from quad_nav.grid import INSCRIBED, GridSpec
 from quad_nav.kernels.discs import nearest_cell, raise_discs
 from quad_nav.peers import thinned
 
+COMFORTABLE = 128  # who stands where costs are lower has room to turn
+
 
 def find_refuge(spec: GridSpec, costs: np.ndarray, here: Pose2D, ways: Sequence[np.ndarray],
                 others: np.ndarray, apart_m: float) -> Optional[Pose2D]:
@@ -23,18 +25,35 @@ def find_refuge(spec: GridSpec, costs: np.ndarray, here: Pose2D, ways: Sequence[
     start = spec.cell_of(here.x_m, here.y_m)
     if start is None:
         return None
-    blocked = (costs >= INSCRIBED).astype(np.uint8)
-    unwanted = np.zeros(spec.shape, dtype=np.uint8)
+    unwanted = (costs >= COMFORTABLE).astype(np.uint8)
     grid = (spec.origin_x_m, spec.origin_y_m, spec.resolution_m)
-    for other in others:
-        away_m = math.hypot(other[0] - here.x_m, other[1] - here.y_m)
-        near_m = min(apart_m, away_m - 2.0 * spec.resolution_m)  # the way out begins outside
-        raise_discs(blocked, *grid, other[None, :], near_m, 1)
-        raise_discs(unwanted, *grid, other[None, :], apart_m, 1)
+    raise_discs(unwanted, *grid, others, apart_m, 1)
     for way in ways:
         raise_discs(unwanted, *grid, thinned(way, 2.0 * spec.resolution_m), apart_m, 1)
-    cell_x, cell_y = nearest_cell(blocked, unwanted, *start)
+    cell_x, cell_y = nearest_cell(_blocked(spec, costs, here, others, apart_m), unwanted, *start)
     if cell_x < 0:
         return None
     x_m, y_m = spec.centre_of(cell_x, cell_y)
     return Pose2D(x_m, y_m, math.atan2(y_m - here.y_m, x_m - here.x_m))
+
+
+def can_be_reached(spec: GridSpec, costs: np.ndarray, here: Pose2D, place: Pose2D,
+                   others: np.ndarray, apart_m: float) -> bool:
+    """Whether there is a way to a place that passes through no peer."""
+    start, end = spec.cell_of(here.x_m, here.y_m), spec.cell_of(place.x_m, place.y_m)
+    if start is None or end is None:
+        return False
+    unwanted = np.ones(spec.shape, dtype=np.uint8)
+    unwanted[end[1], end[0]] = 0
+    return nearest_cell(_blocked(spec, costs, here, others, apart_m), unwanted, *start)[0] >= 0
+
+
+def _blocked(spec: GridSpec, costs: np.ndarray, here: Pose2D, others: np.ndarray,
+             apart_m: float) -> np.ndarray:
+    """Where no way out leads through, uint8[H, W]; it begins outside of every peer's disc."""
+    blocked = (costs >= INSCRIBED).astype(np.uint8)
+    for other in others:
+        away_m = math.hypot(other[0] - here.x_m, other[1] - here.y_m)
+        raise_discs(blocked, spec.origin_x_m, spec.origin_y_m, spec.resolution_m, other[None, :],
+                    min(apart_m, away_m - 2.0 * spec.resolution_m), 1)
+    return blocked

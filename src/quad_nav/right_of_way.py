@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import Optional, Sequence, Tuple
+from typing import Container, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -27,6 +27,7 @@ _TIMES_S = np.arange(0.0, HORIZON_S + 1e-9, _STEP_S)
 _STEPS_APART = np.abs(np.subtract.outer(np.arange(len(_TIMES_S)), np.arange(len(_TIMES_S))))
 _MEETING = _STEPS_APART * _STEP_S <= EARLIER_LATER_S + 1e-9
 _NEARER_M = 0.05  # what counts as coming nearer
+_WHY_IT_STANDS = 2.0  # times apart_m: who is farther away cannot be what a peer stands for
 
 
 class Manner(enum.Enum):
@@ -51,20 +52,26 @@ class GivingWay:
 
 
 def gives_way(position: np.ndarray, way: np.ndarray, rank_s: float, peers: Sequence[Peer],
-              apart_m: float, speed_mps: float) -> Optional[Tuple[Peer, Manner]]:
+              apart_m: float, speed_mps: float, standing: Container[str] = ()
+              ) -> Optional[Tuple[Peer, Manner]]:
     """To whom a robot gives way, and how; None when it goes.
 
     The robot is at ``position``, float64[2], and follows ``way``, float64[n, 2]; centres
     are to stay ``apart_m`` from each other. Of several peers the first in rank counts.
+    Nobody waits for those ``standing``, by name; but who is near and in their way makes
+    room, for it may be why they stand.
     """
     own = positions_ahead(position, way, speed_mps, _TIMES_S)
     for peer in sorted(peers, key=lambda peer: peer.intention.rank_s):
         if peer.intention.rank_s >= rank_s or peer.is_parked:
             continue
+        stands = peer.name in standing
+        if stands and np.hypot(*(peer.position - position)) > _WHY_IT_STANDS * apart_m:
+            continue
         theirs = track(peer, speed_mps)
         if comes_near(position, theirs, apart_m):
             return peer, Manner.LEAVE
-        if _meet(own, theirs, apart_m):
+        if not stands and _meet(own, theirs, apart_m):
             return peer, Manner.WAIT
     return None
 

@@ -17,8 +17,8 @@ from quad_nav.costmap.peers import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.mends import Mends
-from quad_nav.peers import IDLE_RANK_S, Peer
-from quad_nav.refuge import find_refuge
+from quad_nav.peers import Peer
+from quad_nav.refuge import can_be_reached, find_refuge
 from quad_nav.right_of_way import (
     EARLIER_LATER_S,
     HORIZON_S,
@@ -39,6 +39,7 @@ _SEEN_AROUND_M = 0.15  # a LIDAR's point so far from a peer's circle is the peer
 _STOOD_M = 0.1
 _OUTSIDE_M = 0.05
 _WAIT_AT_LEAST_S = 1.0
+_LOOK_AGAIN_S = 1.0  # how often it is looked whether a refuge can still be reached
 _PARKED_COST, _WAY_COST = 120, 100
 _WAY_AHEAD_S = np.arange(0.0, HORIZON_S + EARLIER_LATER_S, 0.25)
 _BEHIND_M = 8.0  # how far a peer's plan is kept clear of when a refuge is looked for
@@ -54,16 +55,17 @@ class Traffic:
         self.peers: List[Peer] = []
         self._global, self._local = global_costmap, local_costmap
         self.cruising_mps = CRUISING_MPS
-        self._radius_m = 0.0
         self._margin_m = 0.0
         self._wait_until_s = -math.inf
+        self._look_again_s = -math.inf
         self._lost: List[str] = []
+        self._newcomers: List[str] = []
         self._standing: Dict[str, Standstill] = {}
 
     def restart(self) -> None:
         """For a clock that has jumped: forgets what it has seen."""
-        self.peers, self._lost, self._standing = [], [], {}
-        self._wait_until_s = -math.inf
+        self.peers, self._lost, self._newcomers, self._standing = [], [], [], {}
+        self._wait_until_s = self._look_again_s = -math.inf
 
     # -- what is seen ----------------------------------------------------------------
 
@@ -81,9 +83,9 @@ class Traffic:
         news += [f"{name} is heard of again" for name in self._lost
                  if any(p.name == name for p in fresh)]
         self._lost = lost
-        self._radius_m = self._local.circumscribed_radius_m
         self._margin_m = mends.peer_margin_m
         self.peers = [peer.moved_to(now_s) for peer in fresh if self._matters(peer, here)]
+        self._newcomers += [p.name for p in self.peers if p.name not in self._standing]
         self._standing = {p.name: self._standing.get(p.name, Standstill()) for p in self.peers}
         for peer in self.peers:
             self._standing[peer.name].has_moved(now_s, Pose2D(peer.x_m, peer.y_m), _STOOD_M)
@@ -97,8 +99,13 @@ class Traffic:
 
     @property
     def reach_m(self) -> float:
-        """How far away a peer may be and still matter."""
-        return 2.0 * (self.cruising_mps * HORIZON_S + self.apart_m)
+        """How far away a peer may be and still matter: to meet it, or to see it by LIDAR."""
+        meeting_m = 2.0 * (self.cruising_mps * HORIZON_S + self.apart_m)
+        return max(meeting_m, self._marked_up_to_m() + self.apart_m)
+
+    @property
+    def _radius_m(self) -> float:
+        return self._local.circumscribed_radius_m
 
     @property
     def keep_off_m(self) -> float:
@@ -111,13 +118,6 @@ class Traffic:
 
     def is_parked(self, peer: Peer, now_s: float) -> bool:
         return peer.is_parked or self._standing[peer.name].exceeds(now_s, PARKED_AFTER_S)
-
-    def _stays(self, peer: Peer, now_s: float, rank_s: float) -> bool:
-        """Whether a robot of this rank need not give way to a peer, because it stays.
-
-        One without a goal believes what the peer says: it may itself be why that one stands.
-        """
-        return peer.is_parked if rank_s >= IDLE_RANK_S else self.is_parked(peer, now_s)
 
     # -- costmaps --------------------------------------------------------------------
 
@@ -133,6 +133,9 @@ class Traffic:
             elif peer.intention.rank_s < rank_s:
                 areas.append(PeerArea(track(peer, self.cruising_mps, _WAY_AHEAD_S),
                                       self.apart_m + _SPARE_M, _WAY_COST))
+        seen_m = self._radius_m + _SEEN_AROUND_M
+        new = [k for k, peer in enumerate(self.peers) if peer.name in self._newcomers]
+        self._newcomers = []
         for costmap, points, shown in ((self._global, positions, areas),
                                        (self._local, _moved(positions, local_from_global),
                                         self._solid(here, local_from_global))):
@@ -140,8 +143,17 @@ class Traffic:
                 if isinstance(layer, PeerLayer):
                     layer.see(shown)
                 elif isinstance(layer, ObstacleLayer):
-                    layer.left_out = np.column_stack(
-                        (points, np.full(len(points), self._radius_m + _SEEN_AROUND_M)))
+                    layer.left_out = np.column_stack((points, np.full(len(points), seen_m)))
+                    for x_m, y_m in points[new]:  # until now the LIDAR took it for an obstacle
+                        layer.free_square(float(x_m), float(y_m), 2.0 * seen_m)
+
+    def _marked_up_to_m(self) -> float:
+        """How far away a LIDAR's point may be and still be marked."""
+        layers = [layer.params for costmap in (self._global, self._local)
+                  for layer in costmap.layers.values() if isinstance(layer, ObstacleLayer)]
+        return max((layer.obstacle_range_m if source.obstacle_range_m is None
+                    else source.obstacle_range_m
+                    for layer in layers for source in layer.sources), default=0.0)
 
     def _solid(self, here: Pose2D, local_from_global: Pose2D) -> List[PeerArea]:
         """Obstacles for the rollouts: who means to stay, as wide as they are to keep off.
@@ -186,14 +198,15 @@ class Traffic:
     def _decide(self, now_s: float, here: Pose2D, way: np.ndarray,
                 rank_s: float) -> Optional[GivingWay]:
         position = np.array([here.x_m, here.y_m])
-        moving = [peer for peer in self.peers if not self._stays(peer, now_s, rank_s)]
-        to = gives_way(position, way, rank_s, moving, self.apart_m, self.cruising_mps)
+        standing = {peer.name for peer in self.peers if self.is_parked(peer, now_s)}
+        to = gives_way(position, way, rank_s, self.peers, self.apart_m, self.cruising_mps,
+                       standing)
         if to is None:
             return None
         peer, manner = to
         if manner is Manner.WAIT:
             return GivingWay(peer.name, manner)
-        return self._leave(peer, here, rank_s)
+        return self._leave(now_s, peer, here, rank_s)
 
     def is_free(self, place: Pose2D) -> bool:
         """Whether no peer is at a place or will come through."""
@@ -203,26 +216,38 @@ class Traffic:
 
     def _still_leaving(self, now_s: float, here: Pose2D, rank_s: float,
                        current: GivingWay) -> Optional[GivingWay]:
-        """The way to a refuge goes on until the peer is past or cannot come."""
+        """The way to a refuge goes on until the peer is past or means to stay."""
         assert current.refuge is not None
         peer = next((p for p in self.peers if p.name == current.to), None)
-        if (peer is None or peer.intention.rank_s >= rank_s
-                or self._stays(peer, now_s, rank_s)):
+        if peer is None or peer.intention.rank_s >= rank_s or peer.is_parked:
             return None
         ahead = _ahead(peer)
         nearest_m = float(np.hypot(*(ahead - (here.x_m, here.y_m)).T).min())
         if nearest_m > self.apart_m + _SPARE_M or not comes_near(
                 np.array([here.x_m, here.y_m]), ahead, self.apart_m + _SPARE_M):
             return None
-        refuge = np.array([current.refuge.x_m, current.refuge.y_m])
-        others = [p for p in self.peers if p.name != current.to]
-        taken = any(np.hypot(*(p.position - refuge)) < self.apart_m - _SPARE_M for p in others)
-        if taken or np.hypot(*(ahead - refuge).T).min() < self.apart_m - _SPARE_M:
-            return self._leave(peer, here, rank_s)
+        if self._is_spoilt(now_s, here, current, ahead):
+            return self._leave(now_s, peer, here, rank_s)
         return current
 
-    def _leave(self, peer: Peer, here: Pose2D, rank_s: float) -> GivingWay:
+    def _is_spoilt(self, now_s: float, here: Pose2D, current: GivingWay,
+                   ahead: np.ndarray) -> bool:
+        """Whether a refuge is taken, in the way by now, or cut off by what was seen since."""
+        assert current.refuge is not None
+        refuge = np.array([current.refuge.x_m, current.refuge.y_m])
+        others = np.array([p.position for p in self.peers if p.name != current.to]).reshape(-1, 2)
+        nearest_m = np.hypot(*(np.vstack((others, ahead)) - refuge).T).min()
+        if nearest_m < self.apart_m - _SPARE_M:
+            return True
+        if now_s < self._look_again_s:
+            return False
+        self._look_again_s = now_s + _LOOK_AGAIN_S
+        return not can_be_reached(self._global.spec, self._global.costs, here, current.refuge,
+                                  np.array([p.position for p in self.peers]), self.apart_m)
+
+    def _leave(self, now_s: float, peer: Peer, here: Pose2D, rank_s: float) -> GivingWay:
         """To the nearest place off all the peer's way; failing that, off its next stretch."""
+        self._look_again_s = now_s + _LOOK_AGAIN_S
         first = [p for p in self.peers if p.intention.rank_s < rank_s and not p.is_parked]
         others = np.array([p.position for p in self.peers])
         nearby = [track(p, self.cruising_mps) for p in first if p is not peer]

@@ -183,6 +183,7 @@ def test_config_barn_is_the_default_but_for_what_body_and_place_force():
     assert changed == {
         **{f"{costmap}/robot_radius": (0.35, 0.25) for costmap in costmaps},
         **{f"{costmap}/inflation_radius": (0.80, 0.70) for costmap in costmaps},
+        **{f"{costmap}/base_scan/obstacle_range": (6.0, 2.5) for costmap in costmaps},
         "global_costmap/origin_x": (None, -8.25), "global_costmap/origin_y": (None, 2.0)}
     assert set(default) <= set(ours)
 

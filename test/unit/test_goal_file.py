@@ -130,7 +130,7 @@ def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError) as caught:
         load_goals(tmp_path / "none.json")
     assert caught.value.problems == [
-        f"{tmp_path}/none.json: cannot be read: No such file or directory; expected a goal file"]
+        f"{tmp_path}/none.json: cannot be read: No such file or directory; expected a file"]
 
 
 def test_settings_outside_a_file():
@@ -138,8 +138,8 @@ def test_settings_outside_a_file():
         SequenceSettings(retries=2), [])
     _, problems = read_settings({"retries": True, "goal_timeout": "long"}, "sequencer")
     assert problems == [
-        "sequencer: retries: is true; expected a whole number, 0 or more",
-        'sequencer: goal_timeout: is "long"; expected a number of seconds above 0']
+        "sequencer: retries: is true; expected a whole number, 0 to 10000",
+        'sequencer: goal_timeout: is "long"; expected a number of seconds above 0, 1e+09 at most']
 
 
 def test_an_edited_file_is_taken_once_it_has_settled(tmp_path):

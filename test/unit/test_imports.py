@@ -13,7 +13,8 @@ PACKAGE = "quad_nav"
 
 # A unit (a module or subpackage of quad_nav) imports itself and units of the rows above its own.
 LAYERS = [
-    {"errors", "footprint", "geometry", "grid", "mends", "peers", "shipped", "versions"},
+    {"errors", "footprint", "geometry", "grid", "mends", "peers", "plain_yaml", "shipped",
+     "user_files", "versions"},
     {"kernels"},
     {"sim", "costmap", "plan", "control"},
     {"recovery"},
@@ -26,18 +27,22 @@ LAYERS = [
     {"assembly"},
     {"warm_up", "check", "scene_check", "random_mission", "face"},
     {"offline", "ros"},
+    {"tuning"},
     {"cli"},
 ]
 NOUNS = LAYERS[0]  # they may import one another
 # Navigation knows no simulator.
 WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "random_mission", "face",
-               "offline", "ros", "cli"}
+               "offline", "ros", "tuning", "cli"}
 
 # Where a third-party package may be imported: those files or folders and nowhere else.
 PLACES = {
     "click": "cli/",
     "rich": "cli/",
-    "joblib": "offline/barn/runs.py",
+    "joblib": ("offline/barn/runs.py", "tuning/workers.py"),
+    "ray": "tuning/workers.py",
+    "optuna": "tuning/",
+    "sqlalchemy": "tuning/study.py",
     "numba": "kernels/",
     "pybullet": "sim/body.py",
     "defusedxml": "sim/xml_tree.py",
@@ -50,7 +55,7 @@ PLACES = {
     "lz4": "offline/",
     "rosbags": "offline/",
     "mcap": "offline/",
-    "matplotlib": "offline/report/",
+    "matplotlib": ("offline/report/", "tuning/report/"),
     "jinja2": "offline/report/",
     "PIL": ("sim/map_image.py", "offline/report/"),
 }

@@ -6,10 +6,11 @@ import pytest
 
 from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.config import load, updated
-from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.mends import ORIGINAL, Mends
 from quad_nav.recovery import Surroundings
+from quad_nav.tick import Located
 
 LIDAR = {"data_type": "LaserScan", "marking": True, "clearing": False,
          "max_obstacle_height": 2.0, "expected_update_rate": 21.0}
@@ -17,8 +18,8 @@ TREE = {name: {"observation_sources": "scan", "scan": LIDAR, "obstacle_range": 5
         for name in ("global_costmap", "local_costmap")}
 OFF = {"progress_timeout": 0.0, "stuck_cost_factor": 1.0, "sensor_timeout": 0.0,
        "clear_any_obstacle_layer": False, "refuse_colliding_escape": False,
-       "predict_goal_turn": False, "stop_after_rotation": False, "keep_off_peers": False,
-       "make_room_when_idle": False, "doubt_scans": False}
+       "leave_contact": False, "predict_goal_turn": False, "stop_after_rotation": False,
+       "keep_off_peers": False, "make_room_when_idle": False, "doubt_scans": False}
 HERE = Pose2D(5.0, 5.0)
 
 
@@ -79,3 +80,24 @@ def test_switches_can_be_thrown_in_flight():
     apply_configuration(navigator, configuration)
     assert navigator.mends.progress_timeout_s == 3.0
     assert not navigator.controller.params.predict_goal_turn
+
+
+@pytest.mark.parametrize("mends, leaves", [({}, True), ({"leave_contact": False}, False)])
+def test_one_that_touches_a_wall_leaves_it(mends, leaves):
+    """Its back is 0.36 m behind it, in the cell of the wall at 0.38 m."""
+    away = Pose2D(5.0, 5.0, 3.14)
+    node = {"robot_radius": 0.35,
+            "plugins": [{"name": "obstacle_layer", "type": "costmap_2d::ObstacleLayer"},
+                        {"name": "inflation_layer", "type": "costmap_2d::InflationLayer"}],
+            "obstacle_layer": {**TREE["local_costmap"], "footprint_clearing_enabled": False}}
+    navigator = build_navigator(load({
+        "global_costmap": node, "local_costmap": {**node, "rolling_window": True, "width": 4.0,
+                                                  "height": 4.0},
+        "mends": mends}))
+    scan = Scan(0.0, -0.05, 0.05, 0.02, 60.0, np.full(3, 0.38, dtype=np.float32))
+    for costmap in (navigator.global_costmap, navigator.local_costmap):
+        costmap.layers["obstacle_layer"].add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), 0.0)
+    navigator.set_goal(Pose2D(2.0, 5.0, 3.14), 0.0)
+    tick = navigator.tick(0.0, Located(away, away), Twist2D())
+    assert any("every trajectory hits something" in warning for warning in tick.warnings)
+    assert tick.command == (Twist2D(0.1) if leaves else Twist2D())

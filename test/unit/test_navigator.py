@@ -32,6 +32,9 @@ class FakeCostmap:
         self.params = CostmapParams(update_frequency_hz)
         self.spec = GridSpec(10, 10, 1.0)
         self.costs = np.zeros((10, 10), dtype=np.uint8)
+        self.footprint = np.zeros((0, 2))
+        self.circumscribed_radius_m = 0.0
+        self.layers = {}
         self.updates = []
         self.stale = []
 

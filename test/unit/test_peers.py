@@ -21,7 +21,7 @@ from quad_nav.peers import (
     thinned,
     unknown_intention,
 )
-from quad_nav.refuge import find_refuge
+from quad_nav.refuge import COMFORTABLE, can_be_reached, find_refuge
 from quad_nav.right_of_way import Manner, comes_near, gives_way
 from quad_nav.separation import COASTING_S, within_cell
 
@@ -212,6 +212,14 @@ def test_for_a_parked_one_nobody_gives_way():
     assert decide(EAST, rank_of(IDLE_RANK_S, 1), [peer(1.0, 0.0)]) is None
 
 
+def test_nobody_waits_for_one_that_stands_but_who_is_in_its_way_makes_room():
+    standing = peer(1.0, 0.0, rank_s=0.0, way=[(1.0, 0.0), (6.0, 0.0)])
+    for at, manner in ([(2.5, -1.2), None], [(2.5, -0.5), Manner.LEAVE], [(3.0, 0.0), None]):
+        found = gives_way(np.array(at), np.array([at, (2.5, 3.0)]), 1.0, [standing], APART_M,
+                          CRUISING_MPS, {"other"})
+        assert (found and found[1]) == manner
+
+
 def test_a_track_that_leads_away_does_not_come_near():
     place = np.array([0.0, 0.0])
     away = np.column_stack((np.linspace(0.5, 3.0, 11), np.zeros(11)))
@@ -263,6 +271,28 @@ def test_in_a_corridor_the_refuge_is_beyond_its_end():
     way = np.array([[0.5, 2.05], [3.8, 2.05]])
     refuge = find_refuge(SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]), APART_M)
     assert refuge is not None and refuge.x_m > 3.3 and abs(refuge.y_m - 2.05) > APART_M - 0.1
+
+
+def test_a_refuge_has_room_to_turn():
+    """Costs beside the wall at the top are high: the refuge is on the other side."""
+    costs = np.zeros(SPEC.shape, dtype=np.uint8)
+    costs[28:, :] = COMFORTABLE
+    way = np.array([[0.5, 2.0], [3.5, 2.0]])
+    refuge = find_refuge(SPEC, costs, Pose2D(2.5, 2.2), [way], np.array([[0.5, 2.0]]), APART_M)
+    assert refuge is not None and refuge.y_m == pytest.approx(2.0 - APART_M, abs=0.11)
+
+
+@pytest.mark.parametrize("gap, other, reached", [(True, (0.5, 0.5), True),
+                                                 (False, (0.5, 0.5), False),
+                                                 (True, (2.05, 3.0), False)])
+def test_whether_a_refuge_can_still_be_reached(gap, other, reached):
+    """Through the only gap of a wall, unless a peer is in it."""
+    costs = np.zeros(SPEC.shape, dtype=np.uint8)
+    costs[:, 20] = LETHAL
+    if gap:
+        costs[25:35, 20] = FREE
+    assert can_be_reached(SPEC, costs, Pose2D(1.0, 1.0), Pose2D(3.0, 1.0), np.array([other]),
+                          APART_M) is reached
 
 
 def test_there_may_be_no_refuge():

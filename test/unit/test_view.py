@@ -13,6 +13,7 @@ from recorded_flight import setup
 from quad_nav.errors import InputError
 from quad_nav.face.markers import CUBE, CUBE_LIST, CYLINDER, SPHERE, Marker
 from quad_nav.geometry import Pose3D, Scan, quaternion_from_yaw
+from quad_nav.offline import view
 from quad_nav.offline.run import fly
 from quad_nav.offline.view import View, scan_points
 from quad_nav.offline.view_solids import solid
@@ -41,7 +42,7 @@ class FakeRerun(types.ModuleType):
     def __getattr__(self, name):
         if name[:1].isupper():
             return lambda *args, **fields: Made(name, args, fields)
-        if name in ("init", "save", "spawn", "disconnect", "send_blueprint"):
+        if name in ("init", "save", "connect_tcp", "disconnect", "send_blueprint"):
             return lambda *args: self.calls.append((name, *args))
         raise AttributeError(name)
 
@@ -117,10 +118,26 @@ def test_a_flight_is_saved_with_its_parts(rerun, tmp_path):
     assert summary.sim_time_s == 1.0
 
 
-def test_without_a_file_the_viewer_is_opened(rerun):
+class FakeViewer:
+    """What Popen starts; it listens at once, or it ends."""
+
+    returncode = None
+
+    def __init__(self, command, **_):
+        type(self).command = command
+
+    def poll(self):
+        return self.returncode
+
+
+def test_without_a_file_a_viewer_is_opened_that_only_this_machine_reaches(rerun, monkeypatch):
+    listening = iter([False, False, True])
+    monkeypatch.setattr(view, "_is_listening", lambda: next(listening))
+    monkeypatch.setattr(view.subprocess, "Popen", FakeViewer)
     View()
-    assert ("spawn",) in rerun.calls
-    assert "save" not in [call[0] for call in rerun.calls]
+    assert "--bind=127.0.0.1" in FakeViewer.command
+    assert [call for call in rerun.calls if call[0] in ("save", "connect_tcp")] == [
+        ("connect_tcp", "127.0.0.1:9876")]
 
 
 def test_without_a_display_no_viewer_is_opened(rerun, monkeypatch):
@@ -132,11 +149,10 @@ def test_without_a_display_no_viewer_is_opened(rerun, monkeypatch):
 
 
 def test_a_viewer_that_does_not_start_is_told(rerun, monkeypatch):
-    def spawn():
-        raise RuntimeError("no viewer.\nmore")
-
-    rerun.spawn = spawn
-    with pytest.raises(InputError, match="viewer does not start: no viewer. expected a display"):
+    monkeypatch.setattr(view, "_is_listening", lambda: False)
+    monkeypatch.setattr(view.subprocess, "Popen", FakeViewer)
+    monkeypatch.setattr(FakeViewer, "returncode", 3)
+    with pytest.raises(InputError, match="does not start: rerun ended with 3; expected a display"):
         View()
 
 

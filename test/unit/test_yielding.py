@@ -175,6 +175,31 @@ def test_the_lidars_points_on_a_known_peer_are_left_out(age_s, is_marked):
     assert (layer.grid.costs == LETHAL).any() == is_marked
 
 
+def test_what_the_lidar_has_marked_of_a_peer_is_forgotten_when_it_is_known():
+    source = {"observation_sources": "scan", "obstacle_range": 5.0, "scan": {
+        "data_type": "LaserScan", "marking": True, "max_obstacle_height": 2.0}}
+    navigator = build_navigator(load({"global_costmap": source, "local_costmap": source}))
+    here = Pose2D(5.0, 5.0)
+    layer = navigator.global_costmap.layers["obstacle_layer"]
+    scan = Scan(0.0, 0.0, 0.01, 0.02, 60.0, np.full(2, 1.7, dtype=np.float32))
+    layer.add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), 0.0)
+    navigator.tick(0.0, Located(here, here), Twist2D())
+    assert (layer.grid.costs == LETHAL).any()
+    nothing = Scan(1.0, 0.0, 0.01, 0.02, 60.0, np.full(2, math.inf, dtype=np.float32))
+    layer.add_scan("scan", nothing, Pose3D(5.0, 5.0, 1.0), 1.0)
+    seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 1.0)]
+    navigator.tick(1.0, Located(here, here), Twist2D(), seen)
+    navigator.global_costmap.update(1.0, here)
+    assert not (layer.grid.costs == LETHAL).any()
+
+
+def test_peers_are_known_as_far_as_the_lidar_marks():
+    source = {"observation_sources": "scan", "scan": {"obstacle_range": 9.0, "marking": True}}
+    far = build_navigator(load({"global_costmap": source}))
+    near = build_navigator(load({}))
+    assert far.peer_reach_m > 9.0 + 2 * RADIUS_M > near.peer_reach_m > 2 * 0.3 * 7.0
+
+
 def test_what_a_robot_tells_of_itself():
     navigator = build_navigator(load({**TREE, "robot": 3}))
     idle = navigator.intention

@@ -14,7 +14,7 @@ import quad_nav
 # The exit statuses of every command; 130 after Ctrl-C as from a shell.
 EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 
-COMMANDS = ("barn", "check", "fly", "report")
+COMMANDS = ("barn", "check", "fly", "report", "sweep", "tune")
 
 
 class Commands(click.Group):

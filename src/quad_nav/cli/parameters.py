@@ -5,6 +5,7 @@ from typing import Any, Tuple
 
 import yaml
 
+from quad_nav import plain_yaml
 from quad_nav.errors import InputError
 
 
@@ -18,7 +19,7 @@ def parameter(text: str) -> Tuple[str, Any]:
     if not equals or not path.strip("/"):
         raise InputError([f"--set {text}: expected PATH=VALUE, as global_costmap/width=60"])
     try:
-        return path, yaml.safe_load(value)
+        return path, plain_yaml.load(value)
     except yaml.YAMLError as error:
         raise InputError([f"--set {text}: {value!r} is not YAML, expected a value as in a "
                           f"parameter file: {error}"]) from error

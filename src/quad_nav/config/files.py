@@ -16,6 +16,8 @@ import yaml
 
 from quad_nav.config.notes import CAUTION, Remark
 from quad_nav.errors import InputError
+from quad_nav.plain_yaml import MOST_BYTES, MOST_LEVELS, PlainLoader
+from quad_nav.user_files import read_text
 
 COMMON = "costmap_common_params"
 REQUIRED = (COMMON, "local_costmap_params", "global_costmap_params", "base_local_planner_params")
@@ -170,13 +172,12 @@ class _Document:
 
 
 def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError([f"{path}: cannot be read: {error}"]) from error
-    text = _substituted(text, path, arguments)
+    text = _substituted(read_text(path, MOST_BYTES), path, arguments)
     document = _Document(path)
-    loader = yaml.SafeLoader(text)
+    try:
+        loader = PlainLoader(text)
+    except yaml.YAMLError as error:  # characters that no YAML may have
+        raise InputError([_told(error, path)]) from error
     try:
         node = loader.get_single_node()
         if node is None:
@@ -215,7 +216,7 @@ def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
 
 
 def _collect(node: yaml.MappingNode, above: Tuple[str, ...], document: _Document,
-             loader: yaml.SafeLoader) -> None:
+             loader: PlainLoader) -> None:
     """Walks the nodes rather than the values: only they have lines and duplicates."""
     seen = set()
     for key_node, _ in node.value:
@@ -230,6 +231,9 @@ def _collect(node: yaml.MappingNode, above: Tuple[str, ...], document: _Document
         key = str(loader.construct_object(key_node, deep=True))
         line = key_node.start_mark.line + 1
         path = above + tuple(filter(None, key.split("/")))
+        if not above < path or len(path) > MOST_LEVELS:
+            raise InputError([f"{document.path}:{line}: {key[:40]!r} is no name of a parameter; "
+                              f"expected 1 to {MOST_LEVELS} names with / between them"])
         document.lines[path] = line
         if isinstance(value_node, yaml.MappingNode):
             document.values.append((path, {}))

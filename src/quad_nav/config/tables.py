@@ -94,6 +94,8 @@ MENDS = Table(
               " called obstacles."),
         flag("refuse_colliding_escape", True, "refuse_colliding_escape",
               "Escape backwards only out of a collision, not into one."),
+        flag("leave_contact", True, "leave_contact",
+              "A round robot that has no legal trajectory goes to where costs are lower."),
         flag("predict_goal_turn", True, "predict_goal_turn",
               "Turn no farther in one control period than is left to the goal's heading."),
         flag("heed_meter_scoring", False, "heed_meter_scoring",

@@ -6,6 +6,8 @@ from typing import Any, Optional, Sequence, Tuple
 import numpy as np
 import yaml
 
+from quad_nav import plain_yaml
+
 Polygon = Tuple[Tuple[float, float], ...]
 
 
@@ -20,7 +22,7 @@ def polygon_from_text(text: str) -> Optional[Polygon]:
     if text.strip() in ("", "[]"):
         return None
     try:
-        points = yaml.safe_load(text)
+        points = plain_yaml.load(text)
     except yaml.YAMLError:
         raise ValueError("not a list") from None
     return polygon_from_list(points)

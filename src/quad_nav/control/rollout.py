@@ -18,6 +18,7 @@ squared distance to the plan's end counts. B. Gerkey and K. Konolige 2008,
 """
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
@@ -27,7 +28,7 @@ from quad_nav.control.cost_cloud import cost_cloud
 from quad_nav.control.map_grid import distance_grids
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
+from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels import collision
 from quad_nav.kernels import rollout as kernel
 
@@ -64,9 +65,20 @@ class Rollout:
             self.grids.goal, plan_xy)
         self.rules = _rules(params, spec.resolution_m)
 
-    def score(self, samples: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3]."""
-        return kernel.score(self.scene, self.rules, _triple(self.pose), self.velocity, samples)
+    def score(self, samples: np.ndarray, limit: float = math.inf
+              ) -> Tuple[np.ndarray, np.ndarray]:
+        """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3].
+
+        A cost may be infinite if it is above ``limit``.
+        """
+        return kernel.score(self.scene, self.rules, _triple(self.pose), self.velocity, samples,
+                            limit)
+
+    def cheapest(self, samples: np.ndarray) -> Optional[Tuple[int, float]]:
+        """Index and cost of the cheapest legal sample, the first of equals; None if none is."""
+        k, cost = kernel.cheapest(self.scene, self.rules, _triple(self.pose), self.velocity,
+                                  samples)
+        return (k, cost) if k >= 0 else None
 
     def trajectory(self, sample: Triple) -> Trajectory:
         return self._simulate(_triple(self.pose), self.velocity, sample)
@@ -77,14 +89,21 @@ class Rollout:
                               _twist_triple(command)).cost >= 0.0
 
     def is_free(self, pose: Pose2D) -> bool:
-        """Whether the footprint hits nothing at a pose."""
-        return collision.footprint_cost(
-            self.scene.window, self.scene.footprint, *_triple(pose)) >= 0.0
+        """Whether nothing is under the footprint at a pose, within its outline neither."""
+        window, footprint = self.scene.window, self.scene.footprint
+        if collision.footprint_cost(window, footprint, *_triple(pose)) < 0.0:
+            return False
+        inside = np.zeros(window.costs.shape, dtype=np.bool_)
+        if len(footprint) > 2:
+            collision.mark_footprint(window, footprint, *_triple(pose), inside)
+        return not bool((window.costs[inside] >= LETHAL).any())
 
     def _simulate(self, pose: Triple, velocity: Triple, sample: Triple) -> Trajectory:
         row = np.array(sample)
-        points = np.empty((kernel.step_count(self.rules, row), 3))
-        cost, count = kernel.simulate(self.scene, self.rules, pose, velocity, row, points)
+        headings = np.empty((kernel.step_count(self.rules, row), 3))
+        kernel.turn(self.rules, pose[2], velocity[2], sample[2], headings)
+        points = np.empty_like(headings)
+        cost, count = kernel.simulate(self.scene, self.rules, pose, velocity, row, headings, points)
         return Trajectory(sample, cost, points[:count])
 
     def goal_distance_at(self, x_m: float, y_m: float) -> Optional[int]:

@@ -118,9 +118,8 @@ def _forward_samples(window: VelocityWindow, thetas: np.ndarray,
 
 def _cheapest(rollout: Rollout, samples: np.ndarray) -> Optional[_Candidate]:
     """The legal sample of lowest cost, the first of equals."""
-    costs, _ = rollout.score(samples)
-    k = int(np.argmin(np.where(costs >= 0.0, costs, np.inf)))
-    return _Candidate(_row(samples, k), float(costs[k])) if costs[k] >= 0.0 else None
+    found = rollout.cheapest(samples)
+    return _Candidate(_row(samples, found[0]), found[1]) if found is not None else None
 
 
 def _turn_in_place(rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation,
@@ -131,7 +130,8 @@ def _turn_in_place(rollout: Rollout, params: TrajectoryPlannerParams, oscillatio
     samples = np.zeros((len(thetas), 3))
     samples[:, 2] = np.where(thetas > 0.0, np.maximum(thetas, slowest),
                              np.minimum(thetas, -slowest))
-    costs, ends = rollout.score(samples)
+    must_not_cost_more = best is not None and best.sample[1] == 0.0
+    costs, ends = rollout.score(samples, best.cost if best and must_not_cost_more else math.inf)
     facing = math.inf
     for k, theta in enumerate(thetas):
         stuck = oscillation.stuck_left if theta < 0.0 else oscillation.stuck_right

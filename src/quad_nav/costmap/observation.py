@@ -1,8 +1,7 @@
 """What one sensor saw lately: points in the global frame, and for how long they count."""
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import List, Optional
 
 import numpy as np
@@ -39,21 +38,22 @@ class Observation:
     stamp_s: float
     sensor: np.ndarray
     points: np.ndarray
+    stamp_ns: int = field(init=False)
 
-    @cached_property
-    def stamp_ns(self) -> int:
-        return _nanoseconds(self.stamp_s)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stamp_ns", _nanoseconds(self.stamp_s))
 
 
 @dataclass(frozen=True)
 class ObservationStack:
-    """Observations in one piece, for kernels: sensors float64[k, 3], points float32[n, 3].
+    """Observations for kernels: sensors float64[k, 3], points float32[n, 3].
 
-    Observation i has the points from ``ends[i - 1]``, or 0, to ``ends[i]``, int64[k].
+    Observation i has the points from ``begins[i]`` to ``ends[i]``, int64[k]; others are old.
     """
 
     sensors: np.ndarray
     points: np.ndarray
+    begins: np.ndarray
     ends: np.ndarray
 
 
@@ -69,19 +69,30 @@ class ObservationBuffer:
         self.observations: List[Observation] = []
         self._last_reception_s: Optional[float] = None
         self._stack: Optional[ObservationStack] = None
+        self._points = np.empty((0, 3), np.float32)  # those of the observations, and old ones
+        self._begins: List[int] = []  # of the observations' points in that
+        self._end = 0
 
     @property
     def stack(self) -> ObservationStack:
         """All that is kept, newest first."""
         if self._stack is None:
-            self._stack = _stacked(self.observations)
+            count = len(self.observations)
+            begins = np.array(self._begins[:count], np.int64)
+            lengths = np.array([len(one.points) for one in self.observations], np.int64)
+            sensors = [one.sensor for one in self.observations] or [np.empty(0)]
+            self._stack = ObservationStack(np.concatenate(sensors).reshape(count, 3),
+                                           self._points, begins, begins + lengths)
         return self._stack
 
     def add(self, observation: Observation, now_s: float) -> None:
         """Keep an observation that arrived now; drop those that are too old now."""
         self.observations.insert(0, observation)
+        self._begins.insert(0, self._end)
         self._stack = None
         self.restart_clock(now_s)
+        if self.observations:  # or it is too old itself
+            self._store(observation.points)
 
     def start_clock(self, now_s: float) -> None:
         """Count silence from now if nothing was ever received."""
@@ -100,27 +111,33 @@ class ObservationBuffer:
         period_s = self.params.expected_update_period_s
         return period_s == 0.0 or _nanoseconds(self.silence_s(now_s)) <= _nanoseconds(period_s)
 
+    def _store(self, points: np.ndarray) -> None:
+        """Behind the others' points; if there is no room, all move to an array with more."""
+        if self._end + len(points) <= len(self._points):
+            self._points[self._end:self._end + len(points)] = points
+            self._end += len(points)
+            return
+        clouds = [one.points for one in reversed(self.observations)]
+        ends = np.cumsum([len(cloud) for cloud in clouds]).tolist()
+        self._begins = [0, *ends[:-1]][::-1]
+        self._end = ends[-1]
+        self._points = np.concatenate([*clouds, np.empty((self._end, 3), np.float32)])
+
     def _drop_stale(self, reception_s: float) -> None:
         persistence_s = self.params.observation_persistence_s
         if persistence_s == 0.0:
-            del self.observations[1:]
-            self._stack = None
+            self._drop_from(1)
             return
         oldest_ns = _nanoseconds(reception_s) - _nanoseconds(persistence_s)
         for k, observation in enumerate(self.observations):
             if observation.stamp_ns < oldest_ns:
-                del self.observations[k:]
-                self._stack = None
+                self._drop_from(k)
                 return
 
-
-def _stacked(observations: List[Observation]) -> ObservationStack:
-    if not observations:
-        return ObservationStack(np.empty((0, 3)), np.empty((0, 3), np.float32),
-                                np.empty(0, np.int64))
-    return ObservationStack(np.array([one.sensor for one in observations]),
-                            np.concatenate([one.points for one in observations]),
-                            np.cumsum([len(one.points) for one in observations]))
+    def _drop_from(self, first: int) -> None:
+        del self.observations[first:]
+        del self._begins[first:]
+        self._stack = None
 
 
 def _nanoseconds(seconds: float) -> int:

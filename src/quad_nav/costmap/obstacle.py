@@ -20,8 +20,6 @@ from quad_nav.grid import FREE, UNKNOWN, GridSpec
 from quad_nav.kernels.projection import outside_circles
 from quad_nav.kernels.raytrace import clear_all_rays, mark_all_points
 
-_MOST_LINES = 2 ** 16  # that an update remembers: in grids up to 256 x 256 one to each cell
-
 COMBINE_OVERWRITE = 0
 COMBINE_MAXIMUM = 1
 
@@ -70,7 +68,6 @@ class ObstacleLayer(GridLayer):
         self._rolling_window = rolling_window
         self._footprint = np.empty((0, 2))
         self._footprint_now = np.empty((0, 2))
-        self._cleared_lines = np.empty(1, dtype=np.int64)
         self.left_out = np.empty((0, 3))
 
     def add_scan(self, source_name: str, scan: Scan, global_from_sensor: Pose3D, now_s: float,
@@ -174,18 +171,13 @@ class ObstacleLayer(GridLayer):
 
     def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         spec, seen = self.grid.spec, buffer.stack
-        wanted = min(_MOST_LINES, 2 ** (self.grid.costs.size - 1).bit_length())
-        if len(self._cleared_lines) != wanted:
-            self._cleared_lines = np.empty(wanted, dtype=np.int64)
-        self._cleared_lines.fill(-1)
         clear_all_rays(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
-                       seen.sensors, seen.points, seen.ends, range_m, self._cleared_lines,
-                       touched)
+                       seen.sensors, seen.points, seen.begins, seen.ends, range_m, touched)
 
     def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         spec, seen = self.grid.spec, buffer.stack
         mark_all_points(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
-                        seen.sensors, seen.points, seen.ends, range_m,
+                        seen.sensors, seen.points, seen.begins, seen.ends, range_m,
                         self.params.max_obstacle_height_m, touched)
 
     def _raytrace_range(self, source: SourceParams) -> float:

@@ -17,6 +17,7 @@ from quad_nav.versions import versions
 
 FLIGHT_TOPIC, EVENTS_TOPIC = "/quad/flight", "/quad/events"
 
+_MOST_DIGITS = 100
 START_S = 1.0
 """What ``/clock`` says at a simulation's start: nodes take 0 for a clock that stands."""
 
@@ -57,10 +58,16 @@ def to_text(info: Mapping[str, Any]) -> str:
 def from_text(text: str) -> Optional[Dict[str, Any]]:
     """None for what is no object in JSON."""
     try:
-        info = json.loads(text)
-    except ValueError:
+        info = json.loads(text, parse_int=_whole_number)
+    except (ValueError, RecursionError):
         return None
     return info if isinstance(info, dict) else None
+
+
+def _whole_number(digits: str) -> int:
+    if len(digits) > _MOST_DIGITS:
+        raise ValueError("a number with too many digits")
+    return int(digits)
 
 
 def _goal(goal: Any) -> Sequence[float]:

@@ -8,7 +8,7 @@ from quad_nav.geometry import Pose2D, Pose3D
 
 PATH_PERIOD_S = 0.5
 PATH_SPACING_M = 0.05
-PATH_POSES = 5000
+PATH_POSES = 1000  # 50 m, and some megabyte of messages
 
 T = TypeVar("T")
 

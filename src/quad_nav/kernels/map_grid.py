@@ -55,30 +55,37 @@ def spread(costs, passable, sources):
     reach keep H * W + 1.
     """
     size_y, size_x = costs.shape
-    obstacle, unreached = costs.size, costs.size + 1
-    distance = np.full(costs.size, unreached, np.int32)
-    blocked = ((costs >= INSCRIBED) & ~passable).ravel()
-    queue = np.empty(costs.size, np.int64)
+    obstacle, unreached, blocked = costs.size, costs.size + 1, costs.size + 2
+    width = size_x + 2  # a border that is neither free nor blocked ends the wave
+    distance = np.full((size_y + 2) * width, -1, np.int32)
+    for y in range(size_y):
+        for x in range(size_x):
+            is_blocked = costs[y, x] >= INSCRIBED and not passable[y, x]
+            distance[(y + 1) * width + x + 1] = blocked if is_blocked else unreached
+    queue = np.empty(costs.size, np.int32)
     count = 0
     for source in sources:
-        if distance[source] == unreached:
-            distance[source] = 0
-            queue[count] = source
+        cell = (source // size_x + 1) * width + source % size_x + 1
+        if distance[cell] != 0:
+            distance[cell] = 0
+            queue[count] = cell
             count += 1
     head = 0
     while head < count:
-        cell = queue[head]
+        cell = np.int64(queue[head])
         head += 1
-        x = cell % size_x
-        for offset in (-1, 1, -size_x, size_x):
-            neighbour = cell + offset
-            if ((offset == -1 and x == 0) or (offset == 1 and x == size_x - 1)
-                    or not 0 <= neighbour < costs.size or distance[neighbour] != unreached):
-                continue
-            if blocked[neighbour]:
+        further = distance[cell] + 1
+        for offset in (-1, 1, -width, width):
+            neighbour = np.uint64(cell + offset)
+            if distance[neighbour] == unreached:
+                distance[neighbour] = further
+                queue[count] = neighbour
+                count += 1
+            elif distance[neighbour] == blocked:
                 distance[neighbour] = obstacle
-                continue
-            distance[neighbour] = distance[cell] + 1
-            queue[count] = neighbour
-            count += 1
-    return distance.reshape(costs.shape)
+    inner = distance.reshape(size_y + 2, width)[1:-1, 1:-1].copy()
+    for y in range(size_y):
+        for x in range(size_x):
+            if inner[y, x] == blocked:
+                inner[y, x] = unreached
+    return inner

@@ -9,6 +9,10 @@ from numba import njit
 from quad_nav.grid import FREE, LETHAL
 from quad_nav.kernels.cells import cell_index
 
+SECTORS = 1024
+MOST_OBSTRUCTED = 512  # cells that are worth looking for lines towards them
+MOST_LINES = 2 ** 16  # that an update remembers: in grids up to 256 x 256 one to each cell
+
 
 @njit(cache=True, nogil=True)
 def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
@@ -63,14 +67,15 @@ def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
 
 @njit(cache=True, nogil=True)
 def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points, range_m,
-               cleared, bounds):
+               sectors, cleared, bounds):
     """Free the cells between the sensor and each point, up to ``range_m``.
 
-    points: float32[n, 3] in the frame of the grid. ``cleared``, int64[2 ** b], -1 at
-    first, remembers the last line that was cleared to each cell, of large grids to one of
-    several cells: a slow robot's scans have most lines in common. ``bounds``, float64[4] (min x,
-    min y, max x, max y in metres), grows by what was touched. A sensor outside the
-    grid clears nothing: returns False.
+    points: float32[n, 3] in the frame of the grid. Lines into sectors, bool[SECTORS], that
+    are False are passed over, all of them if there is none. ``cleared``, int64[2 ** b], -1
+    at first, remembers the last line that was cleared to each cell, of large grids to one
+    of several cells: a slow robot's scans have most lines in common; it may be empty.
+    ``bounds``, float64[4] (min x, min y, max x, max y in metres), grows by what rays reach. A
+    sensor outside the grid clears nothing: returns False.
     """
     size_y, size_x = costs.shape
     x0 = cell_index(sensor_x, origin_x, resolution, size_x)
@@ -79,25 +84,38 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
         return False
     include(bounds, sensor_x, sensor_y)
     high_x, high_y = origin_x + size_x * resolution, origin_y + size_y * resolution
+    # A ray that leaves the grid ends in it. The last millimetre makes no other cell.
+    whole = (bounds[0] <= origin_x and bounds[1] <= origin_y
+             and bounds[2] >= high_x - 0.001 and bounds[3] >= high_y - 0.001)
     max_cells = max(0.0, math.ceil(range_m / resolution))
     flat_costs = costs.reshape(-1)
     start = y0 * size_x + x0
-    places = np.uint64(cleared.size - 1)
-    surely_near = (1.0 - 1e-9) * range_m * range_m
+    places = np.uint64(max(cleared.size - 1, 0))
+    surely_near, surely_far = (1.0 - 1e-9) * range_m * range_m, (1.0 + 1e-9) * range_m * range_m
     for k in range(points.shape[0]):
-        x, y = clip_to_grid(sensor_x, sensor_y, float(points[k, 0]), float(points[k, 1]),
-                            origin_x, origin_y, high_x, high_y)
+        x, y = float(points[k, 0]), float(points[k, 1])
+        wanted = sectors.size > 0 and sectors[sector_of(x - sensor_x, y - sensor_y)]
+        if not wanted:
+            if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]:
+                continue
+            if whole and not (origin_x <= x <= high_x and origin_y <= y <= high_y):
+                continue
+            if _range_ends_inside(bounds, sensor_x, sensor_y, x - sensor_x, y - sensor_y,
+                                  surely_far):
+                continue
+        x, y = clip_to_grid(sensor_x, sensor_y, x, y, origin_x, origin_y, high_x, high_y)
         x1 = cell_index(x, origin_x, resolution, size_x)
         y1 = cell_index(y, origin_y, resolution, size_y)
         if x1 < 0 or y1 < 0:
             continue
-        end = y1 * size_x + x1
-        line = start * costs.size + end
-        place = np.uint64(end) & places
-        if cleared[place] != line:
-            cleared[place] = line
-            clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
         dx, dy = x - sensor_x, y - sensor_y
+        if wanted:
+            line = start * costs.size + y1 * size_x + x1
+            place = np.uint64(y1 * size_x + x1) & places
+            if cleared.size == 0 or cleared[place] != line:
+                if cleared.size > 0:
+                    cleared[place] = line
+                clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
         scale = 1.0
         if dx * dx + dy * dy > surely_near:  # hypot is slow, and most points are near
             length = math.hypot(dx, dy)
@@ -107,28 +125,164 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
 
 
 @njit(cache=True, nogil=True)
-def clear_all_rays(costs, origin_x, origin_y, resolution, sensors, points, ends, range_m, cleared,
-                   bounds):
-    """``clear_rays`` of several observations, in order.
+def _range_ends_inside(bounds, x, y, dx, dy, square_m2):
+    """Whether the point of a ray in direction (dx, dy) is inside the bounds, as (x, y) is.
 
-    Observation k has sensors[k], float64[3], and points from ends[k - 1], or 0, to ends[k].
+    ``square_m2`` is the square of its distance.
     """
-    begin = 0
-    for k in range(len(ends)):
-        clear_rays(costs, origin_x, origin_y, resolution, sensors[k, 0], sensors[k, 1],
-                   points[begin:ends[k]], range_m, cleared, bounds)
-        begin = ends[k]
+    to_x = bounds[2] - x if dx > 0.0 else x - bounds[0]
+    to_y = bounds[3] - y if dy > 0.0 else y - bounds[1]
+    length = dx * dx + dy * dy
+    return (length * to_x * to_x >= square_m2 * dx * dx
+            and length * to_y * to_y >= square_m2 * dy * dy)
 
 
 @njit(cache=True, nogil=True)
-def mark_all_points(costs, origin_x, origin_y, resolution, sensors, points, ends, range_m,
+def clear_all_rays(costs, origin_x, origin_y, resolution, sensors, points, begins, ends, range_m,
+                   bounds):
+    """``clear_rays`` of several observations, in order.
+
+    Observation k has sensors[k], float64[3], and points from begins[k] to ends[k].
+
+    A line through nothing but free cells changes nothing. Mostly the first observation
+    leaves few cells that are not free; from then on only lines towards those are cleared.
+    """
+    no_lines = np.empty(0, dtype=np.int64)
+    lines = no_lines
+    everywhere = np.ones(SECTORS, dtype=np.bool_)
+    sectors = np.empty(SECTORS, dtype=np.bool_)
+    obstructed = np.empty(MOST_OBSTRUCTED, dtype=np.int64)
+    window = _reached(costs, origin_x, origin_y, resolution, sensors, range_m)
+    count = find_obstructed(costs, window, obstructed)
+    for k in range(len(ends)):
+        seen = points[begins[k]:ends[k]]
+        x, y = sensors[k, 0], sensors[k, 1]
+        if count == 0:
+            clear_rays(costs, origin_x, origin_y, resolution, x, y, seen, range_m,
+                       everywhere[:0], no_lines, bounds)
+        elif count <= MOST_OBSTRUCTED:
+            _find_sectors(obstructed[:count], costs.shape[1], (x - origin_x) / resolution,
+                          (y - origin_y) / resolution, sectors)
+            clear_rays(costs, origin_x, origin_y, resolution, x, y, seen, range_m,
+                       sectors, no_lines, bounds)
+            count = _keep_obstructed(costs.reshape(-1), obstructed, count)
+        else:
+            if lines.size == 0:
+                lines = np.full(_power_of_two(costs.size), -1, dtype=np.int64)
+            clear_rays(costs, origin_x, origin_y, resolution, x, y, seen, range_m,
+                       everywhere, lines, bounds)
+            if k == 0:  # what is still much after the first mostly stays so
+                count = find_obstructed(costs, window, obstructed)
+
+
+@njit(cache=True, nogil=True)
+def sector_of(dx, dy):
+    """Number of the sector, counterclockwise from +x, that a direction points into.
+
+    Sectors are equal steps along the sides of a square that stands on its corner, which
+    needs no arc tangent.
+    """
+    around = abs(dx) + abs(dy)
+    if not 0.0 < around < np.inf:
+        return 0
+    way = dy / around if dx >= 0.0 else 2.0 - dy / around
+    if way < 0.0:
+        way += 4.0
+    return min(int(way * (SECTORS / 4)), SECTORS - 1)
+
+
+@njit(cache=True, nogil=True)
+def find_obstructed(costs, window, obstructed):
+    """Fill int64[m] with the flat indices of a window's cells that are not free.
+
+    window: columns x0..xn-1 and rows y0..yn-1. Returns their number, m + 1 if there are more.
+    """
+    x0, xn, y0, yn = window
+    size_x = costs.shape[1]
+    count = 0
+    for y in range(y0, yn):
+        row = costs[y]
+        any_cost = np.uint8(0)
+        for x in range(x0, xn):  # a loop that the compiler makes vectors of
+            any_cost |= row[x]
+        if any_cost == FREE:
+            continue
+        for x in range(x0, xn):
+            if row[x] != FREE:
+                if count == obstructed.size:
+                    return count + 1
+                obstructed[count] = y * size_x + x
+                count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _reached(costs, origin_x, origin_y, resolution, sensors, range_m):
+    """The window of the cells that rays of a length from any of the sensors can reach."""
+    size_y, size_x = costs.shape
+    reach = range_m + 2 * resolution
+    low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+    for k in range(sensors.shape[0]):
+        low_x, high_x = min(low_x, sensors[k, 0]), max(high_x, sensors[k, 0])
+        low_y, high_y = min(low_y, sensors[k, 1]), max(high_y, sensors[k, 1])
+    x0 = min(max((low_x - reach - origin_x) / resolution, 0.0), float(size_x))
+    xn = min(max((high_x + reach - origin_x) / resolution + 1, 0.0), float(size_x))
+    y0 = min(max((low_y - reach - origin_y) / resolution, 0.0), float(size_y))
+    yn = min(max((high_y + reach - origin_y) / resolution + 1, 0.0), float(size_y))
+    return int(x0), int(xn), int(y0), int(yn)
+
+
+@njit(cache=True, nogil=True)
+def _find_sectors(obstructed, size_x, sensor_x, sensor_y, sectors):
+    """Make True the sectors of the lines from a sensor that may pass a cell.
+
+    sensor_x, sensor_y: in cells, from the grid's corner. A line's cells are within
+    sqrt(1/2) + 1/2 of the ray: half a cell for each rounding of its ends and of the line.
+    """
+    sectors[:] = False
+    for k in range(obstructed.size):
+        dx = obstructed[k] % size_x + 0.5 - sensor_x
+        dy = obstructed[k] // size_x + 0.5 - sensor_y
+        distance = math.sqrt(dx * dx + dy * dy)
+        if distance < 2.5:
+            sectors[:] = True
+            return
+        aside_x, aside_y = 1.5 * dy / distance, -1.5 * dx / distance
+        sector = sector_of(dx + aside_x, dy + aside_y)
+        last = sector_of(dx - aside_x, dy - aside_y)
+        sectors[sector] = True
+        while sector != last:
+            sector = (sector + 1) % SECTORS
+            sectors[sector] = True
+
+
+@njit(cache=True, nogil=True)
+def _keep_obstructed(flat_costs, obstructed, count):
+    """Move those that are still not free to the front; returns their number."""
+    kept = 0
+    for k in range(count):
+        if flat_costs[obstructed[k]] != FREE:
+            obstructed[kept] = obstructed[k]
+            kept += 1
+    return kept
+
+
+@njit(cache=True, nogil=True)
+def _power_of_two(cells):
+    """The first power of two that is not below ``cells``, but ``MOST_LINES`` at most."""
+    size = 1
+    while size < cells and size < MOST_LINES:
+        size *= 2
+    return size
+
+
+@njit(cache=True, nogil=True)
+def mark_all_points(costs, origin_x, origin_y, resolution, sensors, points, begins, ends, range_m,
                     max_height_m, bounds):
     """``mark_points`` of several observations, as in ``clear_all_rays``."""
-    begin = 0
     for k in range(len(ends)):
-        mark_points(costs, origin_x, origin_y, resolution, sensors[k], points[begin:ends[k]],
-                    range_m, max_height_m, bounds)
-        begin = ends[k]
+        mark_points(costs, origin_x, origin_y, resolution, sensors[k],
+                    points[begins[k]:ends[k]], range_m, max_height_m, bounds)
 
 
 @njit(cache=True, nogil=True)

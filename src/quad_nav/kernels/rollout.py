@@ -59,22 +59,37 @@ def step_count(rules, sample):
 
 
 @njit(cache=True, nogil=True)
-def simulate(scene, rules, pose, velocity, sample, points):
+def turn(rules, theta, vtheta, wanted, headings):
+    """Fill float64[steps, 3] with the yaw at each step, its cosine and its sine."""
+    steps = headings.shape[0]
+    dt = rules.sim_time_s / steps
+    for k in range(steps):
+        headings[k, 0], headings[k, 1], headings[k, 2] = theta, math.cos(theta), math.sin(theta)
+        vtheta = _approach(wanted, vtheta, rules.acc_lim_theta_radps2 * dt)
+        theta += vtheta * dt
+
+
+@njit(cache=True, nogil=True)
+def simulate(scene, rules, pose, velocity, sample, headings, points, with_footprint=True):
     """Cost of one sample and the number of poses written to ``points``, float64[k, 3].
 
-    Negative cost: COLLIDES (or off the map) and NO_WAY; ``points`` then ends
-    before the pose that failed.
+    ``headings``, float64[steps, 3], is what ``turn`` gives for the sample. Without the
+    footprint it is what the sample costs if no cell under the footprint does. Negative
+    cost: COLLIDES (or off the map) and NO_WAY; ``points`` then ends before the pose that
+    failed.
     """
-    steps = step_count(rules, sample)
+    steps = headings.shape[0]
     dt = rules.sim_time_s / steps
-    x, y, theta = pose
-    vx, vy, vtheta = velocity
+    x, y = pose[0], pose[1]
+    vx, vy = velocity[0], velocity[1]
     path_distance, goal_distance, occupancy, heading, time = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(steps):
+        theta, cos, sin = headings[k]
         cell_x, cell_y = cell_of(scene.window, x, y)
         if cell_x < 0 or cell_y < 0:
             return COLLIDES, k
-        if scene.highest_near[cell_y, cell_x] > occupancy:  # else the footprint changes nothing
+        # Where nothing near costs more than what is known the footprint changes nothing.
+        if with_footprint and scene.highest_near[cell_y, cell_x] > occupancy:
             cost = footprint_cost(scene.window, scene.footprint, x, y, theta)
             if cost < 0.0:
                 return COLLIDES, k
@@ -91,11 +106,13 @@ def simulate(scene, rules, pose, velocity, sample, points):
         points[k, 0], points[k, 1], points[k, 2] = x, y, theta
         vx = _approach(sample[0], vx, rules.acc_lim_x_mps2 * dt)
         vy = _approach(sample[1], vy, rules.acc_lim_y_mps2 * dt)
-        vtheta = _approach(sample[2], vtheta, rules.acc_lim_theta_radps2 * dt)
-        side = math.pi / 2 + theta
-        x, y = (x + (vx * math.cos(theta) + vy * math.cos(side)) * dt,
-                y + (vx * math.sin(theta) + vy * math.sin(side)) * dt)
-        theta += vtheta * dt
+        speed_x, speed_y = vx * cos, vx * sin
+        if vy != 0.0:
+            side = math.pi / 2 + theta
+            speed_x += vy * math.cos(side)
+            speed_y += vy * math.sin(side)
+        x += speed_x * dt
+        y += speed_y * dt
         time += dt
     if rules.heading_scoring:
         return (rules.occupancy_scale * occupancy + rules.path_scale * path_distance
@@ -134,19 +151,88 @@ def _heading_difference(scene, cell_x, cell_y, x, y, theta):
 
 
 @njit(cache=True, nogil=True)
-def score(scene, rules, pose, velocity, samples):
+def score(scene, rules, pose, velocity, samples, limit):
     """Cost float64[n] and last pose float64[n, 3] of each sample, float64[n, 3].
 
-    The last pose is nan for a sample whose first pose fails.
+    Infinite for a sample that is known to cost more than ``limit``. The last pose is nan for
+    a sample whose first pose fails.
+    """
+    headings, places = _all_turns(rules, pose, velocity, samples)
+    points = np.empty((headings.shape[1], 3))
+    bounds = _lower_bounds(scene, rules, pose, velocity, samples, headings, places, points)
+    costs = np.empty(samples.shape[0])
+    ends = np.full((samples.shape[0], 3), np.nan)
+    for k in range(samples.shape[0]):
+        if bounds[k] > limit:
+            costs[k] = np.inf
+            continue
+        turned = headings[places[k], :step_count(rules, samples[k])]
+        costs[k], count = simulate(scene, rules, pose, velocity, samples[k], turned, points)
+        if count > 0:
+            ends[k] = points[count - 1]
+    return costs, ends
+
+
+@njit(cache=True, nogil=True)
+def cheapest(scene, rules, pose, velocity, samples):
+    """Index and cost of the legal sample of lowest cost, the first of equals; -1 if none is.
+
+    samples: float64[n, 3]. They are tried in the order of what they cost without the
+    footprint, which is the slow part, until that is more than the best one's cost.
+    """
+    headings, places = _all_turns(rules, pose, velocity, samples)
+    points = np.empty((headings.shape[1], 3))
+    bounds = _lower_bounds(scene, rules, pose, velocity, samples, headings, places, points)
+    best, best_cost = -1, np.inf
+    for k in np.argsort(bounds, kind="mergesort"):
+        if bounds[k] > best_cost:
+            break
+        if bounds[k] == COLLIDES or bounds[k] == NO_WAY:
+            continue
+        turned = headings[places[k], :step_count(rules, samples[k])]
+        cost, _ = simulate(scene, rules, pose, velocity, samples[k], turned, points)
+        if cost >= 0.0 and (cost < best_cost or (cost == best_cost and k < best)):
+            best, best_cost = k, cost
+    return best, best_cost
+
+
+@njit(cache=True, nogil=True)
+def _lower_bounds(scene, rules, pose, velocity, samples, headings, places, points):
+    """What samples cost at least, float64[n]: without the footprint, if that can only add."""
+    bounds = np.full(samples.shape[0], -np.inf)
+    if rules.occupancy_scale >= 0.0:
+        for k in range(samples.shape[0]):
+            turned = headings[places[k], :step_count(rules, samples[k])]
+            bounds[k], _ = simulate(scene, rules, pose, velocity, samples[k], turned, points,
+                                    False)
+    return bounds
+
+
+@njit(cache=True, nogil=True)
+def _all_turns(rules, pose, velocity, samples):
+    """``turn`` for all samples: float64[m, longest, 3], and which one is whose, int64[n].
+
+    Many samples turn in the same way, with as many steps.
     """
     longest = 1
     for k in range(samples.shape[0]):
         longest = max(longest, step_count(rules, samples[k]))
-    points = np.empty((longest, 3))
-    costs = np.empty(samples.shape[0])
-    ends = np.full((samples.shape[0], 3), np.nan)
+    turns = np.empty((samples.shape[0], 2))
+    places = np.empty(samples.shape[0], dtype=np.int64)
+    known = 0
     for k in range(samples.shape[0]):
-        costs[k], count = simulate(scene, rules, pose, velocity, samples[k], points)
-        if count > 0:
-            ends[k] = points[count - 1]
-    return costs, ends
+        steps, vtheta = step_count(rules, samples[k]), samples[k, 2]
+        places[k] = -1
+        for place in range(known):
+            if turns[place, 0] == steps and turns[place, 1] == vtheta:
+                places[k] = place
+                break
+        if places[k] < 0:
+            places[k] = known
+            turns[known, 0], turns[known, 1] = steps, vtheta
+            known += 1
+    headings = np.empty((known, longest, 3))
+    for place in range(known):
+        turn(rules, pose[2], velocity[2], turns[place, 1],
+             headings[place, :int(turns[place, 0])])
+    return headings, places

@@ -8,14 +8,22 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import itertools
 import json
 import math
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
 
+import numpy as np
+
 from quad_nav.errors import InputError
 from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, Goal, GoalSequence, SequenceSettings
+from quad_nav.user_files import read_bytes
+
+MOST_BYTES = 4 * 1024 * 1024
+MOST_GOALS = 10_000
+LONGEST_M = 1e6
+"""No goal is farther away along an axis, and no tolerance larger."""
+LONGEST_S = 1e9
 
 # Says what is wrong with a place and what was expected, or None where a robot may be.
 PlaceCheck = Callable[[float, float], Optional[str]]
@@ -33,12 +41,12 @@ def _is_number(value: Any) -> bool:
 
 
 SETTINGS: Dict[str, _Setting] = {
-    "goal_tolerance": _Setting("goal_tolerance_m", lambda v: _is_number(v) and v > 0,
-                               "a number of metres above 0"),
-    "goal_timeout": _Setting("goal_timeout_s", lambda v: _is_number(v) and v > 0,
-                             "a number of seconds above 0"),
-    "retries": _Setting("retries", lambda v: _is_number(v) and v >= 0 and v == int(v),
-                        "a whole number, 0 or more"),
+    "goal_tolerance": _Setting("goal_tolerance_m", lambda v: _is_number(v) and 0 < v <= LONGEST_M,
+                               f"a number of metres above 0, {LONGEST_M:g} at most"),
+    "goal_timeout": _Setting("goal_timeout_s", lambda v: _is_number(v) and 0 < v <= LONGEST_S,
+                             f"a number of seconds above 0, {LONGEST_S:g} at most"),
+    "retries": _Setting("retries", lambda v: _is_number(v) and 0 <= v <= MOST_GOALS and v == int(v),
+                        f"a whole number, 0 to {MOST_GOALS}"),
     "loop": _Setting("loop", lambda v: isinstance(v, bool), "true or false"),
 }
 KEYS: Tuple[str, ...] = ("goals", "$schema", *SETTINGS)
@@ -47,12 +55,7 @@ KEYS: Tuple[str, ...] = ("goals", "$schema", *SETTINGS)
 def load_goals(path: Union[str, Path], check_place: Optional[PlaceCheck] = None,
                defaults: SequenceSettings = DEFAULT_SETTINGS) -> GoalSequence:
     """The sequence in a goal file; raises InputError with every fault in it."""
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError([f"{path}: cannot be read: {error.strerror}; expected a goal file"]
-                         ) from error
-    return parse_goals(content, str(path), check_place, defaults)
+    return parse_goals(read_bytes(Path(path), MOST_BYTES), str(path), check_place, defaults)
 
 
 def parse_goals(content: Union[bytes, str], name: str, check_place: Optional[PlaceCheck] = None,
@@ -145,8 +148,8 @@ class WatchedGoalFile:
     def _content(self) -> Optional[bytes]:
         # A file that is gone for good is a changed content like any other: load_goals says so.
         try:
-            return self.path.read_bytes()
-        except OSError:
+            return read_bytes(self.path, MOST_BYTES)
+        except InputError:
             return None
 
 
@@ -162,6 +165,8 @@ def _decode(content: Union[bytes, str], name: str) -> Tuple[Any, List[str]]:
             tree[key] = value
         return tree
 
+    if len(content) > MOST_BYTES:
+        raise InputError([f"{name}: has {len(content)} bytes; expected {MOST_BYTES} at most"])
     try:
         text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
     except UnicodeDecodeError as error:
@@ -191,6 +196,8 @@ def _read_goals(tree: Dict[str, Any], name: str, check_place: Optional[PlaceChec
         return [], [f"{name}: goals: is {_kind(entries)}; expected a list [[x, y], ...]"]
     if not entries:
         return [], [f"{name}: goals: is empty; expected at least one goal [x, y]"]
+    if len(entries) > MOST_GOALS:
+        return [], [f"{name}: goals: are {len(entries)}; expected {MOST_GOALS} at most"]
     goals: List[Goal] = []
     problems: List[str] = []
     for index, entry in enumerate(entries):
@@ -214,6 +221,8 @@ def _goal_faults(entry: Any) -> Iterable[str]:
     for label, unit, value in zip(("x", "y", "yaw"), ("metres", "metres", "radians"), entry):
         if not _is_number(value):
             yield f": {label} is {_show(value)}; expected a finite number of {unit}"
+        elif label != "yaw" and abs(value) > LONGEST_M:
+            yield f": {label} is {value:g}; expected {LONGEST_M:g} metres at most"
         elif label == "yaw" and abs(value) > 2 * math.pi:
             yield (f": yaw is {value:g}; expected radians between -2 pi and 2 pi "
                    f"({value:g} degrees are {math.radians(value):.4g})")
@@ -221,8 +230,8 @@ def _goal_faults(entry: Any) -> Iterable[str]:
 
 def _loop_faults(goals: List[Goal], tolerance_m: float, name: str) -> List[str]:
     """Goals that one place can reach all at once would be flown round endlessly on the spot."""
-    if any(a.pose.distance_to(b.pose) > 2 * tolerance_m
-           for a, b in itertools.combinations(goals, 2)):
+    places = np.array([(goal.x_m, goal.y_m) for goal in goals])
+    if any(np.hypot(*(places - place).T).max() > 2 * tolerance_m for place in places):
         return []
     expected = f"two goals more than twice the goal_tolerance apart ({2 * tolerance_m:g} m)"
     return [f"{name}: loop: has nowhere to go; expected {expected}"]

@@ -10,6 +10,7 @@ from rosbags.rosbag1 import Reader, ReaderError
 
 from quad_nav.errors import InputError
 from quad_nav.offline.record_messages import decode
+from quad_nav.user_files import open_file
 
 Wanted = Callable[[str, str], bool]
 """Whether a topic of a type, as ``nav_msgs/Path``, is to be read."""
@@ -32,6 +33,7 @@ def read_messages(path: Path, wanted: Wanted) -> Iterator[Message]:
     Raises:
         InputError: no recording, or one that is damaged or was not completed.
     """
+    open_file(path).close()  # not a pipe, which the libraries would wait for
     read = _read_mcap if path.suffix == ".mcap" else _read_bag
     try:
         for topic, kind, stamp_ns, data in read(path, wanted):
@@ -41,6 +43,8 @@ def read_messages(path: Path, wanted: Wanted) -> Iterator[Message]:
                           "recorded flight"]) from error
     except (ReaderError, McapError) as error:
         raise InputError([f"{path}: {_why(error)}"]) from error
+    except MemoryError:
+        raise
     except Exception as error:
         # What the two libraries raise for damaged files is not their own errors alone:
         # struct's, lz4's and AssertionError are among it.

@@ -7,6 +7,7 @@ import numpy as np
 
 from quad_nav.geometry import Pose2D, Pose3D, yaw_from_quaternion
 from quad_nav.offline.bag_file import Message
+from quad_nav.offline.bag_info import checked_pose, finite
 from quad_nav.offline.record_messages import pose_from, stamp_ns
 from quad_nav.offline.trace import GoalTrace, RobotTrace
 from quad_nav.tick import State
@@ -37,19 +38,26 @@ class BagRobot:
         """When the first odometry was."""
         return self._moves[0][0]
 
+    @property
+    def last_s(self) -> float:
+        """When the last odometry was."""
+        return self._moves[-1][0]
+
     def move(self, message: Message) -> None:
         odometry = message.content
         time_s = _seconds(odometry.header)
         if self._moves and time_s <= self._moves[-1][0]:
             return  # told again by a paused simulation
-        pose = self.map_from_odom.compose(pose_from(odometry.pose.pose.position,
-                                                    odometry.pose.pose.orientation))
+        pose = self.map_from_odom.compose(checked_pose(
+            pose_from(odometry.pose.pose.position, odometry.pose.pose.orientation)))
         twist = odometry.twist.twist
+        finite((twist.linear.x, twist.linear.y, twist.angular.z))
         self._moves.append((time_s, pose.x_m, pose.y_m, pose.z_m, *pose.quaternion,
                             twist.linear.x, twist.linear.y, twist.angular.z))
 
     def command(self, message: Message) -> None:
         twist = message.content
+        finite((twist.linear.x, twist.linear.y, twist.angular.z))
         self._commands.append((message.stamp_ns / 1e9, twist.linear.x, twist.linear.y,
                                twist.angular.z))
 
@@ -59,7 +67,9 @@ class BagRobot:
         if self._plans and self._plans[-1][0] == time_s:
             self._plans.pop()
         if poses:
-            self._plans.append((time_s, np.array([_planar(one.pose) for one in poses])))
+            plan = np.array([_planar(one.pose) for one in poses])
+            finite((float(np.abs(plan).max()),))
+            self._plans.append((time_s, plan))
 
     def state(self, message: Message) -> None:
         state = _STATES.get(message.content.data)
@@ -75,10 +85,10 @@ class BagRobot:
                                  status.recovery_behavior_name))
 
     def event(self, event: Dict[str, Any]) -> None:
-        """What the sequencer did, see ``flight_info.event``."""
-        if event.get("event") == "sent" and not event["why"]:
+        """What the sequencer did, as ``checked_event`` has it."""
+        if event["event"] == "sent" and not event["why"]:
             self._goals.append(event)
-        elif event.get("event") == "ended" and self._goals:
+        elif event["event"] == "ended" and self._goals:
             self._goals[-1] = {**self._goals[-1], "ended_s": event["time_s"],
                                "reached": event["reached"], "reason": event["reason"],
                                "attempts": event["attempts"]}

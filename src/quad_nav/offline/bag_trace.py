@@ -14,21 +14,34 @@ from quad_nav.face.contacts import NAME, contact_from_values
 from quad_nav.face.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC, from_text
 from quad_nav.mission.flight_log import Contact
 from quad_nav.offline.bag_file import Message, read_messages
+from quad_nav.offline.bag_info import (
+    LONGEST_S,
+    MOST_ROBOTS,
+    checked_event,
+    checked_flight,
+    checked_pose,
+    finite,
+)
 from quad_nav.offline.bag_robot import BagRobot
+from quad_nav.offline.memory import at_most_more
 from quad_nav.offline.record_messages import pose_from, stamp_ns
 from quad_nav.offline.trace import FlightTrace
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import scene_from_document
 
+MOST_MEMORY_BYTES = 4 * 10 ** 9
+"""For a recording that is read; what is packed in it may be a thousand times larger."""
+LONGEST_FLIGHT_S = 30 * 24 * 3600.0
+"""Stamps of two clocks in one recording are decades apart."""
 _CONTACTS_TOPIC = "/simulation/contacts"
 # Topic, type, and what a quadcopter's record takes of it.
 _ROBOT_TOPICS: Tuple[Tuple[str, str, Callable[[BagRobot, Message], None]], ...] = (
-    (r"/odom(\d+)", "nav_msgs/Odometry", BagRobot.move),
-    (r"/cmd_vel(\d+)", "geometry_msgs/Twist", BagRobot.command),
-    (r"/move_base(\d+)/[^/]+/plan", "nav_msgs/Path", BagRobot.plan),
-    (r"/move_base(\d+)/state", "std_msgs/String", BagRobot.state),
-    (r"/move_base(\d+)/feedback", "move_base_msgs/MoveBaseActionFeedback", BagRobot.cycle),
-    (r"/move_base(\d+)/recovery_status", "move_base_msgs/RecoveryStatus", BagRobot.recovery),
+    (r"/odom([0-9]{1,4})", "nav_msgs/Odometry", BagRobot.move),
+    (r"/cmd_vel([0-9]{1,4})", "geometry_msgs/Twist", BagRobot.command),
+    (r"/move_base([0-9]{1,4})/[^/]+/plan", "nav_msgs/Path", BagRobot.plan),
+    (r"/move_base([0-9]{1,4})/state", "std_msgs/String", BagRobot.state),
+    (r"/move_base([0-9]{1,4})/feedback", "move_base_msgs/MoveBaseActionFeedback", BagRobot.cycle),
+    (r"/move_base([0-9]{1,4})/recovery_status", "move_base_msgs/RecoveryStatus", BagRobot.recovery),
 )
 
 
@@ -40,14 +53,22 @@ def read_trace(path: Path) -> FlightTrace:
     Raises:
         InputError: no recording, a damaged one, or one without odometry.
     """
+    try:
+        with at_most_more(MOST_MEMORY_BYTES):
+            return _read(path)
+    except MemoryError as error:
+        raise InputError([f"{path}: needs more than {MOST_MEMORY_BYTES / 1e9:g} GB of memory, "
+                          "expected less; `rosbag filter` makes a shorter recording"]) from error
+
+
+def _read(path: Path) -> FlightTrace:
     reading = _Reading()
     for message in read_messages(path, _is_wanted):
         try:
             reading.take(message)
-        except (KeyError, TypeError, ValueError) as error:
+        except ValueError as error:
             raise InputError([f"{path}: {message.topic}: cannot be understood: "
-                              f"{type(error).__name__}: {error}; expected what "
-                              "docs/recording.md says"]) from error
+                              f"{error}; expected what docs/recording.md says"]) from error
     return reading.trace(path)
 
 
@@ -90,31 +111,37 @@ class _Reading:
         take(self._robot(robot), message)
 
     def _robot(self, robot: int) -> BagRobot:
+        if robot >= MOST_ROBOTS:
+            raise ValueError(f"quadcopter {robot}, expected 0 to {MOST_ROBOTS - 1}")
         return self.robots.setdefault(robot, BagRobot())
 
     def take_flight(self, message: Message) -> None:
-        self.info.update(from_text(message.content.data) or {})
+        self.info.update(checked_flight(from_text(message.content.data) or {}))
 
     def take_clock(self, message: Message) -> None:
         self._clock_ns = stamp_ns(message.content.clock)
 
     def take_event(self, message: Message) -> None:
         event = from_text(message.content.data)
-        if event is not None and isinstance(event.get("robot"), int):
+        if event is not None:
+            event = checked_event(event)
             self._robot(event["robot"]).event(event)
 
     def take_contact(self, message: Message) -> None:
         status = message.content
         if status.name == NAME:
-            self.contacts.append(contact_from_values(
-                status.hardware_id, {pair.key: pair.value for pair in status.values}))
+            contact = contact_from_values(
+                status.hardware_id, {pair.key: pair.value for pair in status.values})
+            finite((contact.x_m, contact.y_m))
+            finite((contact.time_s,), LONGEST_S)
+            self.contacts.append(contact)
 
     def take_transforms(self, message: Message) -> None:
         for transform in message.content.transforms:
-            match = re.fullmatch(r"/?odom(\d+)", transform.child_frame_id)
+            match = re.fullmatch(r"/?odom([0-9]{1,4})", transform.child_frame_id)
             if match and transform.header.frame_id.lstrip("/") == "map":
-                self._robot(int(match.group(1))).map_from_odom = pose_from(
-                    transform.transform.translation, transform.transform.rotation)
+                self._robot(int(match.group(1))).map_from_odom = checked_pose(pose_from(
+                    transform.transform.translation, transform.transform.rotation))
 
     def trace(self, path: Path) -> FlightTrace:
         flown = {number: robot for number, robot in sorted(self.robots.items())
@@ -122,6 +149,10 @@ class _Reading:
         if not flown:
             raise InputError([f"{path}: has no odometry; expected messages nav_msgs/Odometry on "
                               "/odom0 and so on"])
+        for number, robot in flown.items():
+            if robot.last_s - robot.first_s > LONGEST_FLIGHT_S:
+                raise InputError([f"{path}: /odom{number}: {robot.last_s - robot.first_s:g} s from "
+                                  f"first to last, expected {LONGEST_FLIGHT_S:g} s at most"])
         start_s = self.info.get("start_s")
         if start_s is None:
             start_s = min(robot.first_s for robot in flown.values())
@@ -140,6 +171,9 @@ class _Reading:
         document = self.info.get("scene")
         if document is None:
             return None
+        if isinstance(document, dict) and {"world", "map"} & set(document):
+            raise InputError([f"{path}: {FLIGHT_TOPIC}: scene: names another file, expected all "
+                              "of it in the recording"])
         return scene_from_document(document, f"{path}: {FLIGHT_TOPIC}: scene")
 
 

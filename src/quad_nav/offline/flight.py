@@ -151,12 +151,9 @@ class Flight:
 
     def advance(self) -> None:
         """Fly for one period of odometry, 1/40 s."""
-        for _ in range(STEPS_PER_ODOMETRY):
-            for contact in self.simulation.step():
-                for observer in self._observers:
-                    observer.touched(contact)
-            if self.simulation.step_count % self.setup.steps_per_scan == 0:
-                self._scan()
+        end = self.simulation.step_count + STEPS_PER_ODOMETRY
+        while self.simulation.step_count < end:
+            self._step(end)
         self.states = self._read_states()
         for observer in self._observers:
             observer.moved(self)
@@ -178,6 +175,16 @@ class Flight:
 
     def _read_states(self) -> List[RobotState]:
         return [self.simulation.state(index) for index in range(len(self.robots))]
+
+    def _step(self, end: int) -> None:
+        """To a step, or to that of the next scan, which is taken."""
+        count, per_scan = self.simulation.step_count, self.setup.steps_per_scan
+        next_scan = (count // per_scan + 1) * per_scan
+        for contact in self.simulation.advance(min(end, next_scan) - count):
+            for observer in self._observers:
+                observer.touched(contact)
+        if self.simulation.step_count == next_scan:
+            self._scan()
 
     def _scan(self) -> None:
         everybody = range(len(self.robots))

@@ -50,7 +50,10 @@ class FlightOptions:
 
 @dataclass(frozen=True)
 class FlightSetup:
-    """A flight that can be flown; ``simulation`` has the navigators' control period."""
+    """A flight that can be flown; ``simulation`` has the navigators' control period.
+
+    ``config_name`` is the folder's name alone: where it is, recordings and reports do not tell.
+    """
 
     scene: Scene
     robots: Tuple[RobotGoals, ...]
@@ -95,7 +98,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
     slowest_s = max(1.0 / one.navigator.controller_frequency_hz for one in configurations)
     warnings = dict.fromkeys(line for one in configurations for line in one.warnings)
     return FlightSetup(
-        scene, tuple(robots), tuple(configurations), options.config,
+        scene, tuple(robots), tuple(configurations), Path(options.config).name,
         replace(options.simulation, controller_period_s=slowest_s),
         round(STEPS_PER_S / options.scans_per_s), options.seed, options.time_limit_s,
         warnings=(*scene.remarks, *close_ends(robots, radius_m), *warnings))

@@ -6,7 +6,11 @@ from __future__ import annotations
 
 import importlib
 import os
+import shutil
+import socket
+import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any, List, Optional, Tuple
 
@@ -27,6 +31,8 @@ from quad_nav.tick import Located, Tick
 
 SUFFIX = ".rrd"
 _TIMELINE = "flight"
+_LOOPBACK, _PORT = "127.0.0.1", 9876
+_STARTS_WITHIN_S = 30.0
 _BACKGROUND_RGB = (250, 250, 250)
 
 
@@ -148,18 +154,50 @@ def _rerun() -> Any:
 
 
 def _spawn(rr: Any) -> None:
-    """Opens the viewer; pip puts it beside Python, where an unactivated environment's PATH
-    does not look."""
+    """Opens the viewer, or shows the flight in one that is open.
+
+    rerun's own ``spawn`` has it listen to the whole network.
+    """
     if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
         raise InputError(["--view: there is no display for the viewer; expected one, or "
                           "--view FILE.rrd to look at later"])
-    beside = str(Path(sys.executable).parent)
-    os.environ["PATH"] = os.pathsep.join((os.environ.get("PATH", os.defpath), beside))
+    if not _is_listening():
+        # pip puts it beside Python, where an unactivated environment's PATH does not look.
+        places = os.pathsep.join((str(Path(sys.executable).parent),
+                                  os.environ.get("PATH", os.defpath)))
+        program = shutil.which("rerun", path=places) or "rerun"
+        try:
+            viewer = subprocess.Popen(
+                [program, f"--bind={_LOOPBACK}", f"--port={_PORT}", "--memory-limit=75%",
+                 "--expect-data-soon"], start_new_session=True, stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        except OSError as error:
+            raise InputError([_no_viewer(error.strerror)]) from error
+        _wait_for(viewer)
+    rr.connect_tcp(f"{_LOOPBACK}:{_PORT}")
+
+
+def _wait_for(viewer: subprocess.Popen) -> None:
+    end_s = time.monotonic() + _STARTS_WITHIN_S
+    while not _is_listening():
+        if viewer.poll() is not None:
+            raise InputError([_no_viewer(f"rerun ended with {viewer.returncode}")])
+        if time.monotonic() > end_s:
+            raise InputError([_no_viewer(f"rerun is not there after {_STARTS_WITHIN_S:g} s")])
+        time.sleep(0.05)
+
+
+def _is_listening() -> bool:
     try:
-        rr.spawn()
-    except RuntimeError as error:
-        raise InputError([f"--view: the viewer does not start: {str(error).splitlines()[0]} "
-                          "expected a display, or --view FILE.rrd to look at later"]) from error
+        socket.create_connection((_LOOPBACK, _PORT), timeout=1.0).close()
+    except OSError:
+        return False
+    return True
+
+
+def _no_viewer(why: Optional[str]) -> str:
+    return (f"--view: the viewer does not start: {why}; expected a display, or --view FILE.rrd "
+            "to look at later")
 
 
 def _check(path: Path) -> None:

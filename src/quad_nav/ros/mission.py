@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Iterator, List, Optional
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
@@ -23,6 +23,7 @@ from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.standing import MissionStanding, RobotStanding, on_clock
 from quad_nav.mission.summary import MissionSummary, summarize_robot
 from quad_nav.ros import readiness
+from quad_nav.ros.diagnostics import DiagnosticsTopic
 from quad_nav.ros.marker_messages import only_markers
 from quad_nav.ros.mission_diagnostics import contact_from_message, progress
 from quad_nav.ros.mission_journal import MissionJournal
@@ -59,7 +60,7 @@ class Mission:
         self._seed: Optional[int] = rospy.get_param("/simulator/seed", None)
         self._now_s = 0.0
         self._goals = rospy.Publisher("/goals", MarkerArray, queue_size=1, latch=True)
-        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1)
+        self._diagnostics = DiagnosticsTopic()
         self._contacts = rospy.Subscriber("/simulation/contacts", DiagnosticStatus,
                                           self._on_contact)
         self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)

@@ -39,7 +39,9 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
         "distance_m": "" if distance_m is None else f"{distance_m:.2f}",
         "attempt": flight.attempt if flight else 0, "retries": sum(attempts) - len(attempts),
         "reached": len(flown.legs) - skipped, "skipped": skipped, "contacts": contacts,
-        "recoveries": flown.recoveries, "path_length_m": f"{flown.path_length_m:.2f}",
+        "last reason": next((leg.reason for leg in reversed(flown.legs) if leg.reason), ""),
+        "odometry silent s": f"{robot.silent_s:.2f}", "recoveries": flown.recoveries,
+        "path_length_m": f"{flown.path_length_m:.2f}",
     }
     return DiagnosticStatus(level=level, name=f"mission: {robot.name}", message=message,
                             hardware_id=robot.name,

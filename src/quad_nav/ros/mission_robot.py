@@ -53,7 +53,7 @@ class MissionRobot:
         self.sequencer = Sequencer(goals.sequence)
         self.link = RobotLink(index, news)
         self.pose: Optional[Pose3D] = None
-        self.is_silent = False
+        self.is_silent, self.silent_s = False, 0.0
         self._odometry: Optional[Odometry] = None
         self._begun_s = 0.0
         self._heard_s = self._settled_s = 0.0
@@ -136,7 +136,8 @@ class MissionRobot:
             self._path.add(stamp_s, self.pose)
 
     def _watch_silence(self, now_s: float) -> None:
-        was_silent, self.is_silent = self.is_silent, now_s - self._heard_s > ODOMETRY_SILENT_S
+        self.silent_s = now_s - self._heard_s
+        was_silent, self.is_silent = self.is_silent, self.silent_s > ODOMETRY_SILENT_S
         if self.is_silent and not was_silent:
             rospy.logwarn("%s: nothing has come on %s for %.0f s", self.name,
                           self.link.odometry.resolved_name, ODOMETRY_SILENT_S)

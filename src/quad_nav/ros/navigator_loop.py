@@ -2,10 +2,13 @@
 from __future__ import annotations
 
 import time
-from typing import Sequence
+from typing import List, Sequence
 
 import rospy
 
+from quad_nav.face.health import Health
+from quad_nav.ros.diagnostics import tell_every_second
+from quad_nav.ros.navigator_health import LoopHealth
 from quad_nav.ros.peer_topics import PeerTopics
 from quad_nav.ros.robot_navigator import POLL_S, RobotNavigator
 from quad_nav.ros.silence import SilenceWatch
@@ -25,6 +28,8 @@ def serve(robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics],
     """
     silence = SilenceWatch([*(subscriber for one in peers for subscriber in one.subscribers),
                             *(subscriber for one in robots for subscriber in one.subscribers)])
+    loop = LoopHealth(len(robots))
+    tell_every_second(lambda: _health(loop, robots))
     for robot in robots:
         rospy.on_shutdown(robot.stop)
     while rospy.get_time() == 0.0 and not rospy.is_shutdown():
@@ -46,7 +51,9 @@ def serve(robots: Sequence[RobotNavigator], peers: Sequence[PeerTopics],
             continue
         for one in peers:
             one.refresh(now_s)
-        _tell_lag(now_s - max(min(robot.due_s for robot in robots), begun_s))
+        late_s = now_s - max(min(robot.due_s for robot in robots), begun_s)
+        loop.came_round(now_s, late_s)
+        _tell_lag(late_s)
         for robot in robots:
             if robot.due_s <= now_s + 1e-9:
                 robot.step(now_s)
@@ -78,6 +85,11 @@ class Stall:
             return False
         rospy.loginfo("the clock had stood still for %.1f s", stood_s)
         return True
+
+
+def _health(loop: LoopHealth, robots: Sequence[RobotNavigator]) -> List[Health]:
+    now_s = rospy.get_time()
+    return [loop.read(now_s), *(one for robot in robots for one in robot.health.read(now_s))]
 
 
 def _tell_lag(late_s: float) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry, Path
 
+from quad_nav.face.incoming import MOST_POSES, pose_problem, twist_problem, way_problem
 from quad_nav.geometry import Pose2D
 from quad_nav.peers import IDLE_RANK_S, Intention, Peer, peer_at, rank_of, unknown_intention
 from quad_nav.ros.convert import odometry_from_message, time_message
@@ -90,6 +91,10 @@ class PeerTopics:
             rospy.logwarn_throttle(5.0, f"{name}: its place in {self._frame} is unknown: {error}")
             return None
         odom_from_base, velocity = odometry_from_message(odometry)
+        problem = pose_problem(odom_from_base) or twist_problem(velocity)
+        if problem:
+            rospy.logwarn_throttle(5.0, f"{name}: its odometry is of no use: {problem}")
+            return None
         pose = map_from_odom.compose(odom_from_base).to_2d()
         return peer_at(name, pose, velocity, odometry.header.stamp.to_sec())
 
@@ -124,5 +129,10 @@ def intention_message(intention: Intention, frame: str, now_s: float) -> Path:
 def intention_from_message(message: Path, number: int) -> Intention:
     if not message.poses:
         return Intention(rank_of(IDLE_RANK_S, number))
-    way = [(p.pose.position.x, p.pose.position.y) for p in message.poses]
-    return Intention(message.poses[0].header.stamp.to_sec(), np.array(way))
+    way = np.array([(p.pose.position.x, p.pose.position.y)
+                    for p in message.poses[:MOST_POSES + 1]])
+    problem = way_problem(way)
+    if problem:
+        rospy.logwarn_throttle(5.0, f"quad{number}: its intention is of no use: {problem}")
+        return Intention(rank_of(IDLE_RANK_S, number))
+    return Intention(message.poses[0].header.stamp.to_sec(), way)

@@ -14,6 +14,7 @@ from nav_msgs.msg import Odometry
 
 from quad_nav import config
 from quad_nav.assembly import apply_configuration, build_navigator
+from quad_nav.face.incoming import twist_problem
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.ros import sensors, static_maps
 from quad_nav.ros.complaints import Complaints
@@ -21,6 +22,7 @@ from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.costmap_publisher import CostmapPublisher
 from quad_nav.ros.goal_server import GoalServer
 from quad_nav.ros.names import Names, own_node
+from quad_nav.ros.navigator_health import InputMeter, NavigatorHealth
 from quad_nav.ros.peer_topics import PeerTopics
 from quad_nav.ros.plan_services import PlanServices
 from quad_nav.ros.plan_topics import PlanTopics
@@ -62,11 +64,19 @@ class RobotNavigator:
         self._services = PlanServices(navigator, self._topics, self._lock, self._located_now,
                                       lambda: self._configuration.clearing_radius_m, names)
         self._goals = GoalServer(transforms, navigator.global_costmap.params.global_frame, names)
+        self.health = self._new_health(names)
 
     @property
     def subscribers(self) -> List[rospy.Subscriber]:
         """Whose silence would be a fault."""
         return [self._odometry, *(sensor.subscriber for sensor in self._sensors)]
+
+    def _new_health(self, names: Names) -> NavigatorHealth:
+        node = rospy.get_name() if names is own_node else names("~")
+        return NavigatorHealth(
+            node.strip("/"), f"quad{self.number}",
+            [InputMeter(self._odometry), *(InputMeter(sensor.subscriber, sensor.expected_period_s)
+                                           for sensor in self._sensors)])
 
     def step(self, now_s: float) -> None:
         """Does what is due at a time."""
@@ -92,7 +102,10 @@ class RobotNavigator:
 
     def _on_odometry(self, message: Odometry) -> None:
         velocity = twist_from_message(message.twist.twist)
-        if velocity.is_finite:
+        problem = twist_problem(velocity)
+        if problem:
+            self._complaints.say(f"{self._name}odometry is dropped: {problem}")
+        else:
             self._velocity, self._heard_s = velocity, rospy.get_time()
 
     def _on_reconfigure(self, namespace: str, changes: dict) -> config.Configuration:
@@ -115,6 +128,8 @@ class RobotNavigator:
         in_global, located = self._locate(now_s)
         peers = self._peers.near(self.number, located.in_global, navigator.peer_reach_m)
         tick = navigator.tick(now_s, located, self._velocity, peers)
+        self.health.wanted_hz = navigator.params.controller_frequency_hz
+        self.health.ticked(tick, located)
         self._publish(tick, in_global, located)
 
     def _locate(self, now_s: float) -> Tuple[Optional[Pose3D], Located]:

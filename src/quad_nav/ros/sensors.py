@@ -5,6 +5,7 @@ original's message filter; the oldest of too many waiting ones is dropped.
 """
 from __future__ import annotations
 
+import struct
 import threading
 from collections import deque
 from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
@@ -17,7 +18,8 @@ from sensor_msgs.msg import PointCloud, PointCloud2
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.trust import ScanTrust
-from quad_nav.geometry import Pose3D
+from quad_nav.face.incoming import MOST_POINTS, scan_problem
+from quad_nav.geometry import Pose3D, Scan
 from quad_nav.ros.complaints import Complaints
 from quad_nav.ros.convert import ScanMessage, scan_from_message
 from quad_nav.ros.names import Names, own_node
@@ -25,6 +27,7 @@ from quad_nav.ros.transforms import Transforms, TransformUnavailable
 
 MESSAGE_TYPES = {"LaserScan": ScanMessage, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
 QUEUE_LENGTH = 50
+UNUSABLE = (ValueError, TypeError, ArithmeticError, struct.error)  # what a bad message leads to
 
 
 class Sensor:
@@ -40,6 +43,13 @@ class Sensor:
         self._lock = threading.Lock()
         self.subscriber = rospy.Subscriber(
             topic, MESSAGE_TYPES[data_type], self._store, queue_size=QUEUE_LENGTH)
+
+    @property
+    def expected_period_s(self) -> float:
+        """How often something is to come for every layer to be current, 0 if none minds."""
+        periods_s = [layer.buffers[source].params.expected_update_period_s
+                     for _, layer, source, _ in self.targets]
+        return min((period_s for period_s in periods_s if period_s > 0.0), default=0.0)
 
     def _store(self, message) -> None:
         with self._lock:
@@ -83,8 +93,11 @@ class Sensor:
         if self._trust is None:
             self._trust = ScanTrust(layer.buffers[source].params
                                     for _, layer, source, _ in self.targets)
-        why_not = self._trust.why_not(scan_from_message(message), global_from_sensor,
-                                      rospy.get_time())
+        try:
+            scan = _checked_scan(message)
+        except UNUSABLE:
+            return False  # when it is handed over it is said why
+        why_not = self._trust.why_not(scan, global_from_sensor, rospy.get_time())
         if why_not:
             self._complaints.say(f"{self.topic}: a scan is not believed: {why_not}")
         return bool(why_not)
@@ -130,7 +143,11 @@ class Sensor:
                    poses: Sequence[Tuple[Pose3D, Pose3D]]) -> None:
         """Layers that see a message in the same way share what the first makes of it."""
         is_scan, stamp_s = self.data_type == "LaserScan", message.header.stamp.to_sec()
-        seen: Any = scan_from_message(message) if is_scan else _cloud_points(message)
+        try:
+            seen: Any = _checked_scan(message) if is_scan else _cloud_points(message)
+        except UNUSABLE as error:
+            rospy.logwarn_throttle(5.0, "%s: a message is dropped: %s", self.topic, error)
+            return
         made: Dict[tuple, Tuple[ObstacleLayer, str]] = {}
         for (costmap, layer, source, frame), (points_pose, origin_pose) in zip(self.targets, poses):
             way = (costmap.params.global_frame, frame, layer.way_of_seeing(source))
@@ -143,13 +160,30 @@ class Sensor:
                 layer.add_cloud(source, seen, points_pose, stamp_s, received_s, origin_pose)
 
 
+def _checked_scan(message) -> Scan:
+    """Raises ValueError for one that cannot be used."""
+    scan = scan_from_message(message)
+    problem = scan_problem(scan)
+    if problem:
+        raise ValueError(problem)
+    return scan
+
+
 def _cloud_points(message) -> np.ndarray:
-    """float32[n, 3] in the message's frame."""
+    """float32[n, 3] in the message's frame, without points that are nowhere.
+
+    Raises what numpy and struct raise for a message that is not as long as it says.
+    """
+    count = (len(message.points) if isinstance(message, PointCloud)
+             else message.width * message.height)
+    if count > MOST_POINTS:
+        raise ValueError(f"{count} points, expected {MOST_POINTS} at most")
     if isinstance(message, PointCloud):
         points = [(p.x, p.y, p.z) for p in message.points]
     else:
         points = list(point_cloud2.read_points(message, field_names=("x", "y", "z")))
-    return np.array(points, dtype=np.float32).reshape(-1, 3)
+    cloud = np.array(points, dtype=np.float32).reshape(-1, 3)
+    return cloud[np.isfinite(cloud).all(axis=1)]
 
 
 def connect(costmaps: Sequence[LayeredCostmap], names: Names = own_node) -> List[Sensor]:

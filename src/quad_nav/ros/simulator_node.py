@@ -21,6 +21,7 @@ from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError
+from quad_nav.face.incoming import twist_problem
 from quad_nav.ros.command_lease import CommandLease
 from quad_nav.ros.convert import twist_from_message
 from quad_nav.ros.marker_messages import goal_spheres
@@ -182,7 +183,7 @@ class SimulatorNode:
         while self._commands:
             robot, message = self._commands.popleft()
             twist = twist_from_message(message)
-            if not twist.is_finite:
+            if twist_problem(twist):
                 rospy.logwarn_throttle(5.0, "/cmd_vel%d: dropped, expected finite numbers: %s",
                                        robot, twist)
                 continue

@@ -24,6 +24,7 @@ from quad_nav.ros.convert import (
     transform,
     transform_message,
 )
+from quad_nav.ros.diagnostics import DiagnosticsTopic
 from quad_nav.ros.marker_messages import marker_array
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
@@ -33,7 +34,7 @@ _STAYS, _MOUNT = transform(Pose3D(0.0, 0.0, 0.0)), transform(base_from_lidar)
 _LAGS_BELOW = 0.9
 """Part of the asked-for rate below which the simulation is said to lag."""
 _LAGGING_REPORTS = 3
-"""Reports in a row that lag before it is logged; nodes that start up take their time."""
+"""Reports in a row that lag before it counts; nodes that start up take their time."""
 
 
 class SimulatorTopics:
@@ -54,7 +55,7 @@ class SimulatorTopics:
         self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
         self._scans = [rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=10) for i in robots]
         self._contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=100)
-        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._diagnostics = DiagnosticsTopic()
         self._scene = rospy.Publisher("/simulation/scene", MarkerArray, queue_size=1, latch=True)
         self._quadcopters = rospy.Publisher("/simulation/quadcopters", MarkerArray, queue_size=1,
                                             latch=True)
@@ -121,7 +122,8 @@ class SimulatorTopics:
                                    "second are reached", factor, rate)
         message = "paused" if paused else f"{'lags: ' if lags else ''}{factor:.2f} x real time"
         return DiagnosticStatus(
-            level=DiagnosticStatus.WARN if lags else DiagnosticStatus.OK,
+            level=(DiagnosticStatus.WARN if self._lagging_reports >= _LAGGING_REPORTS
+                   else DiagnosticStatus.OK),
             name="simulator: clock", hardware_id="simulator", message=message,
             values=_pairs(text_values(real_time_factor=factor, rate=rate,
                            contacts=len(self._simulation.contacts))))

@@ -10,6 +10,7 @@ from nav_msgs.msg import OccupancyGrid
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.face.incoming import grid_problem
 from quad_nav.grid import GridSpec
 from quad_nav.ros.names import Names, own_node
 
@@ -31,6 +32,10 @@ class MapListener:
 
     def _on_map(self, message: OccupancyGrid) -> None:
         info = message.info
+        problem = grid_problem(info.width, info.height, info.resolution, len(message.data))
+        if problem:
+            rospy.logwarn("%s: the map is dropped: %s", self._grid.resolved_name, problem)
+            return
         spec = GridSpec(info.width, info.height, info.resolution,
                         info.origin.position.x, info.origin.position.y)
         frame, wanted = message.header.frame_id, self._costmap.params.global_frame
@@ -44,6 +49,10 @@ class MapListener:
             self._grid.unregister()
 
     def _on_update(self, message: OccupancyGridUpdate) -> None:
+        problem = grid_problem(message.width, message.height, 1.0, len(message.data))
+        if problem:
+            rospy.logwarn_throttle(5.0, f"{self._updates.resolved_name}: dropped: {problem}")
+            return
         part = np.array(message.data, dtype=np.int8).reshape(message.height, message.width)
         with self._lock:
             self._layer.update_map(part, message.x, message.y)

@@ -28,6 +28,9 @@ _MANY_BOXES = 256
 _STRIPE_M = 4.0
 _BOXES_PER_BODY = 16
 """pybullet's limit for the shapes of one collision shape."""
+_PARKED_M = 100.0
+"""Below the floor, without contacts: quadcopters that are not engaged."""
+_LEVEL = [0.0, 0.0, 0.0, 1.0]
 
 GoalSphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
 """Centre in metres, radius in metres, RGBA in 0..1."""
@@ -35,6 +38,8 @@ GoalSphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float,
 
 class World:
     """Scene and quadcopters; steps by a fixed time under given forces.
+
+    Quadcopters are engaged at first, see ``engage``.
 
     With ``gui`` pybullet opens a window; ``InputError`` if there is no display.
     """
@@ -67,6 +72,7 @@ class World:
         for group in grouped:
             self._names[self._add_boxes(group)] = None
         self._robots = [self._add_quadcopter(k, start) for k, start in enumerate(starts)]
+        self._engaged = list(range(len(starts)))
         self._goal_ids = []
         pybullet.performCollisionDetection(physicsClientId=client)
         self._draw(True)
@@ -82,22 +88,53 @@ class World:
 
     def state(self) -> BodyState:
         """Read all bodies."""
-        client = self._client
-        rows: List[float] = []
-        for robot in self._robots:
-            position, quaternion = pybullet.getBasePositionAndOrientation(robot, client)
-            linear, angular = pybullet.getBaseVelocity(robot, client)
-            rows += (*position, *quaternion, *linear, *angular)
-        return BodyState(np.array(rows).reshape(-1, 13))
+        rows = np.empty((len(self._robots), 13))
+        self._read(range(len(self._robots)), rows)
+        return BodyState(rows)
 
-    def step(self, positions_m: np.ndarray, forces_n: np.ndarray, torques_nm: np.ndarray) -> None:
-        """One time step under forces at the bodies' centres and torques, float64[n, 3] in map."""
+    def engage(self, robots: Sequence[int], state: BodyState) -> None:
+        """From now on only these quadcopters can be touched and are moved by ``step``.
+
+        Those that were not engaged are put where ``state`` has them.
+        """
+        if list(robots) == self._engaged:
+            return
+        client = self._client
+        for robot in set(self._engaged) - set(robots):
+            body, far_m = self._robots[robot], [0.0, 0.0, -_PARKED_M - robot]
+            pybullet.setCollisionFilterGroupMask(body, -1, 0, 0, physicsClientId=client)
+            pybullet.resetBasePositionAndOrientation(body, far_m, _LEVEL, client)
+        for robot in sorted(set(robots) - set(self._engaged)):
+            body, row = self._robots[robot], state.rows[robot].tolist()
+            pybullet.setCollisionFilterGroupMask(body, -1, 1, -1, physicsClientId=client)
+            pybullet.resetBasePositionAndOrientation(body, row[0:3], row[3:7], client)
+            pybullet.resetBaseVelocity(body, row[7:10], row[10:13], client)
+        self._engaged = list(robots)
+
+    def step(self, state: BodyState, forces_n: np.ndarray, torques_nm: np.ndarray) -> BodyState:
+        """``state`` after one time step of the quadcopters that are engaged.
+
+        Under forces at the bodies' centres and torques, float64[n, 3] in map.
+        """
         client, in_map = self._client, pybullet.WORLD_FRAME
-        for robot, position, force, torque in zip(self._robots, positions_m.tolist(),
-                                                  forces_n.tolist(), torques_nm.tolist()):
-            pybullet.applyExternalForce(robot, -1, force, position, in_map, client)
-            pybullet.applyExternalTorque(robot, -1, torque, in_map, client)
+        positions, forces, torques = (rows.tolist() for rows in (
+            state.positions_m, forces_n, torques_nm))
+        for robot in self._engaged:
+            body = self._robots[robot]
+            pybullet.applyExternalForce(body, -1, forces[robot], positions[robot], in_map, client)
+            pybullet.applyExternalTorque(body, -1, torques[robot], in_map, client)
         pybullet.stepSimulation(client)
+        rows = state.rows.copy()
+        self._read(self._engaged, rows)
+        return BodyState(rows)
+
+    def _read(self, robots: Sequence[int], rows: np.ndarray) -> None:
+        client = self._client
+        for robot in robots:
+            body = self._robots[robot]
+            position, quaternion = pybullet.getBasePositionAndOrientation(body, client)
+            linear, angular = pybullet.getBaseVelocity(body, client)
+            rows[robot] = (*position, *quaternion, *linear, *angular)
 
     def touches(self) -> List[Touch]:
         """What presses on the quadcopters after the last step."""

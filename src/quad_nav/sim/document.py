@@ -9,16 +9,18 @@ from typing import Any, Dict, Hashable, List, Optional, Sequence, Tuple
 import yaml
 
 from quad_nav.errors import InputError
+from quad_nav.plain_yaml import MOST_BYTES, PlainLoader
+from quad_nav.user_files import read_text
+
+LARGEST = 1e6
+"""No length, height or angle in a scene is beyond it."""
+LONGEST_TEXT = 200
 
 
 def read_yaml(path: Path) -> Any:
     """The document of a file. Raises ``InputError``, with the line if it is not YAML."""
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError([f"{path}: cannot be read: {error}"]) from error
-    try:
-        return yaml.load(text, Loader=_Loader)
+        return yaml.load(read_text(path, MOST_BYTES), Loader=_Loader)
     except yaml.YAMLError as error:
         raise InputError([f"{path}: {_yaml_fault(error)}"]) from error
 
@@ -58,8 +60,10 @@ class Checker:
 
     def text(self, fields: Dict[str, Any], key: str, place: str, default: str) -> str:
         value = fields.get(key, default)
-        if not isinstance(value, str) or not value:
-            self.fault(_join(place, key), f"{value!r}, expected a text")
+        if not isinstance(value, str) or not 0 < len(value) <= LONGEST_TEXT or (
+                not value.isprintable()):
+            self.fault(_join(place, key), f"{kind(value)}, expected a text of 1 to "
+                       f"{LONGEST_TEXT} characters that can be printed")
             return default
         return value
 
@@ -85,20 +89,25 @@ class Checker:
         if not math.isfinite(value) or (positive and value <= 0):
             self.fault(place, f"{value}, {expected}")
             return 1.0
+        if abs(value) > LARGEST:
+            self.fault(place, f"{value:g}, expected {LARGEST:g} at most")
+            return 1.0
         return float(value)
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(PlainLoader):
     """Refuses a key that is given twice, where YAML would silently keep the last."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False
                           ) -> Dict[Hashable, Any]:
         seen = set()
         for key_node, _ in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                continue
             if key_node.value in seen:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"key {key_node.value!r} is given twice", key_node.start_mark)
-            seen.add(key_node.value if isinstance(key_node.value, str) else id(key_node))
+            seen.add(key_node.value)
         return super().construct_mapping(node, deep)
 
 
@@ -116,8 +125,12 @@ def kind(value: Any) -> str:
         return "missing"
     if isinstance(value, list):
         return f"a list of {len(value)}"
-    return "a mapping" if isinstance(value, dict) else repr(value)
+    return "a mapping" if isinstance(value, dict) else _short(repr(value))
 
 
 def _join(place: str, key: Any) -> str:
     return f"{place}.{key}" if place else str(key)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= LONGEST_TEXT else text[:LONGEST_TEXT] + "..."

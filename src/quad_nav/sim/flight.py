@@ -123,16 +123,19 @@ def limit_command(twist: Twist2D, params: FlightParams) -> Tuple[float, float, f
 
 
 class FlightLaw:
-    """The law for one airframe; it has no memory of what it was called with."""
+    """The law for one airframe; it has no memory of what it was called with.
+
+    ``law`` and ``airframe`` are what ``flight_law.fly`` calls so.
+    """
 
     def __init__(self, airframe: Airframe, params: FlightParams):
         limit_mps2 = min(params.max_acceleration_mps2,
                          GRAVITY_MPS2 * math.tan(params.max_tilt_rad))
-        self._law = (params.velocity_gain_per_s, params.attitude_bandwidth_radps,
-                     params.altitude_bandwidth_radps, params.yaw_rate_gain_per_s, limit_mps2,
-                     params.max_yaw_acceleration_radps2)
-        self._airframe = np.array([airframe.mass_kg, airframe.max_thrust_n,
-                                   *airframe.inertia_kgm2, *airframe.max_torques_nm])
+        self.law = (params.velocity_gain_per_s, params.attitude_bandwidth_radps,
+                    params.altitude_bandwidth_radps, params.yaw_rate_gain_per_s, limit_mps2,
+                    params.max_yaw_acceleration_radps2)
+        self.airframe = np.array([airframe.mass_kg, airframe.max_thrust_n,
+                                  *airframe.inertia_kgm2, *airframe.max_torques_nm])
 
     def thrust_and_torque(self, state: BodyState, commands: np.ndarray, altitude_m: float
                           ) -> Tuple[np.ndarray, np.ndarray]:
@@ -142,6 +145,6 @@ class FlightLaw:
         ahead and to the left of the heading, rad/s.
         """
         forces, torques = np.empty_like(commands), np.empty_like(commands)
-        flight_law.fly(state.rows, commands, altitude_m, GRAVITY_MPS2, self._airframe, self._law,
+        flight_law.fly(state.rows, commands, altitude_m, GRAVITY_MPS2, self.airframe, self.law,
                        forces, torques)
         return forces, torques

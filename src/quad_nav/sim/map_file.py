@@ -1,6 +1,6 @@
 """Maps of ROS's ``map_server`` as obstacles: a YAML file beside an image.
 
-    image: office.pgm              # beside this file, or an absolute path; PGM or PNG
+    image: office.pgm              # in this file's folder or below it; PGM or PNG
     resolution: 0.05               # metres per pixel
     origin: [-10.0, -10.0, 0.0]    # pose in map of the image's lower left corner
     negate: 0
@@ -28,9 +28,11 @@ from quad_nav.kernels.rectangles import cover
 from quad_nav.sim.document import Checker, kind
 from quad_nav.sim.map_image import Pixels, read_pixels
 from quad_nav.sim.scene import Box
+from quad_nav.user_files import named_in
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 MAX_BOXES = 200_000
+MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-3, 100.0
 _RECTANGLES_AT_ONCE = 65_536
 _KEYS = ["image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode"]
 _MODES = ("trinary", "scale", "raw")
@@ -176,9 +178,21 @@ def _read_fields(check: Checker, document: Any, folder: Path) -> Optional[MapFie
     if free > occupied:
         check.fault("free_thresh", f"{free:g} is above occupied_thresh, {occupied:g}")
     mode = document.get("mode", "trinary")
-    if mode not in _MODES:
+    if not isinstance(mode, str) or mode not in _MODES:
         check.fault("mode", f"{kind(mode)}, expected {', '.join(_MODES)}")
-    return MapFields(folder / image, resolution_m, origin, bool(negate), occupied, free, mode)
+    if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
+        check.fault("resolution", f"{resolution_m:g} m, expected {MIN_RESOLUTION_M:g} to "
+                    f"{MAX_RESOLUTION_M:g}")
+    return MapFields(_image_path(check, folder, image), resolution_m, origin, bool(negate),
+                     occupied, free, mode)
+
+
+def _image_path(check: Checker, folder: Path, image: str) -> Path:
+    try:
+        return named_in(folder, image)
+    except InputError as error:
+        check.fault("image", "; ".join(error.problems))
+        return folder
 
 
 def _threshold(check: Checker, document: Any, key: str) -> float:

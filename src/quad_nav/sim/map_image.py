@@ -9,8 +9,10 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from quad_nav.errors import InputError
+from quad_nav.user_files import open_file
 
 MAX_CELLS = 10_000 * 10_000
+MAX_BYTES = 512 * 1024 * 1024
 _FORMATS = ("PPM", "PNG")  # PPM stands for the whole family, PGM among it
 _PALETTE_MODES = {"1": "L", "P": "RGBA", "PA": "RGBA", "CMYK": "RGB", "La": "LA", "RGBa": "RGBA"}
 
@@ -35,7 +37,7 @@ def read_pixels(path: Path, alpha_counts: bool) -> Pixels:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # MAX_CELLS is ours
-            with Image.open(path, formats=_FORMATS) as image:
+            with open_file(path, MAX_BYTES) as file, Image.open(file, formats=_FORMATS) as image:
                 _check_size(path, image)
                 return _pixels(image, alpha_counts)
     except UnidentifiedImageError:
@@ -46,9 +48,11 @@ def read_pixels(path: Path, alpha_counts: bool) -> Pixels:
 
 def _check_size(path: Path, image: Image.Image) -> None:
     width, height = image.size
-    if width * height > MAX_CELLS:
+    if not 0 < width * height <= MAX_CELLS:
         raise InputError([f"{path}: is {width} x {height} pixels, "
-                          f"expected {MAX_CELLS:g} pixels at most"])
+                          f"expected 1 to {MAX_CELLS:g} pixels"])
+    if image.mode == "F":
+        raise InputError([f"{path}: has pixels with fractions, expected PGM or PNG"])
 
 
 def _pixels(image: Image.Image, alpha_counts: bool) -> Pixels:

@@ -171,8 +171,10 @@ class Scene:
 
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Obstacle:
         """The obstacle or wall whose surface is nearest to a point."""
-        return min((self._boxes.nearest(x_m, y_m, z_m), *self._round_obstacles),
-                   key=lambda solid: solid.clearance_m(x_m, y_m, z_m))
+        nearest: List[Obstacle] = [self._boxes.nearest(x_m, y_m, z_m)]
+        if self._round_obstacles:
+            nearest.append(self._rounds.nearest(x_m, y_m, z_m))
+        return min(nearest, key=lambda solid: solid.clearance_m(x_m, y_m, z_m))
 
     def wall_boxes(self) -> List[Box]:
         """The walls as boxes; the ones at the lower and upper y hold the corners."""
@@ -191,8 +193,12 @@ class Scene:
         return _Boxes([*self.wall_boxes(), *(o for o in self.obstacles if isinstance(o, Box))])
 
     @cached_property
-    def _round_obstacles(self) -> List[Obstacle]:
+    def _round_obstacles(self) -> List[Union[Cylinder, Sphere]]:
         return [o for o in self.obstacles if not isinstance(o, Box)]
+
+    @cached_property
+    def _rounds(self) -> _Rounds:
+        return _Rounds(self._round_obstacles)
 
 
 class _Boxes:
@@ -221,6 +227,25 @@ class _Boxes:
         local = (self._cos * dx + self._sin * dy, self._cos * dy - self._sin * dx, dz)
         outside = np.abs(local).T - self._halves
         return _signed_distance((outside[:, 0], outside[:, 1], outside[:, 2]))
+
+
+class _Rounds:
+    """Many cylinders and spheres, asked for the nearest one."""
+
+    def __init__(self, rounds: Sequence[Union[Cylinder, Sphere]]):
+        self._rounds = rounds
+        self._centres = np.array([[o.x_m, o.y_m, o.bottom_m + o.height_m / 2] for o in rounds])
+        self._radii = np.array([o.radius_m for o in rounds])
+        self._half_heights = np.array([o.height_m / 2 for o in rounds])
+        self._are_spheres = np.array([isinstance(o, Sphere) for o in rounds])
+
+    def nearest(self, x_m: float, y_m: float, z_m: float) -> Union[Cylinder, Sphere]:
+        """The one with the least clearance; see ``Cylinder.clearance_m``."""
+        dx, dy, dz = ((x_m, y_m, z_m) - self._centres).T
+        beside = np.hypot(dx, dy)
+        upright_m = _signed_distance((beside - self._radii, np.abs(dz) - self._half_heights))
+        clearances_m = np.where(self._are_spheres, np.hypot(beside, dz) - self._radii, upright_m)
+        return self._rounds[int(np.argmin(clearances_m))]
 
 
 def _outside_slab(z_m: float, bottom_m: float, height_m: float) -> float:

@@ -15,7 +15,7 @@
 ``bottom`` (default 0) lifts an obstacle off the floor. Instead of drawing the place itself
 a scene may take it from another file, with its own obstacles on top:
 
-    world: depot.world             # or map: office.yaml; beside this file, or an absolute path
+    world: depot.world             # or map: office.yaml; in this file's folder or below it
     unknown: free                  # or occupied: what cells of a map that nobody saw are
 
 Then ``size`` with ``origin`` may be left out, for the extent of the solids or of the map,
@@ -44,6 +44,7 @@ from quad_nav.sim.scene import (
     Walls,
 )
 from quad_nav.sim.surroundings import Surroundings, from_map, from_world
+from quad_nav.user_files import named_in
 
 _KEYS = ["name", "size", "origin", "altitude", "walls", "obstacles", "starts", "world", "map",
          "unknown"]
@@ -51,7 +52,8 @@ _SHAPE_KEYS = {"box": ["name", "shape", "centre", "size", "height", "yaw", "bott
                "cylinder": ["name", "shape", "centre", "radius", "height", "bottom"],
                "sphere": ["name", "shape", "centre", "radius", "bottom"]}
 _WORLD_SUFFIXES = (".world", ".sdf")
-_MAX_SIZE_M = 1e5
+MAX_SIZE_M = 1e5
+MAX_STARTS = 1000
 
 
 def load_scene(path: Union[str, Path]) -> Scene:
@@ -61,13 +63,14 @@ def load_scene(path: Union[str, Path]) -> Scene:
     Raises ``InputError`` with one line per fault.
     """
     path = Path(path)
+    place = path.resolve() if path.is_symlink() else path  # files beside it are looked for there
     if path.suffix in _WORLD_SUFFIXES:
-        document: Any = {"world": path.name}
+        document: Any = {"world": place.name}
     else:
         document = read_yaml(path)
         if isinstance(document, dict) and "image" in document:
-            document = {"map": path.name}
-    return scene_from_document(document, str(path), path.stem, path.parent)
+            document = {"map": place.name}
+    return scene_from_document(document, str(path), path.stem, place.parent)
 
 
 def scene_from_document(document: Any, source: str, default_name: str = "scene",
@@ -118,7 +121,7 @@ def _read_surroundings(check: Checker, fields: Dict[str, Any], folder: Path, hei
                        ) -> Optional[Surroundings]:
     """The world or map that the scene takes its place from, if it does."""
     unknown = fields.get("unknown", "free")
-    if unknown not in ("free", "occupied"):
+    if not isinstance(unknown, str) or unknown not in ("free", "occupied"):
         check.fault("unknown", f"{kind(unknown)}, expected free or occupied")
     if "unknown" in fields and "map" not in fields:
         check.fault("unknown", "belongs to a map, expected the key map too")
@@ -127,9 +130,10 @@ def _read_surroundings(check: Checker, fields: Dict[str, Any], folder: Path, hei
         return None
     try:
         if "world" in fields:
-            return from_world(folder / check.text(fields, "world", "", "."), model_path())
+            return from_world(named_in(folder, check.text(fields, "world", "", ".")),
+                              model_path())
         if "map" in fields:
-            return from_map(folder / check.text(fields, "map", "", "."), height_m,
+            return from_map(named_in(folder, check.text(fields, "map", "", ".")), height_m,
                             unknown == "occupied")
     except InputError as error:
         check.problems += error.problems
@@ -156,8 +160,8 @@ def _read_arena(check: Checker, fields: Dict[str, Any], around: Optional[Surroun
         x, y, end_x, end_y = around.extent
         return (x, y, end_x - x, end_y - y)
     size = check.numbers(fields, "size", "", 2, positive=True)
-    if max(size) > _MAX_SIZE_M:
-        check.fault("size", f"{max(size):g} m, expected {_MAX_SIZE_M:g} m at most")
+    if max(size) > MAX_SIZE_M:
+        check.fault("size", f"{max(size):g} m, expected {MAX_SIZE_M:g} m at most")
     origin = (check.numbers(fields, "origin", "", 2) if "origin" in fields or is_elsewhere
               else (0.0, 0.0))
     return (*origin, *size)
@@ -197,6 +201,9 @@ def _read_starts(check: Checker, fields: Dict[str, Any], around: Optional[Surrou
                  ) -> List[Optional[Pose2D]]:
     is_elsewhere = "world" in fields or "map" in fields
     starts = check.sequence(fields, "starts", [] if is_elsewhere else None)
+    if len(starts) > MAX_STARTS:
+        check.fault("starts", f"{len(starts)} poses, expected {MAX_STARTS} at most")
+        return []
     if fields.get("starts") == []:
         check.fault("starts", "no start pose, expected at least one [x, y, yaw]")
     return [_read_start(check, entry, f"starts[{k}]") for k, entry in enumerate(starts)]

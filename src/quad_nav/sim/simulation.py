@@ -23,12 +23,15 @@ from quad_nav.sim.flight import (
     FlightParams,
     limit_command,
 )
+from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.lidar import LidarParams, make_scan
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 STEPS_PER_S = 240
 STEP_S = 1.0 / STEPS_PER_S
 LIDAR_CASTERS = ("kernel", "bullet")
+_STEPS_NEAR = 12
+"""Who is near to something mostly stays so for a while; asking less often is cheaper."""
 _START_GAP_M = 0.05
 _START_TRIES = 1000
 
@@ -101,6 +104,8 @@ class Simulation:
         self._starts = start_poses(scene, n_robots, params.jitter_m, seed,
                                    params.airframe.radius_m)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
+        # Who looks into the engine, by its window or its rays, has to find the bodies there.
+        self._engine_is_seen = gui or params.lidar_caster == "bullet"
         self._caster: Caster = (
             KernelCaster(params.lidar, scene, n_robots, params.airframe.radius_m)
             if params.lidar_caster == "kernel"
@@ -115,6 +120,10 @@ class Simulation:
         self._contact_log = ContactLog()
         self._noise = [np.random.default_rng([self.seed, 1, robot]) for robot in range(n)]
         self._state = self._world.state()
+        self._free_flight = FreeFlight(self.scene, n, self.params.airframe.radius_m, self._law,
+                                       STEP_S)
+        # The step up to which the engine moves a quadcopter.
+        self._engine_until = np.full(n, math.inf if self._engine_is_seen else -math.inf)
 
     @property
     def n_robots(self) -> int:
@@ -153,13 +162,43 @@ class Simulation:
 
     def step(self) -> List[Contact]:
         """Advance by ``STEP_S``; returns the contacts that begin."""
-        if self.step_count > self._next_hover_step:
-            self._hover()
+        return self.advance(1)
+
+    def advance(self, steps: int) -> List[Contact]:
+        """Advance by so many ``STEP_S``; returns the contacts that begin."""
+        end = self.step_count + steps
+        contacts: List[Contact] = []
+        while self.step_count < end:
+            if self.step_count > self._next_hover_step:
+                self._hover()
+            in_engine = self._engine_until > self.step_count
+            if not in_engine.any():
+                self._fly_freely(in_engine, int(min(end, self._next_hover_step + 1)))
+            elif in_engine.all() or self._fly_freely(in_engine, self.step_count + 1):
+                contacts += self._step_with_engine(in_engine)
+        return contacts
+
+    def _fly_freely(self, in_engine: np.ndarray, end: int) -> bool:
+        """All others up to a step; False if fewer, because the engine has to move more.
+
+        With somebody in the engine that has to make the same step, time goes on there.
+        """
+        state, done, near = self._free_flight.advance(self._state, self._commands, in_engine,
+                                                      end - self.step_count)
+        if done:
+            self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
+        self._engine_until[near] = self.step_count + done + _STEPS_NEAR
+        self._state = state
+        if not in_engine.any():
+            self.step_count += done
+        return not near
+
+    def _step_with_engine(self, in_engine: np.ndarray) -> List[Contact]:
         forces, torques = self._law.thrust_and_torque(self._state, self._commands,
                                                       self.scene.altitude_m)
-        self._world.step(self._state.positions_m, forces, torques)
+        self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
+        self._state = self._world.step(self._state, forces, torques)
         self.step_count += 1
-        self._state = self._world.state()
         return self._contact_log.update(self.now_s, self._world.touches())
 
     def _hover(self) -> None:

@@ -22,7 +22,12 @@ from quad_nav.sim.xml_tree import Element, read_xml
 MAX_OBSTACLES = 100_000
 MAX_INCLUDES = 16
 """Files inside each other; one that includes itself would never end."""
+MAX_PARTS = 200_000
+"""Models, links and collisions; files that include each other twice would make it 2^16."""
+MAX_BYTES = 64 * 1024 * 1024
+"""Of the world and all the files that it includes, each counted once."""
 
+_LONGEST_NAME = 200
 _OTHER_SOLIDS = ("actor", "population", "road")
 
 
@@ -40,6 +45,25 @@ class _Findings:
     left_out: Dict[str, List[str]] = field(default_factory=dict)
     not_static: List[str] = field(default_factory=list)
     problems: List[str] = field(default_factory=list)
+    files: Dict[Path, Element] = field(default_factory=dict)
+    bytes_read: int = 0
+    parts: int = 0
+
+    def read(self, path: Path) -> Element:
+        """The root of a file, read once however often it is included."""
+        if path not in self.files:
+            self.files[path] = read_xml(path)
+            self.bytes_read += path.stat().st_size
+            if self.bytes_read > MAX_BYTES:
+                raise InputError([f"{path}: makes it {self.bytes_read} bytes of included files, "
+                                  f"expected {MAX_BYTES} at most"])
+        return self.files[path]
+
+    def count_part(self, path: Path) -> None:
+        self.parts += 1
+        if self.parts > MAX_PARTS:
+            raise InputError([f"{path}: more than {MAX_PARTS} models, links and collisions with "
+                              "what is included"])
 
     def leave_out(self, name: str, reason: str) -> None:
         self.left_out.setdefault(reason, []).append(name)
@@ -51,13 +75,13 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
     ``<include>`` finds ``model://`` beside the file, in a folder ``models`` there or one
     up, and in the folders of ``model_path``. Raises ``InputError`` with every fault.
     """
-    root = read_xml(path)
+    findings = _Findings()
+    root = findings.read(path)
     if root.tag not in ("sdf", "gazebo"):
         raise InputError([f"{path}: line {root.line}: <{root.tag}>, expected <sdf>"])
     worlds = list(root.all("world"))
     if len(worlds) > 1:
         raise InputError([f"{path}: line {worlds[1].line}: a second <world>, expected one"])
-    findings = _Findings()
     folders = (path.parent, path.parent / "models", path.parent.parent / "models", *model_path)
     walk = _Walk(SdfReader(path, findings.problems), findings, folders)
     world = worlds[0] if worlds else root
@@ -98,6 +122,7 @@ class _Walk:
             if child.tag not in ("model", "include"):
                 continue
             name = prefix + _name_of(child)
+            self.findings.count_part(self.reader.path)
             try:
                 if child.tag == "include":
                     self._include(child, map_from_parent, prefix, state)
@@ -140,7 +165,7 @@ class _Walk:
             if uri == "model://ground_plane":
                 return
             raise NotRepresented(f"<include> of {uri or 'nothing'}, not found")
-        root = read_xml(path)
+        root = self.findings.read(path)
         walk = _Walk(SdfReader(path, self.findings.problems), self.findings, self.folders,
                      self.depth + 1)
         for model in root.all("model"):
@@ -149,6 +174,7 @@ class _Walk:
     def _link(self, link: Element, map_from_model: Pose3D, prefix: str,
               state: Optional[Element]) -> None:
         name = prefix + _name_of(link)
+        self.findings.count_part(self.reader.path)
         collisions = list(link.all("collision"))
         if not collisions and link.first("visual") is not None:
             self.findings.leave_out(name, "looks without a collision")
@@ -165,6 +191,7 @@ class _Walk:
 
     def _collision(self, collision: Element, map_from_link: Pose3D, prefix: str) -> None:
         name = prefix + _name_of(collision)
+        self.findings.count_part(self.reader.path)
         try:
             map_from_shape = map_from_link.compose(self.reader.pose(collision))
             geometry = collision.first("geometry") or Element("geometry", {}, collision.line)
@@ -185,4 +212,5 @@ def _state_of(state: Optional[Element], tag: str, name: str) -> Optional[Element
 
 def _name_of(element: Element, default: str = "") -> str:
     given = element.text_of("name") if element.tag == "include" else element.attributes.get("name")
-    return given or default or element.text_of("uri").split("/")[-1] or element.tag
+    name = given or default or element.text_of("uri").split("/")[-1] or element.tag
+    return "".join(c if c.isprintable() else "?" for c in name[:_LONGEST_NAME])

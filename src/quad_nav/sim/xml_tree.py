@@ -16,9 +16,11 @@ import defusedxml.sax
 from defusedxml.common import DefusedXmlException
 
 from quad_nav.errors import InputError
+from quad_nav.user_files import read_bytes
 
-MAX_BYTES = 64 * 1024 * 1024
+MAX_BYTES = 32 * 1024 * 1024
 MAX_DEPTH = 100
+MAX_ELEMENTS = 1_000_000
 
 
 @dataclass
@@ -47,12 +49,9 @@ class Element:
 def read_xml(path: Path) -> Element:
     """The root element of a file. Raises ``InputError`` with the line if it is not XML."""
     builder = _Builder(path)
+    content = read_bytes(path, MAX_BYTES)
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError([f"{path}: is too large, expected {MAX_BYTES:g} bytes at most"])
-        defusedxml.sax.parseString(path.read_bytes(), builder, forbid_dtd=True)
-    except OSError as error:
-        raise InputError([f"{path}: cannot be read: {error}"]) from error
+        defusedxml.sax.parseString(content, builder, forbid_dtd=True)
     except DefusedXmlException as error:
         raise InputError([f"{path}: line {builder.line}: DOCTYPE and entities are refused, "
                           "expected XML without them"]) from error
@@ -67,6 +66,8 @@ class _Builder(ContentHandler):
         super().__init__()
         self._path = path
         self._open: List[Element] = []
+        self._texts: List[List[str]] = []
+        self._elements = 0
         self.root = Element("", {}, 0)
 
     @property
@@ -78,6 +79,9 @@ class _Builder(ContentHandler):
 
     def startElement(self, name: str, attrs: AttributesImpl) -> None:
         element = Element(name, dict(attrs.items()), self.line)
+        self._elements += 1
+        if self._elements > MAX_ELEMENTS:
+            raise InputError([f"{self._path}: line {self.line}: more than {MAX_ELEMENTS} elements"])
         if len(self._open) >= MAX_DEPTH:
             raise InputError([f"{self._path}: line {self.line}: more than {MAX_DEPTH} elements "
                               "inside each other"])
@@ -86,9 +90,10 @@ class _Builder(ContentHandler):
         else:
             self.root = element
         self._open.append(element)
+        self._texts.append([])
 
     def endElement(self, name: str) -> None:
-        self._open.pop()
+        self._open.pop().text = "".join(self._texts.pop())
 
     def characters(self, content: str) -> None:
-        self._open[-1].text += content
+        self._texts[-1].append(content)

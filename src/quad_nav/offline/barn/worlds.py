@@ -7,6 +7,7 @@ Cell [row, column] is centred at x = 0.15 column - 4.425, y = 0.15 row + 0.075.
 from __future__ import annotations
 
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, List, Sequence, Tuple
@@ -16,6 +17,7 @@ import numpy as np
 from quad_nav.errors import InputError
 from quad_nav.offline.barn.protocol import GOAL_M, START
 from quad_nav.sim.scene import Cylinder, Scene, Walls
+from quad_nav.user_files import open_file
 
 ALTITUDE_M = 0.5
 """Half the cylinders' height: a tilted LIDAR sees neither the floor nor past their tops nearby."""
@@ -26,6 +28,8 @@ FIELD = (64, 30)
 """Rows along y, columns along x."""
 MARGIN_M = 5.0
 """Free floor around field, start and goal, before the walls that every scene has."""
+MOST_BYTES = 256 * 1024 * 1024
+"""Of all arrays of a file, unpacked."""
 _LOW_X_M = -4.5
 
 
@@ -76,9 +80,13 @@ def load_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[BarnWorld, ...]:
 
 def _read(path: Path) -> Dict[str, np.ndarray]:
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open_file(path) as opened, np.load(opened, allow_pickle=False) as file:
+            size = sum(member.file_size for member in file.zip.infolist())
+            if size > MOST_BYTES:
+                raise ValueError(f"it holds {size} bytes, at most {MOST_BYTES} are read")
             return {name: file[name] for name in file.files}
-    except (OSError, EOFError, ValueError, AttributeError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, ValueError, AttributeError, TypeError, NotImplementedError,
+            MemoryError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError([f"{path}: cannot be read: {error}; expected an .npz with index, "
                           "occupied and path_<index>"]) from error
 

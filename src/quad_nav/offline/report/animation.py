@@ -1,6 +1,7 @@
 """A flight in motion, as GIF or MP4."""
 from __future__ import annotations
 
+import math
 import shutil
 from pathlib import Path
 from typing import List, Optional, Tuple
@@ -157,7 +158,8 @@ class _MovingRobot:
 
 def _speed(among: Tracks) -> int:
     duration_s = float(among.times_s[-1] - among.times_s[0]) if len(among.times_s) else 0.0
-    return next((speed for speed in _SPEEDS if duration_s / speed <= _LONGEST_S), _SPEEDS[-1])
+    return next((speed for speed in _SPEEDS if duration_s / speed <= _LONGEST_S),
+                math.ceil(duration_s / _LONGEST_S))
 
 
 def _frame_times(among: Tracks, speed: int) -> np.ndarray:

@@ -76,18 +76,18 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
                     *_curves(trace, among, flight, shown)]
     sim_s = float(among.times_s[-1]) if len(among.times_s) else 0.0
     factor = sim_s / wall_time_s if wall_time_s else None
-    return _page("flight.html.jinja", sections, trace=trace, flight=flight, factor=factor,
-                 parameters=parameter_rows(trace),
-                 parameters_known=any(robot.parameters for robot in trace.robots))
+    return render("flight.html.jinja", sections, trace=trace, flight=flight, factor=factor,
+                  parameters=parameter_rows(trace),
+                  parameters_known=any(robot.parameters for robot in trace.robots))
 
 
 def comparison_page(flights: Sequence[FlightFigures]) -> Page:
     """The report of several flights."""
     with style.styled():
-        picture = _picture("comparison", "Figures of each flight", comparison_picture(flights))
+        compared = picture("comparison", "Figures of each flight", comparison_picture(flights))
     section = Section("comparison", "Side by side", "Every dot is a flight; boxes hold the middle "
-                      "half of five or more, with the median.", (picture,))
-    return _page("comparison.html.jinja", [section], flights=flights, groups=grouped(flights))
+                      "half of five or more, with the median.", (compared,))
+    return render("comparison.html.jinja", [section], flights=flights, groups=grouped(flights))
 
 
 def _paths(trace: FlightTrace, among: Tracks, shown: Sequence[Encounter]) -> Section:
@@ -95,7 +95,7 @@ def _paths(trace: FlightTrace, among: Tracks, shown: Sequence[Encounter]) -> Sec
         "paths", "Paths", "Goals have their numbers in the order of flight and start positions the "
         "robot's number; discs show where the flight ended. Do paths keep to the middle of gaps, "
         "and where do they go round in circles?",
-        (_picture("paths", "Paths over the scene", paths_picture(trace, among, shown)),))
+        (picture("paths", "Paths over the scene", paths_picture(trace, among, shown)),))
 
 
 def _encounters(trace: FlightTrace, among: Tracks, met: Sequence[Encounter],
@@ -109,7 +109,7 @@ def _encounters(trace: FlightTrace, among: Tracks, met: Sequence[Encounter],
                "arrows are the way of 1.5 s. Each frame is 3.2 m wide.")
     if len(met) > len(shown):
         caption += (f" The {len(shown)} closest are shown, {len(met) - len(shown)} more are not.")
-    pictures = tuple(_picture(f"encounter_{letter}", note, encounter_picture(trace, among, one))
+    pictures = tuple(picture(f"encounter_{letter}", note, encounter_picture(trace, among, one))
                      for letter, note, one in zip(LETTERS, map(_note, shown), shown))
     return Section("encounters", "Close encounters", caption, pictures,
                    tuple(f"{letter}: {_note(one)}" for letter, one in zip(LETTERS, shown)))
@@ -138,13 +138,13 @@ def _curves(trace: FlightTrace, among: Tracks, flight: FlightFigures,
         Section("gaps", "Distances", "Between hulls, discs of "
                 f"{trace.robot_radius_m:.2f} m radius; below zero they overlap. Letters are close "
                 "encounters, dashed lines contacts.",
-                (_picture("distances", "Gaps over time", distance_picture(trace, among, shown)),)),
+                (picture("distances", "Gaps over time", distance_picture(trace, among, shown)),)),
         Section("timeline", "Goals", "Bars are goals with their numbers, from being sent to being "
-                "reached.", (_picture("timeline", "Goals over time", timeline_picture(trace)),)),
-        Section("motion", "Motion", motion, (_picture("motion", "Speed, turn rate and tilt over "
+                "reached.", (picture("timeline", "Goals over time", timeline_picture(trace)),)),
+        Section("motion", "Motion", motion, (picture("motion", "Speed, turn rate and tilt over "
                                                       "time", motion_picture(trace, rows)),)),
         Section("cycles", "Control cycles", cycles,
-                (_picture("cycles", "Times of control cycles", cycle_picture(trace)),)),
+                (picture("cycles", "Times of control cycles", cycle_picture(trace)),)),
     ]
 
 
@@ -157,13 +157,17 @@ def _most_endangered(flight: FlightFigures) -> List[int]:
     return sorted(sorted(range(len(flight.robots)), key=least_gap_m)[:style.MOST_ROWS])
 
 
-def _picture(name: str, alt: str, figure: Figure) -> Picture:
+def picture(name: str, alt: str, figure: Figure) -> Picture:
+    """A figure as a picture."""
     return Picture(name, alt, style.png(figure))
 
 
-def _page(template: str, sections: Sequence[Section], **context: Any) -> Page:
+def render(template: str, sections: Sequence[Section], folder: Optional[Path] = None,
+           **context: Any) -> Page:
+    """A page from a template of this folder, or of another one; ``context`` is for it."""
+    folders = [Path(__file__).parent, *([folder] if folder is not None else [])]
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True,
+        loader=jinja2.FileSystemLoader(folders), autoescape=True,
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters["figure"] = _figure_filter()
     html = environment.get_template(template).render(sections=sections, **context)

@@ -27,6 +27,7 @@ RC: Dict[Any, Any] = {
     "axes.spines.right": False, "xtick.color": "#505860", "ytick.color": "#505860",
     "legend.frameon": False, "lines.linewidth": 1.4, "hatch.linewidth": 0.6,
     "figure.facecolor": "white",
+    "text.parse_math": False,  # names of quadcopters may hold any character
 }
 
 

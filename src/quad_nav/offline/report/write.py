@@ -16,17 +16,17 @@ def write_report(trace: FlightTrace, path: Path, pictures: Optional[Path] = None
 
     ``pictures``: the folder that gets every picture as a PNG file, None for none.
     """
-    _write(flight_page(trace, wall_time_s), path, pictures)
+    write_page(flight_page(trace, wall_time_s), path, pictures)
 
 
 def write_comparison(flights: Sequence[FlightFigures], path: Path,
                      pictures: Optional[Path] = None) -> None:
     """The report of several flights, written as ``write_report`` does."""
-    _write(comparison_page(flights), path, pictures)
+    write_page(comparison_page(flights), path, pictures)
 
 
-def _write(page: Page, path: Path, pictures: Optional[Path]) -> None:
-    """A reader never sees half of the HTML."""
+def write_page(page: Page, path: Path, pictures: Optional[Path] = None) -> None:
+    """The HTML, and its pictures as PNG files for a folder; nobody sees half of the HTML."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     partial.write_text(page.html, encoding="utf-8")

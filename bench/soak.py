@@ -1,0 +1,98 @@
+"""Whether a long flight stays as it began: memory and control cycles over simulated hours.
+
+    PYTHONPATH=src .venv/bin/python bench/soak.py --robots 10 --hours 8
+
+Goals at random in a random scene, again and again. Each row is a stretch of the flight.
+Memory is compared with that at the end of the first one, when everything has been used
+once; cycle times tell as much of the machine's other work as of the flight.
+"""
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import List
+
+import click
+import numpy as np
+
+from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.mission.sequencer import Action, GoalEnded
+from quad_nav.offline.flight import Flight
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.run import fly
+from quad_nav.offline.setup import FlightOptions, read_setup
+from quad_nav.sim.contacts import Contact
+from quad_nav.tick import Located, Tick
+
+FLAT = 0.05  # that much growth is none
+HEADER = "hours   memory MB   cycles   median ms   99 % ms   reached   skipped   contacts"
+
+
+class Stretches(FlightObserver):
+    """Prints a row for every ``length_s`` of simulated time."""
+
+    def __init__(self, length_s: float):
+        self._length_s = length_s
+        self.memories_mb: List[float] = []
+        self._begin()
+
+    def touched(self, contact: Contact) -> None:
+        self._contacts += 1
+
+    def acted(self, robot: int, now_s: float, action: Action) -> None:
+        if isinstance(action, GoalEnded):
+            self._reached += action.reached
+            self._skipped += not action.reached
+
+    def ticked(self, robot: int, tick: Tick, located: Located, wall_s: float) -> None:
+        if tick.cycle:
+            self._cycles_ms.append(1000 * wall_s)
+
+    def moved(self, flight: Flight) -> None:
+        if flight.now_s < self._length_s * (len(self.memories_mb) + 1):
+            return
+        self.memories_mb.append(memory_mb())
+        median_ms, slow_ms = np.percentile(self._cycles_ms, (50, 99))
+        click.echo(f"{flight.now_s / 3600:5.2f} {self.memories_mb[-1]:11.1f} "
+                   f"{len(self._cycles_ms):8d} {median_ms:11.2f} {slow_ms:9.2f} "
+                   f"{self._reached:9d} {self._skipped:9d} {self._contacts:10d}")
+        self._begin()
+
+    def _begin(self) -> None:
+        self._cycles_ms: List[float] = []
+        self._reached = self._skipped = self._contacts = 0
+
+
+def memory_mb() -> float:
+    """What the process has in memory now."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 1e6
+
+
+def looped(goals: RobotGoals) -> RobotGoals:
+    sequence = replace(goals.sequence, settings=replace(goals.sequence.settings, loop=True))
+    return replace(goals, sequence=sequence)
+
+
+@click.command()
+@click.option("--robots", default=10, show_default=True)
+@click.option("--hours", default=8.0, show_default=True, help="Simulated.")
+@click.option("--minutes", default=30.0, show_default=True, help="Simulated, per row.")
+@click.option("--seed", default=0, show_default=True)
+@click.option("--config", default="default", show_default=True)
+def main(robots: int, hours: float, minutes: float, seed: int, config: str) -> None:
+    """A long flight; exit status 1 if memory grows or two quadcopters touch."""
+    setup = read_setup(FlightOptions(None, None, config, robots=robots, seed=seed,
+                                     time_limit_s=3600 * hours))
+    stretches = Stretches(60 * minutes)
+    click.echo(HEADER)
+    summary = fly(replace(setup, robots=tuple(map(looped, setup.robots))), (stretches,))
+    first_mb, last_mb = stretches.memories_mb[0], stretches.memories_mb[-1]
+    growth = last_mb / first_mb - 1.0
+    click.echo(f"memory {100 * growth:+.1f} %, {len(summary.contacts)} contacts, "
+               f"{summary.real_time_factor:.1f} times as fast as real time")
+    raise SystemExit(growth > FLAT or len(summary.contacts) > 0)
+
+
+if __name__ == "__main__":
+    main()

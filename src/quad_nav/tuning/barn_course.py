@@ -1,0 +1,126 @@
+"""BARN's worlds as a course: searched on worlds that are not in the official sample."""
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Dict, List, Sequence, Tuple
+
+from quad_nav.errors import InputError
+from quad_nav.offline.barn.figures import Figures, figures
+from quad_nav.offline.barn.protocol import SAMPLE_STEP, TIME_LIMIT_S, Outcome, Run, metric
+from quad_nav.offline.barn.setup import BarnOptions, Contestant, flight_setup, read_barn_setup
+from quad_nav.offline.barn.worlds import BarnWorld
+from quad_nav.offline.setup import FlightSetup, config_folder
+from quad_nav.tuning.courses import HELD_OUT_SEED, LIDAR, Case, files_digest
+from quad_nav.tuning.flight_result import FlightResult, FlightTask
+from quad_nav.tuning.space import Assignments
+
+
+class BarnCourse:
+    """One flight through each world, with the same seed for every candidate.
+
+    The search flies through worlds spread evenly over those outside of the official sample;
+    the sample's are held out.
+
+    Raises:
+        InputError: the worlds or the parameters cannot be used.
+    """
+
+    ends_at_contact = True
+
+    def __init__(self, options: BarnOptions):
+        self.options = options
+        setup = read_barn_setup(options)
+        self.warnings: List[str] = list(setup.warnings)
+        self._worlds = setup.worlds
+        self._contestants: Dict[Assignments, Contestant] = {(): setup.contestant}
+        rest = [k for k, world in enumerate(self._worlds) if world.number % SAMPLE_STEP]
+        sample = [k for k, world in enumerate(self._worlds) if not world.number % SAMPLE_STEP]
+        problems = [f"{options.worlds}: no world {what}; expected some"
+                    for what, found in (("outside of the official sample", rest),
+                                        ("of the official sample", sample)) if not found]
+        if options.seed >= HELD_OUT_SEED:
+            problems.append(f"seed: {options.seed}, expected less than {HELD_OUT_SEED}")
+        if problems:
+            raise InputError(problems)
+        self._rest, self._sample = _spread(rest), sample
+
+    @property
+    def config(self) -> str:
+        return self.options.params
+
+    @property
+    def fixed(self) -> Tuple[Tuple[str, Any], ...]:
+        return self.options.parameters
+
+    def search_cases(self, count: int) -> Tuple[Case, ...]:
+        """So many flights, through worlds outside of the sample."""
+        return self._cases(self._rest, self.options.seed, count)
+
+    def held_out_cases(self, count: int) -> Tuple[Case, ...]:
+        """So many flights through worlds of the sample; 50 are one through each."""
+        return self._cases(self._sample, self.options.seed + HELD_OUT_SEED, count)
+
+    def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
+        """A flight; the parameters are checked once for all worlds.
+
+        Raises:
+            InputError: they cannot be flown with.
+        """
+        of_world = [path for path, _ in assignments if path.startswith(f"{LIDAR}/")]
+        if of_world:
+            raise InputError([f"{path}: the LIDAR is the benchmark's own" for path in of_world])
+        if assignments not in self._contestants:
+            options = replace(self.options, only=(self._worlds[case.course].number,),
+                              parameters=(*self.options.parameters, *assignments))
+            self._contestants[assignments] = read_barn_setup(options).contestant
+        contestant = replace(self._contestants[assignments], seed=case.seed)
+        return flight_setup(contestant, self._worlds[case.course], 0)
+
+    def task(self, case: Case, assignments: Assignments) -> FlightTask:
+        """A flight that can be sent anywhere; it says if the parameters cannot be used."""
+        try:
+            return FlightTask(self.setup(case, assignments), self.ends_at_contact)
+        except InputError as error:
+            return FlightTask(None, refused="; ".join(error.problems))
+
+    def identity(self) -> Dict[str, Any]:
+        """What flights depend on besides candidate and case; plain JSON."""
+        given = self.options
+        return {"config": {"name": given.params,
+                           "files": files_digest(config_folder(given.params))},
+                "parameters": dict(given.parameters),
+                "worlds": {"name": Path(given.worlds).name,
+                           "files": files_digest(Path(given.worlds))},
+                "body_radius_m": given.body_radius_m}
+
+    def figures(self, cases: Sequence[Case], flights: Sequence[FlightResult]) -> Figures:
+        """The benchmark's own figures of flights."""
+        return figures([run_of(self._worlds[case.course], case, flight)
+                        for case, flight in zip(cases, flights)])
+
+    def _cases(self, numbers: Sequence[int], seed: int, count: int) -> Tuple[Case, ...]:
+        return tuple(Case(number, f"BARN world {self._worlds[number].number}",
+                          seed + k // len(numbers))
+                     for k, number in ((k, numbers[k % len(numbers)]) for k in range(count)))
+
+
+def run_of(world: BarnWorld, case: Case, flight: FlightResult) -> Run:
+    """A flight as the benchmark judges it: see ``offline.barn.runs.judge``."""
+    outcome = (Outcome.COLLISION if flight.contacts
+               else Outcome.SUCCESS if flight.completed else Outcome.TIME_OUT)
+    time_s = TIME_LIMIT_S if outcome is Outcome.TIME_OUT else flight.time_s
+    return Run(world.number, 0, case.seed, outcome, time_s,
+               metric(outcome, time_s, world.path_length_m), 0.0, flight.clearance_m or 0.0,
+               flight.recoveries)
+
+
+def _spread(numbers: Sequence[int]) -> List[int]:
+    """The same numbers, such that any first few of them lie evenly among all."""
+    order = sorted(range(len(numbers)), key=_reversed_bits)
+    return [numbers[k] for k in order]
+
+
+def _reversed_bits(number: int) -> int:
+    """The base-2 van der Corput sequence: the bits of a number in reverse."""
+    return int(f"{number:016b}"[::-1], 2)

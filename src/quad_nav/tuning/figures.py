@@ -1,0 +1,47 @@
+"""What many flights of one set of parameters come to."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Optional, Sequence
+
+from quad_nav.tuning.flight_result import FlightResult
+from quad_nav.tuning.score import mean_cost
+
+
+@dataclass(frozen=True)
+class Figures:
+    """``mean_time_s`` is of the flights that reached every goal, None without any.
+
+    ``touched``: flights with a contact; ``least_gap_m``: the smallest of all, between hulls.
+    """
+
+    flights: int
+    completed: int
+    succeeded: int
+    contacts: int
+    touched: int
+    mean_time_s: Optional[float]
+    least_gap_m: Optional[float]
+    mean_gap_m: Optional[float]
+    roughness_mps2: float
+    recoveries: int
+    cost: float
+
+
+def figures(flights: Sequence[FlightResult]) -> Figures:
+    """Raises ValueError without any flight."""
+    if not flights:
+        raise ValueError("no flights, no figures")
+    gaps = [flight.gap_m for flight in flights if flight.gap_m is not None]
+    return Figures(
+        len(flights), sum(flight.completed for flight in flights),
+        sum(flight.succeeded for flight in flights), sum(flight.contacts for flight in flights),
+        sum(flight.contacts > 0 for flight in flights),
+        _mean([flight.time_s for flight in flights if flight.completed]),
+        min(gaps, default=None), _mean(gaps),
+        sum(flight.roughness_mps2 for flight in flights) / len(flights),
+        sum(flight.recoveries for flight in flights), mean_cost(flights))
+
+
+def _mean(values: Sequence[float]) -> Optional[float]:
+    return sum(values) / len(values) if values else None

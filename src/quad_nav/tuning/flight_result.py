@@ -1,0 +1,164 @@
+"""What one flight comes to, and flying it."""
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import List, Optional
+
+from quad_nav.geometry import Twist2D
+from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.offline.flight import Flight
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.run import fly
+from quad_nav.offline.setup import FlightSetup
+from quad_nav.sim.contacts import Contact
+from quad_nav.tick import Located, Tick
+
+_TURN_ARM_M = 0.3
+"""A change of the turn rate counts as that of the speed so far from the middle: at the hull."""
+
+
+@dataclass(frozen=True)
+class FlightTask:
+    """A flight with everything that it needs, so that another machine can fly it.
+
+    ``refused`` says why it cannot be flown; then ``setup`` is None.
+    """
+
+    setup: Optional[FlightSetup]
+    ends_at_contact: bool = False
+    refused: str = ""
+
+
+@dataclass(frozen=True)
+class FlightResult:
+    """One flight. Gaps are between hulls, None where nothing was near.
+
+    ``time_s``: from the first goal to the last one's end, of the quadcopter that took longest.
+    ``straight_m``: the longest way of a quadcopter, straight from its start through its goals.
+    ``roughness_mps2``: how much commands change in a second, see ``Roughness``.
+    ``reason``: why it ended early or could not be flown.
+    """
+
+    goals: int
+    reached: int
+    contacts: int
+    time_s: float
+    straight_m: float
+    clearance_m: Optional[float] = None
+    separation_m: Optional[float] = None
+    roughness_mps2: float = 0.0
+    recoveries: int = 0
+    reason: str = ""
+
+    @property
+    def completed(self) -> bool:
+        """Every goal was reached."""
+        return self.goals > 0 and self.reached == self.goals
+
+    @property
+    def succeeded(self) -> bool:
+        """Every goal was reached and nothing touched."""
+        return self.completed and self.contacts == 0
+
+    @property
+    def gap_m(self) -> Optional[float]:
+        """To whatever came nearest."""
+        gaps = [gap for gap in (self.clearance_m, self.separation_m) if gap is not None]
+        return min(gaps, default=None)
+
+    def to_json(self) -> str:
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> FlightResult:
+        return cls(**json.loads(text))
+
+
+def fly_task(task: FlightTask) -> FlightResult:
+    """Flies it; parameters that cannot be flown with reach no goal."""
+    if task.setup is None:
+        return FlightResult(1, 0, 0, 0.0, 1.0, reason=task.refused)
+    roughness, contacts = Roughness(), FirstContact()
+    summary = fly(task.setup, (roughness, contacts),
+                  contacts.has_come if task.ends_at_contact else None)
+    return result_of(summary, task.setup, roughness.mean_mps2)
+
+
+def result_of(summary: MissionSummary, setup: FlightSetup, roughness_mps2: float) -> FlightResult:
+    """What counts of a flight's summary."""
+    legs = [leg for robot in summary.robots for leg in robot.legs]
+    return FlightResult(
+        goals=len(legs), reached=sum(leg.reached for leg in legs),
+        contacts=len(summary.contacts), time_s=max(map(_time_s, summary.robots)),
+        straight_m=max(_straight_m(robot, start.x_m, start.y_m)
+                       for robot, start in zip(summary.robots, setup.scene.starts)),
+        clearance_m=_least([robot.min_clearance_m for robot in summary.robots]),
+        separation_m=_least([robot.min_separation_m for robot in summary.robots]),
+        roughness_mps2=roughness_mps2,
+        recoveries=sum(robot.recoveries for robot in summary.robots), reason=summary.reason)
+
+
+class Roughness(FlightObserver):
+    """The sum of all changes of commands, by the time and the number of quadcopters.
+
+    A command is (vx, vy, turn rate); a change of the turn rate counts 0.3 m times it, what it
+    is at the hull. A command that is not followed by another one changes nothing.
+    """
+
+    def __init__(self) -> None:
+        self._last: List[Optional[Twist2D]] = []
+        self._total_mps = 0.0
+        self._time_s = 0.0
+
+    def began(self, flight: Flight) -> None:
+        self._last = [None] * len(flight.robots)
+
+    def ticked(self, robot: int, tick: Tick, located: Located, wall_s: float) -> None:
+        new, old = tick.command, self._last[robot]
+        if new is None:
+            return
+        if old is not None:
+            self._total_mps += math.hypot(new.vx_mps - old.vx_mps, new.vy_mps - old.vy_mps)
+            self._total_mps += _TURN_ARM_M * abs(new.vyaw_radps - old.vyaw_radps)
+        self._last[robot] = new
+
+    def ended(self, flight: Flight) -> None:
+        self._time_s = flight.now_s
+
+    @property
+    def mean_mps2(self) -> float:
+        """Per second and quadcopter."""
+        robot_s = self._time_s * len(self._last)
+        return self._total_mps / robot_s if robot_s > 0.0 else 0.0
+
+
+class FirstContact(FlightObserver):
+    """Whether anything was touched."""
+
+    def __init__(self) -> None:
+        self._contacts: List[Contact] = []
+
+    def touched(self, contact: Contact) -> None:
+        self._contacts.append(contact)
+
+    def has_come(self) -> bool:
+        return bool(self._contacts)
+
+
+def _time_s(robot: RobotSummary) -> float:
+    return sum(leg.time_s or 0.0 for leg in robot.legs)
+
+
+def _straight_m(robot: RobotSummary, x_m: float, y_m: float) -> float:
+    total_m = 0.0
+    for leg in robot.legs:
+        total_m += math.hypot(leg.goal.x_m - x_m, leg.goal.y_m - y_m)
+        x_m, y_m = leg.goal.x_m, leg.goal.y_m
+    return total_m
+
+
+def _least(gaps: List[Optional[float]]) -> Optional[float]:
+    known = [gap for gap in gaps if gap is not None and math.isfinite(gap)]
+    return min(known, default=None)

@@ -1,0 +1,56 @@
+"""Flights that were flown, in an SQLite file, so that none is flown twice.
+
+Each is committed as soon as it is over: what is there survives Ctrl-C, a crash and kill -9.
+Only the process that hands out the flights writes.
+"""
+from __future__ import annotations
+
+import json
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Dict, Optional, Tuple
+
+from quad_nav.tuning.flight_result import FlightResult
+
+Key = Tuple[str, str, int]
+"""Parameters as JSON with sorted keys, the mission's or world's name, the seed."""
+
+_TABLE = ("CREATE TABLE IF NOT EXISTS flights (parameters TEXT, mission TEXT, seed INTEGER, "
+          "result TEXT NOT NULL, PRIMARY KEY (parameters, mission, seed))")
+
+
+class Journal:
+    """``path`` None keeps flights for as long as the object lives."""
+
+    def __init__(self, path: Optional[Path] = None):
+        self._path = path
+        self._flights: Dict[Key, FlightResult] = {}
+        if path is not None:
+            with closing(sqlite3.connect(path)) as file, file:
+                file.execute(_TABLE)
+                rows = file.execute("SELECT parameters, mission, seed, result FROM flights")
+                self._flights = {(parameters, mission, seed): FlightResult.from_json(result)
+                                 for parameters, mission, seed, result in rows}
+        self.known_at_start = len(self._flights)
+
+    def __contains__(self, key: Key) -> bool:
+        return key in self._flights
+
+    def __getitem__(self, key: Key) -> FlightResult:
+        return self._flights[key]
+
+    def __len__(self) -> int:
+        return len(self._flights)
+
+    def add(self, key: Key, flight: FlightResult) -> None:
+        """Keeps a flight; it is on the disk when this returns."""
+        if self._path is not None:
+            with closing(sqlite3.connect(self._path, timeout=60.0)) as file, file:
+                file.execute("INSERT INTO flights VALUES (?, ?, ?, ?)", (*key, flight.to_json()))
+        self._flights[key] = flight
+
+
+def key_text(parameters: Dict[str, object]) -> str:
+    """The parameters of a ``Key``."""
+    return json.dumps(parameters, sort_keys=True)

@@ -1,0 +1,33 @@
+"""Whether parameters that are to be varied count at all."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, List, Sequence, Tuple
+
+from quad_nav import config
+from quad_nav.config.files import set_value
+from quad_nav.config.notes import CLAMPED, IGNORED, UNKNOWN, UNSUPPORTED, UNUSED
+from quad_nav.errors import InputError
+from quad_nav.tuning.space import costmap_paths
+
+_NO_EFFECT = (UNKNOWN, UNSUPPORTED, IGNORED, UNUSED, CLAMPED)
+
+
+def parameter_faults(parameters: Sequence[Tuple[str, Any]], folder: Path, name: str) -> List[str]:
+    """Values that cannot be, and parameters that change nothing about what flies.
+
+    ``parameters`` go on top of the ``folder``'s; ``name`` is where they are written.
+    """
+    tree = config.load_files(folder, {"i": "0"})
+    paths = []
+    for path, value in parameters:
+        for single in costmap_paths(path):
+            set_value(tree, single, value, name)
+            paths.append(f"/{single}/")
+    try:
+        remarks = config.load(tree).remarks
+    except InputError as error:
+        return list(error.problems)
+    return [f"{remark}; expected a parameter that counts in {folder}" for remark in remarks
+            if remark.kind in _NO_EFFECT and (remark.origin == name or any(
+                path.startswith(f"{remark.place}/") for path in paths))]

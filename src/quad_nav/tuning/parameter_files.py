@@ -1,0 +1,156 @@
+"""Tuned parameters as move_base's files: the base's own, with other values in some places."""
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+
+from quad_nav import config
+from quad_nav.config.files import COMMON, OPTIONAL, REQUIRED, set_value
+from quad_nav.errors import QuadError
+from quad_nav.tuning.space import BOTH, COSTMAPS, costmap_paths
+from quad_nav.tuning.yaml_edit import inserted, replaced
+
+_FILE = re.compile(rf"({'|'.join((*REQUIRED, *OPTIONAL))}|robot)(\d*)\.yaml")
+_PLANNERS = "base_local_planner_params"
+_NODE = "move_base_params"
+_OF_PLANNERS = re.compile(r"[A-Z]\w*")  # namespaces of planners are their classes' names
+
+
+class FilesDiffer(QuadError):
+    """What was written does not load as what was meant; the base is written too oddly."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A parameter's new value with the remark beside it; ``path`` may be of both costmaps."""
+
+    path: str
+    value: Any
+    remark: str
+
+
+def base_configuration(folder: Path, fixed: Sequence[Tuple[str, Any]], robot: int = 0
+                       ) -> config.Configuration:
+    """What flies with the base.
+
+    Raises:
+        InputError: it cannot be flown with.
+    """
+    return config.load(_tree(folder, fixed, robot))
+
+
+def base_value(tree: Mapping[str, Any], path: str) -> Any:
+    """The value in force in a settled tree, None when there is none.
+
+    A costmap's own key may have moved into the layer that reads it.
+    """
+    single = costmap_paths(path)[0]
+    value = _below(tree, single.split("/"))
+    first, *rest = single.split("/")
+    if value is None and first in COSTMAPS:
+        layers = [layer for layer in tree.get(first, {}).values() if isinstance(layer, dict)]
+        found = [value for value in (_below(layer, rest) for layer in layers) if value is not None]
+        return found[0] if found else None
+    return value
+
+
+def write_parameters(base: Path, target: Path, changes: Sequence[Change]) -> None:
+    """Writes the base's files with ``changes`` into a folder.
+
+    Raises:
+        FilesDiffer: they would not load as the base with these changes; nothing is written.
+    """
+    files = {path.name: path.read_text(encoding="utf-8") for path in sorted(base.glob("*.yaml"))
+             if _FILE.fullmatch(path.name)}
+    for change in changes:
+        _change(files, change)
+    partial = target.with_name(f"{target.name}.partial")
+    _write(files, partial)
+    _check(base, partial, changes)
+    _write(files, target)
+    for path in partial.iterdir():
+        path.unlink()
+    partial.rmdir()
+
+
+def _write(files: Mapping[str, str], folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in folder.glob("*.yaml"):
+        path.unlink()
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def _change(files: Dict[str, str], change: Change) -> None:
+    """Replaces the value wherever it stands; where it belongs it is put if it does not."""
+    home, home_path = _home(change.path)
+    if not any(_stem(name) == home for name in files):
+        files[f"{home}.yaml"] = ""
+    for name, text in files.items():
+        is_home = _stem(name) == home
+        paths = [home_path] if is_home else []
+        if _stem(name) != COMMON:
+            paths += [single for single in costmap_paths(change.path) if single not in paths]
+        found = False
+        for path in paths:
+            new = replaced(text, path.split("/"), change.value, change.remark)
+            if new is not None:
+                text, found = new, True
+        if is_home and not found:
+            text = inserted(text, home_path.split("/"), change.value, change.remark)
+        files[name] = text
+
+
+def _home(path: str) -> Tuple[str, str]:
+    """The file that a parameter belongs to, and its path there."""
+    first, _, rest = path.partition("/")
+    if first == BOTH:
+        return COMMON, rest
+    if first in COSTMAPS:
+        return f"{first}_params", path
+    return (_PLANNERS if rest and _OF_PLANNERS.fullmatch(first) else _NODE), path
+
+
+def _stem(name: str) -> str:
+    match = _FILE.fullmatch(name)
+    return match.group(1) if match else ""
+
+
+def _check(base: Path, written: Path, changes: Sequence[Change]) -> None:
+    """Loads both, for every robot that has files of its own and for one without."""
+    numbers = {int(match.group(2)) for match in map(_FILE.fullmatch, (
+        path.name for path in base.glob("*.yaml"))) if match and match.group(2)}
+    assignments = [(change.path, change.value) for change in changes]
+    for robot in sorted({0, 1, *numbers}):
+        meant = config.load(_tree(base, assignments, robot)).to_tree()
+        found = config.load(_tree(written, (), robot)).to_tree()
+        if meant != found:
+            raise FilesDiffer(f"{base}: its files cannot be edited, robot {robot} would fly with "
+                              f"something else: {', '.join(_unlike(meant, found))}")
+
+
+def _tree(folder: Path, assignments: Sequence[Tuple[str, Any]], robot: int) -> Dict[str, Any]:
+    tree = config.load_files(folder, {"i": str(robot)})
+    for path, value in assignments:
+        for single in costmap_paths(path):
+            set_value(tree, single, value, "tuned")
+    return tree
+
+
+def _below(tree: Any, path: Sequence[str]) -> Optional[Any]:
+    for key in path:
+        tree = tree.get(key) if isinstance(tree, Mapping) else None
+    return None if isinstance(tree, Mapping) else tree
+
+
+def _unlike(meant: Mapping[str, Any], found: Mapping[str, Any], place: str = "") -> List[str]:
+    lines: List[str] = []
+    for key in sorted({*meant, *found}):
+        one, other = meant.get(key), found.get(key)
+        if isinstance(one, dict) and isinstance(other, dict):
+            lines += _unlike(one, other, f"{place}{key}/")
+        elif one != other:
+            lines.append(f"{place}{key} {other!r} and not {one!r}")
+    return lines

@@ -1,0 +1,53 @@
+"""A study's outcome as files: parameters, record, figures and report."""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Iterator
+
+from quad_nav.offline.run import fly
+from quad_nav.offline.trace import FlightTrace, TraceObserver
+from quad_nav.tuning.flight_result import FirstContact
+from quad_nav.tuning.parameter_files import write_parameters
+from quad_nav.tuning.record import changes, markdown, to_json
+from quad_nav.tuning.space import Assignments
+from quad_nav.tuning.tune import TuneResult
+
+PARAMETERS = "config"
+RECORD = "STUDY.md"
+FIGURES = "results.json"
+REPORT = "report.html"
+
+
+def write_result(result: TuneResult, command: str) -> Iterator[Path]:
+    """Writes everything into the study's folder; yields what is there now."""
+    folder = result.setup.options.output
+    parameters = folder / PARAMETERS
+    write_parameters(result.setup.base_folder, parameters, changes(result))
+    (parameters / RECORD).write_text(markdown(result, command), encoding="utf-8")
+    yield parameters
+    text = json.dumps(to_json(result, command), indent=2, allow_nan=False, default=str)
+    (folder / FIGURES).write_text(text + "\n", encoding="utf-8")
+    yield folder / FIGURES
+    yield _write_report(result, command)
+
+
+def _write_report(result: TuneResult, command: str) -> Path:
+    """Imported here: a study can be run without waiting for what draws."""
+    from quad_nav.offline.report.write import write_page
+    from quad_nav.tuning.report.tune_page import tune_page
+    path = result.setup.options.output / REPORT
+    before, after = (_traced(result, name, assignments)
+                     for name, assignments in (("base", ()), ("tuned", result.assignments)))
+    write_page(tune_page(result, before, after, command), path)
+    return path
+
+
+def _traced(result: TuneResult, name: str, assignments: Assignments) -> FlightTrace:
+    """The first of the flights that were held out once more, to be drawn."""
+    course, case = result.setup.course, result.held_out.cases[0]
+    setup = course.setup(case, assignments)
+    observer, contacts = TraceObserver(f"{case.name}, seed {case.seed}, {name}"), FirstContact()
+    is_stopped = contacts.has_come if course.ends_at_contact else None
+    summary = fly(setup, (observer, contacts), is_stopped)
+    return observer.trace(summary.contacts, summary.reason)

@@ -1,0 +1,41 @@
+"""Feed a target with bytes that atheris makes up: ``make fuzz TARGET=scene SECONDS=60``.
+
+    run.py TARGET [SECONDS]
+
+Begins with the files of ``corpus/TARGET``; new ones stay in a folder of their own, so that
+the corpus stays small. Ends with 1 at the first fault, whose input is kept beside it.
+"""
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+import tempfile
+from pathlib import Path
+
+import atheris
+
+from quad_nav import kernels
+
+for module in pkgutil.iter_modules(kernels.__path__):  # numba cannot compile atheris's hooks
+    importlib.import_module(f"{kernels.__name__}.{module.name}")
+with atheris.instrument_imports(include=["quad_nav", "PIL", "yaml", "rosbags", "mcap"]):
+    from targets import TARGETS, run
+
+
+def main() -> None:
+    if len(sys.argv) not in (2, 3) or sys.argv[1] not in TARGETS:
+        sys.exit(f"expected: run.py TARGET [SECONDS], TARGET one of {', '.join(TARGETS)}")
+    name, seconds = sys.argv[1], sys.argv[2] if len(sys.argv) == 3 else "60"
+    found = Path(tempfile.mkdtemp(prefix=f"quad-fuzz-{name}-"))
+    corpus = Path(__file__).parent / "corpus" / name
+    print(f"new inputs and faults: {found}", flush=True)
+    atheris.Setup(
+        [sys.argv[0], f"-max_total_time={seconds}", "-timeout=20", "-rss_limit_mb=3000",
+         "-max_len=20000", f"-artifact_prefix={found}/fault-", "-print_final_stats=1",
+         str(found), str(corpus)], lambda data: run(name, data) and None)
+    atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,194 @@
+"""What reads files and texts that somebody else may have written, each as a function of bytes.
+
+A target returns for input that can be used, and for other input when it was refused with an
+``InputError``; everything else that it raises is a fault. ``make fuzz`` calls them with bytes
+that atheris makes up, the unit tests with the files below ``corpus`` and mutations of these.
+"""
+from __future__ import annotations
+
+import json
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+from typing import Callable, Dict
+
+import numpy as np
+from PIL import Image
+
+from quad_nav import config
+from quad_nav.cli.parameters import parameter
+from quad_nav.config.files import REQUIRED
+from quad_nav.errors import InputError
+from quad_nav.face.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC
+from quad_nav.mission.goal_file import parse_goals
+from quad_nav.offline import record_messages as messages
+from quad_nav.offline.bag_file import Message
+from quad_nav.offline.bag_trace import _is_wanted, _Reading, read_trace
+from quad_nav.offline.report.figures import figures
+from quad_nav.offline.report.page import flight_page
+from quad_nav.scene_check import scene_check
+from quad_nav.shipped import shipped
+from quad_nav.sim.scene_file import load_scene
+
+MOST_FUZZED_CELLS = 250_000
+"""Larger maps are read as well, but not a hundred times a second."""
+_MAP = ("image: map.png\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+
+
+def goals(data: bytes) -> None:
+    parse_goals(data, "goals.json", _arena_check())
+
+
+def scene(data: bytes) -> None:
+    load_scene(_written("scene.yaml", data))
+
+
+def map_yaml(data: bytes) -> None:
+    """A map's YAML, or a scene's, beside an image of 40 x 40 cells."""
+    pixels = np.full((40, 40), 254, np.uint8)
+    pixels[:4] = 0
+    Image.fromarray(pixels).save(_folder() / "map.png")
+    load_scene(_written("map.yaml", data))
+
+
+def map_image(data: bytes) -> None:
+    _written("map.png", data)
+    load_scene(_written("map.yaml", _MAP.encode()))
+
+
+def world(data: bytes) -> None:
+    load_scene(_written("fuzz.world", data))
+
+
+def parameters(data: bytes) -> None:
+    """One of move_base's four files; the others are the tutorial's."""
+    for name in REQUIRED:
+        _written(f"{name}.yaml", shipped("config", f"tutorial/{name}.yaml").read_bytes())
+    for name in REQUIRED:
+        path = _folder() / f"{name}.yaml"
+        usual = path.read_bytes()
+        path.write_bytes(data)
+        try:
+            config.load(config.load_files(_folder(), {"i": "0"}))
+        except InputError:
+            pass
+        path.write_bytes(usual)
+
+
+def command_line(data: bytes) -> None:
+    """``--set PATH=VALUE``."""
+    parameter(data.decode("utf-8", "replace"))
+
+
+def bag(data: bytes) -> None:
+    figures(read_trace(_written("flight.bag", data)))
+
+
+def mcap(data: bytes) -> None:
+    figures(read_trace(_written("flight.mcap", data)))
+
+
+def flight_info(data: bytes) -> None:
+    """``/quad/flight`` and, line by line, ``/quad/events`` of a recording with odometry."""
+    first, *events = data.decode("utf-8", "replace").split("\n")
+    reading = _reading_with_odometry()
+    text = messages.message
+    try:
+        reading.take(Message(FLIGHT_TOPIC, "std_msgs/String", 0, text("std_msgs/String", first)))
+        for line in events:
+            reading.take(Message(EVENTS_TOPIC, "std_msgs/String", 0,
+                                 text("std_msgs/String", line)))
+    except ValueError:
+        return  # read_trace makes an InputError of it
+    figures(reading.trace(Path("flight.bag")))
+
+
+def page(data: bytes) -> None:
+    """The whole report of a flight that is told by ``flight_info``; slow."""
+    reading = _reading_with_odometry()
+    told = messages.message("std_msgs/String", data.decode("utf-8", "replace"))
+    try:
+        reading.take(Message(FLIGHT_TOPIC, "std_msgs/String", 0, told))
+    except ValueError:
+        return
+    flight_page(reading.trace(Path("flight.bag")))
+
+
+def robot_messages(data: bytes) -> None:
+    """The first byte says which topic, the rest is a message as it comes over the wire."""
+    topics = [("/odom0", "nav_msgs/Odometry"), ("/cmd_vel0", "geometry_msgs/Twist"),
+              ("/move_base0/NavfnROS/plan", "nav_msgs/Path"),
+              ("/move_base0/state", "std_msgs/String"),
+              ("/move_base0/feedback", "move_base_msgs/MoveBaseActionFeedback"),
+              ("/move_base0/recovery_status", "move_base_msgs/RecoveryStatus"),
+              ("/tf", "tf2_msgs/TFMessage"), ("/clock", "rosgraph_msgs/Clock"),
+              ("/simulation/contacts", "diagnostic_msgs/DiagnosticStatus")]
+    topic, kind = topics[data[0] % len(topics) if data else 0]
+    assert _is_wanted(topic, kind)
+    try:
+        content = messages.decode(data[1:], kind)
+    except Exception:  # read_messages makes an InputError of whatever decoding raises
+        return
+    reading = _reading_with_odometry()
+    try:
+        reading.take(Message(topic, kind, 0, content))
+    except ValueError:
+        return
+    figures(reading.trace(Path("flight.bag")))
+
+
+TARGETS: Dict[str, Callable[[bytes], None]] = {
+    target.__name__: target for target in (
+        goals, scene, map_yaml, map_image, world, parameters, command_line, bag, mcap,
+        flight_info, page, robot_messages)}
+
+
+def run(name: str, data: bytes) -> bool:
+    """Whether the input can be used. Raises what is a fault."""
+    try:
+        TARGETS[name](data)
+    except InputError as error:
+        assert error.problems, "refused without a reason"
+        return False
+    return True
+
+
+@lru_cache(maxsize=None)
+def _arena_check():
+    return scene_check(load_scene(shipped("scenes", "arena.yaml")), 0.3)
+
+
+@lru_cache(maxsize=None)
+def _folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix="quad-fuzz-"))
+
+
+def _written(name: str, data: bytes) -> Path:
+    path = _folder() / name
+    path.write_bytes(data)
+    return path
+
+
+def _reading_with_odometry() -> _Reading:
+    reading = _Reading()
+    for second in (1, 2, 3):
+        reading.take(Message("/odom0", "nav_msgs/Odometry", 0, odometry(second, 1.0 + second)))
+    return reading
+
+
+def odometry(second: int, x_m: float):
+    make = messages.message
+    zeros = np.zeros(36)
+    vector = make("geometry_msgs/Vector3", 0.0, 0.0, 0.0)
+    pose = make("geometry_msgs/Pose", make("geometry_msgs/Point", x_m, 1.0, 1.0),
+                make("geometry_msgs/Quaternion", 0.0, 0.0, 0.0, 1.0))
+    return make("nav_msgs/Odometry",
+                make("std_msgs/Header", 0, messages.time(second * 10**9), "odom0"), "base_link0",
+                make("geometry_msgs/PoseWithCovariance", pose, zeros),
+                make("geometry_msgs/TwistWithCovariance",
+                     make("geometry_msgs/Twist", vector, vector), zeros))
+
+
+def json_bytes(value: object) -> bytes:
+    return json.dumps(value).encode()

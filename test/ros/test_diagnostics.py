@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""/diagnostics tells how every node is, as often while paused, and what becomes of it."""
+import time
+
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flight_case import FlightCase, goal_pose
+from rosgraph_msgs.msg import Log
+from std_srvs.srv import SetBool, Trigger
+
+OK, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
+NAVIGATORS = {f"move_base{i}: {part}" for i in (0, 1) for part in ("control", "inputs", "loop")}
+EVERYBODY = NAVIGATORS | {"simulator: clock", "simulator: quadcopter 0", "simulator: quadcopter 1"}
+
+
+class Diagnostics(FlightCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.statuses, cls.log, cls.arrivals = {}, [], []
+        cls.subscribers = [
+            rospy.Subscriber("/diagnostics", DiagnosticArray, cls.store, queue_size=100),
+            rospy.Subscriber("/rosout", Log, lambda line: cls.log.append(line.msg), queue_size=100)]
+        cls.start()
+
+    @classmethod
+    def store(cls, array):
+        for status in array.status:
+            cls.statuses[status.name] = status
+            if status.name == "move_base0: inputs":
+                cls.arrivals.append(time.monotonic())
+
+    def level(self, name):
+        return self.statuses[name].level if name in self.statuses else None
+
+    def value(self, name, key):
+        return {pair.key: pair.value for pair in self.statuses[name].values}[key]
+
+    def test_1_every_node_tells_and_all_is_well(self):
+        self.wait(lambda: set(self.statuses) >= EVERYBODY, f"all of {sorted(EVERYBODY)}")
+        self.wait(lambda: all(self.level(f"move_base{i}: inputs") == OK for i in (0, 1)),
+                  "inputs that come")
+        for i in (0, 1):
+            self.assertEqual(self.statuses[f"move_base{i}: inputs"].hardware_id, f"quad{i}")
+
+    def test_2_a_flight_and_a_lidar_that_falls_silent(self):
+        self.goal_topics[0].publish(goal_pose(self.position(0)[0], 6.5))
+        self.wait(lambda: self.value("move_base0: control", "state") == "controlling", "a flight")
+        self.lidar(0, False)
+        self.wait(lambda: self.level("move_base0: inputs") == ERROR, "an error of its inputs")
+        self.assertIn("nothing on /scan0 for", self.statuses["move_base0: inputs"].message)
+        self.wait(lambda: self.level("move_base0: control") == ERROR, "a navigator that stopped")
+        self.assertIn("stopped: nothing from", self.statuses["move_base0: control"].message)
+        self.assertEqual(self.level("move_base1: inputs"), OK)
+        self.lidar(0, True)
+        self.wait(lambda: self.level("move_base0: inputs") == OK, "inputs that come again")
+        self.wait(lambda: self.level("move_base0: control") == OK, "a flight that goes on")
+        self.assertIn("stopped: nothing from", self.value("move_base0: control", "last reason"))
+
+    def test_3_each_change_of_level_is_one_line_in_the_log(self):
+        changes = [line for line in self.log if line.startswith("move_base0: inputs: ")
+                   and "/scan0" in line or line.startswith("move_base0: inputs: ERROR -> OK")]
+        down = [line for line in changes if "OK -> ERROR: nothing on /scan0" in line]
+        self.assertEqual((len(down), len([x for x in changes if "ERROR -> OK" in x])), (1, 1))
+
+    def test_4_a_paused_simulation_is_told_of_too(self):
+        rospy.ServiceProxy("/simulation/pause", Trigger)()
+        self.wait(lambda: self.statuses["simulator: clock"].message == "paused", "paused")
+        before = len(self.arrivals)
+        self.wait(lambda: len(self.arrivals) >= before + 3, "three messages more")
+        self.assertEqual(self.level("move_base0: inputs"), OK)
+
+    def lidar(self, i, on):
+        answer = rospy.ServiceProxy(f"/simulation/lidar{i}/enable", SetBool)(on)
+        self.assertTrue(answer.success, answer.message)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "diagnostics", Diagnostics)

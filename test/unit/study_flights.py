@@ -1,0 +1,148 @@
+"""A small mission for studies: one quadcopter, 3 m past a pillar, a second of computing."""
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Dict, Iterable, Iterator, List, Sequence, Tuple
+
+from quad_nav.offline.setup import FlightSetup
+from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionOptions
+from quad_nav.tuning.evaluation import Evaluation, Watcher
+from quad_nav.tuning.flight_result import FlightResult, FlightTask
+from quad_nav.tuning.search import SearchOptions, search
+from quad_nav.tuning.space import Assignments, Dimension, SearchSpace
+from quad_nav.tuning.study import open_study
+from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup, start_values
+from quad_nav.tuning.workers import Numbered, NumberedResult, Workers
+
+SCENE = """\
+name: small
+size: [5.0, 4.0]
+altitude: 1.0
+obstacles:
+  - {name: pillar, shape: cylinder, centre: [2.5, 1.7], radius: 0.2, height: 2.0}
+starts:
+  - [1.0, 2.0, 0.0]
+"""
+SPACE = """\
+TrajectoryPlannerROS/max_vel_x: {range: [0.3, 0.8]}
+TrajectoryPlannerROS/vx_samples: {range: [3, 8], integer: true}
+"*_costmap/inflation_radius": {range: [0.4, 0.9]}
+"""
+FAST = (("TrajectoryPlannerROS/vtheta_samples", 8), ("global_costmap/width", 5.0),
+        ("global_costmap/height", 4.0), ("TrajectoryPlannerROS/sim_time", 1.0))
+FLOWN = FlightResult(goals=2, reached=2, contacts=0, time_s=40.0, straight_m=10.0,
+                     clearance_m=0.5, separation_m=None, roughness_mps2=0.2)
+
+
+def write_mission(folder: Path) -> Mission:
+    """The mission's files."""
+    goals = folder / "goals"
+    goals.mkdir(parents=True, exist_ok=True)
+    (goals / "quad0_goals.json").write_text(json.dumps({"goals": [[4.0, 2.0]]}))
+    (folder / "scene.yaml").write_text(SCENE)
+    return Mission(folder / "scene.yaml", goals)
+
+
+def mission_options(folder: Path, **given: Any) -> MissionOptions:
+    """Whose flights take a fifth of what those with all samples do."""
+    return MissionOptions((write_mission(folder),), parameters=FAST, **given)
+
+
+def tune_setup(folder: Path, output: Path, candidates: int = 3, **given: Any) -> TuneSetup:
+    """A study of few short flights."""
+    options = mission_options(folder)
+    space = folder / "space.yaml"
+    space.write_text(SPACE)
+    return read_tune_setup(TuneOptions(
+        options, output, space, SearchOptions(candidates, 2, 3, 0), finalists=1, final_flights=2,
+        held_out=1, **given))
+
+
+def told(trials: Sequence[Any]) -> List[Tuple[Any, ...]]:
+    """What a study consists of, less the times of day."""
+    return [(trial.number, trial.state, trial.value, trial.params, trial.intermediate_values,
+             trial.user_attrs) for trial in trials]
+
+
+def searched(setup: TuneSetup, workers: Workers) -> List[Tuple[Any, ...]]:
+    """The trials of the search alone."""
+    with open_study(setup.options.output, setup.identity) as study:
+        evaluation = Evaluation(setup.course, setup.space, workers, study.journal, Watcher())
+        search(evaluation, study, start_values(setup.space, setup.base), setup.options.search)
+        return told(study.trials)
+
+
+def mortal_tasks(marker: Path, deaths: int) -> List[Tuple[int, Any]]:
+    """Six flights on paper, one of which kills its worker so many times."""
+    class Mortal:
+        setup = None
+
+        def __init__(self, kills: bool):
+            self.kills = kills
+
+        @property
+        def refused(self) -> str:
+            if self.kills:
+                with marker.open("a") as file:
+                    file.write("x")
+                if len(marker.read_text()) <= deaths:
+                    os._exit(9)
+            return "flown"
+
+    return [(number, Mortal(number == 3)) for number in range(6)]
+
+
+class PaperCourse:
+    """Flights on paper: how long one takes follows from its parameters and its seed.
+
+    Its workers are ``PaperWorkers``. The best speed is 0.5; "idle" has no effect; a "bad" of
+    more than 5 reaches no goal.
+    """
+
+    config = "default"
+    fixed = ()
+    ends_at_contact = False
+
+    def search_cases(self, count: int) -> Tuple[Case, ...]:
+        return tuple(Case(0, "paper", seed) for seed in range(count))
+
+    def held_out_cases(self, count: int) -> Tuple[Case, ...]:
+        return tuple(Case(0, "paper", HELD_OUT_SEED + seed) for seed in range(count))
+
+    def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
+        raise AssertionError("nothing is flown on paper")
+
+    def task(self, case: Case, assignments: Assignments) -> FlightTask:
+        return FlightTask(None, refused=json.dumps([dict(assignments), case.seed]))
+
+    def identity(self) -> Dict[str, Any]:
+        return {"course": "paper"}
+
+
+class PaperWorkers:
+    """Flies on paper, and counts."""
+
+    count = 1
+
+    def __init__(self) -> None:
+        self.flown: List[str] = []
+
+    def fly(self, tasks: Iterable[Numbered]) -> Iterator[NumberedResult]:
+        for number, task in tasks:
+            self.flown.append(task.refused)
+            yield number, paper_flight(*json.loads(task.refused))
+
+
+def paper_flight(parameters: Dict[str, Any], seed: int) -> FlightResult:
+    """10 m in 40 s and more the farther the speed is from 0.5; seeds differ by a second."""
+    time_s = 40.0 + 100.0 * abs(parameters.get("speed", 0.1) - 0.5) + seed % 3
+    reached = 2 if parameters.get("bad", 0.0) <= 5.0 else 0
+    return replace(FLOWN, time_s=time_s, reached=reached)
+
+
+PAPER_SPACE = SearchSpace("paper", (Dimension("speed", 0.0, 1.0), Dimension("idle", 0.0, 1.0),
+                                    Dimension("bad", 0.0, 10.0)))
+PAPER_BASE = {"speed": 0.1, "idle": 0.5, "bad": 0.0}

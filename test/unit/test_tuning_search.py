@@ -1,0 +1,197 @@
+"""Searching and refining on paper, where the best is known."""
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Optional
+
+import optuna
+import pytest
+from optuna.trial import TrialState
+from study_flights import PAPER_BASE, PAPER_SPACE, PaperCourse, PaperWorkers, told
+
+from quad_nav.errors import InputError
+from quad_nav.tuning.evaluation import Evaluation, Watcher
+from quad_nav.tuning.flight_result import FlightResult
+from quad_nav.tuning.journal import Journal
+from quad_nav.tuning.proposals import is_hopeless, propose
+from quad_nav.tuning.refinement import refine
+from quad_nav.tuning.report.search_pictures import importances
+from quad_nav.tuning.search import SearchOptions, best_first, rounds, search
+from quad_nav.tuning.study import open_study, unlike
+
+HERE = Path(__file__).resolve().parent
+OPTIONS = SearchOptions(candidates=32, flights=4, generation=8, seed=3)
+IDENTITY = {"course": "paper"}
+
+
+class StopsAfter(Watcher):
+    """Ctrl-C after so many flights."""
+
+    def __init__(self, flights: int):
+        self._left = flights
+
+    def flown(self, flight: FlightResult, kept: bool) -> None:
+        self._left -= not kept
+        if self._left == 0:
+            raise KeyboardInterrupt
+
+
+def run(folder: Path, options: SearchOptions = OPTIONS, watcher: Optional[Watcher] = None):
+    """The trials of a search, and the flights that it flew."""
+    workers = PaperWorkers()
+    with open_study(folder, IDENTITY) as study:
+        evaluation = Evaluation(PaperCourse(), PAPER_SPACE, workers, study.journal,
+                                watcher or Watcher())
+        try:
+            search(evaluation, study, PAPER_BASE, options)
+        except KeyboardInterrupt:
+            pass
+        return told(study.trials), workers.flown
+
+
+def test_flights_are_flown_in_rounds():
+    assert rounds(1) == (1,)
+    assert rounds(2) == (2,)
+    assert rounds(8) == (2, 4, 8)
+    assert rounds(10) == (2, 4, 8, 10)
+
+
+def test_the_search_finds_what_is_best_and_drops_what_is_bad(tmp_path):
+    trials, flown = run(tmp_path)
+    assert len(trials) == 32
+    assert trials[0][3] == PAPER_BASE
+    best = min(trials, key=lambda trial: trial[2])
+    assert abs(best[3]["speed"] - 0.5) < 0.05  # within a tenth of the range
+    dropped = [trial for trial in trials if trial[1] is TrialState.PRUNED]
+    assert dropped and all(max(trial[4]) < 4 for trial in dropped)
+    assert len(flown) == sum(max(trial[4]) for trial in trials) < 128
+
+
+def test_no_candidate_of_a_generation_knows_of_another(tmp_path):
+    trials, _ = run(tmp_path, SearchOptions(16, 2, 8, 3))
+    with open_study(tmp_path, IDENTITY) as study:
+        first = study.trials[:8]
+    assert propose(PAPER_SPACE, first, 1, 8, 3) == [trial[3] for trial in trials[8:]]
+    assert propose(PAPER_SPACE, first, 1, 8, 4) != [trial[3] for trial in trials[8:]]
+
+
+@pytest.mark.parametrize("flights", [5, 60])
+def test_an_interrupted_search_ends_as_an_uninterrupted_one_and_flies_nothing_again(
+        tmp_path, flights):
+    whole, all_flown = run(tmp_path / "whole")
+    _, before = run(tmp_path / "parts", watcher=StopsAfter(flights))
+    assert len(before) == flights
+    resumed, after = run(tmp_path / "parts")
+    assert resumed == whole
+    assert sorted(before + after) == sorted(all_flown)
+
+
+def test_a_search_can_be_made_longer(tmp_path):
+    whole, _ = run(tmp_path / "whole", SearchOptions(20, 4, 8, 3))
+    run(tmp_path / "parts", SearchOptions(11, 4, 8, 3))
+    assert run(tmp_path / "parts", SearchOptions(20, 4, 8, 3))[0] == whole
+
+
+def test_kill_9_loses_nothing(tmp_path):
+    whole, all_flown = run(tmp_path / "whole")
+    code = """
+import os, signal, sys
+from pathlib import Path
+from typing import Optional
+import test_tuning_search as t
+class Dies(t.Watcher):
+    left = 23
+    def flown(self, flight, kept):
+        self.left -= 1
+        if self.left == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+t.run(Path(sys.argv[1]), watcher=Dies())
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(HERE)])}
+    died = subprocess.run([sys.executable, "-c", code, str(tmp_path / "parts")], env=environment)
+    assert died.returncode == -signal.SIGKILL
+    before = Journal(tmp_path / "parts" / "study.db").known_at_start
+    resumed, after = run(tmp_path / "parts")
+    assert before == 23
+    assert resumed == whole
+    assert before + len(after) == len(all_flown)
+
+
+def test_a_folder_keeps_to_its_study(tmp_path):
+    with open_study(tmp_path, {"seed": 0, "space": [1, 2]}):
+        with pytest.raises(InputError, match="another quad tune works on this study"):
+            with open_study(tmp_path, {"seed": 0, "space": [1, 2]}):
+                pass
+    with pytest.raises(InputError) as raised:
+        with open_study(tmp_path, {"seed": 1, "space": [1, 3], "x": "y"}):
+            pass
+    assert [line.split(": ", 2)[2].split(";")[0] for line in raised.value.problems] == [
+        "seed was 0 and is 1", "space[1] was 2 and is 3", 'x was absent and is "y"']
+    assert unlike({"a": (1,)}, {"a": [2, 3]}) != []
+    (tmp_path / "study.db").write_text("no database, but long enough to be looked at" * 100)
+    with pytest.raises(InputError, match="cannot be read as a study"):
+        with open_study(tmp_path, {}):
+            pass
+
+
+def test_a_candidate_is_dropped_above_the_median_of_those_that_flew_everything():
+    trials = [optuna.create_trial(value=1.0, intermediate_values={2: float(mean), 4: 1.0})
+              for mean in (1, 2, 3, 4, 5)]
+    assert is_hopeless(trials, 2, 3.01)
+    assert not is_hopeless(trials, 2, 3.0)
+    assert not is_hopeless(trials[:4], 2, 99.0)  # too few to say
+    pruned = optuna.create_trial(state=TrialState.PRUNED, value=0.0, intermediate_values={2: 0.0})
+    assert not is_hopeless([*trials, pruned, pruned], 2, 3.0)
+
+
+def test_refining_keeps_what_helps_and_takes_back_what_does_not():
+    workers, course = PaperWorkers(), PaperCourse()
+    evaluation = Evaluation(course, PAPER_SPACE, workers, Journal(), Watcher())
+    refined = refine(evaluation, [{"speed": 0.5, "idle": 0.9, "bad": 0.0},
+                                  {"speed": 0.6, "idle": 0.2, "bad": 0.0}],
+                     PAPER_BASE, course.search_cases(2), course.search_cases(3))
+    assert refined.values == {"speed": 0.5}
+    (gain,) = refined.gains
+    assert (gain.path, gain.value, gain.base) == ("speed", 0.5, 0.1)
+    # 40 s less over 10 m: 4 s for each metre.
+    assert (gain.time_s, gain.cost) == (pytest.approx(40.0), pytest.approx(4.0))
+    assert len(workers.flown) == len(set(workers.flown))
+
+
+def test_nothing_is_changed_when_nothing_beats_the_base():
+    course = PaperCourse()
+    evaluation = Evaluation(course, PAPER_SPACE, PaperWorkers(), Journal(), Watcher())
+    refined = refine(evaluation, [{"speed": 0.99, "idle": 0.5, "bad": 0.0},
+                                  {"speed": 0.5, "idle": 0.5, "bad": 9.0}],
+                     {**PAPER_BASE, "speed": 0.1}, course.search_cases(2), course.search_cases(2))
+    assert refined.values == {} and refined.gains == ()
+
+
+def test_the_best_are_those_that_flew_everything():
+    trials = [optuna.create_trial(value=2.0), optuna.create_trial(value=1.0),
+              optuna.create_trial(state=TrialState.PRUNED, value=0.0, intermediate_values={1: 0.0})]
+    assert [trial.value for trial in best_first(trials)] == [1.0, 2.0]
+
+
+def test_a_flight_is_known_by_parameters_mission_and_seed(tmp_path):
+    course = PaperCourse()
+    workers = PaperWorkers()
+    for _ in range(2):
+        evaluation = Evaluation(course, PAPER_SPACE, workers, Journal(tmp_path / "f.db"), Watcher())
+        evaluation.flown([{"speed": 0.5}, {"speed": 0.5}, {"speed": 0.25}], course.search_cases(2))
+    assert [json.loads(flown) for flown in workers.flown] == [
+        [{"speed": 0.5}, 0], [{"speed": 0.25}, 0], [{"speed": 0.5}, 1], [{"speed": 0.25}, 1]]
+
+
+def test_the_parameter_that_counts_is_found(tmp_path):
+    run(tmp_path)
+    with open_study(tmp_path, IDENTITY) as study:
+        found = importances(study.trials, PAPER_SPACE)
+        assert importances(study.trials[:5], PAPER_SPACE) == {}  # too few to say
+    assert next(iter(found)) == "speed"
+    assert sum(found.values()) == pytest.approx(1.0)
