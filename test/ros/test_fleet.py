@@ -28,10 +28,16 @@ class Fleet(FlightCase):
         for i in range(ROBOTS):
             rospy.wait_for_service(f"/move_base{i}/make_plan", timeout=PATIENCE_S)
 
-    def test_1_every_robot_has_the_whole_face(self):
-        published = dict(rospy.get_published_topics())
+    @staticmethod
+    def heard():
+        """Every topic that some node subscribes to."""
         _, subscriptions, _ = rosgraph.Master("/test").getSystemState()
-        heard = {name for name, _ in subscriptions}
+        return {name for name, _ in subscriptions}
+
+    def test_1_every_robot_has_the_whole_face(self):
+        self.wait(lambda: f"/move_base_simple/goal{ROBOTS - 1}" in self.heard(), "the last robot")
+        published = dict(rospy.get_published_topics())
+        heard = self.heard()
         for i in range(ROBOTS):
             for name, kind in names_of(TYPES, i).items():
                 self.assertEqual(published.get(name), kind, name)
