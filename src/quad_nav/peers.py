@@ -100,20 +100,3 @@ def thinned(way: np.ndarray, spacing_m: float) -> np.ndarray:
     lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
     at = np.linspace(0.0, lengths[-1], 2 + int(lengths[-1] / spacing_m))
     return np.column_stack((np.interp(at, lengths, way[:, 0]), np.interp(at, lengths, way[:, 1])))
-
-
-def positions_ahead(start: np.ndarray, way: np.ndarray, speed_mps: float,
-                    times_s: np.ndarray) -> np.ndarray:
-    """Where a robot will be at times from now, float64[k, 2].
-
-    It goes from ``start``, float64[2], to the nearest point of its ``way``,
-    float64[n, 2], and along it at an even speed; at the end it stays.
-    """
-    if not len(way):
-        return np.repeat(start[None, :], len(times_s), axis=0)
-    nearest = int(np.argmin(np.sum((way - start) ** 2, axis=1)))
-    points = np.vstack((start[None, :], way[min(nearest + 1, len(way) - 1):]))
-    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    travelled = speed_mps * times_s
-    return np.column_stack((np.interp(travelled, lengths, points[:, 0]),
-                            np.interp(travelled, lengths, points[:, 1])))

@@ -18,7 +18,8 @@ from typing import Container, Optional, Sequence, Tuple
 import numpy as np
 
 from quad_nav.geometry import Pose2D
-from quad_nav.peers import Peer, positions_ahead
+from quad_nav.kernels.ways import places_along
+from quad_nav.peers import Peer
 
 HORIZON_S = 7.0
 EARLIER_LATER_S = 1.5
@@ -93,3 +94,15 @@ def _meet(own: np.ndarray, theirs: np.ndarray, apart_m: float) -> bool:
     distances = np.hypot(*np.moveaxis(own[:, None] - theirs[None], 2, 0))
     nearest = distances[_MEETING].min()
     return bool(nearest < min(apart_m, distances[0, 0] - _NEARER_M))
+
+
+def positions_ahead(start: np.ndarray, way: np.ndarray, speed_mps: float,
+                    times_s: np.ndarray) -> np.ndarray:
+    """Where a robot will be at times from now, float64[k, 2].
+
+    It goes from ``start``, float64[2], to the nearest point of its ``way``,
+    float64[n, 2], and along it at an even speed; at the end it stays.
+    """
+    if not len(way):
+        return np.repeat(start[None, :], len(times_s), axis=0)
+    return places_along(start, way, speed_mps * times_s)

@@ -84,18 +84,14 @@ class Traffic:
                  if any(p.name == name for p in fresh)]
         self._lost = lost
         self._margin_m = mends.peer_margin_m
-        self.peers = [peer.moved_to(now_s) for peer in fresh if self._matters(peer, here)]
+        reach_m = self.reach_m
+        self.peers = [peer.moved_to(now_s) for peer in fresh if here is not None
+                      and math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m) < reach_m]
         self._newcomers += [p.name for p in self.peers if p.name not in self._standing]
         self._standing = {p.name: self._standing.get(p.name, Standstill()) for p in self.peers}
         for peer in self.peers:
             self._standing[peer.name].has_moved(now_s, Pose2D(peer.x_m, peer.y_m), _STOOD_M)
         return news
-
-    def _matters(self, peer: Peer, here: Optional[Pose2D]) -> bool:
-        """Whether the two could meet within what is looked ahead."""
-        if here is None:
-            return False
-        return math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m) < self.reach_m
 
     @property
     def reach_m(self) -> float:

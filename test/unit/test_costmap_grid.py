@@ -120,9 +120,9 @@ def test_forget_area_inside_a_square_that_leaves_the_grid():
 
 
 def test_merge_maximum_takes_unknown_for_the_lowest():
-    below = np.array([0, 10, 254, 255, 255, 100], dtype=np.uint8)
-    merge_maximum(below, np.array([255, 9, 253, 0, 255, 101], dtype=np.uint8))
-    assert below.tolist() == [0, 10, 254, 0, 255, 101]
+    below = np.array([[0, 10, 254], [255, 255, 100]], dtype=np.uint8)
+    merge_maximum(below, np.array([[255, 9, 253], [0, 255, 101]], dtype=np.uint8))
+    assert below.tolist() == [[0, 10, 254], [0, 255, 101]]
 
 
 def test_merge_known_overwrites_downwards_too():

@@ -16,13 +16,12 @@ from quad_nav.peers import (
     Intention,
     Peer,
     peer_at,
-    positions_ahead,
     rank_of,
     thinned,
     unknown_intention,
 )
 from quad_nav.refuge import COMFORTABLE, can_be_reached, find_refuge
-from quad_nav.right_of_way import Manner, comes_near, gives_way
+from quad_nav.right_of_way import Manner, comes_near, gives_way, positions_ahead
 from quad_nav.separation import COASTING_S, within_cell
 
 KEEP_OFF_M = 0.4
@@ -320,3 +319,12 @@ def test_the_layer_without_peers_changes_nothing():
     assert layer.update_bounds(Pose2D(2.0, 2.0), 0.0, NOWHERE) == NOWHERE
     layer.update_costs(master, master.window_of(NOWHERE.grown(1e31)))
     assert (master.costs == UNKNOWN).all()
+
+
+def test_places_on_the_way_of_a_peer():
+    """From (1, 1) it goes on to the point after the nearest one, then along the way to its end."""
+    way = np.array([(0.0, 0.0), (1.0, 0.0), (4.0, 5.0), (4.0, 7.0)])
+    ahead = positions_ahead(np.array([1.0, 1.0]), way, 0.5, np.array([0.0, 5.0, 10.0, 12.0, 99.0]))
+    np.testing.assert_allclose(ahead, [(1.0, 1.0), (2.5, 3.0), (4.0, 5.0), (4.0, 6.0), (4.0, 7.0)])
+    stays = positions_ahead(np.array([1.0, 1.0]), np.empty((0, 2)), 0.5, np.array([0.0, 9.0]))
+    assert stays.tolist() == [[1.0, 1.0], [1.0, 1.0]]

@@ -7,6 +7,7 @@ from typing import Optional, Tuple
 import numpy as np
 
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
+from quad_nav.kernels.merging import raise_to
 from quad_nav.kernels.polygon import fill_convex_polygon
 
 
@@ -155,11 +156,8 @@ def shift(cells: np.ndarray, move_x: int, move_y: int, empty: int) -> None:
 
 
 def merge_maximum(below: np.ndarray, above: np.ndarray) -> None:
-    """Keep the higher cost of each cell in ``below``; unknown is lower than free.
-
-    Adding 1 to uint8 takes unknown (255) to 0 and so puts the costs in that order.
-    """
-    np.subtract(np.maximum(below + np.uint8(1), above + np.uint8(1)), np.uint8(1), out=below)
+    """Keep the higher cost of each cell in ``below``; unknown is lower than free."""
+    raise_to(below, above)
 
 
 def merge_known(below: np.ndarray, above: np.ndarray) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.geometry import Pose2D, Pose3D, Scan, angle_difference
+from quad_nav.kernels.projection import count_returns
 
 _ELSEWHERE_M, _ELSEWHERE_RAD = 0.05, 0.05
 # A step of the pose from one scan to the next that is no flight but a correction.
@@ -49,14 +50,15 @@ class ScanTrust:
     def why_not(self, scan: Scan, global_from_sensor: Pose3D, now_s: float) -> str:
         """Why a scan that came now is not to be believed; "" when it is."""
         here = global_from_sensor.to_2d()
-        ranges = scan.ranges_m
-        returns = int(np.count_nonzero((ranges >= scan.range_min_m) & (ranges < scan.range_max_m)))
+        ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
+        returns, near = count_returns(ranges, np.float32(scan.range_min_m),
+                                      np.float32(scan.range_max_m),
+                                      np.float32(0.5 * scan.range_max_m))
         reason = (self._why_late(scan, now_s) or _why_empty(ranges, returns)
                   or self._why_repeated(ranges, here, returns)
                   or self._why_lost(scan, here, returns))
         if not reason:
-            near = ((ranges >= scan.range_min_m) & (ranges < 0.5 * scan.range_max_m))
-            self._good = here, len(ranges), int(np.count_nonzero(near))
+            self._good = here, len(ranges), near
         return reason
 
     def _why_late(self, scan: Scan, now_s: float) -> str:

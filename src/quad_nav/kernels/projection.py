@@ -62,3 +62,14 @@ def outside_circles(points, circles):
             kept[m] = points[k]
             m += 1
     return kept[:m].copy()
+
+
+@njit(cache=True, nogil=True)
+def count_returns(ranges, range_min, range_max, near):
+    """How many of float32[n] are in [range_min, range_max), and in [range_min, near)."""
+    returns = nearer = 0
+    for k in range(ranges.shape[0]):
+        if ranges[k] >= range_min:
+            returns += ranges[k] < range_max
+            nearer += ranges[k] < near
+    return returns, nearer
