@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import json
 import os
+import threading
 import time
 import unittest
 
@@ -23,11 +24,18 @@ class Latest:
     def __init__(self, topic, message_type):
         self.message = None
         self.count = 0
+        self._came = threading.Event()
         self._subscriber = rospy.Subscriber(topic, message_type, self._store, queue_size=100)
 
     def _store(self, message):
         self.message = message
         self.count += 1
+        self._came.set()
+
+    def wait(self):
+        """Until there is a message."""
+        if not self._came.wait(PATIENCE_S):
+            raise AssertionError(f"nothing on {self._subscriber.resolved_name}")
 
 
 class FlightCase(unittest.TestCase):
@@ -47,12 +55,14 @@ class FlightCase(unittest.TestCase):
 
     @classmethod
     def start(cls):
-        """Navigators connected, simulation running."""
+        """Navigators connected, simulation running, odometry heard."""
         rospy.wait_for_service("/simulation/start", timeout=PATIENCE_S)
         rospy.ServiceProxy("/simulation/start", Trigger)()
         for client in cls.clients:
             if not client.wait_for_server(rospy.Duration(PATIENCE_S)):
                 raise AssertionError(f"no action server for {client.action_client.ns}")
+        for odometry in cls.odometry:
+            odometry.wait()
 
     def wait(self, condition, what, patience_s=PATIENCE_S):
         """Until the condition holds; a failure names what did not come."""

@@ -59,18 +59,21 @@ class Faults(FlightCase):
         self.wait(flies, f"robot 0 under way {when}")
 
     def test_blind_it_hovers_and_goes_on(self):
+        # One list, and no subTest(): rosunit counts a test whose parts have failed as passed.
+        late = {}
         for fault in BLINDING:
-            with self.subTest(fault):
-                self.fly(f"before {fault}")
-                begin_s = rospy.get_time()
-                self.senses.fault = fault
-                self.simulated_seconds(LASTS_S)
-                hover_after_s = self.moving_s - begin_s
-                self.senses.fault = ""
-                end_s = rospy.get_time()
-                self.fly(f"after {fault}")
-                self.report(fault, hover_after_s, rospy.get_time() - end_s)
-                self.assertLess(hover_after_s, CONTROL_PERIOD_S + BLIND_S + TRANSPORT_S)
+            self.fly(f"before {fault}")
+            begin_s = rospy.get_time()
+            self.senses.fault = fault
+            self.simulated_seconds(LASTS_S)
+            hover_after_s = self.moving_s - begin_s
+            self.senses.fault = ""
+            end_s = rospy.get_time()
+            self.fly(f"after {fault}")
+            self.report(fault, hover_after_s, rospy.get_time() - end_s)
+            if hover_after_s >= CONTROL_PERIOD_S + BLIND_S + TRANSPORT_S:
+                late[fault] = hover_after_s
+        self.assertEqual(late, {})
 
     def test_it_flies_on_when_odometry_jumps(self):
         self.fly()

@@ -54,29 +54,34 @@ SUBSCRIBED = {
 }
 
 
+def names_of(table, i):
+    return {name.format(i=i): kind for name, kind in table.items()}
+
+
+def absent(robots):
+    """What is not there, or of another type, of these robots' topics and services."""
+    _, subscriptions, services = rosgraph.Master("/test").getSystemState()
+    published = dict(rospy.get_published_topics())
+    heard, served = dict(subscriptions), dict(services)
+    names = []
+    for i in robots:
+        names += [name for name, kind in names_of(TYPES, i).items() if published.get(name) != kind]
+        names += [name for name in names_of(SUBSCRIBED, i) if name not in heard]
+        names += [name for name in names_of(SERVICES, i) if name not in served]
+    return names
+
+
 class RosFace(FlightCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
         cls.start()
 
-    def numbered(self, table):
-        return {name.format(i=i): kind for name, kind in table.items() for i in (0, 1)}
-
-    def test_every_topic_has_its_type(self):
-        published = dict(rospy.get_published_topics())
-        for name, kind in self.numbered(TYPES).items():
-            self.assertEqual(published.get(name), kind, name)
-
-    def test_every_subscription_is_there(self):
-        _, subscriptions, _ = rosgraph.Master("/test").getSystemState()
-        names = {name for name, _ in subscriptions}
-        for name in self.numbered(SUBSCRIBED):
-            self.assertIn(name, names)
-
-    def test_every_service_has_its_type(self):
-        for name, kind in self.numbered(SERVICES).items():
-            self.assertEqual(rosservice.get_service_type(name), kind, name)
+    def test_every_topic_and_service_has_its_type(self):
+        self.wait(lambda: not absent((0, 1)), "every topic, subscription and service")
+        for i in (0, 1):
+            for name, kind in names_of(SERVICES, i).items():
+                self.assertEqual(rosservice.get_service_type(name), kind, name)
 
     def rate(self, topic, message_type, seconds=5.0):
         """Messages per simulated second."""
