@@ -8,8 +8,9 @@ from typing import Callable, Optional, Tuple
 import numpy as np
 
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.offline.flight import Flight, FlightRobot
+from quad_nav.offline.flight import Flight
 from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.pilot import Pilot
 from quad_nav.tick import Located
 
 Seen = Tuple[Scan, Pose3D]
@@ -32,12 +33,12 @@ class SenseFault(FlightObserver):
         self.begin_s, self.end_s = begin_s, end_s
         self.hover_after_s = 0.0
         self.away_s: Optional[float] = None
-        self._robot: Optional[FlightRobot] = None
+        self._pilot: Optional[Pilot] = None
 
     def began(self, flight: Flight) -> None:
-        self._robot = flight.robots[0]
-        self._see, self._navigate = self._robot.see, self._robot.navigate
-        self._robot.see, self._robot.navigate = self.see, self.navigate
+        self._pilot, self._configuration = flight.pilots[0], flight.robots[0].configuration
+        self._see, self._navigate = self._pilot.see, self._pilot.navigate
+        self._pilot.see, self._pilot.navigate = self.see, self.navigate
 
     def is_on(self, now_s: float) -> bool:
         return self.begin_s <= now_s < self.end_s
@@ -133,13 +134,10 @@ class NoPose(SenseFault):
     """tf is silent: the pose is unknown once the last one is older than the tolerance."""
 
     def located_as(self, now_s, state, peers):
-        robot = self._robot
-        if now_s - self.begin_s <= robot.configuration.local_costmap.transform_tolerance_s:
+        if now_s - self.begin_s <= self._configuration.local_costmap.transform_tolerance_s:
             return self._navigate(now_s, state, peers)
         located = Located(None, None)
-        tick = robot.navigator.tick(now_s, located, state.twist, peers)
-        robot._take(tick)
-        return tick, located
+        return self._pilot.navigator.tick(now_s, located, state.twist, peers), located
 
 
 class ShiftedPose(SenseFault):

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import multiprocessing
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,10 @@ import pytest
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.summary import to_json
+from quad_nav.offline.crew import Crew
+from quad_nav.offline.flight import Flight
 from quad_nav.offline.gaps import Gaps
+from quad_nav.offline.helper import HelperError
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.offline.setup import FlightOptions, read_setup
@@ -65,6 +69,54 @@ def test_the_same_seed_gives_the_same_flight_bit_for_bit_and_another_does_not():
     assert tracks[0].shape == (160, 2, 13)
     assert np.array_equal(tracks[0], tracks[1])
     assert not np.array_equal(tracks[0], tracks[2])
+
+
+@pytest.mark.parametrize("processes", [2, 3])
+def test_navigators_in_several_processes_fly_the_same_bit_for_bit(processes):
+    """Four that meet, so that what they tell each other matters."""
+    meeting = read_setup(options(scene=ROOT / "scenes" / "encounters" / "four_ways.yaml",
+                                 goals=ROOT / "goals" / "encounters" / "four_ways",
+                                 config="default", time_limit_s=12.0))
+    alone, shared = Track(), Track()
+    summary = fly(meeting, [alone])
+    assert figures(fly(meeting, [shared], processes=processes)) == figures(summary)
+    assert np.array_equal(alone.rows, shared.rows)
+    assert multiprocessing.active_children() == []
+
+
+def test_a_process_of_navigators_that_dies_ends_the_flight_with_the_reason():
+    class Killer(FlightObserver):
+        def moved(self, flight):
+            if flight.now_s > 0.5:
+                multiprocessing.active_children()[0].kill()
+
+    with pytest.raises(HelperError, match="1 navigators has failed: it has ended"):
+        fly(read_setup(options()), [Killer()], processes=2)
+    assert multiprocessing.active_children() == []
+
+
+def test_what_fails_in_a_process_of_navigators_is_told_with_its_place(monkeypatch):
+    monkeypatch.setattr(Crew, "navigate", lambda *_: 1 / 0)
+    flight = Flight(read_setup(options()), processes=2)
+    flight._crew.navigate = lambda *_: []
+    with pytest.raises(HelperError, match="(?s)Traceback.*ZeroDivisionError"):
+        flight.advance()
+    flight.end()
+
+
+def test_an_observer_that_looks_inside_finds_all_navigators():
+    class Inside(FlightObserver):
+        looks_inside = True
+        seen = set()
+
+        def began(self, flight):
+            assert list(flight.pilots) == [0, 1]
+
+        def scanned(self, robot, scan, map_from_lidar):
+            self.seen.add(robot)
+
+    fly(read_setup(options(time_limit_s=0.1)), [Inside()], processes=2)
+    assert Inside.seen == {0, 1}
 
 
 def test_the_same_seed_gives_the_same_flight_in_another_process():

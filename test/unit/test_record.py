@@ -50,7 +50,7 @@ class Notes(FlightObserver):
 
     def ticked(self, robot, tick, located, wall_s):
         for name in tick.windows:
-            navigator = self._flight.robots[robot].navigator
+            navigator = self._flight.pilots[robot].navigator
             costs = {"global": navigator.global_costmap, "local": navigator.local_costmap}[name]
             self.windows.append((robot, name, tick.now_s, occupancy(costs.costs)))
 

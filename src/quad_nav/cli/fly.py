@@ -18,6 +18,7 @@ from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import table, to_json, write_json
+from quad_nav.offline.helper import processes_for
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import INTERRUPTED
 from quad_nav.offline.run import fly as fly_setup
@@ -64,6 +65,9 @@ _AMOUNT = click.FloatRange(min=0.0)
               help="Standard deviation of the LIDAR's ranges.")
 @click.option("--lidar", type=click.Choice(LIDAR_CASTERS), default="kernel", show_default=True,
               help="Who casts the beams: our kernel, or the physics engine.")
+@click.option("--processes", type=click.IntRange(min=1), metavar="N",
+              help="Processes that share the navigators; the flight is the same. [default: one for"
+              " ten quadcopters, as many as there are cores]")
 @click.option("--json", "json_path", type=click.Path(dir_okay=False, allow_dash=True),
               metavar="FILE", help="Write the summary there; - is the terminal.")
 @click.option("--record", type=_A_FILE, metavar="FILE.bag|FILE.mcap",
@@ -77,7 +81,7 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
 def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str],
         report: Optional[Path], animate: Optional[Path], quiet: bool,
-        **given: Any) -> None:
+        processes: Optional[int], **given: Any) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
     Ctrl-C ends the flight and keeps what was flown.
@@ -95,7 +99,8 @@ def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str],
     if not quiet:
         for warning in setup.warnings:
             click.echo(warning, err=True)
-    sys.exit(_fly(setup, watchers, json_path, pictures, quiet))
+    processes = processes or processes_for(len(setup.robots))
+    sys.exit(_fly(setup, watchers, json_path, pictures, quiet, processes))
 
 
 def _options(scan_range: float, beams: int, range_noise: float, jitter: float, lidar: str,
@@ -124,12 +129,12 @@ def _watchers(record: Optional[Path], view: Optional[str]) -> List[FlightObserve
 
 
 def _fly(setup: FlightSetup, watchers: Sequence[FlightObserver], json_path: Optional[str],
-         pictures: FlightPictures, quiet: bool) -> int:
+         pictures: FlightPictures, quiet: bool, processes: int) -> int:
     observers = [*watchers, *pictures.observers]
     if not quiet:
         observers.append(ProgressBar())
     with _stop_on_signal() as is_stopped:
-        summary = fly_setup(setup, observers, is_stopped)
+        summary = fly_setup(setup, observers, is_stopped, processes)
     to_terminal = json_path == "-"
     if not quiet:
         click.echo(table(summary), err=to_terminal)

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 class FlightObserver:
     """Is told what happens, in the order in which it does; each method may do nothing.
 
-    ``robot`` is the quadcopter's number. What is handed over must not be changed.
+    ``robot`` is the quadcopter's number. What is handed over must not be changed. One that
+    ``looks_inside`` wants the scans, or the navigators in ``flight.pilots``.
     """
+
+    looks_inside = False
 
     @property
     def stop_reason(self) -> str:

@@ -40,6 +40,8 @@ class Recorder(FlightObserver):
         InputError: the file cannot be made.
     """
 
+    looks_inside = True
+
     def __init__(self, path: Path, title: str = "flight"):
         self._topics = Topics(create(path))
         self._title = title
@@ -52,8 +54,8 @@ class Recorder(FlightObserver):
 
     def began(self, flight: Flight) -> None:
         self._flight = flight
-        self._navigators = [NavigatorTopics(index, robot.navigator, self._topics)
-                            for index, robot in enumerate(flight.robots)]
+        self._navigators = [NavigatorTopics(index, flight.pilots[index].navigator, self._topics)
+                            for index in range(len(flight.robots))]
         self._paths = [FlownPath(_path_pose) for _ in flight.robots]
         self._tell_flight()
         self._write("/simulation/scene", START_NS, messages.marker_array(
@@ -102,7 +104,7 @@ class Recorder(FlightObserver):
 
     def ticked(self, robot: int, tick: Tick, located: Located, wall_s: float) -> None:
         navigator = self._navigators[robot]
-        if navigator.action.is_waiting and self._flight.robots[robot].waiting_goal is None:
+        if navigator.action.is_waiting and not self._flight.robots[robot].goal_waits:
             navigator.action.accept(tick.now_s)
         navigator.write(tick, located)
 

@@ -17,10 +17,13 @@ INTERRUPTED = "interrupted"
 
 
 def fly(setup: FlightSetup, observers: Sequence[FlightObserver] = (),
-        is_stopped: Optional[Callable[[], bool]] = None) -> MissionSummary:
-    """Fly until every goal is through, time is up, or ``is_stopped`` says so."""
+        is_stopped: Optional[Callable[[], bool]] = None, processes: int = 1) -> MissionSummary:
+    """Fly until every goal is through, time is up, or ``is_stopped`` says so.
+
+    The navigators share so many ``processes``.
+    """
     gaps = Gaps(setup.scene, len(setup.robots), setup.robot_radius_m)
-    flight = Flight(setup, (gaps, *observers))
+    flight = Flight(setup, (gaps, *observers), processes)
     start_wall_s = time.perf_counter()
     try:
         reason = _advance_to_end(flight, is_stopped)

@@ -45,6 +45,8 @@ class View(FlightObserver):
         InputError: rerun is not installed, or the file cannot be made.
     """
 
+    looks_inside = True
+
     def __init__(self, path: Optional[Path] = None):
         self._rr = _rerun()
         if path is not None:

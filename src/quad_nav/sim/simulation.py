@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import List, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
 from quad_nav.sim.body import GoalSphere, World
-from quad_nav.sim.casters import Caster, KernelCaster, WorldCaster
+from quad_nav.sim.casters import WorldCaster
 from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import (
     Airframe,
@@ -24,7 +24,8 @@ from quad_nav.sim.flight import (
     limit_command,
 )
 from quad_nav.sim.free_flight import FreeFlight
-from quad_nav.sim.lidar import LidarParams, make_scan
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.lidars import Lidars, kernel_lidars
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 STEPS_PER_S = 240
@@ -84,6 +85,30 @@ class RobotState:
         return Twist2D(self.linear_mps[0], self.linear_mps[1], self.angular_radps[2])
 
 
+class RobotStates(Sequence[RobotState]):
+    """The states of all quadcopters at one instant, each made when it is asked for."""
+
+    def __init__(self, bodies: BodyState):
+        self.bodies = bodies
+        self._states: List[Optional[RobotState]] = [None] * len(bodies.rows)
+
+    def __len__(self) -> int:
+        return len(self._states)
+
+    def __getitem__(self, robot: int) -> RobotState:  # type: ignore[override]
+        state = self._states[robot]
+        if state is None:
+            state = self._states[robot] = _robot_state(self.bodies.rows[robot])
+        return state
+
+
+def _robot_state(row: np.ndarray) -> RobotState:
+    x, y, z, qx, qy, qz, qw, *twist = row.tolist()
+    quaternion, to_base = (qx, qy, qz, qw), (-qx, -qy, -qz, qw)
+    return RobotState(Pose3D(x, y, z, quaternion), rotate(to_base, twist[:3]),
+                      rotate(to_base, twist[3:]))
+
+
 class Simulation:
     """N quadcopters in a scene, one step at a time.
 
@@ -106,10 +131,6 @@ class Simulation:
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
         # Who looks into the engine, by its window or its rays, has to find the bodies there.
         self._engine_is_seen = gui or params.lidar_caster == "bullet"
-        self._caster: Caster = (
-            KernelCaster(params.lidar, scene, n_robots, params.airframe.radius_m)
-            if params.lidar_caster == "kernel"
-            else WorldCaster(params.lidar, self._world))
         self._begin()
 
     def _begin(self) -> None:
@@ -118,12 +139,20 @@ class Simulation:
         self._hover_step = np.full(n, -math.inf)  # the last step that a command counts for
         self._next_hover_step = math.inf
         self._contact_log = ContactLog()
-        self._noise = [np.random.default_rng([self.seed, 1, robot]) for robot in range(n)]
+        self.lidars = self._new_lidars()
         self._state = self._world.state()
         self._free_flight = FreeFlight(self.scene, n, self.params.airframe.radius_m, self._law,
                                        STEP_S)
         # The step up to which the engine moves a quadcopter.
         self._engine_until = np.full(n, math.inf if self._engine_is_seen else -math.inf)
+
+    def _new_lidars(self) -> Lidars:
+        params = self.params
+        if params.lidar_caster == "kernel":
+            return kernel_lidars(params.lidar, self.scene, self.n_robots, self.seed,
+                                 params.airframe.radius_m)
+        return Lidars(params.lidar, WorldCaster(params.lidar, self._world), self.n_robots,
+                      self.seed)
 
     @property
     def n_robots(self) -> int:
@@ -218,11 +247,7 @@ class Simulation:
         return self.step_count > self._hover_step
 
     def state(self, robot: int) -> RobotState:
-        (x, y, z, qx, qy, qz, qw, *twist) = self._state.rows[robot].tolist()
-        quaternion = (qx, qy, qz, qw)
-        to_base = (-qx, -qy, -qz, qw)
-        return RobotState(Pose3D(x, y, z, quaternion), rotate(to_base, twist[:3]),
-                          rotate(to_base, twist[3:]))
+        return _robot_state(self._state.rows[robot])
 
     def scan(self, robot: int) -> Scan:
         """What the LIDAR of a quadcopter sees at this instant."""
@@ -230,9 +255,7 @@ class Simulation:
 
     def scans(self, robots: Sequence[int]) -> List[Scan]:
         """What the LIDARs of several quadcopters see at this instant, in one go."""
-        distances_m = self._caster.cast(self._state, robots)
-        return [make_scan(self.params.lidar, self.now_s, row, self._noise[robot])
-                for robot, row in zip(robots, distances_m)]
+        return self.lidars.scan(self._state, robots, self.now_s)
 
     def show_goals(self, spheres: Sequence[GoalSphere]) -> None:
         """Draw goals in the window."""
