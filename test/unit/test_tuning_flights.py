@@ -32,6 +32,7 @@ from quad_nav.offline.barn.runs import fly_world
 from quad_nav.offline.barn.setup import BarnOptions, read_barn_setup
 from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionCourse, check_missions
+from quad_nav.tuning.evaluation import task_of
 from quad_nav.tuning.flight_result import FlightTask, fly_task
 from quad_nav.tuning.report.outcome_pictures import front
 from quad_nav.tuning.sweep import read_points
@@ -88,7 +89,7 @@ def test_what_is_held_out_is_never_searched(tmp_path):
 
 def test_a_flight_needs_no_files_where_it_is_flown(tmp_path):
     course = MissionCourse(mission_options(tmp_path))
-    task = course.task(course.search_cases(1)[0], (("TrajectoryPlannerROS/max_vel_x", 0.6),))
+    task = task_of(course, course.search_cases(1)[0], (("TrajectoryPlannerROS/max_vel_x", 0.6),))
     for path in (tmp_path / "goals").iterdir():
         path.unlink()
     flight = fly_task(task)
@@ -101,7 +102,7 @@ def test_a_flight_needs_no_files_where_it_is_flown(tmp_path):
 
 def test_parameters_that_cannot_be_flown_with_reach_no_goal(tmp_path):
     course = MissionCourse(mission_options(tmp_path))
-    task = course.task(course.search_cases(1)[0], (("TrajectoryPlannerROS/sim_time", -1.0),))
+    task = task_of(course, course.search_cases(1)[0], (("TrajectoryPlannerROS/sim_time", -1.0),))
     flight = fly_task(task)
     assert not flight.completed
     assert "sim_time" in flight.reason
@@ -112,8 +113,8 @@ def test_the_lidar_can_be_another_one(tmp_path):
     case = course.search_cases(1)[0]
     lidar = course.setup(case, (("lidar/range", 3), ("lidar/beams", 90))).simulation.lidar
     assert (lidar.range_max_m, lidar.beam_count) == (3.0, 90)
-    assert "lidar/rnge: unknown" in course.task(case, (("lidar/rnge", 3),)).refused
-    assert "expected more than 0" in course.task(case, (("lidar/beams", 0),)).refused
+    assert "lidar/rnge: unknown" in task_of(course, case, (("lidar/rnge", 3),)).refused
+    assert "expected more than 0" in task_of(course, case, (("lidar/beams", 0),)).refused
 
 
 def barn_worlds(folder: Path) -> Path:
@@ -140,7 +141,7 @@ def test_a_flight_through_barn_counts_as_the_benchmark_counts_it(tmp_path):
     path = barn_worlds(tmp_path)
     course = BarnCourse(BarnOptions(path))
     cases = [Case(0, "BARN world 0", 0)]
-    flight = fly_task(course.task(cases[0], ()))
+    flight = fly_task(task_of(course, cases[0], ()))
     setup = read_barn_setup(BarnOptions(path, only=(0,)))
     run = fly_world(setup.contestant, setup.worlds[0], 0)
     assert run.outcome is Outcome.SUCCESS

@@ -12,7 +12,7 @@ from quad_nav.offline.barn.setup import BarnOptions, Contestant, flight_setup, r
 from quad_nav.offline.barn.worlds import BarnWorld
 from quad_nav.offline.setup import FlightSetup, config_folder
 from quad_nav.tuning.courses import HELD_OUT_SEED, LIDAR, Case, files_digest
-from quad_nav.tuning.flight_result import FlightResult, FlightTask
+from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.space import Assignments
 
 
@@ -76,13 +76,6 @@ class BarnCourse:
             self._contestants[assignments] = read_barn_setup(options).contestant
         contestant = replace(self._contestants[assignments], seed=case.seed)
         return flight_setup(contestant, self._worlds[case.course], 0)
-
-    def task(self, case: Case, assignments: Assignments) -> FlightTask:
-        """A flight that can be sent anywhere; it says if the parameters cannot be used."""
-        try:
-            return FlightTask(self.setup(case, assignments), self.ends_at_contact)
-        except InputError as error:
-            return FlightTask(None, refused="; ".join(error.problems))
 
     def identity(self) -> Dict[str, Any]:
         """What flights depend on besides candidate and case; plain JSON."""

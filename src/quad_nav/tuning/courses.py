@@ -12,7 +12,6 @@ from quad_nav.errors import InputError
 from quad_nav.mission.goal_file import WatchedGoalFile
 from quad_nav.offline.setup import FlightOptions, FlightSetup, config_folder, read_setup
 from quad_nav.sim.simulation import SimulationParams
-from quad_nav.tuning.flight_result import FlightTask
 from quad_nav.tuning.space import Assignments, costmap_paths
 
 HELD_OUT_SEED = 1_000_000
@@ -108,13 +107,6 @@ class MissionCourse:
             given.robots, case.seed, given.size_m, given.time_limit_s, given.scans_per_s,
             _simulation(given.simulation, world))
         return _without_files(read_setup(options))
-
-    def task(self, case: Case, assignments: Assignments) -> FlightTask:
-        """A flight that can be sent anywhere; it says if the parameters cannot be used."""
-        try:
-            return FlightTask(self.setup(case, assignments), self.ends_at_contact)
-        except InputError as error:
-            return FlightTask(None, refused="; ".join(error.problems))
 
     def identity(self) -> Dict[str, Any]:
         """What flights depend on besides candidate and case; plain JSON."""

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Protocol, Sequence, Set, Tuple
 
+from quad_nav.errors import InputError
 from quad_nav.offline.setup import FlightSetup
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.flight_result import FlightResult, FlightTask
@@ -35,11 +36,16 @@ class Course(Protocol):
     def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
         """One flight with parameters on top of the base; InputError if it cannot be."""
 
-    def task(self, case: Case, assignments: Assignments) -> FlightTask:
-        """The same as a task with parameters on top of the base."""
-
     def identity(self) -> Dict[str, Any]:
         """What else flights depend on."""
+
+
+def task_of(course: Course, case: Case, assignments: Assignments) -> FlightTask:
+    """A flight that can be sent anywhere; it says if the parameters cannot be used."""
+    try:
+        return FlightTask(course.setup(case, assignments), course.ends_at_contact)
+    except InputError as error:
+        return FlightTask(None, refused="; ".join(error.problems))
 
 
 class Watcher:
@@ -89,7 +95,7 @@ class Evaluation:
                 self._counted.add(key)
                 self.watcher.flown(self._journal[key], True)
         keys = list(missing)
-        tasks = [(number, self.course.task(case, self.space.assignments(values)))
+        tasks = [(number, task_of(self.course, case, self.space.assignments(values)))
                  for number, (values, case) in enumerate(missing.values())]
         for number, flight in fly_all(self._workers, tasks):
             self._journal.add(keys[number], flight)

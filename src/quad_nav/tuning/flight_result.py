@@ -8,11 +8,11 @@ from typing import List, Optional
 
 from quad_nav.geometry import Twist2D
 from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.offline.first_contact import FirstContact
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.offline.setup import FlightSetup
-from quad_nav.sim.contacts import Contact
 from quad_nav.tick import Located, Tick
 
 _TURN_ARM_M = 0.3
@@ -132,19 +132,6 @@ class Roughness(FlightObserver):
         """Per second and quadcopter."""
         robot_s = self._time_s * len(self._last)
         return self._total_mps / robot_s if robot_s > 0.0 else 0.0
-
-
-class FirstContact(FlightObserver):
-    """Whether anything was touched."""
-
-    def __init__(self) -> None:
-        self._contacts: List[Contact] = []
-
-    def touched(self, contact: Contact) -> None:
-        self._contacts.append(contact)
-
-    def has_come(self) -> bool:
-        return bool(self._contacts)
 
 
 def _time_s(robot: RobotSummary) -> float:

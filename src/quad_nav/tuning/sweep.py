@@ -16,7 +16,7 @@ from quad_nav.errors import InputError
 from quad_nav.offline.setup import config_folder
 from quad_nav.tuning.course_reading import CourseOptions, read_course
 from quad_nav.tuning.courses import LIDAR, Case, identity_text
-from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
+from quad_nav.tuning.evaluation import Course, Evaluation, Watcher, task_of
 from quad_nav.tuning.figures import Figures, figures
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.journal import Journal
@@ -126,7 +126,7 @@ def read_sweep_setup(options: SweepOptions) -> SweepSetup:
     problems: List[str] = []
     for point in options.points:
         assignments = space.assignments(point)
-        refused = course.task(case, assignments).refused
+        refused = task_of(course, case, assignments).refused
         problems += [f"{_words(point)}: {refused}"] if refused else parameter_faults(
             [pair for pair in assignments if not pair[0].startswith(f"{LIDAR}/")], folder, _NAME)
     if problems:

@@ -5,9 +5,9 @@ import json
 from pathlib import Path
 from typing import Iterator
 
+from quad_nav.offline.first_contact import FirstContact
 from quad_nav.offline.run import fly
 from quad_nav.offline.trace import FlightTrace, TraceObserver
-from quad_nav.tuning.flight_result import FirstContact
 from quad_nav.tuning.parameter_files import write_parameters
 from quad_nav.tuning.record import changes, markdown, to_json
 from quad_nav.tuning.space import Assignments

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import signal
-from typing import Iterator, List, Sequence, Tuple
+from typing import Iterator, Sequence, Tuple
 
 import joblib
 
@@ -10,9 +10,8 @@ from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.barn.protocol import TIME_LIMIT_S, Outcome, Run, metric
 from quad_nav.offline.barn.setup import BarnSetup, Contestant, flight_setup
 from quad_nav.offline.barn.worlds import BarnWorld
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.first_contact import FirstContact
 from quad_nav.offline.run import fly
-from quad_nav.sim.contacts import Contact
 
 Task = Tuple[BarnWorld, int]
 
@@ -38,7 +37,7 @@ def fly_all(setup: BarnSetup, workers: int) -> Iterator[Run]:
 
 def fly_world(contestant: Contestant, world: BarnWorld, run: int) -> Run:
     """One flight, to the goal, the first contact or the end of its time."""
-    contact = _FirstContact()
+    contact = FirstContact()
     setup = flight_setup(contestant, world, run)
     summary = fly(setup, (contact,), contact.has_come)
     return judge(summary, world, run)
@@ -66,16 +65,3 @@ def _fly_in_worker(contestant: Contestant, world: BarnWorld, run: int) -> Run:
     # Ctrl-C reaches every process of the terminal; the first one ends the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     return fly_world(contestant, world, run)
-
-
-class _FirstContact(FlightObserver):
-    """Whether anything was touched."""
-
-    def __init__(self) -> None:
-        self._contacts: List[Contact] = []
-
-    def touched(self, contact: Contact) -> None:
-        self._contacts.append(contact)
-
-    def has_come(self) -> bool:
-        return bool(self._contacts)
