@@ -7,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, Iterable, Iterator, List, Sequence, Tuple
 
+from quad_nav.errors import InputError
 from quad_nav.offline.setup import FlightSetup
 from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionOptions
 from quad_nav.tuning.evaluation import Evaluation, Watcher
-from quad_nav.tuning.flight_result import FlightResult, FlightTask
+from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.search import SearchOptions, search
 from quad_nav.tuning.space import Assignments, Dimension, SearchSpace
 from quad_nav.tuning.study import open_study
@@ -113,10 +114,8 @@ class PaperCourse:
         return tuple(Case(0, "paper", HELD_OUT_SEED + seed) for seed in range(count))
 
     def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
-        raise AssertionError("nothing is flown on paper")
-
-    def task(self, case: Case, assignments: Assignments) -> FlightTask:
-        return FlightTask(None, refused=json.dumps([dict(assignments), case.seed]))
+        """Nothing is flown on paper; why not says what would have been."""
+        raise InputError([json.dumps([dict(assignments), case.seed])])
 
     def identity(self) -> Dict[str, Any]:
         return {"course": "paper"}
