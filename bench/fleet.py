@@ -1,6 +1,6 @@
 """What a fleet costs on ROS: processor time per node and memory, for several sizes.
 
-    scripts/ros_env python3 bench/fleet.py --robots 2 8 20 --hosts 1
+    scripts/ros_env python3 bench/fleet.py --robots 2 8 20
 
 Starts ``fleet.launch`` for each size, waits until all fly, and measures for some time of
 the simulation's clock. CPU is in seconds per simulated second: 1.0 keeps one core busy at
@@ -18,7 +18,7 @@ import socket
 import subprocess
 import time
 from pathlib import Path
-from typing import Dict, List, Tuple
+from typing import Dict, List, Optional, Tuple
 
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 SETTLE_S, PATIENCE_S = 5.0, 120.0
@@ -28,7 +28,7 @@ SAMPLED = 5  # quadcopters whose commands are counted
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, nargs="+", default=[2, 4, 8, 16, 20, 32, 50])
-    parser.add_argument("--hosts", type=int, default=1)
+    parser.add_argument("--hosts", type=int, help="as many as fleet.launch says")
     parser.add_argument("--seconds", type=float, default=20.0, help="simulated, per size")
     parser.add_argument("arguments", nargs="*", help="more for the launch file")
     given = parser.parse_args()
@@ -40,13 +40,13 @@ def main() -> None:
         one.join()
 
 
-def measure(robots: int, hosts: int, seconds: float, arguments: List[str]) -> None:
+def measure(robots: int, hosts: Optional[int], seconds: float, arguments: List[str]) -> None:
     """One line of the table."""
     port = free_port()
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
     launch = subprocess.Popen(
         ["roslaunch", "-p", str(port), "quad", "fleet.launch", f"robots:={robots}",
-         f"hosts:={hosts}", "rviz:=false", *arguments],
+         *([f"hosts:={hosts}"] if hosts else []), "rviz:=false", *arguments],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     try:
         clock = Clock(time.monotonic() + PATIENCE_S)
@@ -63,6 +63,7 @@ def measure(robots: int, hosts: int, seconds: float, arguments: List[str]) -> No
         launch.wait()
     cpu = {name: (after[name][0] - before[name][0]) / flown_s for name in sorted(before)}
     total = sum(cpu.values())
+    hosts = sum(name.startswith("fleet") for name in cpu)
     print(f"{robots:4d} robots, {hosts} hosts: real-time factor {factor:.2f}, "
           f"{rate_hz:.1f} commands/s, CPU {total:.2f} "
           f"({1000 * total / robots:.0f} ms/robot): "
