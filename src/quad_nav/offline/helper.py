@@ -21,6 +21,7 @@ from quad_nav.sim.lidars import kernel_lidars
 from quad_nav.sim.simulation import RobotStates
 
 _ROBOTS_WORTH_ONE = 10  # fewer, and telling takes as long as doing
+_PATIENCE_S = 5.0
 # A copy of this process is there at once. Where that is not safe, another Python is begun.
 _START = "fork" if sys.platform == "linux" else "spawn"
 
@@ -71,7 +72,10 @@ class Helper:
         with contextlib.suppress(ConnectionError):  # it has ended already
             self._pipe.send(())
         self._pipe.close()
-        self._process.join()
+        self._process.join(_PATIENCE_S)
+        if self._process.is_alive():  # in the middle of something that nobody waits for
+            self._process.kill()
+            self._process.join()
 
     def _tell(self, *words: object) -> None:
         try:
