@@ -87,9 +87,10 @@ def test_what_is_fixed_is_neither_searched_nor_followed():
     assert space.without(["global_costmap/radius"]).paths == ("P/max_turn", "*_costmap/radius")
 
 
-@pytest.mark.parametrize("base", ["default", "tutorial", "barn"])
-def test_every_parameter_of_the_shipped_space_counts(base):
-    space = load_space(ROOT / "spaces" / "default.yaml")
+@pytest.mark.parametrize("base, name", [("default", "default"), ("tutorial", "default"),
+                                        ("barn", "default"), ("barn", "barn")])
+def test_every_parameter_of_the_shipped_spaces_counts(base, name):
+    space = load_space(ROOT / "spaces" / f"{name}.yaml")
     for values in space.corners():
         assert parameter_faults(space.assignments(values), ROOT / "config" / base, "s") == []
 

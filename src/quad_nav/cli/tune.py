@@ -37,7 +37,7 @@ from quad_nav.tuning.write import write_result
               " the search's scenes with other seeds; of BARN the official sample]")
 @click.option("--held-out-goals", type=A_FOLDER, multiple=True, help="The goals for it.")
 @click.option("--space", type=A_FILE, help="Which parameters are searched, and between what."
-              " [default: spaces/default.yaml, or dwa.yaml, of quad]")
+              " [default: spaces/default.yaml of quad, or barn.yaml, or dwa.yaml]")
 @click.option("--candidates", type=COUNT, default=60, show_default=True, metavar="N",
               help="Sets of parameters to try. A study can be continued with more.")
 @click.option("--flights", type=COUNT, default=8, show_default=True, metavar="N",

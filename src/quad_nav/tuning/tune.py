@@ -10,6 +10,7 @@ from optuna.trial import FrozenTrial
 
 from quad_nav import config
 from quad_nav.errors import InputError
+from quad_nav.offline.barn.setup import BarnOptions
 from quad_nav.offline.setup import config_folder
 from quad_nav.plugins import plugin_name
 from quad_nav.shipped import shipped
@@ -27,13 +28,13 @@ from quad_nav.tuning.workers import Workers
 from quad_nav.versions import versions
 
 TUNED = "tuned"
-_SPACES = {"DWAPlannerROS": "dwa.yaml"}
-_DEFAULT_SPACE = "default.yaml"
+_DWA = "DWAPlannerROS"
 
 
 @dataclass(frozen=True)
 class TuneOptions:
-    """What a person asks for. ``space`` None: the shipped one for the base's local planner.
+    """What a person asks for. ``space`` None: the shipped one for the
+    course and the base's local planner.
 
     ``finalists``: the best candidates that fly ``final_flights`` each before one is chosen;
     ``held_out``: flights that the search never sees, with the base and with the best, and with
@@ -118,7 +119,8 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
                     for name in options.against)
     folder = config_folder(course.config)
     configuration = base_configuration(folder, course.fixed)
-    space = _space(options.space, configuration).without([path for path, _ in course.fixed])
+    space = load_space(options.space or _shipped_space(options.course, configuration)).without(
+        [path for path, _ in course.fixed])
     problems = [line for values in space.corners() for line in parameter_faults(
         (*course.fixed, *space.assignments(values)), folder, space.name)]
     if not space.dimensions:
@@ -187,8 +189,7 @@ def start_values(space: SearchSpace, base: Mapping[str, Any]) -> Dict[str, Any]:
             for one in space.dimensions}
 
 
-def _space(path: Optional[Path], configuration: config.Configuration) -> SearchSpace:
-    if path is not None:
-        return load_space(path)
-    planner = plugin_name(configuration.navigator.base_local_planner)
-    return load_space(shipped("spaces", _SPACES.get(planner, _DEFAULT_SPACE)))
+def _shipped_space(course: CourseOptions, configuration: config.Configuration) -> Path:
+    if plugin_name(configuration.navigator.base_local_planner) == _DWA:
+        return shipped("spaces", "dwa.yaml")
+    return shipped("spaces", "barn.yaml" if isinstance(course, BarnOptions) else "default.yaml")
