@@ -43,6 +43,11 @@ def test_a_value_and_its_remark_are_replaced_and_nothing_else():
     assert replaced(TEXT, ["planner", "frames"], "c", "new") == TEXT.replace("[a, b]", "c  # new")
 
 
+def test_a_remark_of_several_lines_goes_also_when_the_value_gets_longer():
+    assert replaced("a: 1  # long\n      # goes on\nb: 2\n", ["a"], 0.0125, "new") == (
+        "a: 0.0125  # new\nb: 2\n")
+
+
 def test_what_is_not_there_is_not_replaced():
     assert replaced(TEXT, ["planner", "sped"], 0.5, "new") is None
     assert replaced(TEXT, ["planner"], 0.5, "new") is None

@@ -23,8 +23,10 @@ def replaced(text: str, path: Sequence[str], value: Any, comment: str) -> Option
     lines = text.split("\n")
     before = lines[first.line][:first.column]
     rest = lines[last.line][last.column:]
+    column = lines[last.line].find("#", last.column)
     lines[first.line:last.line + 1] = [before + value_text(value) + rest]
-    return "\n".join(_remarked(lines, first.line, len(before) + len(value_text(value)), comment))
+    return "\n".join(_remarked(lines, first.line, len(before) + len(value_text(value)), comment,
+                               column))
 
 
 def inserted(text: str, path: Sequence[str], value: Any, comment: str) -> str:
@@ -83,16 +85,18 @@ def _inserted_in_braces(text: str, namespace: yaml.MappingNode, path: Sequence[s
     return f"{text[:at]}{path[0]}: {words}, {text[at:]}"
 
 
-def _remarked(lines: List[str], number: int, end: int, comment: str) -> List[str]:
-    """With the comment behind the value that ends at a column, instead of the one there."""
+def _remarked(lines: List[str], number: int, end: int, comment: str, column: int) -> List[str]:
+    """With the comment behind the value that ends at ``end``, instead of the one there.
+
+    That one stood at ``column`` before the value was changed, and so do its further lines.
+    """
     line = lines[number]
     old = _REMARK.match(line, end)
     if old is None and line[end:].strip():
         return lines  # more follows within braces
-    mark = line.find("#", end)
     kept = [line[:end] + f"  # {comment}"]
     following = number + 1
-    while mark > 0 and following < len(lines) and _comment_column(lines[following]) == mark:
+    while column > 0 and following < len(lines) and _comment_column(lines[following]) == column:
         following += 1
     return [*lines[:number], *kept, *lines[following:]]
 
