@@ -55,7 +55,7 @@ class FlightCase(unittest.TestCase):
 
     @classmethod
     def start(cls):
-        """Navigators connected, simulation running, odometry heard."""
+        """Navigators connected, simulation running, odometry heard, goals listened to."""
         rospy.wait_for_service("/simulation/start", timeout=PATIENCE_S)
         rospy.ServiceProxy("/simulation/start", Trigger)()
         for client in cls.clients:
@@ -63,6 +63,12 @@ class FlightCase(unittest.TestCase):
                 raise AssertionError(f"no action server for {client.action_client.ns}")
         for odometry in cls.odometry:
             odometry.wait()
+        end = time.monotonic() + PATIENCE_S
+        for topic in cls.goal_topics + cls.cancel_topics:
+            while topic.get_num_connections() == 0:
+                if time.monotonic() > end:
+                    raise AssertionError(f"nobody listens to {topic.name}")
+                time.sleep(0.02)
 
     def wait(self, condition, what, patience_s=PATIENCE_S):
         """Until the condition holds; a failure names what did not come."""
