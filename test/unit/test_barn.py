@@ -169,7 +169,7 @@ def test_the_body_keeps_to_the_parameters_velocities_and_frames_may_have_any_nam
     assert max(map(len, told.splitlines())) <= 100
 
 
-def test_config_barn_is_the_default_but_for_what_body_and_place_force():
+def test_config_barn_is_the_default_but_for_body_place_and_what_missions_were_tuned_for():
     def leaves(tree, above=""):
         for key, value in tree.items():
             path = f"{above}/{key}".lstrip("/")
@@ -184,8 +184,10 @@ def test_config_barn_is_the_default_but_for_what_body_and_place_force():
         **{f"{costmap}/robot_radius": (0.35, 0.25) for costmap in costmaps},
         **{f"{costmap}/inflation_radius": (0.80, 0.70) for costmap in costmaps},
         **{f"{costmap}/base_scan/obstacle_range": (6.0, 2.5) for costmap in costmaps},
-        "global_costmap/origin_x": (None, -8.25), "global_costmap/origin_y": (None, 2.0)}
-    assert set(default) <= set(ours)
+        "global_costmap/origin_x": (None, -8.25), "global_costmap/origin_y": (None, 2.0),
+        "TrajectoryPlannerROS/min_in_place_vel_theta": (0.467, 0.4)}
+    assert set(default) - set(ours) == {f"TrajectoryPlannerROS/{name}" for name in (
+        "vx_samples", "sim_time", "path_distance_bias")}
 
 
 def test_a_free_world_is_flown_and_scored(tmp_path):
