@@ -18,7 +18,7 @@ from quad_nav.mission.summary import to_json
 from quad_nav.offline.crew import Crew
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.gaps import Gaps
-from quad_nav.offline.helper import HelperError
+from quad_nav.offline.helper import PROCESS_NAME, HelperError
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.offline.setup import FlightOptions, read_setup
@@ -48,6 +48,12 @@ def write_goals(folder: Path, *robots) -> Path:
     for index, goals in enumerate(robots):
         (folder / f"quad{index}_goals.json").write_text(json.dumps({"goals": goals}))
     return folder
+
+
+def helpers() -> list:
+    """Processes of navigators that run."""
+    return [process for process in multiprocessing.active_children()
+            if process.name == PROCESS_NAME]
 
 
 class Track(FlightObserver):
@@ -81,18 +87,18 @@ def test_navigators_in_several_processes_fly_the_same_bit_for_bit(processes):
     summary = fly(meeting, [alone])
     assert figures(fly(meeting, [shared], processes=processes)) == figures(summary)
     assert np.array_equal(alone.rows, shared.rows)
-    assert multiprocessing.active_children() == []
+    assert helpers() == []
 
 
 def test_a_process_of_navigators_that_dies_ends_the_flight_with_the_reason():
     class Killer(FlightObserver):
         def moved(self, flight):
             if flight.now_s > 0.5:
-                multiprocessing.active_children()[0].kill()
+                helpers()[0].kill()
 
     with pytest.raises(HelperError, match="1 navigators has failed: it has ended"):
         fly(read_setup(options()), [Killer()], processes=2)
-    assert multiprocessing.active_children() == []
+    assert helpers() == []
 
 
 def test_what_fails_in_a_process_of_navigators_is_told_with_its_place(monkeypatch):

@@ -20,6 +20,7 @@ from quad_nav.sim.flight import BodyState
 from quad_nav.sim.lidars import kernel_lidars
 from quad_nav.sim.simulation import RobotStates
 
+PROCESS_NAME = "navigators"
 _ROBOTS_WORTH_ONE = 10  # fewer, and telling takes as long as doing
 _PATIENCE_S = 5.0
 # A copy of this process is there at once. Where that is not safe, another Python is begun.
@@ -44,7 +45,8 @@ class Helper:
         self._pipe, theirs = context.Pipe()
         # context.Process is what the platform's way of starting makes of it.
         self._process = context.Process(  # type: ignore[attr-defined]
-            target=_serve, args=(theirs, self._pipe, setup, self.robots), daemon=True)
+            target=_serve, args=(theirs, self._pipe, setup, self.robots), name=PROCESS_NAME,
+            daemon=True)
         self._process.start()
         theirs.close()
 
