@@ -23,6 +23,7 @@ from quad_nav.tick import Located, Tick
 
 Seen = Tuple[Scan, Pose3D]  # and where the LIDAR was, in ``map``
 
+
 @dataclass(frozen=True)
 class Navigated:
     """What a navigator has done; ``goal_waits`` when it has not taken the last goal yet."""

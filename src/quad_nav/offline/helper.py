@@ -3,13 +3,13 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import signal
 import sys
 import traceback
 from multiprocessing.connection import Connection
 from typing import Any, List, Mapping, Optional, Sequence, Tuple
 
+import joblib
 import numpy as np
 
 from quad_nav.geometry import Pose2D
@@ -28,8 +28,8 @@ _START = "fork" if sys.platform == "linux" else "spawn"
 
 
 def processes_for(robots: int) -> int:
-    """How many processes make a flight of so many quadcopters fast on this machine."""
-    return max(1, min(os.cpu_count() or 1, robots // _ROBOTS_WORTH_ONE))
+    """How many processes make a flight of so many quadcopters fast on the cores at hand."""
+    return max(1, min(int(joblib.cpu_count()), robots // _ROBOTS_WORTH_ONE))
 
 
 class HelperError(RuntimeError):
@@ -102,7 +102,7 @@ def _serve(pipe: Connection, others: Connection, setup: FlightSetup, robots: Tup
                 pipe.send(answer)
     except (EOFError, ConnectionError):
         pass  # the flight is over, or who flew it has died
-    except Exception:
+    except Exception:  # whatever it is: it is raised again where the flight is flown
         pipe.send(traceback.format_exc())
 
 
