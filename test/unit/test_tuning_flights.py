@@ -95,7 +95,8 @@ def test_a_flight_needs_no_files_where_it_is_flown(tmp_path):
     flight = fly_task(task)
     assert flight.succeeded and flight.goals == 1
     assert flight.straight_m == 3.0
-    assert 5.0 < flight.time_s < 10.0  # 3 m at no more than 0.6 m/s, and a way round a pillar
+    # To 0.4 m before the goal at no more than 0.6 m/s, and a way round a pillar.
+    assert 2.6 / 0.6 < flight.time_s < 10.0
     assert flight.gap_m == flight.clearance_m > 0.0
     assert flight.roughness_mps2 > 0.0
 

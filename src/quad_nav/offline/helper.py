@@ -3,13 +3,13 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import signal
 import sys
 import traceback
 from multiprocessing.connection import Connection
 from typing import Any, List, Mapping, Optional, Sequence, Tuple
 
-import joblib
 import numpy as np
 
 from quad_nav.geometry import Pose2D
@@ -29,7 +29,8 @@ _START = "fork" if sys.platform == "linux" else "spawn"
 
 def processes_for(robots: int) -> int:
     """How many processes make a flight of so many quadcopters fast on the cores at hand."""
-    return max(1, min(int(joblib.cpu_count()), robots // _ROBOTS_WORTH_ONE))
+    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    return max(1, min(cores, robots // _ROBOTS_WORTH_ONE))
 
 
 class HelperError(RuntimeError):
