@@ -182,8 +182,8 @@ def test_config_barn_is_the_default_but_for_body_place_and_what_studies_tuned():
                if default.get(path) != value}
     costmaps = ("global_costmap", "local_costmap")
     tuned = {f"TrajectoryPlannerROS/{name}" for name in (
-        "max_vel_x", "min_vel_x", "min_in_place_vel_theta", "occdist_scale", "sim_time",
-        "goal_distance_bias")}
+        "max_vel_x", "min_vel_x", "min_in_place_vel_theta", "vtheta_samples", "sim_time",
+        "occdist_scale", "goal_distance_bias", "heading_lookahead")}
     tuned |= {"planner_frequency", *(f"{costmap}/cost_scaling_factor" for costmap in costmaps)}
     assert {path: pair for path, pair in changed.items() if path not in tuned} == {
         **{f"{costmap}/robot_radius": (0.35, 0.25) for costmap in costmaps},
