@@ -1,6 +1,7 @@
 """Tuned values in move_base's files: what changes, and that nothing else does."""
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from quad_nav import config
 from quad_nav.config.files import set_value
 from quad_nav.tuning.parameter_files import Change, FilesDiffer, base_value, write_parameters
+from quad_nav.tuning.space import costmap_paths
 from quad_nav.tuning.yaml_edit import inserted, replaced, value_text
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -133,3 +135,21 @@ def test_the_bases_own_value_is_found_where_a_layer_has_it():
     assert base_value(tree, "*_costmap/base_scan/obstacle_range") == 2.0
     assert base_value(tree, "planner_frequency") == 0.0
     assert base_value(tree, "no/such") is None
+
+
+@pytest.mark.parametrize("name", ["barn", "default"])
+def test_shipped_parameters_are_those_of_their_study(name):
+    folder = ROOT / "config" / name
+    tree = config.load_files(folder, {"i": "0"})
+    rows = re.findall(r"^\| (\S+) +\| (\S+) +\| (\S+) +\| \S.*\|$",
+                      (folder / "STUDY.md").read_text().partition("## What each change")[2], re.M)
+    found = {path: value for path, _, value in rows if path != "parameter"}
+    assert len(found) >= 6
+    for path, value in found.items():
+        for place in costmap_paths(path):
+            here = tree
+            for key in place.split("/"):
+                here = here[key]
+            assert value_text(here) == value, place
+    remarks = "".join(file.read_text() for file in folder.glob("*.yaml"))
+    assert remarks.count("# tuned, was ") == len(found)
