@@ -9,9 +9,11 @@ import pytest
 from hand_made_traces import TIMES_S, flight, robot
 
 from quad_nav.mission.flight_log import Contact
-from quad_nav.offline.report.encounter_picture import frame_times
+from quad_nav.offline.report.encounter_picture import encounter_picture, frame_times
 from quad_nav.offline.report.encounters import encounters, gap_text
 from quad_nav.offline.report.measures import tracks
+from quad_nav.offline.report.paths_picture import paths_picture
+from quad_nav.offline.report.style import styled
 
 
 def found_in(trace, **options):
@@ -51,12 +53,35 @@ def test_what_repeats_soon_is_one_encounter():
 def test_contacts_with_obstacles_come_first_and_the_closest_next():
     trace = flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0)), robot(2, (1.0, 1.8)), contacts=[
         Contact(2.0, "quad2", "pillar", 5.0, 5.0), Contact(3.0, "quad2", "pillar", 5.0, 5.0),
-        Contact(8.0, "quad2", "pillar", 5.0, 5.0), Contact(1.0, "quad0", "quad1", 1.5, 1.0)])
+        Contact(8.0, "quad2", "pillar", 5.0, 5.0)])
     found = found_in(trace)
     assert [(one.names, one.time_s) for one in found[:2]] == [
         (("quad2", "pillar"), 2.0), (("quad2", "pillar"), 8.0)]
     assert found[0].other is None and (found[0].x_m, found[0].y_m) == (5.0, 5.0)
     assert [one.names for one in found[2:]] == [("quad0", "quad2"), ("quad0", "quad1")]
+
+
+@pytest.mark.parametrize("offset_m, gap_m", [(0.62, 0.0), (0.58, -0.02)])
+def test_those_that_touched_have_no_gap(offset_m, gap_m):
+    """They may have touched between two poses, also of a body that is no disc."""
+    trace = passing(offset_m)
+    touch = flight(*trace.robots, contacts=[Contact(5.01, "quad1", "quad0", 3.5, 2.3)])
+    (apart,), (one,) = found_in(trace), found_in(touch)
+    assert apart.gap_m == pytest.approx(offset_m - 0.6)
+    assert one.gap_m == pytest.approx(gap_m)
+    picture = encounter_picture(touch, tracks(touch), one)
+    assert picture.axes[2].get_xlabel() == gap_text(gap_m)
+
+
+def test_the_legend_of_paths_shows_the_letter():
+    trace = passing(1.0)
+    among = tracks(trace)
+    with styled():
+        (legend,) = paths_picture(trace, among, encounters(trace, among)).legends
+        names = [text.get_text() for text in legend.get_texts()]
+        letter = legend.legend_handles[names.index("close encounter")].get_marker()
+    width, height = np.ptp(letter.vertices, axis=0)
+    assert 0.8 < height / width < 1.3
 
 
 def test_nobody_meets_alone():

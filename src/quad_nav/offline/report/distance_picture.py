@@ -63,6 +63,6 @@ def _draw_letters(axes: Axes, marked: Sequence[Encounter]) -> None:
     for letter, one in zip(LETTERS, marked):
         if one.other is not None:
             axes.plot(one.time_s, one.gap_m, "o", ms=5, color="none", mec="black", zorder=8)
-            axes.annotate(letter, (one.time_s, one.gap_m), (0, 9), ha="center",
+            axes.annotate(letter, (one.time_s, one.gap_m), (5, 8),
                           textcoords="offset points", fontsize=9, fontweight="bold")
     axes.axhline(CLOSE_M, color=QUIET, lw=0.8, ls=":")

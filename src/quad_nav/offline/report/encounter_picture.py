@@ -63,15 +63,17 @@ def _draw_frame(axes: Axes, trace: FlightTrace, among: Tracks, one: Encounter, t
     axes.set(xlim=shown[:2], ylim=shown[2:], xticks=[], yticks=[])
     axes.set_title(f"{time_s:.1f} s", loc="center", fontsize=9,
                    color=ALARM if nearest else "black")
-    axes.set_xlabel(_gap(trace, among, one, now), fontsize=8.5, labelpad=3,
+    axes.set_xlabel(_gap(trace, among, one, now, nearest), fontsize=8.5, labelpad=3,
                     color=ALARM if nearest else QUIET)
     for spine in axes.spines.values():
         spine.set(visible=True, color=ALARM if nearest else "#a0a8b0", lw=1.8 if nearest else 0.8)
 
 
-def _gap(trace: FlightTrace, among: Tracks, one: Encounter, now: int) -> str:
+def _gap(trace: FlightTrace, among: Tracks, one: Encounter, now: int, nearest: bool) -> str:
     if one.other is None:
         return ""
+    if nearest:
+        return gap_text(one.gap_m)
     return gap_text(pair_gap_m(among, one.robot, one.other, trace.robot_radius_m)[now])
 
 

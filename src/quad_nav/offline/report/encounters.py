@@ -24,7 +24,8 @@ class Encounter:
 
     ``robot`` and ``other`` are numbers of quadcopters; ``other`` is None for an obstacle or
     wall, which only what was touched counts as. ``gap_m`` is between hulls, NaN for an
-    obstacle. ``x_m``, ``y_m``: the middle between the two, or where it touched.
+    obstacle, and at most 0 when the two touched: that may have been between two poses.
+    ``x_m``, ``y_m``: the middle between the two, or where it touched.
     """
 
     robot: int
@@ -38,7 +39,7 @@ class Encounter:
 
 def encounters(trace: FlightTrace, among: Tracks, below_m: float = CLOSE_M
                ) -> Tuple[Encounter, ...]:
-    """What was touched first, then the others, closest first."""
+    """Obstacles that were touched first, then quadcopters, closest first."""
     found = _obstacles_touched(trace)
     for a, b in itertools.combinations(range(len(trace.robots)), 2):
         found += _of_pair(trace, among, a, b, below_m)
@@ -61,11 +62,19 @@ def _of_pair(trace: FlightTrace, among: Tracks, a: int, b: int, below_m: float
     found: List[Encounter] = []
     for first, last in _joined(runs(close), among.times_s):
         nearest = first + int(np.nanargmin(gap_m[first:last + 1]))
+        names = (trace.robots[a].name, trace.robots[b].name)
+        nearest_m = float(gap_m[nearest])
+        if _touched(trace, names, among.times_s[first], among.times_s[last]):
+            nearest_m = min(nearest_m, 0.0)
         x_m, y_m = among.positions_m[[a, b], nearest].mean(axis=0)
-        found.append(Encounter(a, b, (trace.robots[a].name, trace.robots[b].name),
-                               float(among.times_s[nearest]), float(gap_m[nearest]),
+        found.append(Encounter(a, b, names, float(among.times_s[nearest]), nearest_m,
                                float(x_m), float(y_m)))
     return found
+
+
+def _touched(trace: FlightTrace, names: Tuple[str, str], first_s: float, last_s: float) -> bool:
+    return any({contact.robot, contact.other} == set(names) and first_s <= contact.time_s <= last_s
+               for contact in trace.contacts)
 
 
 def _joined(spans: List[Tuple[int, int]], times_s: np.ndarray) -> List[Tuple[int, int]]:

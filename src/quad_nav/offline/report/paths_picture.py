@@ -6,8 +6,11 @@ from typing import Any, List, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
+from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
+from matplotlib.textpath import TextPath
 
 from quad_nav.offline.report.encounters import LETTERS, Encounter
 from quad_nav.offline.report.measures import Tracks, end_s, position_m
@@ -82,7 +85,7 @@ def _draw_goals(axes: Axes, number: int, robot: RobotTrace, scale: float) -> Non
 
 
 def _symbols(trace: FlightTrace, lettered: bool) -> List[Any]:
-    def symbol(marker: str, label: str, **style: Any) -> Line2D:
+    def symbol(marker: Any, label: str, **style: Any) -> Line2D:
         return Line2D([], [], ls="", marker=marker, label=label, **{
             "color": QUIET, "mec": QUIET, "ms": 8, **style})
 
@@ -93,7 +96,14 @@ def _symbols(trace: FlightTrace, lettered: bool) -> List[Any]:
     if any(not goal.reached for goal in goals):
         found.append(symbol("o", "goal not reached", color="white", mew=1.5))
     if lettered:
-        found.append(symbol(r"$\mathbf{A}$", "close encounter"))
+        found.append(symbol(_letter(LETTERS[0]), "close encounter"))
     if trace.contacts:
         found.append(symbol("X", "contact", color=ALARM, mec="white", ms=10))
     return found
+
+
+def _letter(letter: str) -> Path:
+    """A marker: matplotlib's own ones of text are mathematics, which is switched off here."""
+    outline = TextPath((0.0, 0.0), letter, prop=FontProperties(weight="bold"))
+    middle = outline.get_extents().get_points().mean(axis=0)
+    return Path(outline.vertices - middle, outline.codes)
