@@ -1,7 +1,7 @@
 """Figures over the values of one parameter, of two, or over a list of points."""
 from __future__ import annotations
 
-from typing import Any, Callable, List, Optional, Sequence, Tuple
+from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,14 +12,21 @@ from quad_nav.tuning.figures import Figures
 from quad_nav.tuning.record import value_words
 from quad_nav.tuning.sweep import SweepRow
 
-Measure = Tuple[str, bool, Callable[[Figures], Optional[float]]]
-"""Its title, whether more is better, and the figure."""
+
+class Measure(NamedTuple):
+    """What a panel shows; ``decimals`` of numbers in a map."""
+
+    title: str
+    more_is_better: bool
+    decimals: int
+    figure: Callable[[Figures], Optional[float]]
+
 
 MEASURES: Tuple[Measure, ...] = (
-    ("Missions complete, %", True, lambda one: 100.0 * one.completed / one.flights),
-    ("Flights with contacts, %", False, lambda one: 100.0 * one.touched / one.flights),
-    ("Mean mission time, s", False, lambda one: one.mean_time_s),
-    ("Smallest gap, m", True, lambda one: one.least_gap_m),
+    Measure("Missions complete, %", True, 0, lambda one: 100.0 * one.completed / one.flights),
+    Measure("Flights with contacts, %", False, 0, lambda one: 100.0 * one.touched / one.flights),
+    Measure("Mean mission time, s", False, 1, lambda one: one.mean_time_s),
+    Measure("Smallest gap, m", True, 2, lambda one: one.least_gap_m),
 )
 _MOST_NUMBERS = 100  # cells of a map beyond which there are no numbers in them
 _MOST_LABELS = 30
@@ -49,60 +56,63 @@ def sweep_picture(rows: Sequence[SweepRow]) -> Figure:
 
 
 def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measure) -> None:
-    title, _, value = measure
     places, labels = _places([row.point[path] for row in rows])
-    found = [value(row.figures) for row in rows]
+    found = [measure.figure(row.figures) for row in rows]
     axes.plot(places, [np.nan if one is None else one for one in found], "o-", color=colour(0))
-    if title.startswith("Mean"):  # and each flight
+    if measure.title.startswith("Mean"):  # and each flight
         for place, row in zip(places, rows):
             times_s = [flight.time_s for flight in row.flights if flight.completed]
             axes.plot([place] * len(times_s), times_s, ".", ms=4, color=QUIET, alpha=0.6, zorder=1)
-    axes.set_title(title)
+    axes.set_title(measure.title)
     axes.set_xlabel(path)
     if labels:
         axes.set_xticks(places)
         axes.set_xticklabels(labels)
-    if title.endswith("%"):
+    if measure.title.endswith("%"):
         axes.set_ylim(-5, 105)
 
 
 def _draw_map(figure: Figure, axes: Axes, rows: Sequence[SweepRow], values: Sequence[List[Any]],
               measure: Measure) -> None:
-    title, more_is_better, value = measure
     cells = np.full((len(values[0]), len(values[1])), np.nan)
     first, second = list(rows[0].point)
     for row in rows:
-        found = value(row.figures)
+        found = measure.figure(row.figures)
         place = (values[0].index(row.point[first]), values[1].index(row.point[second]))
         cells[place] = np.nan if found is None else found
-    limits = (0.0, 100.0) if title.endswith("%") else (None, None)
+    limits = (0.0, 100.0) if measure.title.endswith("%") else (None, None)
     image = axes.imshow(cells, aspect="auto", origin="lower", vmin=limits[0], vmax=limits[1],
-                        cmap="RdYlGn" if more_is_better else "RdYlGn_r", alpha=0.85)
+                        cmap="RdYlGn" if measure.more_is_better else "RdYlGn_r", alpha=0.85)
     if cells.size <= _MOST_NUMBERS:
         for (i, j), number in np.ndenumerate(cells):
-            axes.text(j, i, "–" if np.isnan(number) else f"{number:.3g}", ha="center", va="center",
-                      fontsize=8)
+            axes.text(j, i, "–" if np.isnan(number) else f"{number:.{measure.decimals}f}",
+                      color=_ink(image.to_rgba(number)), ha="center", va="center", fontsize=8)
     else:
         figure.colorbar(image, ax=axes)
-    axes.set_title(title)
+    axes.set_title(measure.title)
     axes.grid(visible=False)
     axes.set(xticks=range(len(values[1])), yticks=range(len(values[0])))
     axes.set_xticklabels(list(map(value_words, values[1])))
     axes.set_yticklabels(list(map(value_words, values[0])))
 
 
+def _ink(rgba: np.ndarray) -> str:
+    """What can be read on a cell of this colour, by its luma (ITU-R BT.601)."""
+    luma = float(np.dot(rgba[:3], (0.299, 0.587, 0.114)))
+    return "black" if luma > 0.5 or rgba[3] == 0.0 else "white"
+
+
 def _draw_list(axes: Axes, rows: Sequence[SweepRow], measure: Measure) -> None:
-    title, _, value = measure
-    found = [value(row.figures) for row in rows]
-    is_alarming = title.startswith("Flights with")
+    found = [measure.figure(row.figures) for row in rows]
+    is_alarming = measure.title.startswith("Flights with")
     axes.barh(range(len(rows)), [0.0 if one is None else one for one in found], height=0.65,
               color=ALARM if is_alarming else colour(0))
-    axes.set_title(title, fontsize=8)
+    axes.set_title(measure.title, fontsize=8)
     axes.set(ylim=(len(rows) - 0.4, -0.6), yticks=range(len(rows)))
     labels = [", ".join(map(value_words, row.point.values()))[:_MOST_LETTERS] for row in rows]
     axes.set_yticklabels(labels if len(rows) <= _MOST_LABELS else [""] * len(rows))
     axes.grid(axis="y", visible=False)
-    if title.endswith("%"):
+    if measure.title.endswith("%"):
         axes.set_xlim(0, 105)
 
 
