@@ -134,7 +134,7 @@ class Traffic:
         self._newcomers = []
         for costmap, points, shown in ((self._global, positions, areas),
                                        (self._local, _moved(positions, local_from_global),
-                                        self._solid(here, local_from_global))):
+                                        self._solid(now_s, here, local_from_global))):
             for layer in costmap.layers.values():
                 if isinstance(layer, PeerLayer):
                     layer.see(shown)
@@ -151,8 +151,8 @@ class Traffic:
                     else source.obstacle_range_m
                     for layer in layers for source in layer.sources), default=0.0)
 
-    def _solid(self, here: Pose2D, local_from_global: Pose2D) -> List[PeerArea]:
-        """Obstacles for the rollouts: who means to stay, as wide as they are to keep off.
+    def _solid(self, now_s: float, here: Pose2D, local_from_global: Pose2D) -> List[PeerArea]:
+        """Obstacles for the rollouts: who stays, as wide as they are to keep off.
 
         Never so wide that the robot itself is in one, because then nothing is legal.
         """
@@ -160,7 +160,7 @@ class Traffic:
         for peer in self.peers:
             away_m = math.hypot(peer.x_m - here.x_m, peer.y_m - here.y_m)
             radius_m = min(2.0 * self.keep_off_m, away_m - _OUTSIDE_M) - self._radius_m
-            if peer.is_parked and radius_m > 0.0:
+            if self.is_parked(peer, now_s) and radius_m > 0.0:
                 solid.append(PeerArea(_moved(peer.position[None, :], local_from_global), radius_m,
                                       LETHAL))
         return solid

@@ -145,6 +145,15 @@ def test_a_short_mission_is_flown_to_its_end(tmp_path):
     assert 0.0 < summary.robots[0].min_clearance_m < 1.5
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_two_that_stand_before_each_other_turn_round_and_go_on(seed):
+    """Wide inflation, one command a second: they used to face each other for minutes."""
+    wide = tuple((f"{costmap}_costmap/inflation_radius", 1.2) for costmap in ("global", "local"))
+    summary = fly(read_setup(options(seed=seed, parameters=wide, time_limit_s=150.0,
+                                     simulation=SimulationParams(jitter_m=0.3))))
+    assert summary.reason == "" and summary.success
+
+
 def test_a_flight_that_is_out_of_time_or_stopped_says_so():
     assert fly(read_setup(options(time_limit_s=0.5))).reason == "time limit of 0.5 s"
     stopped = fly(read_setup(options()), is_stopped=lambda: True)

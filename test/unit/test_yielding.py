@@ -215,6 +215,24 @@ def test_what_a_robot_tells_of_itself():
     assert not len(navigator.intention.way)
 
 
+def test_rollouts_go_round_one_that_stands_whatever_it_says():
+    """It is under way, stands for 9 s and moves on. The centre is to keep 2 x (r + 0.05 m) off."""
+    navigator = build_navigator(load(TREE))
+    here = Pose2D(5.0, 5.0)
+
+    def solid(now_s, x_m):
+        way = Intention(0.0, np.array([[x_m, 5.0], [9.0, 5.0]]))
+        seen = [peer_at("quad1", Pose2D(x_m, 5.0), Twist2D(), now_s).intending(way)]
+        navigator.tick(now_s, Located(here, here), Twist2D(), seen)
+        navigator.local_costmap.update(now_s, here)
+        return np.count_nonzero(navigator.local_costmap.costs == LETHAL)
+
+    assert [solid(now_s, 6.0) for now_s in (0.0, 4.0, 7.9)] == [0, 0, 0]
+    assert solid(9.0, 6.0) * 0.05 ** 2 == pytest.approx(
+        math.pi * (RADIUS_M + 2 * 0.05) ** 2, rel=0.05)
+    assert solid(9.2, 6.15) == 0
+
+
 def test_an_idle_robot_makes_room_for_one_that_it_has_made_stand():
     """The goal is 0.71 m from the parked one; who stands for long is taken for parked, too."""
     fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(4.72, 6.2, -1.0), mends={"make_room_when_idle": False})
