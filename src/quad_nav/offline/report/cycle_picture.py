@@ -6,9 +6,15 @@ from typing import List, Sequence, Tuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
-from quad_nav.offline.report.style import QUIET, colour, new_figure, robot_legend, time_axis
+from quad_nav.offline.report.style import (
+    QUIET,
+    colour,
+    label_log,
+    new_figure,
+    robot_legend,
+    time_axis,
+)
 from quad_nav.offline.trace import FlightTrace, RobotTrace
 
 _TAIL = 0.001  # smallest part of the cycles that the distribution shows
@@ -35,7 +41,7 @@ def cycle_picture(trace: FlightTrace) -> Figure:
              else "Time from one control cycle to the next", ylabel="ms")
     if measured:
         left.set_yscale("log")
-        left.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        label_log(left.yaxis)
     else:
         left.set_ylim(0.0, 1.1 * left.get_ylim()[1])
     right.set(title="Share of cycles that take longer", xscale="log", xlim=(_TAIL, 1.0),

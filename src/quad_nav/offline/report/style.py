@@ -2,12 +2,15 @@
 from __future__ import annotations
 
 import io
+import math
 from typing import Any, Dict, Sequence, Tuple
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from quad_nav.sim.colours import robot_rgba
 
@@ -48,6 +51,19 @@ def png(figure: Figure) -> bytes:
 def styled() -> Any:
     """The context in which figures are made and drawn."""
     return matplotlib.rc_context(RC)
+
+
+def label_log(axis: Axis) -> None:
+    """Plain numbers on a logarithmic axis of which the limits are known.
+
+    matplotlib's own labels there are mathematics, which is switched off.
+    """
+    low, high = axis.get_view_interval()
+    decades = math.log10(high / low)
+    steps = (1.0,) if decades > 4.0 else (1.0, 3.0) if decades > 1.2 else (1.0, 2.0, 3.0, 5.0, 7.0)
+    axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def colour(robot: int) -> Tuple[float, float, float]:

@@ -13,7 +13,14 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from optuna.trial import FrozenTrial
 
-from quad_nav.offline.report.style import ALARM, QUIET, colour, new_figure, robot_legend
+from quad_nav.offline.report.style import (
+    ALARM,
+    QUIET,
+    colour,
+    label_log,
+    new_figure,
+    robot_legend,
+)
 from quad_nav.tuning.search import is_complete
 from quad_nav.tuning.space import Dimension, SearchSpace
 
@@ -143,6 +150,7 @@ def _place(one: Dimension, value: Any) -> float:
 def _scale(axes: Axes, one: Dimension) -> None:
     if one.log:
         axes.set_xscale("log")
+        label_log(axes.xaxis)
     if one.choices:
         axes.set_xticks(range(len(one.choices)))
         axes.set_xticklabels(list(map(str, one.choices)))
