@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 from hand_made_traces import fleet, flight, robot
 from matplotlib.figure import Figure
@@ -90,4 +88,4 @@ def test_labels_of_logarithmic_axes(low, high, labels):
         minor = axes.xaxis.get_minor_formatter().format_ticks(axes.xaxis.get_minorticklocs())
     edges = (low * (1.0 - 1e-9), high * (1.0 + 1e-9))
     assert [text for at, text in zip(ticks, texts) if edges[0] <= at <= edges[1]] == labels
-    assert not any(minor) and math.isfinite(sum(ticks))
+    assert not any(minor)

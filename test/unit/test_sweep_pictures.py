@@ -12,13 +12,15 @@ from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.report.sweep_pictures import sweep_picture
 from quad_nav.tuning.sweep import SweepRow
 
+pytestmark = pytest.mark.filterwarnings("error")
+
 
 def flown(time_s: float, gap_m: float, reached: int = 2, contacts: int = 0) -> FlightResult:
     return FlightResult(2, reached, contacts, time_s, 6.0, clearance_m=gap_m)
 
 
 def panels(rows):
-    """Titles and axes; drawn as well, with every warning an error."""
+    """Axes by their titles, of a figure that has been drawn."""
     with styled():
         figure = sweep_picture(rows)
         assert png(figure).startswith(b"\x89PNG")
@@ -29,9 +31,8 @@ def luma(rgb):
     return sum(weight * part for weight, part in zip((0.299, 0.587, 0.114), rgb))
 
 
-@pytest.mark.filterwarnings("error")
 def test_map_over_two_parameters():
-    """With b = 2 a third of the flights does not arrive, with a = 2 and b = 2 none."""
+    """With b = 2 a third of the flights fails where a = 1, and all where a = 2."""
     flights = {(1, 1): (flown(20.0, 0.3), flown(21.0, 0.126)),
                (2, 1): (flown(10.0, 0.05), flown(11.0, 0.2)),
                (1, 2): (flown(30.0, 0.2), flown(32.0, 0.2), flown(50.0, 0.2, 1, contacts=1)),
@@ -52,14 +53,12 @@ def test_map_over_two_parameters():
             assert abs(paper - luma(matplotlib.colors.to_rgb(text.get_color()))) > 0.4
 
 
-@pytest.mark.filterwarnings("error")
 def test_map_where_nothing_arrived():
     rows = [SweepRow({"a": a, "b": b}, (flown(60.0, 0.1, 0),))
             for a, b in itertools.product((1, 2), repeat=2)]
     assert [text.get_text() for text in panels(rows)["Mean mission time, s"].texts] == ["–"] * 4
 
 
-@pytest.mark.filterwarnings("error")
 def test_curve_over_one_parameter():
     """Means as a line, and every flight that arrived as a dot."""
     rows = [SweepRow({"a": 0.5}, (flown(20.0, 0.3), flown(22.0, 0.1))),
@@ -70,7 +69,6 @@ def test_curve_over_one_parameter():
         [[0.5, 20.0], [0.5, 22.0]], [[2.0, 10.0]]]
 
 
-@pytest.mark.filterwarnings("error")
 def test_bars_for_a_list_of_points():
     rows = [SweepRow({"a": 1, "b": "x"}, (flown(20.0, 0.3),)),
             SweepRow({"a": 2, "b": "y"}, (flown(10.0, 0.2),)),

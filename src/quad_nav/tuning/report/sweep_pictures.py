@@ -19,7 +19,7 @@ class Measure(NamedTuple):
     title: str
     more_is_better: bool
     decimals: int
-    figure: Callable[[Figures], Optional[float]]
+    value: Callable[[Figures], Optional[float]]
 
 
 MEASURES: Tuple[Measure, ...] = (
@@ -57,7 +57,7 @@ def sweep_picture(rows: Sequence[SweepRow]) -> Figure:
 
 def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measure) -> None:
     places, labels = _places([row.point[path] for row in rows])
-    found = [measure.figure(row.figures) for row in rows]
+    found = [measure.value(row.figures) for row in rows]
     axes.plot(places, [np.nan if one is None else one for one in found], "o-", color=colour(0))
     if measure.title.startswith("Mean"):  # and each flight
         for place, row in zip(places, rows):
@@ -77,7 +77,7 @@ def _draw_map(figure: Figure, axes: Axes, rows: Sequence[SweepRow], values: Sequ
     cells = np.full((len(values[0]), len(values[1])), np.nan)
     first, second = list(rows[0].point)
     for row in rows:
-        found = measure.figure(row.figures)
+        found = measure.value(row.figures)
         place = (values[0].index(row.point[first]), values[1].index(row.point[second]))
         cells[place] = np.nan if found is None else found
     limits = (0.0, 100.0) if measure.title.endswith("%") else (None, None)
@@ -103,7 +103,7 @@ def _ink(rgba: np.ndarray) -> str:
 
 
 def _draw_list(axes: Axes, rows: Sequence[SweepRow], measure: Measure) -> None:
-    found = [measure.figure(row.figures) for row in rows]
+    found = [measure.value(row.figures) for row in rows]
     is_alarming = measure.title.startswith("Flights with")
     axes.barh(range(len(rows)), [0.0 if one is None else one for one in found], height=0.65,
               color=ALARM if is_alarming else colour(0))
