@@ -6,8 +6,11 @@ import os
 import threading
 import time
 import unittest
+from xmlrpc.client import ServerProxy
 
 import actionlib
+import rosgraph
+import rosnode
 import rospy
 from actionlib_msgs.msg import GoalID
 from geometry_msgs.msg import PoseStamped, Twist
@@ -16,6 +19,24 @@ from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 
 PATIENCE_S = 60.0  # wall time; generous, because a condition that holds ends the wait
+PUBLISHERS = ("/simulator", "/move_base0", "/move_base1")
+
+
+def topics_sent_here():
+    """The topics that the simulator and the navigators send to this node.
+
+    Their own lists say so. A subscriber's number of connections counts those that are still being
+    made, which takes a second or more where many are made at once: what is published before
+    their end is lost.
+    """
+    here, master = rospy.get_name(), rosgraph.Master("/test")
+    topics = set()
+    for name in PUBLISHERS:
+        with ServerProxy(rosnode.get_api_uri(master, name)) as node:
+            _, _, connections = node.getBusInfo(here)
+        topics.update(topic for _, destination, direction, _, topic, *_ in connections
+                      if (direction, destination) == ("o", here))
+    return topics
 
 
 class Latest:
@@ -71,13 +92,13 @@ class FlightCase(unittest.TestCase):
                 time.sleep(0.02)
 
     def wait(self, condition, what, patience_s=PATIENCE_S):
-        """Until the condition holds; a failure names what did not come."""
+        """Until the condition holds; a failure says ``what`` did not come, or what it returns."""
         end = time.monotonic() + patience_s
         while time.monotonic() < end and not rospy.is_shutdown():
             if condition():
                 return
             time.sleep(0.02)
-        self.fail(f"not within {patience_s:g} s: {what}")
+        self.fail(f"not within {patience_s:g} s: {what() if callable(what) else what}")
 
     def simulated_seconds(self, seconds):
         """Lets simulated time pass."""

@@ -13,7 +13,7 @@ import roslib.message
 import rospy
 import rosservice
 import rostest
-from flight_case import goal_pose
+from flight_case import goal_pose, topics_sent_here
 from nav_msgs.msg import Odometry
 from original_case import ROBOTS, OriginalCase, Record, recorded_lines, recorded_yaml
 from sensor_msgs.msg import PointCloud2, PointField
@@ -41,9 +41,8 @@ class OriginalFace(OriginalCase):
         flight.doCleanups()
 
     def fly(self):
-        self.wait(lambda: all(record.is_connected for record in self.records.values()),
-                  "a publisher of " + ", ".join(
-                      name for name, record in self.records.items() if not record.is_connected))
+        self.wait(lambda: self.records.keys() <= topics_sent_here(),
+                  lambda: ", ".join(self.records.keys() - topics_sent_here()))
         self.wait(lambda: all(self.of(0, f"{name}/footprint") for name in UPDATE_HZ), "footprints")
         self.wait(lambda: self.of(0, "local_costmap/costmap_updates"), "an update while it stands")
         cls = type(self)

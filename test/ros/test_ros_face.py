@@ -6,7 +6,7 @@ import rosservice
 import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatusArray
-from flight_case import FlightCase, Latest, goal_pose
+from flight_case import FlightCase, Latest, goal_pose, topics_sent_here
 from geometry_msgs.msg import PolygonStamped
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from sensor_msgs.msg import LaserScan
@@ -137,7 +137,8 @@ class RosFace(FlightCase):
         plans = []
         subscriber = rospy.Subscriber("/move_base0/NavfnROS/plan", Path, plans.append,
                                       queue_size=10)
-        self.wait(lambda: subscriber.get_num_connections() > 0, "the plan's publisher")
+        self.addCleanup(subscriber.unregister)
+        self.wait(lambda: "/move_base0/NavfnROS/plan" in topics_sent_here(), "the plan's publisher")
         x, y = self.position(0)
         self.goal_topics[0].publish(goal_pose(x + 0.5, y + 0.5))
         self.wait(lambda: len(plans) >= 2, "two plans")
