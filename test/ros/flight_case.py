@@ -76,7 +76,7 @@ class FlightCase(unittest.TestCase):
 
     @classmethod
     def start(cls):
-        """Navigators connected, simulation running, odometry heard, goals listened to."""
+        """Simulation running, odometry heard, navigators that hear goals and send results here."""
         rospy.wait_for_service("/simulation/start", timeout=PATIENCE_S)
         rospy.ServiceProxy("/simulation/start", Trigger)()
         for client in cls.clients:
@@ -84,21 +84,20 @@ class FlightCase(unittest.TestCase):
                 raise AssertionError(f"no action server for {client.action_client.ns}")
         for odometry in cls.odometry:
             odometry.wait()
-        end = time.monotonic() + PATIENCE_S
         for topic in cls.goal_topics + cls.cancel_topics:
-            while topic.get_num_connections() == 0:
-                if time.monotonic() > end:
-                    raise AssertionError(f"nobody listens to {topic.name}")
-                time.sleep(0.02)
+            cls.wait(lambda t=topic: t.get_num_connections() > 0, f"a listener on {topic.name}")
+        cls.wait(lambda: {f"/move_base{i}/result" for i in (0, 1)} <= topics_sent_here(),
+                 "navigators that send their results")
 
-    def wait(self, condition, what, patience_s=PATIENCE_S):
+    @staticmethod
+    def wait(condition, what, patience_s=PATIENCE_S):
         """Until the condition holds; a failure says ``what`` did not come, or what it returns."""
         end = time.monotonic() + patience_s
         while time.monotonic() < end and not rospy.is_shutdown():
             if condition():
                 return
             time.sleep(0.02)
-        self.fail(f"not within {patience_s:g} s: {what() if callable(what) else what}")
+        raise AssertionError(f"not within {patience_s:g} s: {what() if callable(what) else what}")
 
     def simulated_seconds(self, seconds):
         """Lets simulated time pass."""
