@@ -9,6 +9,7 @@ import unittest
 from xmlrpc.client import ServerProxy
 
 import actionlib
+import numpy as np
 import rosgraph
 import rosnode
 import rospy
@@ -59,6 +60,37 @@ class Latest:
             raise AssertionError(f"nothing on {self._subscriber.resolved_name}")
 
 
+class Record:
+    """Every message of a topic, and when it came in simulated seconds."""
+
+    def __init__(self, topic, message_type):
+        self.topic = topic
+        self.messages = []
+        self.times_s = []
+        self._subscriber = rospy.Subscriber(topic, message_type, self._store, queue_size=1000)
+
+    def _store(self, message):
+        self.times_s.append(rospy.get_time())
+        self.messages.append(message)
+
+    def rate_hz(self):
+        return rate_hz(self.stamps_s())
+
+    def stamps_s(self):
+        """What the messages say; when they came for those that say nothing."""
+        stamps_s = [message.header.stamp.to_sec() if message._has_header else 0.0
+                    for message in self.messages]
+        return [stamp_s or came_s for stamp_s, came_s in zip(stamps_s, self.times_s)]
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+def rate_hz(times_s):
+    """By the median of the periods, because a loaded machine leaves some cycles out."""
+    return 1.0 / float(np.median(np.diff(times_s)))
+
+
 class FlightCase(unittest.TestCase):
     """Two quadcopters whose simulation has been started and whose odometry comes."""
 
@@ -98,6 +130,12 @@ class FlightCase(unittest.TestCase):
                 return
             time.sleep(0.02)
         raise AssertionError(f"not within {patience_s:g} s: {what() if callable(what) else what}")
+
+    def record(self, topic, message_type):
+        record = Record(topic, message_type)
+        self.addCleanup(record.close)
+        self.wait(lambda: topic in topics_sent_here(), f"a publisher that sends {topic}")
+        return record
 
     def simulated_seconds(self, seconds):
         """Lets simulated time pass."""

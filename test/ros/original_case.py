@@ -11,7 +11,7 @@ import rospy
 import yaml
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from dynamic_reconfigure.client import Client
-from flight_case import PATIENCE_S, FlightCase, Latest, topics_sent_here
+from flight_case import PATIENCE_S, FlightCase, Latest
 from move_base_msgs.msg import MoveBaseActionFeedback, MoveBaseActionResult
 from nav_msgs.msg import OccupancyGrid
 
@@ -36,27 +36,6 @@ def recorded_lines(name, i):
 def recorded_yaml(name, i):
     with open(os.path.join(FOLDER, name), encoding="utf-8") as file:
         return yaml.safe_load(file.read().replace("{i}", str(i)))
-
-
-class Record:
-    """Every message of a topic, and when it came in simulated seconds."""
-
-    def __init__(self, topic, message_type):
-        self.topic = topic
-        self.messages = []
-        self.times_s = []
-        self._subscriber = rospy.Subscriber(topic, message_type, self._store, queue_size=1000)
-
-    def _store(self, message):
-        self.times_s.append(rospy.get_time())
-        self.messages.append(message)
-
-    def rate_hz(self):
-        """Between the first and the last message."""
-        return (len(self.times_s) - 1) / (self.times_s[-1] - self.times_s[0])
-
-    def close(self):
-        self._subscriber.unregister()
 
 
 class OriginalCase(FlightCase):
@@ -100,12 +79,6 @@ class OriginalCase(FlightCase):
         count = self.feedback[i].count
         self.wait(lambda: self.feedback[i].count > count, f"feedback of robot {i}")
         return self.feedback[i].message.feedback.base_position
-
-    def record(self, topic, message_type):
-        record = Record(topic, message_type)
-        self.addCleanup(record.close)
-        self.wait(lambda: topic in topics_sent_here(), f"a publisher that sends {topic}")
-        return record
 
     def global_costmap(self, i):
         """The whole grid, which every new listener is sent."""

@@ -13,9 +13,9 @@ import roslib.message
 import rospy
 import rosservice
 import rostest
-from flight_case import goal_pose, topics_sent_here
+from flight_case import Record, goal_pose, rate_hz, topics_sent_here
 from nav_msgs.msg import Odometry
-from original_case import ROBOTS, OriginalCase, Record, recorded_lines, recorded_yaml
+from original_case import ROBOTS, OriginalCase, recorded_lines, recorded_yaml
 from sensor_msgs.msg import PointCloud2, PointField
 from sensor_msgs.point_cloud2 import read_points
 
@@ -134,8 +134,7 @@ class OriginalFace(OriginalCase):
         for i in ROBOTS:
             grid, updates = (self.records[f"/move_base{i}/local_costmap/{name}"]
                              for name in ("costmap", "costmap_updates"))
-            times_s = sorted(grid.times_s[1:] + updates.times_s)
-            hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
+            hz = rate_hz(sorted(grid.stamps_s()[1:] + updates.stamps_s()))
             self.assertAlmostEqual(hz, PUBLISH_HZ, delta=0.1 * PUBLISH_HZ)
 
     def test_global_costmap_comes_once_for_each_new_listener(self):

@@ -6,7 +6,7 @@ import rosservice
 import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatusArray
-from flight_case import FlightCase, Latest, goal_pose, topics_sent_here
+from flight_case import FlightCase, goal_pose, rate_hz, topics_sent_here
 from geometry_msgs.msg import PolygonStamped
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from sensor_msgs.msg import LaserScan
@@ -83,21 +83,18 @@ class RosFace(FlightCase):
             for name, kind in names_of(SERVICES, i).items():
                 self.assertEqual(rosservice.get_service_type(name), kind, name)
 
-    def rate(self, topic, message_type, seconds=5.0):
-        """Messages per simulated second."""
-        latest = Latest(topic, message_type)
-        self.wait(lambda: latest.count > 0, f"a message on {topic}")
-        begin, count = rospy.get_time(), latest.count
-        self.simulated_seconds(seconds)
-        return (latest.count - count) / (rospy.get_time() - begin)
-
     def test_rates_in_simulated_time(self):
-        for topic, kind, hz in (("/scan0", LaserScan, 20.0), ("/odom1", Odometry, 40.0),
-                                ("/tf", TFMessage, 40.0),
-                                ("/move_base0/status", GoalStatusArray, 5.0),
-                                ("/move_base0/global_costmap/footprint", PolygonStamped, 5.0),
-                                ("/move_base1/local_costmap/footprint", PolygonStamped, 10.0)):
-            self.assertAlmostEqual(self.rate(topic, kind), hz, delta=0.1 * hz, msg=topic)
+        topics = (("/scan0", LaserScan, 20.0), ("/odom1", Odometry, 40.0),
+                  ("/move_base0/status", GoalStatusArray, 5.0),
+                  ("/move_base0/global_costmap/footprint", PolygonStamped, 5.0),
+                  ("/move_base1/local_costmap/footprint", PolygonStamped, 10.0))
+        records = [self.record(topic, kind) for topic, kind, _ in topics]
+        tf = self.record("/tf", TFMessage)
+        self.simulated_seconds(5.0)
+        for record, (topic, _, hz) in zip(records, topics):
+            self.assertAlmostEqual(record.rate_hz(), hz, delta=0.1 * hz, msg=topic)
+        stamps_s = [message.transforms[0].header.stamp.to_sec() for message in tf.messages]
+        self.assertAlmostEqual(rate_hz(stamps_s), 40.0, delta=4.0)
 
     def test_scan_has_the_tutorials_limits(self):
         scan = rospy.wait_for_message("/scan1", LaserScan, timeout=30)

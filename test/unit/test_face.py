@@ -124,6 +124,21 @@ def test_windows_add_up_between_two_publications():
     assert news.note(2.0, NO_CELLS)
 
 
+def test_a_late_update_does_not_delay_what_is_told_after_it():
+    news = CostmapNews(costmap(publish_frequency_hz=1.0))
+    assert news.note(1.2, NO_CELLS)
+    assert not news.note(1.9, NO_CELLS)
+    assert news.note(2.0, NO_CELLS)
+
+
+def test_news_come_again_one_period_after_the_clock_has_gone_back():
+    news = CostmapNews(costmap(publish_frequency_hz=1.0))
+    assert news.note(100.0, NO_CELLS)
+    news.restart(50.5)
+    assert not news.note(51.0, NO_CELLS)
+    assert news.note(51.5, NO_CELLS)
+
+
 def test_without_a_frequency_nothing_is_published():
     assert not CostmapNews(costmap(publish_frequency_hz=0.0)).note(100.0, Window(0, 2, 0, 2))
 

@@ -10,6 +10,9 @@ from typing import Optional
 from quad_nav.costmap.cost_grid import NO_CELLS, Window
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.grid import GridSpec
+from quad_nav.schedule import Schedule
+
+CLOCK_GRAIN_S = 1e-6  # a clock of whole nanoseconds may be this little early
 
 
 class CostmapNews:
@@ -19,19 +22,22 @@ class CostmapNews:
         self._costmap = costmap
         self._changed = NO_CELLS
         self._told: Optional[GridSpec] = None
-        self._last_s = 0.0
+        self._schedule = Schedule(costmap.params.publish_frequency_hz)
+        self.restart(0.0)
+
+    def restart(self, now_s: float) -> None:
+        """For a clock that has jumped: it is time again after one period."""
+        self._schedule.start(now_s)
+        self._schedule.take(now_s)
 
     def note(self, now_s: float, window: Window) -> bool:
         """Take the window that an update changed; whether it is time to tell what changed.
 
-        Never with a publish frequency of 0.
+        Never with a publish frequency of 0. A late update does not delay those after it.
         """
         self._changed = self._changed.union(window)
-        frequency_hz = self._costmap.params.publish_frequency_hz
-        if frequency_hz <= 0.0 or now_s < self._last_s + 1.0 / frequency_hz - 1e-6:
-            return False
-        self._last_s = now_s
-        return True
+        self._schedule.follow(self._costmap.params.publish_frequency_hz, now_s)
+        return self._schedule.take(now_s + CLOCK_GRAIN_S)
 
     def take(self) -> Window:
         """What has changed since it was last taken."""

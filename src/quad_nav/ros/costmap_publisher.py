@@ -44,6 +44,10 @@ class CostmapPublisher:
             subscriber_listener=_NewListener(self._send_full))
         self._voxels = voxel_publishers(names(f"~{name}"), costmap)
 
+    def restart(self, now_s: float) -> None:
+        """For a clock that has jumped back."""
+        self._news.restart(now_s)
+
     def updated(self, now_s: float, pose: Pose2D, window: Window) -> None:
         """To be called after each update of the costmap, with the window it changed."""
         params, stamp = self._costmap.params, rospy.Time.from_sec(now_s)

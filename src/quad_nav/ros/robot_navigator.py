@@ -92,6 +92,8 @@ class RobotNavigator:
             self._heard_s = None
             self._navigator.restart(now_s)
             self._goals.restart(now_s)
+            for publisher in self._publishers.values():
+                publisher.restart(now_s)
             self.due_s = now_s
 
     def stop(self) -> None:
