@@ -64,7 +64,6 @@ class Record:
     """Every message of a topic, and when it came in simulated seconds."""
 
     def __init__(self, topic, message_type):
-        self.topic = topic
         self.messages = []
         self.times_s = []
         self._subscriber = rospy.Subscriber(topic, message_type, self._store, queue_size=1000)

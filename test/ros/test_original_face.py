@@ -42,7 +42,7 @@ class OriginalFace(OriginalCase):
 
     def fly(self):
         self.wait(lambda: self.records.keys() <= topics_sent_here(),
-                  lambda: ", ".join(self.records.keys() - topics_sent_here()))
+                  lambda: f"sent here: {sorted(self.records.keys() - topics_sent_here())}")
         self.wait(lambda: all(self.of(0, f"{name}/footprint") for name in UPDATE_HZ), "footprints")
         self.wait(lambda: self.of(0, "local_costmap/costmap_updates"), "an update while it stands")
         cls = type(self)

@@ -6,7 +6,7 @@ import rosservice
 import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatusArray
-from flight_case import FlightCase, goal_pose, rate_hz, topics_sent_here
+from flight_case import FlightCase, goal_pose, rate_hz
 from geometry_msgs.msg import PolygonStamped
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from sensor_msgs.msg import LaserScan
@@ -131,11 +131,7 @@ class RosFace(FlightCase):
             "/move_base0/global_costmap/costmap", OccupancyGrid, 30).data, "lethal cells")
 
     def test_plan_comes_twice_the_second_time_with_the_goal(self):
-        plans = []
-        subscriber = rospy.Subscriber("/move_base0/NavfnROS/plan", Path, plans.append,
-                                      queue_size=10)
-        self.addCleanup(subscriber.unregister)
-        self.wait(lambda: "/move_base0/NavfnROS/plan" in topics_sent_here(), "the plan's publisher")
+        plans = self.record("/move_base0/NavfnROS/plan", Path).messages
         x, y = self.position(0)
         self.goal_topics[0].publish(goal_pose(x + 0.5, y + 0.5))
         self.wait(lambda: len(plans) >= 2, "two plans")
