@@ -10,6 +10,7 @@ the end every goal must have been reached, none in two flights, and nothing touc
 table are simulated: until the last moving quadcopter hovered, and until all that had not arrived
 flew again; they count from the fault, for a stop or a cut from its beginning and its end.
 """
+
 from __future__ import annotations
 
 import argparse
@@ -57,16 +58,19 @@ class Kind:
     ends_flight: bool = False
 
 
-KINDS = {kind.name: kind for kind in (
-    Kind("sequencer", "/sequencer"),
-    Kind("navigator", "/move_base0", flyers=(0,)),
-    Kind("fleet", "/fleet0", flyers=(0, 1), fleet=True),
-    Kind("stopped", "/move_base0", signal.SIGSTOP, flyers=(0,)),
-    Kind("simulator", "/simulator", ends_flight=True),
-    Kind("roscore", "", ends_flight=True),
-    Kind("link", "", flyers=(1,), fleet=True),
-    Kind("disk", ""),
-)}
+KINDS = {
+    kind.name: kind
+    for kind in (
+        Kind("sequencer", "/sequencer"),
+        Kind("navigator", "/move_base0", flyers=(0,)),
+        Kind("fleet", "/fleet0", flyers=(0, 1), fleet=True),
+        Kind("stopped", "/move_base0", signal.SIGSTOP, flyers=(0,)),
+        Kind("simulator", "/simulator", ends_flight=True),
+        Kind("roscore", "", ends_flight=True),
+        Kind("link", "", flyers=(1,), fleet=True),
+        Kind("disk", ""),
+    )
+}
 
 
 @dataclass
@@ -87,12 +91,14 @@ class Watch:
         import rospy
         from nav_msgs.msg import Odometry
         from std_msgs.msg import String
+
         rospy.init_node("faults", anonymous=True, disable_signals=True)
         self.events: List[dict] = []
         self.now_s = 0.0
         self.speeds_mps: List[Tuple[float, int, float]] = []  # when, who, how fast
         self._subscribers = [rospy.Subscriber("/quad/events", String, self._on_event)] + [
-            rospy.Subscriber(f"/odom{i}", Odometry, self._on_odometry, i) for i in (0, 1)]
+            rospy.Subscriber(f"/odom{i}", Odometry, self._on_odometry, i) for i in (0, 1)
+        ]
 
     def _on_event(self, message) -> None:
         self.events.append(json.loads(message.data))
@@ -109,34 +115,59 @@ class Watch:
 
     def first(self, robot: int, after_s: float, holds: Callable[[float], bool]) -> float:
         """When a quadcopter's speed was first so, inf for never."""
-        return next((t for t, who, v in list(self.speeds_mps)
-                     if who == robot and t >= after_s and holds(v)), math.inf)
+        return next(
+            (
+                t
+                for t, who, v in list(self.speeds_mps)
+                if who == robot and t >= after_s and holds(v)
+            ),
+            math.inf,
+        )
 
 
 class Launch:
     """A roslaunch with a roscore of its own, or, with ``port``, one beside it."""
 
-    def __init__(self, arguments: List[str], folder: Path, port: Optional[int] = None,
-                 prefix: Tuple[str, ...] = (), ip: str = "localhost"):
+    def __init__(
+        self,
+        arguments: List[str],
+        folder: Path,
+        port: Optional[int] = None,
+        prefix: Tuple[str, ...] = (),
+        ip: str = "localhost",
+    ):
         self.folder, self.port = folder, port or free_port()
         core = ["-p", str(self.port)] if port is None else []
         master = f"http://{'localhost' if ip == 'localhost' else HERE_IP}:{self.port}"
         self.log = (folder / f"launch-{time.monotonic():.3f}.log").open("w")
         self.process = subprocess.Popen(
-            [*prefix, "roslaunch", *core, "quad", *arguments], stdout=self.log,
-            stderr=subprocess.STDOUT, start_new_session=True,
-            env={**os.environ, "ROS_MASTER_URI": master, "ROS_HOSTNAME": ip,
-                 "ROS_HOME": str(folder)})
-        os.environ.update(ROS_MASTER_URI=master, ROS_HOSTNAME=(
-            "localhost" if ip == "localhost" else HERE_IP))
+            [*prefix, "roslaunch", *core, "quad", *arguments],
+            stdout=self.log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            env={
+                **os.environ,
+                "ROS_MASTER_URI": master,
+                "ROS_HOSTNAME": ip,
+                "ROS_HOME": str(folder),
+            },
+        )
+        os.environ.update(
+            ROS_MASTER_URI=master, ROS_HOSTNAME=("localhost" if ip == "localhost" else HERE_IP)
+        )
 
     def pid_of(self, node: str) -> int:
         """Of a node, or of the rosmaster for ""."""
         if not node:
-            children = subprocess.run(["ps", "-o", "pid=,args=", "--ppid", str(self.process.pid)],
-                                      stdout=subprocess.PIPE, text=True, check=True).stdout
-            return next(int(line.split()[0]) for line in children.splitlines()
-                        if "rosmaster" in line)
+            children = subprocess.run(
+                ["ps", "-o", "pid=,args=", "--ppid", str(self.process.pid)],
+                stdout=subprocess.PIPE,
+                text=True,
+                check=True,
+            ).stdout
+            return next(
+                int(line.split()[0]) for line in children.splitlines() if "rosmaster" in line
+            )
         uri = ServerProxy(os.environ["ROS_MASTER_URI"]).lookupNode("/faults", node)[2]
         return ServerProxy(uri).getPid("/faults")[2]
 
@@ -155,23 +186,45 @@ class Launch:
 
 def arguments_of(kind: Kind, result: Path, *more: str) -> List[str]:
     file = ["fleet.launch", "robots:=2", f"scene:={SCENE}"] if kind.fleet else ["two_quads.launch"]
-    return [*file, "rviz:=false", f"rate:={RATE}", f"goals:={GOALS}", "exit_when_done:=true",
-            f"result:={result}", *more]
+    return [
+        *file,
+        "rviz:=false",
+        f"rate:={RATE}",
+        f"goals:={GOALS}",
+        "exit_when_done:=true",
+        f"result:={result}",
+        *more,
+    ]
 
 
 def fly(kind: Kind, at_s: float, folder: Path) -> Outcome:
     """One flight with its fault, and a second one where that ends the first."""
     outcome, result = Outcome(at_s), folder / "result.json"
-    more = {"link": ["hosts:=2", "only_host:=0"],
-            "disk": [f"journal:={folder}/disk/journal"]}.get(kind.name, [])
-    launch = Launch(arguments_of(kind, result, *more), folder,
-                    ip=HERE_IP if kind.name == "link" else "localhost")
+    more = {"link": ["hosts:=2", "only_host:=0"], "disk": [f"journal:={folder}/disk/journal"]}.get(
+        kind.name, []
+    )
+    launch = Launch(
+        arguments_of(kind, result, *more),
+        folder,
+        ip=HERE_IP if kind.name == "link" else "localhost",
+    )
     other = None
     if kind.name == "link":
         wait_for(lambda: answers(launch.port), "the roscore")
-        other = Launch(arguments_of(kind, folder / "none", "hosts:=2", "only_host:=1",
-                                    "simulator:=false", "sequencer:=false"), folder,
-                       launch.port, Link.there, THERE_IP)
+        other = Launch(
+            arguments_of(
+                kind,
+                folder / "none",
+                "hosts:=2",
+                "only_host:=1",
+                "simulator:=false",
+                "sequencer:=false",
+            ),
+            folder,
+            launch.port,
+            Link.there,
+            THERE_IP,
+        )
     wait_for(lambda: answers(launch.port), "the roscore")
     watch = Watch()
     wait_for(lambda: watch.now_s >= 1.0 + at_s, "the moment of the fault")
@@ -205,10 +258,13 @@ def inject(kind: Kind, launch: Launch, watch: Watch, outcome: Outcome) -> None:
     blind = [robot for robot in kind.flyers if robot not in done]
     if not blind or kind.ends_flight:
         return
+
     def resumed() -> bool:
-        return all(robot in watch.done or watch.first(
-            robot, max(over_s, hover_s(robot)), lambda v: v > FLIES_MPS) < math.inf
-            for robot in blind)
+        return all(
+            robot in watch.done
+            or watch.first(robot, max(over_s, hover_s(robot)), lambda v: v > FLIES_MPS) < math.inf
+            for robot in blind
+        )
 
     def hover_s(robot: int) -> float:
         return watch.first(robot, fault_s, lambda v: v < HOVERS_MPS)
@@ -216,8 +272,9 @@ def inject(kind: Kind, launch: Launch, watch: Watch, outcome: Outcome) -> None:
     wait_for(lambda: all(hover_s(robot) < math.inf for robot in blind), "hover")
     wait_for(resumed, "flying again")
     outcome.hover_s = max(map(hover_s, blind)) - fault_s
-    again_s = [watch.first(robot, max(over_s, hover_s(robot)), lambda v: v > FLIES_MPS)
-               for robot in blind]
+    again_s = [
+        watch.first(robot, max(over_s, hover_s(robot)), lambda v: v > FLIES_MPS) for robot in blind
+    ]
     outcome.resume_s = max((t for t in again_s if t < math.inf), default=over_s) - over_s
 
 
@@ -230,28 +287,41 @@ def resume(kind: Kind, folder: Path, first: dict, outcome: Outcome) -> dict:
     if not launch.end():
         outcome.problems.append("the resumed flight did not end")
     flown = read(result, outcome)
-    reached = {(robot["robot"], goal["goal"]): goal["time_s"] for robot in first.get("robots", [])
-               for goal in robot["goals"] if goal["reached"]}
-    again = {(robot["robot"], goal["goal"]): goal["time_s"] for robot in flown.get("robots", [])
-             for goal in robot["goals"]}
-    outcome.problems += [f"{name} goal {number} was flown twice"
-                         for (name, number), time_s in reached.items()
-                         if again.get((name, number)) != time_s]
+    reached = {
+        (robot["robot"], goal["goal"]): goal["time_s"]
+        for robot in first.get("robots", [])
+        for goal in robot["goals"]
+        if goal["reached"]
+    }
+    again = {
+        (robot["robot"], goal["goal"]): goal["time_s"]
+        for robot in flown.get("robots", [])
+        for goal in robot["goals"]
+    }
+    outcome.problems += [
+        f"{name} goal {number} was flown twice"
+        for (name, number), time_s in reached.items()
+        if again.get((name, number)) != time_s
+    ]
     return flown
 
 
 def judge(flown: dict, watch: Watch, kind: Kind, outcome: Outcome) -> None:
-    goals = [(robot["robot"], goal) for robot in flown.get("robots", [])
-             for goal in robot["goals"]]
-    outcome.problems += [f"{name} goal {goal['goal']} was not reached: {goal['reason']}"
-                         for name, goal in goals if not goal["reached"]]
-    outcome.problems += [f"{name} goal {goal['goal']} took {goal['attempts']} attempts"
-                         for name, goal in goals if goal["attempts"] > 1]
+    goals = [(robot["robot"], goal) for robot in flown.get("robots", []) for goal in robot["goals"]]
+    outcome.problems += [
+        f"{name} goal {goal['goal']} was not reached: {goal['reason']}"
+        for name, goal in goals
+        if not goal["reached"]
+    ]
+    outcome.problems += [
+        f"{name} goal {goal['goal']} took {goal['attempts']} attempts"
+        for name, goal in goals
+        if goal["attempts"] > 1
+    ]
     outcome.problems += [f"contact: {contact}" for contact in flown.get("contacts", [])]
     if len(goals) != 3:
         outcome.problems.append(f"{len(goals)} goals in the summary, expected 3")
-    ended = [(event["robot"], event["goal"]) for event in watch.events
-             if event["event"] == "ended"]
+    ended = [(event["robot"], event["goal"]) for event in watch.events if event["event"] == "ended"]
     if len(ended) != len(set(ended)):
         outcome.problems.append(f"a goal has ended twice: {ended}")
 
@@ -314,7 +384,8 @@ def flown_apart(kind: Kind, at_s: float, pipe) -> None:
     folder = Path(tempfile.mkdtemp(prefix="quad_faults_"))
     try:
         with {"link": Link, "disk": lambda: small_disk(folder / "disk")}.get(
-                kind.name, contextlib.nullcontext)():
+            kind.name, contextlib.nullcontext
+        )():
             outcome = fly(kind, at_s, folder)
     except Exception as error:
         outcome = Outcome(at_s, problems=[repr(error)])
@@ -347,13 +418,19 @@ def row(kind: Kind, outcomes: List[Outcome]) -> List[str]:
     def figures(values: List[Optional[float]]) -> str:
         known = [value for value in values if value is not None]
         return f"{statistics.median(known):.2f} / {max(known):.2f}" if known else "-"
+
     good = sum(not outcome.problems for outcome in outcomes)
     reasons: Dict[str, int] = {}
     for outcome in outcomes:
         reasons[outcome.reason] = reasons.get(outcome.reason, 0) + 1
     told = "; ".join(f"{count} x {reason}" for reason, count in reasons.items() if reason)
-    return [kind.name, f"{good} of {len(outcomes)}", figures([o.hover_s for o in outcomes]),
-            figures([o.resume_s for o in outcomes]), told or "-"]
+    return [
+        kind.name,
+        f"{good} of {len(outcomes)}",
+        figures([o.hover_s for o in outcomes]),
+        figures([o.resume_s for o in outcomes]),
+        told or "-",
+    ]
 
 
 def main() -> int:
@@ -377,9 +454,20 @@ def main() -> int:
             print(name, outcome, flush=True)
         failed = failed or any(outcome.problems for outcome in outcomes)
         rows.append(row(KINDS[name], outcomes))
-    print(tabulate.tabulate(rows, ["fault", "as it must", "hover s, median / max",
-                                   "on again s, median / max", "reason of the end"],
-                            tablefmt="github", disable_numparse=True))
+    print(
+        tabulate.tabulate(
+            rows,
+            [
+                "fault",
+                "as it must",
+                "hover s, median / max",
+                "on again s, median / max",
+                "reason of the end",
+            ],
+            tablefmt="github",
+            disable_numparse=True,
+        )
+    )
     return 1 if failed else 0
 
 

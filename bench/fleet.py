@@ -8,6 +8,7 @@ real time. Commands per simulated second and quadcopter are as many as the navig
 control rate asks for, or the fleet lags behind the simulation. The load average counts
 other people's processes as well.
 """
+
 from __future__ import annotations
 
 import argparse
@@ -34,8 +35,9 @@ def main() -> None:
     given = parser.parse_args()
     for robots in given.robots:
         context = multiprocessing.get_context("spawn")
-        one = context.Process(target=measure, args=(robots, given.hosts, given.seconds,
-                                                    given.arguments))
+        one = context.Process(
+            target=measure, args=(robots, given.hosts, given.seconds, given.arguments)
+        )
         one.start()
         one.join()
 
@@ -45,9 +47,21 @@ def measure(robots: int, hosts: Optional[int], seconds: float, arguments: List[s
     port = free_port()
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
     launch = subprocess.Popen(
-        ["roslaunch", "-p", str(port), "quad", "fleet.launch", f"robots:={robots}",
-         *([f"hosts:={hosts}"] if hosts else []), "rviz:=false", *arguments],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+        [
+            "roslaunch",
+            "-p",
+            str(port),
+            "quad",
+            "fleet.launch",
+            f"robots:={robots}",
+            *([f"hosts:={hosts}"] if hosts else []),
+            "rviz:=false",
+            *arguments,
+        ],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
         clock = Clock(time.monotonic() + PATIENCE_S)
         clock.wait_until(1.0 + SETTLE_S)
@@ -64,12 +78,14 @@ def measure(robots: int, hosts: Optional[int], seconds: float, arguments: List[s
     cpu = {name: (after[name][0] - before[name][0]) / flown_s for name in sorted(before)}
     total = sum(cpu.values())
     hosts = sum(name.startswith("fleet") for name in cpu)
-    print(f"{robots:4d} robots, {hosts} hosts: real-time factor {factor:.2f}, "
-          f"{rate_hz:.1f} commands/s, CPU {total:.2f} "
-          f"({1000 * total / robots:.0f} ms/robot): "
-          + ", ".join(f"{name} {value:.2f} ({after[name][1]:.0f} MB)"
-                      for name, value in cpu.items())
-          + f"; load {os.getloadavg()[0]:.1f}", flush=True)
+    print(
+        f"{robots:4d} robots, {hosts} hosts: real-time factor {factor:.2f}, "
+        f"{rate_hz:.1f} commands/s, CPU {total:.2f} "
+        f"({1000 * total / robots:.0f} ms/robot): "
+        + ", ".join(f"{name} {value:.2f} ({after[name][1]:.0f} MB)" for name, value in cpu.items())
+        + f"; load {os.getloadavg()[0]:.1f}",
+        flush=True,
+    )
 
 
 class Clock:
@@ -78,6 +94,7 @@ class Clock:
     def __init__(self, give_up_s: float):
         import rospy
         from rosgraph_msgs.msg import Clock as ClockMessage
+
         self.now_s, self._give_up_s = 0.0, give_up_s
         self._wait(lambda: is_listening(int(os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1])))
         rospy.init_node("bench", disable_signals=True, disable_rosout=True)
@@ -102,6 +119,7 @@ class Commands:
 
     def __init__(self, robots: int):
         import rospy
+
         self.count = 0
         for number in range(robots):
             rospy.Subscriber(f"/cmd_vel{number}", rospy.AnyMsg, self._add)
@@ -116,7 +134,7 @@ def used(port: int) -> Dict[str, Tuple[float, float]]:
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             words = (folder / "cmdline").read_bytes().decode().split("\0")
-            names = [word[len("__name:="):] for word in words if word.startswith("__name:=")]
+            names = [word[len("__name:=") :] for word in words if word.startswith("__name:=")]
             environment = (folder / "environ").read_bytes().decode()
             if names and f"ROS_MASTER_URI=http://localhost:{port}" in environment:
                 fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()

@@ -1,4 +1,5 @@
 """How many times faster than real time flights offline are, and where their time goes."""
+
 from __future__ import annotations
 
 import cProfile
@@ -12,14 +13,18 @@ from typing import Dict, Tuple
 import click
 import tabulate
 
-from quad_nav.offline.helper import processes_for
+from quad_nav.files.shipped import shipped
 from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightOptions, FlightSetup, read_setup
-from quad_nav.shipped import shipped
+from quad_nav.offline.worker_process import processes_for
+from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 
 # Quadcopters, simulated seconds, factor to reach, what a swarm simulator without navigation does.
 MISSIONS: Tuple[Tuple[int, float, float, float], ...] = (
-    (1, 80.0, 60.0, 100.0), (2, 80.0, 40.0, 60.0), (10, 40.0, 10.0, 30.0), (100, 10.0, 1.0, 4.0))
+    (1, 80.0, 60.0, 100.0),
+    (2, 80.0, 40.0, 60.0),
+    (10, 40.0, 10.0, 30.0),
+    (100, 10.0, 1.0, 4.0),
+)
 HALL_M = 60.0
 # Functions that do a part of the work, by the last two parts of their place.
 PARTS: Dict[str, Tuple[str, ...]] = {
@@ -40,8 +45,11 @@ def setup_of(robots: int, config: str) -> FlightSetup:
     if robots < 100:
         return read_setup(FlightOptions(None, None, config, robots=robots))
     size = (("global_costmap/width", HALL_M), ("global_costmap/height", HALL_M))
-    return read_setup(FlightOptions(shipped("scenes", "hall.yaml"), shipped("goals", "hall"),
-                                    config, size, robots))
+    return read_setup(
+        FlightOptions(
+            shipped("scenes", "hall.yaml"), shipped("goals", "hall"), config, size, robots
+        )
+    )
 
 
 def cpu_time_s() -> float:
@@ -56,10 +64,14 @@ def shares(setup: FlightSetup) -> Dict[str, float]:
     profile.runcall(fly, setup)
     stats = pstats.Stats(profile)
     total_s = stats.total_tt  # type: ignore[attr-defined]
-    times_s = {f"{file.rsplit('/', 1)[-1]}:{name}": entry[3]
-               for (file, _, name), entry in stats.stats.items()}  # type: ignore[attr-defined]
-    return {part: sum(times_s.get(place, 0.0) for place in places) / total_s
-            for part, places in PARTS.items()}
+    times_s = {
+        f"{file.rsplit('/', 1)[-1]}:{name}": entry[3]
+        for (file, _, name), entry in stats.stats.items()
+    }  # type: ignore[attr-defined]
+    return {
+        part: sum(times_s.get(place, 0.0) for place in places) / total_s
+        for part, places in PARTS.items()
+    }
 
 
 @click.command()
@@ -79,15 +91,30 @@ def main(config: str, robots: Tuple[int, ...]) -> None:
         cpu_s = cpu_time_s() - start_cpu_s
         parts = shares(replace(setup, time_limit_s=min(sim_s, 20.0)))
         memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        rows.append([count, processes, f"{summary.real_time_factor:.1f}", f"{wanted:g}",
-                     f"{beyond:g}", f"{summary.sim_time_s / cpu_s:.1f}", f"{memory_mb:.0f}",
-                     *(f"{100 * part:.0f}" for part in parts.values())])
+        rows.append(
+            [
+                count,
+                processes,
+                f"{summary.real_time_factor:.1f}",
+                f"{wanted:g}",
+                f"{beyond:g}",
+                f"{summary.sim_time_s / cpu_s:.1f}",
+                f"{memory_mb:.0f}",
+                *(f"{100 * part:.0f}" for part in parts.values()),
+            ]
+        )
         print(f"{count} flown", file=sys.stderr)
-    header = ["robots", "processes", "real-time\nfactor", "at\nleast", "goal\nbeyond",
-              "per CPU\nsecond", "memory\nMB",
-              *(f"{part}\n%".replace(" ", "\n", 1) for part in PARTS)]
-    print(f"Flights offline, config {config}; the percentages under a profiler,\n"
-          "in one process")
+    header = [
+        "robots",
+        "processes",
+        "real-time\nfactor",
+        "at\nleast",
+        "goal\nbeyond",
+        "per CPU\nsecond",
+        "memory\nMB",
+        *(f"{part}\n%".replace(" ", "\n", 1) for part in PARTS),
+    ]
+    print(f"Flights offline, config {config}; the percentages under a profiler,\nin one process")
     print(tabulate.tabulate(rows, header, disable_numparse=True, stralign="right"))
 
 

@@ -4,6 +4,7 @@
 
 Microseconds, medians; of several quadcopters in one call, the time for each.
 """
+
 from __future__ import annotations
 
 import statistics
@@ -31,12 +32,16 @@ def field(obstacles: int, robots: int, size_m: float = 60.0) -> Scene:
     solids: List[Obstacle] = []
     for k in range(obstacles):
         x, y, yaw = random.uniform((0.0, 0.0, 0.0), (size_m, size_m, 3.0)).tolist()
-        solids.append(Box(f"box{k}", x, y, 0.5, 0.5, 2.0, yaw) if k % 2
-                      else Cylinder(f"pillar{k}", x, y, 0.3, 2.0))
+        solids.append(
+            Box(f"box{k}", x, y, 0.5, 0.5, 2.0, yaw)
+            if k % 2
+            else Cylinder(f"pillar{k}", x, y, 0.3, 2.0)
+        )
     side = int(np.ceil(np.sqrt(robots)))
     pitch = size_m / side
-    starts = tuple(Pose2D((k % side + 0.5) * pitch, (k // side + 0.5) * pitch)
-                   for k in range(robots))
+    starts = tuple(
+        Pose2D((k % side + 0.5) * pitch, (k // side + 0.5) * pitch) for k in range(robots)
+    )
     return Scene("field", size_m, size_m, 1.0, Walls(), tuple(solids), starts)
 
 
@@ -66,10 +71,17 @@ def main() -> None:
     table = []
     for name, scene, robots in cases:
         kernel, bullet = (scan_us(scene, robots, caster) for caster in LIDAR_CASTERS)
-        table.append((f"{BEAMS} beams, {name}", f"{kernel:.0f}", f"{bullet:.0f}",
-                      f"{bullet / kernel:.0f}"))
-    print(tabulate(table, ("", "kernel, us", "bullet, us", "ratio"), disable_numparse=True,
-                   colalign=("left", "right", "right", "right")))
+        table.append(
+            (f"{BEAMS} beams, {name}", f"{kernel:.0f}", f"{bullet:.0f}", f"{bullet / kernel:.0f}")
+        )
+    print(
+        tabulate(
+            table,
+            ("", "kernel, us", "bullet, us", "ratio"),
+            disable_numparse=True,
+            colalign=("left", "right", "right", "right"),
+        )
+    )
 
 
 if __name__ == "__main__":

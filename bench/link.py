@@ -2,6 +2,7 @@
 
 Needs root and the command ``ip`` of iproute2.
 """
+
 from __future__ import annotations
 
 import os
@@ -24,8 +25,9 @@ def why_no_links() -> str:
         return "network namespaces need root"
     if shutil.which("ip") is None:
         return "there is no command ip; expected iproute2"
-    made = subprocess.run(["ip", "netns", "add", SPACE + "_try"], stderr=subprocess.PIPE,
-                          check=False)
+    made = subprocess.run(
+        ["ip", "netns", "add", SPACE + "_try"], stderr=subprocess.PIPE, check=False
+    )
     if made.returncode:
         return f"no network namespace can be made: {made.stderr.decode().strip()}"
     ip("netns", "delete", SPACE + "_try")

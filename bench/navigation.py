@@ -5,6 +5,7 @@
 The parameters and the arena are the tutorial's; the figures are medians in
 milliseconds. Compilation is not in them.
 """
+
 from __future__ import annotations
 
 import statistics
@@ -16,12 +17,12 @@ from typing import Callable, List, Tuple
 from tabulate import tabulate
 
 from quad_nav import config
-from quad_nav.assembly import build_navigator
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.navigator import Navigator
+from quad_nav.navigator.navigator import Navigator
+from quad_nav.scenario.assembly import build_navigator
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation
@@ -43,8 +44,9 @@ ORIGINAL = {
 }
 
 
-def median_ms(call: Callable[[], object], prepare: Callable[[], object] = lambda: None,
-              runs: int = RUNS) -> float:
+def median_ms(
+    call: Callable[[], object], prepare: Callable[[], object] = lambda: None, runs: int = RUNS
+) -> float:
     """The median of ``runs`` calls after a first one that compiles."""
     prepare()
     call()
@@ -59,8 +61,9 @@ def median_ms(call: Callable[[], object], prepare: Callable[[], object] = lambda
 
 def tutorial_navigator() -> Tuple[Navigator, Pose2D]:
     """A navigator of the tutorial in the arena, with a second's flight in its costmaps."""
-    navigator = build_navigator(config.load(
-        config.load_files(ROOT / "config" / "tutorial", {"i": "0"})))
+    navigator = build_navigator(
+        config.load(config.load_files(ROOT / "config" / "tutorial", {"i": "0"}))
+    )
     simulation = Simulation(load_scene(ROOT / "scenes" / "arena.yaml"), 2)
     for k in range(2 * SCANS):  # the first second is for taking up speed
         simulation.set_command(0, Twist2D(vx_mps=0.3))
@@ -71,7 +74,8 @@ def tutorial_navigator() -> Tuple[Navigator, Pose2D]:
             scan = replace(simulation.scan(0), stamp_s=0.05 * (k - SCANS))
             for costmap in (navigator.global_costmap, navigator.local_costmap):
                 costmap.layers["obstacle_layer"].add_scan(
-                    "base_scan", scan, pose.compose(base_from_lidar), scan.stamp_s)
+                    "base_scan", scan, pose.compose(base_from_lidar), scan.stamp_s
+                )
     simulation.close()
     for costmap in (navigator.global_costmap, navigator.local_costmap):
         costmap.update(1.0, pose.to_2d())
@@ -90,30 +94,58 @@ def rows() -> List[Tuple[str, float]]:
     def control(controller) -> float:
         return median_ms(
             lambda: controller.compute_velocity(local.spec, local.costs, pose, flying),
-            prepare=lambda: controller.set_plan(plan))
+            prepare=lambda: controller.set_plan(plan),
+        )
 
     controller = navigator.controller
     assert isinstance(controller, TrajectoryPlanner)
-    short = TrajectoryPlanner(replace(controller.params, vx_samples=6, sim_time_s=1.0),
-                              controller.footprint, controller.control_period_s)
-    window = TrajectoryPlanner(replace(controller.params, dwa=True), controller.footprint,
-                               controller.control_period_s)
+    short = TrajectoryPlanner(
+        replace(controller.params, vx_samples=6, sim_time_s=1.0),
+        controller.footprint,
+        controller.control_period_s,
+    )
+    window = TrajectoryPlanner(
+        replace(controller.params, dwa=True), controller.footprint, controller.control_period_s
+    )
     dwa = DwaPlanner(
-        replace(DwaParams(), vx_samples=20, vy_samples=1, vth_samples=20, max_vel_y_mps=0.0,
-                min_vel_y_mps=0.0, max_vel_x_mps=0.3, max_vel_trans_mps=0.3),
-        controller.footprint, controller.control_period_s)
-    measured = [update(local), update(globe),
-                median_ms(lambda: navigator.make_plan(pose, GOAL)),
-                control(controller), control(short), control(window),
-                control(dwa)]
+        replace(
+            DwaParams(),
+            vx_samples=20,
+            vy_samples=1,
+            vth_samples=20,
+            max_vel_y_mps=0.0,
+            min_vel_y_mps=0.0,
+            max_vel_x_mps=0.3,
+            max_vel_trans_mps=0.3,
+        ),
+        controller.footprint,
+        controller.control_period_s,
+    )
+    measured = [
+        update(local),
+        update(globe),
+        median_ms(lambda: navigator.make_plan(pose, GOAL)),
+        control(controller),
+        control(short),
+        control(window),
+        control(dwa),
+    ]
     return list(zip(ORIGINAL, measured))
 
 
 def main() -> None:
-    table = [(name, f"{ms:.2f}", f"{ORIGINAL[name]:.2f}", f"{ms / ORIGINAL[name]:.2f}")
-             for name, ms in rows()]
-    print(tabulate(table, ("", "ours, ms", "original, ms", "ratio"), disable_numparse=True,
-                   colalign=("left", "right", "right", "right")))
+    table = [
+        (name, f"{ms:.2f}", f"{ORIGINAL[name]:.2f}", f"{ms / ORIGINAL[name]:.2f}")
+        for name, ms in rows()
+    ]
+    print(
+        tabulate(
+            table,
+            ("", "ours, ms", "original, ms", "ratio"),
+            disable_numparse=True,
+            colalign=("left", "right", "right", "right"),
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ Memory is compared with that at the end of the first one, when everything has be
 once; cycle times tell as much of the machine's other work as of the flight, seconds of processor
 time less.
 """
+
 from __future__ import annotations
 
 import time
@@ -19,12 +20,12 @@ import numpy as np
 
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import Action, GoalEnded
+from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightOptions, read_setup
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.contacts import Contact
-from quad_nav.tick import Located, Tick
 
 FLAT = 0.05  # that much growth is none
 HEADER = "hours   memory MB   CPU s   cycles   median ms   99 % ms   reached   skipped   contacts"
@@ -46,7 +47,7 @@ class Stretches(FlightObserver):
             self._reached += action.reached
             self._skipped += not action.reached
 
-    def ticked(self, robot: int, tick: Tick, located: Located, wall_s: float) -> None:
+    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         if tick.cycle:
             self._cycles_ms.append(1000 * wall_s)
 
@@ -56,9 +57,11 @@ class Stretches(FlightObserver):
         self.memories_mb.append(memory_mb())
         median_ms, slow_ms = np.percentile(self._cycles_ms, (50, 99))
         cpu_s = time.process_time() - self._begin_cpu_s
-        click.echo(f"{flight.now_s / 3600:5.2f} {self.memories_mb[-1]:11.1f} {cpu_s:7.1f} "
-                   f"{len(self._cycles_ms):8d} {median_ms:11.2f} {slow_ms:9.2f} "
-                   f"{self._reached:9d} {self._skipped:9d} {self._contacts:10d}")
+        click.echo(
+            f"{flight.now_s / 3600:5.2f} {self.memories_mb[-1]:11.1f} {cpu_s:7.1f} "
+            f"{len(self._cycles_ms):8d} {median_ms:11.2f} {slow_ms:9.2f} "
+            f"{self._reached:9d} {self._skipped:9d} {self._contacts:10d}"
+        )
         self._begin()
 
     def _begin(self) -> None:
@@ -86,15 +89,18 @@ def looped(goals: RobotGoals) -> RobotGoals:
 @click.option("--config", default="default", show_default=True)
 def main(robots: int, hours: float, minutes: float, seed: int, config: str) -> None:
     """A long flight; exit status 1 if memory grows or two quadcopters touch."""
-    setup = read_setup(FlightOptions(None, None, config, robots=robots, seed=seed,
-                                     time_limit_s=3600 * hours))
+    setup = read_setup(
+        FlightOptions(None, None, config, robots=robots, seed=seed, time_limit_s=3600 * hours)
+    )
     stretches = Stretches(60 * minutes)
     click.echo(HEADER)
     summary = fly(replace(setup, robots=tuple(map(looped, setup.robots))), (stretches,))
     first_mb, last_mb = stretches.memories_mb[0], stretches.memories_mb[-1]
     growth = last_mb / first_mb - 1.0
-    click.echo(f"memory {100 * growth:+.1f} %, {len(summary.contacts)} contacts, "
-               f"{summary.real_time_factor:.1f} times as fast as real time")
+    click.echo(
+        f"memory {100 * growth:+.1f} %, {len(summary.contacts)} contacts, "
+        f"{summary.real_time_factor:.1f} times as fast as real time"
+    )
     raise SystemExit(growth > FLAT or len(summary.contacts) > 0)
 
 

@@ -8,6 +8,7 @@ many messages of odometry and scans did not arrive by their sequence numbers, an
 of each node. Exit status 1 if a node's memory grows by more than 5 % after the first row, or
 a message is lost.
 """
+
 from __future__ import annotations
 
 import argparse
@@ -35,9 +36,22 @@ def main() -> None:
     port = free_port()
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
     launch = subprocess.Popen(
-        ["roslaunch", "-p", str(port), "quad", "fleet.launch", f"robots:={given.robots}",
-         f"hosts:={given.hosts}", "rviz:=false", "loop:=true", *given.arguments],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+        [
+            "roslaunch",
+            "-p",
+            str(port),
+            "quad",
+            "fleet.launch",
+            f"robots:={given.robots}",
+            f"hosts:={given.hosts}",
+            "rviz:=false",
+            "loop:=true",
+            *given.arguments,
+        ],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
         is_steady = watch(given.robots, 60 * given.minutes, 60 * given.stretch, port)
     finally:
@@ -59,14 +73,19 @@ def watch(robots: int, duration_s: float, stretch_s: float, port: int) -> bool:
         time.sleep(min(stretch_s, end_s - wall_s))
         flown_s = clock.now_s - begin_s
         memories.append({name: memory_mb for name, (_, memory_mb) in used(port).items()})
-        print(f"{clock.now_s:7.0f} s: factor {flown_s / (time.monotonic() - wall_s):.2f}, "
-              f"{(commands.count - begin_count) / flown_s / sampled:.1f} commands/s, "
-              f"{sum(one.lost for one in counters)} of "
-              f"{sum(one.received for one in counters)} messages lost, "
-              + ", ".join(f"{name} {mb:.1f} MB" for name, mb in sorted(memories[-1].items())),
-              flush=True)
-    grown = [name for name, mb in memories[0].items()
-             if memories[-1].get(name, 0.0) > (1 + FLAT) * mb or name not in memories[-1]]
+        print(
+            f"{clock.now_s:7.0f} s: factor {flown_s / (time.monotonic() - wall_s):.2f}, "
+            f"{(commands.count - begin_count) / flown_s / sampled:.1f} commands/s, "
+            f"{sum(one.lost for one in counters)} of "
+            f"{sum(one.received for one in counters)} messages lost, "
+            + ", ".join(f"{name} {mb:.1f} MB" for name, mb in sorted(memories[-1].items())),
+            flush=True,
+        )
+    grown = [
+        name
+        for name, mb in memories[0].items()
+        if memories[-1].get(name, 0.0) > (1 + FLAT) * mb or name not in memories[-1]
+    ]
     lost = sum(one.lost for one in counters)
     print(f"grown or gone: {', '.join(grown) or 'none'}; messages lost: {lost}")
     return not grown and not lost
@@ -77,6 +96,7 @@ class SequenceCounter:
 
     def __init__(self, topic: str, message_type: type):
         import rospy
+
         self.received = self.lost = 0
         self._last = -1
         rospy.Subscriber(topic, message_type, self._take, queue_size=QUEUE)
@@ -91,8 +111,12 @@ class SequenceCounter:
 def count_messages(robots: int) -> List[SequenceCounter]:
     from nav_msgs.msg import Odometry
     from sensor_msgs.msg import LaserScan
-    return [SequenceCounter(f"/{name}{number}", message_type) for number in range(robots)
-            for name, message_type in (("odom", Odometry), ("scan", LaserScan))]
+
+    return [
+        SequenceCounter(f"/{name}{number}", message_type)
+        for number in range(robots)
+        for name, message_type in (("odom", Odometry), ("scan", LaserScan))
+    ]
 
 
 if __name__ == "__main__":

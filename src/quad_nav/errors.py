@@ -3,6 +3,7 @@
 A planner's failure is an exception, so that no caller can mistake it for a
 plan. A goal that ends in one of them is aborted, with its words.
 """
+
 from __future__ import annotations
 
 from typing import List, Sequence
@@ -68,5 +69,6 @@ class InvalidGoal(NavigationError):
 def _line(problem: str) -> str:
     if len(problem) > _LONGEST_LINE:
         problem = problem[:_LONGEST_LINE] + " ..."
-    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode()
-                   for c in problem)
+    return "".join(
+        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in problem
+    )

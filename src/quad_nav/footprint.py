@@ -3,6 +3,7 @@
 A footprint is convex, in the robot's frame unless said otherwise. The numbers are those of
 costmap_2d to the last bit, because radii decide costs.
 """
+
 from __future__ import annotations
 
 import math

@@ -4,6 +4,7 @@ Right-handed frames, metres, radians, seconds. Yaw is counter-clockwise about
 z. Quaternions are (x, y, z, w). A pose named ``a_from_b`` takes coordinates in
 frame b to coordinates in frame a.
 """
+
 from __future__ import annotations
 
 import math
@@ -73,8 +74,12 @@ class Pose3D:
     def compose(self, other: Pose3D) -> Pose3D:
         """``a_from_b.compose(b_from_c)`` is ``a_from_c``."""
         x, y, z = rotate(self.quaternion, (other.x_m, other.y_m, other.z_m))
-        return Pose3D(self.x_m + x, self.y_m + y, self.z_m + z,
-                      multiply_quaternions(self.quaternion, other.quaternion))
+        return Pose3D(
+            self.x_m + x,
+            self.y_m + y,
+            self.z_m + z,
+            multiply_quaternions(self.quaternion, other.quaternion),
+        )
 
     def inverse(self) -> Pose3D:
         qx, qy, qz, qw = self.quaternion
@@ -123,15 +128,23 @@ def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> 
     cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
     cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
     cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
-    return (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
 
 
 def multiply_quaternions(a: Quaternion, b: Quaternion) -> Quaternion:
     ax, ay, az, aw = a
     bx, by, bz, bw = b
-    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
 
 
 def rotate(quaternion: Quaternion, vector: Sequence[float]) -> Tuple[float, float, float]:
@@ -142,15 +155,20 @@ def rotate(quaternion: Quaternion, vector: Sequence[float]) -> Tuple[float, floa
     qx, qy, qz, qw = quaternion
     x, y, z = vector
     cx, cy, cz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
-    return (x + qw * cx + qy * cz - qz * cy,
-            y + qw * cy + qz * cx - qx * cz,
-            z + qw * cz + qx * cy - qy * cx)
+    return (
+        x + qw * cx + qy * cz - qz * cy,
+        y + qw * cy + qz * cx - qx * cz,
+        z + qw * cz + qx * cy - qy * cx,
+    )
 
 
 def rotation_from_quaternion(quaternion: Quaternion) -> np.ndarray:
     """Rotation matrix float64[3, 3] of a unit quaternion."""
     x, y, z, w = quaternion
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )

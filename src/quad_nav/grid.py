@@ -5,6 +5,7 @@ Row 0 has the lowest y and column 0 the lowest x; ``origin`` is the world
 position of the lower left corner of cell (0, 0). Cell coordinates are written
 (cell_x, cell_y).
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -34,10 +35,12 @@ class GridSpec:
     @property
     def extent(self) -> str:
         """Where the grid lies, for messages."""
-        return (f"x {self.origin_x_m:.2f} to "
-                f"{self.origin_x_m + self.size_x * self.resolution_m:.2f}, "
-                f"y {self.origin_y_m:.2f} to "
-                f"{self.origin_y_m + self.size_y * self.resolution_m:.2f} m")
+        return (
+            f"x {self.origin_x_m:.2f} to "
+            f"{self.origin_x_m + self.size_x * self.resolution_m:.2f}, "
+            f"y {self.origin_y_m:.2f} to "
+            f"{self.origin_y_m + self.size_y * self.resolution_m:.2f} m"
+        )
 
     def contains_cell(self, cell_x: int, cell_y: int) -> bool:
         return 0 <= cell_x < self.size_x and 0 <= cell_y < self.size_y
@@ -46,11 +49,15 @@ class GridSpec:
         """The cell that holds a world point, or None outside the grid."""
         if x_m < self.origin_x_m or y_m < self.origin_y_m:
             return None
-        cell = (int((x_m - self.origin_x_m) / self.resolution_m),
-                int((y_m - self.origin_y_m) / self.resolution_m))
+        cell = (
+            int((x_m - self.origin_x_m) / self.resolution_m),
+            int((y_m - self.origin_y_m) / self.resolution_m),
+        )
         return cell if self.contains_cell(*cell) else None
 
     def centre_of(self, cell_x: int, cell_y: int) -> Tuple[float, float]:
         """World coordinates of a cell's centre."""
-        return (self.origin_x_m + (cell_x + 0.5) * self.resolution_m,
-                self.origin_y_m + (cell_y + 0.5) * self.resolution_m)
+        return (
+            self.origin_x_m + (cell_x + 0.5) * self.resolution_m,
+            self.origin_y_m + (cell_y + 0.5) * self.resolution_m,
+        )

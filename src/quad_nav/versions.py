@@ -1,4 +1,5 @@
 """What a figure was measured with."""
+
 from __future__ import annotations
 
 import platform

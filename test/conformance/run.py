@@ -6,6 +6,7 @@
 Exit status: 0 when every case agrees, 1 when one does not, 2 when the folder or one of
 its cases cannot be used.
 """
+
 from __future__ import annotations
 
 import argparse
@@ -19,7 +20,7 @@ import tabulate
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src"))
 
-from families import DATA, FAMILIES, Difference, Unusable, cases  # noqa: E402
+from families import DATA, FAMILIES, Difference, InvalidValue, cases  # noqa: E402
 
 EXIT_AGREES, EXIT_DIFFERS, EXIT_UNUSABLE = 0, 1, 2
 
@@ -48,7 +49,7 @@ def run_family(family: str, data: Path) -> Result:
     result = Result(family)
     try:
         paths = cases(family, data)
-    except Unusable as error:
+    except InvalidValue as error:
         return Result(family, unusable=[str(error)], note="unusable")
     if not paths:
         return Result(family, note="not in this folder")
@@ -56,7 +57,7 @@ def run_family(family: str, data: Path) -> Result:
         result.cases += 1
         try:
             differences = FAMILIES[family](path)
-        except Unusable as error:
+        except InvalidValue as error:
             result.unusable.append(f"{path}: {error}")
             continue
         except Exception as error:  # what ours raises, whatever it is, is a failure of the case
@@ -71,9 +72,11 @@ def run_family(family: str, data: Path) -> Result:
 
 def unknown_families(data: Path) -> List[Result]:
     """Folders of recordings that nothing here compares."""
-    return [Result(path.name, note="unknown family, not compared")
-            for path in sorted(data.iterdir())
-            if path.name not in FAMILIES and (path / "index.json").is_file()]
+    return [
+        Result(path.name, note="unknown family, not compared")
+        for path in sorted(data.iterdir())
+        if path.name not in FAMILIES and (path / "index.json").is_file()
+    ]
 
 
 def run(data: Path) -> int:
@@ -82,11 +85,16 @@ def run(data: Path) -> int:
         print(f"{data}: no such folder; expected one of recordings", file=sys.stderr)
         return EXIT_UNUSABLE
     results = [run_family(family, data) for family in FAMILIES] + unknown_families(data)
-    print(tabulate.tabulate(
-        [result.row() for result in results],
-        ["family", "cases", "passed", "first failure", "field", "difference"],
-        tablefmt="simple", maxcolwidths=[None, None, None, 28, 20, 30],
-        colalign=("left", "right", "right", "left", "left", "left"), disable_numparse=True))
+    print(
+        tabulate.tabulate(
+            [result.row() for result in results],
+            ["family", "cases", "passed", "first failure", "field", "difference"],
+            tablefmt="simple",
+            maxcolwidths=[None, None, None, 28, 20, 30],
+            colalign=("left", "right", "right", "left", "left", "left"),
+            disable_numparse=True,
+        )
+    )
     total, passed = sum(r.cases for r in results), sum(r.passed for r in results)
     print(f"\n{passed} of {total} cases agree.")
     unusable = [line for result in results for line in result.unusable]
@@ -101,8 +109,13 @@ def run(data: Path) -> int:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", nargs="?", type=Path, default=DATA,
-                        help="recordings: a folder for each family (default: %(default)s)")
+    parser.add_argument(
+        "folder",
+        nargs="?",
+        type=Path,
+        default=DATA,
+        help="recordings: a folder for each family (default: %(default)s)",
+    )
     return run(parser.parse_args().folder)
 
 

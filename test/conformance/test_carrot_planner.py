@@ -1,4 +1,5 @@
 """The carrot planner against recordings of the original."""
+
 from __future__ import annotations
 
 import pytest

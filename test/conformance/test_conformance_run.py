@@ -1,4 +1,5 @@
 """The command that compares on any folder: what it says and its exit status."""
+
 from __future__ import annotations
 
 import json
@@ -7,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 from families import DATA, FAMILIES, cases
-from families.case import Unusable, load_case
+from families.case import InvalidValue, load_case
 from families.comparison import Comparison, Difference
 from run import run
 
@@ -79,16 +80,23 @@ def test_unknown_family_is_said_and_not_counted(tmp_path, capsys):
     assert "notes" not in rows(output)
 
 
-@pytest.mark.parametrize("spoil, said", [
-    (lambda family: (family / "index.json").unlink(), "index.json: cannot be read"),
-    (lambda family: (family / "index.json").write_text("{"), "index.json: cannot be read"),
-    (lambda family: (family / "index.json").write_text("[1]"), "expected a list of {case: "),
-    (lambda family: (family / "index.json").write_text("[]"), "there is no case in it"),
-    (lambda family: (family / "case.npz").unlink(), "files that are not there: case.npz"),
-    (lambda family: (family / "case.npz").write_text("?"), "case.npz: cannot be read"),
-    (lambda family: put(family.parent, "occupancy", "cost_to_occupancy", "other", occupancy=None),
-     "other.npz: there is no 'occupancy'"),
-])
+@pytest.mark.parametrize(
+    "spoil, said",
+    [
+        (lambda family: (family / "index.json").unlink(), "index.json: cannot be read"),
+        (lambda family: (family / "index.json").write_text("{"), "index.json: cannot be read"),
+        (lambda family: (family / "index.json").write_text("[1]"), "expected a list of {case: "),
+        (lambda family: (family / "index.json").write_text("[]"), "there is no case in it"),
+        (lambda family: (family / "case.npz").unlink(), "files that are not there: case.npz"),
+        (lambda family: (family / "case.npz").write_text("?"), "case.npz: cannot be read"),
+        (
+            lambda family: put(
+                family.parent, "occupancy", "cost_to_occupancy", "other", occupancy=None
+            ),
+            "other.npz: there is no 'occupancy'",
+        ),
+    ],
+)
 def test_folders_that_cannot_be_used(tmp_path, capsys, spoil, said):
     put(tmp_path, "occupancy", "cost_to_occupancy", "case")
     spoil(tmp_path / "occupancy")
@@ -110,39 +118,47 @@ def test_every_family_that_is_compared_is_among_the_recordings():
 def test_missing_keys_within_meta_are_the_recordings_fault(tmp_path):
     put(tmp_path, "occupancy", "footprint_00", "case", meta=np.array('{"params": {}}'))
     meta = load_case(tmp_path / "occupancy" / "case.npz").meta
-    with pytest.raises(Unusable, match="there is no 'robot_radius'"):
+    with pytest.raises(InvalidValue, match="there is no 'robot_radius'"):
         meta["params"]["robot_radius"]
 
 
-@pytest.mark.parametrize("found, recorded, text", [
-    (3, 4, "3, recorded 4"),
-    ([1, 2, 3], [1, 5, 6], "2 of 3 differ, the first at [1]: 2, recorded 5"),
-    ([[0.0, np.nan]], [[0.0, 1.0]], "1 of 2 differ, the first at [0, 1]: nan, recorded 1.0"),
-    (np.zeros((2, 3)), np.zeros((2, 4)), "shape (2, 3), recorded (2, 4)"),
-    (["a"], ["b"], "1 of 1 differ, the first at [0]: a, recorded b"),
-    (True, False, "True, recorded False"),
-])
+@pytest.mark.parametrize(
+    "found, recorded, text",
+    [
+        (3, 4, "3, recorded 4"),
+        ([1, 2, 3], [1, 5, 6], "2 of 3 differ, the first at [1]: 2, recorded 5"),
+        ([[0.0, np.nan]], [[0.0, 1.0]], "1 of 2 differ, the first at [0, 1]: nan, recorded 1.0"),
+        (np.zeros((2, 3)), np.zeros((2, 4)), "shape (2, 3), recorded (2, 4)"),
+        (["a"], ["b"], "1 of 1 differ, the first at [0]: a, recorded b"),
+        (True, False, "True, recorded False"),
+    ],
+)
 def test_exact(found, recorded, text):
     comparison = Comparison()
     comparison.exact("field", found, recorded)
     assert comparison.differences == [Difference("field", text)]
 
 
-@pytest.mark.parametrize("found, recorded, text", [
-    ([1.0, 2.0], [1.0, 2.25], "0.25 apart at [1]: 2.0, recorded 2.25, allowed are 0.1"),
-    (1.0, 1.5, "0.5 apart: 1.0, recorded 1.5, allowed are 0.1"),
-    ([np.nan], [1.0], "inf apart at [0]: nan, recorded 1.0, allowed are 0.1"),
-    ([np.inf], [-np.inf], "inf apart at [0]: inf, recorded -inf, allowed are 0.1"),
-    (np.zeros((0, 2)), np.zeros((1, 2)), "shape (0, 2), recorded (1, 2)"),
-])
+@pytest.mark.parametrize(
+    "found, recorded, text",
+    [
+        ([1.0, 2.0], [1.0, 2.25], "0.25 apart at [1]: 2.0, recorded 2.25, allowed are 0.1"),
+        (1.0, 1.5, "0.5 apart: 1.0, recorded 1.5, allowed are 0.1"),
+        ([np.nan], [1.0], "inf apart at [0]: nan, recorded 1.0, allowed are 0.1"),
+        ([np.inf], [-np.inf], "inf apart at [0]: inf, recorded -inf, allowed are 0.1"),
+        (np.zeros((0, 2)), np.zeros((1, 2)), "shape (0, 2), recorded (1, 2)"),
+    ],
+)
 def test_near(found, recorded, text):
     comparison = Comparison()
     comparison.near("field", found, recorded, 0.1)
     assert comparison.differences == [Difference("field", text)]
 
 
-@pytest.mark.parametrize("same", [
-    [1.0, np.nan, np.inf], np.zeros((0, 3)), 5, [True, False], np.array(["obstacle_layer"])])
+@pytest.mark.parametrize(
+    "same",
+    [[1.0, np.nan, np.inf], np.zeros((0, 3)), 5, [True, False], np.array(["obstacle_layer"])],
+)
 def test_agreement(same):
     comparison = Comparison()
     comparison.exact("field", same, same)

@@ -1,4 +1,5 @@
 """What an empty parameter tree means, against the original."""
+
 from __future__ import annotations
 
 import pytest

@@ -1,4 +1,5 @@
 """The dynamic window planner against recordings of the original."""
+
 from __future__ import annotations
 
 import pytest

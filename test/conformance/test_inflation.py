@@ -1,4 +1,5 @@
 """The inflation layer against the original's, cost for cost."""
+
 from __future__ import annotations
 
 import pytest

@@ -1,4 +1,5 @@
 """NavFn against recordings of the original."""
+
 from __future__ import annotations
 
 import pytest

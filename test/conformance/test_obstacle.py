@@ -1,4 +1,5 @@
 """Scans and clouds to master grids, against the original's, cell for cell."""
+
 from __future__ import annotations
 
 import pytest

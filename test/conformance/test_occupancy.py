@@ -1,4 +1,5 @@
 """Footprints and published occupancies against the original's."""
+
 from __future__ import annotations
 
 import pytest

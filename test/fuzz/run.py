@@ -5,6 +5,7 @@
 Begins with the files of ``corpus/TARGET``; new ones stay in a folder of their own, so that
 the corpus stays small. Ends with 1 at the first fault, whose input is kept beside it.
 """
+
 from __future__ import annotations
 
 import importlib
@@ -31,9 +32,19 @@ def main() -> None:
     corpus = Path(__file__).parent / "corpus" / name
     print(f"new inputs and faults: {found}", flush=True)
     atheris.Setup(
-        [sys.argv[0], f"-max_total_time={seconds}", "-timeout=20", "-rss_limit_mb=3000",
-         "-max_len=20000", f"-artifact_prefix={found}/fault-", "-print_final_stats=1",
-         str(found), str(corpus)], lambda data: run(name, data) and None)
+        [
+            sys.argv[0],
+            f"-max_total_time={seconds}",
+            "-timeout=20",
+            "-rss_limit_mb=3000",
+            "-max_len=20000",
+            f"-artifact_prefix={found}/fault-",
+            "-print_final_stats=1",
+            str(found),
+            str(corpus),
+        ],
+        lambda data: run(name, data) and None,
+    )
     atheris.Fuzz()
 
 

@@ -4,6 +4,7 @@ A target returns for input that can be used, and for other input when it was ref
 ``InputError``; everything else that it raises is a fault. ``make fuzz`` calls them with bytes
 that atheris makes up, the unit tests with the files below ``corpus`` and mutations of these.
 """
+
 from __future__ import annotations
 
 import json
@@ -19,21 +20,23 @@ from quad_nav import config
 from quad_nav.cli.parameters import parameter
 from quad_nav.config.files import REQUIRED
 from quad_nav.errors import InputError
-from quad_nav.face.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC
+from quad_nav.files.shipped import shipped
 from quad_nav.mission.goal_file import parse_goals
-from quad_nav.offline import record_messages as messages
-from quad_nav.offline.bag_file import Message
-from quad_nav.offline.bag_trace import _is_wanted, _Reading, read_trace
-from quad_nav.offline.report.figures import figures
-from quad_nav.offline.report.page import flight_page
-from quad_nav.scene_check import scene_check
-from quad_nav.shipped import shipped
+from quad_nav.recording import messages
+from quad_nav.recording.bag_file import Message
+from quad_nav.recording.bag_trace import _is_wanted, _Reading, read_trace
+from quad_nav.report.figures import figures
+from quad_nav.report.page import flight_page
+from quad_nav.scenario.scene_check import scene_check
 from quad_nav.sim.scene_file import load_scene
+from quad_nav.topics.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC
 
 MOST_FUZZED_CELLS = 250_000
 """Larger maps are read as well, but not a hundred times a second."""
-_MAP = ("image: map.png\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n"
-        "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+_MAP = (
+    "image: map.png\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n"
+    "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+)
 
 
 def goals(data: bytes) -> None:
@@ -97,8 +100,7 @@ def flight_info(data: bytes) -> None:
     try:
         reading.take(Message(FLIGHT_TOPIC, "std_msgs/String", 0, text("std_msgs/String", first)))
         for line in events:
-            reading.take(Message(EVENTS_TOPIC, "std_msgs/String", 0,
-                                 text("std_msgs/String", line)))
+            reading.take(Message(EVENTS_TOPIC, "std_msgs/String", 0, text("std_msgs/String", line)))
     except ValueError:
         return  # read_trace makes an InputError of it
     figures(reading.trace(Path("flight.bag")))
@@ -117,13 +119,17 @@ def page(data: bytes) -> None:
 
 def robot_messages(data: bytes) -> None:
     """The first byte says which topic, the rest is a message as it comes over the wire."""
-    topics = [("/odom0", "nav_msgs/Odometry"), ("/cmd_vel0", "geometry_msgs/Twist"),
-              ("/move_base0/NavfnROS/plan", "nav_msgs/Path"),
-              ("/move_base0/state", "std_msgs/String"),
-              ("/move_base0/feedback", "move_base_msgs/MoveBaseActionFeedback"),
-              ("/move_base0/recovery_status", "move_base_msgs/RecoveryStatus"),
-              ("/tf", "tf2_msgs/TFMessage"), ("/clock", "rosgraph_msgs/Clock"),
-              ("/simulation/contacts", "diagnostic_msgs/DiagnosticStatus")]
+    topics = [
+        ("/odom0", "nav_msgs/Odometry"),
+        ("/cmd_vel0", "geometry_msgs/Twist"),
+        ("/move_base0/NavfnROS/plan", "nav_msgs/Path"),
+        ("/move_base0/state", "std_msgs/String"),
+        ("/move_base0/feedback", "move_base_msgs/MoveBaseActionFeedback"),
+        ("/move_base0/recovery_status", "move_base_msgs/RecoveryStatus"),
+        ("/tf", "tf2_msgs/TFMessage"),
+        ("/clock", "rosgraph_msgs/Clock"),
+        ("/simulation/contacts", "diagnostic_msgs/DiagnosticStatus"),
+    ]
     topic, kind = topics[data[0] % len(topics) if data else 0]
     assert _is_wanted(topic, kind)
     try:
@@ -139,9 +145,22 @@ def robot_messages(data: bytes) -> None:
 
 
 TARGETS: Dict[str, Callable[[bytes], None]] = {
-    target.__name__: target for target in (
-        goals, scene, map_yaml, map_image, world, parameters, command_line, bag, mcap,
-        flight_info, page, robot_messages)}
+    target.__name__: target
+    for target in (
+        goals,
+        scene,
+        map_yaml,
+        map_image,
+        world,
+        parameters,
+        command_line,
+        bag,
+        mcap,
+        flight_info,
+        page,
+        robot_messages,
+    )
+}
 
 
 def run(name: str, data: bytes) -> bool:
@@ -181,13 +200,20 @@ def odometry(second: int, x_m: float):
     make = messages.message
     zeros = np.zeros(36)
     vector = make("geometry_msgs/Vector3", 0.0, 0.0, 0.0)
-    pose = make("geometry_msgs/Pose", make("geometry_msgs/Point", x_m, 1.0, 1.0),
-                make("geometry_msgs/Quaternion", 0.0, 0.0, 0.0, 1.0))
-    return make("nav_msgs/Odometry",
-                make("std_msgs/Header", 0, messages.time(second * 10**9), "odom0"), "base_link0",
-                make("geometry_msgs/PoseWithCovariance", pose, zeros),
-                make("geometry_msgs/TwistWithCovariance",
-                     make("geometry_msgs/Twist", vector, vector), zeros))
+    pose = make(
+        "geometry_msgs/Pose",
+        make("geometry_msgs/Point", x_m, 1.0, 1.0),
+        make("geometry_msgs/Quaternion", 0.0, 0.0, 0.0, 1.0),
+    )
+    return make(
+        "nav_msgs/Odometry",
+        make("std_msgs/Header", 0, messages.time(second * 10**9), "odom0"),
+        "base_link0",
+        make("geometry_msgs/PoseWithCovariance", pose, zeros),
+        make(
+            "geometry_msgs/TwistWithCovariance", make("geometry_msgs/Twist", vector, vector), zeros
+        ),
+    )
 
 
 def json_bytes(value: object) -> bytes:

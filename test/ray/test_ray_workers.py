@@ -1,4 +1,5 @@
 """Flights on a Ray cluster, which this test starts on this machine: `make ray`."""
+
 from __future__ import annotations
 
 import sys
@@ -20,8 +21,9 @@ from quad_nav.tuning.workers import LocalWorkers, RayWorkers, fly_all  # noqa: E
 @pytest.fixture(scope="module")
 def workers() -> Iterator[RayWorkers]:
     """Two workers on a cluster of one machine."""
-    cluster = Cluster(initialize_head=True, head_node_args={
-        "num_cpus": 2, "include_dashboard": False})
+    cluster = Cluster(
+        initialize_head=True, head_node_args={"num_cpus": 2, "include_dashboard": False}
+    )
     yield RayWorkers(cluster.address)
     ray.shutdown()
     cluster.shutdown()
@@ -40,7 +42,8 @@ def test_the_study_is_the_one_of_a_single_process(workers, tmp_path):
 def test_flights_of_a_worker_that_dies_are_flown_again(workers, tmp_path):
     flown = dict(fly_all(workers, mortal_tasks(tmp_path / "deaths", 1)))
     assert {number: flight.reason for number, flight in flown.items()} == dict.fromkeys(
-        range(6), "flown")
+        range(6), "flown"
+    )
     assert (tmp_path / "deaths").read_text() == "xx"
 
 

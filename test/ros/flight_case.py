@@ -1,4 +1,5 @@
 """What the tests on running nodes share: waiting for conditions, goals, commands."""
+
 from __future__ import annotations
 
 import json
@@ -35,8 +36,11 @@ def topics_sent_here():
     for name in PUBLISHERS:
         with ServerProxy(rosnode.get_api_uri(master, name)) as node:
             _, _, connections = node.getBusInfo(here)
-        topics.update(topic for _, destination, direction, _, topic, *_ in connections
-                      if (direction, destination) == ("o", here))
+        topics.update(
+            topic
+            for _, destination, direction, _, topic, *_ in connections
+            if (direction, destination) == ("o", here)
+        )
     return topics
 
 
@@ -77,8 +81,10 @@ class Record:
 
     def stamps_s(self):
         """What the messages say; when they came for those that say nothing."""
-        stamps_s = [message.header.stamp.to_sec() if message._has_header else 0.0
-                    for message in self.messages]
+        stamps_s = [
+            message.header.stamp.to_sec() if message._has_header else 0.0
+            for message in self.messages
+        ]
         return [stamp_s or came_s for stamp_s, came_s in zip(stamps_s, self.times_s)]
 
     def close(self):
@@ -98,12 +104,15 @@ class FlightCase(unittest.TestCase):
         rospy.init_node("test_flight", anonymous=True)
         cls.odometry = [Latest(f"/odom{i}", Odometry) for i in (0, 1)]
         cls.command = [Latest(f"/cmd_vel{i}", Twist) for i in (0, 1)]
-        cls.goal_topics = [rospy.Publisher(f"/move_base_simple/goal{i}", PoseStamped, queue_size=1)
-                           for i in (0, 1)]
-        cls.cancel_topics = [rospy.Publisher(f"/move_base{i}/cancel", GoalID, queue_size=1)
-                             for i in (0, 1)]
-        cls.clients = [actionlib.SimpleActionClient(f"/move_base{i}", MoveBaseAction)
-                       for i in (0, 1)]
+        cls.goal_topics = [
+            rospy.Publisher(f"/move_base_simple/goal{i}", PoseStamped, queue_size=1) for i in (0, 1)
+        ]
+        cls.cancel_topics = [
+            rospy.Publisher(f"/move_base{i}/cancel", GoalID, queue_size=1) for i in (0, 1)
+        ]
+        cls.clients = [
+            actionlib.SimpleActionClient(f"/move_base{i}", MoveBaseAction) for i in (0, 1)
+        ]
 
     @classmethod
     def start(cls):
@@ -117,8 +126,10 @@ class FlightCase(unittest.TestCase):
             odometry.wait()
         for topic in cls.goal_topics + cls.cancel_topics:
             cls.wait(lambda t=topic: t.get_num_connections() > 0, f"a listener on {topic.name}")
-        cls.wait(lambda: {f"/move_base{i}/result" for i in (0, 1)} <= topics_sent_here(),
-                 "navigators that send their results")
+        cls.wait(
+            lambda: {f"/move_base{i}/result" for i in (0, 1)} <= topics_sent_here(),
+            "navigators that send their results",
+        )
 
     @staticmethod
     def wait(condition, what, patience_s=PATIENCE_S):
@@ -158,7 +169,7 @@ class FlightCase(unittest.TestCase):
 
     def speed(self, i):
         v = self.odometry[i].message.twist.twist.linear
-        return (v.x ** 2 + v.y ** 2) ** 0.5
+        return (v.x**2 + v.y**2) ** 0.5
 
 
 def goal_pose(x, y, w=1.0, frame="map"):

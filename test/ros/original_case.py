@@ -3,6 +3,7 @@
 What differs on purpose is named where it is tested; the names of the action's topics are in
 ``OURS``.
 """
+
 from __future__ import annotations
 
 import os
@@ -20,9 +21,13 @@ ROBOTS = (0, 1)
 
 # With the tutorial's remaps the robots share the action's topics but for the goal, and a cancel
 # stops them all. On purpose the launch files here give each robot its own.
-OURS = {"/move_base/goal{i}": "/move_base{i}/goal",
-        **{f"/move_base/{name}": f"/move_base{{i}}/{name}"
-           for name in ("cancel", "feedback", "recovery_status", "result", "status")}}
+OURS = {
+    "/move_base/goal{i}": "/move_base{i}/goal",
+    **{
+        f"/move_base/{name}": f"/move_base{{i}}/{name}"
+        for name in ("cancel", "feedback", "recovery_status", "result", "status")
+    },
+}
 UNFINISHED = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 
 
@@ -61,8 +66,11 @@ class OriginalCase(FlightCase):
     def is_idle(self, i, since):
         """Half a second after a time, no goal is waiting or active."""
         message = self.statuses[i].message
-        return (message is not None and message.header.stamp > since + rospy.Duration(0.5)
-                and all(s.status not in UNFINISHED for s in message.status_list))
+        return (
+            message is not None
+            and message.header.stamp > since + rospy.Duration(0.5)
+            and all(s.status not in UNFINISHED for s in message.status_list)
+        )
 
     def send(self, i, goal):
         topic = self.goal_topics[i]
@@ -83,7 +91,8 @@ class OriginalCase(FlightCase):
     def global_costmap(self, i):
         """The whole grid, which every new listener is sent."""
         return rospy.wait_for_message(
-            f"/move_base{i}/global_costmap/costmap", OccupancyGrid, PATIENCE_S)
+            f"/move_base{i}/global_costmap/costmap", OccupancyGrid, PATIENCE_S
+        )
 
     def client(self, namespace):
         client = Client(namespace, timeout=PATIENCE_S)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Goal files with faults: all of them named, exit status 2, nothing flies."""
+
 import rospy
 import rostest
 from flight_case import FlightCase
@@ -10,10 +11,12 @@ class BadGoals(FlightCase):
         result = self.read_result(rospy.get_param("~result"))
         self.assertEqual(result["exit_status"], 2)
         problems = "\n".join(result["problems"])
-        self.assertIn("quad0_goals.json: goals[1] (goal 2): (2.2, 4) is inside an obstacle",
-                      problems)
-        self.assertIn("quad1_goals.json: gaols: is not a key of goal files; expected goals",
-                      problems)
+        self.assertIn(
+            "quad0_goals.json: goals[1] (goal 2): (2.2, 4) is inside an obstacle", problems
+        )
+        self.assertIn(
+            "quad1_goals.json: gaols: is not a key of goal files; expected goals", problems
+        )
         self.wait(lambda: self.odometry[0].message is not None, "odometry")
         self.assertEqual(rospy.get_time(), 1.0)  # where the simulator's clock stands before a start
         self.assertEqual([command.count for command in self.command], [0, 0])

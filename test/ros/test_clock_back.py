@@ -1,19 +1,20 @@
 #!/usr/bin/env python3
 """A clock that goes back in flight: the mission goes on, and nothing is flown twice."""
+
 import rospy
 import rostest
 from flight_case import FlightCase
-from senses import Senses
+from sensor_faults import Senses
 
 
 class ClockBack(FlightCase):
     def test_the_mission_goes_on(self):
-        senses = Senses()
+        sensor_faults = Senses()
         self.wait(lambda: self.odometry[0].message is not None, "odometry")
         self.wait(lambda: self.speed(0) > 0.15, "robot 0 under way")
         self.simulated_seconds(4.0)
         before_s = rospy.get_time()
-        senses.back_s += 5.0
+        sensor_faults.back_s += 5.0
         self.wait(lambda: rospy.get_time() < before_s - 4.0, "a clock that has gone back")
         result = self.read_result(rospy.get_param("~result"), patience_s=200.0)
         self.assertTrue(result["success"], result)

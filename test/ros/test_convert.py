@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Conversions there and back give what went in."""
+
 import math
 import unittest
 
@@ -8,9 +9,9 @@ import rospy
 import rostest
 
 from quad_nav.geometry import Pose3D, Scan, Twist2D, quaternion_from_euler
-from quad_nav.peers import IDLE_RANK_S, Intention, rank_of
-from quad_nav.ros import convert
-from quad_nav.ros.peer_topics import intention_from_message, intention_message
+from quad_nav.peers.peer import IDLE_RANK_S, Intention, rank_of
+from quad_nav.ros.common import convert
+from quad_nav.ros.navigator.peer_topics import intention_from_message, intention_message
 
 POSE = Pose3D(1.0, -2.0, 0.5, quaternion_from_euler(0.1, -0.2, 2.0))
 TWIST = Twist2D(0.3, -0.1, 0.7)
@@ -24,15 +25,20 @@ class Convert(unittest.TestCase):
 
     def test_transforms(self):
         message = convert.transform_message(POSE, "odom0", "base_link0", STAMP)
-        self.assertEqual((message.header.frame_id, message.child_frame_id, message.header.stamp),
-                         ("odom0", "base_link0", STAMP))
+        self.assertEqual(
+            (message.header.frame_id, message.child_frame_id, message.header.stamp),
+            ("odom0", "base_link0", STAMP),
+        )
         self.assertEqual(convert.pose_from_transform(message), POSE)
 
     def test_odometry(self):
-        message = convert.odometry_message(POSE, (0.3, -0.1, 9.0), (9.0, 9.0, 0.7),
-                                           ("odom0", "base_link0"), STAMP)
-        self.assertEqual((message.header.frame_id, message.child_frame_id, message.header.stamp),
-                         ("odom0", "base_link0", STAMP))
+        message = convert.odometry_message(
+            POSE, (0.3, -0.1, 9.0), (9.0, 9.0, 0.7), ("odom0", "base_link0"), STAMP
+        )
+        self.assertEqual(
+            (message.header.frame_id, message.child_frame_id, message.header.stamp),
+            ("odom0", "base_link0", STAMP),
+        )
         self.assertEqual(convert.odometry_from_message(message), (POSE, TWIST))
 
     def test_scans(self):
@@ -44,14 +50,22 @@ class Convert(unittest.TestCase):
         back = convert.scan_from_message(message)
         np.testing.assert_array_equal(back.ranges_m, ranges)
         self.assertEqual(
-            (back.stamp_s, back.angle_min_rad, back.angle_increment_rad, back.range_min_m,
-             back.range_max_m), (12.25, -math.pi, math.pi / 2, 0.02, 60.0))
+            (
+                back.stamp_s,
+                back.angle_min_rad,
+                back.angle_increment_rad,
+                back.range_min_m,
+                back.range_max_m,
+            ),
+            (12.25, -math.pi, math.pi / 2, 0.02, 60.0),
+        )
 
     def test_intentions(self):
         told = Intention(rank_of(1700000012.25, 3), np.array([[1.0, 2.0], [1.5, 2.5]]))
         message = intention_message(told, "map", 1700000020.5)
-        self.assertEqual((message.header.frame_id, message.header.stamp.to_sec()),
-                         ("map", 1700000020.5))
+        self.assertEqual(
+            (message.header.frame_id, message.header.stamp.to_sec()), ("map", 1700000020.5)
+        )
         heard = intention_from_message(message, 3)
         self.assertAlmostEqual(heard.rank_s, told.rank_s, places=6)
         np.testing.assert_array_equal(heard.way, told.way)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A LIDAR that falls silent stops its quadcopter, and no other."""
+
 import rospy
 import rostest
 from flight_case import FlightCase, goal_pose

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """/diagnostics tells how every node is, as often while paused, and what becomes of it."""
+
 import time
 
 import rospy
@@ -21,7 +22,8 @@ class Diagnostics(FlightCase):
         cls.statuses, cls.log, cls.arrivals = {}, [], []
         cls.subscribers = [
             rospy.Subscriber("/diagnostics", DiagnosticArray, cls.store, queue_size=100),
-            rospy.Subscriber("/rosout", Log, lambda line: cls.log.append(line.msg), queue_size=100)]
+            rospy.Subscriber("/rosout", Log, lambda line: cls.log.append(line.msg), queue_size=100),
+        ]
         cls.start()
 
     @classmethod
@@ -39,8 +41,10 @@ class Diagnostics(FlightCase):
 
     def test_1_every_node_tells_and_all_is_well(self):
         self.wait(lambda: set(self.statuses) >= EVERYBODY, f"all of {sorted(EVERYBODY)}")
-        self.wait(lambda: all(self.level(f"move_base{i}: inputs") == OK for i in (0, 1)),
-                  "inputs that come")
+        self.wait(
+            lambda: all(self.level(f"move_base{i}: inputs") == OK for i in (0, 1)),
+            "inputs that come",
+        )
         for i in (0, 1):
             self.assertEqual(self.statuses[f"move_base{i}: inputs"].hardware_id, f"quad{i}")
 
@@ -59,8 +63,13 @@ class Diagnostics(FlightCase):
         self.assertIn("stopped: nothing from", self.value("move_base0: control", "last reason"))
 
     def test_3_each_change_of_level_is_one_line_in_the_log(self):
-        changes = [line for line in self.log if line.startswith("move_base0: inputs: ")
-                   and "/scan0" in line or line.startswith("move_base0: inputs: ERROR -> OK")]
+        changes = [
+            line
+            for line in self.log
+            if line.startswith("move_base0: inputs: ")
+            and "/scan0" in line
+            or line.startswith("move_base0: inputs: ERROR -> OK")
+        ]
         down = [line for line in changes if "OK -> ERROR: nothing on /scan0" in line]
         self.assertEqual((len(down), len([x for x in changes if "ERROR -> OK" in x])), (1, 1))
 

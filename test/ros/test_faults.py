@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Senses and commands that go wrong in flight: hover while blind, go on, touch nothing."""
+
 import math
 import os
 import time
@@ -10,10 +11,21 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from flight_case import FlightCase, Latest, goal_pose
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from senses import Senses
+from sensor_faults import Senses
 
-BLINDING = ["no scans", "frozen, new stamps", "frozen, old stamps", "half a second late", "NaN",
-            "zeros", "+inf", "half the beams", "no tf", "old tf", "no odometry"]
+BLINDING = [
+    "no scans",
+    "frozen, new stamps",
+    "frozen, old stamps",
+    "half a second late",
+    "NaN",
+    "zeros",
+    "+inf",
+    "half the beams",
+    "no tf",
+    "old tf",
+    "no odometry",
+]
 CONTROL_PERIOD_S, BLIND_S = 0.1, 0.5
 TRANSPORT_S = 0.3  # of what is sent and what is heard, on a machine that is busy with other things
 LASTS_S = 3.0
@@ -25,7 +37,7 @@ class Faults(FlightCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.senses = Senses()
+        cls.sensor_faults = Senses()
         cls.odometry = [Latest(f"/true/odom{i}", Odometry) for i in (0, 1)]
         cls.contacts = Latest("/simulation/contacts", DiagnosticStatus)
         cls.moving_s = 0.0
@@ -40,11 +52,12 @@ class Faults(FlightCase):
             cls.moving_s = rospy.get_time()
 
     def tearDown(self):
-        self.senses.fault = ""
+        self.sensor_faults.fault = ""
         self.assertEqual(self.contacts.count, 0, self.contacts.message)
 
     def fly(self, when="at first"):
         """Robot 0 under way between its two places."""
+
         def flies():
             x, y = PLACES[self.place]
             if self.distance(0, x, y) < 1.5:
@@ -55,6 +68,7 @@ class Faults(FlightCase):
                 self.sent = now
                 self.goal_topics[0].publish(goal_pose(x, y))
             return self.speed(0) > 0.2
+
         self.sent = 0.0
         self.wait(flies, f"robot 0 under way {when}")
 
@@ -64,10 +78,10 @@ class Faults(FlightCase):
         for fault in BLINDING:
             self.fly(f"before {fault}")
             begin_s = rospy.get_time()
-            self.senses.fault = fault
+            self.sensor_faults.fault = fault
             self.simulated_seconds(LASTS_S)
             hover_after_s = self.moving_s - begin_s
-            self.senses.fault = ""
+            self.sensor_faults.fault = ""
             end_s = rospy.get_time()
             self.fly(f"after {fault}")
             self.report(fault, hover_after_s, rospy.get_time() - end_s)
@@ -77,15 +91,15 @@ class Faults(FlightCase):
 
     def test_it_flies_on_when_odometry_jumps(self):
         self.fly()
-        self.senses.fault = "odometry jumps"
+        self.sensor_faults.fault = "odometry jumps"
         self.simulated_seconds(LASTS_S)
-        self.senses.fault = ""
+        self.sensor_faults.fault = ""
         self.fly("after the jump back")
 
     def test_it_goes_on_when_the_clock_goes_back(self):
         self.fly()
         before_s = rospy.get_time()
-        self.senses.back_s += 5.0
+        self.sensor_faults.back_s += 5.0
         self.wait(lambda: rospy.get_time() < before_s - 4.0, "a clock that has gone back")
         self.fly("after the clock went back")
 
@@ -116,8 +130,11 @@ class Faults(FlightCase):
         self.wait(lambda: self.speed(0) > 0.1, "robot 0 under way after the flood")
 
     def report(self, fault, hover_after_s, on_after_s):
-        print(f"fault: {fault}: last moving command after {hover_after_s:.2f} s, "
-              f"under way again after {on_after_s:.2f} s", flush=True)
+        print(
+            f"fault: {fault}: last moving command after {hover_after_s:.2f} s, "
+            f"under way again after {on_after_s:.2f} s",
+            flush=True,
+        )
         if REPORT:
             with open(REPORT, "a", encoding="utf-8") as file:
                 file.write(f"{fault}\t{hover_after_s:.3f}\t{on_after_s:.3f}\n")

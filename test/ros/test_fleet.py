@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A fleet in two processes: its ROS face is that of single navigators, and it flies its mission."""
+
 import dynamic_reconfigure.client
 import rosgraph
 import rospy
@@ -13,7 +14,7 @@ from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetPlan
 from test_ros_face import SERVICES, absent, names_of
 
-from quad_nav.random_mission import random_mission
+from quad_nav.scenario.random_mission import random_mission
 
 ROBOTS, SEED = 4, 3
 
@@ -35,14 +36,20 @@ class Fleet(FlightCase):
         statuses = [Latest(f"/move_base{i}/status", GoalStatusArray) for i in range(ROBOTS)]
 
         def active():
-            return [i for i, status in enumerate(statuses) if status.message is not None
-                    and any(s.status == GoalStatus.ACTIVE for s in status.message.status_list)]
+            return [
+                i
+                for i, status in enumerate(statuses)
+                if status.message is not None
+                and any(s.status == GoalStatus.ACTIVE for s in status.message.status_list)
+            ]
+
         self.wait(active, "a robot with a goal")
         goal = PoseStamped()
         goal.header.frame_id, goal.pose.orientation.w = "map", 1.0
         with self.assertRaises(rospy.ServiceException):
             rospy.ServiceProxy(f"/move_base{active()[0]}/make_plan", GetPlan)(
-                PoseStamped(), goal, 0.1)
+                PoseStamped(), goal, 0.1
+            )
 
     def test_3_robots_are_shared_between_the_hosts(self):
         published, _, _ = rosgraph.Master("/test").getSystemState()
@@ -54,18 +61,21 @@ class Fleet(FlightCase):
         self.assertEqual(rospy.get_param("/move_base2/controller_frequency"), 10.0)
         size_m = random_mission(ROBOTS, SEED).scene.size_x_m
         self.assertEqual(rospy.get_param("/move_base2/global_costmap/width"), size_m)
-        client = dynamic_reconfigure.client.Client("/move_base2/TrajectoryPlannerROS",
-                                                   timeout=PATIENCE_S)
+        client = dynamic_reconfigure.client.Client(
+            "/move_base2/TrajectoryPlannerROS", timeout=PATIENCE_S
+        )
         self.assertEqual(client.update_configuration({"sim_time": 1.2})["sim_time"], 1.2)
         self.assertEqual(rospy.get_param("/move_base2/TrajectoryPlannerROS/sim_time"), 1.2)
         self.assertNotEqual(rospy.get_param("/move_base1/TrajectoryPlannerROS/sim_time"), 1.2)
 
     def test_5_topics_say_what_they_are_about(self):
-        grid = rospy.wait_for_message("/move_base3/global_costmap/costmap", OccupancyGrid,
-                                      PATIENCE_S)
+        grid = rospy.wait_for_message(
+            "/move_base3/global_costmap/costmap", OccupancyGrid, PATIENCE_S
+        )
         self.assertEqual(grid.header.frame_id, "map")
-        feedback = rospy.wait_for_message("/move_base3/feedback", MoveBaseActionFeedback,
-                                          PATIENCE_S)
+        feedback = rospy.wait_for_message(
+            "/move_base3/feedback", MoveBaseActionFeedback, PATIENCE_S
+        )
         self.assertEqual(feedback.feedback.base_position.header.frame_id, "map")
 
     def test_9_every_goal_is_reached(self):

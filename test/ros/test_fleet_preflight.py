@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A fleet that cannot be flown is refused before anything starts, with every fault."""
+
 import os
 import shutil
 import subprocess
@@ -14,10 +15,17 @@ CONFIG = os.path.join(rospkg.RosPack().get_path("quad"), "config", "default")
 
 def preflight(*arguments):
     """(exit status, what was said) for a launch with these arguments."""
-    dump = subprocess.run(["roslaunch", "--dump-params", "quad", "fleet.launch", "rviz:=false",
-                           *arguments], stdout=subprocess.PIPE, check=True)
-    check = subprocess.run(["python3", "-m", "quad_nav.ros.preflight"], input=dump.stdout,
-                           stderr=subprocess.PIPE, check=False)
+    dump = subprocess.run(
+        ["roslaunch", "--dump-params", "quad", "fleet.launch", "rviz:=false", *arguments],
+        stdout=subprocess.PIPE,
+        check=True,
+    )
+    check = subprocess.run(
+        ["python3", "-m", "quad_nav.ros.common.preflight"],
+        input=dump.stdout,
+        stderr=subprocess.PIPE,
+        check=False,
+    )
     return check.returncode, check.stderr.decode()
 
 
@@ -37,13 +45,16 @@ class FleetPreflight(unittest.TestCase):
         self.assertEqual(preflight("robots:=100", "hosts:=4")[0], 0)
 
     def test_mixed_fleets_can_be_flown(self):
-        folder = self.config(robot1="controller_frequency: 5.0\n",
-                             robot2="base_local_planner: dwa_local_planner/DWAPlannerROS\n")
+        folder = self.config(
+            robot1="controller_frequency: 5.0\n",
+            robot2="base_local_planner: dwa_local_planner/DWAPlannerROS\n",
+        )
         self.assertEqual(preflight("robots:=3", f"config:={folder}")[0], 0)
 
     def test_every_bad_override_is_named_with_its_line(self):
-        folder = self.config(robot1="controller_frequency: often\n",
-                             robot3="\nlocal_costmap:\n  resolution: -1.0\n")
+        folder = self.config(
+            robot1="controller_frequency: often\n", robot3="\nlocal_costmap:\n  resolution: -1.0\n"
+        )
         status, said = preflight("robots:=4", f"config:={folder}")
         self.assertEqual(status, 2)
         self.assertEqual(said.count(f"{folder}/robot1.yaml:1"), 1)

@@ -30,8 +30,11 @@ class Goals(FlightCase):
     def is_idle(self, i, since):
         """Half a second after a time, no goal is waiting or active."""
         message = self.statuses[i].message
-        return (message is not None and message.header.stamp > since + rospy.Duration(0.5)
-                and all(s.status not in UNFINISHED for s in message.status_list))
+        return (
+            message is not None
+            and message.header.stamp > since + rospy.Duration(0.5)
+            and all(s.status not in UNFINISHED for s in message.status_list)
+        )
 
     def far_place(self, i):
         """A free place on the robot's own side of the arena, metres away from it."""
@@ -83,7 +86,8 @@ class Goals(FlightCase):
         status = self.result_after(0, count)
         self.assertEqual(status.status, GoalStatus.ABORTED)
         self.assertEqual(
-            status.text, "Aborting on goal because it was sent with an invalid quaternion")
+            status.text, "Aborting on goal because it was sent with an invalid quaternion"
+        )
 
     def test_unknown_frame_is_aborted_with_the_reason(self):
         count = self.results[0].count

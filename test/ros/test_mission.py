@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The tutorial's mission, from its launch file to the summary's last number."""
+
 import rospy
 import rostest
 from flight_case import FlightCase

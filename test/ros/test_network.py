@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Nobody but this machine reaches a flight by `make fly`; `address:=` opens it, and says so."""
+
 from __future__ import annotations
 
 import os
@@ -26,8 +27,12 @@ def servers(processes):
     found = set()
     for pid, node in processes.items():
         sockets = inodes(pid)
-        for table, state in (("tcp", TCP_LISTENS), ("tcp6", TCP_LISTENS), ("udp", UDP_IS_BOUND),
-                             ("udp6", UDP_IS_BOUND)):
+        for table, state in (
+            ("tcp", TCP_LISTENS),
+            ("tcp6", TCP_LISTENS),
+            ("udp", UDP_IS_BOUND),
+            ("udp6", UDP_IS_BOUND),
+        ):
             for line in read(f"/proc/net/{table}").splitlines()[1:]:
                 fields = line.split()
                 if fields[3] == state and fields[9] in sockets:
@@ -73,7 +78,10 @@ class Network(unittest.TestCase):
         self.addCleanup(printed.close)
         flight = subprocess.Popen(
             [str(FLY), "rviz:=false", f"result:={folder.name}/result.json", *arguments],
-            env={**os.environ, **environment}, stdout=printed, stderr=subprocess.STDOUT)
+            env={**os.environ, **environment},
+            stdout=printed,
+            stderr=subprocess.STDOUT,
+        )
         self.addCleanup(self.end, flight)
         return flight, Path(printed.name)
 
@@ -94,8 +102,9 @@ class Network(unittest.TestCase):
 
     def test_1_nothing_listens_beyond_this_machine_whatever_the_environment_says(self):
         flight, _ = self.fly(ROS_IP="192.0.2.1", ROS_HOSTNAME=socket.gethostname())
-        elsewhere = {(node, address) for node, address in self.all_servers(flight)
-                     if address not in LOOPBACK}
+        elsewhere = {
+            (node, address) for node, address in self.all_servers(flight) if address not in LOOPBACK
+        }
         self.assertEqual(elsewhere, set())
 
     def test_2_an_address_opens_the_flight_and_says_what_that_means(self):
@@ -103,8 +112,9 @@ class Network(unittest.TestCase):
         found = self.all_servers(flight)
         # C++ nodes listen everywhere again; this is what the test above would see.
         self.assertIn(("rosout", "00000000"), found)
-        self.assertRegex(printed.read_text(),
-                         r"open to the network at http://127\.0\.1\.1:\d+ .*whoever reaches")
+        self.assertRegex(
+            printed.read_text(), r"open to the network at http://127\.0\.1\.1:\d+ .*whoever reaches"
+        )
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A flight on ROS and the same one offline: equal outcome, goal times within 5 %."""
+
 from pathlib import Path
 
 import rospy
@@ -8,7 +9,7 @@ from flight_case import FlightCase
 
 from quad_nav.mission.summary import to_json
 from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightOptions, read_setup
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 
 
 class Offline(FlightCase):
@@ -22,8 +23,9 @@ class Offline(FlightCase):
             for goal, other in zip(robot["goals"], twin["goals"]):
                 where = f"{robot['robot']} goal {goal['goal']}"
                 self.assertEqual(goal["reached"], other["reached"], where)
-                self.assertAlmostEqual(goal["time_s"], other["time_s"], msg=where,
-                                       delta=0.05 * goal["time_s"])
+                self.assertAlmostEqual(
+                    goal["time_s"], other["time_s"], msg=where, delta=0.05 * goal["time_s"]
+                )
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ On purpose ours differs in this:
 * a refused ``make_plan`` says why;
 * a stop follows a rotation recovery; the original's spins on for the planner's patience.
 """
+
 import math
 
 import rospy
@@ -27,8 +28,12 @@ from std_srvs.srv import Empty
 FREE_PLACES = ((1.5, 1.5), (1.5, 6.4))  # of robot 0; a wall is near all the way between
 OFF_THE_MAP = (20.0, 20.0)
 PERIOD_S = 1.0  # of control, in the tutorial
-RECOVERIES = [("conservative_reset", 0, 4), ("rotate_recovery", 1, 4),
-              ("aggressive_reset", 2, 4), ("rotate_recovery", 3, 4)]
+RECOVERIES = [
+    ("conservative_reset", 0, 4),
+    ("rotate_recovery", 1, 4),
+    ("aggressive_reset", 2, 4),
+    ("rotate_recovery", 3, 4),
+]
 
 
 class OriginalBehaviour(OriginalCase):
@@ -48,14 +53,18 @@ class OriginalBehaviour(OriginalCase):
         rospy.wait_for_service(f"/move_base0/{service}", PATIENCE_S)
         start = goal_pose(*self.position(0))
         return rospy.ServiceProxy(f"/move_base0/{service}", GetPlan)(
-            start, goal_pose(x, y), tolerance).plan
+            start, goal_pose(x, y), tolerance
+        ).plan
 
     def obstacle_cells(self, nearest_m, farthest_m=math.inf):
         """Centres of the cells of seen obstacles within these distances of robot 0."""
         grid = self.global_costmap(0)
         cell_m = grid.info.resolution
-        centres = [((k % grid.info.width + 0.5) * cell_m, (k // grid.info.width + 0.5) * cell_m)
-                   for k, cost in enumerate(grid.data) if cost == 100]
+        centres = [
+            ((k % grid.info.width + 0.5) * cell_m, (k // grid.info.width + 0.5) * cell_m)
+            for k, cost in enumerate(grid.data)
+            if cost == 100
+        ]
         return [at for at in centres if nearest_m < self.distance(0, *at) < farthest_m]
 
     def end_distance(self, path, x, y):
@@ -72,8 +81,9 @@ class OriginalBehaviour(OriginalCase):
             self.assertGreater(len(plan.poses), 100)
             self.assertEqual(self.end_distance(plan, 9.0, 5.5), 0.0)
             self.wait(lambda p=plans: len(p.messages) == 2, "the plan twice")
-            self.assertEqual([len(path.poses) for path in plans.messages],
-                             [len(plan.poses) - 1, len(plan.poses)])
+            self.assertEqual(
+                [len(path.poses) for path in plans.messages], [len(plan.poses) - 1, len(plan.poses)]
+            )
             plans.close()
 
     def test_make_plan_off_the_map_is_empty(self):
@@ -154,8 +164,11 @@ class OriginalBehaviour(OriginalCase):
 
     def test_goals_that_cannot_be_taken(self):
         quaternion = "Aborting on goal because it was sent with an invalid quaternion"
-        for keywords, text in (({"w": 0.0}, quaternion), ({"frame": ""}, "its frame ''"),
-                               ({"frame": "nowhere"}, "its frame 'nowhere'")):
+        for keywords, text in (
+            ({"w": 0.0}, quaternion),
+            ({"frame": ""}, "its frame ''"),
+            ({"frame": "nowhere"}, "its frame 'nowhere'"),
+        ):
             count = self.results[0].count
             self.send(0, goal_pose(1.5, 2.5, **keywords))
             status = self.result_after(0, count).status
@@ -168,8 +181,9 @@ class OriginalBehaviour(OriginalCase):
         self.send(0, goal)
         self.wait(lambda: goals.messages, "current_goal")
         current = goals.messages[0]
-        self.assertEqual((current.header.frame_id, current.header.stamp),
-                         ("map", goal.header.stamp))
+        self.assertEqual(
+            (current.header.frame_id, current.header.stamp), ("map", goal.header.stamp)
+        )
         at = current.pose.position
         self.assertAlmostEqual(self.distance(0, at.x, at.y), 0.5, delta=0.1)
 
@@ -184,13 +198,24 @@ class OriginalBehaviour(OriginalCase):
         self.send(0, goal_pose(*OFF_THE_MAP))
         result = self.result_after(0, count)
         self.assertEqual(result.status.status, GoalStatus.ABORTED)
-        self.assertEqual(result.status.text, "Failed to find a valid plan. "
-                                             "Even after executing recovery behaviors.")
-        self.assertEqual([(status.recovery_behavior_name, status.current_recovery_number,
-                           status.total_number_of_recoveries) for status in recoveries.messages],
-                         RECOVERIES)
-        self.assertEqual({status.pose_stamped.header.frame_id for status in recoveries.messages},
-                         {"map"})
+        self.assertEqual(
+            result.status.text,
+            "Failed to find a valid plan. Even after executing recovery behaviors.",
+        )
+        self.assertEqual(
+            [
+                (
+                    status.recovery_behavior_name,
+                    status.current_recovery_number,
+                    status.total_number_of_recoveries,
+                )
+                for status in recoveries.messages
+            ],
+            RECOVERIES,
+        )
+        self.assertEqual(
+            {status.pose_stamped.header.frame_id for status in recoveries.messages}, {"map"}
+        )
         took_s = (result.header.stamp - result.status.goal_id.stamp).to_sec()
         self.assertAlmostEqual(took_s, 43.8, delta=4.0)
         self.assert_two_turns(commands.messages)
@@ -221,8 +246,9 @@ class OriginalBehaviour(OriginalCase):
         self.reconfigure("/move_base0", recovery_behavior_enabled=False)
         status = self.result_after(0, count).status
         self.assertEqual(status.status, GoalStatus.ABORTED)
-        self.assertEqual(status.text,
-                         "Robot is oscillating. Even after executing recovery behaviors.")
+        self.assertEqual(
+            status.text, "Robot is oscillating. Even after executing recovery behaviors."
+        )
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ One flight of robot 0 is recorded; robot 1 stands. On purpose
 * the navigator does not subscribe to its own footprints;
 * updates of the costmaps come exactly at ``publish_frequency``, not at the next turn after it.
 """
+
 import numpy as np
 import rosgraph
 import roslib.message
@@ -41,8 +42,10 @@ class OriginalFace(OriginalCase):
         flight.doCleanups()
 
     def fly(self):
-        self.wait(lambda: self.records.keys() <= topics_sent_here(),
-                  lambda: f"sent here: {sorted(self.records.keys() - topics_sent_here())}")
+        self.wait(
+            lambda: self.records.keys() <= topics_sent_here(),
+            lambda: f"sent here: {sorted(self.records.keys() - topics_sent_here())}",
+        )
         self.wait(lambda: all(self.of(0, f"{name}/footprint") for name in UPDATE_HZ), "footprints")
         self.wait(lambda: self.of(0, "local_costmap/costmap_updates"), "an update while it stands")
         cls = type(self)
@@ -94,8 +97,11 @@ class OriginalFace(OriginalCase):
     def test_parameters_on_the_server(self):
         """All of the original's; ours has some more."""
         for i in ROBOTS:
-            self.assert_holds(rospy.get_param(f"/move_base{i}"),
-                              recorded_yaml("parameters.yaml", i), f"/move_base{i}")
+            self.assert_holds(
+                rospy.get_param(f"/move_base{i}"),
+                recorded_yaml("parameters.yaml", i),
+                f"/move_base{i}",
+            )
 
     def assert_holds(self, ours, recorded, place):
         for key, value in recorded.items():
@@ -122,8 +128,11 @@ class OriginalFace(OriginalCase):
         expected = {f"/move_base{i}/status": STATUS_HZ for i in ROBOTS}
         for costmap, hz in UPDATE_HZ.items():
             expected.update({f"/move_base{i}/{costmap}/footprint": hz for i in ROBOTS})
-        for name in ("feedback", "TrajectoryPlannerROS/global_plan",
-                     "TrajectoryPlannerROS/cost_cloud"):
+        for name in (
+            "feedback",
+            "TrajectoryPlannerROS/global_plan",
+            "TrajectoryPlannerROS/cost_cloud",
+        ):
             expected[f"/move_base0/{name}"] = CONTROLLER_HZ
         expected["/cmd_vel0"] = CONTROLLER_HZ
         for name, hz in expected.items():
@@ -132,8 +141,10 @@ class OriginalFace(OriginalCase):
     def test_local_costmap_comes_at_its_publish_frequency(self):
         """Both topics together, without the grid that a new listener gets."""
         for i in ROBOTS:
-            grid, updates = (self.records[f"/move_base{i}/local_costmap/{name}"]
-                             for name in ("costmap", "costmap_updates"))
+            grid, updates = (
+                self.records[f"/move_base{i}/local_costmap/{name}"]
+                for name in ("costmap", "costmap_updates")
+            )
             hz = rate_hz(sorted(grid.stamps_s()[1:] + updates.stamps_s()))
             self.assertAlmostEqual(hz, PUBLISH_HZ, delta=0.1 * PUBLISH_HZ)
 
@@ -147,8 +158,10 @@ class OriginalFace(OriginalCase):
     # -- costmaps ------------------------------------------------------------------
 
     def test_grids(self):
-        for name, cells, resolution_m in (("global_costmap", 240, 0.05),
-                                          ("local_costmap", WINDOW_CELLS, CELL_M)):
+        for name, cells, resolution_m in (
+            ("global_costmap", 240, 0.05),
+            ("local_costmap", WINDOW_CELLS, CELL_M),
+        ):
             for grid in self.of(0, f"{name}/costmap"):
                 self.assertEqual(grid.header.frame_id, "map")
                 self.assertEqual((grid.info.width, grid.info.height), (cells, cells))
@@ -172,8 +185,10 @@ class OriginalFace(OriginalCase):
         self.assertLessEqual(len(self.of(1, "local_costmap/costmap")), 2)
         for update in updates:
             self.assertEqual(update.header.frame_id, "map")
-            self.assertEqual((update.x, update.y, update.width, update.height),
-                             (0, 0, WINDOW_CELLS, WINDOW_CELLS))
+            self.assertEqual(
+                (update.x, update.y, update.width, update.height),
+                (0, 0, WINDOW_CELLS, WINDOW_CELLS),
+            )
 
     def test_footprints(self):
         with_recorded = [(float(x), float(y)) for x, y in recorded_lines("footprint.txt", 0)]
@@ -186,10 +201,10 @@ class OriginalFace(OriginalCase):
     # -- goal and feedback ---------------------------------------------------------
 
     def test_goal_goes_on_as_an_action_goal(self):
-        goal, = self.of(0, "goal")
+        (goal,) = self.of(0, "goal")
         self.assertEqual((goal.goal_id.id, goal.goal_id.stamp), ("", rospy.Time(0)))
         self.assertEqual(goal.goal.target_pose.pose, self.goal.pose)
-        current, = self.of(0, "current_goal")
+        (current,) = self.of(0, "current_goal")
         self.assertEqual(current.header.frame_id, "map")
         self.assertEqual(current.header.stamp, self.goal.header.stamp)
         self.assertEqual(current.pose.position, self.goal.pose.position)
@@ -198,8 +213,9 @@ class OriginalFace(OriginalCase):
         odometry = self.records["/odom0"].messages
         stamps_s = np.array([message.header.stamp.to_sec() for message in odometry])
         for message in self.of(0, "feedback"):
-            self.assertEqual(message.status.text,
-                             "This goal has been accepted by the simple action server")
+            self.assertEqual(
+                message.status.text, "This goal has been accepted by the simple action server"
+            )
             base = message.feedback.base_position
             self.assertEqual(base.header.frame_id, "map")
             nearest = int(np.argmin(np.abs(stamps_s - base.header.stamp.to_sec())))
@@ -219,19 +235,22 @@ class OriginalFace(OriginalCase):
         np.testing.assert_allclose(points[-1], GOAL)
         steps_m = np.hypot(*np.diff(points[:-1], axis=0).T)
         self.assertGreaterEqual(steps_m.min(), 0.025 - 1e-6)
-        self.assertLessEqual(steps_m.max(), 0.05 * 2 ** 0.5 + 1e-6)
+        self.assertLessEqual(steps_m.max(), 0.05 * 2**0.5 + 1e-6)
 
     def test_global_plan_has_no_time_and_stays_near(self):
         record = self.records["/move_base0/TrajectoryPlannerROS/global_plan"]
         feedback = self.records["/move_base0/feedback"]
         for path, came_s in zip(record.messages, record.times_s):
             self.assertEqual(path.header.frame_id, "map")
-            self.assertEqual({path.header.stamp, *(pose.header.stamp for pose in path.poses)},
-                             {rospy.Time(0)})
+            self.assertEqual(
+                {path.header.stamp, *(pose.header.stamp for pose in path.poses)}, {rospy.Time(0)}
+            )
             nearest = int(np.argmin(np.abs(np.array(feedback.times_s) - came_s)))
             robot = feedback.messages[nearest].feedback.base_position.pose.position
-            far_m = max(np.hypot(pose.pose.position.x - robot.x, pose.pose.position.y - robot.y)
-                        for pose in path.poses)
+            far_m = max(
+                np.hypot(pose.pose.position.x - robot.x, pose.pose.position.y - robot.y)
+                for pose in path.poses
+            )
             self.assertLess(far_m, REACH_M + 0.1)
 
     def test_local_plan_is_never_empty(self):
@@ -249,13 +268,13 @@ class OriginalFace(OriginalCase):
         for cloud in self.of(0, "TrajectoryPlannerROS/cost_cloud"):
             self.assertEqual(cloud.header.frame_id, "map")
             self.assertEqual(cloud.fields, fields)
-            self.assertEqual((cloud.height, cloud.width), (1, WINDOW_CELLS ** 2))
-            self.assertEqual((cloud.point_step, cloud.row_step), (28, 28 * WINDOW_CELLS ** 2))
+            self.assertEqual((cloud.height, cloud.width), (1, WINDOW_CELLS**2))
+            self.assertEqual((cloud.point_step, cloud.row_step), (28, 28 * WINDOW_CELLS**2))
             self.assertFalse(cloud.is_bigendian or cloud.is_dense)
             scored = ~np.isnan(cloud_points(cloud)).any(axis=1)
             count = int(scored.sum())
             self.assertTrue(scored[:count].all())
-            self.assertGreater(count, WINDOW_CELLS ** 2 / 4)
+            self.assertGreater(count, WINDOW_CELLS**2 / 4)
 
     def test_cost_cloud_adds_up(self):
         """Distances in cells are scored in metres: 0.6 path + 0.8 goal + 0.01 obstacles."""
@@ -263,7 +282,8 @@ class OriginalFace(OriginalCase):
             points = cloud_points(cloud)
             x, y, z, path, goal, obstacles, total = points[~np.isnan(points).any(axis=1)].T
             np.testing.assert_allclose(
-                total, 0.6 * CELL_M * path + 0.8 * CELL_M * goal + 0.01 * obstacles, rtol=1e-4)
+                total, 0.6 * CELL_M * path + 0.8 * CELL_M * goal + 0.01 * obstacles, rtol=1e-4
+            )
             self.assertFalse(z.any())
             column, row = np.rint(x / CELL_M - 0.5), np.rint(y / CELL_M - 0.5)
             np.testing.assert_allclose(x, (column + 0.5) * CELL_M, atol=1e-4)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """dynamic_reconfigure beside the recorded original's: descriptions, values, and that they count."""
+
 import ast
 
 import rospy
@@ -35,12 +36,13 @@ class OriginalReconfigure(OriginalCase):
         """In the recorded order; the recordings end early, and ours has parameters of its own."""
         for _, namespace, recorded in self.namespaces():
             message = self.latched(f"{namespace}/parameter_descriptions", ConfigDescription)
-            group, = message.groups
-            self.assertEqual((group.name, group.type, group.id, group.parent),
-                             ("Default", "", 0, 0))
+            (group,) = message.groups
+            self.assertEqual(
+                (group.name, group.type, group.id, group.parent), ("Default", "", 0, 0)
+            )
             ours = [(p.name, p.type, p.description) for p in group.parameters]
             expected = [(name, *rest) for name, rest in recorded["parameters"].items()]
-            self.assertEqual(ours[:len(expected)], expected, namespace)
+            self.assertEqual(ours[: len(expected)], expected, namespace)
             self.assertEqual({p.level for p in group.parameters}, {0})
             for bound in ("min", "max"):
                 config = getattr(message, bound)
@@ -48,21 +50,26 @@ class OriginalReconfigure(OriginalCase):
                 self.assertEqual(set(bounds), {p.name for p in group.parameters}, namespace)
                 for name, value in recorded.get(bound, {}).items():
                     self.assertEqual(bounds[name], value, f"{namespace}/{name} {bound}")
-                state, = config.groups
-                self.assertEqual((state.name, state.state, state.id, state.parent),
-                                 ("Default", True, 0, 0))
+                (state,) = config.groups
+                self.assertEqual(
+                    (state.name, state.state, state.id, state.parent), ("Default", True, 0, 0)
+                )
 
     def test_enumeration_is_what_rqt_reconfigure_parses(self):
         for i in ROBOTS:
             client = self.client(f"/move_base{i}/local_costmap/obstacle_layer")
             group = client.get_group_descriptions(PATIENCE_S)
-            method, = [parameter["edit_method"] for parameter in group["parameters"]
-                       if parameter["name"] == "combination_method"]
+            (method,) = [
+                parameter["edit_method"]
+                for parameter in group["parameters"]
+                if parameter["name"] == "combination_method"
+            ]
             choices = ast.literal_eval(method)
             self.assertEqual(choices["enum_description"], "Method for combining layers enum")
             self.assertEqual(
                 [(choice["name"], choice["value"], choice["type"]) for choice in choices["enum"]],
-                [("Overwrite", 0, "int"), ("Maximum", 1, "int"), ("Nothing", 99, "int")])
+                [("Overwrite", 0, "int"), ("Maximum", 1, "int"), ("Nothing", 99, "int")],
+            )
 
     def test_values(self):
         for _, namespace, recorded in self.namespaces():
@@ -79,17 +86,19 @@ class OriginalReconfigure(OriginalCase):
         self.wait(lambda: values(updates.messages[-1])["sim_time"] == 2.0, "the new value")
         for i, sim_time_s in ((0, 2.0), (1, 1.7)):
             self.assertEqual(
-                rospy.get_param(f"/move_base{i}/TrajectoryPlannerROS/sim_time"), sim_time_s)
+                rospy.get_param(f"/move_base{i}/TrajectoryPlannerROS/sim_time"), sim_time_s
+            )
 
     # -- out of range --------------------------------------------------------------
 
     def test_out_of_range_is_clamped(self):
         for namespace, name, value, clamped in (
-                ("TrajectoryPlannerROS", "max_vel_x", 100.0, 20.0),
-                ("TrajectoryPlannerROS", "max_vel_x", -1.0, 0.0),
-                ("TrajectoryPlannerROS", "vx_samples", 0, 1),
-                ("global_costmap/inflation_layer", "inflation_radius", 60.0, 50.0),
-                ("", "planner_patience", 1000.0, 100.0)):
+            ("TrajectoryPlannerROS", "max_vel_x", 100.0, 20.0),
+            ("TrajectoryPlannerROS", "max_vel_x", -1.0, 0.0),
+            ("TrajectoryPlannerROS", "vx_samples", 0, 1),
+            ("global_costmap/inflation_layer", "inflation_radius", 60.0, 50.0),
+            ("", "planner_patience", 1000.0, 100.0),
+        ):
             namespace = f"/move_base0/{namespace}".rstrip("/")
             answer = self.reconfigure(namespace, **{name: value})
             self.assertEqual(answer[name], clamped, f"{namespace}/{name}")

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Two navigators that know each other from their topics: none touches the other."""
+
 import rospy
 import rostest
 from flight_case import FlightCase, Latest
@@ -9,8 +10,10 @@ from nav_msgs.msg import Path
 class Peers(FlightCase):
     def test_the_tutorials_mission_without_a_contact(self):
         intentions = [Latest(f"/move_base{i}/intention", Path) for i in (0, 1)]
-        self.wait(lambda: all(i.message is not None and i.message.poses for i in intentions),
-                  "both navigators telling where they go")
+        self.wait(
+            lambda: all(i.message is not None and i.message.poses for i in intentions),
+            "both navigators telling where they go",
+        )
         for latest in intentions:
             self.assertEqual(latest.message.header.frame_id, "map")
             ranks = {pose.header.stamp.to_sec() for pose in latest.message.poses}

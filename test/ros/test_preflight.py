@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A launch that cannot be flown is refused before anything starts, with every fault."""
+
 import json
 import os
 import subprocess
@@ -14,8 +15,12 @@ ARGUMENTS = ["--dump-params", "quad", "two_quads.launch", "rviz:=false"]
 def preflight(*arguments):
     """(exit status, what was said) for a launch with these arguments."""
     dump = subprocess.run(["roslaunch", *ARGUMENTS, *arguments], stdout=subprocess.PIPE, check=True)
-    check = subprocess.run(["python3", "-m", "quad_nav.ros.preflight"], input=dump.stdout,
-                           stderr=subprocess.PIPE, check=False)
+    check = subprocess.run(
+        ["python3", "-m", "quad_nav.ros.common.preflight"],
+        input=dump.stdout,
+        stderr=subprocess.PIPE,
+        check=False,
+    )
     return check.returncode, check.stderr.decode()
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Nodes killed and stopped in flight: hover, come back, and no goal is lost or flown twice."""
+
 import json
 import os
 import signal
@@ -31,7 +32,8 @@ class Respawn(FlightCase):
         super().setUpClass()
         cls.events = []
         cls.subscriber = rospy.Subscriber(
-            "/quad/events", String, lambda message: cls.events.append(json.loads(message.data)))
+            "/quad/events", String, lambda message: cls.events.append(json.loads(message.data))
+        )
 
     def test_the_mission_survives(self):
         self.wait(lambda: self.odometry[0].message is not None, "odometry")
@@ -46,8 +48,9 @@ class Respawn(FlightCase):
         result = self.read_result(rospy.get_param("~result"), patience_s=200.0)
         self.assertTrue(result["success"], result)
         for robot in result["robots"]:
-            self.assertTrue(all(goal["reached"] and goal["attempts"] == 1
-                                for goal in robot["goals"]), robot)
+            self.assertTrue(
+                all(goal["reached"] and goal["attempts"] == 1 for goal in robot["goals"]), robot
+            )
         self.assertEqual(sorted(self.told("ended")), [(0, 0), (0, 1), (1, 0)])
         first_sent = self.told("sent", why="")
         self.assertEqual(len(first_sent), len(set(first_sent)), first_sent)
@@ -72,8 +75,11 @@ class Respawn(FlightCase):
         os.kill(pid, signal.SIGCONT)
 
     def told(self, kind, **having):
-        return [(event["robot"], event["goal"]) for event in self.events if event["event"] == kind
-                and all(event[key] == value for key, value in having.items())]
+        return [
+            (event["robot"], event["goal"])
+            for event in self.events
+            if event["event"] == kind and all(event[key] == value for key, value in having.items())
+        ]
 
 
 if __name__ == "__main__":

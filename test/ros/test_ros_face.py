@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The topics, types, rates, frames and services that others' tools depend on."""
+
 import rosgraph
 import rospy
 import rosservice
@@ -43,10 +44,8 @@ SERVICES = {
     "/move_base{i}/set_parameters": "dynamic_reconfigure/Reconfigure",
     "/move_base{i}/TrajectoryPlannerROS/set_parameters": "dynamic_reconfigure/Reconfigure",
     "/move_base{i}/global_costmap/set_parameters": "dynamic_reconfigure/Reconfigure",
-    "/move_base{i}/global_costmap/obstacle_layer/set_parameters":
-        "dynamic_reconfigure/Reconfigure",
-    "/move_base{i}/local_costmap/inflation_layer/set_parameters":
-        "dynamic_reconfigure/Reconfigure",
+    "/move_base{i}/global_costmap/obstacle_layer/set_parameters": "dynamic_reconfigure/Reconfigure",
+    "/move_base{i}/local_costmap/inflation_layer/set_parameters": "dynamic_reconfigure/Reconfigure",
 }
 SUBSCRIBED = {
     "/move_base{i}/cancel": "actionlib_msgs/GoalID",
@@ -84,10 +83,13 @@ class RosFace(FlightCase):
                 self.assertEqual(rosservice.get_service_type(name), kind, name)
 
     def test_rates_in_simulated_time(self):
-        topics = (("/scan0", LaserScan, 20.0), ("/odom1", Odometry, 40.0),
-                  ("/move_base0/status", GoalStatusArray, 5.0),
-                  ("/move_base0/global_costmap/footprint", PolygonStamped, 5.0),
-                  ("/move_base1/local_costmap/footprint", PolygonStamped, 10.0))
+        topics = (
+            ("/scan0", LaserScan, 20.0),
+            ("/odom1", Odometry, 40.0),
+            ("/move_base0/status", GoalStatusArray, 5.0),
+            ("/move_base0/global_costmap/footprint", PolygonStamped, 5.0),
+            ("/move_base1/local_costmap/footprint", PolygonStamped, 10.0),
+        )
         records = [self.record(topic, kind) for topic, kind, _ in topics]
         tf = self.record("/tf", TFMessage)
         self.simulated_seconds(5.0)
@@ -102,17 +104,23 @@ class RosFace(FlightCase):
         self.assertEqual(len(scan.ranges), 512)
         self.assertAlmostEqual(scan.range_min, 0.02, places=6)
         self.assertAlmostEqual(scan.range_max, 60.0)
-        self.assertAlmostEqual(scan.angle_max, scan.angle_min + 511 * scan.angle_increment,
-                               places=5)
+        self.assertAlmostEqual(
+            scan.angle_max, scan.angle_min + 511 * scan.angle_increment, places=5
+        )
 
     def test_tf_tree(self):
         buffer = tf2_ros.Buffer()
         listener = tf2_ros.TransformListener(buffer)
         for i in (0, 1):
-            for parent, child in (("map", f"odom{i}"), (f"odom{i}", f"base_link{i}"),
-                                  (f"base_link{i}", f"Lidar{i}")):
-                self.wait(lambda p=parent, c=child: buffer.can_transform(p, c, rospy.Time(0)),
-                          f"transform {parent} -> {child}")
+            for parent, child in (
+                ("map", f"odom{i}"),
+                (f"odom{i}", f"base_link{i}"),
+                (f"base_link{i}", f"Lidar{i}"),
+            ):
+                self.wait(
+                    lambda p=parent, c=child: buffer.can_transform(p, c, rospy.Time(0)),
+                    f"transform {parent} -> {child}",
+                )
             mount = buffer.lookup_transform(f"base_link{i}", f"Lidar{i}", rospy.Time(0))
             self.assertAlmostEqual(mount.transform.translation.z, 0.06)
         listener.unregister()
@@ -127,8 +135,15 @@ class RosFace(FlightCase):
         grid = rospy.wait_for_message("/move_base0/global_costmap/costmap", OccupancyGrid, 30)
         self.assertEqual((grid.info.width, grid.info.height), (240, 240))
         self.assertEqual(grid.header.frame_id, "map")
-        self.wait(lambda: 100 in rospy.wait_for_message(
-            "/move_base0/global_costmap/costmap", OccupancyGrid, 30).data, "lethal cells")
+        self.wait(
+            lambda: (
+                100
+                in rospy.wait_for_message(
+                    "/move_base0/global_costmap/costmap", OccupancyGrid, 30
+                ).data
+            ),
+            "lethal cells",
+        )
 
     def test_plan_comes_twice_the_second_time_with_the_goal(self):
         plans = self.record("/move_base0/NavfnROS/plan", Path).messages

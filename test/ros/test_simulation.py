@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Start, pause and reset; commands that cannot be used; the watchdog."""
+
 import math
 import time
 
@@ -28,6 +29,7 @@ class Simulation(FlightCase):
         def commanded():
             self.pilot.publish(command)
             return condition()
+
         self.wait(commanded, what)
 
     def test_pause_stands_still_and_start_goes_on(self):

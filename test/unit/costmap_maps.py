@@ -1,4 +1,5 @@
 """Maps in ASCII for the costmap's tests: top row first, as one reads them."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -17,8 +18,7 @@ def costs_of(text: str) -> np.ndarray:
 
 def picture(costs: np.ndarray) -> str:
     """A grid as ASCII; costs between free and inscribed are '+'."""
-    return "\n".join("".join(_SIGNS.get(cost, "+") for cost in row)
-                     for row in costs[::-1].tolist())
+    return "\n".join("".join(_SIGNS.get(cost, "+") for cost in row) for row in costs[::-1].tolist())
 
 
 def drawn(text: str) -> str:

@@ -1,4 +1,5 @@
-"""Faults of a quadcopter's senses, between an offline flight's simulation and its navigator."""
+"""Faults of a quadcopter's sensor_faults, between an offline flight's simulation and its navigator."""
+
 from __future__ import annotations
 
 from collections import deque
@@ -8,10 +9,10 @@ from typing import Callable, Optional, Tuple
 import numpy as np
 
 from quad_nav.geometry import Pose3D, Scan
+from quad_nav.navigator.tick import RobotPoses
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.pilot import Pilot
-from quad_nav.tick import Located
+from quad_nav.offline.offline_robot import OfflineRobot
 
 Seen = Tuple[Scan, Pose3D]
 
@@ -23,7 +24,7 @@ def with_ranges(scan: Scan, change: Callable[[np.ndarray], None]) -> Scan:
 
 
 class SenseFault(FlightObserver):
-    """Quadcopter 0's senses from ``begin_s`` to ``end_s``; the base class does no harm.
+    """Quadcopter 0's sensor_faults from ``begin_s`` to ``end_s``; the base class does no harm.
 
     ``hover_after_s`` is how long after the fault's begin the last command was sent that was
     not to hover, as far as the fault lasts; ``away_s`` how long after its end it flew again.
@@ -33,7 +34,7 @@ class SenseFault(FlightObserver):
         self.begin_s, self.end_s = begin_s, end_s
         self.hover_after_s = 0.0
         self.away_s: Optional[float] = None
-        self._pilot: Optional[Pilot] = None
+        self._pilot: Optional[OfflineRobot] = None
 
     def began(self, flight: Flight) -> None:
         self._pilot, self._configuration = flight.pilots[0], flight.robots[0].configuration
@@ -44,8 +45,11 @@ class SenseFault(FlightObserver):
         return self.begin_s <= now_s < self.end_s
 
     def see(self, scan, map_from_lidar, now_s):
-        seen = self.scanned_as(scan, map_from_lidar) if self.is_on(now_s) else (
-            self.not_scanned_as(scan, map_from_lidar))
+        seen = (
+            self.scanned_as(scan, map_from_lidar)
+            if self.is_on(now_s)
+            else (self.not_scanned_as(scan, map_from_lidar))
+        )
         if seen is not None:
             self._see(*seen, now_s)
 
@@ -126,7 +130,8 @@ class ScansOf(SenseFault):
 
     def scanned_as(self, scan, map_from_lidar):
         def fill(ranges_m):
-            ranges_m[:len(ranges_m) // 2 if self._first_half else None] = self._value
+            ranges_m[: len(ranges_m) // 2 if self._first_half else None] = self._value
+
         return with_ranges(scan, fill), map_from_lidar
 
 
@@ -136,7 +141,7 @@ class NoPose(SenseFault):
     def located_as(self, now_s, state, peers):
         if now_s - self.begin_s <= self._configuration.local_costmap.transform_tolerance_s:
             return self._navigate(now_s, state, peers)
-        located = Located(None, None)
+        located = RobotPoses(None, None)
         return self._pilot.navigator.tick(now_s, located, state.twist, peers), located
 
 
@@ -153,4 +158,5 @@ class ShiftedPose(SenseFault):
 
     def located_as(self, now_s, state, peers):
         return self._navigate(
-            now_s, replace(state, map_from_base=self._shifted(state.map_from_base)), peers)
+            now_s, replace(state, map_from_base=self._shifted(state.map_from_base)), peers
+        )

@@ -1,4 +1,5 @@
 """A small mission for studies: one quadcopter, 3 m past a pillar, a second of computing."""
+
 from __future__ import annotations
 
 import json
@@ -8,7 +9,7 @@ from pathlib import Path
 from typing import Any, Dict, Iterable, Iterator, List, Sequence, Tuple
 
 from quad_nav.errors import InputError
-from quad_nav.offline.setup import FlightSetup
+from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionOptions
 from quad_nav.tuning.evaluation import Evaluation, Watcher
 from quad_nav.tuning.flight_result import FlightResult
@@ -32,10 +33,22 @@ TrajectoryPlannerROS/max_vel_x: {range: [0.3, 0.8]}
 TrajectoryPlannerROS/vx_samples: {range: [3, 8], integer: true}
 "*_costmap/inflation_radius": {range: [0.4, 0.9]}
 """
-FAST = (("TrajectoryPlannerROS/vtheta_samples", 8), ("global_costmap/width", 5.0),
-        ("global_costmap/height", 4.0), ("TrajectoryPlannerROS/sim_time", 1.0))
-FLOWN = FlightResult(goals=2, reached=2, contacts=0, time_s=40.0, straight_m=10.0,
-                     clearance_m=0.5, separation_m=None, roughness_mps2=0.2)
+FAST = (
+    ("TrajectoryPlannerROS/vtheta_samples", 8),
+    ("global_costmap/width", 5.0),
+    ("global_costmap/height", 4.0),
+    ("TrajectoryPlannerROS/sim_time", 1.0),
+)
+FLOWN = FlightResult(
+    goals=2,
+    reached=2,
+    contacts=0,
+    time_s=40.0,
+    straight_m=10.0,
+    clearance_m=0.5,
+    separation_m=None,
+    roughness_mps2=0.2,
+)
 
 
 def write_mission(folder: Path) -> Mission:
@@ -57,15 +70,33 @@ def tune_setup(folder: Path, output: Path, candidates: int = 3, **given: Any) ->
     options = mission_options(folder)
     space = folder / "space.yaml"
     space.write_text(SPACE)
-    return read_tune_setup(TuneOptions(
-        options, output, space, SearchOptions(candidates, 2, 3, 0), finalists=1, final_flights=2,
-        held_out=1, **given))
+    return read_tune_setup(
+        TuneOptions(
+            options,
+            output,
+            space,
+            SearchOptions(candidates, 2, 3, 0),
+            finalists=1,
+            final_flights=2,
+            held_out=1,
+            **given,
+        )
+    )
 
 
 def told(trials: Sequence[Any]) -> List[Tuple[Any, ...]]:
     """What a study consists of, less the times of day."""
-    return [(trial.number, trial.state, trial.value, trial.params, trial.intermediate_values,
-             trial.user_attrs) for trial in trials]
+    return [
+        (
+            trial.number,
+            trial.state,
+            trial.value,
+            trial.params,
+            trial.intermediate_values,
+            trial.user_attrs,
+        )
+        for trial in trials
+    ]
 
 
 def searched(setup: TuneSetup, workers: Workers) -> List[Tuple[Any, ...]]:
@@ -78,6 +109,7 @@ def searched(setup: TuneSetup, workers: Workers) -> List[Tuple[Any, ...]]:
 
 def mortal_tasks(marker: Path, deaths: int) -> List[Tuple[int, Any]]:
     """Six flights on paper, one of which kills its worker so many times."""
+
     class Mortal:
         setup = None
 
@@ -142,6 +174,8 @@ def paper_flight(parameters: Dict[str, Any], seed: int) -> FlightResult:
     return replace(FLOWN, time_s=time_s, reached=reached)
 
 
-PAPER_SPACE = SearchSpace("paper", (Dimension("speed", 0.0, 1.0), Dimension("idle", 0.0, 1.0),
-                                    Dimension("bad", 0.0, 10.0)))
+PAPER_SPACE = SearchSpace(
+    "paper",
+    (Dimension("speed", 0.0, 1.0), Dimension("idle", 0.0, 1.0), Dimension("bad", 0.0, 10.0)),
+)
 PAPER_BASE = {"speed": 0.1, "idle": 0.5, "bad": 0.0}

@@ -13,13 +13,13 @@ from quad_nav.control.controller import Control
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Twist2D, quaternion_from_yaw
 from quad_nav.mission import flight_log
-from quad_nav.offline import record_messages as messages
-from quad_nav.offline.bag_trace import read_trace
+from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick, Trigger
 from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.record import Recorder
-from quad_nav.offline.record_file import create
+from quad_nav.recording import messages
+from quad_nav.recording.bag_trace import read_trace
+from quad_nav.recording.record_file import create
+from quad_nav.recording.recorder import Recorder
 from quad_nav.sim.contacts import Contact
-from quad_nav.tick import Located, RecoveryStart, State, Tick, Trigger
 
 # Stamps are whole nanoseconds; contacts are told with six digits; a quaternion gives a yaw.
 TIME_S, SIX_DIGITS, YAW_RAD = 1e-9, 1e-5, 1e-12
@@ -38,18 +38,24 @@ class Troubles(FlightObserver):
         now_s = flight.now_s
         start = RecoveryStart("conservative_reset", 0, 3, Trigger.CONTROLLING)
         plan = np.array([[1.0, 2.0, 3.0], [1.5, 2.5, -3.0]])
-        tick = Tick(now_s, State.CLEARING, command=Twist2D(0.1, -0.2, 0.3), plan=plan,
-                    control=Control(Twist2D(), 0.0, plan, plan), recovery=start)
+        tick = Tick(
+            now_s,
+            State.CLEARING,
+            command=Twist2D(0.1, -0.2, 0.3),
+            plan=plan,
+            control=Control(Twist2D(), 0.0, plan, plan),
+            recovery=start,
+        )
         for other in self._others:
             other.touched(dataclasses.replace(TOUCH, time_s=now_s))
-            other.ticked(0, tick, Located(HERE, HERE), 0.01)
+            other.ticked(0, tick, RobotPoses(HERE, HERE), 0.01)
 
 
 @pytest.fixture(scope="module", params=["flight.bag", "flight.mcap"])
 def traces(request, tmp_path_factory):
     """The trace of the observer and the one that was read."""
     from quad_nav.offline.run import fly
-    from quad_nav.offline.trace import TraceObserver
+    from quad_nav.recording.trace import TraceObserver
 
     folder = tmp_path_factory.mktemp("flight")
     path = folder / request.param
@@ -98,8 +104,9 @@ def test_states_and_recoveries(traces):
         assert [state for _, state in read.states] == [state for _, state in seen.states]
         assert [name for _, name in read.recoveries] == [name for _, name in seen.recoveries]
         for found, expected in ((read.states, seen.states), (read.recoveries, seen.recoveries)):
-            assert [time_s for time_s, _ in found] == \
-                pytest.approx([time_s for time_s, _ in expected], abs=TIME_S)
+            assert [time_s for time_s, _ in found] == pytest.approx(
+                [time_s for time_s, _ in expected], abs=TIME_S
+            )
     assert traces[1].robots[0].states[-1][1] is State.CLEARING
     assert traces[1].robots[0].recoveries[0][1] == "conservative_reset"
 
@@ -112,23 +119,26 @@ def test_goals(traces):
         for one, other in zip(read.goals, seen.goals):
             assert one.sent_s == pytest.approx(other.sent_s, abs=TIME_S)
             assert one.ended_s == pytest.approx(other.ended_s, abs=TIME_S)
-            assert dataclasses.replace(one, sent_s=0.0, ended_s=0.0) == \
-                dataclasses.replace(other, sent_s=0.0, ended_s=0.0)
+            assert dataclasses.replace(one, sent_s=0.0, ended_s=0.0) == dataclasses.replace(
+                other, sent_s=0.0, ended_s=0.0
+            )
 
 
 def test_contacts(traces):
     (seen,), (read,) = traces[0].contacts, traces[1].contacts
     assert (read.robot, read.other) == (seen.robot, seen.other) == ("quad1", "quad0")
-    assert (read.time_s, read.x_m, read.y_m) == \
-        pytest.approx((seen.time_s, seen.x_m, seen.y_m), abs=SIX_DIGITS)
+    assert (read.time_s, read.x_m, read.y_m) == pytest.approx(
+        (seen.time_s, seen.x_m, seen.y_m), abs=SIX_DIGITS
+    )
 
 
 # Recordings of others, with few topics.
 
 
 def odometry(stamp, x_m, frame="odom0"):
-    return messages.odometry(Pose3D(x_m, 0.0, 1.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.0),
-                             (frame, "base_link0"), stamp)
+    return messages.odometry(
+        Pose3D(x_m, 0.0, 1.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.0), (frame, "base_link0"), stamp
+    )
 
 
 def bag(path, *entries):
@@ -144,10 +154,13 @@ def bag(path, *entries):
 
 
 def test_odometry_alone_makes_a_trace(tmp_path):
-    path = bag(tmp_path / "walk.bag", ("/odom0", 5 * 10**9, odometry(5 * 10**9, 1.0)),
-               ("/odom0", 6 * 10**9, odometry(6 * 10**9, 1.5)))
+    path = bag(
+        tmp_path / "walk.bag",
+        ("/odom0", 5 * 10**9, odometry(5 * 10**9, 1.0)),
+        ("/odom0", 6 * 10**9, odometry(6 * 10**9, 1.5)),
+    )
     trace = read_trace(path)
-    robot, = trace.robots
+    (robot,) = trace.robots
     assert (trace.title, trace.scene, trace.seed, trace.contacts) == ("walk", None, None, ())
     assert robot.times_s.tolist() == [0.0, 1.0]
     assert robot.positions_m[:, 0].tolist() == [1.0, 1.5]
@@ -158,20 +171,30 @@ def test_odometry_alone_makes_a_trace(tmp_path):
 def test_odometry_is_put_into_the_map(tmp_path):
     """odom0 lies 10 m along x of map and is turned to the left."""
     quarter = Pose3D(10.0, 0.0, 0.0, quaternion_from_yaw(np.pi / 2))
-    path = bag(tmp_path / "flight.bag",
-               ("/tf", 10**9, messages.message("tf2_msgs/TFMessage", [
-                   messages.transform(quarter, "map", "odom0", 10**9)])),
-               ("/odom0", 10**9, odometry(10**9, 1.0)))
+    path = bag(
+        tmp_path / "flight.bag",
+        (
+            "/tf",
+            10**9,
+            messages.message(
+                "tf2_msgs/TFMessage", [messages.transform(quarter, "map", "odom0", 10**9)]
+            ),
+        ),
+        ("/odom0", 10**9, odometry(10**9, 1.0)),
+    )
     assert read_trace(path).robots[0].positions_m == pytest.approx(np.array([[10.0, 1.0, 1.0]]))
 
 
 def test_a_wall_clock_of_the_recorder_does_not_count(tmp_path):
     """Recorded at a wall time of 1e9 s, while the simulation's clock said 2 s."""
     wall = 10**18
-    path = bag(tmp_path / "flight.bag", ("/odom0", wall, odometry(10**9, 0.0)),
-               ("/clock", wall + 1, messages.clock(2 * 10**9)),
-               ("/cmd_vel0", wall + 2, messages.command(Twist2D(0.3, 0.0, 0.1))))
-    robot, = read_trace(path).robots
+    path = bag(
+        tmp_path / "flight.bag",
+        ("/odom0", wall, odometry(10**9, 0.0)),
+        ("/clock", wall + 1, messages.clock(2 * 10**9)),
+        ("/cmd_vel0", wall + 2, messages.command(Twist2D(0.3, 0.0, 0.1))),
+    )
+    (robot,) = read_trace(path).robots
     assert robot.command_times_s.tolist() == [1.0]
     assert robot.commands.tolist() == [[0.3, 0.0, 0.1]]
 
@@ -183,10 +206,12 @@ def test_a_paused_simulation_s_odometry_counts_once(tmp_path):
 
 
 def test_what_several_nodes_say_about_the_flight_adds_up(tmp_path):
-    path = bag(tmp_path / "flight.bag",
-               ("/quad/flight", 1, messages.text(json.dumps({"seed": 4, "start_s": 1.0}))),
-               ("/quad/flight", 2, messages.text(json.dumps({"robot_radius_m": 0.25}))),
-               ("/odom0", 3 * 10**9, odometry(3 * 10**9, 0.0)))
+    path = bag(
+        tmp_path / "flight.bag",
+        ("/quad/flight", 1, messages.text(json.dumps({"seed": 4, "start_s": 1.0}))),
+        ("/quad/flight", 2, messages.text(json.dumps({"robot_radius_m": 0.25}))),
+        ("/odom0", 3 * 10**9, odometry(3 * 10**9, 0.0)),
+    )
     trace = read_trace(path)
     assert (trace.seed, trace.robot_radius_m) == (4, 0.25)
     assert trace.robots[0].times_s.tolist() == [2.0]
@@ -198,9 +223,13 @@ def test_navfn_s_plan_told_twice_is_one(tmp_path):
         return messages.message("nav_msgs/Path", messages.header("map", 10**9), poses)
 
     topic = "/move_base0/NavfnROS/plan"
-    path = bag(tmp_path / "flight.bag", ("/odom0", 10**9, odometry(10**9, 0.0)),
-               (topic, 10**9, path_of(0.0, 1.0)), (topic, 10**9, path_of(0.0, 1.0, 2.0)))
-    (_, plan), = read_trace(path).robots[0].plans
+    path = bag(
+        tmp_path / "flight.bag",
+        ("/odom0", 10**9, odometry(10**9, 0.0)),
+        (topic, 10**9, path_of(0.0, 1.0)),
+        (topic, 10**9, path_of(0.0, 1.0, 2.0)),
+    )
+    ((_, plan),) = read_trace(path).robots[0].plans
     assert plan[:, 0].tolist() == [0.0, 1.0, 2.0]
 
 
@@ -223,11 +252,12 @@ def test_a_file_of_something_else_is_refused(tmp_path, name, data):
 
 @pytest.mark.parametrize("name", ["flight.bag", "flight.mcap"])
 def test_a_file_that_is_cut_short_is_refused(tmp_path, name):
-    path = bag(tmp_path / name, *(("/odom0", k * 10**9, odometry(k * 10**9, 0.0))
-                                  for k in range(1, 100)))
+    path = bag(
+        tmp_path / name, *(("/odom0", k * 10**9, odometry(k * 10**9, 0.0)) for k in range(1, 100))
+    )
     data = path.read_bytes()
     for part in (0.3, 0.9, 0.99):
-        path.write_bytes(data[:int(part * len(data))])
+        path.write_bytes(data[: int(part * len(data))])
         with pytest.raises(InputError, match=f"{name}: "):
             read_trace(path)
 
@@ -244,16 +274,19 @@ def test_a_bag_that_was_not_completed_can_be_mended(tmp_path):
 def test_a_damaged_chunk_is_refused(tmp_path):
     path = bag(tmp_path / "flight.bag", ("/odom0", 10**9, odometry(10**9, 0.0)))
     data = bytearray(path.read_bytes())
-    data[data.index(b"\x04\x22\x4d\x18") + 20] ^= 0xff
+    data[data.index(b"\x04\x22\x4d\x18") + 20] ^= 0xFF
     path.write_bytes(data)
     with pytest.raises(InputError, match="flight.bag: is damaged"):
         read_trace(path)
 
 
-@pytest.mark.parametrize("topic, content", [
-    ("/quad/events", messages.text('{"robot": 0, "event": "sent"}')),
-    ("/simulation/contacts", messages.diagnostic(1, "contact", "", "quad0", {"with": "wall"})),
-])
+@pytest.mark.parametrize(
+    "topic, content",
+    [
+        ("/quad/events", messages.text('{"robot": 0, "event": "sent"}')),
+        ("/simulation/contacts", messages.diagnostic(1, "contact", "", "quad0", {"with": "wall"})),
+    ],
+)
 def test_a_message_that_says_something_else_is_named(tmp_path, topic, content):
     path = bag(tmp_path / "flight.bag", ("/odom0", 1, odometry(1, 0.0)), (topic, 2, content))
     with pytest.raises(InputError, match=f"flight.bag: {topic}: cannot be understood: .*expected"):

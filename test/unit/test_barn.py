@@ -1,4 +1,5 @@
 """The BARN benchmark on worlds made here: what is read, flown, counted and said."""
+
 from __future__ import annotations
 
 import csv
@@ -12,24 +13,25 @@ import pytest
 from click.testing import CliRunner
 
 from quad_nav import config
+from quad_nav.barn.figures import figures, wilson_interval
+from quad_nav.barn.protocol import Outcome, Run, metric
+from quad_nav.barn.results import Results, differences
+from quad_nav.barn.runs import fly_all, fly_world, judge
+from quad_nav.barn.setup import BarnOptions, read_barn_setup
+from quad_nav.barn.worlds import BarnWorld, load_worlds
 from quad_nav.cli.barn import barn
 from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Contact, Leg
 from quad_nav.mission.goal_sequence import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
-from quad_nav.offline.barn.figures import figures, wilson_interval
-from quad_nav.offline.barn.protocol import Outcome, Run, metric
-from quad_nav.offline.barn.results import Results, differences
-from quad_nav.offline.barn.runs import fly_all, fly_world, judge
-from quad_nav.offline.barn.setup import BarnOptions, read_barn_setup
-from quad_nav.offline.barn.worlds import BarnWorld, load_worlds
 from quad_nav.sim.scene import Cylinder
 
 ROOT = Path(__file__).resolve().parents[2]
 COLUMN_AHEAD = 14  # x = -2.325 m, 7.5 cm beside the straight way
 SLOW = (("TrajectoryPlannerROS/max_vel_x", 0.3),)
-BLIND = tuple((f"{costmap}/base_scan/marking", False)
-              for costmap in ("global_costmap", "local_costmap"))
+BLIND = tuple(
+    (f"{costmap}/base_scan/marking", False) for costmap in ("global_costmap", "local_costmap")
+)
 RUN = Run(0, 0, 0, Outcome.SUCCESS, 20.0, 0.25, 9.5, 0.3, 0)
 
 
@@ -55,8 +57,12 @@ def one_ahead() -> np.ndarray:
 def write_worlds(path: Path, **worlds: np.ndarray) -> Path:
     """``w6=cells`` is world 6; its reference path goes from (-2.25, 5) to (-2.25, 9)."""
     numbers = [int(name[1:]) for name in worlds]
-    np.savez(path, index=np.array(numbers, np.int32), occupied=np.stack(list(worlds.values())),
-             **{f"path_{n}": np.array([[-2.25, 5.0], [-2.25, 9.0]], np.float32) for n in numbers})
+    np.savez(
+        path,
+        index=np.array(numbers, np.int32),
+        occupied=np.stack(list(worlds.values())),
+        **{f"path_{n}": np.array([[-2.25, 5.0], [-2.25, 9.0]], np.float32) for n in numbers},
+    )
     return path
 
 
@@ -64,11 +70,14 @@ def setup_of(path: Path, **options):
     return read_barn_setup(BarnOptions(path, **options))
 
 
-@pytest.mark.parametrize("time_s, expected", [
-    (8.0, 0.5),     # 2 OT = 10 s is the least: 5 / 10
-    (20.0, 0.25),   # 5 / 20
-    (60.0, 0.125),  # 8 OT = 40 s is the most: 5 / 40
-])
+@pytest.mark.parametrize(
+    "time_s, expected",
+    [
+        (8.0, 0.5),  # 2 OT = 10 s is the least: 5 / 10
+        (20.0, 0.25),  # 5 / 20
+        (60.0, 0.125),  # 8 OT = 40 s is the most: 5 / 40
+    ],
+)
 def test_the_metric_of_a_10_m_path_whose_optimal_time_is_5_s(time_s, expected):
     assert metric(Outcome.SUCCESS, time_s, 10.0) == expected
     assert metric(Outcome.COLLISION, time_s, 10.0) == 0.0
@@ -82,25 +91,36 @@ def test_wilsons_interval_has_the_values_of_the_textbook():
 
 
 def test_figures_are_means_over_worlds_of_the_successful_runs_times():
-    runs = [RUN, replace(RUN, run=1, time_s=30.0, metric=0.2),
-            replace(RUN, world=1, time_s=35.0, metric=0.15),
-            replace(RUN, world=1, run=1, outcome=Outcome.COLLISION, time_s=3.0, metric=0.0),
-            replace(RUN, world=2, outcome=Outcome.TIME_OUT, time_s=100.0, metric=0.0,
-                    gave_up="aborted")]
+    runs = [
+        RUN,
+        replace(RUN, run=1, time_s=30.0, metric=0.2),
+        replace(RUN, world=1, time_s=35.0, metric=0.15),
+        replace(RUN, world=1, run=1, outcome=Outcome.COLLISION, time_s=3.0, metric=0.0),
+        replace(
+            RUN, world=2, outcome=Outcome.TIME_OUT, time_s=100.0, metric=0.0, gave_up="aborted"
+        ),
+    ]
     row = figures(runs)
     assert (row.worlds, row.runs, row.successes, row.collisions, row.time_outs, row.gave_up) == (
-        3, 5, 3, 1, 1, 1)
+        3,
+        5,
+        3,
+        1,
+        1,
+        1,
+    )
     assert row.mean_time_s == pytest.approx(30.0)  # of 25 s in world 0 and 35 s in world 1
     assert row.metric == pytest.approx(0.12)
     assert figures(runs[3:]).mean_time_s is None
 
 
 def test_a_world_has_cylinders_where_its_cells_say_and_the_path_counts_from_start_to_goal(tmp_path):
-    world, = load_worlds(write_worlds(tmp_path / "w.npz", w6=one_ahead()))
+    (world,) = load_worlds(write_worlds(tmp_path / "w.npz", w6=one_ahead()))
     assert world.number == 6 and world.path_length_m == pytest.approx(10.0)
     scene = world.scene()
-    assert scene.obstacles == (Cylinder("cylinder [30, 14]", pytest.approx(-2.325),
-                                        pytest.approx(4.575), 0.075, 1.0),)
+    assert scene.obstacles == (
+        Cylinder("cylinder [30, 14]", pytest.approx(-2.325), pytest.approx(4.575), 0.075, 1.0),
+    )
     assert scene.starts[0].x_m == -2.25 and scene.starts[0].yaw_rad == pytest.approx(math.pi / 2)
     # The walls are 5 m off the field and 5 m off start and goal.
     assert (scene.origin_x_m, scene.end_x_m) == (-4.5 - 5.0, 0.0 + 5.0)
@@ -115,13 +135,22 @@ def test_only_some_worlds_are_read_and_absent_ones_are_told(tmp_path):
         load_worlds(path, (6, 8))
 
 
-@pytest.mark.parametrize("arrays, told", [
-    ({}, "has no array index"),
-    ({"index": np.array([0.5]), "occupied": np.zeros((1, 64, 30))}, "expected a row of integers"),
-    ({"index": np.array([3, 3]), "occupied": np.zeros((2, 64, 30))}, "has numbers twice"),
-    ({"index": np.array([3]), "occupied": np.zeros((1, 30, 64))}, r"expected \(1, 64, 30\)"),
-    ({"index": np.array([3]), "occupied": np.zeros((1, 64, 30))}, r"path_3: .* expected points"),
-])
+@pytest.mark.parametrize(
+    "arrays, told",
+    [
+        ({}, "has no array index"),
+        (
+            {"index": np.array([0.5]), "occupied": np.zeros((1, 64, 30))},
+            "expected a row of integers",
+        ),
+        ({"index": np.array([3, 3]), "occupied": np.zeros((2, 64, 30))}, "has numbers twice"),
+        ({"index": np.array([3]), "occupied": np.zeros((1, 30, 64))}, r"expected \(1, 64, 30\)"),
+        (
+            {"index": np.array([3]), "occupied": np.zeros((1, 64, 30))},
+            r"path_3: .* expected points",
+        ),
+    ],
+)
 def test_files_that_are_no_worlds_are_refused(tmp_path, arrays, told):
     np.savez(tmp_path / "w.npz", **arrays)
     with pytest.raises(InputError, match=told):
@@ -139,8 +168,11 @@ def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
     cells = free()
     cells[20, 14] = 1  # its axis is 0.106 m from the start
     with pytest.raises(InputError) as error:
-        setup_of(write_worlds(tmp_path / "w.npz", w1=cells), params="tutorial",
-                 parameters=(("local_costmap/base_scan/data_type", "PointCloud2"),))
+        setup_of(
+            write_worlds(tmp_path / "w.npz", w1=cells),
+            params="tutorial",
+            parameters=(("local_costmap/base_scan/data_type", "PointCloud2"),),
+        )
     start, sensor, goal = error.value.problems
     assert "world 1: a cylinder is 0.03 m from the start" in start
     assert "data_type PointCloud2, expected LaserScan" in sensor
@@ -155,14 +187,26 @@ def test_maps_are_refused_because_nobody_knows_the_worlds(tmp_path):
 
 def test_the_body_keeps_to_the_parameters_velocities_and_frames_may_have_any_name(tmp_path):
     path = write_worlds(tmp_path / "w.npz", w1=free())
-    setup = setup_of(path, parameters=(
-        ("TrajectoryPlannerROS/max_vel_x", 0.5), ("TrajectoryPlannerROS/max_vel_theta", 1.57),
-        ("global_costmap/global_frame", "odom"), ("global_costmap/robot_base_frame", "base_link"),
-        ("local_costmap/base_scan/sensor_frame", "front_laser")))
+    setup = setup_of(
+        path,
+        parameters=(
+            ("TrajectoryPlannerROS/max_vel_x", 0.5),
+            ("TrajectoryPlannerROS/max_vel_theta", 1.57),
+            ("global_costmap/global_frame", "odom"),
+            ("global_costmap/robot_base_frame", "base_link"),
+            ("local_costmap/base_scan/sensor_frame", "front_laser"),
+        ),
+    )
     flight = setup.contestant.simulation.flight
     assert (flight.max_speed_mps, flight.max_yaw_rate_radps) == (0.5, 1.57)
-    assert setup.contestant.frames == ("odom", "map", "base_link", "base_link0", "Lidar0",
-                                       "front_laser")
+    assert setup.contestant.frames == (
+        "odom",
+        "map",
+        "base_link",
+        "base_link0",
+        "Lidar0",
+        "front_laser",
+    )
     backwards = setup_of(path, parameters=(("TrajectoryPlannerROS/escape_vel", -0.9),))
     assert backwards.contestant.simulation.flight.max_speed_mps == 0.9
     told = differences(setup.contestant)
@@ -176,20 +220,37 @@ def test_config_barn_is_the_default_but_for_body_place_and_what_studies_tuned():
             path = f"{above}/{key}".lstrip("/")
             yield from leaves(value, path) if isinstance(value, dict) else [(path, value)]
 
-    default, ours = (dict(leaves(config.load_files(ROOT / "config" / name, {"i": "0"})))
-                     for name in ("default", "barn"))
-    changed = {path: (default.get(path), value) for path, value in ours.items()
-               if default.get(path) != value}
+    default, ours = (
+        dict(leaves(config.load_files(ROOT / "config" / name, {"i": "0"})))
+        for name in ("default", "barn")
+    )
+    changed = {
+        path: (default.get(path), value)
+        for path, value in ours.items()
+        if default.get(path) != value
+    }
     costmaps = ("global_costmap", "local_costmap")
-    tuned = {f"TrajectoryPlannerROS/{name}" for name in (
-        "max_vel_x", "min_vel_x", "min_in_place_vel_theta", "vtheta_samples", "sim_time",
-        "occdist_scale", "goal_distance_bias", "heading_lookahead")}
+    tuned = {
+        f"TrajectoryPlannerROS/{name}"
+        for name in (
+            "max_vel_x",
+            "min_vel_x",
+            "min_in_place_vel_theta",
+            "vtheta_samples",
+            "sim_time",
+            "occdist_scale",
+            "goal_distance_bias",
+            "heading_lookahead",
+        )
+    }
     tuned |= {"planner_frequency", *(f"{costmap}/cost_scaling_factor" for costmap in costmaps)}
     assert {path: pair for path, pair in changed.items() if path not in tuned} == {
         **{f"{costmap}/robot_radius": (0.35, 0.25) for costmap in costmaps},
         **{f"{costmap}/inflation_radius": (0.80, 0.70) for costmap in costmaps},
         **{f"{costmap}/base_scan/obstacle_range": (6.0, 2.5) for costmap in costmaps},
-        "global_costmap/origin_x": (None, -8.25), "global_costmap/origin_y": (None, 2.0)}
+        "global_costmap/origin_x": (None, -8.25),
+        "global_costmap/origin_y": (None, 2.0),
+    }
     assert set(default) - set(ours) <= tuned
 
 
@@ -213,12 +274,16 @@ def test_a_start_that_is_walled_in_is_a_time_out(tmp_path):
 def test_two_workers_give_what_one_gives_a_contact_is_a_collision_and_the_seed_counts(tmp_path):
     path = write_worlds(tmp_path / "w.npz", w1=one_ahead(), w2=free())
     setup = setup_of(path, parameters=(*BLIND, *SLOW), runs=2, only=(1,), seed=7)
-    alone, together = (sorted(fly_all(setup, workers), key=lambda run: run.run)
-                       for workers in (1, 2))
+    alone, together = (
+        sorted(fly_all(setup, workers), key=lambda run: run.run) for workers in (1, 2)
+    )
     assert alone == together and [run.seed for run in alone] == [7, 8]
     for run in alone:
-        assert (run.outcome, run.metric, run.touched) == (Outcome.COLLISION, 0.0,
-                                                          "cylinder [30, 14]")
+        assert (run.outcome, run.metric, run.touched) == (
+            Outcome.COLLISION,
+            0.0,
+            "cylinder [30, 14]",
+        )
         # It touches when its hull gets there, 0.275 m before the cylinder's axis.
         assert 1.2 / 0.3 < run.time_s < 1.6 / 0.3 and run.min_clearance_m < 0.01
 
@@ -227,12 +292,21 @@ def leg(reached: bool, time_s: float, reason: str = "") -> Leg:
     return Leg(0, 1, Goal(-2.25, 13.0), reached, reason, 1, time_s, 9.0, 10.0)
 
 
-@pytest.mark.parametrize("flown, contacts, expected, time_s, gave_up", [
-    (leg(True, 25.0), (), Outcome.SUCCESS, 25.0, ""),
-    (leg(True, 25.0), (Contact(25.0, "quad0", "cylinder", 1.0, 2.0),), Outcome.COLLISION, 25.0, ""),
-    (leg(False, 12.0, "aborted: no plan"), (), Outcome.TIME_OUT, 100.0, "aborted: no plan"),
-    (leg(False, 100.0, "not reached in 100 s"), (), Outcome.TIME_OUT, 100.0, ""),
-])
+@pytest.mark.parametrize(
+    "flown, contacts, expected, time_s, gave_up",
+    [
+        (leg(True, 25.0), (), Outcome.SUCCESS, 25.0, ""),
+        (
+            leg(True, 25.0),
+            (Contact(25.0, "quad0", "cylinder", 1.0, 2.0),),
+            Outcome.COLLISION,
+            25.0,
+            "",
+        ),
+        (leg(False, 12.0, "aborted: no plan"), (), Outcome.TIME_OUT, 100.0, "aborted: no plan"),
+        (leg(False, 100.0, "not reached in 100 s"), (), Outcome.TIME_OUT, 100.0, ""),
+    ],
+)
 def test_what_a_flight_counts_for(flown, contacts, expected, time_s, gave_up):
     robot = RobotSummary("quad0", (flown,), 9.0, 0.1)
     run = judge(MissionSummary((robot,), contacts, seed=3), BarnWorld(5, free(), 10.0), 0)
@@ -242,9 +316,21 @@ def test_what_a_flight_counts_for(flown, contacts, expected, time_s, gave_up):
 def test_the_command_prints_figures_and_differences_and_writes_files(tmp_path):
     path = write_worlds(tmp_path / "w.npz", w6=one_ahead())
     sets = [word for name, value in BLIND for word in ("--set", f"{name}={value}")]
-    done = CliRunner().invoke(barn, [
-        "--worlds", str(path), "--workers", "1", "--per-world", *sets, "--csv",
-        str(tmp_path / "runs.csv"), "--json", str(tmp_path / "figures.json")])
+    done = CliRunner().invoke(
+        barn,
+        [
+            "--worlds",
+            str(path),
+            "--workers",
+            "1",
+            "--per-world",
+            *sets,
+            "--csv",
+            str(tmp_path / "runs.csv"),
+            "--json",
+            str(tmp_path / "figures.json"),
+        ],
+    )
     assert done.exit_code == 0, done.output
     rows = [line.split() for line in done.output.splitlines()]
     assert ["official", "sample", "1", "1", "0.0", "0.0-79.3", "100.0", "0.0", "-", "0.000"] in rows
@@ -255,9 +341,10 @@ def test_the_command_prints_figures_and_differences_and_writes_files(tmp_path):
     assert told["figures"]["official sample"]["collisions"] == 1
     assert told["versions"]["numpy"] == np.__version__
     with (tmp_path / "runs.csv").open() as file:
-        line, = csv.DictReader(file)
+        (line,) = csv.DictReader(file)
     assert line["outcome"] == "collision" and line == {
-        key: "" if value is None else str(value) for key, value in told["runs"][0].items()}
+        key: "" if value is None else str(value) for key, value in told["runs"][0].items()
+    }
 
 
 def test_bad_input_ends_with_2_and_ctrl_c_with_130_and_what_was_flown(tmp_path, monkeypatch):

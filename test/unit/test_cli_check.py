@@ -1,4 +1,5 @@
 """``quad check``: which files belong together, what is told about them, and the exit status."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -6,9 +7,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from quad_nav.check import Report, check_files, check_folder, report_text
 from quad_nav.cli import main
 from quad_nav.config import Remark
+from quad_nav.config.check import Report, check_files, check_folder, report_text
 from quad_nav.config.file_sets import FileSet, file_sets
 from quad_nav.config.files import PlacedFile
 
@@ -69,61 +70,87 @@ def test_every_robot_with_files_of_its_own(tmp_path):
     common, local, *others = STANDARD
     assert sets(tmp_path) == {
         "./robot 2": [common, "local_costmap_params2.yaml", *others],
-        "./robot 10": [common, local, *others, "robot10.yaml"]}
+        "./robot 10": [common, local, *others, "robot10.yaml"],
+    }
     assert list(sets(tmp_path, "2")) == ["./robot 2"]
 
 
 def test_alternatives_make_sets_of_their_own(tmp_path):
-    write(tmp_path, {
-        "costmap_common_params_big.yaml": "robot_radius: 0.5",
-        "costmap_common_params_small.yaml": "robot_radius: 0.1",
-        "dwa_params_big.yaml": "DWAPlannerROS: {max_vel_x: 1.0}",
-        "dwa_params_small.yaml": "DWAPlannerROS: {max_vel_x: 2.0}",
-        "move_base_params.yaml": "controller_frequency: 5.0",
-        "local_costmap_params.yaml": "local_costmap: {width: 3}"})
+    write(
+        tmp_path,
+        {
+            "costmap_common_params_big.yaml": "robot_radius: 0.5",
+            "costmap_common_params_small.yaml": "robot_radius: 0.1",
+            "dwa_params_big.yaml": "DWAPlannerROS: {max_vel_x: 1.0}",
+            "dwa_params_small.yaml": "DWAPlannerROS: {max_vel_x: 2.0}",
+            "move_base_params.yaml": "controller_frequency: 5.0",
+            "local_costmap_params.yaml": "local_costmap: {width: 3}",
+        },
+    )
     shared = ["local_costmap_params.yaml", "move_base_params.yaml"]
     assert {name: set(files) for name, files in sets(tmp_path).items()} == {
         f"./{name}": {f"costmap_common_params_{name}.yaml", f"dwa_params_{name}.yaml", *shared}
-        for name in ("big", "small")}
+        for name in ("big", "small")
+    }
 
 
 def test_names_of_alternatives_are_whole_words_or_numbers(tmp_path):
-    write(tmp_path, {"costmap_common_cat.yaml": "robot_radius: 0.5",
-                     "costmap_common_car.yaml": "robot_radius: 0.5",
-                     "costmap_common_car_2.yaml": "robot_radius: 0.5"})
+    write(
+        tmp_path,
+        {
+            "costmap_common_cat.yaml": "robot_radius: 0.5",
+            "costmap_common_car.yaml": "robot_radius: 0.5",
+            "costmap_common_car_2.yaml": "robot_radius: 0.5",
+        },
+    )
     assert list(sets(tmp_path)) == ["./car", "./car_2", "./cat"]
-    write(tmp_path / "numbers", {"costmap_common0.yaml": "robot_radius: 0.5",
-                                 "costmap_common1.yaml": "robot_radius: 0.5"})
+    write(
+        tmp_path / "numbers",
+        {"costmap_common0.yaml": "robot_radius: 0.5", "costmap_common1.yaml": "robot_radius: 0.5"},
+    )
     assert list(sets(tmp_path / "numbers")) == ["./0", "./1"]
     assert list(sets(tmp_path / "numbers", "1")) == ["./1"]
 
 
 def test_folders_of_changes_come_after_what_they_change(tmp_path):
-    write(tmp_path, {"costmap_common.yaml": "robot_radius: 0.5",
-                     "costmap_local.yaml": "width: 3",
-                     "one/costmap_common.yaml": "robot_radius: 0.1",
-                     "one/costmap_local.yaml": "width: 4",
-                     "two/move_base.yaml": "controller_frequency: 5.0"})
+    write(
+        tmp_path,
+        {
+            "costmap_common.yaml": "robot_radius: 0.5",
+            "costmap_local.yaml": "width: 3",
+            "one/costmap_common.yaml": "robot_radius: 0.1",
+            "one/costmap_local.yaml": "width: 4",
+            "two/move_base.yaml": "controller_frequency: 5.0",
+        },
+    )
     assert sets(tmp_path) == {
-        "one": ["costmap_common.yaml", "one/costmap_common.yaml", "costmap_local.yaml",
-                "one/costmap_local.yaml"],
-        "two": ["costmap_common.yaml", "costmap_local.yaml", "two/move_base.yaml"]}
+        "one": [
+            "costmap_common.yaml",
+            "one/costmap_common.yaml",
+            "costmap_local.yaml",
+            "one/costmap_local.yaml",
+        ],
+        "two": ["costmap_common.yaml", "costmap_local.yaml", "two/move_base.yaml"],
+    }
 
 
-@pytest.mark.parametrize("name, text, namespaces", [
-    ("costmap_common.yaml", "robot_radius: 0.5", ("global_costmap", "local_costmap")),
-    ("costmap_local.yaml", "width: 3", ("local_costmap",)),
-    ("nav_global_costmap.yml", "width: 3", ("global_costmap",)),
-    ("costmaps.yaml", "local_costmap: {width: 3}", ("",)),
-    ("costmap_house.yaml", "rolling_window: true", ("local_costmap",)),
-    ("costmap_house.yaml", "rolling_window: false", ("global_costmap",)),
-    ("costmap.yaml", "robot_radius: 0.5", ("global_costmap", "local_costmap")),
-    ("layers.yaml", "inflation_radius: 0.5", ("global_costmap", "local_costmap")),
-    ("x.yaml", "TrajectoryPlannerROS: {max_vel_x: 0.3}", ("",)),
-    ("x.yaml", "recovery_behaviors: []", ("",)),
-    ("x.yaml", "move_base: {controller_frequency: 5.0}", ("",)),
-    ("planner.yaml", "a: [", ("",)),
-])
+@pytest.mark.parametrize(
+    "name, text, namespaces",
+    [
+        ("costmap_common.yaml", "robot_radius: 0.5", ("global_costmap", "local_costmap")),
+        ("costmap_local.yaml", "width: 3", ("local_costmap",)),
+        ("nav_global_costmap.yml", "width: 3", ("global_costmap",)),
+        ("costmaps.yaml", "local_costmap: {width: 3}", ("",)),
+        ("costmap_house.yaml", "rolling_window: true", ("local_costmap",)),
+        ("costmap_house.yaml", "rolling_window: false", ("global_costmap",)),
+        ("costmap.yaml", "robot_radius: 0.5", ("global_costmap", "local_costmap")),
+        ("layers.yaml", "inflation_radius: 0.5", ("global_costmap", "local_costmap")),
+        ("x.yaml", "TrajectoryPlannerROS: {max_vel_x: 0.3}", ("",)),
+        ("x.yaml", "recovery_behaviors: []", ("",)),
+        ("x.yaml", "move_base: {controller_frequency: 5.0}", ("",)),
+        ("planner.yaml", "a: [", ("",)),
+    ],
+)
 def test_where_a_file_is_loaded(tmp_path, name, text, namespaces):
     write(tmp_path, {name: text})
     (one,), left = file_sets(tmp_path)
@@ -131,19 +158,24 @@ def test_where_a_file_is_loaded(tmp_path, name, text, namespaces):
     assert left == []
 
 
-@pytest.mark.parametrize("name, text", [
-    ("map.yaml", "image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]"),
-    ("amcl.yaml", "transform_tolerance: 0.1\nglobal_frame_id: map"),
-    ("broken.yaml", "a: ["),
-    (".hidden/move_base.yaml", "controller_frequency: 5.0"),
-])
+@pytest.mark.parametrize(
+    "name, text",
+    [
+        ("map.yaml", "image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]"),
+        ("amcl.yaml", "transform_tolerance: 0.1\nglobal_frame_id: map"),
+        ("broken.yaml", "a: ["),
+        (".hidden/move_base.yaml", "controller_frequency: 5.0"),
+    ],
+)
 def test_what_is_not_move_bases(tmp_path, name, text):
     write(tmp_path, {name: text})
     assert file_sets(tmp_path) == ([], [] if "hidden" in name else [tmp_path / name])
     status, output = quad(tmp_path)
     assert status == 2
-    assert output.strip() == (f"{tmp_path}: no move_base parameters in it; expected files such as"
-                              " costmap_common_params.yaml")
+    assert output.strip() == (
+        f"{tmp_path}: no move_base parameters in it; expected files such as"
+        " costmap_common_params.yaml"
+    )
 
 
 def test_files_are_loaded_in_the_order_given(tmp_path):
@@ -164,15 +196,21 @@ def test_a_costmaps_name_before_a_file(tmp_path):
 
 
 def test_table(tmp_path, monkeypatch):
-    write(tmp_path, {
-        **STANDARD, "move_base_params.yaml": "recovery_behaviour_enabled: true\n",
-        "base_local_planner_params.yaml":
-            "TrajectoryPlannerROS:\n  pdist_scale: 1.0\n  max_vel_x: 25\n",
-        "costmap_common_params.yaml": SEEING + "zzz: 1\n"})
+    write(
+        tmp_path,
+        {
+            **STANDARD,
+            "move_base_params.yaml": "recovery_behaviour_enabled: true\n",
+            "base_local_planner_params.yaml": "TrajectoryPlannerROS:\n  pdist_scale: 1.0\n  max_vel_x: 25\n",
+            "costmap_common_params.yaml": SEEING + "zzz: 1\n",
+        },
+    )
     monkeypatch.chdir(tmp_path)
     status, output = quad(".", "--strict")
     assert status == 1
-    assert output.rstrip() == """\
+    assert (
+        output.rstrip()
+        == """\
 .: no errors, 4 remarks
   costmap_common_params.yaml, local_costmap_params.yaml, global_costmap_params.yaml,
   base_local_planner_params.yaml, move_base_params.yaml
@@ -187,22 +225,37 @@ TrajectoryPlannerROS/max_vel_x      clamped  25 becomes 20.0, the largest
   base_local_planner_params.yaml:3           that move_base allows
 *_costmap/zzz                       unknown  nothing reads it
   costmap_common_params.yaml:3"""
+    )
 
 
 def test_all_errors_at_once_and_remarks_after_them(tmp_path):
-    write(tmp_path, {**STANDARD, "local_costmap_params.yaml":
-          "local_costmap:\n  width: three\n  static_mapp: true\n  height: -1.0\n"})
+    write(
+        tmp_path,
+        {
+            **STANDARD,
+            "local_costmap_params.yaml": "local_costmap:\n  width: three\n  static_mapp: true\n  height: -1.0\n",
+        },
+    )
     status, output = quad(tmp_path)
     assert status == 2
     assert f"{tmp_path}: 2 errors, 1 remark\n" in output
     places = [line.split()[:2] for line in output.splitlines() if line.startswith("local_costmap/")]
-    assert places == [["local_costmap/width", "error"], ["local_costmap/height", "error"],
-                      ["local_costmap/static_mapp", "unknown"]]
+    assert places == [
+        ["local_costmap/width", "error"],
+        ["local_costmap/height", "error"],
+        ["local_costmap/static_mapp", "unknown"],
+    ]
 
 
 def test_files_that_cannot_be_read_hide_no_other_errors(tmp_path):
-    write(tmp_path, {**STANDARD, "local_costmap_params.yaml": "local_costmap:\n\twidth: 1\n",
-                     "global_costmap_params.yaml": "global_costmap: {width: three, q: 1}\n"})
+    write(
+        tmp_path,
+        {
+            **STANDARD,
+            "local_costmap_params.yaml": "local_costmap:\n\twidth: 1\n",
+            "global_costmap_params.yaml": "global_costmap: {width: three, q: 1}\n",
+        },
+    )
     ((report,), left) = check_folder(tmp_path)
     assert [line.kind for line in report.lines] == ["error", "error"]
     assert report.lines[0].origin == f"{tmp_path / 'local_costmap_params.yaml'}:2:1"
@@ -217,8 +270,13 @@ def test_a_file_that_is_not_there(tmp_path):
 
 
 def test_the_robots_number(tmp_path):
-    write(tmp_path, {**STANDARD, "costmap_common_params.yaml":
-          "observation_sources: scan\nscan: {data_type: LaserScan, topic: scan$(arg i)}\n"})
+    write(
+        tmp_path,
+        {
+            **STANDARD,
+            "costmap_common_params.yaml": "observation_sources: scan\nscan: {data_type: LaserScan, topic: scan$(arg i)}\n",
+        },
+    )
     assert quad(tmp_path)[0] == 0
     assert quad(tmp_path, "--robot", 3)[0] == 0
     assert quad(tmp_path, "--robot", -1)[0] == 2
@@ -229,11 +287,21 @@ def test_the_robots_number(tmp_path):
 @pytest.mark.parametrize("width", [100, 80])
 def test_tables_keep_to_the_width(width):
     lines = (
-        Remark("/global_costmap/obstacle_layer/base_scan/expected_update_rate", "caution",
-               "a long text " * 20, "some/folder/costmap_common_params.yaml:12"),
-        Remark("/recovery_behaviour_enabled", "unknown", "unknown, nothing reads it",
-               "move_base.yaml:2", "recovery_behavior_enabled"),
-        Remark("/local_costmap", "unsupported", "an_endless_name::" * 10))
+        Remark(
+            "/global_costmap/obstacle_layer/base_scan/expected_update_rate",
+            "caution",
+            "a long text " * 20,
+            "some/folder/costmap_common_params.yaml:12",
+        ),
+        Remark(
+            "/recovery_behaviour_enabled",
+            "unknown",
+            "unknown, nothing reads it",
+            "move_base.yaml:2",
+            "recovery_behavior_enabled",
+        ),
+        Remark("/local_costmap", "unsupported", "an_endless_name::" * 10),
+    )
     text = report_text(Report(FileSet(None, "", (), "0"), lines), width)
     assert max(map(len, text.splitlines())) <= width
     assert ("nearest name" in text) == (width == 100)
@@ -241,11 +309,19 @@ def test_tables_keep_to_the_width(width):
 
 
 def test_what_differs_between_the_costmaps_is_told_of_each(tmp_path):
-    write(tmp_path, {**STANDARD, "local_costmap_params.yaml": "local_costmap: {colour: 1}\n",
-                     "global_costmap_params.yaml": "global_costmap: {colour: 1}\n"})
+    write(
+        tmp_path,
+        {
+            **STANDARD,
+            "local_costmap_params.yaml": "local_costmap: {colour: 1}\n",
+            "global_costmap_params.yaml": "global_costmap: {colour: 1}\n",
+        },
+    )
     ((report,), _) = check_folder(tmp_path)
-    assert [line.place for line in report.lines] == ["/global_costmap/colour",
-                                                     "/local_costmap/colour"]
+    assert [line.place for line in report.lines] == [
+        "/global_costmap/colour",
+        "/local_costmap/colour",
+    ]
 
 
 def test_usage():

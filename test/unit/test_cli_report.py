@@ -15,8 +15,21 @@ from quad_nav.cli import main
 def bag(tmp_path_factory) -> Path:
     """Half a second of the tutorial's mission."""
     path = tmp_path_factory.mktemp("flight") / "good.bag"
-    CliRunner().invoke(main, ["fly", "--quiet", "--time-limit", "0.5", "--beams", "64",
-                              "--config", "tutorial", "--record", str(path)])
+    CliRunner().invoke(
+        main,
+        [
+            "fly",
+            "--quiet",
+            "--time-limit",
+            "0.5",
+            "--beams",
+            "64",
+            "--config",
+            "tutorial",
+            "--record",
+            str(path),
+        ],
+    )
     return path
 
 
@@ -60,8 +73,11 @@ def test_every_fault_is_told_and_nothing_written(report, tmp_path):
     result = report("../good.bag", "../bad.bag", "../worse.bag", "--animate", "one.avi")
     assert result.exit_code == 2
     lines = result.output.splitlines()
-    assert lines[:3] == ["no report:", "  animation: 3 flights, expected one",
-                         "  animation: one.avi, expected a name that ends in .gif or .mp4"]
+    assert lines[:3] == [
+        "no report:",
+        "  animation: 3 flights, expected one",
+        "  animation: one.avi, expected a name that ends in .gif or .mp4",
+    ]
     assert [line.split(":")[0] for line in lines[3:]] == ["  ../bad.bag", "  ../worse.bag"]
     assert list((tmp_path / "out").iterdir()) == []
 

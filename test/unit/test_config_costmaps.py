@@ -1,4 +1,5 @@
 """Costmaps in both styles: with a plugins list, and as before ROS Hydro."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -27,29 +28,48 @@ def layers(tree):
 
 def test_nothing_set_gives_an_obstacle_and_an_inflation_layer():
     costmap = local_costmap({})
-    assert costmap.layers == (("obstacle_layer", ObstacleLayerParams()),
-                              ("inflation_layer", InflationLayerParams()))
+    assert costmap.layers == (
+        ("obstacle_layer", ObstacleLayerParams()),
+        ("inflation_layer", InflationLayerParams()),
+    )
     assert (costmap.robot_radius_m, costmap.width_m, costmap.resolution_m) == (0.46, 10.0, 0.05)
 
 
 def test_sizes_that_no_grid_can_have_are_all_told():
     with pytest.raises(InputError) as caught:
-        load({"global_costmap": {"width": 501, "height": 500, "resolution": 0.05},
-              "local_costmap": {"width": 3, "height": 12, "resolution": 4.0}}, "/nav")
+        load(
+            {
+                "global_costmap": {"width": 501, "height": 500, "resolution": 0.05},
+                "local_costmap": {"width": 3, "height": 12, "resolution": 4.0},
+            },
+            "/nav",
+        )
     assert caught.value.problems == [
         "/nav/global_costmap: 501 x 500 m cannot be in cells of 0.05 m;"
         " expected 1 to 100000000 cells",
-        "/nav/local_costmap: 3 x 12 m cannot be in cells of 4 m; expected 1 to 100000000 cells"]
+        "/nav/local_costmap: 3 x 12 m cannot be in cells of 4 m; expected 1 to 100000000 cells",
+    ]
     assert local_costmap({"width": 50, "height": 50, "resolution": 0.005}).spec.shape == (
-        10000, 10000)
+        10000,
+        10000,
+    )
     assert local_costmap({"width": 4, "height": 4, "resolution": 4.0}).spec.shape == (1, 1)
 
 
 def test_static_map_puts_a_static_layer_first_and_moves_its_parameters():
-    costmap = local_costmap({"static_map": True, "map_topic": "/floor", "lethal_cost_threshold": 65,
-                             "track_unknown_space": True})
+    costmap = local_costmap(
+        {
+            "static_map": True,
+            "map_topic": "/floor",
+            "lethal_cost_threshold": 65,
+            "track_unknown_space": True,
+        }
+    )
     assert [name for name, _ in costmap.layers] == [
-        "static_layer", "obstacle_layer", "inflation_layer"]
+        "static_layer",
+        "obstacle_layer",
+        "inflation_layer",
+    ]
     static = costmap.layers[0][1]
     assert static == StaticLayerParams(map_topic="/floor", lethal_cost_threshold=65)
     assert costmap.track_unknown_space
@@ -57,9 +77,12 @@ def test_static_map_puts_a_static_layer_first_and_moves_its_parameters():
 
 
 def test_old_style_sources_move_below_the_obstacle_layer():
-    tree = {"observation_sources": "front  rear", "max_obstacle_height": 0.25,
-            "front": {"data_type": "LaserScan", "topic": "scan0", "clearing": True},
-            "rear": {"data_type": "PointCloud2", "marking": False, "obstacle_range": 1.5}}
+    tree = {
+        "observation_sources": "front  rear",
+        "max_obstacle_height": 0.25,
+        "front": {"data_type": "LaserScan", "topic": "scan0", "clearing": True},
+        "rear": {"data_type": "PointCloud2", "marking": False, "obstacle_range": 1.5},
+    }
     configuration = load({"local_costmap": tree}, "")
     obstacles = dict(configuration.local_costmap.layers)["obstacle_layer"]
     front, rear = obstacles.sources
@@ -75,10 +98,18 @@ def test_old_style_sources_move_below_the_obstacle_layer():
 
 
 def test_plugins_give_order_names_and_namespaces():
-    costmap = local_costmap({
-        "plugins": [INFLATION, OBSTACLE], "inflater": {"inflation_radius": 0.3},
-        "obstacles": {"observation_sources": "scan", "scan": {"data_type": "LaserScan"},
-                      "obstacle_range": 4.0, "combination_method": 99}})
+    costmap = local_costmap(
+        {
+            "plugins": [INFLATION, OBSTACLE],
+            "inflater": {"inflation_radius": 0.3},
+            "obstacles": {
+                "observation_sources": "scan",
+                "scan": {"data_type": "LaserScan"},
+                "obstacle_range": 4.0,
+                "combination_method": 99,
+            },
+        }
+    )
     assert [name for name, _ in costmap.layers] == ["inflater", "obstacles"]
     inflater, obstacles = (layer for _, layer in costmap.layers)
     assert inflater.inflation_radius_m == 0.3
@@ -86,8 +117,12 @@ def test_plugins_give_order_names_and_namespaces():
 
 
 def test_parameters_of_the_costmap_replace_the_layers_even_with_plugins():
-    tree = {"plugins": [OBSTACLE, INFLATION], "inflation_radius": 0.8, "raytrace_range": 7.0,
-            "inflater": {"inflation_radius": 0.3, "cost_scaling_factor": 3.0}}
+    tree = {
+        "plugins": [OBSTACLE, INFLATION],
+        "inflation_radius": 0.8,
+        "raytrace_range": 7.0,
+        "inflater": {"inflation_radius": 0.3, "cost_scaling_factor": 3.0},
+    }
     inflater = layers(tree)["inflater"]
     assert (inflater.inflation_radius_m, inflater.cost_scaling_factor) == (0.8, 3.0)
     assert layers(tree)["obstacles"].raytrace_range_m == 7.0
@@ -100,30 +135,45 @@ def test_own_namespaces_count_without_plugins_too():
 
 
 def test_map_type_voxel_makes_a_voxel_layer_of_the_costmaps_parameters():
-    tree = {"map_type": "voxel", "z_voxels": 8, "z_resolution": 0.25, "mark_threshold": 1,
-            "publish_voxel_map": True, "observation_sources": "scan",
-            "scan": {"data_type": "LaserScan"}, "obstacle_layer": {"unknown_threshold": 4}}
+    tree = {
+        "map_type": "voxel",
+        "z_voxels": 8,
+        "z_resolution": 0.25,
+        "mark_threshold": 1,
+        "publish_voxel_map": True,
+        "observation_sources": "scan",
+        "scan": {"data_type": "LaserScan"},
+        "obstacle_layer": {"unknown_threshold": 4},
+    }
     configuration = load({"local_costmap": tree}, "")
     layer = dict(configuration.local_costmap.layers)["obstacle_layer"]
     assert layer == VoxelLayerParams(
-        z_voxels=8, z_resolution_m=0.25, mark_threshold=1, publish_voxel_map=True,
-        unknown_threshold=4, sources=(SourceParams("scan", "scan", data_type="LaserScan"),))
+        z_voxels=8,
+        z_resolution_m=0.25,
+        mark_threshold=1,
+        publish_voxel_map=True,
+        unknown_threshold=4,
+        sources=(SourceParams("scan", "scan", data_type="LaserScan"),),
+    )
     assert [str(remark) for remark in configuration.remarks if "local" in remark.place] == []
     assert configuration.to_tree()["local_costmap"]["obstacle_layer"]["z_voxels"] == 8
 
 
 def test_voxel_layer_among_plugins():
     voxels = {"name": "space", "type": "costmap_2d::VoxelLayer"}
-    tree = {"plugins": [voxels], "origin_z": 0.5, "space": {"origin_z": 1.5, "z_voxels": 20,
-                                                           "max_obstacle_height": 1.0}}
+    tree = {
+        "plugins": [voxels],
+        "origin_z": 0.5,
+        "space": {"origin_z": 1.5, "z_voxels": 20, "max_obstacle_height": 1.0},
+    }
     configuration = load({"local_costmap": tree}, "")
     layer = dict(configuration.local_costmap.layers)["space"]
     assert (layer.origin_z_m, layer.z_voxels, layer.max_obstacle_height_m) == (0.5, 16, 1.0)
     told = [str(remark) for remark in configuration.remarks]
-    assert ("/local_costmap/space/origin_z: ignored by move_base: local_costmap/origin_z replaces"
-            " it") in told
-    assert ("/local_costmap/space/z_voxels: 20 becomes 16, the largest that move_base allows"
-            in told)
+    assert (
+        "/local_costmap/space/origin_z: ignored by move_base: local_costmap/origin_z replaces it"
+    ) in told
+    assert "/local_costmap/space/z_voxels: 20 becomes 16, the largest that move_base allows" in told
     with pytest.raises(InputError, match="^/local_costmap/z_voxels: 0 cannot be; expected a"):
         load({"local_costmap": {"map_type": "voxel", "z_voxels": 0}}, "")
 
@@ -131,8 +181,10 @@ def test_voxel_layer_among_plugins():
 def test_an_obstacle_layer_reads_no_voxels():
     tree = {"obstacle_layer": {"z_voxels": 8}}
     told = [str(remark) for remark in load({"local_costmap": tree}, "").remarks]
-    assert ("/local_costmap/obstacle_layer/z_voxels: ignored by move_base: only a"
-            " costmap_2d::VoxelLayer reads it") in told
+    assert (
+        "/local_costmap/obstacle_layer/z_voxels: ignored by move_base: only a"
+        " costmap_2d::VoxelLayer reads it"
+    ) in told
 
 
 def test_unsupported_layers_are_left_out_and_told():
@@ -150,12 +202,16 @@ def test_a_layer_may_be_named_as_an_old_switch():
     assert configuration.to_tree()["global_costmap"]["static_map"] == {"enabled": True}
 
 
-@pytest.mark.parametrize("footprint", [
-    [[0.3, 0.2], [0.3, -0.2], [-0.25, 0]], "[[0.3,0.2], [0.3,-0.2], [-0.25,0]]"])
+@pytest.mark.parametrize(
+    "footprint", [[[0.3, 0.2], [0.3, -0.2], [-0.25, 0]], "[[0.3,0.2], [0.3,-0.2], [-0.25,0]]"]
+)
 def test_footprint_is_a_list_or_a_text_of_float32(footprint):
     configuration = load({"local_costmap": {"footprint": footprint, "robot_radius": 0.4}}, "")
-    expected = ((np.float32(0.3), np.float32(0.2)), (np.float32(0.3), np.float32(-0.2)),
-                (np.float32(-0.25), np.float32(0.0)))
+    expected = (
+        (np.float32(0.3), np.float32(0.2)),
+        (np.float32(0.3), np.float32(-0.2)),
+        (np.float32(-0.25), np.float32(0.0)),
+    )
     assert configuration.local_costmap.footprint == expected
 
 
@@ -175,4 +231,5 @@ def test_a_value_that_came_from_above_is_complained_about_there():
     with pytest.raises(InputError) as caught:
         load({"obstacle_range": "far"}, "/nav")
     assert caught.value.problems == [
-        "/nav/obstacle_range: 'far' is not a number; expected a number of metres, 0 or more"]
+        "/nav/obstacle_range: 'far' is not a number; expected a number of metres, 0 or more"
+    ]

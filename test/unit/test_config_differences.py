@@ -7,8 +7,8 @@ from hand_made_traces import flight, robot
 
 from quad_nav import config
 from quad_nav.config.differences import Difference, differences
-from quad_nav.offline.report.parameter_table import ParameterRow, parameter_rows
-from quad_nav.shipped import shipped
+from quad_nav.files.shipped import shipped
+from quad_nav.report.parameter_table import ParameterRow, parameter_rows
 
 
 def tree_of(number: int, **changes):
@@ -24,21 +24,38 @@ def test_nothing_set_is_no_difference():
 def test_the_default_is_the_one_in_force_at_start():
     assert differences(config.load({"controller_patience": 15.0}).to_tree()) == ()
     assert differences(config.load({"controller_frequency": 10.0}).to_tree()) == (
-        Difference("controller_frequency", 10.0, 20.0, "Hz"),)
+        Difference("controller_frequency", 10.0, 20.0, "Hz"),
+    )
 
 
-@pytest.mark.parametrize("tree, expected", [
-    ({"TrajectoryPlannerROS": {"max_vel_x": 0.3}},
-     [Difference("TrajectoryPlannerROS/max_vel_x", 0.3, 0.55, "m/s")]),
-    ({"TrajectoryPlannerROS": {"holonomic_robot": False}},
-     [Difference("TrajectoryPlannerROS/holonomic_robot", False, True)]),
-    ({"mends": {"sensor_timeout": 0.0}}, [Difference("mends/sensor_timeout", 0.0, 1.0, "seconds")]),
-    ({"local_costmap": {"inflation_radius": 0.8}},
-     [Difference("local_costmap/inflation_layer/inflation_radius", 0.8, 0.55, "metres")]),
-    ({"recovery_behaviors": [{"name": "turn", "type": "RotateRecovery"}],
-      "turn": {"sim_granularity": 0.1}},
-     [Difference("turn/sim_granularity", 0.1, 0.017, "radians")]),
-])
+@pytest.mark.parametrize(
+    "tree, expected",
+    [
+        (
+            {"TrajectoryPlannerROS": {"max_vel_x": 0.3}},
+            [Difference("TrajectoryPlannerROS/max_vel_x", 0.3, 0.55, "m/s")],
+        ),
+        (
+            {"TrajectoryPlannerROS": {"holonomic_robot": False}},
+            [Difference("TrajectoryPlannerROS/holonomic_robot", False, True)],
+        ),
+        (
+            {"fixes": {"sensor_timeout": 0.0}},
+            [Difference("fixes/sensor_timeout", 0.0, 1.0, "seconds")],
+        ),
+        (
+            {"local_costmap": {"inflation_radius": 0.8}},
+            [Difference("local_costmap/inflation_layer/inflation_radius", 0.8, 0.55, "metres")],
+        ),
+        (
+            {
+                "recovery_behaviors": [{"name": "turn", "type": "RotateRecovery"}],
+                "turn": {"sim_granularity": 0.1},
+            },
+            [Difference("turn/sim_granularity", 0.1, 0.017, "radians")],
+        ),
+    ],
+)
 def test_each_namespace(tree, expected):
     assert list(differences(config.load(tree).to_tree())) == expected
 
@@ -52,8 +69,9 @@ def test_every_difference_of_the_tutorial_is_found():
 
 
 def test_costmaps_and_robots_share_rows():
-    rows = parameter_rows(flight(*(robot(k, (1.0 + k, 1.0), parameters=tree_of(k))
-                                   for k in range(2))))
+    rows = parameter_rows(
+        flight(*(robot(k, (1.0 + k, 1.0), parameters=tree_of(k)) for k in range(2)))
+    )
     assert ParameterRow("*_costmap/robot_base_frame", "base_link{i}", "base_link", "") in rows
     assert ParameterRow("*_costmap/robot_radius", "0.35", "0.46", "metres") in rows
     assert ParameterRow("global_costmap/width", "12", "10", "metres") in rows
@@ -62,11 +80,16 @@ def test_costmaps_and_robots_share_rows():
 
 
 def test_what_one_robot_alone_has_names_it():
-    rows = parameter_rows(flight(
-        robot(0, (1.0, 1.0), parameters=tree_of(0)),
-        robot(1, (2.0, 1.0), parameters=tree_of(1, controller_frequency=5.0))))
+    rows = parameter_rows(
+        flight(
+            robot(0, (1.0, 1.0), parameters=tree_of(0)),
+            robot(1, (2.0, 1.0), parameters=tree_of(1, controller_frequency=5.0)),
+        )
+    )
     assert [(row.value, row.who) for row in rows if row.path == "controller_frequency"] == [
-        ("1", "quad0"), ("5", "quad1")]
+        ("1", "quad0"),
+        ("5", "quad1"),
+    ]
 
 
 def test_unknown_parameters_make_no_rows():

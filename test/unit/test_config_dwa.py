@@ -1,4 +1,5 @@
 """The tree of DWAPlannerROS: defaults, old names, and where the latch is looked for."""
+
 from __future__ import annotations
 
 from dataclasses import fields
@@ -19,10 +20,12 @@ def settled(namespace, **node_level):
 
 
 def test_every_field_has_a_spelling_and_the_same_default():
-    of_table = {parameter.field: parameter.in_force
-                for parameter in DWA_TABLE.parameters if parameter.field}
-    assert of_table == {field.name: field.default for field in fields(DwaParams)
-                        if field.name not in MENDS}
+    of_table = {
+        parameter.field: parameter.in_force for parameter in DWA_TABLE.parameters if parameter.field
+    }
+    assert of_table == {
+        field.name: field.default for field in fields(DwaParams) if field.name not in MENDS
+    }
 
 
 def test_defaults_are_values_that_may_be_written():
@@ -45,8 +48,15 @@ def test_an_empty_namespace_is_completed():
 
 
 def test_values_reach_their_fields():
-    tree, _ = settled({"max_vel_trans": 1.5, "theta_stopped_vel": 0.3, "vth_samples": 7.0,
-                       "use_dwa": False, "sum_scores": True})
+    tree, _ = settled(
+        {
+            "max_vel_trans": 1.5,
+            "theta_stopped_vel": 0.3,
+            "vth_samples": 7.0,
+            "use_dwa": False,
+            "sum_scores": True,
+        }
+    )
     params = dwa_params(tree)
     assert params.max_vel_trans_mps == 1.5
     assert params.rot_stopped_velocity_radps == 0.3
@@ -54,39 +64,62 @@ def test_values_reach_their_fields():
     assert not params.use_dwa and params.sum_scores
 
 
-@pytest.mark.parametrize("old, new", [
-    ("max_trans_vel", "max_vel_trans"), ("max_rot_vel", "max_vel_theta"),
-    ("acc_lim_th", "acc_lim_theta"), ("rot_stopped_vel", "theta_stopped_vel")])
+@pytest.mark.parametrize(
+    "old, new",
+    [
+        ("max_trans_vel", "max_vel_trans"),
+        ("max_rot_vel", "max_vel_theta"),
+        ("acc_lim_th", "acc_lim_theta"),
+        ("rot_stopped_vel", "theta_stopped_vel"),
+    ],
+)
 def test_old_names_change_nothing_and_are_told(old, new):
     tree, notes = settled({old: 0.7})
     assert dwa_params(tree) == DwaParams()
     assert [(remark.kind, remark.place) for remark in notes.remarks] == [
-        (IGNORED, f"/move_base0/DWAPlannerROS/{old}")]
+        (IGNORED, f"/move_base0/DWAPlannerROS/{old}")
+    ]
     assert notes.remarks[0].text == f"ignored by move_base: the name is {new}"
 
 
-@pytest.mark.parametrize("own, node_level, in_force", [
-    (None, None, False), (True, None, True), (None, True, True), (False, True, False)])
+@pytest.mark.parametrize(
+    "own, node_level, in_force",
+    [(None, None, False), (True, None, True), (None, True, True), (False, True, False)],
+)
 def test_latch_is_looked_for_upwards(own, node_level, in_force):
     name = "latch_xy_goal_tolerance"
-    tree, notes = settled({} if own is None else {name: own},
-                          **({} if node_level is None else {name: node_level}))
+    tree, notes = settled(
+        {} if own is None else {name: own}, **({} if node_level is None else {name: node_level})
+    )
     assert not notes.problems and not notes.remarks
     assert dwa_params(tree).latch_xy_goal_tolerance == in_force
 
 
 def test_a_latch_that_is_no_flag():
     _, notes = settled({}, latch_xy_goal_tolerance="yes")
-    assert notes.problems == ["/move_base0/latch_xy_goal_tolerance: 'yes' is neither true nor"
-                              " false; expected true or false"]
+    assert notes.problems == [
+        "/move_base0/latch_xy_goal_tolerance: 'yes' is neither true nor"
+        " false; expected true or false"
+    ]
 
 
 def test_what_cannot_be_is_a_problem_and_what_is_odd_a_remark():
-    tree, notes = settled({"sim_time": 0.0, "vx_samples": 0, "acc_lim_x": 30.0,
-                           "occdist_scale": 0, "max_vel_tran": 1.0})
-    assert notes.problems == ["/move_base0/DWAPlannerROS/sim_time: 0.0 cannot be; expected a"
-                              " positive number of seconds"]
+    tree, notes = settled(
+        {
+            "sim_time": 0.0,
+            "vx_samples": 0,
+            "acc_lim_x": 30.0,
+            "occdist_scale": 0,
+            "max_vel_tran": 1.0,
+        }
+    )
+    assert notes.problems == [
+        "/move_base0/DWAPlannerROS/sim_time: 0.0 cannot be; expected a positive number of seconds"
+    ]
     assert {remark.place.split("/")[-1]: remark.kind for remark in notes.remarks} == {
-        "vx_samples": CLAMPED, "acc_lim_x": CLAMPED, "occdist_scale": CAUTION,
-        "max_vel_tran": UNKNOWN}
+        "vx_samples": CLAMPED,
+        "acc_lim_x": CLAMPED,
+        "occdist_scale": CAUTION,
+        "max_vel_tran": UNKNOWN,
+    }
     assert (tree[DWA_PLANNER]["vx_samples"], tree[DWA_PLANNER]["acc_lim_x"]) == (1, 20.0)

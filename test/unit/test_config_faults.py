@@ -1,4 +1,5 @@
 """Values that cannot be used: each is an error with its place, all of them at once."""
+
 from __future__ import annotations
 
 import pytest
@@ -13,76 +14,130 @@ def problems(tree):
     return caught.value.problems
 
 
-@pytest.mark.parametrize("tree, complaint", [
-    ({"local_costmap": {"width": "three"}},
-     "local_costmap/width: 'three' is not a number; expected a positive number of metres"),
-    ({"local_costmap": {"resolution": 0}},
-     "local_costmap/resolution: 0 cannot be; expected a positive number of metres"),
-    ({"local_costmap": {"robot_radius": -0.1}},
-     "local_costmap/robot_radius: -0.1 cannot be; expected a number of metres, 0 or more"),
-    ({"global_costmap": {"update_frequency": float("nan")}},
-     "global_costmap/update_frequency: nan is not finite; expected a number of Hz, 0 or more"),
-    ({"global_costmap": {"origin_x": float("inf")}},
-     "global_costmap/origin_x: inf is not finite; expected a number of metres"),
-    ({"global_costmap": {"inflation_radius": True}},
-     "global_costmap/inflation_radius: True is not a number; expected a number of metres, 0 or"
-     " more"),
-    ({"global_costmap": {"inflation_radius": "1e-1"}},
-     "global_costmap/inflation_radius: '1e-1' is not a number but a text (write 0.1); expected a"
-     " number of metres, 0 or more"),
-    ({"local_costmap": {"rolling_window": 1}},
-     "local_costmap/rolling_window: 1 is neither true nor false; expected true or false"),
-    ({"local_costmap": {"static_map": "yes"}},
-     "local_costmap/static_map: 'yes' is neither true nor false; expected true or false"),
-    ({"local_costmap": {"global_frame": 3}},
-     "local_costmap/global_frame: 3 is not a text; expected a frame's name"),
-    ({"local_costmap": 3},
-     "local_costmap: 3 is a value; expected a namespace of parameters"),
-    ({"controller_frequency": 0},
-     "controller_frequency: 0 cannot be; expected a positive number of Hz"),
-    ({"max_planning_retries": "many"},
-     "max_planning_retries: 'many' is not a number; expected a whole number"),
-    ({"TrajectoryPlannerROS": {"y_vels": [-0.3, 0.3]}},
-     "TrajectoryPlannerROS/y_vels: [-0.3, 0.3] is not a text; expected numbers of m/s separated by"
-     " commas"),
-    ({"TrajectoryPlannerROS": {"pdist_scale": "high"}},
-     "TrajectoryPlannerROS/pdist_scale: 'high' is not a number; expected a number, 0 or more"),
-    ({"local_costmap": {"obstacle_layer": {"combination_method": 2}}},
-     "local_costmap/obstacle_layer/combination_method: 2 is no choice; expected one of 0"
-     " (Overwrite), 1 (Maximum), 99 (Nothing)"),
-    ({"local_costmap": {"observation_sources": "scan", "scan": {"data_type": "Laser"}}},
-     "local_costmap/scan/data_type: 'Laser' is no sensor's type; expected LaserScan, PointCloud or"
-     " PointCloud2"),
-    ({"local_costmap": {"plugins": [{"name": "obstacles"}]}},
-     "local_costmap/plugins: {'name': 'obstacles'} is no layer; expected {name: , type: }"),
-    ({"local_costmap": {"footprint": [[0, 1], [1, 0]]}},
-     "local_costmap/footprint: [[0, 1], [1, 0]]: fewer than three points; expected a list [[x1,"
-     " y1], [x2, y2], [x3, y3], ...] of metres"),
-    ({"local_costmap": {"footprint": "[[0, 1], [1, 0], [x, 1]]"}},
-     "local_costmap/footprint: '[[0, 1], [1, 0], [x, 1]]': 'x' is not a number; expected a list"
-     " [[x1, y1], [x2, y2], [x3, y3], ...] of metres"),
-    ({"recovery_behaviors": "none"},
-     "recovery_behaviors: 'none' is not a list; expected a list of {name: , type: }"),
-    ({"recovery_behaviors": [{"name": "clear", "type": "ClearCostmapRecovery"}],
-      "clear": {"layer_names": "obstacle_layer"}},
-     "clear/layer_names: 'obstacle_layer' is no list of names; expected the names of layers, as in"
-     " [obstacle_layer]"),
-    ({"recovery_behaviors": [{"name": "clear", "type": "ClearCostmapRecovery"}],
-      "clear": {"affected_maps": "all"}},
-     "clear/affected_maps: 'all' is no choice; expected local, global or both"),
-], ids=lambda value: "-".join(value) if isinstance(value, dict) else "")
+@pytest.mark.parametrize(
+    "tree, complaint",
+    [
+        (
+            {"local_costmap": {"width": "three"}},
+            "local_costmap/width: 'three' is not a number; expected a positive number of metres",
+        ),
+        (
+            {"local_costmap": {"resolution": 0}},
+            "local_costmap/resolution: 0 cannot be; expected a positive number of metres",
+        ),
+        (
+            {"local_costmap": {"robot_radius": -0.1}},
+            "local_costmap/robot_radius: -0.1 cannot be; expected a number of metres, 0 or more",
+        ),
+        (
+            {"global_costmap": {"update_frequency": float("nan")}},
+            "global_costmap/update_frequency: nan is not finite; expected a number of Hz, 0 or more",
+        ),
+        (
+            {"global_costmap": {"origin_x": float("inf")}},
+            "global_costmap/origin_x: inf is not finite; expected a number of metres",
+        ),
+        (
+            {"global_costmap": {"inflation_radius": True}},
+            "global_costmap/inflation_radius: True is not a number; expected a number of metres, 0 or"
+            " more",
+        ),
+        (
+            {"global_costmap": {"inflation_radius": "1e-1"}},
+            "global_costmap/inflation_radius: '1e-1' is not a number but a text (write 0.1); expected a"
+            " number of metres, 0 or more",
+        ),
+        (
+            {"local_costmap": {"rolling_window": 1}},
+            "local_costmap/rolling_window: 1 is neither true nor false; expected true or false",
+        ),
+        (
+            {"local_costmap": {"static_map": "yes"}},
+            "local_costmap/static_map: 'yes' is neither true nor false; expected true or false",
+        ),
+        (
+            {"local_costmap": {"global_frame": 3}},
+            "local_costmap/global_frame: 3 is not a text; expected a frame's name",
+        ),
+        ({"local_costmap": 3}, "local_costmap: 3 is a value; expected a namespace of parameters"),
+        (
+            {"controller_frequency": 0},
+            "controller_frequency: 0 cannot be; expected a positive number of Hz",
+        ),
+        (
+            {"max_planning_retries": "many"},
+            "max_planning_retries: 'many' is not a number; expected a whole number",
+        ),
+        (
+            {"TrajectoryPlannerROS": {"y_vels": [-0.3, 0.3]}},
+            "TrajectoryPlannerROS/y_vels: [-0.3, 0.3] is not a text; expected numbers of m/s separated by"
+            " commas",
+        ),
+        (
+            {"TrajectoryPlannerROS": {"pdist_scale": "high"}},
+            "TrajectoryPlannerROS/pdist_scale: 'high' is not a number; expected a number, 0 or more",
+        ),
+        (
+            {"local_costmap": {"obstacle_layer": {"combination_method": 2}}},
+            "local_costmap/obstacle_layer/combination_method: 2 is no choice; expected one of 0"
+            " (Overwrite), 1 (Maximum), 99 (Nothing)",
+        ),
+        (
+            {"local_costmap": {"observation_sources": "scan", "scan": {"data_type": "Laser"}}},
+            "local_costmap/scan/data_type: 'Laser' is no sensor's type; expected LaserScan, PointCloud or"
+            " PointCloud2",
+        ),
+        (
+            {"local_costmap": {"plugins": [{"name": "obstacles"}]}},
+            "local_costmap/plugins: {'name': 'obstacles'} is no layer; expected {name: , type: }",
+        ),
+        (
+            {"local_costmap": {"footprint": [[0, 1], [1, 0]]}},
+            "local_costmap/footprint: [[0, 1], [1, 0]]: fewer than three points; expected a list [[x1,"
+            " y1], [x2, y2], [x3, y3], ...] of metres",
+        ),
+        (
+            {"local_costmap": {"footprint": "[[0, 1], [1, 0], [x, 1]]"}},
+            "local_costmap/footprint: '[[0, 1], [1, 0], [x, 1]]': 'x' is not a number; expected a list"
+            " [[x1, y1], [x2, y2], [x3, y3], ...] of metres",
+        ),
+        (
+            {"recovery_behaviors": "none"},
+            "recovery_behaviors: 'none' is not a list; expected a list of {name: , type: }",
+        ),
+        (
+            {
+                "recovery_behaviors": [{"name": "clear", "type": "ClearCostmapRecovery"}],
+                "clear": {"layer_names": "obstacle_layer"},
+            },
+            "clear/layer_names: 'obstacle_layer' is no list of names; expected the names of layers, as in"
+            " [obstacle_layer]",
+        ),
+        (
+            {
+                "recovery_behaviors": [{"name": "clear", "type": "ClearCostmapRecovery"}],
+                "clear": {"affected_maps": "all"},
+            },
+            "clear/affected_maps: 'all' is no choice; expected local, global or both",
+        ),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
 def test_fault_is_named_with_place_and_expectation(tree, complaint):
     assert problems(tree) == ["/move_base0/" + complaint]
 
 
 def test_all_faults_are_told_at_once():
-    told = problems({
-        "conservative_reset_dist": "far",
-        "recovery_behaviors": 1,
-        "TrajectoryPlannerROS": {"sim_time": 0},
-        "NavfnROS": {"allow_unknown": "no"},
-        "global_costmap": {"width": None},
-        "local_costmap": {"circumscribed_radius": "wide", "cost_scaling_factor": [1]}})
+    told = problems(
+        {
+            "conservative_reset_dist": "far",
+            "recovery_behaviors": 1,
+            "TrajectoryPlannerROS": {"sim_time": 0},
+            "NavfnROS": {"allow_unknown": "no"},
+            "global_costmap": {"width": None},
+            "local_costmap": {"circumscribed_radius": "wide", "cost_scaling_factor": [1]},
+        }
+    )
     assert [line.split(":")[0] for line in told] == [
         "/move_base0/conservative_reset_dist",
         "/move_base0/TrajectoryPlannerROS/sim_time",
@@ -90,12 +145,14 @@ def test_all_faults_are_told_at_once():
         "/move_base0/global_costmap/width",
         "/move_base0/local_costmap/cost_scaling_factor",  # where it was written, not where it goes
         "/move_base0/local_costmap/circumscribed_radius",
-        "/move_base0/recovery_behaviors"]
+        "/move_base0/recovery_behaviors",
+    ]
 
 
 def test_a_tree_that_is_none():
     assert problems([1, 2]) == [
-        "/move_base0: [1, 2] is no parameter tree; expected names with values"]
+        "/move_base0: [1, 2] is no parameter tree; expected names with values"
+    ]
 
 
 def test_whole_numbers_are_taken_for_doubles_and_the_other_way_round():

@@ -1,4 +1,5 @@
 """YAML files: where each goes, the robot's number, and what is wrong with them."""
+
 from __future__ import annotations
 
 import pytest
@@ -8,8 +9,7 @@ from quad_nav.config.files import PlacedFile
 from quad_nav.errors import InputError
 
 FILES = {
-    "costmap_common_params":
-        "robot_radius: 0.35\nbase_scan: {topic: scan$(arg i), marking: true}\n",
+    "costmap_common_params": "robot_radius: 0.35\nbase_scan: {topic: scan$(arg i), marking: true}\n",
     "local_costmap_params": "local_costmap:\n  width: 3.0\n  robot_radius: 0.2\n",
     "global_costmap_params": "global_costmap: {width: 12.0}\n",
     "base_local_planner_params": "TrajectoryPlannerROS: {max_vel_x: 0.3}\n",
@@ -31,17 +31,25 @@ def problems(*arguments):
 
 def test_common_goes_into_both_costmaps_and_the_own_file_wins(folder):
     assert load_files(folder, {"i": "7"}) == {
-        "global_costmap": {"robot_radius": 0.35, "width": 12.0,
-                           "base_scan": {"topic": "scan7", "marking": True}},
-        "local_costmap": {"robot_radius": 0.2, "width": 3.0,
-                          "base_scan": {"topic": "scan7", "marking": True}},
-        "TrajectoryPlannerROS": {"max_vel_x": 0.3}}
+        "global_costmap": {
+            "robot_radius": 0.35,
+            "width": 12.0,
+            "base_scan": {"topic": "scan7", "marking": True},
+        },
+        "local_costmap": {
+            "robot_radius": 0.2,
+            "width": 3.0,
+            "base_scan": {"topic": "scan7", "marking": True},
+        },
+        "TrajectoryPlannerROS": {"max_vel_x": 0.3},
+    }
 
 
 def test_move_base_file_and_the_robots_own_on_top(folder):
     (folder / "move_base_params.yaml").write_text("controller_frequency: 5.0\n")
     (folder / "robot1.yaml").write_text(
-        "controller_frequency: 9.0\nlocal_costmap: {base_scan: {marking: false}}\n")
+        "controller_frequency: 9.0\nlocal_costmap: {base_scan: {marking: false}}\n"
+    )
     one, two = (load_files(folder, {"i": number}) for number in "12")
     assert (one["controller_frequency"], two["controller_frequency"]) == (9.0, 5.0)
     assert one["local_costmap"]["base_scan"] == {"topic": "scan1", "marking": False}
@@ -66,16 +74,19 @@ def test_values_remember_their_file_and_line(folder):
         load(load_files(folder, {"i": "0"}), "/move_base0")
     assert caught.value.problems == [
         f"/move_base0/local_costmap/width ({folder / 'local_costmap_params.yaml'}:2): 'three' is"
-        " not a number; expected a positive number of metres"]
+        " not a number; expected a positive number of metres"
+    ]
 
 
 def test_missing_files_are_all_named(tmp_path):
     (tmp_path / "global_costmap_params.yaml").write_text("")
     assert problems(tmp_path, {"i": "0"}) == [
-        f"{tmp_path}: no {stem}.yaml or {stem}0.yaml" for stem in (
-            "costmap_common_params", "local_costmap_params", "base_local_planner_params")]
+        f"{tmp_path}: no {stem}.yaml or {stem}0.yaml"
+        for stem in ("costmap_common_params", "local_costmap_params", "base_local_planner_params")
+    ]
     assert problems(tmp_path / "nowhere") == [
-        f"{tmp_path / 'nowhere'}: no such folder; expected one with costmap_common_params.yaml"]
+        f"{tmp_path / 'nowhere'}: no such folder; expected one with costmap_common_params.yaml"
+    ]
 
 
 def test_every_broken_file_is_named_with_its_line(folder):
@@ -98,17 +109,20 @@ def test_substitution_that_stands_for_nothing(folder):
     path = folder / "global_costmap_params.yaml"
     assert problems(folder, {"i": "0"}) == [
         f"{path}:2: $(find quad) stands for nothing; expected $(arg i)",
-        f"{path}:3: $(arg j) stands for nothing; expected $(arg i)"]
+        f"{path}:3: $(arg j) stands for nothing; expected $(arg i)",
+    ]
 
 
 def test_key_that_is_there_twice_counts_once_and_is_told(folder):
     (folder / "local_costmap_params.yaml").write_text(
-        "local_costmap:\n  width: 3.0\n  height: 3.0\n  width: 5.0\n")
+        "local_costmap:\n  width: 3.0\n  height: 3.0\n  width: 5.0\n"
+    )
     tree = load_files(folder, {"i": "0"})
     assert tree["local_costmap"]["width"] == 5.0
     assert [str(remark) for remark in load(tree, "").remarks if "twice" in remark.text] == [
         f"local_costmap/width ({folder / 'local_costmap_params.yaml'}:4): there twice; YAML takes"
-        " the last one"]
+        " the last one"
+    ]
 
 
 def test_empty_file_sets_nothing(folder):
@@ -119,21 +133,28 @@ def test_empty_file_sets_nothing(folder):
 def test_anchors_and_merge_keys(folder):
     (folder / "base_local_planner_params.yaml").write_text(
         "x: &fast {max_vel_x: 0.5, min_vel_x: 0.1}\n"
-        "TrajectoryPlannerROS: {<<: *fast, max_vel_x: 0.7}\n")
+        "TrajectoryPlannerROS: {<<: *fast, max_vel_x: 0.7}\n"
+    )
     tree = load_files(folder, {"i": "0"})
     assert tree["TrajectoryPlannerROS"] == {"max_vel_x": 0.7, "min_vel_x": 0.1}
     assert tree.remarks == []  # a merge key's value under an own one is no duplicate
 
 
 def test_costmaps_own_files_may_leave_the_namespace_to_roslaunch(tmp_path):
-    texts = {"costmap_common.yaml": "width: 1.0\nheight: 2.0\n",
-             "costmap_local.yaml": "width: 3.0\n",
-             "global_costmap_params.yaml": "width: 4.0\n", "planner.yaml": "width: 5.0\n"}
+    texts = {
+        "costmap_common.yaml": "width: 1.0\nheight: 2.0\n",
+        "costmap_local.yaml": "width: 3.0\n",
+        "global_costmap_params.yaml": "width: 4.0\n",
+        "planner.yaml": "width: 5.0\n",
+    }
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
     tree = load_files([tmp_path / name for name in texts])
-    assert tree == {"local_costmap": {"width": 3.0, "height": 2.0},
-                    "global_costmap": {"width": 4.0, "height": 2.0}, "width": 5.0}
+    assert tree == {
+        "local_costmap": {"width": 3.0, "height": 2.0},
+        "global_costmap": {"width": 4.0, "height": 2.0},
+        "width": 5.0,
+    }
     assert tree.origins["local_costmap/width"] == f"{tmp_path / 'costmap_local.yaml'}:1"
 
 
@@ -146,7 +167,8 @@ def test_a_file_may_be_placed(tmp_path):
 def test_dump_of_a_parameter_server(tmp_path):
     (tmp_path / "dump.yaml").write_text(
         "move_base0:\n  controller_frequency: 1.0\nmove_base1:\n  controller_frequency: 2.0\n"
-        "rosversion: '1.15'\n")
+        "rosversion: '1.15'\n"
+    )
     trees = [load_files([tmp_path / "dump.yaml"], {"i": number}) for number in "01"]
     assert trees == [{"controller_frequency": 1.0}, {"controller_frequency": 2.0}]
     assert trees[1].origins == {"controller_frequency": f"{tmp_path / 'dump.yaml'}:4"}

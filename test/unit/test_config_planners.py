@@ -1,16 +1,17 @@
 """Which planners fly, with which parameters, and what is said about the others."""
+
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.config import load, planners, reconfigurable, updated, values
 from quad_nav.control.dwa_planner import DwaParams
 from quad_nav.errors import InputError
 from quad_nav.plan.carrot import Carrot, CarrotParams
 from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
 from quad_nav.plan.navfn import Navfn, NavfnParams
+from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
 SEEING = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}}
 DWA = {"base_local_planner": "dwa_local_planner/DWAPlannerROS"}
@@ -23,15 +24,25 @@ def told(tree):
     return [(remark.kind, str(remark)) for remark in load(tree, "/nav").remarks]
 
 
-@pytest.mark.parametrize("name, namespace, planner, params", [
-    ("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}}, Navfn,
-     NavfnParams(allow_unknown=False)),
-    ("global_planner/GlobalPlanner",
-     {"GlobalPlanner": {"use_dijkstra": False, "cost_factor": 1, "orientation_mode": 2}},
-     SearchPlanner, SearchPlannerParams(use_dijkstra=False, cost_factor=1.0, orientation_mode=2)),
-    ("carrot_planner/CarrotPlanner", {}, Carrot, CarrotParams()),
-    ("CarrotPlanner", {}, Carrot, CarrotParams()),
-])
+@pytest.mark.parametrize(
+    "name, namespace, planner, params",
+    [
+        (
+            "navfn/NavfnROS",
+            {"NavfnROS": {"allow_unknown": False}},
+            Navfn,
+            NavfnParams(allow_unknown=False),
+        ),
+        (
+            "global_planner/GlobalPlanner",
+            {"GlobalPlanner": {"use_dijkstra": False, "cost_factor": 1, "orientation_mode": 2}},
+            SearchPlanner,
+            SearchPlannerParams(use_dijkstra=False, cost_factor=1.0, orientation_mode=2),
+        ),
+        ("carrot_planner/CarrotPlanner", {}, Carrot, CarrotParams()),
+        ("CarrotPlanner", {}, Carrot, CarrotParams()),
+    ],
+)
 def test_chosen_planner_is_built_with_its_parameters(name, namespace, planner, params):
     configuration = load({"base_global_planner": name, **namespace})
     navigator = build_navigator(configuration)
@@ -41,15 +52,18 @@ def test_chosen_planner_is_built_with_its_parameters(name, namespace, planner, p
     assert navigator.planner.params == params
 
 
-@pytest.mark.parametrize("key, name", [
-    (key, name) for key, slot in planners.SLOTS.items() for name in slot.types])
+@pytest.mark.parametrize(
+    "key, name", [(key, name) for key, slot in planners.SLOTS.items() for name in slot.types]
+)
 def test_every_planner_that_can_be_chosen_can_be_built(key, name):
-    off = {"refuse_colliding_escape": False, "predict_goal_turn": False}
-    configuration = load({key: name, "mends": off})
+    off = {"reject_colliding_escape": False, "predict_goal_turn": False}
+    configuration = load({key: name, "fixes": off})
     navigator = build_navigator(configuration)
     made = {"base_global_planner": navigator.planner, "base_local_planner": navigator.controller}
-    chosen = {"base_global_planner": configuration.global_planner,
-              "base_local_planner": configuration.local_planner}
+    chosen = {
+        "base_global_planner": configuration.global_planner,
+        "base_local_planner": configuration.local_planner,
+    }
     assert made[key].params == chosen[key]
     apply_configuration(navigator, configuration)
 
@@ -65,40 +79,69 @@ def test_carrot_has_the_footprint_in_force():
     assert np.abs(navigator.planner.footprint).max() == pytest.approx(0.21)
 
 
-@pytest.mark.parametrize("tree, kind, line", [
-    ({"GlobalPlanner": {"anything": 1}}, "unused",
-     "GlobalPlanner: unused: base_global_planner is navfn/NavfnROS"),
-    ({**SEARCH, "NavfnROS": {"allow_unknown": 3}}, "unused",
-     "NavfnROS: unused: base_global_planner is global_planner/GlobalPlanner"),
-    ({**SEARCH, "GlobalPlanner": {"default_tolerance": 0.5}}, "ignored",
-     "GlobalPlanner/default_tolerance: ignored by move_base: the original reads it and never uses"
-     " it"),
-    ({**SEARCH, "GlobalPlanner": {"use_djikstra": True}}, "unknown",
-     "GlobalPlanner/use_djikstra: unknown, nothing reads it; did you mean use_dijkstra?"),
-    ({"base_global_planner": "GlobalPlanner"}, "renamed",
-     "base_global_planner: GlobalPlanner is called global_planner/GlobalPlanner today"),
-    ({"base_global_planner": "sbpl/SBPLLatticePlanner"}, "unsupported",
-     "base_global_planner: sbpl/SBPLLatticePlanner is not supported here; navfn/NavfnROS flies"
-     " instead"),
-    ({"TebLocalPlannerROS": {}}, "unsupported",
-     "TebLocalPlannerROS: no such planner flies here, nothing below is read"),
-], ids=str)
+@pytest.mark.parametrize(
+    "tree, kind, line",
+    [
+        (
+            {"GlobalPlanner": {"anything": 1}},
+            "unused",
+            "GlobalPlanner: unused: base_global_planner is navfn/NavfnROS",
+        ),
+        (
+            {**SEARCH, "NavfnROS": {"allow_unknown": 3}},
+            "unused",
+            "NavfnROS: unused: base_global_planner is global_planner/GlobalPlanner",
+        ),
+        (
+            {**SEARCH, "GlobalPlanner": {"default_tolerance": 0.5}},
+            "ignored",
+            "GlobalPlanner/default_tolerance: ignored by move_base: the original reads it and never uses"
+            " it",
+        ),
+        (
+            {**SEARCH, "GlobalPlanner": {"use_djikstra": True}},
+            "unknown",
+            "GlobalPlanner/use_djikstra: unknown, nothing reads it; did you mean use_dijkstra?",
+        ),
+        (
+            {"base_global_planner": "GlobalPlanner"},
+            "renamed",
+            "base_global_planner: GlobalPlanner is called global_planner/GlobalPlanner today",
+        ),
+        (
+            {"base_global_planner": "sbpl/SBPLLatticePlanner"},
+            "unsupported",
+            "base_global_planner: sbpl/SBPLLatticePlanner is not supported here; navfn/NavfnROS flies"
+            " instead",
+        ),
+        (
+            {"TebLocalPlannerROS": {}},
+            "unsupported",
+            "TebLocalPlannerROS: no such planner flies here, nothing below is read",
+        ),
+    ],
+    ids=str,
+)
 def test_the_one_remark(tree, kind, line):
     assert told(tree) == [(kind, "/nav/" + line)]
 
 
 def test_dwa_flies_with_its_own_parameters_and_those_at_the_nodes_level():
-    tree = {**DWA, "latch_xy_goal_tolerance": True, "controller_frequency": 5.0,
-            "DWAPlannerROS": {"max_vel_x": 0.3, "controller_frequency": 10.0}}
+    tree = {
+        **DWA,
+        "latch_xy_goal_tolerance": True,
+        "controller_frequency": 5.0,
+        "DWAPlannerROS": {"max_vel_x": 0.3, "controller_frequency": 10.0},
+    }
 
     configuration = load(tree, "/nav")
 
-    assert configuration.local_planner == DwaParams(
-        max_vel_x_mps=0.3, latch_xy_goal_tolerance=True)
+    assert configuration.local_planner == DwaParams(max_vel_x_mps=0.3, latch_xy_goal_tolerance=True)
     assert configuration.local_planner_period_s == 0.1
     assert [line for kind, line in told(tree)] == [
         "/nav/DWAPlannerROS/controller_frequency: rollouts reckon with 10.0 Hz, while the loop"
-        " runs at 5.0 Hz"]
+        " runs at 5.0 Hz"
+    ]
     changed = updated(configuration, "DWAPlannerROS", {"max_vel_x": 0.2})
     assert changed.local_planner.max_vel_x_mps == 0.2
     assert list(reconfigurable(changed))[:2] == ["", "DWAPlannerROS"]
@@ -111,9 +154,13 @@ def test_turns_take_their_limits_from_the_trajectory_planner_when_it_does_not_fl
 
     assert dict(configuration.recoveries)["rotate_recovery"].max_vel_theta_radps == 0.4
     assert told(tree) == [
-        ("unused", "/nav/TrajectoryPlannerROS: unused: base_local_planner is"
-                   " dwa_local_planner/DWAPlannerROS; recoveries that turn take its limits all the"
-                   " same")]
+        (
+            "unused",
+            "/nav/TrajectoryPlannerROS: unused: base_local_planner is"
+            " dwa_local_planner/DWAPlannerROS; recoveries that turn take its limits all the"
+            " same",
+        )
+    ]
     assert "TrajectoryPlannerROS" not in reconfigurable(configuration)
     tree["TrajectoryPlannerROS"]["max_vel_theta"] = "fast"
     with pytest.raises(InputError, match="TrajectoryPlannerROS/max_vel_theta: 'fast' is not a"):
@@ -122,16 +169,22 @@ def test_turns_take_their_limits_from_the_trajectory_planner_when_it_does_not_fl
 
 def test_global_planner_is_reconfigurable():
     configuration = load({**SEARCH, "GlobalPlanner": {"neutral_cost": 60}})
-    assert list(reconfigurable(configuration))[:3] == [
-        "", "TrajectoryPlannerROS", "GlobalPlanner"]
+    assert list(reconfigurable(configuration))[:3] == ["", "TrajectoryPlannerROS", "GlobalPlanner"]
     assert values(configuration, "GlobalPlanner") == {
-        "lethal_cost": 253, "neutral_cost": 60, "cost_factor": 3.0, "publish_potential": True,
-        "orientation_mode": 1, "orientation_window_size": 1, "outline_map": True}
+        "lethal_cost": 253,
+        "neutral_cost": 60,
+        "cost_factor": 3.0,
+        "publish_potential": True,
+        "orientation_mode": 1,
+        "orientation_window_size": 1,
+        "outline_map": True,
+    }
 
     changed = updated(configuration, "GlobalPlanner", {"cost_factor": 9.0, "orientation_mode": 3})
 
     assert changed.global_planner == SearchPlannerParams(
-        neutral_cost=60, cost_factor=5.0, orientation_mode=3)
+        neutral_cost=60, cost_factor=5.0, orientation_mode=3
+    )
     assert changed.local_planner == configuration.local_planner
     navigator = build_navigator(configuration)
     apply_configuration(navigator, changed)
@@ -151,15 +204,20 @@ def test_planners_without_reconfigurable_parameters():
 
 
 def test_a_planner_cannot_be_exchanged_in_flight():
-    with pytest.raises(InputError, match="^base_global_planner: 'navfn/NavfnROS' cannot take over"
-                                         " in flight; expected global_planner/GlobalPlanner$"):
+    with pytest.raises(
+        InputError,
+        match="^base_global_planner: 'navfn/NavfnROS' cannot take over"
+        " in flight; expected global_planner/GlobalPlanner$",
+    ):
         updated(load(SEARCH), "", {"base_global_planner": "navfn/NavfnROS"})
     same = updated(load(SEARCH), "", {**SEARCH, "planner_frequency": 1.0})
     assert same.navigator.planner_frequency_hz == 1.0
 
 
 def test_a_choice_that_is_none():
-    for value, expected in ((3, "3 is not a text; expected a plugin's name"),
-                            (None, "None is not a text; expected a plugin's name")):
+    for value, expected in (
+        (3, "3 is not a text; expected a plugin's name"),
+        (None, "None is not a text; expected a plugin's name"),
+    ):
         with pytest.raises(InputError, match=expected):
             load({"base_global_planner": value})

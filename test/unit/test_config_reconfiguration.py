@@ -1,4 +1,5 @@
 """Changes while a configuration is in force, and what dynamic_reconfigure is told about them."""
+
 from __future__ import annotations
 
 import pytest
@@ -22,21 +23,53 @@ def configuration():
 def test_namespaces_and_the_order_of_parameters(configuration):
     namespaces = reconfigurable(configuration)
     assert list(namespaces) == [
-        "", "TrajectoryPlannerROS", "global_costmap", "global_costmap/obstacle_layer",
-        "global_costmap/inflation_layer", "local_costmap", "local_costmap/static_layer",
-        "local_costmap/obstacle_layer", "local_costmap/inflation_layer", "mends"]
-    names = {namespace: [parameter.name for parameter in parameters]
-             for namespace, parameters in namespaces.items()}
+        "",
+        "TrajectoryPlannerROS",
+        "global_costmap",
+        "global_costmap/obstacle_layer",
+        "global_costmap/inflation_layer",
+        "local_costmap",
+        "local_costmap/static_layer",
+        "local_costmap/obstacle_layer",
+        "local_costmap/inflation_layer",
+        "fixes",
+    ]
+    names = {
+        namespace: [parameter.name for parameter in parameters]
+        for namespace, parameters in namespaces.items()
+    }
     assert names["local_costmap"] == [
-        "transform_tolerance", "update_frequency", "publish_frequency", "width", "height",
-        "resolution", "origin_x", "origin_y", "footprint", "robot_radius", "footprint_padding"]
+        "transform_tolerance",
+        "update_frequency",
+        "publish_frequency",
+        "width",
+        "height",
+        "resolution",
+        "origin_x",
+        "origin_y",
+        "footprint",
+        "robot_radius",
+        "footprint_padding",
+    ]
     assert names["local_costmap/obstacle_layer"] == [
-        "enabled", "footprint_clearing_enabled", "max_obstacle_height", "combination_method"]
+        "enabled",
+        "footprint_clearing_enabled",
+        "max_obstacle_height",
+        "combination_method",
+    ]
     assert names["local_costmap/inflation_layer"] == [
-        "enabled", "cost_scaling_factor", "inflation_radius", "inflate_unknown"]
+        "enabled",
+        "cost_scaling_factor",
+        "inflation_radius",
+        "inflate_unknown",
+    ]
     assert names["local_costmap/static_layer"] == ["enabled"]
-    assert names[""][:4] == ["base_global_planner", "base_local_planner", "planner_frequency",
-                             "controller_frequency"]
+    assert names[""][:4] == [
+        "base_global_planner",
+        "base_local_planner",
+        "planner_frequency",
+        "controller_frequency",
+    ]
     assert len(names[""]) == 16
     assert len(names["TrajectoryPlannerROS"]) == 28
     assert names["TrajectoryPlannerROS"][-2:] == ["y_vels", "restore_defaults"]
@@ -72,18 +105,31 @@ def test_changes_of_costmaps_and_layers(configuration):
 
 def test_voxel_layer():
     configuration = load({"local_costmap": {"map_type": "voxel"}}, "")
-    names = [parameter.name
-             for parameter in reconfigurable(configuration)["local_costmap/obstacle_layer"]]
-    assert names == ["enabled", "footprint_clearing_enabled", "max_obstacle_height", "origin_z",
-                     "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold",
-                     "combination_method"]
+    names = [
+        parameter.name
+        for parameter in reconfigurable(configuration)["local_costmap/obstacle_layer"]
+    ]
+    assert names == [
+        "enabled",
+        "footprint_clearing_enabled",
+        "max_obstacle_height",
+        "origin_z",
+        "z_resolution",
+        "z_voxels",
+        "unknown_threshold",
+        "mark_threshold",
+        "combination_method",
+    ]
     changed = updated(configuration, "local_costmap/obstacle_layer", {"z_voxels": 4})
     assert dict(changed.local_costmap.layers)["obstacle_layer"].z_voxels == 4
 
 
 def test_values_are_clamped(configuration):
-    changed = updated(configuration, "TrajectoryPlannerROS",
-                      {"max_vel_x": -3.0, "vx_samples": 1000, "min_vel_theta": 0.5})
+    changed = updated(
+        configuration,
+        "TrajectoryPlannerROS",
+        {"max_vel_x": -3.0, "vx_samples": 1000, "min_vel_theta": 0.5},
+    )
     planner = changed.local_planner
     assert (planner.max_vel_x_mps, planner.min_vel_theta_radps) == (0.0, 0.0)
     assert planner.vx_samples == 300
@@ -113,15 +159,24 @@ def test_restore_defaults_goes_back_to_what_was_loaded(configuration):
 
 def test_changes_that_cannot_be_made_are_all_told_and_none_is_made(configuration):
     with pytest.raises(InputError) as caught:
-        updated(configuration, "", {
-            "planner_frequency": 2.0, "controller_frequency": 0.0, "planner_patience": float("nan"),
-            "shutdown_costmaps": 1, "base_local_planner": "dwa_local_planner/DWAPlannerROS"})
+        updated(
+            configuration,
+            "",
+            {
+                "planner_frequency": 2.0,
+                "controller_frequency": 0.0,
+                "planner_patience": float("nan"),
+                "shutdown_costmaps": 1,
+                "base_local_planner": "dwa_local_planner/DWAPlannerROS",
+            },
+        )
     assert caught.value.problems == [
         "controller_frequency: 0.0 cannot be; expected a positive number of Hz",
         "planner_patience: nan is not finite; expected a number of seconds, 0 or more",
         "shutdown_costmaps: 1 is neither true nor false; expected true or false",
         "base_local_planner: 'dwa_local_planner/DWAPlannerROS' cannot take over in flight;"
-        " expected base_local_planner/TrajectoryPlannerROS"]
+        " expected base_local_planner/TrajectoryPlannerROS",
+    ]
     assert configuration.navigator.planner_frequency_hz == 0.0
 
 
@@ -130,7 +185,8 @@ def test_size_that_no_grid_can_have_is_refused(configuration):
         updated(configuration, "global_costmap", {"width": 21474836})
     assert caught.value.problems == [
         "global_costmap: 21474836 x 10 m cannot be in cells of 0.05 m;"
-        " expected 1 to 100000000 cells"]
+        " expected 1 to 100000000 cells"
+    ]
     with pytest.raises(InputError, match="^local_costmap: 10 x 10 m cannot be in cells of 20 m;"):
         updated(configuration, "local_costmap", {"resolution": 20.0})
 
@@ -142,15 +198,20 @@ def test_more_trajectories_than_can_be_looked_at_are_refused(configuration):
     assert caught.value.problems == [
         "TrajectoryPlannerROS: 400 trajectories of up to 5.1e+07 points are too many; expected at"
         " most 100000000 points altogether: fewer samples, less sim_time or speed, or a coarser"
-        " granularity"]
+        " granularity"
+    ]
     with pytest.raises(InputError, match="400 trajectories of up to 1.7e[+]08 points"):
         updated(configuration, "TrajectoryPlannerROS", {"angular_sim_granularity": 1e-8})
 
 
-@pytest.mark.parametrize("change, told", [
-    ({"vx_samples": 21474836}, "4294967200 trajectories of up to 37.4 points"),
-    ({"sim_time": 1e16}, "600 trajectories of up to 2.2e[+]17 points"),
-    ({"max_vel_trans": 1e9, "max_vel_y": 1e9}, "600 trajectories of up to 6.8e[+]10 points")])
+@pytest.mark.parametrize(
+    "change, told",
+    [
+        ({"vx_samples": 21474836}, "4294967200 trajectories of up to 37.4 points"),
+        ({"sim_time": 1e16}, "600 trajectories of up to 2.2e[+]17 points"),
+        ({"max_vel_trans": 1e9, "max_vel_y": 1e9}, "600 trajectories of up to 6.8e[+]10 points"),
+    ],
+)
 def test_dwa_planner_is_refused_the_same(change, told):
     dwa = load({"base_local_planner": "dwa_local_planner/DWAPlannerROS"}, "")
     with pytest.raises(InputError, match=told):

@@ -1,4 +1,5 @@
 """What is legal and yet worth a line: unknown, unsupported, ignored, clamped, renamed."""
+
 from __future__ import annotations
 
 import pytest
@@ -20,88 +21,183 @@ def planner(**parameters):
 
 
 def slow(**parameters):
-    return {"recovery_behaviors": [{"name": "slow", "type": "MoveSlowAndClear"}],
-            "slow": parameters}
+    return {
+        "recovery_behaviors": [{"name": "slow", "type": "MoveSlowAndClear"}],
+        "slow": parameters,
+    }
 
 
-@pytest.mark.parametrize("tree, kind, line", [
-    ({"recovery_behaviour_enabled": True}, "unknown",
-     "recovery_behaviour_enabled: unknown, nothing reads it; did you mean"
-     " recovery_behavior_enabled?"),
-    ({"zzz": 1}, "unknown", "zzz: unknown, nothing reads it"),
-    (planner(max_vel_y=0.0), "unknown",
-     "TrajectoryPlannerROS/max_vel_y: unknown, nothing reads it; did you mean max_vel_x?"),
-    (planner(path_distance_bias=32.0), "clamped",
-     "TrajectoryPlannerROS/path_distance_bias: 32.0 becomes 5.0, the largest that move_base"
-     " allows"),
-    (planner(min_vel_theta=0.4), "clamped",
-     "TrajectoryPlannerROS/min_vel_theta: 0.4 becomes 0.0, the largest that move_base allows"),
-    (planner(vx_samples=0), "clamped",
-     "TrajectoryPlannerROS/vx_samples: 0 becomes 1, the smallest that move_base allows"),
-    (planner(vx_samples=6.5), "clamped",
-     "TrajectoryPlannerROS/vx_samples: 6.5 becomes 7: move_base takes whole numbers only"),
-    (planner(pdist_scale=2.0), "renamed",
-     "TrajectoryPlannerROS/pdist_scale: called path_distance_bias today"),
-    (planner(pdist_scale=2.0, path_distance_bias=1.0), "ignored",
-     "TrajectoryPlannerROS/pdist_scale: ignored by move_base: path_distance_bias is there as well"),
-    (planner(acc_limit_x=2.0), "ignored",
-     "TrajectoryPlannerROS/acc_limit_x: ignored by move_base: the name is acc_lim_x"),
-    (planner(meter_scoring=False), "ignored",
-     "TrajectoryPlannerROS/meter_scoring: ignored by move_base: distances are always scored in"
-     " metres"),
-    (planner(world_model="costmap"), "unsupported",
-     "TrajectoryPlannerROS/world_model: known to move_base but not supported here: the costmap is"
-     " the only world model"),
-    (planner(escape_vel=0.1), "caution",
-     "TrajectoryPlannerROS/escape_vel: the robot escapes forwards: a velocity below 0 backs up"),
-    ({**planner(controller_frequency=20.0), "controller_frequency": 5.0}, "caution",
-     "TrajectoryPlannerROS/controller_frequency: rollouts reckon with 20.0 Hz, while the loop runs"
-     " at 5.0 Hz"),
-    ({"TebLocalPlannerROS": {"max_vel_x": 1.0}}, "unsupported",
-     "TebLocalPlannerROS: no such planner flies here, nothing below is read"),
-    ({"DWAPlannerROS": {"max_vel_x": 1.0}}, "unused",
-     "DWAPlannerROS: unused: base_local_planner is base_local_planner/TrajectoryPlannerROS"),
-    ({"base_local_planner": "teb_local_planner/TebLocalPlannerROS"}, "unsupported",
-     "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported here;"
-     " base_local_planner/TrajectoryPlannerROS flies instead"),
-    ({"base_global_planner": "NavfnROS"}, "renamed",
-     "base_global_planner: NavfnROS is called navfn/NavfnROS today"),
-    ({"aggressive_reset": {"reset_distance": 0.5}}, "ignored",
-     "aggressive_reset/reset_distance: ignored by move_base: without recovery_behaviors it is"
-     " 1.84"),
-    ({"recovery_behaviors": [{"name": "back", "type": "twist_recovery/TwistRecovery"}]},
-     "unsupported",
-     "recovery_behaviors/back: twist_recovery/TwistRecovery is not supported here, the"
-     " behaviour is left out; there are clear_costmap_recovery/ClearCostmapRecovery,"
-     " rotate_recovery/RotateRecovery, move_slow_and_clear/MoveSlowAndClear"),
-    (slow(planner_namespace="DWAPlannerROS", max_trans_param_name="max_vel_trans"), "caution",
-     "slow/planner_namespace: DWAPlannerROS does not fly here: TrajectoryPlannerROS is limited"),
-    (slow(max_rot_param_name="max_vel_thet"), "caution",
-     "slow/max_rot_param_name: TrajectoryPlannerROS has no speed of the name max_vel_thet; did you"
-     " mean max_vel_theta?"),
-    (slow(limited_speed=0.1), "unknown",
-     "slow/limited_speed: unknown, nothing reads it; did you mean limited_rot_speed?"),
-    ({"local_costmap": {**SEEING, "plugins": []}}, "ignored",
-     "local_costmap/observation_sources: ignored by move_base: with plugins it belongs below the"
-     " obstacle layer's name"),
-    ({"local_costmap": {"plugins": [], "inflation_radius": 1.0}}, "ignored",
-     "local_costmap/inflation_radius: ignored by move_base: no costmap_2d::InflationLayer in"
-     " plugins takes it"),
-    ({"local_costmap": {"plugins": [], "inflater": {"inflation_radius": 1.0}}}, "ignored",
-     "local_costmap/inflater: ignored by move_base: no layer of that name is in plugins"),
-    ({"local_costmap": {"plugins": [], "static_map": True}}, "ignored",
-     "local_costmap/static_map: ignored by move_base: plugins say which layers there are, and"
-     " costmap_2d::StaticLayer is not among them"),
-    ({"local_costmap": {}}, "caution",
-     "local_costmap: no map and no observation_sources: there are no obstacles in this costmap"),
-    ({"local_costmap": {**SEEING, "obstacle_layer": {"rear": {"topic": "scan1"}}}}, "caution",
-     "local_costmap/obstacle_layer/rear: looks like a source, and observation_sources does not"
-     " name it: nothing reads it"),
-    ({"local_costmap": {"observation_sources": "scan", "scan": {"topic": "scan0"}}}, "caution",
-     "local_costmap/scan: no data_type: move_base listens for a PointCloud"),
-    ({"local_costmap": {**SEEING, "inflation_layer": {"robot_radius": 0.3}}}, "unknown",
-     "local_costmap/inflation_layer/robot_radius: unknown, nothing reads it"),
-], ids=str)
+@pytest.mark.parametrize(
+    "tree, kind, line",
+    [
+        (
+            {"recovery_behaviour_enabled": True},
+            "unknown",
+            "recovery_behaviour_enabled: unknown, nothing reads it; did you mean"
+            " recovery_behavior_enabled?",
+        ),
+        ({"zzz": 1}, "unknown", "zzz: unknown, nothing reads it"),
+        (
+            planner(max_vel_y=0.0),
+            "unknown",
+            "TrajectoryPlannerROS/max_vel_y: unknown, nothing reads it; did you mean max_vel_x?",
+        ),
+        (
+            planner(path_distance_bias=32.0),
+            "clamped",
+            "TrajectoryPlannerROS/path_distance_bias: 32.0 becomes 5.0, the largest that move_base"
+            " allows",
+        ),
+        (
+            planner(min_vel_theta=0.4),
+            "clamped",
+            "TrajectoryPlannerROS/min_vel_theta: 0.4 becomes 0.0, the largest that move_base allows",
+        ),
+        (
+            planner(vx_samples=0),
+            "clamped",
+            "TrajectoryPlannerROS/vx_samples: 0 becomes 1, the smallest that move_base allows",
+        ),
+        (
+            planner(vx_samples=6.5),
+            "clamped",
+            "TrajectoryPlannerROS/vx_samples: 6.5 becomes 7: move_base takes whole numbers only",
+        ),
+        (
+            planner(pdist_scale=2.0),
+            "renamed",
+            "TrajectoryPlannerROS/pdist_scale: called path_distance_bias today",
+        ),
+        (
+            planner(pdist_scale=2.0, path_distance_bias=1.0),
+            "ignored",
+            "TrajectoryPlannerROS/pdist_scale: ignored by move_base: path_distance_bias is there as well",
+        ),
+        (
+            planner(acc_limit_x=2.0),
+            "ignored",
+            "TrajectoryPlannerROS/acc_limit_x: ignored by move_base: the name is acc_lim_x",
+        ),
+        (
+            planner(meter_scoring=False),
+            "ignored",
+            "TrajectoryPlannerROS/meter_scoring: ignored by move_base: distances are always scored in"
+            " metres",
+        ),
+        (
+            planner(world_model="costmap"),
+            "unsupported",
+            "TrajectoryPlannerROS/world_model: known to move_base but not supported here: the costmap is"
+            " the only world model",
+        ),
+        (
+            planner(escape_vel=0.1),
+            "caution",
+            "TrajectoryPlannerROS/escape_vel: the robot escapes forwards: a velocity below 0 backs up",
+        ),
+        (
+            {**planner(controller_frequency=20.0), "controller_frequency": 5.0},
+            "caution",
+            "TrajectoryPlannerROS/controller_frequency: rollouts reckon with 20.0 Hz, while the loop runs"
+            " at 5.0 Hz",
+        ),
+        (
+            {"TebLocalPlannerROS": {"max_vel_x": 1.0}},
+            "unsupported",
+            "TebLocalPlannerROS: no such planner flies here, nothing below is read",
+        ),
+        (
+            {"DWAPlannerROS": {"max_vel_x": 1.0}},
+            "unused",
+            "DWAPlannerROS: unused: base_local_planner is base_local_planner/TrajectoryPlannerROS",
+        ),
+        (
+            {"base_local_planner": "teb_local_planner/TebLocalPlannerROS"},
+            "unsupported",
+            "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported here;"
+            " base_local_planner/TrajectoryPlannerROS flies instead",
+        ),
+        (
+            {"base_global_planner": "NavfnROS"},
+            "renamed",
+            "base_global_planner: NavfnROS is called navfn/NavfnROS today",
+        ),
+        (
+            {"aggressive_reset": {"reset_distance": 0.5}},
+            "ignored",
+            "aggressive_reset/reset_distance: ignored by move_base: without recovery_behaviors it is"
+            " 1.84",
+        ),
+        (
+            {"recovery_behaviors": [{"name": "back", "type": "twist_recovery/TwistRecovery"}]},
+            "unsupported",
+            "recovery_behaviors/back: twist_recovery/TwistRecovery is not supported here, the"
+            " behaviour is left out; there are clear_costmap_recovery/ClearCostmapRecovery,"
+            " rotate_recovery/RotateRecovery, move_slow_and_clear/MoveSlowAndClear",
+        ),
+        (
+            slow(planner_namespace="DWAPlannerROS", max_trans_param_name="max_vel_trans"),
+            "caution",
+            "slow/planner_namespace: DWAPlannerROS does not fly here: TrajectoryPlannerROS is limited",
+        ),
+        (
+            slow(max_rot_param_name="max_vel_thet"),
+            "caution",
+            "slow/max_rot_param_name: TrajectoryPlannerROS has no speed of the name max_vel_thet; did you"
+            " mean max_vel_theta?",
+        ),
+        (
+            slow(limited_speed=0.1),
+            "unknown",
+            "slow/limited_speed: unknown, nothing reads it; did you mean limited_rot_speed?",
+        ),
+        (
+            {"local_costmap": {**SEEING, "plugins": []}},
+            "ignored",
+            "local_costmap/observation_sources: ignored by move_base: with plugins it belongs below the"
+            " obstacle layer's name",
+        ),
+        (
+            {"local_costmap": {"plugins": [], "inflation_radius": 1.0}},
+            "ignored",
+            "local_costmap/inflation_radius: ignored by move_base: no costmap_2d::InflationLayer in"
+            " plugins takes it",
+        ),
+        (
+            {"local_costmap": {"plugins": [], "inflater": {"inflation_radius": 1.0}}},
+            "ignored",
+            "local_costmap/inflater: ignored by move_base: no layer of that name is in plugins",
+        ),
+        (
+            {"local_costmap": {"plugins": [], "static_map": True}},
+            "ignored",
+            "local_costmap/static_map: ignored by move_base: plugins say which layers there are, and"
+            " costmap_2d::StaticLayer is not among them",
+        ),
+        (
+            {"local_costmap": {}},
+            "caution",
+            "local_costmap: no map and no observation_sources: there are no obstacles in this costmap",
+        ),
+        (
+            {"local_costmap": {**SEEING, "obstacle_layer": {"rear": {"topic": "scan1"}}}},
+            "caution",
+            "local_costmap/obstacle_layer/rear: looks like a source, and observation_sources does not"
+            " name it: nothing reads it",
+        ),
+        (
+            {"local_costmap": {"observation_sources": "scan", "scan": {"topic": "scan0"}}},
+            "caution",
+            "local_costmap/scan: no data_type: move_base listens for a PointCloud",
+        ),
+        (
+            {"local_costmap": {**SEEING, "inflation_layer": {"robot_radius": 0.3}}},
+            "unknown",
+            "local_costmap/inflation_layer/robot_radius: unknown, nothing reads it",
+        ),
+    ],
+    ids=str,
+)
 def test_remark(tree, kind, line):
     assert (kind, "/nav/" + line) in remarks(tree)
 
@@ -125,47 +221,74 @@ def test_rollouts_reckon_with_the_planners_own_rate_then_the_nodes():
 
 
 def test_listed_recoveries_are_flown_in_their_order_with_their_parameters():
-    tree = {"recovery_behaviors": [
-                {"name": "look", "type": "rotate_recovery/RotateRecovery"},
-                {"name": "forget", "type": "ClearCostmapRecovery"}],
-            "forget": {"reset_distance": 0.5, "layer_names": ["obstacles"],
-                       "affected_maps": "local"},
-            "look": {"frequency": 10}, **planner(max_vel_theta=0.7, yaw_goal_tolerance=0.2)}
+    tree = {
+        "recovery_behaviors": [
+            {"name": "look", "type": "rotate_recovery/RotateRecovery"},
+            {"name": "forget", "type": "ClearCostmapRecovery"},
+        ],
+        "forget": {"reset_distance": 0.5, "layer_names": ["obstacles"], "affected_maps": "local"},
+        "look": {"frequency": 10},
+        **planner(max_vel_theta=0.7, yaw_goal_tolerance=0.2),
+    }
     configuration = load(tree, "")
     assert configuration.recoveries == (
-        ("look", RotateParams(frequency_hz=10.0, max_vel_theta_radps=0.7,
-                              yaw_goal_tolerance_rad=0.2)),
-        ("forget", ClearCostmapParams(reset_distance_m=0.5, layer_names=("obstacles",),
-                                      affected_maps="local")))
+        (
+            "look",
+            RotateParams(frequency_hz=10.0, max_vel_theta_radps=0.7, yaw_goal_tolerance_rad=0.2),
+        ),
+        (
+            "forget",
+            ClearCostmapParams(
+                reset_distance_m=0.5, layer_names=("obstacles",), affected_maps="local"
+            ),
+        ),
+    )
     assert configuration.navigator.recovery_behaviors == (
         ("look", "rotate_recovery/RotateRecovery"),
-        ("forget", "clear_costmap_recovery/ClearCostmapRecovery"))
+        ("forget", "clear_costmap_recovery/ClearCostmapRecovery"),
+    )
 
 
 def test_going_slowly_limits_every_speed_of_the_planner():
     ((name, params),) = load(slow(limited_trans_speed=0.1, clearing_distance=1), "").recoveries
     assert name == "slow"
     assert params == MoveSlowAndClearParams(
-        clearing_distance_m=1.0, limited_trans_speed_mps=0.1,
+        clearing_distance_m=1.0,
+        limited_trans_speed_mps=0.1,
         translation_fields=("max_vel_x_mps", "min_vel_x_mps", "escape_vel_mps"),
-        rotation_fields=("max_vel_theta_radps", "min_vel_theta_radps",
-                         "min_in_place_vel_theta_radps", "max_rotational_vel_radps"))
+        rotation_fields=(
+            "max_vel_theta_radps",
+            "min_vel_theta_radps",
+            "min_in_place_vel_theta_radps",
+            "max_rotational_vel_radps",
+        ),
+    )
 
 
 def test_going_slowly_limits_the_local_planner_that_flies():
-    tree = {**slow(planner_namespace="DWAPlannerROS", max_trans_param_name="max_trans_vel"),
-            "base_local_planner": "dwa_local_planner/DWAPlannerROS"}
+    tree = {
+        **slow(planner_namespace="DWAPlannerROS", max_trans_param_name="max_trans_vel"),
+        "base_local_planner": "dwa_local_planner/DWAPlannerROS",
+    }
     assert remarks(tree) == []
     ((_, params),) = load(tree, "").recoveries
     assert params.translation_fields == (
-        "max_vel_trans_mps", "min_vel_trans_mps", "max_vel_x_mps", "min_vel_x_mps",
-        "max_vel_y_mps", "min_vel_y_mps")
+        "max_vel_trans_mps",
+        "min_vel_trans_mps",
+        "max_vel_x_mps",
+        "min_vel_x_mps",
+        "max_vel_y_mps",
+        "min_vel_y_mps",
+    )
     assert params.rotation_fields == ("max_vel_theta_radps", "min_vel_theta_radps")
 
 
 def test_the_names_of_speeds_may_be_the_originals_or_the_planners():
-    names = {"planner_namespace": "TrajectoryPlannerROS", "max_trans_param_name": "max_vel_x",
-             "max_rot_param_name": "max_rot_vel"}
+    names = {
+        "planner_namespace": "TrajectoryPlannerROS",
+        "max_trans_param_name": "max_vel_x",
+        "max_rot_param_name": "max_rot_vel",
+    }
     assert remarks(slow(**names)) == []
     assert load(slow(**names), "").recoveries == load(slow(), "").recoveries
 

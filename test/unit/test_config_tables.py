@@ -1,4 +1,5 @@
 """The tables agree with the dataclasses that they fill, and the reference page with them."""
+
 from __future__ import annotations
 
 from dataclasses import fields
@@ -16,8 +17,8 @@ from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
-from quad_nav.mends import Mends
-from quad_nav.navigator import NavigatorParams
+from quad_nav.navigator.fixes import Fixes
+from quad_nav.navigator.navigator import NavigatorParams
 from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
@@ -29,14 +30,17 @@ ROTATE = Table(fixed=tables.ROTATE.fixed + tables.ROTATE_FROM_PLANNER)
 # (dataclass, table, fields that are read in another way than from one row)
 PAIRS = [
     (NavigatorParams, tables.NAVIGATOR, {"recovery_behaviors"}),
-    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER,
-     {"refuse_colliding_escape", "predict_goal_turn"}),
+    (
+        TrajectoryPlannerParams,
+        tables.TRAJECTORY_PLANNER,
+        {"reject_colliding_escape", "predict_goal_turn"},
+    ),
     (NavfnParams, tables.NAVFN, set()),
     (SearchPlannerParams, global_planner_tables.SEARCH_PLANNER, set()),
     (CarrotParams, global_planner_tables.CARROT, set()),
     (ClearCostmapParams, tables.CLEAR_COSTMAP, {"layer_names"}),
     (RotateParams, ROTATE, {"stop_afterwards"}),
-    (Mends, tables.MENDS, set()),
+    (Fixes, tables.MENDS, set()),
     (MoveSlowAndClearParams, tables.MOVE_SLOW, {"translation_fields", "rotation_fields"}),
     (CostmapParams, costmap_tables.COSTMAP, {"layers"}),
     (ObstacleLayerParams, costmap_tables.OBSTACLE_LAYER, {"sources", "track_unknown_space"}),
@@ -48,11 +52,15 @@ PAIRS = [
 TABLES = [table for _, table, _ in PAIRS]
 
 
-@pytest.mark.parametrize("params, table, apart", PAIRS, ids=lambda value: getattr(
-    value, "__name__", ""))
+@pytest.mark.parametrize(
+    "params, table, apart", PAIRS, ids=lambda value: getattr(value, "__name__", "")
+)
 def test_every_field_has_a_spelling_and_the_same_default(params, table, apart):
-    of_table = {parameter.field: parameter.field_value(parameter.in_force)
-                for parameter in table.parameters if parameter.field}
+    of_table = {
+        parameter.field: parameter.field_value(parameter.in_force)
+        for parameter in table.parameters
+        if parameter.field
+    }
     of_class = {field.name: field.default for field in fields(params)}
     assert set(of_class) == set(of_table) | apart
     shared = set(of_table) - apart

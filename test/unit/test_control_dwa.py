@@ -1,4 +1,5 @@
 """The dynamic window planner's parts, with numbers worked out by hand."""
+
 from __future__ import annotations
 
 import math
@@ -38,19 +39,35 @@ def boxed_in() -> np.ndarray:
 
 
 def line(x0, y0, x1, y1, yaw=0.0, count=41):
-    return np.column_stack((np.linspace(x0, x1, count), np.linspace(y0, y1, count),
-                            np.full(count, yaw)))
+    return np.column_stack(
+        (np.linspace(x0, x1, count), np.linspace(y0, y1, count), np.full(count, yaw))
+    )
 
 
 def critics(params=PARAMS, costs=None, pose=ORIGIN, velocity=REST, plan=None):
-    return Critics(params, WINDOW, free() if costs is None else costs, SQUARE,
-                   line(0.0, 0.0, 1.0, 0.0) if plan is None else plan, pose, velocity)
+    return Critics(
+        params,
+        WINDOW,
+        free() if costs is None else costs,
+        SQUARE,
+        line(0.0, 0.0, 1.0, 0.0) if plan is None else plan,
+        pose,
+        velocity,
+    )
 
 
 def only(vx, vy=0.0, vtheta_up_to=0.0, **more):
     """Parameters that sample one velocity, for a robot that has it already."""
-    return replace(PARAMS, min_vel_x_mps=vx, max_vel_x_mps=vx, min_vel_y_mps=vy, max_vel_y_mps=vy,
-                   max_vel_theta_radps=vtheta_up_to, max_vel_trans_mps=1.0, **more)
+    return replace(
+        PARAMS,
+        min_vel_x_mps=vx,
+        max_vel_x_mps=vx,
+        min_vel_y_mps=vy,
+        max_vel_y_mps=vy,
+        max_vel_theta_radps=vtheta_up_to,
+        max_vel_trans_mps=1.0,
+        **more,
+    )
 
 
 def chosen(params, **state):
@@ -65,36 +82,55 @@ def planner_at(plan, params=PARAMS) -> DwaPlanner:
 
 # Samples
 
-@pytest.mark.parametrize("start, end, count, values", [
-    (0.0, 0.5, 3, [0.0, 0.25, 0.5]),
-    (-1.0, 2.0, 2, [-1.0, 0.0, 2.0]),   # 0 is put between
-    (-1.0, 1.0, 3, [-1.0, 0.0, 1.0]),   # 0 is there already
-    (0.25, 0.75, 1, [0.25, 0.75]),      # both ends at least
-    (0.5, 0.5, 4, [0.5]),
-    (0.75, 0.5, 2, [0.75, 0.5]),        # faster than allowed: down to the limit
-])
+
+@pytest.mark.parametrize(
+    "start, end, count, values",
+    [
+        (0.0, 0.5, 3, [0.0, 0.25, 0.5]),
+        (-1.0, 2.0, 2, [-1.0, 0.0, 2.0]),  # 0 is put between
+        (-1.0, 1.0, 3, [-1.0, 0.0, 1.0]),  # 0 is there already
+        (0.25, 0.75, 1, [0.25, 0.75]),  # both ends at least
+        (0.5, 0.5, 4, [0.5]),
+        (0.75, 0.5, 2, [0.75, 0.5]),  # faster than allowed: down to the limit
+    ],
+)
 def test_spaced(start, end, count, values):
     assert spaced(start, end, count) == values
 
 
 def test_samples_span_what_one_period_reaches():
-    params = replace(PARAMS, acc_lim_x_mps2=0.5, acc_lim_theta_radps2=1.0, vx_samples=2,
-                     vth_samples=2)
+    params = replace(
+        PARAMS, acc_lim_x_mps2=0.5, acc_lim_theta_radps2=1.0, vx_samples=2, vth_samples=2
+    )
 
     samples = velocity_samples(params, ORIGIN, (0.25, 0.0, 0.5), ORIGIN, 0.25)
 
-    assert samples.tolist() == [[0.125, 0.0, 0.25], [0.125, 0.0, 0.75],
-                                [0.375, 0.0, 0.25], [0.375, 0.0, 0.75]]
+    assert samples.tolist() == [
+        [0.125, 0.0, 0.25],
+        [0.125, 0.0, 0.75],
+        [0.375, 0.0, 0.25],
+        [0.375, 0.0, 0.75],
+    ]
 
 
 def test_samples_without_dwa_span_the_simulation_and_do_not_overshoot():
-    params = replace(PARAMS, use_dwa=False, sim_time_s=2.0, vx_samples=2, vth_samples=2,
-                     acc_lim_theta_radps2=0.125)
+    params = replace(
+        PARAMS,
+        use_dwa=False,
+        sim_time_s=2.0,
+        vx_samples=2,
+        vth_samples=2,
+        acc_lim_theta_radps2=0.125,
+    )
 
     samples = velocity_samples(params, ORIGIN, (0.0, 0.0, 0.25), Pose2D(0.5, 0.0), 0.25)
 
-    assert samples.tolist() == [[0.0, 0.0, 0.0], [0.0, 0.0, 0.5],
-                                [0.25, 0.0, 0.0], [0.25, 0.0, 0.5]]
+    assert samples.tolist() == [
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.5],
+        [0.25, 0.0, 0.0],
+        [0.25, 0.0, 0.5],
+    ]
 
 
 def test_samples_are_single_precision():
@@ -103,6 +139,7 @@ def test_samples_are_single_precision():
 
 
 # Simulation
+
 
 def test_straight_trajectory_advances_by_the_granularity():
     best = chosen(only(0.5), velocity=Twist2D(0.5))
@@ -114,16 +151,27 @@ def test_straight_trajectory_advances_by_the_granularity():
 
 
 def test_sideways_is_to_the_left_of_the_heading():
-    best = chosen(only(0.0, 0.25, sim_time_s=1.0, sim_granularity_m=0.125),
-                  pose=Pose2D(0.0, 0.0, math.pi / 2), velocity=Twist2D(0.0, 0.25))
+    best = chosen(
+        only(0.0, 0.25, sim_time_s=1.0, sim_granularity_m=0.125),
+        pose=Pose2D(0.0, 0.0, math.pi / 2),
+        velocity=Twist2D(0.0, 0.25),
+    )
 
-    np.testing.assert_allclose(best.points, [[0, 0, math.pi / 2], [-0.125, 0, math.pi / 2]],
-                               atol=1e-6)
+    np.testing.assert_allclose(
+        best.points, [[0, 0, math.pi / 2], [-0.125, 0, math.pi / 2]], atol=1e-6
+    )
 
 
 def test_turns_are_cut_by_the_angular_granularity():
-    params = replace(PARAMS, min_vel_x_mps=0.0, max_vel_x_mps=0.0, max_vel_theta_radps=0.5,
-                     sim_time_s=1.0, angular_sim_granularity_rad=0.25, acc_lim_theta_radps2=0.0)
+    params = replace(
+        PARAMS,
+        min_vel_x_mps=0.0,
+        max_vel_x_mps=0.0,
+        max_vel_theta_radps=0.5,
+        sim_time_s=1.0,
+        angular_sim_granularity_rad=0.25,
+        acc_lim_theta_radps2=0.0,
+    )
     best = chosen(params, velocity=Twist2D(0.0, 0.0, 0.5))
     assert best.points.tolist() == [[0.0, 0.0, 0.0], [0.0, 0.0, 0.25]]
 
@@ -139,61 +187,92 @@ def test_without_dwa_the_command_is_the_first_step():
     assert points[:, 0].tolist() == [0.0, 0.125, 0.3125, 0.5625]
 
 
-@pytest.mark.parametrize("velocity, legal", [
-    ((0.05, 0.0, 0.3), False),   # too slow either way
-    ((0.1, 0.0, 0.0), True),
-    ((0.0, 0.0, 0.4), True),
-    ((0.55, 0.0, 0.0), True),
-    ((0.5, 0.3, 0.0), False),    # 0.58 m/s together
-])
+@pytest.mark.parametrize(
+    "velocity, legal",
+    [
+        ((0.05, 0.0, 0.3), False),  # too slow either way
+        ((0.1, 0.0, 0.0), True),
+        ((0.0, 0.0, 0.4), True),
+        ((0.55, 0.0, 0.0), True),
+        ((0.5, 0.3, 0.0), False),  # 0.58 m/s together
+    ],
+)
 def test_speed_limits(velocity, legal):
     state = critics()
-    _, _, is_legal = travel(state.motion, state.map_grids, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0),
-                            np.array([velocity]))
+    _, _, is_legal = travel(
+        state.motion, state.map_grids, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.array([velocity])
+    )
     assert is_legal.tolist() == [legal]
 
 
 # Critics
+
 
 def test_cost_is_the_weighted_sum_of_the_critics():
     costs = free()
     costs[34, 28:33] = 50  # under the outline's left side all the way
     params = only(0.25, sim_time_s=1.0, sim_granularity_m=0.125)
 
-    best = chosen(params, costs=costs, pose=Pose2D(0.01, 0.01), velocity=Twist2D(0.25),
-                  plan=line(0.01, 0.11, 1.01, 0.11))
+    best = chosen(
+        params,
+        costs=costs,
+        pose=Pose2D(0.01, 0.01),
+        velocity=Twist2D(0.25),
+        plan=line(0.01, 0.11, 1.01, 0.11),
+    )
 
     # Last pose x = 0.135, cell (32, 30): 2 cells from the path and 18 + 2 from the local goal,
     # cell (50, 32). Its nose, x = 0.46, cell (39, 30): 2 from the path and 17 + 2 from the cell
     # (56, 32) of (1.333, 0.142), 0.325 m beyond the local goal.
     obstacle, goal_front, alignment, path, goal = 50, 19, 2, 2, 20
     assert best.cost == pytest.approx(
-        0.01 * obstacle + 0.05 * (0.8 * goal_front + 0.6 * alignment + 0.6 * path + 0.8 * goal))
+        0.01 * obstacle + 0.05 * (0.8 * goal_front + 0.6 * alignment + 0.6 * path + 0.8 * goal)
+    )
 
 
 @pytest.mark.parametrize("cheat_factor, cells", [(0.1, 3 + 8), (1.0, 3)])
 def test_near_the_goal_there_is_no_alignment(cheat_factor, cells):
-    params = only(0.25, sim_time_s=1.0, sim_granularity_m=0.125, goal_distance_bias=0.0,
-                  path_distance_bias=1.0, cheat_factor=cheat_factor)
+    params = only(
+        0.25,
+        sim_time_s=1.0,
+        sim_granularity_m=0.125,
+        goal_distance_bias=0.0,
+        path_distance_bias=1.0,
+        cheat_factor=cheat_factor,
+    )
     # The local goal is 0.23 m away. The last pose, cell (32, 29), is 3 from the path; the nose,
     # cell (39, 29), is 3 + 5 from the path's end, cell (34, 32).
-    best = chosen(params, pose=Pose2D(0.01, -0.01), velocity=Twist2D(0.25),
-                  plan=line(0.01, 0.11, 0.21, 0.11))
+    best = chosen(
+        params, pose=Pose2D(0.01, -0.01), velocity=Twist2D(0.25), plan=line(0.01, 0.11, 0.21, 0.11)
+    )
     assert best.cost == pytest.approx(0.05 * cells)
 
 
 def test_twirling_costs_its_speed():
-    params = replace(PARAMS, min_vel_x_mps=0.0, max_vel_x_mps=0.0, max_vel_theta_radps=0.5,
-                     acc_lim_theta_radps2=0.0, twirling_scale=2.0, path_distance_bias=0.0,
-                     goal_distance_bias=0.0)
+    params = replace(
+        PARAMS,
+        min_vel_x_mps=0.0,
+        max_vel_x_mps=0.0,
+        max_vel_theta_radps=0.5,
+        acc_lim_theta_radps2=0.0,
+        twirling_scale=2.0,
+        path_distance_bias=0.0,
+        goal_distance_bias=0.0,
+    )
     assert chosen(params, velocity=Twist2D(0.0, 0.0, -0.5)).cost == 1.0
 
 
 def test_costs_on_the_way_count_by_the_highest_or_are_summed():
     costs = free()
     costs[:, 30:33] = [10, 30, 20]
-    params = only(0.5, sim_time_s=0.3, sim_granularity_m=0.05, path_distance_bias=0.0,
-                  goal_distance_bias=0.0, occdist_scale=1.0)
+    params = only(
+        0.5,
+        sim_time_s=0.3,
+        sim_granularity_m=0.05,
+        path_distance_bias=0.0,
+        goal_distance_bias=0.0,
+        occdist_scale=1.0,
+    )
     state = {"costs": costs, "pose": Pose2D(0.225, 0.02), "velocity": Twist2D(0.5)}
 
     # 3 poses, x = 0.225, 0.275, 0.325: the outline's rear at 0.025, 0.075, 0.125.
@@ -210,10 +289,24 @@ def test_fast_robot_keeps_off_what_a_slow_one_passes():
     costs = free()
     costs[34, :] = LETHAL  # y 0.20 to 0.25
     pose = Pose2D(0.0, -0.01)  # outline at 0.19 unscaled, 0.214 at 0.43 m/s
-    assert chosen(replace(only(0.25), max_vel_trans_mps=0.55), costs=costs, pose=pose,
-                  velocity=Twist2D(0.25)).cost >= 0.0
-    assert chosen(replace(only(0.43), max_vel_trans_mps=0.55), costs=costs, pose=pose,
-                  velocity=Twist2D(0.43)).cost == NO_LEGAL_TRAJECTORY
+    assert (
+        chosen(
+            replace(only(0.25), max_vel_trans_mps=0.55),
+            costs=costs,
+            pose=pose,
+            velocity=Twist2D(0.25),
+        ).cost
+        >= 0.0
+    )
+    assert (
+        chosen(
+            replace(only(0.43), max_vel_trans_mps=0.55),
+            costs=costs,
+            pose=pose,
+            velocity=Twist2D(0.43),
+        ).cost
+        == NO_LEGAL_TRAJECTORY
+    )
 
 
 def test_no_room_to_grow_is_an_endless_footprint():
@@ -243,8 +336,9 @@ def test_behind_a_wall_path_and_goal_are_out_of_reach():
     state = {"costs": costs, "velocity": Twist2D(0.125), "plan": line(0.9, 0.0, 1.2, 0.0)}
     params = only(0.125)
     assert chosen(params, **state).cost == NO_LEGAL_TRAJECTORY
-    assert chosen(replace(params, path_distance_bias=0.0, goal_distance_bias=0.0),
-                  **state).cost == 0.0
+    assert (
+        chosen(replace(params, path_distance_bias=0.0, goal_distance_bias=0.0), **state).cost == 0.0
+    )
 
 
 def test_first_of_equals_wins():
@@ -268,11 +362,13 @@ def test_search_finds_what_scoring_every_sample_finds(seed, sum_scores):
     best = state.choose(OscillationCritic(), PERIOD_S)
 
     samples = velocity_samples(params, state.pose, state.velocity, state.goal, PERIOD_S)
-    commands, distances, legal = travel(state.motion, state.map_grids, state.start,
-                                        state.velocity, samples)
+    commands, distances, legal = travel(
+        state.motion, state.map_grids, state.start, state.velocity, samples
+    )
     scales = footprint_scales(params, commands)
     obstacles = state.obstacles(scales)._replace(
-        highest_near=np.full(WINDOW.shape, 255, np.uint8))  # no short cut
+        highest_near=np.full(WINDOW.shape, 255, np.uint8)
+    )  # no short cut
     scored = np.full(len(samples), np.inf)
     for k in np.flatnonzero(legal):
         points, _ = state.simulate(samples[k])
@@ -286,6 +382,7 @@ def test_search_finds_what_scoring_every_sample_finds(seed, sum_scores):
 
 
 # Oscillation
+
 
 def noted(critic, *commands, pose=ORIGIN):
     for command in commands:
@@ -311,12 +408,21 @@ def test_turns_do_not_count_at_speed():
 def test_two_reversals_leave_only_standing():
     critic = noted(OscillationCritic(), (0.2, 0.0, 0.0), (-0.2, 0.0, 0.0), (0.2, 0.0, 0.0))
     assert critic.forbids(np.array([[0.2, 0, 0], [-0.2, 0, 0], [0.0, 0, 0]])).tolist() == [
-        True, True, False]
+        True,
+        True,
+        False,
+    ]
 
 
-@pytest.mark.parametrize("pose, restricted", [
-    (Pose2D(1.04, 1.0), True), (Pose2D(1.06, 1.0), False),
-    (Pose2D(1.0, 1.0, 0.19), True), (Pose2D(1.0, 1.0, -0.21), False)])
+@pytest.mark.parametrize(
+    "pose, restricted",
+    [
+        (Pose2D(1.04, 1.0), True),
+        (Pose2D(1.06, 1.0), False),
+        (Pose2D(1.0, 1.0, 0.19), True),
+        (Pose2D(1.0, 1.0, -0.21), False),
+    ],
+)
 def test_restrictions_end_by_moving_or_turning(pose, restricted):
     critic = noted(OscillationCritic(), (0.0, 0.2, 0.0), (0.0, -0.2, 0.0), pose=Pose2D(1.0, 1.0))
     assert critic.strafe.negative_only
@@ -326,6 +432,7 @@ def test_restrictions_end_by_moving_or_turning(pose, restricted):
 
 
 # The whole planner
+
 
 def test_flies_straight_along_a_straight_plan():
     planner = planner_at(line(0.0, 0.0, 4.0, 0.0))
@@ -392,16 +499,18 @@ def test_goal_is_the_end_of_the_whole_plan():
 def test_plan_is_taken_to_the_local_frame():
     planner = planner_at(line(0.0, 0.0, 0.0, 1.0, yaw=0.5))
     # The plan's frame is turned by -90 degrees: its y axis is the local x axis.
-    control = planner.compute_velocity(WINDOW, free(), Pose2D(1.0, 0.0, 0.0), REST,
-                                       local_from_plan=Pose2D(0.0, 0.0, -math.pi / 2))
+    control = planner.compute_velocity(
+        WINDOW, free(), Pose2D(1.0, 0.0, 0.0), REST, local_from_plan=Pose2D(0.0, 0.0, -math.pi / 2)
+    )
     assert control.goal_mode
     assert control.command.vyaw_radps == pytest.approx(-3.2 * PERIOD_S)
 
 
 @pytest.mark.parametrize("latch", [True, False])
 def test_latched_goal_holds_when_pushed_away(latch):
-    planner = planner_at(line(-1.0, 0.0, 0.0, 0.0, yaw=1.0),
-                         replace(PARAMS, latch_xy_goal_tolerance=latch))
+    planner = planner_at(
+        line(-1.0, 0.0, 0.0, 0.0, yaw=1.0), replace(PARAMS, latch_xy_goal_tolerance=latch)
+    )
     planner.compute_velocity(WINDOW, free(), ORIGIN, REST)
 
     control = planner.compute_velocity(WINDOW, free(), Pose2D(-0.3, 0.0), REST)
@@ -431,9 +540,13 @@ def test_the_turn_is_judged_by_the_distances_of_the_last_search():
     assert planner.compute_velocity(WINDOW, unreached, Pose2D(0.05, 0.0), REST).goal_mode
 
 
-@pytest.mark.parametrize("forget", [
-    lambda planner: planner.compute_velocity(WINDOW, free(), ORIGIN, REST),
-    lambda planner: planner.set_plan(line(0.0, 0.0, 1.0, 0.0))])
+@pytest.mark.parametrize(
+    "forget",
+    [
+        lambda planner: planner.compute_velocity(WINDOW, free(), ORIGIN, REST),
+        lambda planner: planner.set_plan(line(0.0, 0.0, 1.0, 0.0)),
+    ],
+)
 def test_a_stop_at_the_goal_and_a_new_plan_forget_oscillations(forget):
     planner = planner_at(line(-1.0, 0.0, 0.0, 0.0, yaw=1.0))
     noted(planner.oscillation, (0.0, 0.0, 0.5), (0.0, 0.0, -0.5))

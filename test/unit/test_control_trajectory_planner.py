@@ -1,4 +1,5 @@
 """The trajectory planner's parts, with numbers worked out by hand."""
+
 from __future__ import annotations
 
 import math
@@ -40,13 +41,21 @@ def boxed_in() -> np.ndarray:
 
 
 def line(x0: float, y0: float, x1: float, y1: float, yaw: float = 0.0, count: int = 41):
-    return np.column_stack((np.linspace(x0, x1, count), np.linspace(y0, y1, count),
-                            np.full(count, yaw)))
+    return np.column_stack(
+        (np.linspace(x0, x1, count), np.linspace(y0, y1, count), np.full(count, yaw))
+    )
 
 
 def rollout(costs=None, pose=ORIGIN, velocity=REST, params=PARAMS, plan=None):
-    return Rollout(params, WINDOW, free() if costs is None else costs, SQUARE,
-                   line(0.0, 0.0, 1.0, 0.0) if plan is None else plan, pose, velocity)
+    return Rollout(
+        params,
+        WINDOW,
+        free() if costs is None else costs,
+        SQUARE,
+        line(0.0, 0.0, 1.0, 0.0) if plan is None else plan,
+        pose,
+        velocity,
+    )
 
 
 def planner_at(plan, params=PARAMS, period_s=0.2) -> TrajectoryPlanner:
@@ -56,6 +65,7 @@ def planner_at(plan, params=PARAMS, period_s=0.2) -> TrajectoryPlanner:
 
 
 # Distances
+
 
 def test_distances_go_round_obstacles_and_mark_what_they_touch():
     costs = costs_of("""
@@ -107,8 +117,11 @@ def test_local_goal_is_the_end_of_the_first_stretch_inside():
 
 # Footprint
 
-@pytest.mark.parametrize("cost, under_the_outline", [
-    (0, 0), (100, 100), (INSCRIBED, INSCRIBED), (LETHAL, -1), (UNKNOWN, -2)])
+
+@pytest.mark.parametrize(
+    "cost, under_the_outline",
+    [(0, 0), (100, 100), (INSCRIBED, INSCRIBED), (LETHAL, -1), (UNKNOWN, -2)],
+)
 def test_footprint_cost_is_the_highest_under_the_outline(cost, under_the_outline):
     costs = free()
     costs[30, 34] = cost  # x 0.20 to 0.25, y 0.00 to 0.05
@@ -130,6 +143,7 @@ def test_footprint_off_the_map(x_m):
 
 # Rollout
 
+
 def test_straight_trajectory_advances_by_the_granularity():
     trajectory = rollout(velocity=Twist2D(0.5)).trajectory((0.5, 0.0, 0.0))
 
@@ -150,12 +164,19 @@ def test_velocity_follows_the_acceleration_limit():
 def test_cost_is_the_weighted_sum_at_the_last_pose():
     costs = free()
     costs[34, 28:33] = 50  # under the outline's left side all the way
-    params = replace(PARAMS, sim_time_s=1.0, sim_granularity_m=0.25, path_distance_bias=2.0,
-                     goal_distance_bias=3.0, occdist_scale=0.1)
+    params = replace(
+        PARAMS,
+        sim_time_s=1.0,
+        sim_granularity_m=0.25,
+        path_distance_bias=2.0,
+        goal_distance_bias=3.0,
+        occdist_scale=0.1,
+    )
     plan = line(0.01, 0.11, 1.01, 0.11)
 
-    trajectory = rollout(costs, pose=Pose2D(0.01, 0.01), velocity=Twist2D(0.5), params=params,
-                         plan=plan).trajectory((0.5, 0.0, 0.0))
+    trajectory = rollout(
+        costs, pose=Pose2D(0.01, 0.01), velocity=Twist2D(0.5), params=params, plan=plan
+    ).trajectory((0.5, 0.0, 0.0))
 
     # Last pose x = 0.26: 2 cells to the path, 15 + 2 to the goal, 5 cm each.
     assert trajectory.cost == pytest.approx(2.0 * 0.05 * 2 + 3.0 * 0.05 * 17 + 0.1 * 50)
@@ -211,6 +232,7 @@ def test_cost_cloud_holds_the_cells_a_robot_could_be_in():
 
 # Velocities
 
+
 def test_spaced_sums_its_steps():
     values, step = spaced(0.1, 0.3, 3)
     assert values.tolist() == [0.1, 0.1 + step, 0.1 + step + step]
@@ -244,6 +266,7 @@ def test_top_speed_does_not_overshoot_the_local_goal():
 
 # Plan
 
+
 def test_plan_in_window_ends_with_the_first_pose_outside():
     plan = line(-4.0, 0.0, 4.0, 0.0, count=9)
     part = plan_in_window(plan, WINDOW, Pose2D(0.0, 0.0), Pose2D(0.0, 0.0))
@@ -254,8 +277,9 @@ def test_plan_is_taken_to_the_local_frame():
     local_from_plan = Pose2D(1.0, 0.0, math.pi / 2)
     plan = np.array([[0.0, 1.0, 0.0], [1.0, 1.0, 0.5]])
     part = plan_in_window(plan, WINDOW, Pose2D(0.0, 0.0), local_from_plan)
-    np.testing.assert_allclose(part, [[0.0, 0.0, math.pi / 2], [0.0, 1.0, math.pi / 2 + 0.5]],
-                               atol=1e-12)
+    np.testing.assert_allclose(
+        part, [[0.0, 0.0, math.pi / 2], [0.0, 1.0, math.pi / 2 + 0.5]], atol=1e-12
+    )
 
 
 def test_poses_passed_are_those_a_metre_behind():
@@ -266,18 +290,22 @@ def test_poses_passed_are_those_a_metre_behind():
 
 # At the goal
 
+
 def test_stopping_slows_each_component():
     command = stopping_command(Twist2D(0.5, -0.05, -0.8), PARAMS, 0.1)
     assert (command.vx_mps, command.vy_mps, command.vyaw_radps) == pytest.approx((0.25, 0, -0.48))
 
 
-@pytest.mark.parametrize("turn_rad, current_radps, period_s, expected_radps", [
-    (0.8, 0.0, 1.0, 0.8),     # the turn itself
-    (3.0, 0.0, 1.0, 1.0),     # max_rotational_vel
-    (0.1, 0.0, 1.0, 0.4),     # min_in_place_vel_theta
-    (-0.5, 0.3, 0.05, -0.46),  # 0.3 + 3.2 * 0.05
-    (0.05, 1.0, 0.05, math.sqrt(2 * 3.2 * 0.05)),  # the braking curve
-])
+@pytest.mark.parametrize(
+    "turn_rad, current_radps, period_s, expected_radps",
+    [
+        (0.8, 0.0, 1.0, 0.8),  # the turn itself
+        (3.0, 0.0, 1.0, 1.0),  # max_rotational_vel
+        (0.1, 0.0, 1.0, 0.4),  # min_in_place_vel_theta
+        (-0.5, 0.3, 0.05, -0.46),  # 0.3 + 3.2 * 0.05
+        (0.05, 1.0, 0.05, math.sqrt(2 * 3.2 * 0.05)),  # the braking curve
+    ],
+)
 def test_turning_speed(turn_rad, current_radps, period_s, expected_radps):
     command = turning_command(turn_rad, Twist2D(vyaw_radps=current_radps), PARAMS, period_s)
     assert command.vyaw_radps == pytest.approx(expected_radps)
@@ -290,6 +318,7 @@ def test_stopped_within_the_given_velocities():
 
 
 # Oscillation
+
 
 def test_second_turn_without_moving_is_stuck_until_the_robot_moves():
     oscillation = Oscillation()
@@ -305,8 +334,11 @@ def test_second_turn_without_moving_is_stuck_until_the_robot_moves():
 
 
 def test_escape_ends_by_moving_or_turning():
-    for moved, escaping in ((Pose2D(0.05, 0.0, 0.5), True), (Pose2D(0.11, 0.0), False),
-                            (Pose2D(0.0, 0.0, 1.6), False)):
+    for moved, escaping in (
+        (Pose2D(0.05, 0.0, 0.5), True),
+        (Pose2D(0.11, 0.0), False),
+        (Pose2D(0.0, 0.0, 1.6), False),
+    ):
         oscillation = Oscillation()
         oscillation.begin_escape(Pose2D(0.0, 0.0))
         oscillation.end_escape_if_moved(moved, 0.1, math.pi / 2)
@@ -314,6 +346,7 @@ def test_escape_ends_by_moving_or_turning():
 
 
 # The whole planner
+
 
 def test_flies_straight_along_a_straight_plan():
     planner = planner_at(line(0.0, 0.0, 4.0, 0.0))
@@ -378,8 +411,9 @@ def test_at_the_goal_it_stops_then_turns_then_is_done():
 
 @pytest.mark.parametrize("latch", [True, False])
 def test_latched_goal_holds_when_pushed_away(latch):
-    planner = planner_at(line(-1.0, 0.0, 0.0, 0.0, yaw=1.0),
-                         replace(PARAMS, latch_xy_goal_tolerance=latch))
+    planner = planner_at(
+        line(-1.0, 0.0, 0.0, 0.0, yaw=1.0), replace(PARAMS, latch_xy_goal_tolerance=latch)
+    )
     planner.compute_velocity(WINDOW, free(), ORIGIN, REST)
 
     control = planner.compute_velocity(WINDOW, free(), Pose2D(-0.3, 0.0), REST)
@@ -408,8 +442,9 @@ def test_new_parameters_keep_the_plan_and_the_state():
 
 # Mended faults
 
+
 def test_an_escape_must_lead_out_of_the_collision():
-    params = replace(PARAMS, xy_goal_tolerance_m=0.05, refuse_colliding_escape=True)
+    params = replace(PARAMS, xy_goal_tolerance_m=0.05, reject_colliding_escape=True)
     costs = free()
     costs[:, 34] = LETHAL  # the wall touches the outline at x = 0.20
     plan = line(0.0, 0.0, 0.15, 0.0)
@@ -417,7 +452,7 @@ def test_an_escape_must_lead_out_of_the_collision():
     assert control.command == Twist2D(-0.1, 0.0, 0.0)
 
     costs[:, 24] = LETHAL  # 0.1 m back, the outline touches this one at x = -0.30
-    original = planner_at(plan, replace(params, refuse_colliding_escape=False))
+    original = planner_at(plan, replace(params, reject_colliding_escape=False))
     assert original.compute_velocity(WINDOW, costs, ORIGIN, REST).command.vx_mps == -0.1
     mended = planner_at(plan, params)
     with pytest.raises(NoValidTrajectory, match="hits something"):
@@ -425,11 +460,14 @@ def test_an_escape_must_lead_out_of_the_collision():
     assert not mended.oscillation.escaping
 
 
-@pytest.mark.parametrize("turn_rad, expected_radps", [
-    (0.2, 0.2),     # below min_in_place_vel_theta: what is left in one period of 1 s
-    (-0.06, -0.06),
-    (3.0, 1.0),     # max_rotational_vel
-])
+@pytest.mark.parametrize(
+    "turn_rad, expected_radps",
+    [
+        (0.2, 0.2),  # below min_in_place_vel_theta: what is left in one period of 1 s
+        (-0.06, -0.06),
+        (3.0, 1.0),  # max_rotational_vel
+    ],
+)
 def test_the_turn_at_the_goal_stops_where_one_period_ends(turn_rad, expected_radps):
     params = replace(PARAMS, predict_goal_turn=True, min_in_place_vel_theta_radps=1.0)
     assert turning_command(turn_rad, REST, params, 1.0).vyaw_radps == pytest.approx(expected_radps)

@@ -39,10 +39,13 @@ def test_centre_on_keeps_what_still_fits():
 
 
 def test_centre_on_cuts_towards_zero_when_moving_back():
-    grid = grid_of("""....
+    grid = grid_of(
+        """....
                       ....
                       #...
-                      ....""", origin=(1.0, 0.0))
+                      ....""",
+        origin=(1.0, 0.0),
+    )
     grid.centre_on(1.8, 0.8)  # the origin should be (0.05, -0.95): less than a cell away
     assert (grid.spec.origin_x_m, grid.spec.origin_y_m) == (1.0, 0.0)
     grid.centre_on(1.7, 0.7)  # (-0.05, -1.05): one whole cell each way
@@ -61,10 +64,14 @@ def test_centre_on_far_away_forgets_everything():
     assert picture(grid.costs) == drawn("??\n??")
 
 
-@pytest.mark.parametrize("bounds, window", [
-    (Bounds(1.5, 2.5, 3.5, 2.6), Window(1, 4, 2, 3)),
-    (Bounds(-9.0, -9.0, 99.0, 99.0), Window(0, 5, 0, 4)),
-    (Bounds(1.0, 1.0, 5.0, 4.0), Window(1, 5, 1, 4))])
+@pytest.mark.parametrize(
+    "bounds, window",
+    [
+        (Bounds(1.5, 2.5, 3.5, 2.6), Window(1, 4, 2, 3)),
+        (Bounds(-9.0, -9.0, 99.0, 99.0), Window(0, 5, 0, 4)),
+        (Bounds(1.0, 1.0, 5.0, 4.0), Window(1, 5, 1, 4)),
+    ],
+)
 def test_window_of_bounds(bounds, window):
     assert CostGrid(GridSpec(5, 4, 1.0)).window_of(bounds) == window
 
@@ -75,7 +82,8 @@ def test_no_bounds_no_window():
 
 def test_bounds_combine():
     assert Bounds(0.0, 1.0, 2.0, 3.0).union(Bounds(-1.0, 2.0, 1.0, 5.0)) == Bounds(
-        -1.0, 1.0, 2.0, 5.0)
+        -1.0, 1.0, 2.0, 5.0
+    )
     assert Bounds(0.0, 1.0, 2.0, 3.0).grown(0.5) == Bounds(-0.5, 0.5, 2.5, 3.5)
     assert NOWHERE.including(np.array([(1.0, 5.0), (3.0, 4.0)])) == Bounds(1.0, 4.0, 3.0, 5.0)
 

@@ -1,4 +1,5 @@
 """Costs by hand: 1 m cells, inscribed radius 1 m, and a factor of ln 2, half per metre."""
+
 from __future__ import annotations
 
 import math
@@ -55,8 +56,9 @@ def test_unknown_cells_take_inscribed_costs_only():
 
 
 def test_unknown_cells_take_all_costs_when_asked():
-    params = InflationLayerParams(inflation_radius_m=3.0, cost_scaling_factor=math.log(2.0),
-                                  inflate_unknown=True)
+    params = InflationLayerParams(
+        inflation_radius_m=3.0, cost_scaling_factor=math.log(2.0), inflate_unknown=True
+    )
     assert inflated("#????", params)[0].tolist() == [254, 253, 126, 63, 255]
 
 
@@ -81,9 +83,9 @@ def test_first_update_is_everywhere_and_later_ones_hold_the_last():
     layer = InflationLayer(HALF_PER_METRE, 1.0, 1.0)
     assert layer.update_bounds(ROBOT, 0.0, Bounds(1.0, 1.0, 2.0, 2.0)) == EVERYWHERE
     assert layer.update_bounds(ROBOT, 1.0, Bounds(4.0, 4.0, 5.0, 6.0)) == Bounds(
-        -2.0, -2.0, 8.0, 9.0)
-    assert layer.update_bounds(ROBOT, 2.0, Bounds(4.0, 4.0, 5.0, 5.0)) == Bounds(
-        1.0, 1.0, 8.0, 9.0)
+        -2.0, -2.0, 8.0, 9.0
+    )
+    assert layer.update_bounds(ROBOT, 2.0, Bounds(4.0, 4.0, 5.0, 5.0)) == Bounds(1.0, 1.0, 8.0, 9.0)
 
 
 def test_new_parameters_or_footprint_redo_everything():

@@ -16,12 +16,18 @@ from quad_nav.costmap.static import StaticLayerParams, StaticMap
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.grid import GridSpec
 
-LASER = SourceParams(name="laser", clearing=True, obstacle_range_m=10.0, raytrace_range_m=10.0,
-                     expected_update_period_s=1.0)
+LASER = SourceParams(
+    name="laser",
+    clearing=True,
+    obstacle_range_m=10.0,
+    raytrace_range_m=10.0,
+    expected_update_period_s=1.0,
+)
 OBSTACLES = ("obstacle_layer", ObstacleLayerParams(sources=(LASER,)))
 INFLATION = ("inflation_layer", InflationLayerParams(inflation_radius_m=1.0))
-SMALL = CostmapParams(width_m=6.0, height_m=3.0, resolution_m=1.0, robot_radius_m=0.1,
-                      layers=(OBSTACLES, INFLATION))
+SMALL = CostmapParams(
+    width_m=6.0, height_m=3.0, resolution_m=1.0, robot_radius_m=0.1, layers=(OBSTACLES, INFLATION)
+)
 ROBOT = Pose2D(0.5, 1.5)
 
 
@@ -103,8 +109,9 @@ def test_clear_area_says_what_it_cleared():
     costmap.layers["obstacle_layer"].grid.costs[...] = 254
     assert costmap.clear_area(["obstacles"], 0.5, 1.5, 2.0, keep_inside=True) == []
     assert costmap.is_current(0.0)
-    assert costmap.clear_area(["obstacle_layer", "inflation_layer"], 3.0, 1.5, 4.0,
-                              keep_inside=True) == ["obstacle_layer"]
+    assert costmap.clear_area(
+        ["obstacle_layer", "inflation_layer"], 3.0, 1.5, 4.0, keep_inside=True
+    ) == ["obstacle_layer"]
     assert not costmap.is_current(0.0)
     costmap.update(0.0, Pose2D(-5.0, -5.0))
     # The square's border counts as outside: columns 1 and 5, and row 0, because its lower

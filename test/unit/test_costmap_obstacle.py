@@ -1,4 +1,5 @@
 """One layer of 1 m cells; the sensor stands in the middle of a cell."""
+
 from __future__ import annotations
 
 import math
@@ -15,8 +16,9 @@ from quad_nav.costmap.projection import scan_points, transform_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan, quaternion_from_euler, quaternion_from_yaw
 from quad_nav.grid import UNKNOWN, GridSpec
 
-SOURCE = SourceParams(name="laser", data_type="LaserScan", clearing=True, obstacle_range_m=10.0,
-                      raytrace_range_m=10.0)
+SOURCE = SourceParams(
+    name="laser", data_type="LaserScan", clearing=True, obstacle_range_m=10.0, raytrace_range_m=10.0
+)
 SENSOR = Pose3D(0.5, 2.5, 0.3)
 ROBOT = Pose2D(0.5, 2.5)
 
@@ -27,8 +29,9 @@ def layer_of(source=SOURCE, size=(6, 5), unknown=True, **params):
 
 
 def scan_of(*ranges_m, stamp_s=0.0, angle_min_rad=0.0, increment_rad=math.pi / 4):
-    return Scan(stamp_s, angle_min_rad, increment_rad, 0.1, 20.0,
-                np.array(ranges_m, dtype=np.float32))
+    return Scan(
+        stamp_s, angle_min_rad, increment_rad, 0.1, 20.0, np.array(ranges_m, dtype=np.float32)
+    )
 
 
 def see(layer, *ranges_m, at_s=0.0, sensor=SENSOR, **scan):
@@ -73,8 +76,11 @@ def test_ranges_limit_marking_and_clearing():
 
 
 def test_ranges_of_the_layer_count_when_the_source_has_none():
-    layer = layer_of(replace(SOURCE, obstacle_range_m=None, raytrace_range_m=None),
-                     obstacle_range_m=4.5, raytrace_range_m=1.0)
+    layer = layer_of(
+        replace(SOURCE, obstacle_range_m=None, raytrace_range_m=None),
+        obstacle_range_m=4.5,
+        raytrace_range_m=1.0,
+    )
     see(layer, 4.0)
     layer.update_bounds(ROBOT, 0.0, NOWHERE)
     assert picture(layer.grid.costs[2:3]) == drawn("..??#?")
@@ -145,10 +151,14 @@ def test_rays_start_at_the_sensor_frame_if_it_is_another():
     assert picture(layer.grid.costs[2:3]) == drawn("??.#??")
 
 
-@pytest.mark.parametrize("method, expected", [
-    (0, "#..##."),  # overwrites what the layer knows
-    (1, "#.####"),  # keeps the higher cost, with unknown the lowest
-    (2, "#?##.#")])  # leaves the master alone
+@pytest.mark.parametrize(
+    "method, expected",
+    [
+        (0, "#..##."),  # overwrites what the layer knows
+        (1, "#.####"),  # keeps the higher cost, with unknown the lowest
+        (2, "#?##.#"),
+    ],
+)  # leaves the master alone
 def test_combination_with_the_layers_below(method, expected):
     layer = layer_of(combination_method=method)
     layer.grid.costs[...] = costs_of("?..##.")
@@ -232,11 +242,13 @@ def test_no_beams_no_points():
 
 def test_points_follow_the_sensor():
     quarter_turn = Pose3D(10.0, 20.0, 1.0, quaternion_from_yaw(math.pi / 2))
-    np.testing.assert_allclose(transform_points(np.array([[2.0, 1.0, 0.5]]), quarter_turn),
-                               [[9.0, 22.0, 1.5]], atol=1e-5)
+    np.testing.assert_allclose(
+        transform_points(np.array([[2.0, 1.0, 0.5]]), quarter_turn), [[9.0, 22.0, 1.5]], atol=1e-5
+    )
     nose_down = Pose3D(0.0, 0.0, 3.0, quaternion_from_euler(0.0, math.pi / 2, 0.0))
-    np.testing.assert_allclose(transform_points(np.array([[2.0, 1.0, 0.0]]), nose_down),
-                               [[0.0, 1.0, 1.0]], atol=1e-6)
+    np.testing.assert_allclose(
+        transform_points(np.array([[2.0, 1.0, 0.0]]), nose_down), [[0.0, 1.0, 1.0]], atol=1e-6
+    )
 
 
 def test_points_outside_the_heights_are_dropped():

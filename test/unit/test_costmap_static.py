@@ -16,8 +16,9 @@ OCCUPANCY = {".": 0, "#": 100, "?": -1}
 
 
 def occupancy_of(text):
-    return np.array([[OCCUPANCY[sign] for sign in row] for row in text.split()[::-1]],
-                    dtype=np.int8)
+    return np.array(
+        [[OCCUPANCY[sign] for sign in row] for row in text.split()[::-1]], dtype=np.int8
+    )
 
 
 def map_of(text, origin=(0.0, 0.0)):
@@ -31,13 +32,17 @@ def layer_of(static_map, rolling_window=False, **params):
     return layer
 
 
-@pytest.mark.parametrize("params, expected", [
-    ({}, [255, 0, 0, 0, 254]),
-    ({"track_unknown_space": False}, [0, 0, 0, 0, 254]),
-    ({"lethal_cost_threshold": 65}, [255, 0, 0, 254, 254]),
-    ({"trinary_costmap": False}, [255, 0, 127, 165, 254]),
-    ({"trinary_costmap": False, "lethal_cost_threshold": 80}, [255, 0, 158, 206, 254]),
-    ({"unknown_cost_value": 50}, [254, 0, 255, 0, 254])])
+@pytest.mark.parametrize(
+    "params, expected",
+    [
+        ({}, [255, 0, 0, 0, 254]),
+        ({"track_unknown_space": False}, [0, 0, 0, 0, 254]),
+        ({"lethal_cost_threshold": 65}, [255, 0, 0, 254, 254]),
+        ({"trinary_costmap": False}, [255, 0, 127, 165, 254]),
+        ({"trinary_costmap": False, "lethal_cost_threshold": 80}, [255, 0, 158, 206, 254]),
+        ({"unknown_cost_value": 50}, [254, 0, 255, 0, 254]),
+    ],
+)
 def test_costs_of_occupancies(params, expected):
     layer = layer_of(map_of("."), **params)
     assert layer.costs_of(np.array([-1, 0, 50, 65, 100], dtype=np.int8)).tolist() == expected

@@ -1,4 +1,5 @@
 """The voxel layer on 1 m voxels, drawn from the side: x to the right, z upwards."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -16,17 +17,29 @@ from quad_nav.grid import UNKNOWN, GridSpec
 from quad_nav.kernels.voxels import clear_voxel_line
 
 ROW = 2  # everything happens in the row with y from 2 to 3 m
-SOURCE = SourceParams(name="cloud", clearing=True, obstacle_range_m=10.0, raytrace_range_m=10.0,
-                      min_obstacle_height_m=-9.0, max_obstacle_height_m=9.0)
+SOURCE = SourceParams(
+    name="cloud",
+    clearing=True,
+    obstacle_range_m=10.0,
+    raytrace_range_m=10.0,
+    min_obstacle_height_m=-9.0,
+    max_obstacle_height_m=9.0,
+)
 EYE = (0.5, 2.5, 0.5)
 ROBOT = Pose2D(0.5, 2.5)
 
 
 def layer_of(source=SOURCE, rolling=False, **params):
-    params = {"z_voxels": 3, "z_resolution_m": 1.0, "max_obstacle_height_m": 9.0,
-              "track_unknown_space": True, **params}
+    params = {
+        "z_voxels": 3,
+        "z_resolution_m": 1.0,
+        "max_obstacle_height_m": 9.0,
+        "track_unknown_space": True,
+        **params,
+    }
     return VoxelLayerParams(sources=(source,), **params).make_layer(
-        GridSpec(6, 5, 1.0), rolling_window=rolling, default_cost=0)
+        GridSpec(6, 5, 1.0), rolling_window=rolling, default_cost=0
+    )
 
 
 def see(layer, *points, eye=EYE, at_s=0.0):
@@ -41,7 +54,7 @@ def side(layer):
 
 
 def row(layer):
-    return picture(layer.grid.costs[ROW:ROW + 1])
+    return picture(layer.grid.costs[ROW : ROW + 1])
 
 
 def test_a_ray_clears_until_two_cells_before_the_voxel_that_is_marked():
@@ -170,8 +183,9 @@ def test_heights_of_points(z_m, column):
 
 
 def test_points_above_the_height_or_out_of_range_are_not_marked():
-    layer = layer_of(replace(SOURCE, clearing=False, obstacle_range_m=4.0),
-                     max_obstacle_height_m=1.0)
+    layer = layer_of(
+        replace(SOURCE, clearing=False, obstacle_range_m=4.0), max_obstacle_height_m=1.0
+    )
     see(layer, (2.5, 1.5), (4.5, 0.5), (4.4, 0.5))
     assert side(layer) == drawn("""??????
                                    ??????
@@ -204,7 +218,7 @@ def test_combination_with_the_layers_below(method, expected):
     master = CostGrid(GridSpec(6, 5, 1.0))
     master.costs[ROW] = costs_of("#..#..")[0]
     layer.update_costs(master, Window(0, 6, ROW, ROW + 1))
-    assert picture(master.costs[ROW:ROW + 1]) == expected
+    assert picture(master.costs[ROW : ROW + 1]) == expected
 
 
 def test_the_footprint_frees_costs_and_leaves_voxels():
@@ -219,8 +233,14 @@ def test_the_footprint_frees_costs_and_leaves_voxels():
 
 def test_voxels_move_with_a_rolling_window():
     layer = layer_of(rolling=True)
-    layer.add_cloud("cloud", np.array([(4.5, 2.5, 0.5)], np.float32), Pose3D(0.0, 0.0, 0.0), 0.0,
-                    0.0, Pose3D(*EYE))
+    layer.add_cloud(
+        "cloud",
+        np.array([(4.5, 2.5, 0.5)], np.float32),
+        Pose3D(0.0, 0.0, 0.0),
+        0.0,
+        0.0,
+        Pose3D(*EYE),
+    )
     layer.update_bounds(Pose2D(2.75, 2.25), 0.0, NOWHERE)  # the middle as it is
     assert side(layer).splitlines()[-1] == "...?#?"
     layer.buffers["cloud"].observations.clear()
@@ -255,12 +275,22 @@ def test_a_change_of_parameters_empties_the_layer_and_is_passed_on():
 
 def test_in_a_costmap():
     voxels = VoxelLayerParams(sources=(SOURCE,), z_voxels=3, z_resolution_m=1.0)
-    params = CostmapParams(width_m=6.0, height_m=5.0, resolution_m=1.0, robot_radius_m=0.2,
-                           layers=(("voxels", voxels),))
+    params = CostmapParams(
+        width_m=6.0,
+        height_m=5.0,
+        resolution_m=1.0,
+        robot_radius_m=0.2,
+        layers=(("voxels", voxels),),
+    )
     costmap = LayeredCostmap(params)
     costmap.layers["voxels"].add_cloud(
-        "cloud", np.array([(4.5, 2.5, 1.5), (5.5, 1.5, 2.5)], np.float32), Pose3D(0.0, 0.0, 0.0),
-        0.0, 0.0, Pose3D(*EYE))
+        "cloud",
+        np.array([(4.5, 2.5, 1.5), (5.5, 1.5, 2.5)], np.float32),
+        Pose3D(0.0, 0.0, 0.0),
+        0.0,
+        0.0,
+        Pose3D(*EYE),
+    )
     costmap.update(0.0, ROBOT)
     assert picture(costmap.costs) == drawn("""......
                                               ......

@@ -2,14 +2,15 @@
 
 ``bench/encounters.py`` flies them with many seeds.
 """
+
 from __future__ import annotations
 
 import pytest
 
+from quad_nav.files.shipped import shipped
 from quad_nav.mission.robot_goals import goal_paths
 from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightOptions, read_setup
-from quad_nav.shipped import shipped
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import SimulationParams
 
@@ -20,10 +21,16 @@ MARGIN_M = 0.15  # between hulls: twice 0.05 m, and 0.12 m by which footprints a
 
 def setup_of(goals: str, seed: int = 0, time_limit_s: float = 150.0):
     beams = LidarParams(step_size_rad=LidarParams().scan_range_rad / 256)
-    return read_setup(FlightOptions(
-        shipped("scenes", f"encounters/{LOOPS.get(goals, goals)}.yaml"),
-        shipped("goals", f"encounters/{goals}"), seed=seed, time_limit_s=time_limit_s,
-        scans_per_s=10.0, simulation=SimulationParams(beams, jitter_m=0.3)))
+    return read_setup(
+        FlightOptions(
+            shipped("scenes", f"encounters/{LOOPS.get(goals, goals)}.yaml"),
+            shipped("goals", f"encounters/{goals}"),
+            seed=seed,
+            time_limit_s=time_limit_s,
+            scans_per_s=10.0,
+            simulation=SimulationParams(beams, jitter_m=0.3),
+        )
+    )
 
 
 def test_every_scene_has_goals_and_every_goal_a_scene():

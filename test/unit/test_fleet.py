@@ -1,32 +1,36 @@
 """A fleet's names, parameters and RViz file: what needs no ROS to be looked at."""
+
 from pathlib import Path
 
 import pytest
 
 from quad_nav.errors import InputError
-from quad_nav.random_mission import random_mission
-from quad_nav.ros.fleet_setup import configurations, read_setup, scene_of
-from quad_nav.ros.names import in_fleet, own_node
-from quad_nav.ros.rviz_file import document
-from quad_nav.shipped import shipped
+from quad_nav.files.shipped import shipped
+from quad_nav.ros.common.names import in_fleet, own_node
+from quad_nav.scenario.fleet_setup import configurations, read_setup, scene_of
+from quad_nav.scenario.random_mission import random_mission
 from quad_nav.sim.colours import ROBOT_COLOURS
+from quad_nav.topics.rviz_file import document
 
 CONFIG = str(shipped("config", "default"))
 
 
-@pytest.mark.parametrize("name, called", [
-    ("~local_costmap/costmap", "/move_base7/local_costmap/costmap"),
-    ("~", "/move_base7"),
-    ("cmd_vel", "/cmd_vel7"),
-    ("/scan", "/scan7"),
-    ("move_base_simple/goal", "/move_base_simple/goal7"),
-    ("move_base", "/move_base7"),
-    ("move_base/goal", "/move_base7/goal"),
-    ("move_base/recovery_status", "/move_base7/recovery_status"),
-    ("scan7", "/scan7"),
-    ("/camera/points", "/camera/points"),
-    ("map", "/map"),
-])
+@pytest.mark.parametrize(
+    "name, called",
+    [
+        ("~local_costmap/costmap", "/move_base7/local_costmap/costmap"),
+        ("~", "/move_base7"),
+        ("cmd_vel", "/cmd_vel7"),
+        ("/scan", "/scan7"),
+        ("move_base_simple/goal", "/move_base_simple/goal7"),
+        ("move_base", "/move_base7"),
+        ("move_base/goal", "/move_base7/goal"),
+        ("move_base/recovery_status", "/move_base7/recovery_status"),
+        ("scan7", "/scan7"),
+        ("/camera/points", "/camera/points"),
+        ("map", "/map"),
+    ],
+)
 def test_names_in_a_fleet_are_those_of_the_launch_files_remaps(name, called):
     assert in_fleet(7)(name) == called
     assert own_node(name) == name
@@ -41,8 +45,10 @@ def test_the_launch_file_remaps_the_same_names():
 
 
 def test_hosts_share_the_robots():
-    shares = [read_setup({"config": CONFIG, "robots": 5, "hosts": 2, "host": host}, "fleet")
-              for host in (0, 1)]
+    shares = [
+        read_setup({"config": CONFIG, "robots": 5, "hosts": 2, "host": host}, "fleet")
+        for host in (0, 1)
+    ]
     assert [list(share.configurations) for share in shares] == [[0, 2, 4], [1, 3]]
     one = shares[1].configurations[3]
     assert (one.robot, one.robots) == (3, 5)
@@ -74,13 +80,16 @@ def test_every_fault_is_told_once_with_its_place(tmp_path):
     assert "robot1.yaml:1" in refused.value.problems[1]
 
 
-@pytest.mark.parametrize("parameters, fault", [
-    ({"robots": 101}, "robots: is 101"),
-    ({"robots": 2, "hosts": 3}, "expected a robot for each host"),
-    ({"hosts": 2, "host": 2}, "expected a robot for each host"),
-    ({"seed": -1}, "seed: is -1"),
-    ({"robot": 3}, "expected robots"),
-])
+@pytest.mark.parametrize(
+    "parameters, fault",
+    [
+        ({"robots": 101}, "robots: is 101"),
+        ({"robots": 2, "hosts": 3}, "expected a robot for each host"),
+        ({"hosts": 2, "host": 2}, "expected a robot for each host"),
+        ({"seed": -1}, "seed: is -1"),
+        ({"robot": 3}, "expected robots"),
+    ],
+)
 def test_parameters_of_a_fleet_are_checked(parameters, fault):
     with pytest.raises(InputError) as refused:
         read_setup({"config": CONFIG, **parameters}, "fleet")
@@ -104,6 +113,7 @@ def test_rviz_of_many_listens_to_the_overview_only():
         displays = document(robots, random_mission(robots, 0).scene)
         group = displays["Visualization Manager"]["Displays"][-1]
         return {one["Name"] for one in group["Displays"] if one["Enabled"]}
+
     assert shown(5) == {"Global plan", "Trail"}
     assert {"Scan", "Global costmap"} <= shown(4)
 

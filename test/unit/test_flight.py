@@ -1,4 +1,5 @@
 """The flight law: forces that can be worked out by hand, and the commands it is given."""
+
 from __future__ import annotations
 
 import math
@@ -20,10 +21,12 @@ AIRFRAME = Airframe(mass_kg=2.0, inertia_kgm2=(0.01, 0.01, 0.02), max_thrust_n=6
 PARAMS = FlightParams()
 
 
-def body(roll=0.0, pitch=0.0, yaw=0.0, z=1.0, velocity=(0.0, 0.0, 0.0),
-         angular=(0.0, 0.0, 0.0)) -> BodyState:
-    return BodyState(np.array([[0.0, 0.0, z, *quaternion_from_euler(roll, pitch, yaw), *velocity,
-                                *angular]]))
+def body(
+    roll=0.0, pitch=0.0, yaw=0.0, z=1.0, velocity=(0.0, 0.0, 0.0), angular=(0.0, 0.0, 0.0)
+) -> BodyState:
+    return BodyState(
+        np.array([[0.0, 0.0, z, *quaternion_from_euler(roll, pitch, yaw), *velocity, *angular]])
+    )
 
 
 def forces_on(state: BodyState, *command: float, params: FlightParams = PARAMS):
@@ -85,14 +88,41 @@ def test_acceleration_is_limited_by_the_tilt():
 
 
 def test_rows_are_independent():
-    states = BodyState(np.array([
-        [0.0, 0.0, 1.0, *quaternion_from_euler(0.0, 0.0, 0.3), 0.1, 0.0, 0.0, 0.0, 0.0, 0.2],
-        [5.0, 5.0, 0.8, *quaternion_from_euler(0.1, -0.1, 2.0), 0.0, 0.4, -0.1, 0.3, 0.0, -0.5]]))
+    states = BodyState(
+        np.array(
+            [
+                [
+                    0.0,
+                    0.0,
+                    1.0,
+                    *quaternion_from_euler(0.0, 0.0, 0.3),
+                    0.1,
+                    0.0,
+                    0.0,
+                    0.0,
+                    0.0,
+                    0.2,
+                ],
+                [
+                    5.0,
+                    5.0,
+                    0.8,
+                    *quaternion_from_euler(0.1, -0.1, 2.0),
+                    0.0,
+                    0.4,
+                    -0.1,
+                    0.3,
+                    0.0,
+                    -0.5,
+                ],
+            ]
+        )
+    )
     commands = np.array([[0.3, 0.0, 0.5], [-0.2, 0.1, 0.0]])
     both = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(states, commands, 1.0)
     for k in range(2):
-        one = BodyState(states.rows[k:k + 1])
-        alone = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(one, commands[k:k + 1], 1.0)
+        one = BodyState(states.rows[k : k + 1])
+        alone = FlightLaw(AIRFRAME, PARAMS).thrust_and_torque(one, commands[k : k + 1], 1.0)
         assert both[0][k] == pytest.approx(alone[0][0])
         assert both[1][k] == pytest.approx(alone[1][0])
 
@@ -106,11 +136,14 @@ def test_rotations_of_many_bodies_are_those_of_each():
         assert rotations[k] == pytest.approx(rotation_from_quaternion(quaternion))
 
 
-@pytest.mark.parametrize("twist, limited", [
-    (Twist2D(0.3, -0.1, 0.7), (0.3, -0.1, 0.7)),
-    (Twist2D(3.0, 4.0, 0.0), (1.2, 1.6, 0.0)),
-    (Twist2D(0.0, 0.0, -9.0), (0.0, 0.0, -2.0)),
-    (Twist2D(1e308, 1e308, 0.0), (math.sqrt(2.0), math.sqrt(2.0), 0.0)),
-])
+@pytest.mark.parametrize(
+    "twist, limited",
+    [
+        (Twist2D(0.3, -0.1, 0.7), (0.3, -0.1, 0.7)),
+        (Twist2D(3.0, 4.0, 0.0), (1.2, 1.6, 0.0)),
+        (Twist2D(0.0, 0.0, -9.0), (0.0, 0.0, -2.0)),
+        (Twist2D(1e308, 1e308, 0.0), (math.sqrt(2.0), math.sqrt(2.0), 0.0)),
+    ],
+)
 def test_commands_are_limited_in_length_not_in_direction(twist, limited):
     assert limit_command(twist, PARAMS) == pytest.approx(limited)

@@ -1,4 +1,5 @@
 """Senses that fail in flight: the quadcopter hovers while it is blind, and then flies on."""
+
 from __future__ import annotations
 
 import json
@@ -19,7 +20,7 @@ from flight_faults import (
 )
 
 from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightOptions, read_setup
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import SimulationParams
 
@@ -32,9 +33,19 @@ CONTROL_PERIOD_S, BLIND_S = 0.1, 0.5
 def flown_with(fault, folder, config="default", time_limit_s=END_S + 0.5):
     """One quadcopter that has three metres to fly, 10 s, and as long as it stands."""
     (folder / "quad0_goals.json").write_text(json.dumps({"goals": [[1.0, 4.5]]}))
-    return fly(read_setup(FlightOptions(
-        ROOT / "scenes" / "arena.yaml", folder, config, time_limit_s=time_limit_s, scans_per_s=10.0,
-        simulation=SimulationParams(FEW_BEAMS))), [fault])
+    return fly(
+        read_setup(
+            FlightOptions(
+                ROOT / "scenes" / "arena.yaml",
+                folder,
+                config,
+                time_limit_s=time_limit_s,
+                scans_per_s=10.0,
+                simulation=SimulationParams(FEW_BEAMS),
+            )
+        ),
+        [fault],
+    )
 
 
 def test_without_a_fault_it_flies_all_the_time(tmp_path):
@@ -43,12 +54,22 @@ def test_without_a_fault_it_flies_all_the_time(tmp_path):
     assert harmless.hover_after_s > END_S - BEGIN_S - 2 * CONTROL_PERIOD_S
 
 
-@pytest.mark.parametrize("fault", [
-    NoScans(BEGIN_S, END_S), FrozenScans(BEGIN_S, END_S), OldScans(BEGIN_S, END_S),
-    LateScans(BEGIN_S, END_S), ScansOf(BEGIN_S, END_S, math.nan), ScansOf(BEGIN_S, END_S, 0.0),
-    ScansOf(BEGIN_S, END_S, math.inf), ScansOf(BEGIN_S, END_S, math.nan, first_half=True),
-    ScansOf(BEGIN_S, END_S, math.inf, first_half=True), NoPose(BEGIN_S, END_S),
-], ids=["none", "frozen", "old", "late", "NaN", "zeros", "inf", "half NaN", "half inf", "no pose"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        NoScans(BEGIN_S, END_S),
+        FrozenScans(BEGIN_S, END_S),
+        OldScans(BEGIN_S, END_S),
+        LateScans(BEGIN_S, END_S),
+        ScansOf(BEGIN_S, END_S, math.nan),
+        ScansOf(BEGIN_S, END_S, 0.0),
+        ScansOf(BEGIN_S, END_S, math.inf),
+        ScansOf(BEGIN_S, END_S, math.nan, first_half=True),
+        ScansOf(BEGIN_S, END_S, math.inf, first_half=True),
+        NoPose(BEGIN_S, END_S),
+    ],
+    ids=["none", "frozen", "old", "late", "NaN", "zeros", "inf", "half NaN", "half inf", "no pose"],
+)
 def test_blind_it_hovers_and_then_goes_on(fault, tmp_path):
     summary = flown_with(fault, tmp_path)
     assert fault.hover_after_s <= CONTROL_PERIOD_S + BLIND_S
@@ -73,7 +94,7 @@ def test_the_original_flies_on_by_a_frozen_scan(tmp_path):
     for file in (ROOT / "config" / "default").iterdir():
         text = file.read_text()
         if file.name == "move_base_params.yaml":
-            text += "  doubt_scans: false\n"
+            text += "  reject_implausible_scans: false\n"
         (config / file.name).write_text(text)
     fault = FrozenScans(BEGIN_S, END_S)
     flown_with(fault, tmp_path, str(config))

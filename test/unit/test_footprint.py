@@ -15,14 +15,18 @@ PADDING = float(np.float32(0.01))
 def test_circle_has_sixteen_points_counter_clockwise():
     points = footprints.circle(2.0)
     assert points.shape == (16, 2)
-    np.testing.assert_allclose(points[[0, 2, 4, 8]],
-                               [(2, 0), (math.sqrt(2), math.sqrt(2)), (0, 2), (-2, 0)], atol=1e-12)
+    np.testing.assert_allclose(
+        points[[0, 2, 4, 8]], [(2, 0), (math.sqrt(2), math.sqrt(2)), (0, 2), (-2, 0)], atol=1e-12
+    )
 
 
 def test_padding_moves_coordinates_away_from_zero():
     padded = footprints.pad([(0.3, -0.2), (0.0, 0.4), (-0.1, 0.0)], 0.01)
-    assert padded.tolist() == [[0.3 + PADDING, -0.2 - PADDING], [0.0, 0.4 + PADDING],
-                               [-0.1 - PADDING, 0.0]]
+    assert padded.tolist() == [
+        [0.3 + PADDING, -0.2 - PADDING],
+        [0.0, 0.4 + PADDING],
+        [-0.1 - PADDING, 0.0],
+    ]
 
 
 def test_circle_of_the_tutorial_is_wider_than_its_radius():
@@ -38,7 +42,8 @@ def test_radii_of_a_rectangle():
 
 def test_inscribed_radius_when_the_origin_is_outside():
     assert footprints.radii([(1.0, 1.0), (3.0, 1.0), (3.0, -1.0), (1.0, -1.0)]) == pytest.approx(
-        (1.0, math.hypot(3.0, 1.0)))
+        (1.0, math.hypot(3.0, 1.0))
+    )
 
 
 def test_nearest_corner_when_the_foot_of_the_perpendicular_is_outside_every_edge():

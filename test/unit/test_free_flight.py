@@ -1,4 +1,5 @@
 """Quadcopters that touch nothing fly without the physics engine, and as they do with it."""
+
 import math
 from dataclasses import replace
 
@@ -14,22 +15,38 @@ from quad_nav.sim.scene import Cylinder, Scene, Walls
 from quad_nav.sim.simulation import STEP_S, Simulation, SimulationParams
 
 SKY = Scene("sky", 40.0, 40.0, 20.0, Walls(), (), (Pose2D(10.0, 20.0, 0.3), Pose2D(30.0, 20.0)))
-ROOM = Scene("room", 8.0, 8.0, 1.0, Walls(), (Cylinder("post", 4.0, 4.0, 0.2, 2.0),),
-             (Pose2D(1.5, 2.0), Pose2D(1.5, 6.0)))
+ROOM = Scene(
+    "room",
+    8.0,
+    8.0,
+    1.0,
+    Walls(),
+    (Cylinder("post", 4.0, 4.0, 0.2, 2.0),),
+    (Pose2D(1.5, 2.0), Pose2D(1.5, 6.0)),
+)
 ENGINE = SimulationParams(lidar_caster="bullet")
 
 
 def free_step(bodies, forces, torques, airframe, step_s):
     rows = bodies.rows.copy()
-    step_freely(rows, np.zeros(len(rows), bool), forces, torques,
-                FlightLaw(airframe, FlightParams()).airframe, GRAVITY_MPS2, step_s)
+    step_freely(
+        rows,
+        np.zeros(len(rows), bool),
+        forces,
+        torques,
+        FlightLaw(airframe, FlightParams()).airframe,
+        GRAVITY_MPS2,
+        step_s,
+    )
     return BodyState(rows)
 
 
 def random_commands(seed, count, speed_mps):
     random = np.random.default_rng(seed)
-    return [Twist2D(*random.uniform(-speed_mps, speed_mps, 2), random.uniform(-2.0, 2.0))
-            for _ in range(count)]
+    return [
+        Twist2D(*random.uniform(-speed_mps, speed_mps, 2), random.uniform(-2.0, 2.0))
+        for _ in range(count)
+    ]
 
 
 def test_a_free_step_is_the_engines():
@@ -41,9 +58,12 @@ def test_a_free_step_is_the_engines():
         before = world.state()
         engine = world.step(before, forces, torques)
         free = free_step(before, forces, torques, Airframe(), STEP_S)
-        np.testing.assert_allclose(np.delete(free.rows, range(3, 7), axis=1),
-                                   np.delete(engine.rows, range(3, 7), axis=1),
-                                   rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(
+            np.delete(free.rows, range(3, 7), axis=1),
+            np.delete(engine.rows, range(3, 7), axis=1),
+            rtol=1e-12,
+            atol=1e-13,
+        )
         np.testing.assert_allclose(free.rotations, engine.rotations, atol=1e-13)
     assert np.abs(world.state().angular_radps).max() > 1.0  # or the gyroscopic term was not tried
     world.close()
@@ -52,12 +72,32 @@ def test_a_free_step_is_the_engines():
 def test_falling_for_a_step():
     falling = free_step(
         BodyState(np.array([[0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0, 1.0] + 5 * [0.0]])),
-        np.array([[4.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.02]]), Airframe(mass_kg=2.0), 0.5)
+        np.array([[4.0, 0.0, 0.0]]),
+        np.array([[0.0, 0.0, 0.02]]),
+        Airframe(mass_kg=2.0),
+        0.5,
+    )
     # v = (1 + 0.5 4 / 2, 0, -0.5 9.81), x = 0.5 v; the yaw rate is 0.5 0.02 / 0.02.
     half = 0.5 * 0.5 * 0.5
     np.testing.assert_allclose(
-        falling.rows[0], [1.0, 0.0, 9.0 - 0.25 * 9.81, 0.0, 0.0, math.sin(half), math.cos(half),
-                          2.0, 0.0, -0.5 * 9.81, 0.0, 0.0, 0.5], atol=1e-15)
+        falling.rows[0],
+        [
+            1.0,
+            0.0,
+            9.0 - 0.25 * 9.81,
+            0.0,
+            0.0,
+            math.sin(half),
+            math.cos(half),
+            2.0,
+            0.0,
+            -0.5 * 9.81,
+            0.0,
+            0.0,
+            0.5,
+        ],
+        atol=1e-15,
+    )
 
 
 def test_the_same_flight_with_and_without_the_engine():
@@ -78,8 +118,9 @@ def test_the_same_flight_with_and_without_the_engine():
 def test_nothing_touches_that_was_not_near(seed):
     """Two quadcopters bump about in a small room; each touch has been foreseen."""
     simulation = Simulation(ROOM, 2, replace(ENGINE, jitter_m=0.3), seed)
-    free = FreeFlight(ROOM, 2, simulation.params.airframe.radius_m,
-                      FlightLaw(Airframe(), FlightParams()), STEP_S)
+    free = FreeFlight(
+        ROOM, 2, simulation.params.airframe.radius_m, FlightLaw(Airframe(), FlightParams()), STEP_S
+    )
     hover, nobody = np.zeros((2, 3)), np.zeros(2, bool)
     foreseen, free_steps = [], 0
     for one, other in zip(random_commands([seed, 0], 30, 1.5), random_commands([seed, 1], 30, 1.5)):

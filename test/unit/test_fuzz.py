@@ -3,6 +3,7 @@
 The targets are those of ``make fuzz``. Here they get the files of the corpus, which hold
 what was once a fault, and usual documents with one part replaced by something odd.
 """
+
 from __future__ import annotations
 
 import copy
@@ -23,13 +24,42 @@ import targets  # noqa: E402
 
 CORPUS = sorted(path for path in (FUZZ / "corpus").rglob("*") if path.is_file())
 CONFIG = Path(__file__).parents[2] / "config" / "default"
-ODD = [None, True, 0, -1, 1e-300, 1e300, -1e300, float("inf"), float("nan"), 10**40, 2**31, "",
-       "x", "1", "$\\frac{", "\x1b[2J", "\ud800", "a" * 5000, "../../etc/passwd", "/dev/zero",
-       "a\0b", [], [[]], [1], [1, 2, 3, 4], ["a"], {}, {"a": {"b": []}}, [{}]]
+ODD = [
+    None,
+    True,
+    0,
+    -1,
+    1e-300,
+    1e300,
+    -1e300,
+    float("inf"),
+    float("nan"),
+    10**40,
+    2**31,
+    "",
+    "x",
+    "1",
+    "$\\frac{",
+    "\x1b[2J",
+    "\ud800",
+    "a" * 5000,
+    "../../etc/passwd",
+    "/dev/zero",
+    "a\0b",
+    [],
+    [[]],
+    [1],
+    [1, 2, 3, 4],
+    ["a"],
+    {},
+    {"a": {"b": []}},
+    [{}],
+]
 ODD_YAML = [*(value for value in ODD if value != "\ud800"), datetime.date(2001, 1, 1), b"\xff"]
 
-quick = settings(max_examples=150, deadline=None, derandomize=True,
-                 suppress_health_check=[HealthCheck.too_slow])
+quick = settings(
+    max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 
 
 @pytest.mark.parametrize("path", CORPUS, ids=lambda path: f"{path.parent.name}-{path.name}")
@@ -46,8 +76,13 @@ def test_every_target_has_a_corpus():
 def places(tree, above=()):
     """The ways to every part of a document, the whole first."""
     yield above
-    below = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(
-        tree, list) else ()
+    below = (
+        tree.items()
+        if isinstance(tree, dict)
+        else enumerate(tree)
+        if isinstance(tree, list)
+        else ()
+    )
     for key, value in below:
         yield from places(value, (*above, key))
 
@@ -108,8 +143,9 @@ def test_scenes_of_maps(tree):
     targets.run("map_yaml", as_yaml(tree))
 
 
-@pytest.mark.parametrize("name", ["base_local_planner", "costmap_common", "local_costmap",
-                                  "global_costmap"])
+@pytest.mark.parametrize(
+    "name", ["base_local_planner", "costmap_common", "local_costmap", "global_costmap"]
+)
 def test_parameters(name):
     document = yaml.safe_load((CONFIG / f"{name}_params.yaml").read_text().replace("$(arg i)", "0"))
 
@@ -122,17 +158,45 @@ def test_parameters(name):
 
 
 @quick
-@given(st.lists(st.sampled_from(
-    ["<model name='a'>", "</model>", "<link>", "</link>", "<collision>", "</collision>",
-     "<geometry>", "</geometry>", "<box><size>1 1 1</size></box>", "<box/>", "<pose>1 2</pose>",
-     "<pose>nan inf 0 1e300 0 0</pose>", "<pose>1 2 .5 0 0 0</pose>", "<sphere><radius>-1</radius>"
-     "</sphere>", "<cylinder><radius>1e-300</radius><length>1</length></cylinder>",
-     "<include><uri>model://a</uri></include>", "<include><uri>fuzz.world</uri></include>",
-     "<include/>", "<state>", "</state>", "<plane/>", "&amp;", "&x;", "<!--", "<![CDATA[", "\0"]),
-    max_size=30))
+@given(
+    st.lists(
+        st.sampled_from(
+            [
+                "<model name='a'>",
+                "</model>",
+                "<link>",
+                "</link>",
+                "<collision>",
+                "</collision>",
+                "<geometry>",
+                "</geometry>",
+                "<box><size>1 1 1</size></box>",
+                "<box/>",
+                "<pose>1 2</pose>",
+                "<pose>nan inf 0 1e300 0 0</pose>",
+                "<pose>1 2 .5 0 0 0</pose>",
+                "<sphere><radius>-1</radius></sphere>",
+                "<cylinder><radius>1e-300</radius><length>1</length></cylinder>",
+                "<include><uri>model://a</uri></include>",
+                "<include><uri>fuzz.world</uri></include>",
+                "<include/>",
+                "<state>",
+                "</state>",
+                "<plane/>",
+                "&amp;",
+                "&x;",
+                "<!--",
+                "<![CDATA[",
+                "\0",
+            ]
+        ),
+        max_size=30,
+    )
+)
 def test_worlds(parts):
-    targets.run("world", f"<sdf version='1.6'><world name='w'>{''.join(parts)}</world></sdf>"
-                .encode())
+    targets.run(
+        "world", f"<sdf version='1.6'><world name='w'>{''.join(parts)}</world></sdf>".encode()
+    )
 
 
 @quick
@@ -164,5 +228,6 @@ def test_images_with_bytes_changed(path, data):
     content = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 3))):
         content[data.draw(st.integers(0, min(len(content), 60) - 1))] = data.draw(
-            st.integers(0, 255))
+            st.integers(0, 255)
+        )
     targets.run("map_image", bytes(content))

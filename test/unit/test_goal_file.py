@@ -1,4 +1,5 @@
 """Goal files: what loads, and how each fault in one is named."""
+
 import json
 import math
 from pathlib import Path
@@ -20,9 +21,12 @@ from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
 GOALS = Path(__file__).parents[2] / "goals"
 
 # A round pillar of 0.5 m radius at (5, 5) in a 10 m arena without walls.
-PILLAR = clearance_check(lambda x, y: 0 < x < 10 and 0 < y < 10,
-                         lambda x, y: math.hypot(x - 5, y - 5) - 0.5,
-                         robot_radius_m=0.3, arena="x 0 to 10 m, y 0 to 10 m")
+PILLAR = clearance_check(
+    lambda x, y: 0 < x < 10 and 0 < y < 10,
+    lambda x, y: math.hypot(x - 5, y - 5) - 0.5,
+    robot_radius_m=0.3,
+    arena="x 0 to 10 m, y 0 to 10 m",
+)
 
 
 def faults(content, check_place=None):
@@ -31,10 +35,13 @@ def faults(content, check_place=None):
     return caught.value.problems
 
 
-@pytest.mark.parametrize("robot, goals", [
-    (0, [(3.0, 6.5), (9.0, 5.5), (1.5, 9.0)]),
-    (1, [(4.0, 3.5), (2.0, 9.0), (8.5, 5.0)]),
-])
+@pytest.mark.parametrize(
+    "robot, goals",
+    [
+        (0, [(3.0, 6.5), (9.0, 5.5), (1.5, 9.0)]),
+        (1, [(4.0, 3.5), (2.0, 9.0), (8.5, 5.0)]),
+    ],
+)
 def test_the_tutorials_files_load(robot, goals):
     sequence = load_goals(GOALS / f"quad{robot}_goals.json")
     assert sequence == GoalSequence(tuple(Goal(x, y) for x, y in goals))
@@ -42,12 +49,17 @@ def test_the_tutorials_files_load(robot, goals):
 
 def test_the_tutorials_listing_loads_without_braces():
     assert parse_goals('  "goals": [[3.0,6.5],[9.0,5.5]]\n', "f.json").goals == (
-        Goal(3.0, 6.5), Goal(9.0, 5.5))
+        Goal(3.0, 6.5),
+        Goal(9.0, 5.5),
+    )
 
 
 def test_every_key_is_read():
-    sequence = parse_goals("""{"$schema": "schema.json", "goals": [[1, 2], [3, 4, 1.5]],
-        "loop": true, "goal_tolerance": 0.25, "goal_timeout": 60, "retries": 3}""", "f.json")
+    sequence = parse_goals(
+        """{"$schema": "schema.json", "goals": [[1, 2], [3, 4, 1.5]],
+        "loop": true, "goal_tolerance": 0.25, "goal_timeout": 60, "retries": 3}""",
+        "f.json",
+    )
     assert sequence.goals == (Goal(1.0, 2.0), Goal(3.0, 4.0, 1.5))
     assert sequence.settings == SequenceSettings(0.25, 60.0, 3, True)
     assert isinstance(sequence.settings.retries, int)
@@ -63,43 +75,68 @@ def test_a_byte_order_mark_is_no_fault():
     assert parse_goals(b'\xef\xbb\xbf{"goals": [[1, 2]]}', "f.json").goals == (Goal(1.0, 2.0),)
 
 
-@pytest.mark.parametrize("content, problem", [
-    ('{"goals": [[1,2],]}', "f.json:1:18: is not JSON: Expecting value"),
-    ('{"goals":\n [[1,2]\n', "f.json:3:1: is not JSON: Expecting ',' delimiter"),
-    ('"goals": [[1,2],]', "f.json:1:17: is not JSON: Expecting value"),
-    ("", "f.json:1:1: is not JSON: Expecting value"),
-    (b"\xff", "f.json: byte 0 is not UTF-8"),
-    ("[" * 100000, "f.json: is nested too deeply"),
-    ("[[1, 2]]", "f.json: is a list; expected {"),
-    ("{}", "f.json: has no goals"),
-    ('{"goals": 3}', "f.json: goals: is 3; expected a list"),
-    ('{"goals": []}', "f.json: goals: is empty; expected at least one goal"),
-    ('{"goals": [5]}', "f.json: goals[0] (goal 1): is 5; expected [x, y] or [x, y, yaw]"),
-    ('{"goals": [[1]]}', "f.json: goals[0] (goal 1): has 1 numbers; expected [x, y]"),
-    ('{"goals": [[1, 2, 3, 4]]}', "f.json: goals[0] (goal 1): has 4 numbers; expected [x, y]"),
-    ('{"goals": [[1, true]]}', "f.json: goals[0] (goal 1): y is true; expected a finite number"),
-    ('{"goals": [["1", 2]]}', 'f.json: goals[0] (goal 1): x is "1"; expected a finite number'),
-    ('{"goals": [[NaN, 2]]}', "f.json: goals[0] (goal 1): x is NaN; expected a finite number"),
-    ('{"goals": [[1, -Infinity]]}', "f.json: goals[0] (goal 1): y is -Infinity; expected"),
-    ('{"goals": [[1e999, 2]]}', "f.json: goals[0] (goal 1): x is Infinity; expected"),
-    ('{"goals": [[1' + "0" * 5000 + ', 2]]}', "f.json: goals[0] (goal 1): x is Infinity"),
-    ('{"goals": [[1, 2, 90]]}', ("f.json: goals[0] (goal 1): yaw is 90; expected radians between "
-                                "-2 pi and 2 pi (90 degrees are 1.571)")),
-    ('{"goals": [[1, 2]], "goals": [[3, 4]]}', "f.json: goals: is given twice; expected once"),
-    ('{"goals": [[1, 2]], "Retrys": 1}',
-     "f.json: Retrys: is not a key of goal files; expected retries"),
-    ('{"goals": [[1, 2]], "zzz": 1}',
-     "f.json: zzz: is not a key of goal files; expected one of goals, $schema, goal_tolerance"),
-    ('{"goals": [[1, 2]], "$schema": 1}', "f.json: $schema: is 1; expected a string"),
-    ('{"goals": [[1, 2]], "loop": 1}', "f.json: loop: is 1; expected true or false"),
-    ('{"goals": [[1, 2]], "retries": 1.5}', "f.json: retries: is 1.5; expected a whole number"),
-    ('{"goals": [[1, 2]], "retries": -1}', "f.json: retries: is -1; expected a whole number"),
-    ('{"goals": [[1, 2]], "goal_tolerance": 0}', "f.json: goal_tolerance: is 0; expected a number"),
-    ('{"goals": [[1, 2]], "goal_timeout": NaN}', "f.json: goal_timeout: is NaN; expected a number"),
-    ('{"goals": [[1, 2], [1, 2.8]], "loop": true}',
-     ("f.json: loop: has nowhere to go; expected two goals more than twice the goal_tolerance "
-     "apart (0.8 m)")),
-])
+@pytest.mark.parametrize(
+    "content, problem",
+    [
+        ('{"goals": [[1,2],]}', "f.json:1:18: is not JSON: Expecting value"),
+        ('{"goals":\n [[1,2]\n', "f.json:3:1: is not JSON: Expecting ',' delimiter"),
+        ('"goals": [[1,2],]', "f.json:1:17: is not JSON: Expecting value"),
+        ("", "f.json:1:1: is not JSON: Expecting value"),
+        (b"\xff", "f.json: byte 0 is not UTF-8"),
+        ("[" * 100000, "f.json: is nested too deeply"),
+        ("[[1, 2]]", "f.json: is a list; expected {"),
+        ("{}", "f.json: has no goals"),
+        ('{"goals": 3}', "f.json: goals: is 3; expected a list"),
+        ('{"goals": []}', "f.json: goals: is empty; expected at least one goal"),
+        ('{"goals": [5]}', "f.json: goals[0] (goal 1): is 5; expected [x, y] or [x, y, yaw]"),
+        ('{"goals": [[1]]}', "f.json: goals[0] (goal 1): has 1 numbers; expected [x, y]"),
+        ('{"goals": [[1, 2, 3, 4]]}', "f.json: goals[0] (goal 1): has 4 numbers; expected [x, y]"),
+        (
+            '{"goals": [[1, true]]}',
+            "f.json: goals[0] (goal 1): y is true; expected a finite number",
+        ),
+        ('{"goals": [["1", 2]]}', 'f.json: goals[0] (goal 1): x is "1"; expected a finite number'),
+        ('{"goals": [[NaN, 2]]}', "f.json: goals[0] (goal 1): x is NaN; expected a finite number"),
+        ('{"goals": [[1, -Infinity]]}', "f.json: goals[0] (goal 1): y is -Infinity; expected"),
+        ('{"goals": [[1e999, 2]]}', "f.json: goals[0] (goal 1): x is Infinity; expected"),
+        ('{"goals": [[1' + "0" * 5000 + ", 2]]}", "f.json: goals[0] (goal 1): x is Infinity"),
+        (
+            '{"goals": [[1, 2, 90]]}',
+            (
+                "f.json: goals[0] (goal 1): yaw is 90; expected radians between "
+                "-2 pi and 2 pi (90 degrees are 1.571)"
+            ),
+        ),
+        ('{"goals": [[1, 2]], "goals": [[3, 4]]}', "f.json: goals: is given twice; expected once"),
+        (
+            '{"goals": [[1, 2]], "Retrys": 1}',
+            "f.json: Retrys: is not a key of goal files; expected retries",
+        ),
+        (
+            '{"goals": [[1, 2]], "zzz": 1}',
+            "f.json: zzz: is not a key of goal files; expected one of goals, $schema, goal_tolerance",
+        ),
+        ('{"goals": [[1, 2]], "$schema": 1}', "f.json: $schema: is 1; expected a string"),
+        ('{"goals": [[1, 2]], "loop": 1}', "f.json: loop: is 1; expected true or false"),
+        ('{"goals": [[1, 2]], "retries": 1.5}', "f.json: retries: is 1.5; expected a whole number"),
+        ('{"goals": [[1, 2]], "retries": -1}', "f.json: retries: is -1; expected a whole number"),
+        (
+            '{"goals": [[1, 2]], "goal_tolerance": 0}',
+            "f.json: goal_tolerance: is 0; expected a number",
+        ),
+        (
+            '{"goals": [[1, 2]], "goal_timeout": NaN}',
+            "f.json: goal_timeout: is NaN; expected a number",
+        ),
+        (
+            '{"goals": [[1, 2], [1, 2.8]], "loop": true}',
+            (
+                "f.json: loop: has nowhere to go; expected two goals more than twice the goal_tolerance "
+                "apart (0.8 m)"
+            ),
+        ),
+    ],
+)
 def test_each_fault_has_its_place_and_what_was_expected(content, problem):
     problems = faults(content)
     assert len(problems) == 1
@@ -113,12 +150,18 @@ def test_all_faults_are_listed_at_once():
         "f.json: loop: is 2; expected true or false",
         "f.json: goals[0] (goal 1): x is true; expected a finite number of metres",
         "f.json: goals[0] (goal 1): y is null; expected a finite number of metres",
-        ("f.json: goals[1] (goal 2): (5, 5) is inside an obstacle; "
-        "expected 0.30 m of room around it"),
-        ("f.json: goals[3] (goal 4): (11, 2) is outside the arena; "
-        "expected a place in x 0 to 10 m, y 0 to 10 m"),
-        ("f.json: goals[4] (goal 5): (5, 5.7) is 0.20 m from an obstacle or a wall; "
-        "expected at least the robot's radius, 0.30 m"),
+        (
+            "f.json: goals[1] (goal 2): (5, 5) is inside an obstacle; "
+            "expected 0.30 m of room around it"
+        ),
+        (
+            "f.json: goals[3] (goal 4): (11, 2) is outside the arena; "
+            "expected a place in x 0 to 10 m, y 0 to 10 m"
+        ),
+        (
+            "f.json: goals[4] (goal 5): (5, 5.7) is 0.20 m from an obstacle or a wall; "
+            "expected at least the robot's radius, 0.30 m"
+        ),
     ]
 
 
@@ -130,16 +173,20 @@ def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError) as caught:
         load_goals(tmp_path / "none.json")
     assert caught.value.problems == [
-        f"{tmp_path}/none.json: cannot be read: No such file or directory; expected a file"]
+        f"{tmp_path}/none.json: cannot be read: No such file or directory; expected a file"
+    ]
 
 
 def test_settings_outside_a_file():
     assert read_settings({"retries": 2, "loop": False}, "sequencer") == (
-        SequenceSettings(retries=2), [])
+        SequenceSettings(retries=2),
+        [],
+    )
     _, problems = read_settings({"retries": True, "goal_timeout": "long"}, "sequencer")
     assert problems == [
         "sequencer: retries: is true; expected a whole number, 0 to 10000",
-        'sequencer: goal_timeout: is "long"; expected a number of seconds above 0, 1e+09 at most']
+        'sequencer: goal_timeout: is "long"; expected a number of seconds above 0, 1e+09 at most',
+    ]
 
 
 def test_an_edited_file_is_taken_once_it_has_settled(tmp_path):

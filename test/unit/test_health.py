@@ -1,11 +1,13 @@
 """What nodes tell of themselves, from what was measured."""
+
 from __future__ import annotations
 
 import dataclasses
 
 import pytest
 
-from quad_nav.face.health import (
+from quad_nav.navigator.tick import State
+from quad_nav.topics.health import (
     Control,
     Input,
     Level,
@@ -14,7 +16,6 @@ from quad_nav.face.health import (
     inputs_health,
     loop_health,
 )
-from quad_nav.tick import State
 
 SCAN = Input("/scan0", 10.0, 0.05, 0.01, 1.0)
 ODOM = Input("/odom0", 40.0, 0.02, 0.0, 3.0)
@@ -26,16 +27,27 @@ def changed(one, **fields):
     return dataclasses.replace(one, **fields)
 
 
-@pytest.mark.parametrize("inputs, is_located, level, message", [
-    ([ODOM, SCAN], True, Level.OK, "all are coming"),
-    ([ODOM, changed(SCAN, silent_s=None)], True, Level.STALE, "nothing yet on /scan0"),
-    ([changed(ODOM, silent_s=1.5), changed(SCAN, silent_s=1.5)], True, Level.ERROR,
-     "nothing on /scan0 for 1.5 s"),
-    ([changed(ODOM, silent_s=None), changed(SCAN, silent_s=1.04)], True, Level.ERROR,
-     "nothing on /scan0 for 1.0 s"),
-    ([ODOM, changed(SCAN, silent_s=1.0)], True, Level.OK, "all are coming"),
-    ([ODOM, SCAN], False, Level.ERROR, "its place is unknown, see /tf"),
-])
+@pytest.mark.parametrize(
+    "inputs, is_located, level, message",
+    [
+        ([ODOM, SCAN], True, Level.OK, "all are coming"),
+        ([ODOM, changed(SCAN, silent_s=None)], True, Level.STALE, "nothing yet on /scan0"),
+        (
+            [changed(ODOM, silent_s=1.5), changed(SCAN, silent_s=1.5)],
+            True,
+            Level.ERROR,
+            "nothing on /scan0 for 1.5 s",
+        ),
+        (
+            [changed(ODOM, silent_s=None), changed(SCAN, silent_s=1.04)],
+            True,
+            Level.ERROR,
+            "nothing on /scan0 for 1.0 s",
+        ),
+        ([ODOM, changed(SCAN, silent_s=1.0)], True, Level.OK, "all are coming"),
+        ([ODOM, SCAN], False, Level.ERROR, "its place is unknown, see /tf"),
+    ],
+)
 def test_inputs(inputs, is_located, level, message):
     health = inputs_health("move_base0", "quad0", inputs, is_located)
     assert (health.name, health.hardware_id) == ("move_base0: inputs", "quad0")
@@ -44,21 +56,37 @@ def test_inputs(inputs, is_located, level, message):
 
 def test_what_inputs_tell_beside_their_level():
     values = inputs_health("move_base0", "quad0", [SCAN, changed(ODOM, silent_s=None)], True).values
-    assert values == {"located": "True", "/scan0 Hz": "10.0", "/scan0 silent s": "0.05",
-                      "/scan0 late s": "0.010", "/odom0 Hz": "40.0", "/odom0 silent s": "",
-                      "/odom0 late s": "0.000"}
+    assert values == {
+        "located": "True",
+        "/scan0 Hz": "10.0",
+        "/scan0 silent s": "0.05",
+        "/scan0 late s": "0.010",
+        "/odom0 Hz": "40.0",
+        "/odom0 silent s": "",
+        "/odom0 late s": "0.000",
+    }
 
 
-@pytest.mark.parametrize("fields, level, message", [
-    ({}, Level.OK, "controlling at 9.6 Hz"),
-    ({"state": State.IDLE, "rate_hz": 0.0}, Level.OK, "idle"),
-    ({"rate_hz": 4.0, "slow_seconds": 2}, Level.OK, "controlling at 4.0 Hz"),
-    ({"rate_hz": 4.0, "slow_seconds": 3}, Level.WARN, "controlling at 4.0 Hz, 10 Hz are wanted"),
-    ({"state": State.CLEARING}, Level.WARN, "clearing at 9.6 Hz: a recovery behaviour runs"),
-    ({"trouble": "no plan: blocked"}, Level.WARN, "controlling: no plan: blocked"),
-    ({"trouble": "stopped: nothing from scan"}, Level.ERROR,
-     "controlling: stopped: nothing from scan"),
-])
+@pytest.mark.parametrize(
+    "fields, level, message",
+    [
+        ({}, Level.OK, "controlling at 9.6 Hz"),
+        ({"state": State.IDLE, "rate_hz": 0.0}, Level.OK, "idle"),
+        ({"rate_hz": 4.0, "slow_seconds": 2}, Level.OK, "controlling at 4.0 Hz"),
+        (
+            {"rate_hz": 4.0, "slow_seconds": 3},
+            Level.WARN,
+            "controlling at 4.0 Hz, 10 Hz are wanted",
+        ),
+        ({"state": State.CLEARING}, Level.WARN, "clearing at 9.6 Hz: a recovery behaviour runs"),
+        ({"trouble": "no plan: blocked"}, Level.WARN, "controlling: no plan: blocked"),
+        (
+            {"trouble": "stopped: nothing from scan"},
+            Level.ERROR,
+            "controlling: stopped: nothing from scan",
+        ),
+    ],
+)
 def test_control(fields, level, message):
     health = control_health("move_base0", "quad0", changed(CONTROL, **fields))
     assert (health.level, health.message) == (level, message)
@@ -66,11 +94,14 @@ def test_control(fields, level, message):
     assert health.values["last reason at s"] == "12.50"
 
 
-@pytest.mark.parametrize("fields, level, message", [
-    ({}, Level.OK, "8 served"),
-    ({"late_s": 0.5}, Level.WARN, "up to 0.50 s late: cycles are left out"),
-    ({"late_s": 0.5, "unseen_s": 7.0}, Level.ERROR, "has not come round for 7 s"),
-])
+@pytest.mark.parametrize(
+    "fields, level, message",
+    [
+        ({}, Level.OK, "8 served"),
+        ({"late_s": 0.5}, Level.WARN, "up to 0.50 s late: cycles are left out"),
+        ({"late_s": 0.5, "unseen_s": 7.0}, Level.ERROR, "has not come round for 7 s"),
+    ],
+)
 def test_loop(fields, level, message):
     health = loop_health("fleet0", changed(LOOP, **fields))
     assert (health.name, health.hardware_id) == ("fleet0: loop", "fleet0")

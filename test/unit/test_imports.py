@@ -11,35 +11,46 @@ import pytest
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 PACKAGE = "quad_nav"
 
-# A unit (a module or subpackage of quad_nav) imports itself and units of the rows above its own.
+# A unit (a module or a package directly in quad_nav) imports itself and units of the rows above.
 LAYERS = [
-    {"errors", "footprint", "geometry", "grid", "mends", "peers", "plain_yaml", "shipped",
-     "user_files", "versions"},
+    {"errors"},
+    {"versions"},
+    {"geometry", "grid", "files"},
+    {"footprint", "timing"},
     {"kernels"},
-    {"sim", "costmap", "plan", "control"},
-    {"recovery"},
-    {"plugins", "schedule", "parameter_limiter", "standstill", "refuge", "right_of_way",
-     "separation"},
-    {"tick", "traffic"},
-    {"costmap_updates", "navigator_params", "progress", "recovering", "yielding"},
+    {"costmap", "plan", "control", "sim"},
+    {"recovery", "peers"},
     {"navigator", "mission"},
     {"config"},
-    {"assembly"},
-    {"warm_up", "check", "scene_check", "random_mission", "face"},
+    {"scenario"},
+    {"topics"},
     {"offline", "ros"},
+    {"recording"},
+    {"report"},
+    {"barn"},
     {"tuning"},
     {"cli"},
 ]
-NOUNS = LAYERS[0]  # they may import one another
-# Navigation knows no simulator.
-WORLD_USERS = {"sim", "config", "assembly", "warm_up", "scene_check", "random_mission", "face",
-               "offline", "ros", "tuning", "cli"}
+# Navigation and the simulator do not import each other.
+WORLD_USERS = {
+    "sim",
+    "mission",
+    "scenario",
+    "topics",
+    "offline",
+    "recording",
+    "report",
+    "barn",
+    "tuning",
+    "cli",
+    "ros",
+}
 
-# Where a third-party package may be imported: those files or folders and nowhere else.
+# The files or folders in which a third-party package may be imported.
 PLACES = {
     "click": "cli/",
     "rich": "cli/",
-    "joblib": ("offline/barn/runs.py", "tuning/workers.py"),
+    "joblib": ("barn/runs.py", "tuning/workers.py"),
     "ray": "tuning/workers.py",
     "optuna": "tuning/",
     "sqlalchemy": "tuning/study.py",
@@ -51,13 +62,13 @@ PLACES = {
     "actionlib": "ros/",
     "dynamic_reconfigure": "ros/",
     "tf2_ros": "ros/",
-    "rerun": "offline/view",
-    "lz4": "offline/",
-    "rosbags": "offline/",
-    "mcap": "offline/",
-    "matplotlib": ("offline/report/", "tuning/report/"),
-    "jinja2": "offline/report/",
-    "PIL": ("sim/map_image.py", "offline/report/"),
+    "rerun": "recording/viewer",
+    "lz4": "recording/",
+    "rosbags": "recording/",
+    "mcap": "recording/",
+    "matplotlib": ("report/", "tuning/report/"),
+    "jinja2": "report/",
+    "PIL": ("sim/map_image.py", "report/"),
 }
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")
 
@@ -75,13 +86,13 @@ def test_module_imports_only_what_it_may(path):
 @pytest.mark.parametrize(
     "module, statement",
     [
-        ("costmap/layered.py", "import quad_nav.navigator"),
+        ("costmap/layered.py", "import quad_nav.navigator.navigator"),
         ("costmap/layered.py", "from quad_nav import plan"),
         ("costmap/layered.py", "from ..sim.scene import Scene"),
-        ("navigator.py", "def tick():\n    from quad_nav.sim import scene"),
+        ("navigator/navigator.py", "def tick():\n    from quad_nav.sim import scene"),
         ("offline/run.py", "from quad_nav.ros import topics"),
         ("kernels/navfn.py", "from quad_nav.costmap.layered import LayeredCostmap"),
-        ("navigator.py", "import rospy"),
+        ("navigator/navigator.py", "import rospy"),
         ("mission/summary.py", "from geometry_msgs.msg import Pose"),
         ("sim/lidar.py", "import pybullet as p"),
         ("plan/navfn.py", "from numba import njit"),
@@ -96,8 +107,8 @@ def test_rules_refuse(module, statement):
     "module, statement",
     [
         ("costmap/layered.py", "from . import static\nfrom quad_nav import footprint, grid"),
-        ("navigator.py", "import numpy\nfrom quad_nav.plan.navfn import Navfn"),
-        ("ros/move_base_node.py", "import rospy\nfrom nav_msgs.msg import Path"),
+        ("navigator/navigator.py", "import numpy\nfrom quad_nav.plan.navfn import Navfn"),
+        ("ros/navigator/move_base_node.py", "import rospy\nfrom nav_msgs.msg import Path"),
         ("sim/body.py", "import pybullet"),
         ("kernels/navfn.py", "from numba import njit"),
     ],
@@ -147,7 +158,7 @@ def may_import(path: Path, name: str) -> bool:
 
 
 def may_import_unit(importer: str, imported: str) -> bool:
-    if importer == imported or {importer, imported} <= NOUNS:
+    if importer == imported:
         return True
     if imported == "sim" and importer not in WORLD_USERS:
         return False

@@ -1,4 +1,5 @@
 """Messages of anybody's: what is dropped, and that the rest does the costmaps no harm."""
+
 from __future__ import annotations
 
 import math
@@ -9,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quad_nav.costmap.projection import scan_points, transform_points
-from quad_nav.face import incoming
 from quad_nav.geometry import Pose3D, Scan, Twist2D
+from quad_nav.topics import incoming
 
 ANY = st.floats(width=32)
 ODD = st.one_of(st.sampled_from([math.nan, math.inf, -math.inf, 0.0, 3.4e38, -1e-40]), ANY)
@@ -20,9 +21,16 @@ def scan(angle_min_rad=-3.0, increment_rad=0.01, low_m=0.02, high_m=60.0, ranges
     return Scan(1.0, angle_min_rad, increment_rad, low_m, high_m, np.array(ranges, np.float32))
 
 
-@pytest.mark.parametrize("odd", [scan(math.nan), scan(increment_rad=math.inf),
-                                 scan(low_m=-math.inf), scan(high_m=math.nan),
-                                 scan(ranges=np.ones(incoming.MOST_BEAMS + 1))])
+@pytest.mark.parametrize(
+    "odd",
+    [
+        scan(math.nan),
+        scan(increment_rad=math.inf),
+        scan(low_m=-math.inf),
+        scan(high_m=math.nan),
+        scan(ranges=np.ones(incoming.MOST_BEAMS + 1)),
+    ],
+)
 def test_scans_that_are_dropped(odd):
     assert incoming.scan_problem(odd)
 
@@ -48,13 +56,16 @@ def test_usual_messages_are_taken():
     assert incoming.grid_problem(3, 2, 0.05, 6) == ""
 
 
-@pytest.mark.parametrize("pose, problem", [
-    (Pose3D(math.nan, 0.0, 0.0), "is not on this earth"),
-    (Pose3D(0.0, 0.0, math.inf), "is not on this earth"),
-    (Pose3D(0.0, 1e7, 0.0), "is not on this earth"),
-    (Pose3D(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0)), "has the length 0, expected 1"),
-    (Pose3D(0.0, 0.0, 0.0, (math.nan, 0.0, 0.0, 1.0)), "has the length nan"),
-])
+@pytest.mark.parametrize(
+    "pose, problem",
+    [
+        (Pose3D(math.nan, 0.0, 0.0), "is not on this earth"),
+        (Pose3D(0.0, 0.0, math.inf), "is not on this earth"),
+        (Pose3D(0.0, 1e7, 0.0), "is not on this earth"),
+        (Pose3D(0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0)), "has the length 0, expected 1"),
+        (Pose3D(0.0, 0.0, 0.0, (math.nan, 0.0, 0.0, 1.0)), "has the length nan"),
+    ],
+)
 def test_poses_that_are_dropped(pose, problem):
     assert problem in incoming.pose_problem(pose)
 
@@ -69,9 +80,15 @@ def test_ways_that_are_dropped():
     assert "at most" in incoming.way_problem(np.zeros((incoming.MOST_POSES + 1, 2)))
 
 
-@pytest.mark.parametrize("width, height, resolution_m, values, problem", [
-    (0, 5, 0.05, 0, "0 x 5 cells"), (2**32 - 1, 2**32 - 1, 0.05, 1, "expected 1 to"),
-    (3, 2, 0.05, 5, "5 values for 3 x 2 cells"), (1, 1, 0.0, 1, "cells of 0 m"),
-    (1, 1, math.nan, 1, "cells of nan m")])
+@pytest.mark.parametrize(
+    "width, height, resolution_m, values, problem",
+    [
+        (0, 5, 0.05, 0, "0 x 5 cells"),
+        (2**32 - 1, 2**32 - 1, 0.05, 1, "expected 1 to"),
+        (3, 2, 0.05, 5, "5 values for 3 x 2 cells"),
+        (1, 1, 0.0, 1, "cells of 0 m"),
+        (1, 1, math.nan, 1, "cells of nan m"),
+    ],
+)
 def test_maps_that_are_dropped(width, height, resolution_m, values, problem):
     assert problem in incoming.grid_problem(width, height, resolution_m, values)

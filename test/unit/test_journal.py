@@ -1,4 +1,5 @@
 """The journal: what a sequencer that comes after another one reads in it."""
+
 from __future__ import annotations
 
 import errno
@@ -36,7 +37,7 @@ class FullDisk:
     def __call__(self, file, data, offset):
         if self.room == 0:
             raise OSError(errno.ENOSPC, "No space left on device")
-        done = self._write(file, data[:self.room], offset)
+        done = self._write(file, data[: self.room], offset)
         self.room -= done
         return done
 

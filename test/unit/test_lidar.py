@@ -1,4 +1,5 @@
 """The LIDAR: its pattern, ranges against walls at known distances, noise."""
+
 from __future__ import annotations
 
 import math
@@ -28,12 +29,13 @@ class Plane:
         return np.where((fractions >= 0.0) & (fractions <= 1.0), fractions, np.inf)
 
 
-def look(params: LidarParams, map_from_lidar: Pose3D, plane: Plane, stamp_s: float = 0.0,
-         random=None):
+def look(
+    params: LidarParams, map_from_lidar: Pose3D, plane: Plane, stamp_s: float = 0.0, random=None
+):
     """The scan of a LIDAR at a pose, on a quadcopter that hangs below it."""
     pose = map_from_lidar.compose(base_from_lidar.inverse())
     bodies = BodyState(np.array([[*pose.translation, *pose.quaternion, *np.zeros(6)]]))
-    distances, = WorldCaster(params, plane).cast(bodies, [0])
+    (distances,) = WorldCaster(params, plane).cast(bodies, [0])
     return make_scan(params, stamp_s, distances, random)
 
 
@@ -59,8 +61,7 @@ def test_beams_look_along_their_angles():
     assert scan.ranges_m.dtype == np.float32
     assert scan.ranges_m == pytest.approx([np.inf, np.inf, 2.0, np.inf])
     turned = Pose3D(1.0, 5.0, 1.0, quaternion_from_yaw(math.pi / 2))
-    assert look(FOUR_BEAMS, turned, wall).ranges_m == pytest.approx(
-        [np.inf, 2.0, np.inf, np.inf])
+    assert look(FOUR_BEAMS, turned, wall).ranges_m == pytest.approx([np.inf, 2.0, np.inf, np.inf])
 
 
 def test_a_lidar_that_pitches_forward_sees_the_floor_ahead():
@@ -82,8 +83,9 @@ def test_noise_is_gaussian_repeatable_and_leaves_misses_alone():
     floor = Plane([0.0, 1.0, 0.0], 2.0)
 
     def scan(seed):
-        return look(params, Pose3D(0.0, 0.0, 1.0), floor,
-                    random=np.random.default_rng(seed)).ranges_m
+        return look(
+            params, Pose3D(0.0, 0.0, 1.0), floor, random=np.random.default_rng(seed)
+        ).ranges_m
 
     angles = params.angle_min_rad + params.step_size_rad * np.arange(params.beam_count)
     hit = np.isfinite(scan(1))
@@ -95,14 +97,17 @@ def test_noise_is_gaussian_repeatable_and_leaves_misses_alone():
     assert not np.array_equal(scan(1), scan(2))
 
 
-@pytest.mark.parametrize("changes, place", [
-    ({"scan_range_rad": 7.0}, "scan_range"),
-    ({"scan_range_rad": math.nan}, "scan_range"),
-    ({"step_size_rad": 0.0}, "step_size"),
-    ({"step_size_rad": 2.0 * math.pi / 7.5}, "step_size"),
-    ({"range_min_m": 60.0}, "range_min"),
-    ({"noise_std_m": -0.1}, "range_noise"),
-])
+@pytest.mark.parametrize(
+    "changes, place",
+    [
+        ({"scan_range_rad": 7.0}, "scan_range"),
+        ({"scan_range_rad": math.nan}, "scan_range"),
+        ({"step_size_rad": 0.0}, "step_size"),
+        ({"step_size_rad": 2.0 * math.pi / 7.5}, "step_size"),
+        ({"range_min_m": 60.0}, "range_min"),
+        ({"noise_std_m": -0.1}, "range_noise"),
+    ],
+)
 def test_bad_parameters(changes, place):
     with pytest.raises(InputError) as caught:
         LidarParams(**changes)

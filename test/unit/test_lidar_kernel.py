@@ -1,4 +1,5 @@
 """The LIDAR's kernel: each shape by hand, and thousands of poses beside the physics engine."""
+
 from __future__ import annotations
 
 import math
@@ -33,12 +34,14 @@ def beams(*bearings_rad: float) -> Beams:
     """Beams that are a step apart; the first may be anywhere."""
     angles = np.array(bearings_rad)
     step = float(angles[1] - angles[0]) if len(angles) > 1 else 0.1
-    return Beams(np.column_stack([np.cos(angles), np.sin(angles)]), float(angles[0]), step,
-                 0.02, FAR_M)
+    return Beams(
+        np.column_stack([np.cos(angles), np.sin(angles)]), float(angles[0]), step, 0.02, FAR_M
+    )
 
 
-def cast(solids: Solids, origin, pattern: Beams, *, pitch_rad: float = 0.0,
-         grid: SolidGrid = NO_GRID) -> np.ndarray:
+def cast(
+    solids: Solids, origin, pattern: Beams, *, pitch_rad: float = 0.0, grid: SolidGrid = NO_GRID
+) -> np.ndarray:
     """Ranges of one LIDAR whose nose is down by the pitch."""
     cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
     rotation = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
@@ -48,8 +51,12 @@ def cast(solids: Solids, origin, pattern: Beams, *, pitch_rad: float = 0.0,
 
 
 def solid(kind: int, centre, sizes, rotation=((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> Solids:
-    return Solids(np.array([kind]), np.array([centre], float), np.array([rotation], float),
-                  np.array([sizes], float))
+    return Solids(
+        np.array([kind]),
+        np.array([centre], float),
+        np.array([rotation], float),
+        np.array([sizes], float),
+    )
 
 
 AHEAD = beams(0.0)
@@ -79,7 +86,8 @@ def test_a_low_box_is_seen_by_a_tilted_lidar_alone():
     pitch = math.atan(0.2)
     assert cast(box, (0, 0, 1), AHEAD, pitch_rad=pitch)[0] == pytest.approx(math.hypot(2.5, 0.5))
     assert cast(box, (2.2, 0, 1), AHEAD, pitch_rad=pitch)[0] == pytest.approx(
-        math.hypot(5.0, 1.0))  # beyond the box, on the floor
+        math.hypot(5.0, 1.0)
+    )  # beyond the box, on the floor
 
 
 def test_an_upright_cylinder():
@@ -90,7 +98,8 @@ def test_an_upright_cylinder():
     assert np.isinf(cast(pillar, (0, 0, 2.1), AHEAD)[0])
     # Sinking by 0.05 m per metre from 2.24 m, it reaches the top at x = 4.8.
     assert cast(pillar, (0, 0, 2.24), AHEAD, pitch_rad=math.atan(0.05))[0] == pytest.approx(
-        math.hypot(4.8, 0.24))
+        math.hypot(4.8, 0.24)
+    )
 
 
 def test_a_cylinder_on_its_side():
@@ -122,8 +131,13 @@ def test_a_solid_around_the_lidar_is_not_seen(kind, size):
 
 
 def test_the_nearest_of_what_stands_in_line():
-    row = solids_of([Cylinder("far", 8.0, 0.0, 0.5, 2.0), Box("near", 3.0, 0.0, 1.0, 1.0, 2.0),
-                     Box("middle", 5.0, 0.0, 1.0, 1.0, 2.0)])
+    row = solids_of(
+        [
+            Cylinder("far", 8.0, 0.0, 0.5, 2.0),
+            Box("near", 3.0, 0.0, 1.0, 1.0, 2.0),
+            Box("middle", 5.0, 0.0, 1.0, 1.0, 2.0),
+        ]
+    )
     assert cast(row, (0, 0, 1), AHEAD)[0] == pytest.approx(2.5)
     assert cast(row, (4, 0, 1), AHEAD)[0] == pytest.approx(0.5)
 
@@ -181,8 +195,11 @@ def forest(random: np.random.Generator, count: int, size_m: float) -> Iterator:
         x, y = random.uniform(0.0, size_m, 2).tolist()
         a, b, yaw = random.uniform((0.1, 0.1, -3.0), (0.8, 0.8, 3.0)).tolist()
         height, bottom = random.uniform((0.2, 0.0), (2.0, 1.0)).tolist()
-        yield (Box(f"box{k}", x, y, a, b, height, yaw, bottom) if k % 2
-               else Cylinder(f"pillar{k}", x, y, a / 2, height, bottom))
+        yield (
+            Box(f"box{k}", x, y, a, b, height, yaw, bottom)
+            if k % 2
+            else Cylinder(f"pillar{k}", x, y, a / 2, height, bottom)
+        )
 
 
 # Beside the physics engine, for whose rays solids are up to a millimetre thicker.
@@ -190,11 +207,26 @@ def forest(random: np.random.Generator, count: int, size_m: float) -> Iterator:
 STARTS = tuple(Pose2D(2.0 + k, 2.0) for k in range(8))
 SCENES = {
     "arena": ARENA,
-    "forest": Scene("forest", 20.0, 20.0, 1.0, Walls(1.5),
-                    tuple(forest(np.random.default_rng(1), 60, 20.0)), STARTS),
-    "boxes": Scene("boxes", 10.0, 10.0, 1.0, Walls(3.0),
-                   tuple(solid for solid in forest(np.random.default_rng(2), 40, 10.0)
-                         if isinstance(solid, Box)), STARTS),
+    "forest": Scene(
+        "forest",
+        20.0,
+        20.0,
+        1.0,
+        Walls(1.5),
+        tuple(forest(np.random.default_rng(1), 60, 20.0)),
+        STARTS,
+    ),
+    "boxes": Scene(
+        "boxes",
+        10.0,
+        10.0,
+        1.0,
+        Walls(3.0),
+        tuple(
+            solid for solid in forest(np.random.default_rng(2), 40, 10.0) if isinstance(solid, Box)
+        ),
+        STARTS,
+    ),
 }
 ROUNDS = 130  # of 8 quadcopters
 MARGIN_M = 1e-3
@@ -204,17 +236,21 @@ def place_at_random(world: World, scene: Scene, random: np.random.Generator) -> 
     """Quadcopters that touch nothing, tilted by up to 20 degrees, from low to above all."""
     placed: List[np.ndarray] = []
     while len(placed) < len(world._robots):
-        position = random.uniform((0.4, 0.4, 0.35), (scene.size_x_m - 0.4, scene.size_y_m - 0.4,
-                                                     2.5))
-        if (scene.clearance_m(*position) > 0.35
-                and all(np.linalg.norm(position - other) > 0.7 for other in placed)):
+        position = random.uniform(
+            (0.4, 0.4, 0.35), (scene.size_x_m - 0.4, scene.size_y_m - 0.4, 2.5)
+        )
+        if scene.clearance_m(*position) > 0.35 and all(
+            np.linalg.norm(position - other) > 0.7 for other in placed
+        ):
             placed.append(position)
     for body, position in zip(world._robots, placed):
         towards, tilt, yaw = random.uniform((-3.1, 0.0, -3.1), (3.1, math.radians(20.0), 3.1))
         pybullet.resetBasePositionAndOrientation(
-            body, position.tolist(), quaternion_from_euler(tilt * math.cos(towards),
-                                                           tilt * math.sin(towards), yaw),
-            physicsClientId=world._client)
+            body,
+            position.tolist(),
+            quaternion_from_euler(tilt * math.cos(towards), tilt * math.sin(towards), yaw),
+            physicsClientId=world._client,
+        )
     pybullet.performCollisionDetection(physicsClientId=world._client)
     return world.state()
 
@@ -230,9 +266,12 @@ def ranges(request) -> Tuple[np.ndarray, ...]:
     """Of 1040 poses: the kernel's, the engine's, the kernel's of thicker, of thinner solids."""
     scene, robots = SCENES[request.param], range(8)
     world = World(scene, scene.starts, Airframe(), 1.0 / 240)
-    casters = [KernelCaster(PARAMS, scene, 8), WorldCaster(PARAMS, world),
-               grown(KernelCaster(PARAMS, scene, 8), MARGIN_M),
-               grown(KernelCaster(PARAMS, scene, 8), -MARGIN_M)]
+    casters = [
+        KernelCaster(PARAMS, scene, 8),
+        WorldCaster(PARAMS, world),
+        grown(KernelCaster(PARAMS, scene, 8), MARGIN_M),
+        grown(KernelCaster(PARAMS, scene, 8), -MARGIN_M),
+    ]
     random = np.random.default_rng(11)
     found: List[List[np.ndarray]] = [[] for _ in casters]
     for _ in range(ROUNDS):
@@ -268,8 +307,10 @@ def test_every_range_of_the_engine_is_one_of_solids_up_to_a_millimetre_thicker(r
 
 def test_simulations_see_the_same_with_either_caster():
     """Moving, tilting quadcopters that see each other; all at once or one by one."""
-    simulations = [Simulation(ARENA, 4, SimulationParams(PARAMS, lidar_caster=caster))
-                   for caster in ("kernel", "bullet")]
+    simulations = [
+        Simulation(ARENA, 4, SimulationParams(PARAMS, lidar_caster=caster))
+        for caster in ("kernel", "bullet")
+    ]
     for simulation in simulations:
         for robot in range(4):
             simulation.set_command(robot, Twist2D(1.0, 0.0, 0.5))
@@ -288,8 +329,9 @@ def test_simulations_see_the_same_with_either_caster():
 def test_more_rays_than_the_engine_takes_at_once():
     world = World(ARENA, ARENA.starts[:1], Airframe(), 1.0 / 240)
     count = 2 * pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE
-    fractions = world.cast(np.tile([1.0, 1.0, 2.0], (count, 1)),
-                           np.tile([1.0, 1.0, -2.0], (count, 1)))
+    fractions = world.cast(
+        np.tile([1.0, 1.0, 2.0], (count, 1)), np.tile([1.0, 1.0, -2.0], (count, 1))
+    )
     world.close()
     assert fractions == pytest.approx(np.full(count, 0.5))
 

@@ -1,18 +1,18 @@
 """``docs/limits.md`` says what the code does."""
+
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
 
-from quad_nav import errors, plain_yaml
+from quad_nav import errors
+from quad_nav.barn import worlds
 from quad_nav.config import workload
-from quad_nav.face import incoming
+from quad_nav.files import document, plain_yaml
 from quad_nav.mission import goal_file
-from quad_nav.offline import bag_info, bag_trace
-from quad_nav.offline.barn import worlds
+from quad_nav.recording import bag_info, bag_trace
 from quad_nav.sim import (
-    document,
     free_starts,
     map_file,
     map_image,
@@ -20,26 +20,43 @@ from quad_nav.sim import (
     world_file,
     xml_tree,
 )
+from quad_nav.topics import incoming
 
 TABLE = (Path(__file__).parents[2] / "docs" / "limits.md").read_text(encoding="utf-8")
 ROWS = {
     "messages about one file": [errors.MOST_PROBLEMS],
-    "goal file": [goal_file.MOST_BYTES, goal_file.MOST_GOALS, goal_file.LONGEST_M,
-                  goal_file.LONGEST_S],
-    "YAML: scenes, maps, parameters": [plain_yaml.MOST_BYTES, plain_yaml.MOST_NODES,
-                                       plain_yaml.MOST_LEVELS, plain_yaml.MOST_DIGITS],
+    "goal file": [
+        goal_file.MOST_BYTES,
+        goal_file.MOST_GOALS,
+        goal_file.LONGEST_M,
+        goal_file.LONGEST_S,
+    ],
+    "YAML: scenes, maps, parameters": [
+        plain_yaml.MOST_BYTES,
+        plain_yaml.MOST_NODES,
+        plain_yaml.MOST_LEVELS,
+        plain_yaml.MOST_DIGITS,
+    ],
     "numbers in a scene": [document.LARGEST, scene_file.MAX_SIZE_M, document.LONGEST_TEXT],
     "starts in a scene": [scene_file.MAX_STARTS],
     "starts chosen by `quad`": [free_starts.MAX_LOOKS],
-    "Gazebo world": [xml_tree.MAX_BYTES, xml_tree.MAX_ELEMENTS, xml_tree.MAX_DEPTH,
-                     world_file.MAX_BYTES, world_file.MAX_INCLUDES],
+    "Gazebo world": [
+        xml_tree.MAX_BYTES,
+        xml_tree.MAX_ELEMENTS,
+        xml_tree.MAX_DEPTH,
+        world_file.MAX_BYTES,
+        world_file.MAX_INCLUDES,
+    ],
     "models, links and collisions": [world_file.MAX_PARTS, world_file.MAX_OBSTACLES],
     "image of a map": [map_image.MAX_BYTES, map_image.MAX_CELLS],
     "cells of a map": [map_file.MIN_RESOLUTION_M, map_file.MAX_RESOLUTION_M, map_file.MAX_BOXES],
     "costmap": [workload.MOST_CELLS],
     "BARN worlds (`.npz`)": [worlds.MOST_BYTES],
-    "recording that is read": [bag_trace.MOST_MEMORY_BYTES / 1e9,
-                               bag_trace.LONGEST_FLIGHT_S / 86400, bag_info.MOST_ROBOTS],
+    "recording that is read": [
+        bag_trace.MOST_MEMORY_BYTES / 1e9,
+        bag_trace.LONGEST_FLIGHT_S / 86400,
+        bag_info.MOST_ROBOTS,
+    ],
     "scan": [incoming.MOST_BEAMS],
     "point cloud": [incoming.MOST_POINTS],
     "odometry, commands, goals": [incoming.LARGEST],

@@ -1,4 +1,5 @@
 """``map_server`` maps: how pixels are read, exact covers, and the scene they make."""
+
 from __future__ import annotations
 
 import math
@@ -9,13 +10,19 @@ import pytest
 from PIL import Image
 
 from quad_nav.errors import InputError
+from quad_nav.files.document import read_yaml
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.document import read_yaml
 from quad_nav.sim.map_file import load_map, rectangles_of
 from quad_nav.sim.scene_file import load_scene
 
-YAML = {"image": "m.pgm", "resolution": 0.5, "origin": [0.0, 0.0, 0.0], "negate": 0,
-        "occupied_thresh": 0.65, "free_thresh": 0.196}
+YAML = {
+    "image": "m.pgm",
+    "resolution": 0.5,
+    "origin": [0.0, 0.0, 0.0],
+    "negate": 0,
+    "occupied_thresh": 0.65,
+    "free_thresh": 0.196,
+}
 
 
 def written(folder: Path, pixels, name: str = "m.pgm", **changes) -> Path:
@@ -52,8 +59,9 @@ def test_negated_white_is_occupied(tmp_path):
 
 def test_scale_has_degrees_of_which_none_is_an_obstacle(tmp_path):
     # 1 + 98 * (p - 0.2) / 0.4 with p 0.4 at 153 and 0.2 at 204.
-    path = written(tmp_path, [[0, 153, 204, 255]], mode="scale", free_thresh=0.2,
-                   occupied_thresh=0.6)
+    path = written(
+        tmp_path, [[0, 153, 204, 255]], mode="scale", free_thresh=0.2, occupied_thresh=0.6
+    )
     occupancy = load_map(read_yaml(path), path)
     assert occupancy.occupancy.tolist() == [[100, 50, 1, 0]]
     assert occupancy.occupied(unknown_too=True).tolist() == [[True, False, False, False]]
@@ -61,8 +69,9 @@ def test_scale_has_degrees_of_which_none_is_an_obstacle(tmp_path):
 
 def test_scale_takes_transparent_pixels_for_unknown(tmp_path):
     pixels = [[[0, 0, 0, 0], [150, 150, 150, 255], [150, 150, 150, 0]]]
-    assert cells(tmp_path, pixels, name="m.png", mode="scale", free_thresh=0.0,
-                 occupied_thresh=0.9) == [[100, 45, -1]]
+    assert cells(
+        tmp_path, pixels, name="m.png", mode="scale", free_thresh=0.0, occupied_thresh=0.9
+    ) == [[100, 45, -1]]
 
 
 def test_trinary_counts_alpha_among_the_channels(tmp_path):
@@ -78,23 +87,28 @@ def test_raw_values_are_occupancies(tmp_path):
 def test_plain_pgm_colour_and_16_bit_png(tmp_path):
     assert cells(tmp_path, b"P2\n# drawn by hand\n3 1\n255\n0 205 254\n") == [[100, -1, 0]]
     assert cells(tmp_path, b"P5 2 1 15\n\x00\x0f") == [[100, 0]]
-    assert cells(tmp_path, [[[0, 0, 0], [255, 255, 255], [0, 255, 255]]],
-                 name="m.png") == [[100, 0, -1]]
+    assert cells(tmp_path, [[[0, 0, 0], [255, 255, 255], [0, 255, 255]]], name="m.png") == [
+        [100, 0, -1]
+    ]
     Image.fromarray(np.array([[0, 65000]], np.uint16)).save(tmp_path / "deep.png")
     assert cells(tmp_path, (tmp_path / "deep.png").read_bytes(), name="m.png") == [[100, 0]]
     Image.new("P", (1, 1)).save(tmp_path / "palette.png")
-    assert cells(tmp_path, (tmp_path / "palette.png").read_bytes(), name="m.png",
-                 occupied_thresh=0.7) == [[100]]
+    assert cells(
+        tmp_path, (tmp_path / "palette.png").read_bytes(), name="m.png", occupied_thresh=0.7
+    ) == [[100]]
 
 
-@pytest.mark.parametrize("drawing, count", [
-    ("....", 0),
-    ("#..#", 2),
-    ("#### .##. .##.", 2),    # a wide top and the block below it
-    (".#. ### .#.", 3),
-    (".### .### .### ####", 2),  # higher than wide: the block, then the foot
-    ("##.. ##.. ..## ..##", 2),
-])
+@pytest.mark.parametrize(
+    "drawing, count",
+    [
+        ("....", 0),
+        ("#..#", 2),
+        ("#### .##. .##.", 2),  # a wide top and the block below it
+        (".#. ### .#.", 3),
+        (".### .### .### ####", 2),  # higher than wide: the block, then the foot
+        ("##.. ##.. ..## ..##", 2),
+    ],
+)
 def test_covers_are_small(drawing, count):
     marked = np.array([[c == "#" for c in row] for row in drawing.split()])
     assert len(rectangles_of(marked)) == count
@@ -106,7 +120,7 @@ def test_covers_are_exact_and_disjoint(density, monkeypatch):
     marked = np.random.default_rng(1).random((37, 53)) < density
     times = np.zeros(marked.shape, int)
     for column, row, width, height in rectangles_of(marked):
-        times[row:row + height, column:column + width] += 1
+        times[row : row + height, column : column + width] += 1
     assert (times == marked).all()
 
 
@@ -140,9 +154,11 @@ def test_unknown_cells_are_free_or_occupied(tmp_path):
     written(tmp_path, pixels)
     assert load_scene(tmp_path / "map.yaml").obstacles == ()
     path = tmp_path / "scene.yaml"
-    path.write_text("map: map.yaml\nunknown: occupied\nwalls: {height: 3.0}\naltitude: 1.5\n"
-                    "starts: [[2.0, 2.0, 1.0]]\n"
-                    "obstacles: [{shape: sphere, centre: [5, 2], radius: 0.5, bottom: 1}]\n")
+    path.write_text(
+        "map: map.yaml\nunknown: occupied\nwalls: {height: 3.0}\naltitude: 1.5\n"
+        "starts: [[2.0, 2.0, 1.0]]\n"
+        "obstacles: [{shape: sphere, centre: [5, 2], radius: 0.5, bottom: 1}]\n"
+    )
     scene = load_scene(path)
     upper, ball = scene.obstacles
     assert (upper.y_m, upper.size_x_m, upper.size_y_m, upper.height_m) == (7.5, 10.0, 5.0, 3.0)
@@ -164,25 +180,31 @@ def test_starts_are_chosen_where_the_map_is_known_to_be_free(tmp_path):
 def test_a_map_without_room_is_refused(tmp_path):
     assert faults(tmp_path, np.zeros((20, 20))) == [
         "map.yaml: starts: missing, and no free place was found; "
-        "expected a scene with world or map, and starts"]
+        "expected a scene with world or map, and starts"
+    ]
 
 
 def test_all_faults_of_the_yaml_are_listed(tmp_path):
-    assert faults(tmp_path, resolution=-1, origin=[0, 0], negate=2, occupied_thresh=0.1,
-                  mode="grey") == [
+    assert faults(
+        tmp_path, resolution=-1, origin=[0, 0], negate=2, occupied_thresh=0.1, mode="grey"
+    ) == [
         "map.yaml: resolution: -1, expected a number above 0",
         "map.yaml: origin: a list of 2, expected a list of 3 numbers",
         "map.yaml: negate: 2, expected 0 or 1",
         "map.yaml: free_thresh: 0.196 is above occupied_thresh, 0.1",
-        "map.yaml: mode: 'grey', expected trinary, scale, raw"]
+        "map.yaml: mode: 'grey', expected trinary, scale, raw",
+    ]
 
 
-@pytest.mark.parametrize("pixels, problem", [
-    (b"GIF89a", "m.pgm: is no PGM or PNG image"),
-    (b"P5 4 4 255\n12", "m.pgm: cannot be read: "),
-    (b"P5 12000 10000 255\n", "m.pgm: is 12000 x 10000 pixels, expected 1 to 1e+08 pixels"),
-    (b"P5 100000 100000 255\n", "m.pgm: cannot be read: Image size (10000000000 pixels)"),
-])
+@pytest.mark.parametrize(
+    "pixels, problem",
+    [
+        (b"GIF89a", "m.pgm: is no PGM or PNG image"),
+        (b"P5 4 4 255\n12", "m.pgm: cannot be read: "),
+        (b"P5 12000 10000 255\n", "m.pgm: is 12000 x 10000 pixels, expected 1 to 1e+08 pixels"),
+        (b"P5 100000 100000 255\n", "m.pgm: cannot be read: Image size (10000000000 pixels)"),
+    ],
+)
 def test_bad_images(tmp_path, pixels, problem):
     (fault,) = faults(tmp_path, pixels)
     assert fault.startswith(problem)
@@ -191,19 +213,30 @@ def test_bad_images(tmp_path, pixels, problem):
 def test_keys_that_map_server_does_not_read_are_said(tmp_path):
     path = written(tmp_path, np.full((20, 20), 254), unknown_thresh=0.5)
     assert load_scene(path).remarks[0] == (
-        f"{path}: unknown_thresh: is not read, map_server has no such key")
+        f"{path}: unknown_thresh: is not read, map_server has no such key"
+    )
 
 
-@pytest.mark.parametrize("scene, problem", [
-    ("map: map.yaml\nworld: a.world\n", "s.yaml: map: is given beside world, expected one of them"),
-    ("map: map.yaml\norigin: [1, 1]\n", "s.yaml: size: missing, expected a list of 2 numbers"),
-    ("map: map.yaml\nsize: [1, 1]\n", "s.yaml: origin: missing, expected a list of 2 numbers"),
-    ("map: map.yaml\nunknown: maybe\n", "s.yaml: unknown: 'maybe', expected free or occupied"),
-    ("size: [4, 4]\nstarts: [[2, 2]]\nunknown: free\n",
-     "s.yaml: unknown: belongs to a map, expected the key map too"),
-    ("map: map.yaml\nstarts: [[50, 2]]\n",
-     "s.yaml: starts[0]: (50, 2) is outside the arena, expected 0 < x < 10 and 0 < y < 10"),
-])
+@pytest.mark.parametrize(
+    "scene, problem",
+    [
+        (
+            "map: map.yaml\nworld: a.world\n",
+            "s.yaml: map: is given beside world, expected one of them",
+        ),
+        ("map: map.yaml\norigin: [1, 1]\n", "s.yaml: size: missing, expected a list of 2 numbers"),
+        ("map: map.yaml\nsize: [1, 1]\n", "s.yaml: origin: missing, expected a list of 2 numbers"),
+        ("map: map.yaml\nunknown: maybe\n", "s.yaml: unknown: 'maybe', expected free or occupied"),
+        (
+            "size: [4, 4]\nstarts: [[2, 2]]\nunknown: free\n",
+            "s.yaml: unknown: belongs to a map, expected the key map too",
+        ),
+        (
+            "map: map.yaml\nstarts: [[50, 2]]\n",
+            "s.yaml: starts[0]: (50, 2) is outside the arena, expected 0 < x < 10 and 0 < y < 10",
+        ),
+    ],
+)
 def test_faults_of_a_scene_around_a_map(tmp_path, scene, problem):
     written(tmp_path, np.full((20, 20), 254))
     path = tmp_path / "s.yaml"

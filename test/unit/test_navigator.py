@@ -1,4 +1,5 @@
 """The state machine with planners that do as they are told."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -9,13 +10,13 @@ import pytest
 from quad_nav.errors import NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.mends import ORIGINAL, Mends
-from quad_nav.navigator import Navigator, NavigatorParams
+from quad_nav.navigator.fixes import ORIGINAL, Fixes
+from quad_nav.navigator.navigator import Navigator, NavigatorParams
+from quad_nav.navigator.recovery_sequence import NamedRecovery
+from quad_nav.navigator.tick import RobotPoses, State, Trigger, local_from_global
 from quad_nav.plan.near import ring_offsets
-from quad_nav.recovering import NamedRecovery
 from quad_nav.recovery import Step
-from quad_nav.schedule import Schedule
-from quad_nav.tick import Located, State, Trigger, local_from_global
+from quad_nav.timing import Schedule
 
 HERE = Pose2D(1.0, 1.0, 0.0)
 GOAL = Pose2D(5.0, 1.0, 0.0)
@@ -47,7 +48,6 @@ class FakeCostmap:
 
     def stale_sources(self, now_s):
         return self.stale
-
 
 
 class FakePlanner:
@@ -95,11 +95,11 @@ class FakeRecovery:
         self.steps = steps
         self.started = 0
 
-    def start(self, surroundings):
+    def start(self, context):
         self.started += 1
         self.left = self.steps
 
-    def step(self, surroundings):
+    def step(self, context):
         self.left -= 1
         return Step(command=Twist2D(vyaw_radps=1.0), done=self.left == 0)
 
@@ -107,21 +107,27 @@ class FakeRecovery:
 class Flight:
     """A navigator, its fakes, and a clock that stops wherever something is due."""
 
-    def __init__(self, recoveries=(), mends=ORIGINAL, **params):
+    def __init__(self, recoveries=(), fixes=ORIGINAL, **params):
         params.setdefault("controller_frequency_hz", 10.0)
         self.global_costmap = FakeCostmap(5.0)
         self.local_costmap = FakeCostmap(4.0)
         self.planner, self.controller = FakePlanner(), FakeController()
-        self.navigator = Navigator(NavigatorParams(**params), self.global_costmap,
-                                   self.local_costmap, self.planner, self.controller,
-                                   recoveries, mends)
+        self.navigator = Navigator(
+            NavigatorParams(**params),
+            self.global_costmap,
+            self.local_costmap,
+            self.planner,
+            self.controller,
+            recoveries,
+            fixes,
+        )
         self.now_s = 0.0
         self.pose = HERE
 
     def until(self, end_s):
         ticks = []
         while self.now_s <= end_s + 1e-9:
-            ticks.append(self.navigator.tick(self.now_s, Located(self.pose, self.pose), FORWARD))
+            ticks.append(self.navigator.tick(self.now_s, RobotPoses(self.pose, self.pose), FORWARD))
             self.now_s = max(min(self.navigator.next_due_s, self.now_s + 0.5), self.now_s + 1e-6)
         return ticks
 
@@ -143,7 +149,8 @@ def test_a_goal_is_planned_once_and_commanded_in_every_cycle():
     ticks = flight.until(2.0)
     assert flight.planner.calls == 1
     assert [tick.now_s for tick in ticks if tick.command == FORWARD] == pytest.approx(
-        [0.0, 0.5, 1.0, 1.5, 2.0])
+        [0.0, 0.5, 1.0, 1.5, 2.0]
+    )
     np.testing.assert_array_equal(flight.controller.plans[0], [[1, 1, 0], [5, 1, 0]])
 
 
@@ -152,7 +159,8 @@ def test_planner_frequency_plans_again_and_again():
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(3.05)
     assert [tick.now_s for tick in ticks if tick.plan is not None] == pytest.approx(
-        [0.0, 1.0, 2.0, 3.0])
+        [0.0, 1.0, 2.0, 3.0]
+    )
 
 
 def test_reaching_the_goal_stops_and_succeeds_with_the_originals_words():
@@ -172,8 +180,11 @@ def test_no_plan_within_patience_runs_all_recoveries_and_aborts():
     flight.planner.fails = True
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(10.0)
-    starts = [(tick.recovery.name, tick.recovery.index, tick.recovery.total)
-              for tick in ticks if tick.recovery]
+    starts = [
+        (tick.recovery.name, tick.recovery.index, tick.recovery.total)
+        for tick in ticks
+        if tick.recovery
+    ]
     assert starts == [("r0", 0, 2), ("r1", 1, 2)]
     assert outcomes(ticks) == [(False, Trigger.PLANNING.value)]
     ended = next(tick.now_s for tick in ticks if tick.outcome)
@@ -217,7 +228,7 @@ def test_oscillation_timeout_aborts_when_the_robot_stays_within_its_distance():
 
 
 def test_standing_still_is_replanned_then_recovered_then_aborted():
-    flight = Flight([NamedRecovery("r", FakeRecovery())], Mends(progress_timeout_s=2.0))
+    flight = Flight([NamedRecovery("r", FakeRecovery())], Fixes(progress_timeout_s=2.0))
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(12.0)
     warnings = [warning for tick in ticks for warning in tick.warnings]
@@ -227,7 +238,7 @@ def test_standing_still_is_replanned_then_recovered_then_aborted():
 
 
 def test_obstacle_costs_weigh_less_from_the_new_plan_on_until_the_robot_gets_away():
-    flight = Flight(mends=Mends(progress_timeout_s=2.0))
+    flight = Flight(fixes=Fixes(progress_timeout_s=2.0))
     weights = flight.controller
     weights.params = Weights(occdist_scale=0.01)
     flight.navigator.set_goal(GOAL, 0.0)
@@ -244,7 +255,7 @@ def test_obstacle_costs_weigh_less_from_the_new_plan_on_until_the_robot_gets_awa
 
 
 def test_with_the_originals_progress_timeout_it_spins_for_ever():
-    flight = Flight(mends=ORIGINAL)
+    flight = Flight(fixes=ORIGINAL)
     flight.controller.command = Twist2D(vyaw_radps=1.0)
     flight.navigator.set_goal(GOAL, 0.0)
     assert outcomes(flight.until(60.0)) == []
@@ -293,10 +304,10 @@ def test_silent_sensor_stops_the_robot_and_says_which():
     assert FORWARD in {tick.command for tick in flight.until(2.0)}
 
 
-@pytest.mark.parametrize("mends, turns", [(Mends(keep_off_peers=False), False), (ORIGINAL, True)])
-def test_a_rotation_waits_while_the_robot_is_blind(mends, turns):
+@pytest.mark.parametrize("fixes, turns", [(Fixes(avoid_peers=False), False), (ORIGINAL, True)])
+def test_a_rotation_waits_while_the_robot_is_blind(fixes, turns):
     recovery = FakeRecovery(steps=200)
-    flight = Flight([NamedRecovery("rotate", recovery)], mends, planner_patience_s=0.5)
+    flight = Flight([NamedRecovery("rotate", recovery)], fixes, planner_patience_s=0.5)
     flight.planner.fails = True
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(2.0)
@@ -308,7 +319,7 @@ def test_a_rotation_waits_while_the_robot_is_blind(mends, turns):
 
 
 def test_standing_blind_is_no_lack_of_progress():
-    flight = Flight(mends=Mends(progress_timeout_s=1.0, keep_off_peers=False))
+    flight = Flight(fixes=Fixes(progress_timeout_s=1.0, avoid_peers=False))
     flight.navigator.set_goal(GOAL, 0.0)
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
     flight.until(5.0)
@@ -322,7 +333,7 @@ def test_unknown_pose_stops_the_robot():
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(1.0)
-    tick = flight.navigator.tick(flight.now_s, Located(None, None), FORWARD)
+    tick = flight.navigator.tick(flight.now_s, RobotPoses(None, None), FORWARD)
     assert tick.command == Twist2D()
     assert "stopped: the robot's pose is unknown" in tick.warnings
 
@@ -330,15 +341,15 @@ def test_unknown_pose_stops_the_robot():
 def test_schedule_drops_missed_turns():
     schedule = Schedule(10.0)
     schedule.start(0.0)
-    assert schedule.take(0.0)
-    assert not schedule.take(0.05)
-    assert schedule.take(0.37)
+    assert schedule.pop(0.0)
+    assert not schedule.pop(0.05)
+    assert schedule.pop(0.37)
     assert schedule.due_s == pytest.approx(0.4)
-    assert not Schedule(0.0).take(1e9)
+    assert not Schedule(0.0).pop(1e9)
 
 
 def test_local_from_global_takes_the_global_pose_to_the_local_one():
-    located = Located(Pose2D(2.0, 1.0, np.pi / 2), Pose2D(0.0, 3.0, 0.0))
+    located = RobotPoses(Pose2D(2.0, 1.0, np.pi / 2), Pose2D(0.0, 3.0, 0.0))
     transform = local_from_global(located)
     # Turned by -90 degrees: (2, 1) becomes (1, -2); (0, 3) - (1, -2) = (-1, 5).
     assert (transform.x_m, transform.y_m) == pytest.approx((-1.0, 5.0))
@@ -349,8 +360,7 @@ def test_rings_around_a_goal():
     first = list(ring_offsets(0.15, 0.15))
     # The axis points once each, the corners with both signs: 8 points of one ring.
     assert len(first) == len(set(first)) == 8
-    assert set(first) == {
-        (x, y) for x in (-0.15, 0, 0.15) for y in (-0.15, 0, 0.15)} - {(0, 0)}
+    assert set(first) == {(x, y) for x in (-0.15, 0, 0.15) for y in (-0.15, 0, 0.15)} - {(0, 0)}
     assert list(ring_offsets(0.15, 0.1)) == []
 
 

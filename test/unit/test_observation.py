@@ -1,4 +1,5 @@
 """What a sensor saw lately, in one piece for the kernels."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -8,8 +9,9 @@ from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceP
 
 
 def observation(stamp_s: float, count: int) -> Observation:
-    return Observation(stamp_s, np.array([stamp_s, 0.0, 1.0]),
-                       np.full((count, 3), stamp_s, np.float32))
+    return Observation(
+        stamp_s, np.array([stamp_s, 0.0, 1.0]), np.full((count, 3), stamp_s, np.float32)
+    )
 
 
 @pytest.mark.parametrize("persistence_s", [0.0, 0.25, 1.0])
@@ -25,7 +27,9 @@ def test_the_stack_holds_what_is_kept_newest_first(persistence_s):
         assert len(stack.begins) == len(stack.ends) == len(buffer.observations)
         for k, kept in enumerate(buffer.observations):
             np.testing.assert_array_equal(stack.sensors[k], kept.sensor)
-            np.testing.assert_array_equal(stack.points[stack.begins[k]:stack.ends[k]], kept.points)
+            np.testing.assert_array_equal(
+                stack.points[stack.begins[k] : stack.ends[k]], kept.points
+            )
     # 20 points at most in each of 11 observations, and twice that when they move.
     assert len(stack.points) <= 2 * 11 * 20
 

@@ -1,4 +1,5 @@
 """Flights offline: the same twice, ended when they should be, refused when they can't be flown."""
+
 from __future__ import annotations
 
 import dataclasses
@@ -15,13 +16,13 @@ import pytest
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.summary import to_json
-from quad_nav.offline.crew import Crew
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.gaps import Gaps
-from quad_nav.offline.helper import PROCESS_NAME, HelperError
+from quad_nav.offline.navigator_group import NavigatorGroup
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightOptions, read_setup
+from quad_nav.offline.worker_process import PROCESS_NAME, WorkerProcessError
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Cylinder, Scene, Walls
 from quad_nav.sim.simulation import SimulationParams
@@ -31,16 +32,26 @@ FEW_BEAMS = LidarParams(step_size_rad=2 * np.pi / 128, noise_std_m=0.01)
 
 
 def options(**changes) -> FlightOptions:
-    return FlightOptions(**{
-        "scene": ROOT / "scenes" / "arena.yaml", "goals": ROOT / "goals", "config": "tutorial",
-        "seed": 5, "time_limit_s": 4.0,
-        "simulation": SimulationParams(FEW_BEAMS, jitter_m=0.3), **changes})
+    return FlightOptions(
+        **{
+            "scene": ROOT / "scenes" / "arena.yaml",
+            "goals": ROOT / "goals",
+            "config": "tutorial",
+            "seed": 5,
+            "time_limit_s": 4.0,
+            "simulation": SimulationParams(FEW_BEAMS, jitter_m=0.3),
+            **changes,
+        }
+    )
 
 
 def figures(summary) -> dict:
     """What does not depend on the machine's speed."""
-    return {key: value for key, value in to_json(summary).items()
-            if key not in ("wall_time_s", "real_time_factor")}
+    return {
+        key: value
+        for key, value in to_json(summary).items()
+        if key not in ("wall_time_s", "real_time_factor")
+    }
 
 
 def write_goals(folder: Path, *robots) -> Path:
@@ -52,8 +63,9 @@ def write_goals(folder: Path, *robots) -> Path:
 
 def helpers() -> list:
     """Processes of navigators that run."""
-    return [process for process in multiprocessing.active_children()
-            if process.name == PROCESS_NAME]
+    return [
+        process for process in multiprocessing.active_children() if process.name == PROCESS_NAME
+    ]
 
 
 class Track(FlightObserver):
@@ -80,9 +92,14 @@ def test_the_same_seed_gives_the_same_flight_bit_for_bit_and_another_does_not():
 @pytest.mark.parametrize("processes", [2, 3])
 def test_navigators_in_several_processes_fly_the_same_bit_for_bit(processes):
     """Four that meet, so that what they tell each other matters."""
-    meeting = read_setup(options(scene=ROOT / "scenes" / "encounters" / "four_ways.yaml",
-                                 goals=ROOT / "goals" / "encounters" / "four_ways",
-                                 config="default", time_limit_s=12.0))
+    meeting = read_setup(
+        options(
+            scene=ROOT / "scenes" / "encounters" / "four_ways.yaml",
+            goals=ROOT / "goals" / "encounters" / "four_ways",
+            config="default",
+            time_limit_s=12.0,
+        )
+    )
     alone, shared = Track(), Track()
     summary = fly(meeting, [alone])
     assert figures(fly(meeting, [shared], processes=processes)) == figures(summary)
@@ -96,16 +113,16 @@ def test_a_process_of_navigators_that_dies_ends_the_flight_with_the_reason():
             if flight.now_s > 0.5:
                 helpers()[0].kill()
 
-    with pytest.raises(HelperError, match="1 navigators has failed: it has ended"):
+    with pytest.raises(WorkerProcessError, match="1 navigators has failed: it has ended"):
         fly(read_setup(options()), [Killer()], processes=2)
     assert helpers() == []
 
 
 def test_what_fails_in_a_process_of_navigators_is_told_with_its_place(monkeypatch):
-    monkeypatch.setattr(Crew, "navigate", lambda *_: 1 / 0)
+    monkeypatch.setattr(NavigatorGroup, "navigate", lambda *_: 1 / 0)
     flight = Flight(read_setup(options()), processes=2)
     flight._crew.navigate = lambda *_: []
-    with pytest.raises(HelperError, match="(?s)Traceback.*ZeroDivisionError"):
+    with pytest.raises(WorkerProcessError, match="(?s)Traceback.*ZeroDivisionError"):
         flight.advance()
     flight.end()
 
@@ -126,10 +143,30 @@ def test_an_observer_that_looks_inside_finds_all_navigators():
 
 
 def test_the_same_seed_gives_the_same_flight_in_another_process():
-    arguments = ["--config", "tutorial", "--seed", "5", "--jitter", "0.3", "--range-noise", "0.01",
-                 "--beams", "128", "--time-limit", "4", "--quiet", "--json", "-"]
-    done = subprocess.run([sys.executable, "-m", "quad_nav.cli", "fly", *arguments], cwd=ROOT,
-                          env={"PYTHONPATH": "src"}, stdout=subprocess.PIPE, check=False)
+    arguments = [
+        "--config",
+        "tutorial",
+        "--seed",
+        "5",
+        "--jitter",
+        "0.3",
+        "--range-noise",
+        "0.01",
+        "--beams",
+        "128",
+        "--time-limit",
+        "4",
+        "--quiet",
+        "--json",
+        "-",
+    ]
+    done = subprocess.run(
+        [sys.executable, "-m", "quad_nav.cli", "fly", *arguments],
+        cwd=ROOT,
+        env={"PYTHONPATH": "src"},
+        stdout=subprocess.PIPE,
+        check=False,
+    )
     assert done.returncode == 1  # out of time
     told = json.loads(done.stdout)
     here = json.loads(json.dumps(figures(fly(read_setup(options())))))
@@ -149,8 +186,16 @@ def test_a_short_mission_is_flown_to_its_end(tmp_path):
 def test_two_that_stand_before_each_other_turn_round_and_go_on(seed):
     """Wide inflation, one command a second: they used to face each other for minutes."""
     wide = tuple((f"{costmap}_costmap/inflation_radius", 1.2) for costmap in ("global", "local"))
-    summary = fly(read_setup(options(seed=seed, parameters=wide, time_limit_s=150.0,
-                                     simulation=SimulationParams(jitter_m=0.3))))
+    summary = fly(
+        read_setup(
+            options(
+                seed=seed,
+                parameters=wide,
+                time_limit_s=150.0,
+                simulation=SimulationParams(jitter_m=0.3),
+            )
+        )
+    )
     assert summary.reason == "" and summary.success
 
 
@@ -158,8 +203,7 @@ def test_a_flight_that_is_out_of_time_or_stopped_says_so():
     assert fly(read_setup(options(time_limit_s=0.5))).reason == "time limit of 0.5 s"
     stopped = fly(read_setup(options()), is_stopped=lambda: True)
     assert stopped.reason == "interrupted" and stopped.sim_time_s == pytest.approx(0.025)
-    assert [leg.reason for leg in stopped.robots[0].legs] == ["interrupted", "not sent",
-                                                              "not sent"]
+    assert [leg.reason for leg in stopped.robots[0].legs] == ["interrupted", "not sent", "not sent"]
 
 
 def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
@@ -197,8 +241,15 @@ def test_frames_that_nobody_publishes_are_refused():
 
 def test_gaps_are_between_hulls():
     """A pillar of 0.5 m radius in the middle; two fly past it and each other."""
-    scene = Scene("pillar", 20.0, 20.0, 1.0, Walls(),
-                  (Cylinder("pillar", 10.0, 10.0, 0.5, 2.0),), (Pose2D(1.0, 1.0),))
+    scene = Scene(
+        "pillar",
+        20.0,
+        20.0,
+        1.0,
+        Walls(),
+        (Cylinder("pillar", 10.0, 10.0, 0.5, 2.0),),
+        (Pose2D(1.0, 1.0),),
+    )
     gaps = Gaps(scene, 2, 0.3)
     for positions in ([[10.0, 12.0, 1.0], [10.0, 17.0, 1.0]], [[13.0, 10.0, 1.0], [17.0, 13.0, 1]]):
         state = SimpleNamespace(positions_m=np.array(positions))

@@ -1,4 +1,5 @@
 """Steps that are due at given wall times."""
+
 from __future__ import annotations
 
 import pytest

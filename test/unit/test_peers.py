@@ -1,4 +1,5 @@
 """Cells, tracks, ranks and refuges, with numbers that can be worked out by hand."""
+
 from __future__ import annotations
 
 import math
@@ -7,11 +8,12 @@ import numpy as np
 import pytest
 
 from quad_nav.costmap.cost_grid import NOWHERE, CostGrid
-from quad_nav.costmap.peers import PeerArea, PeerLayer
+from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels.discs import nearest_cell, raise_discs
-from quad_nav.peers import (
+from quad_nav.peers.holding_point import COMFORTABLE, can_be_reached, find_holding_point
+from quad_nav.peers.peer import (
     IDLE_RANK_S,
     Intention,
     Peer,
@@ -20,9 +22,8 @@ from quad_nav.peers import (
     thinned,
     unknown_intention,
 )
-from quad_nav.refuge import COMFORTABLE, can_be_reached, find_refuge
-from quad_nav.right_of_way import Manner, comes_near, gives_way, positions_ahead
-from quad_nav.separation import COASTING_S, within_cell
+from quad_nav.peers.right_of_way import Manner, comes_near, gives_way, positions_ahead
+from quad_nav.peers.voronoi_cell import COASTING_S, limit_to_cell
 
 KEEP_OFF_M = 0.4
 APART_M = 0.9
@@ -31,8 +32,15 @@ STANDING = Twist2D()
 
 
 def peer(x_m, y_m, vx_mps=0.0, vy_mps=0.0, rank_s=IDLE_RANK_S, way=(), name="other"):
-    return Peer(name, x_m, y_m, vx_mps, vy_mps, 0.0,
-                Intention(rank_s, np.array(way, dtype=np.float64).reshape(-1, 2)))
+    return Peer(
+        name,
+        x_m,
+        y_m,
+        vx_mps,
+        vy_mps,
+        0.0,
+        Intention(rank_s, np.array(way, dtype=np.float64).reshape(-1, 2)),
+    )
 
 
 # -- the cell between peers --------------------------------------------------------------
@@ -40,56 +48,72 @@ def peer(x_m, y_m, vx_mps=0.0, vy_mps=0.0, rank_s=IDLE_RANK_S, way=(), name="oth
 
 def test_a_command_ends_where_the_own_half_ends():
     # 1.2 m apart: 0.6 m to the middle, less 0.4 m, leaves 0.2 m of the 0.4 m in 1 s.
-    held = within_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
+    held = limit_to_cell(
+        Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), [peer(1.2, 0.0)], KEEP_OFF_M, 1.0
+    )
     assert held.by == "other"
     assert held.command.vx_mps == pytest.approx(0.2)
 
 
 def test_the_way_that_speed_still_carries_counts():
     speed = Twist2D(0.1 / COASTING_S)  # carries 0.1 m
-    held = within_cell(Pose2D(0.0, 0.0), speed, Twist2D(0.4), [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
+    held = limit_to_cell(Pose2D(0.0, 0.0), speed, Twist2D(0.4), [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
     assert held.command.vx_mps == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("yaw_rad, other", [
-    (math.pi, (1.2, 0.0)),  # away from it
-    (math.pi / 2, (1.2, 0.0)),  # past it
-    (0.0, (1.6, 0.0)),  # towards it, but no farther than the own half
-])
+@pytest.mark.parametrize(
+    "yaw_rad, other",
+    [
+        (math.pi, (1.2, 0.0)),  # away from it
+        (math.pi / 2, (1.2, 0.0)),  # past it
+        (0.0, (1.6, 0.0)),  # towards it, but no farther than the own half
+    ],
+)
 def test_what_stays_in_the_cell_is_not_touched(yaw_rad, other):
     command = Twist2D(0.4)
-    held = within_cell(Pose2D(0.0, 0.0, yaw_rad), STANDING, command, [peer(*other)], KEEP_OFF_M,
-                       1.0)
+    held = limit_to_cell(
+        Pose2D(0.0, 0.0, yaw_rad), STANDING, command, [peer(*other)], KEEP_OFF_M, 1.0
+    )
     assert held.command == command and held.by == ""
 
 
 def test_the_path_stays_the_same_when_it_is_flown_more_slowly():
     command = Twist2D(0.4, 0.0, 0.5)
-    held = within_cell(Pose2D(0.0, 0.0), STANDING, command, [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
+    held = limit_to_cell(Pose2D(0.0, 0.0), STANDING, command, [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
     assert 0.0 < held.command.vx_mps < 0.4
     assert held.command.vyaw_radps / held.command.vx_mps == pytest.approx(0.5 / 0.4)
 
 
 def test_too_near_it_only_turns():
-    held = within_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4, 0.0, 0.5), [peer(0.7, 0.0)],
-                       KEEP_OFF_M, 1.0)
+    held = limit_to_cell(
+        Pose2D(0.0, 0.0), STANDING, Twist2D(0.4, 0.0, 0.5), [peer(0.7, 0.0)], KEEP_OFF_M, 1.0
+    )
     assert held.command == Twist2D(0.0, 0.0, 0.5)
 
 
-@pytest.mark.parametrize("yaw_rad, vx_mps, turn_radps", [
-    (0.0, 0.4, -0.4),  # head-on: to the right
-    (0.8, 0.4, 0.4), (-0.8, 0.4, -0.4),  # the peer is to the right, to the left
-    (math.pi + 0.8, -0.4, 0.4)])  # it backs, with the peer to the right of its course
+@pytest.mark.parametrize(
+    "yaw_rad, vx_mps, turn_radps",
+    [
+        (0.0, 0.4, -0.4),  # head-on: to the right
+        (0.8, 0.4, 0.4),
+        (-0.8, 0.4, -0.4),  # the peer is to the right, to the left
+        (math.pi + 0.8, -0.4, 0.4),
+    ],
+)  # it backs, with the peer to the right of its course
 def test_too_near_and_straight_it_turns_away(yaw_rad, vx_mps, turn_radps):
-    held = within_cell(Pose2D(0.0, 0.0, yaw_rad), STANDING, Twist2D(vx_mps), [peer(0.7, 0.0)],
-                       KEEP_OFF_M, 1.0)
+    held = limit_to_cell(
+        Pose2D(0.0, 0.0, yaw_rad), STANDING, Twist2D(vx_mps), [peer(0.7, 0.0)], KEEP_OFF_M, 1.0
+    )
     assert held.command == Twist2D(0.0, 0.0, turn_radps)
 
 
 def test_the_nearest_of_several_peers_decides():
-    peers = [peer(2.0, 0.0, name="far"), peer(1.2, 0.0, name="near"),
-             peer(-0.9, 0.0, name="behind")]
-    held = within_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), peers, KEEP_OFF_M, 1.0)
+    peers = [
+        peer(2.0, 0.0, name="far"),
+        peer(1.2, 0.0, name="near"),
+        peer(-0.9, 0.0, name="behind"),
+    ]
+    held = limit_to_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), peers, KEEP_OFF_M, 1.0)
     assert held.by == "near"
 
 
@@ -110,8 +134,14 @@ def test_point_masses_that_keep_their_cells_never_meet(seed, stagger, lost_m):
         for k in range(4):
             if step % 20 == stagger * k:
                 yaw = math.atan2(-at[k, 1], -at[k, 0])
-                command = within_cell(Pose2D(*at[k], yaw), STANDING, Twist2D(0.5),
-                                      seen[:k] + seen[k + 1:], KEEP_OFF_M, 1.0).command
+                command = limit_to_cell(
+                    Pose2D(*at[k], yaw),
+                    STANDING,
+                    Twist2D(0.5),
+                    seen[:k] + seen[k + 1 :],
+                    KEEP_OFF_M,
+                    1.0,
+                ).command
                 velocity[k] = command.vx_mps * np.array([math.cos(yaw), math.sin(yaw)])
         at += 0.05 * velocity
         gaps = [np.hypot(*(at[i] - at[j])) for i in range(4) for j in range(i)]
@@ -171,15 +201,24 @@ def decide(way, rank_s, others):
     return None if found is None else (found[0].name, found[1])
 
 
-@pytest.mark.parametrize("one, other", [(EAST[:1] + [(3.0, 0.0)], [(3.5, 0.0), (0.0, 0.0)]),
-                                        ([(1.0, 0.0), (6.0, 0.0)], [(3.0, -2.0), (3.0, 3.0)])])
+@pytest.mark.parametrize(
+    "one, other",
+    [
+        (EAST[:1] + [(3.0, 0.0)], [(3.5, 0.0), (0.0, 0.0)]),
+        ([(1.0, 0.0), (6.0, 0.0)], [(3.0, -2.0), (3.0, 3.0)]),
+    ],
+)
 def test_of_two_exactly_one_gives_way(one, other):
     first, second = rank_of(0.0, 0), rank_of(0.0, 1)
-    outcomes = [decide(one, first, [peer(*other[0], rank_s=second, way=other)]),
-                decide(other, second, [peer(*one[0], rank_s=first, way=one)])]
+    outcomes = [
+        decide(one, first, [peer(*other[0], rank_s=second, way=other)]),
+        decide(other, second, [peer(*one[0], rank_s=first, way=one)]),
+    ]
     assert outcomes[0] is None and outcomes[1] is not None
-    swapped = [decide(one, second, [peer(*other[0], rank_s=first, way=other)]),
-               decide(other, first, [peer(*one[0], rank_s=second, way=one)])]
+    swapped = [
+        decide(one, second, [peer(*other[0], rank_s=first, way=other)]),
+        decide(other, first, [peer(*one[0], rank_s=second, way=one)]),
+    ]
     assert swapped[0] is not None and swapped[1] is None
 
 
@@ -214,8 +253,15 @@ def test_for_a_parked_one_nobody_gives_way():
 def test_nobody_waits_for_one_that_stands_but_who_is_in_its_way_makes_room():
     standing = peer(1.0, 0.0, rank_s=0.0, way=[(1.0, 0.0), (6.0, 0.0)])
     for at, manner in ([(2.5, -1.2), None], [(2.5, -0.5), Manner.LEAVE], [(3.0, 0.0), None]):
-        found = gives_way(np.array(at), np.array([at, (2.5, 3.0)]), 1.0, [standing], APART_M,
-                          CRUISING_MPS, {"other"})
+        found = gives_way(
+            np.array(at),
+            np.array([at, (2.5, 3.0)]),
+            1.0,
+            [standing],
+            APART_M,
+            CRUISING_MPS,
+            {"other"},
+        )
         assert (found and found[1]) == manner
 
 
@@ -257,7 +303,9 @@ def test_the_nearest_cell_is_found_round_a_wall():
 def test_a_refuge_is_beside_the_way():
     costs = np.zeros(SPEC.shape, dtype=np.uint8)
     way = np.array([[0.5, 2.0], [3.5, 2.0]])
-    refuge = find_refuge(SPEC, costs, Pose2D(2.5, 2.2), [way], np.array([[0.5, 2.0]]), APART_M)
+    refuge = find_holding_point(
+        SPEC, costs, Pose2D(2.5, 2.2), [way], np.array([[0.5, 2.0]]), APART_M
+    )
     assert refuge is not None
     assert refuge.x_m == pytest.approx(2.5, abs=0.11)
     assert refuge.y_m == pytest.approx(2.0 + APART_M, abs=0.11)
@@ -268,7 +316,9 @@ def test_in_a_corridor_the_refuge_is_beyond_its_end():
     costs[19:22, :] = FREE  # the corridor along x ...
     costs[:, 34:38] = FREE  # ... opens into a cross-way
     way = np.array([[0.5, 2.05], [3.8, 2.05]])
-    refuge = find_refuge(SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]), APART_M)
+    refuge = find_holding_point(
+        SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]), APART_M
+    )
     assert refuge is not None and refuge.x_m > 3.3 and abs(refuge.y_m - 2.05) > APART_M - 0.1
 
 
@@ -277,29 +327,36 @@ def test_a_refuge_has_room_to_turn():
     costs = np.zeros(SPEC.shape, dtype=np.uint8)
     costs[28:, :] = COMFORTABLE
     way = np.array([[0.5, 2.0], [3.5, 2.0]])
-    refuge = find_refuge(SPEC, costs, Pose2D(2.5, 2.2), [way], np.array([[0.5, 2.0]]), APART_M)
+    refuge = find_holding_point(
+        SPEC, costs, Pose2D(2.5, 2.2), [way], np.array([[0.5, 2.0]]), APART_M
+    )
     assert refuge is not None and refuge.y_m == pytest.approx(2.0 - APART_M, abs=0.11)
 
 
-@pytest.mark.parametrize("gap, other, reached", [(True, (0.5, 0.5), True),
-                                                 (False, (0.5, 0.5), False),
-                                                 (True, (2.05, 3.0), False)])
+@pytest.mark.parametrize(
+    "gap, other, reached",
+    [(True, (0.5, 0.5), True), (False, (0.5, 0.5), False), (True, (2.05, 3.0), False)],
+)
 def test_whether_a_refuge_can_still_be_reached(gap, other, reached):
     """Through the only gap of a wall, unless a peer is in it."""
     costs = np.zeros(SPEC.shape, dtype=np.uint8)
     costs[:, 20] = LETHAL
     if gap:
         costs[25:35, 20] = FREE
-    assert can_be_reached(SPEC, costs, Pose2D(1.0, 1.0), Pose2D(3.0, 1.0), np.array([other]),
-                          APART_M) is reached
+    assert (
+        can_be_reached(SPEC, costs, Pose2D(1.0, 1.0), Pose2D(3.0, 1.0), np.array([other]), APART_M)
+        is reached
+    )
 
 
 def test_there_may_be_no_refuge():
     costs = np.full(SPEC.shape, LETHAL, dtype=np.uint8)
     costs[20, :] = FREE
     way = np.array([[0.5, 2.05], [4.0, 2.05]])
-    assert find_refuge(SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]),
-                       APART_M) is None
+    assert (
+        find_holding_point(SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]), APART_M)
+        is None
+    )
 
 
 def test_the_layer_forgets_where_a_peer_was():

@@ -1,11 +1,12 @@
 """YAML that looks small and is large, and values that do not fit their types."""
+
 from __future__ import annotations
 
 import pytest
 import yaml
 
-from quad_nav import plain_yaml
-from quad_nav.plain_yaml import MOST_LEVELS, MOST_NODES, load
+from quad_nav.files import plain_yaml
+from quad_nav.files.plain_yaml import MOST_LEVELS, MOST_NODES, load
 
 
 def refusal(text):
@@ -24,7 +25,11 @@ def bomb(open_, close, lines):
 
 def test_aliases_may_stand_for_what_was_there():
     assert load("a: &a [1, 2]\nb: *a\nc: {<<: &d {x: 1}, y: 2}\ne: *d") == {
-        "a": [1, 2], "b": [1, 2], "c": {"x": 1, "y": 2}, "e": {"x": 1}}
+        "a": [1, 2],
+        "b": [1, 2],
+        "c": {"x": 1, "y": 2},
+        "e": {"x": 1},
+    }
 
 
 def test_aliases_count_as_often_as_they_are_used():
@@ -34,7 +39,8 @@ def test_aliases_count_as_often_as_they_are_used():
 
 def test_merges_count_too():
     text = "a0: &a0 {x: 1}\n" + "".join(
-        f"a{k + 1}: &a{k + 1} {{<<: [{','.join([f'*a{k}'] * 9)}]}}\n" for k in range(9))
+        f"a{k + 1}: &a{k + 1} {{<<: [{','.join([f'*a{k}'] * 9)}]}}\n" for k in range(9)
+    )
     assert f"more than {MOST_NODES} values" in refusal(text)
 
 
@@ -59,9 +65,23 @@ def test_too_many_values_are_refused_without_reading_on(monkeypatch):
     assert "more than 100 values" in refusal("a: [" + "1, " * 200 + "{")
 
 
-@pytest.mark.parametrize("text", [
-    "!!int x", "!!int ''", "!!float x", "!!bool z", "!!timestamp t", "2001-99-99", "0x_", "0b_",
-    "? !!set {a}\n: 1", "!!python/object/apply:os.system [x]", "9" * 5000,
-    "!!omap 3", "!!pairs [3]"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "!!int x",
+        "!!int ''",
+        "!!float x",
+        "!!bool z",
+        "!!timestamp t",
+        "2001-99-99",
+        "0x_",
+        "0b_",
+        "? !!set {a}\n: 1",
+        "!!python/object/apply:os.system [x]",
+        "9" * 5000,
+        "!!omap 3",
+        "!!pairs [3]",
+    ],
+)
 def test_values_that_do_not_fit_their_type_are_faults_with_a_place(text):
     assert "line 1" in refusal(text)

@@ -1,4 +1,5 @@
 """The carrot planner on maps small enough to be worked out by hand."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -28,7 +29,8 @@ START, GOAL = Pose2D(0.5, 1.5, 0.0), Pose2D(10.5, 1.5, 0.0)
 def plan_of(text: str, start: Pose2D, goal: Pose2D, robot: np.ndarray = ROBOT) -> np.ndarray:
     costs = costs_of(text)
     return Carrot(CarrotParams(), robot).make_plan(
-        GridSpec(costs.shape[1], costs.shape[0], 1.0), costs, start, goal)
+        GridSpec(costs.shape[1], costs.shape[0], 1.0), costs, start, goal
+    )
 
 
 def test_straight_to_a_free_goal():

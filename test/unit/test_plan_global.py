@@ -1,4 +1,5 @@
 """The global planner on maps small enough to be worked out by hand."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -42,10 +43,15 @@ WALL_ACROSS = """
     .........
 """
 SEARCHES = [
-    pytest.param({"use_dijkstra": dijkstra, "use_quadratic": quadratic, "use_grid_path": grid},
-                 id=f"{'Dijkstra' if dijkstra else 'A*'}, {'quadratic' if quadratic else 'simple'},"
-                    f" {'grid' if grid else 'gradient'}")
-    for dijkstra in (True, False) for quadratic in (True, False) for grid in (True, False)]
+    pytest.param(
+        {"use_dijkstra": dijkstra, "use_quadratic": quadratic, "use_grid_path": grid},
+        id=f"{'Dijkstra' if dijkstra else 'A*'}, {'quadratic' if quadratic else 'simple'},"
+        f" {'grid' if grid else 'gradient'}",
+    )
+    for dijkstra in (True, False)
+    for quadratic in (True, False)
+    for grid in (True, False)
+]
 
 
 def spec_of(costs: np.ndarray) -> GridSpec:
@@ -57,8 +63,11 @@ def planned(costs: np.ndarray, start, goal, offset_m=0.5, **params):
     """The planner and its plan between two cells, from centre to centre or near them."""
     planner = SearchPlanner(SearchPlannerParams(**params))
     plan = planner.make_plan(
-        spec_of(costs), costs, Pose2D(start[0] + offset_m, start[1] + offset_m, 0.3),
-        Pose2D(goal[0] + offset_m, goal[1] + offset_m, 0.7))
+        spec_of(costs),
+        costs,
+        Pose2D(start[0] + offset_m, start[1] + offset_m, 0.3),
+        Pose2D(goal[0] + offset_m, goal[1] + offset_m, 0.7),
+    )
     return planner, plan
 
 
@@ -71,7 +80,13 @@ def test_wave_costs_are_scaled_and_end_one_below_lethal():
     costs[1] = [0, 0, 60, 100, 252, INSCRIBED, UNKNOWN, 0]
 
     assert wave_costs(costs, SearchPlannerParams())[1, 1:-1].tolist() == [
-        50, 230, 252, 253, 253, 252]  # 252 is lethal - 1, and that an obstacle
+        50,
+        230,
+        252,
+        253,
+        253,
+        252,
+    ]  # 252 is lethal - 1, and that an obstacle
     assert wave_costs(costs, SearchPlannerParams(allow_unknown=False))[1, 6] == 253
     weaker = SearchPlannerParams(neutral_cost=66, cost_factor=0.55)
     assert wave_costs(costs, weaker)[1, 1:4].tolist() == pytest.approx([66, 99, 121])
@@ -84,15 +99,22 @@ def test_step_costs_of_a_star_are_bytes():
 
 def test_potential_of_a_corridor():
     for params in ({}, {"use_quadratic": False}, {"use_dijkstra": False}):
-        planner, _ = planned(costs_of(CORRIDOR), (1, 1), (5, 1), use_grid_path=True,
-                             old_navfn_behavior=True, **params)
+        planner, _ = planned(
+            costs_of(CORRIDOR),
+            (1, 1),
+            (5, 1),
+            use_grid_path=True,
+            old_navfn_behavior=True,
+            **params,
+        )
         assert planner.potential[1].tolist() == [1e10, 0, 50, 100, 150, 200, 1e10]
 
 
 def test_potential_of_a_diagonal_neighbour():
     planar, _ = planned(costs_of(FIELD), (3, 2), (5, 2), old_navfn_behavior=True)
-    simple, _ = planned(costs_of(FIELD), (3, 2), (5, 2), old_navfn_behavior=True,
-                        use_quadratic=False)
+    simple, _ = planned(
+        costs_of(FIELD), (3, 2), (5, 2), old_navfn_behavior=True, use_quadratic=False
+    )
 
     assert planar.potential[3, 4] == pytest.approx(50 + 50 * 0.7040)
     assert simple.potential[3, 4] == 100
@@ -172,7 +194,8 @@ def test_lower_left_half_of_a_cell_belongs_to_the_neighbour_for_whole_cells_only
         costs = costs_of(CORRIDOR)
         with pytest.raises(NoPath):
             SearchPlanner(SearchPlannerParams(**params)).make_plan(
-                spec_of(costs), costs, start, goal)
+                spec_of(costs), costs, start, goal
+            )
 
 
 def test_outline_and_cleared_start_are_written_into_the_costmap():
@@ -221,9 +244,19 @@ def test_headings_follow_the_path_and_end_with_the_goals():
     ahead = plan_of(costs_of(CORRIDOR), (1, 1), (5, 1), use_grid_path=True)
     assert ahead[:-1, 2].tolist() == [0.0] * 5
     assert ahead[-1, 2] == 0.7
-    astern = plan_of(costs_of(CORRIDOR), (1, 1), (5, 1), use_grid_path=True,
-                     orientation_mode=OrientationMode.BACKWARD)
+    astern = plan_of(
+        costs_of(CORRIDOR),
+        (1, 1),
+        (5, 1),
+        use_grid_path=True,
+        orientation_mode=OrientationMode.BACKWARD,
+    )
     np.testing.assert_allclose(np.abs(astern[:-2, 2]), np.pi)
-    turning = plan_of(costs_of(CORRIDOR), (1, 1), (5, 1), use_grid_path=True,
-                      orientation_mode=OrientationMode.INTERPOLATE)
+    turning = plan_of(
+        costs_of(CORRIDOR),
+        (1, 1),
+        (5, 1),
+        use_grid_path=True,
+        orientation_mode=OrientationMode.INTERPOLATE,
+    )
     np.testing.assert_allclose(turning[:, 2], np.linspace(0.3, 0.7, 6))

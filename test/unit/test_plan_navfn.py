@@ -1,4 +1,5 @@
 """NavFn on maps small enough to be worked out by hand."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -36,8 +37,11 @@ def spec_of(costs: np.ndarray) -> GridSpec:
 
 def plan_of(costs: np.ndarray, start, goal, **params) -> np.ndarray:
     return Navfn(NavfnParams(**params)).make_plan(
-        spec_of(costs), costs, Pose2D(start[0] + 0.5, start[1] + 0.5),
-        Pose2D(goal[0] + 0.5, goal[1] + 0.5, 0.7))
+        spec_of(costs),
+        costs,
+        Pose2D(start[0] + 0.5, start[1] + 0.5),
+        Pose2D(goal[0] + 0.5, goal[1] + 0.5, 0.7),
+    )
 
 
 def test_navigation_costs_go_from_neutral_to_obstacle():
@@ -45,7 +49,13 @@ def test_navigation_costs_go_from_neutral_to_obstacle():
     costs[1] = [0, 0, 100, 252, INSCRIBED, LETHAL, UNKNOWN, 0]
 
     assert navigation_costs(costs, allow_unknown=True)[1, 1:-1].tolist() == [
-        50, 130, 251, 254, 254, 253]
+        50,
+        130,
+        251,
+        254,
+        254,
+        253,
+    ]
     assert navigation_costs(costs, allow_unknown=False)[1, 6] == 254
 
 

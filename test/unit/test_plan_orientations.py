@@ -1,4 +1,5 @@
 """Headings along paths, each mode by hand."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -19,9 +20,15 @@ def test_none_leaves_the_path_alone():
     assert yaws(OrientationMode.NONE).tolist() == [0, 0, 0, 0, WEST]
 
 
-@pytest.mark.parametrize("mode, turned_rad", [
-    (OrientationMode.FORWARD, 0.0), (OrientationMode.BACKWARD, np.pi),
-    (OrientationMode.LEFTWARD, -np.pi / 2), (OrientationMode.RIGHTWARD, np.pi / 2)])
+@pytest.mark.parametrize(
+    "mode, turned_rad",
+    [
+        (OrientationMode.FORWARD, 0.0),
+        (OrientationMode.BACKWARD, np.pi),
+        (OrientationMode.LEFTWARD, -np.pi / 2),
+        (OrientationMode.RIGHTWARD, np.pi / 2),
+    ],
+)
 def test_modes_along_the_path(mode, turned_rad):
     expected = np.array([0, 0, np.pi / 4, NORTH]) + turned_rad
     np.testing.assert_allclose(np.cos(yaws(mode)[:-1] - expected), 1.0)
@@ -29,8 +36,9 @@ def test_modes_along_the_path(mode, turned_rad):
 
 
 def test_direction_over_a_wider_window():
-    np.testing.assert_allclose(directions(CORNER[:, :2], 2), [
-        0.0, np.arctan2(1, 2), np.pi / 4, np.arctan2(2, 1), NORTH])
+    np.testing.assert_allclose(
+        directions(CORNER[:, :2], 2), [0.0, np.arctan2(1, 2), np.pi / 4, np.arctan2(2, 1), NORTH]
+    )
 
 
 def test_interpolation_from_the_robots_heading_to_the_goals():
@@ -42,16 +50,19 @@ def test_interpolation_takes_the_short_way():
     plan[-1, 2] = -3.0
     turned = with_headings(plan, 3.0, OrientationMode.INTERPOLATE, 1)[:, 2]
     half_rad = np.pi - 3.0
-    np.testing.assert_allclose(turned, [3.0, 3.0 + half_rad / 2, np.pi, -3.0 - half_rad / 2, -3.0],
-                               atol=1e-12)
+    np.testing.assert_allclose(
+        turned, [3.0, 3.0 + half_rad / 2, np.pi, -3.0 - half_rad / 2, -3.0], atol=1e-12
+    )
 
 
 def test_forward_then_interpolate_blends_on_the_last_straight():
     plan = np.vstack([[[0, -2, 0], [0, -1, 0]], np.zeros((5, 3))])
     plan[2:, 0] = np.arange(5)
     plan[-1, 2] = 0.8
-    np.testing.assert_allclose(yaws(OrientationMode.FORWARD_THEN_INTERPOLATE, plan=plan), [
-        0.1, NORTH, np.pi / 4, 0.0, 0.8 / 3, 1.6 / 3, 0.8])
+    np.testing.assert_allclose(
+        yaws(OrientationMode.FORWARD_THEN_INTERPOLATE, plan=plan),
+        [0.1, NORTH, np.pi / 4, 0.0, 0.8 / 3, 1.6 / 3, 0.8],
+    )
 
 
 def test_input_stays_as_it_was():

@@ -1,4 +1,5 @@
 """Plugins of the user's own: the examples of docs/plugins.md fly, and what cannot is refused."""
+
 from __future__ import annotations
 
 import importlib
@@ -12,16 +13,21 @@ import pytest
 import yaml
 
 from quad_nav import config
-from quad_nav.assembly import apply_configuration, build_navigator
+from quad_nav.config.plugins import Plugin, plugin_name
 from quad_nav.errors import GoalOutsideMap, InputError, NoPath
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL
-from quad_nav.plugins import Plugin, plugin_name
-from quad_nav.tick import Located, State, Trigger
+from quad_nav.navigator.tick import RobotPoses, State, Trigger
+from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "plugins.md").read_text()
-COSTMAP = {"width": 10.0, "height": 10.0, "resolution": 0.1, "robot_radius": 0.2,
-           "plugins": [{"name": "inflation_layer", "type": "costmap_2d::InflationLayer"}]}
+COSTMAP = {
+    "width": 10.0,
+    "height": 10.0,
+    "resolution": 0.1,
+    "robot_radius": 0.2,
+    "plugins": [{"name": "inflation_layer", "type": "costmap_2d::InflationLayer"}],
+}
 HERE, GOAL = Pose2D(1.0, 2.0, 0.0), Pose2D(3.0, 5.0, 1.0)
 
 
@@ -62,16 +68,18 @@ def problems(tree):
 
 def fly(navigator, pose: Pose2D, goal: Pose2D, end_s: float):
     """Ticks of a robot that does as it is told, until the goal ends."""
-    ticks = [navigator.tick(0.0, Located(pose, pose), Twist2D())]
+    ticks = [navigator.tick(0.0, RobotPoses(pose, pose), Twist2D())]
     navigator.set_goal(goal, 0.0)
     command, now_s = Twist2D(), 0.0
     while now_s < end_s and not ticks[-1].outcome:
-        ticks.append(navigator.tick(now_s, Located(pose, pose), command))
+        ticks.append(navigator.tick(now_s, RobotPoses(pose, pose), command))
         command = ticks[-1].command or command
         step_s = max(min(navigator.next_due_s - now_s, 0.1), 1e-3)
-        pose = Pose2D(pose.x_m + step_s * command.vx_mps * np.cos(pose.yaw_rad),
-                      pose.y_m + step_s * command.vx_mps * np.sin(pose.yaw_rad),
-                      pose.yaw_rad + step_s * command.vyaw_radps)
+        pose = Pose2D(
+            pose.x_m + step_s * command.vx_mps * np.cos(pose.yaw_rad),
+            pose.y_m + step_s * command.vx_mps * np.sin(pose.yaw_rad),
+            pose.yaw_rad + step_s * command.vyaw_radps,
+        )
         now_s += step_s
     return ticks, pose
 
@@ -106,19 +114,19 @@ def test_examples_fly_to_the_goal(tree):
 
 def test_example_layer_is_in_the_costmap_and_inflated(tree):
     navigator = build_navigator(config.load(tree))
-    navigator.tick(0.0, Located(HERE, HERE), Twist2D())
+    navigator.tick(0.0, RobotPoses(HERE, HERE), Twist2D())
 
     costs, spec = navigator.global_costmap.costs, navigator.global_costmap.spec
     centre, beside = spec.cell_of(4.0, 2.0), spec.cell_of(4.65, 2.05)
     assert costs[centre[1], centre[0]] == LETHAL
     assert costs[beside[1], beside[0]] == INSCRIBED
-    assert (costs == LETHAL).sum() == pytest.approx(np.pi * 0.5 ** 2 / 0.1 ** 2, rel=0.1)
+    assert (costs == LETHAL).sum() == pytest.approx(np.pi * 0.5**2 / 0.1**2, rel=0.1)
 
 
 def test_example_layer_can_be_switched_off(tree):
     tree["global_costmap"]["pond"] = {**tree["global_costmap"]["pond"], "enabled": False}
     navigator = build_navigator(config.load(tree))
-    navigator.tick(0.0, Located(HERE, HERE), Twist2D())
+    navigator.tick(0.0, RobotPoses(HERE, HERE), Twist2D())
     assert not navigator.global_costmap.costs.any()
 
 
@@ -128,8 +136,10 @@ def test_example_planner_fails_and_example_recovery_backs_off(tree):
 
     ticks, pose = fly(navigator, HERE, Pose2D(7.0, 2.0), 10.0)
 
-    assert any(re.match(r"there is something at \(3\.\d\d, 2\.00\) m", tick.planning_failed)
-               for tick in ticks)
+    assert any(
+        re.match(r"there is something at \(3\.\d\d, 2\.00\) m", tick.planning_failed)
+        for tick in ticks
+    )
     assert [tick.recovery.name for tick in ticks if tick.recovery] == ["back_off"]
     assert pose.x_m == pytest.approx(HERE.x_m - 0.3, abs=0.02)
     assert ticks[-1].outcome.text == Trigger.PLANNING.value
@@ -148,15 +158,22 @@ def test_planner_is_kept_until_the_footprint_changes(tree):
     apply_configuration(navigator, configuration)
     assert navigator.planner is planner
     assert navigator.state is State.IDLE
-    apply_configuration(navigator, config.updated(
-        configuration, "global_costmap", {"robot_radius": 0.3}))
+    apply_configuration(
+        navigator, config.updated(configuration, "global_costmap", {"robot_radius": 0.3})
+    )
     assert navigator.planner is not planner
 
 
 def test_nothing_of_a_plugin_is_reconfigurable(tree):
     namespaces = config.reconfigurable(config.load(tree))
-    assert list(namespaces) == ["", "global_costmap", "global_costmap/inflation_layer",
-                                "local_costmap", "local_costmap/inflation_layer", "mends"]
+    assert list(namespaces) == [
+        "",
+        "global_costmap",
+        "global_costmap/inflation_layer",
+        "local_costmap",
+        "local_costmap/inflation_layer",
+        "fixes",
+    ]
 
 
 def test_missing_parameter_is_told_with_its_place(tree):
@@ -172,37 +189,55 @@ def test_missing_parameter_is_told_with_its_place(tree):
 
 def test_layers_switch_has_to_be_one(tree):
     tree["global_costmap"]["pond"] = {"enabled": "no"}
-    assert problems(tree) == ["/nav/global_costmap/pond/enabled: 'no' is neither true nor false;"
-                              " expected true or false"]
+    assert problems(tree) == [
+        "/nav/global_costmap/pond/enabled: 'no' is neither true nor false; expected true or false"
+    ]
 
 
-@pytest.mark.parametrize("name, expected", [
-    ("navfn/NavfnROS", "NavfnROS"), ("costmap_2d::ObstacleLayer", "ObstacleLayer"),
-    ("my_package.planners.StraightLine", "StraightLine"), ("NavfnROS", "NavfnROS")])
+@pytest.mark.parametrize(
+    "name, expected",
+    [
+        ("navfn/NavfnROS", "NavfnROS"),
+        ("costmap_2d::ObstacleLayer", "ObstacleLayer"),
+        ("my_package.planners.StraightLine", "StraightLine"),
+        ("NavfnROS", "NavfnROS"),
+    ],
+)
 def test_namespace_of_a_plugin(name, expected):
     assert plugin_name(name) == expected
 
 
 def test_what_is_not_there(package):
     package("planners.py", "limit = 3\n")
-    assert problems({"base_global_planner": "no_such_package.planners.Mine",
-                     "base_local_planner": "my_package.nowhere.Mine"}) == [
+    assert problems(
+        {
+            "base_global_planner": "no_such_package.planners.Mine",
+            "base_local_planner": "my_package.nowhere.Mine",
+        }
+    ) == [
         "/nav/base_local_planner: there is no module my_package.nowhere; expected"
         " package.module.Class with the package's folder in PYTHONPATH",
         "/nav/base_global_planner: there is no module no_such_package; expected"
-        " package.module.Class with the package's folder in PYTHONPATH"]
+        " package.module.Class with the package's folder in PYTHONPATH",
+    ]
     [line] = problems({"base_global_planner": "my_package.planners.Mine"})
-    assert re.fullmatch(r"/nav/base_global_planner: my_package\.planners \(.*planners\.py\) has no"
-                        r" class Mine; expected a global planner as package\.module\.Class", line)
+    assert re.fullmatch(
+        r"/nav/base_global_planner: my_package\.planners \(.*planners\.py\) has no"
+        r" class Mine; expected a global planner as package\.module\.Class",
+        line,
+    )
     [line] = problems({"base_global_planner": "my_package.planners.limit"})
     assert "has limit, not a class" in line
 
 
-@pytest.mark.parametrize("source, complaint", [
-    ("import no_such_thing", "ModuleNotFoundError: No module named 'no_such_thing'"),
-    ("x = 1\ny = undefined", r"NameError: name 'undefined' is not defined \(.*broken\.py:2\)"),
-    ("def f(:", "SyntaxError"),
-])
+@pytest.mark.parametrize(
+    "source, complaint",
+    [
+        ("import no_such_thing", "ModuleNotFoundError: No module named 'no_such_thing'"),
+        ("x = 1\ny = undefined", r"NameError: name 'undefined' is not defined \(.*broken\.py:2\)"),
+        ("def f(:", "SyntaxError"),
+    ],
+)
 def test_module_that_cannot_be_imported(package, source, complaint):
     package("broken.py", source)
     [line] = problems({"base_global_planner": "my_package.broken.Mine"})
@@ -211,7 +246,9 @@ def test_module_that_cannot_be_imported(package, source, complaint):
 
 
 def test_planner_that_lacks_something(package):
-    package("planners.py", """
+    package(
+        "planners.py",
+        """
         class Mine:
             def __init__(self, params):
                 pass
@@ -228,38 +265,47 @@ def test_planner_that_lacks_something(package):
 
             def compute_velocity(self, spec, costs, pose, velocity):
                 pass
-    """)
+    """,
+    )
     mine = "/nav/base_global_planner: my_package.planners.Mine is not a global planner: "
     assert problems({"base_global_planner": "my_package.planners.Mine"}) == [
         mine + "__init__(self, params) cannot take its arguments; expected"
-               " __init__(self, params, footprint)",
+        " __init__(self, params, footprint)",
         mine + "make_plan(self, spec, costs) cannot take its arguments; expected"
-               " make_plan(self, spec, costs, start, goal)"]
+        " make_plan(self, spec, costs, start, goal)",
+    ]
     follower = "/nav/base_local_planner: my_package.planners.Follower is not a local planner: "
     assert problems({"base_local_planner": "my_package.planners.Follower"}) == [
         follower + "it has no method set_footprint; expected set_footprint(self, footprint)",
         follower + "compute_velocity(self, spec, costs, pose, velocity) cannot take its arguments;"
-                   " expected compute_velocity(self, spec, costs, pose, velocity,"
-                   " local_from_plan)",
+        " expected compute_velocity(self, spec, costs, pose, velocity,"
+        " local_from_plan)",
         follower + "it has no method is_goal_reached; expected is_goal_reached(self)",
-        follower + "it has no method cost_cloud; expected cost_cloud(self)"]
+        follower + "it has no method cost_cloud; expected cost_cloud(self)",
+    ]
 
 
 def test_method_inherited_from_the_interface_is_none(package):
-    package("planners.py", """
+    package(
+        "planners.py",
+        """
         from quad_nav.plan.planner import GlobalPlanner
 
         class Mine(GlobalPlanner):
             def __init__(self, params, footprint):
                 pass
-    """)
+    """,
+    )
     [line] = problems({"base_global_planner": "my_package.planners.Mine"})
-    assert line.endswith("it has no method make_plan; expected make_plan(self, spec, costs, start,"
-                         " goal)")
+    assert line.endswith(
+        "it has no method make_plan; expected make_plan(self, spec, costs, start, goal)"
+    )
 
 
 def test_any_signature_that_can_take_the_arguments_will_do(package):
-    package("planners.py", """
+    package(
+        "planners.py",
+        """
         class Mine:
             def __init__(self, *arguments, **options):
                 pass
@@ -267,12 +313,15 @@ def test_any_signature_that_can_take_the_arguments_will_do(package):
             @staticmethod
             def make_plan(spec, costs, start, goal, hurry=False):
                 return None
-    """)
+    """,
+    )
     assert config.load({"base_global_planner": "my_package.planners.Mine"})
 
 
 def test_layer_that_lacks_something(package):
-    package("layers.py", """
+    package(
+        "layers.py",
+        """
         from quad_nav.costmap.layer import Layer
 
         class Plain:
@@ -281,31 +330,40 @@ def test_layer_that_lacks_something(package):
         class Mine(Layer):
             def update_bounds(self, robot, bounds):
                 return bounds
-    """)
-    costmap = {"plugins": [{"name": "plain", "type": "my_package.layers.Plain"},
-                           {"name": "mine", "type": "my_package.layers.Mine"}]}
+    """,
+    )
+    costmap = {
+        "plugins": [
+            {"name": "plain", "type": "my_package.layers.Plain"},
+            {"name": "mine", "type": "my_package.layers.Mine"},
+        ]
+    }
     mine = "/nav/local_costmap/plugins/mine: my_package.layers.Mine is not a costmap layer: "
     assert problems({"local_costmap": costmap}) == [
         "/nav/local_costmap/plugins/plain: my_package.layers.Plain is not a costmap layer: it is"
         " not derived from Layer; expected class Plain(quad_nav.costmap.layer.Layer)",
         mine + "__init__(self, params) cannot take its arguments; expected __init__(self, params,"
-               " spec, rolling_window, default_cost)",
+        " spec, rolling_window, default_cost)",
         mine + "update_bounds(self, robot, bounds) cannot take its arguments; expected"
-               " update_bounds(self, robot, now_s, bounds)"]
+        " update_bounds(self, robot, now_s, bounds)",
+    ]
 
 
 def test_recovery_that_lacks_something(package):
-    package("recoveries.py", """
+    package(
+        "recoveries.py",
+        """
         class Mine:
             def __init__(self, params):
                 self.period_s = 0.1
 
-            def step(self, surroundings):
+            def step(self, context):
                 pass
-    """)
+    """,
+    )
     behaviours = [{"name": "mine", "type": "my_package.recoveries.Mine"}]
-    mine = ("/nav/recovery_behaviors/mine: my_package.recoveries.Mine is not a recovery behaviour:"
-            " ")
+    mine = "/nav/recovery_behaviors/mine: my_package.recoveries.Mine is not a recovery behaviour: "
     assert problems({"recovery_behaviors": behaviours}) == [
         mine + "it has no period_s; expected a class attribute or a property of that name",
-        mine + "it has no method start; expected start(self, surroundings)"]
+        mine + "it has no method start; expected start(self, context)",
+    ]

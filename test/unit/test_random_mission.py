@@ -1,4 +1,5 @@
 """Missions from a seed: room for everybody, and the same mission again."""
+
 from __future__ import annotations
 
 import itertools
@@ -7,8 +8,8 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.mission.robot_goals import close_ends, goal_paths, load_robot_goals
-from quad_nav.random_mission import default_size_m, random_mission
-from quad_nav.scene_check import scene_check
+from quad_nav.scenario.random_mission import default_size_m, random_mission
+from quad_nav.scenario.scene_check import scene_check
 from quad_nav.sim.scene import BODY_RADIUS_M
 from quad_nav.sim.scene_file import load_scene
 
@@ -21,8 +22,9 @@ def test_the_files_are_read_back_as_the_mission_and_can_be_flown(tmp_path):
     paths, missing = goal_paths(tmp_path / "goals", 16)
     robots, faults = load_robot_goals(paths, scene_check(scene, BODY_RADIUS_M))
     assert missing == faults == close_ends(robots, BODY_RADIUS_M) == []
-    assert [tuple((goal.x_m, goal.y_m) for goal in robot.sequence.goals) for robot in robots] \
-        == list(mission.goals)
+    assert [
+        tuple((goal.x_m, goal.y_m) for goal in robot.sequence.goals) for robot in robots
+    ] == list(mission.goals)
 
 
 def test_starts_are_apart_and_obstacles_leave_passages():

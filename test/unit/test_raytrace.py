@@ -1,4 +1,5 @@
 """Clearing passes over lines that have nothing to clear; the outcome is that of all lines."""
+
 from __future__ import annotations
 
 import math
@@ -26,17 +27,31 @@ def scans(random, count, size_m):
     clouds = []
     for sensor in sensors:
         ranges = random.uniform(0.05, size_m, len(directions))
-        clouds.append(sensor + np.stack([ranges * np.cos(directions),
-                                         ranges * np.sin(directions), 0 * ranges], axis=1))
+        clouds.append(
+            sensor
+            + np.stack(
+                [ranges * np.cos(directions), ranges * np.sin(directions), 0 * ranges], axis=1
+            )
+        )
     return sensors, np.concatenate(clouds).astype(np.float32), len(directions)
 
 
 def cleared_by_all_lines(costs, sensors, points, per_scan, range_m):
     bounds = np.array(NOWHERE)
     for k, sensor in enumerate(sensors):
-        clear_rays(costs, -1.0, 2.0, RESOLUTION_M, sensor[0], sensor[1],
-                   points[k * per_scan:(k + 1) * per_scan], range_m, np.ones(SECTORS, bool),
-                   np.empty(0, np.int64), bounds)
+        clear_rays(
+            costs,
+            -1.0,
+            2.0,
+            RESOLUTION_M,
+            sensor[0],
+            sensor[1],
+            points[k * per_scan : (k + 1) * per_scan],
+            range_m,
+            np.ones(SECTORS, bool),
+            np.empty(0, np.int64),
+            bounds,
+        )
     return bounds
 
 
@@ -56,8 +71,9 @@ def test_the_outcome_is_that_of_all_lines(obstructed, range_m):
         ends = per_scan * np.arange(1, len(sensors) + 1)
         bounds = np.array(NOWHERE)
         before = np.count_nonzero(costs)
-        clear_all_rays(costs, -1.0, 2.0, RESOLUTION_M, sensors, points, ends - per_scan, ends,
-                       range_m, bounds)
+        clear_all_rays(
+            costs, -1.0, 2.0, RESOLUTION_M, sensors, points, ends - per_scan, ends, range_m, bounds
+        )
         np.testing.assert_array_equal(costs, expected)
         # The last millimetre before the grid's border is in the same cell.
         np.testing.assert_allclose(bounds, expected_bounds, atol=1.01e-3)
@@ -65,16 +81,22 @@ def test_the_outcome_is_that_of_all_lines(obstructed, range_m):
 
 
 def test_sectors_go_round_once():
-    sectors = [sector_of(math.cos(angle), math.sin(angle))
-               for angle in np.linspace(0.0, 2 * math.pi, 5000, endpoint=False)]
+    sectors = [
+        sector_of(math.cos(angle), math.sin(angle))
+        for angle in np.linspace(0.0, 2 * math.pi, 5000, endpoint=False)
+    ]
     assert sectors[0] == 0 and sectors[-1] == SECTORS - 1
     assert set(np.diff(sectors)) == {0, 1}
     assert [sector_of(0.0, 2.0), sector_of(-1.0, 0.0), sector_of(0.0, -3.0)] == [
-        SECTORS // 4, SECTORS // 2, 3 * SECTORS // 4]
+        SECTORS // 4,
+        SECTORS // 2,
+        3 * SECTORS // 4,
+    ]
 
 
-@pytest.mark.parametrize("direction", [(0.0, 0.0), (math.nan, 1.0), (math.inf, 1.0),
-                                       (1.0, -1e-300)])
+@pytest.mark.parametrize(
+    "direction", [(0.0, 0.0), (math.nan, 1.0), (math.inf, 1.0), (1.0, -1e-300)]
+)
 def test_every_direction_has_a_sector(direction):
     assert 0 <= sector_of(*direction) < SECTORS
 

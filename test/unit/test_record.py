@@ -17,19 +17,19 @@ from recorded_flight import flown, setup
 from quad_nav.cli import main
 from quad_nav.costmap.occupancy import occupancy
 from quad_nav.errors import InputError
-from quad_nav.face.flight_info import FLIGHT_TOPIC
+from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D
-from quad_nav.offline import record_messages as messages
-from quad_nav.offline.bag_file import read_messages
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.record import Recorder
-from quad_nav.offline.record_file import create
-from quad_nav.offline.record_path import path_bytes, plan_bytes, pose_bytes
 from quad_nav.offline.run import INTERRUPTED, fly
-from quad_nav.offline.setup import FlightOptions, read_setup
-from quad_nav.shipped import shipped
+from quad_nav.recording import messages
+from quad_nav.recording.bag_file import read_messages
+from quad_nav.recording.path_messages import path_bytes, plan_bytes, pose_bytes
+from quad_nav.recording.record_file import create
+from quad_nav.recording.recorder import Recorder
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.scene_file import scene_from_document
+from quad_nav.topics.flight_info import FLIGHT_TOPIC
 
 
 class Notes(FlightObserver):
@@ -92,8 +92,10 @@ def test_odometry_is_the_simulation_s_to_the_bit(recorded):
         odometry, state = message.content, states[1]
         assert messages.stamp_ns(odometry.header.stamp) == message.stamp_ns
         assert message.stamp_ns == round(now_s * 1e9) + 10**9
-        assert messages.pose_from(odometry.pose.pose.position,
-                                  odometry.pose.pose.orientation) == state.map_from_base
+        assert (
+            messages.pose_from(odometry.pose.pose.position, odometry.pose.pose.orientation)
+            == state.map_from_base
+        )
         linear = odometry.twist.twist.linear
         assert (linear.x, linear.y, linear.z) == state.linear_mps
         assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom1", "base_link1")
@@ -103,10 +105,18 @@ def test_transforms_are_a_chain_from_the_map_to_the_lidar(recorded):
     path, notes, *_ = recorded
     last = read(path, "/tf")[-1].content.transforms
     links = [(one.header.frame_id, one.child_frame_id) for one in last]
-    assert links == [("map", "odom0"), ("odom0", "base_link0"), ("base_link0", "Lidar0"),
-                     ("map", "odom1"), ("odom1", "base_link1"), ("base_link1", "Lidar1")]
-    assert messages.pose_from(last[4].transform.translation, last[4].transform.rotation) \
+    assert links == [
+        ("map", "odom0"),
+        ("odom0", "base_link0"),
+        ("base_link0", "Lidar0"),
+        ("map", "odom1"),
+        ("odom1", "base_link1"),
+        ("base_link1", "Lidar1"),
+    ]
+    assert (
+        messages.pose_from(last[4].transform.translation, last[4].transform.rotation)
         == notes.states[-1][1][1].map_from_base
+    )
 
 
 def test_scans_are_the_lidar_s_to_the_bit(recorded):
@@ -124,8 +134,11 @@ def test_scans_are_the_lidar_s_to_the_bit(recorded):
 def test_costmaps_are_what_the_navigator_has(recorded, name):
     """A full grid is all of it, an update the window that changed."""
     path, notes, *_ = recorded
-    grids = {round(now_s * 1e9) + 10**9: grid for robot, which, now_s, grid in notes.windows
-             if robot == 0 and which == name}
+    grids = {
+        round(now_s * 1e9) + 10**9: grid
+        for robot, which, now_s, grid in notes.windows
+        if robot == 0 and which == name
+    }
     topic = f"/move_base0/{name}_costmap/costmap"
     found = read(path, topic, f"{topic}_updates")
     assert found[0].topic == topic
@@ -135,7 +148,9 @@ def test_costmaps_are_what_the_navigator_has(recorded, name):
             assert content.data.tobytes() == grid.tobytes()
             assert (content.info.height, content.info.width) == grid.shape
         else:
-            part = grid[content.y:content.y + content.height, content.x:content.x + content.width]
+            part = grid[
+                content.y : content.y + content.height, content.x : content.x + content.width
+            ]
             assert content.data.tobytes() == part.tobytes()
 
 
@@ -151,8 +166,10 @@ def test_goals_are_sent_taken_and_ended_as_by_the_action_server(recorded):
     path = recorded[0]
     sent = read(path, "/move_base_simple/goal0")
     taken = read(path, "/move_base0/current_goal")
-    assert [(one.content.pose.position.x, one.content.pose.position.y) for one in sent] == \
-        [(2.1, 1.9), (2.6, 2.3)]
+    assert [(one.content.pose.position.x, one.content.pose.position.y) for one in sent] == [
+        (2.1, 1.9),
+        (2.6, 2.3),
+    ]
     assert [one.content for one in taken] == [one.content for one in sent]
     results = [one.content.status for one in read(path, "/move_base0/result")]
     assert [one.status for one in results[:1]] == [2]  # PREEMPTED: the next goal came before
@@ -172,11 +189,13 @@ def test_the_flight_is_described_with_its_end(recorded):
 
 def test_markers_show_every_solid_quadcopter_and_goal(recorded):
     path, _, flight, _ = recorded
-    scene, = read(path, "/simulation/scene")
+    (scene,) = read(path, "/simulation/scene")
     assert len(scene.content.markers) == 4 + len(flight.trace.scene.obstacles)
-    quadcopters, = read(path, "/simulation/quadcopters")
-    assert {one.header.frame_id for one in quadcopters.content.markers} == \
-        {"base_link0", "base_link1"}
+    (quadcopters,) = read(path, "/simulation/quadcopters")
+    assert {one.header.frame_id for one in quadcopters.content.markers} == {
+        "base_link0",
+        "base_link1",
+    }
     goals = read(path, "/goals")[0].content.markers
     assert goals[0].action == 3  # DELETEALL
     assert [one.text for one in goals if one.text] == ["1", "2", "1"]
@@ -190,14 +209,17 @@ def test_chunks_are_compressed_as_ros_reads_them(recorded):
     assert flags == {0x64}
 
 
-@pytest.mark.parametrize("kind, digest", [
-    ("tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec"),
-    ("map_msgs/OccupancyGridUpdate", "b295be292b335c34718bd939deebe1c9"),
-    ("move_base_msgs/RecoveryStatus", "a2488e0805e1529a31044786ee1a2623"),
-    ("move_base_msgs/MoveBaseActionGoal", "660d6895a1b9a16dce51fbdd9a64a56b"),
-    ("move_base_msgs/MoveBaseActionFeedback", "7d1870ff6e0decea702b943b5af0b42e"),
-    ("move_base_msgs/MoveBaseActionResult", "1eb06eeff08fa7ea874431638cb52332"),
-])
+@pytest.mark.parametrize(
+    "kind, digest",
+    [
+        ("tf2_msgs/TFMessage", "94810edda583a504dfda3829e70d7eec"),
+        ("map_msgs/OccupancyGridUpdate", "b295be292b335c34718bd939deebe1c9"),
+        ("move_base_msgs/RecoveryStatus", "a2488e0805e1529a31044786ee1a2623"),
+        ("move_base_msgs/MoveBaseActionGoal", "660d6895a1b9a16dce51fbdd9a64a56b"),
+        ("move_base_msgs/MoveBaseActionFeedback", "7d1870ff6e0decea702b943b5af0b42e"),
+        ("move_base_msgs/MoveBaseActionResult", "1eb06eeff08fa7ea874431638cb52332"),
+    ],
+)
 def test_added_definitions_have_the_sums_that_ros_knows_them_by(kind, digest):
     assert messages.definition(kind)[1] == digest
 
@@ -206,16 +228,20 @@ def test_added_definitions_have_the_sums_that_ros_knows_them_by(kind, digest):
 def test_paths_have_the_bytes_of_their_messages(plan):
     poses = [messages.planar_pose(Pose2D(*row)) for row in plan.tolist()]
     stamp = 3_000_000_007
-    path = messages.message("nav_msgs/Path", messages.header("odom0", stamp),
-                            [messages.pose_stamped(pose, "odom0", stamp) for pose in poses])
+    path = messages.message(
+        "nav_msgs/Path",
+        messages.header("odom0", stamp),
+        [messages.pose_stamped(pose, "odom0", stamp) for pose in poses],
+    )
     assert plan_bytes(plan, "odom0", stamp) == messages.encode(path)
     parts = [pose_bytes(pose, "odom0", stamp) for pose in poses]
     assert path_bytes(parts, "odom0", stamp) == messages.encode(path)
 
 
 def test_a_plan_s_headings_are_quaternions():
-    path = messages.decode(plan_bytes(np.array([[1.0, 2.0, 0.3], [3.0, 4.0, -3.1]]), "map", 1),
-                           "nav_msgs/Path")
+    path = messages.decode(
+        plan_bytes(np.array([[1.0, 2.0, 0.3], [3.0, 4.0, -3.1]]), "map", 1), "nav_msgs/Path"
+    )
     for pose, yaw in zip(path.poses, (0.3, -3.1)):
         turn = pose.pose.orientation
         assert (turn.z, turn.w) == pytest.approx((math.sin(yaw / 2), math.cos(yaw / 2)), abs=1e-15)
@@ -224,17 +250,22 @@ def test_a_plan_s_headings_are_quaternions():
 def test_mcap_holds_the_same_messages(recorded, tmp_path):
     path = tmp_path / "flight.mcap"
     fly(setup(tmp_path, time_limit_s=1.0), [Recorder(path, "short")])
-    for ours, theirs in zip(read(path, "/odom0", "/tf", "/quad/events"),
-                            read(recorded[0], "/odom0", "/tf", "/quad/events")):
+    for ours, theirs in zip(
+        read(path, "/odom0", "/tf", "/quad/events"),
+        read(recorded[0], "/odom0", "/tf", "/quad/events"),
+    ):
         assert (ours.topic, ours.stamp_ns) == (theirs.topic, theirs.stamp_ns)
         assert messages.encode(ours.content) == messages.encode(theirs.content)
 
 
-@pytest.mark.parametrize("name, problem", [
-    ("flight.txt", "expected a name that ends with .bag or .mcap"),
-    ("file/flight.bag", "cannot be recorded to: "),
-    ("folder.bag", "is a folder"),
-])
+@pytest.mark.parametrize(
+    "name, problem",
+    [
+        ("flight.txt", "expected a name that ends with .bag or .mcap"),
+        ("file/flight.bag", "cannot be recorded to: "),
+        ("folder.bag", "is a folder"),
+    ],
+)
 def test_a_file_that_cannot_be_made_is_refused_at_once(tmp_path, name, problem):
     (tmp_path / "file").write_text("", encoding="utf-8")
     (tmp_path / "folder.bag").mkdir()
@@ -336,8 +367,9 @@ def test_without_room_for_anything_the_flight_says_so(tmp_path):
     path = tmp_path / "flight.bag"
     with SizeLimit(5_000):
         summary = fly(setup(tmp_path, time_limit_s=0.1), [Recorder(path)])
-    assert summary.reason == ("time limit of 0.1 s; the recording cannot be written: "
-                              "no room for a single chunk")
+    assert summary.reason == (
+        "time limit of 0.1 s; the recording cannot be written: no room for a single chunk"
+    )
     assert not path.exists()
 
 
@@ -361,10 +393,16 @@ def test_a_stop_reason_of_an_observer_ends_the_flight(tmp_path):
 # The command line.
 
 
-@pytest.mark.parametrize("option, problem", [
-    (["--record", "flight.txt"], "flight.txt: cannot be recorded to; expected a name that ends"),
-    (["--view", "flight.bag"], "flight.bag: cannot be saved to; expected a name that ends"),
-])
+@pytest.mark.parametrize(
+    "option, problem",
+    [
+        (
+            ["--record", "flight.txt"],
+            "flight.txt: cannot be recorded to; expected a name that ends",
+        ),
+        (["--view", "flight.bag"], "flight.bag: cannot be saved to; expected a name that ends"),
+    ],
+)
 def test_a_bad_file_ends_with_status_2_before_anything_flies(monkeypatch, option, problem):
     monkeypatch.setitem(sys.modules, "rerun", types.ModuleType("rerun"))
     result = CliRunner().invoke(main, ["fly", "-q", *option])

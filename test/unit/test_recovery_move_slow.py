@@ -1,4 +1,5 @@
 """Going slowly after a recovery: what is cleared, what is limited and for how long."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -7,21 +8,28 @@ import numpy as np
 import pytest
 from costmap_maps import drawn, picture
 
-from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.config import load, updated
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.navigator import Navigator
-from quad_nav.parameter_limiter import ParameterLimiter
-from quad_nav.recovery import MoveSlowAndClear, MoveSlowAndClearParams, ParameterLimit, Surroundings
-from quad_nav.tick import Located, State
+from quad_nav.navigator.navigator import Navigator
+from quad_nav.navigator.parameter_limiter import ParameterLimiter
+from quad_nav.navigator.tick import RobotPoses, State
+from quad_nav.recovery import (
+    MoveSlowAndClear,
+    MoveSlowAndClearParams,
+    ParameterLimit,
+    RecoveryContext,
+)
+from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
 HERE = Pose2D(2.5, 2.5)
-LIMIT = ParameterLimit((("max_vel_x_mps", 0.25), ("max_vel_theta_radps", 0.45),
-                    ("min_vel_theta_radps", 0.45)), distance_m=0.3)
+LIMIT = ParameterLimit(
+    (("max_vel_x_mps", 0.25), ("max_vel_theta_radps", 0.45), ("min_vel_theta_radps", 0.45)),
+    distance_m=0.3,
+)
 
 
 @dataclass
@@ -34,8 +42,11 @@ class Controller:
 
 def costmap_of(size_m=6.0, **layers):
     layers = layers or {"laser": ObstacleLayerParams(), "inflation": InflationLayerParams()}
-    return LayeredCostmap(CostmapParams(width_m=size_m, height_m=size_m, resolution_m=1.0,
-                                        layers=tuple(layers.items())))
+    return LayeredCostmap(
+        CostmapParams(
+            width_m=size_m, height_m=size_m, resolution_m=1.0, layers=tuple(layers.items())
+        )
+    )
 
 
 def full(costmap):
@@ -46,7 +57,7 @@ def full(costmap):
 
 def test_the_square_around_the_robot_is_freed_and_reaches_the_master():
     local = full(costmap_of())
-    around = Surroundings(0.0, full(costmap_of()), local, HERE, HERE)
+    around = RecoveryContext(0.0, full(costmap_of()), local, HERE, HERE)
     step = MoveSlowAndClear(MoveSlowAndClearParams(clearing_distance_m=1.0)).step(around)
     assert step.done and step.command is None
     assert picture(local.layers["laser"].grid.costs) == drawn("""######
@@ -66,18 +77,22 @@ def test_costmaps_that_cannot_be_cleared_are_told():
     blind = costmap_of(inflation=InflationLayerParams())
     small = full(costmap_of(size_m=3.0))
     step = MoveSlowAndClear(MoveSlowAndClearParams(translation_fields=("max_vel_x_mps",))).step(
-        Surroundings(0.0, small, blind, Pose2D(2.75, 1.0), Pose2D(0.5, 0.5)))
+        RecoveryContext(0.0, small, blind, Pose2D(2.75, 1.0), Pose2D(0.5, 0.5))
+    )
     why = "it has no obstacle layer, or ends within 0.5 m of the robot"
     assert step.message.split("; ") == [
-        f"global costmap not cleared: {why}", f"local costmap not cleared: {why}",
-        "not above 0.25 m/s and 0.45 rad/s for the next 0.3 m"]
+        f"global costmap not cleared: {why}",
+        f"local costmap not cleared: {why}",
+        "not above 0.25 m/s and 0.45 rad/s for the next 0.3 m",
+    ]
     assert (small.layers["laser"].grid.costs == 254).all()
 
 
 def test_at_an_unknown_pose_nothing_is_done():
     costmap = full(costmap_of())
     step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
-        Surroundings(0.0, costmap, costmap, None, None))
+        RecoveryContext(0.0, costmap, costmap, None, None)
+    )
     assert step.done and step.limit is None
     assert step.message.count("the robot's pose is unknown") == 2
     assert (costmap.layers["laser"].grid.costs == 254).all()
@@ -85,7 +100,8 @@ def test_at_an_unknown_pose_nothing_is_done():
 
 def test_a_planner_without_speeds_is_not_said_to_be_slow():
     step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
-        Surroundings(0.0, full(costmap_of()), full(costmap_of()), HERE, HERE))
+        RecoveryContext(0.0, full(costmap_of()), full(costmap_of()), HERE, HERE)
+    )
     assert (step.message, step.limit) == ("", None)
 
 
@@ -100,8 +116,9 @@ def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
     speed = ParameterLimiter(controller)
     speed.impose(LIMIT, HERE)
     limited = controller.params
-    assert limited == replace(usual, max_vel_x_mps=0.25, max_vel_theta_radps=0.45,
-                              min_vel_theta_radps=-0.45)
+    assert limited == replace(
+        usual, max_vel_x_mps=0.25, max_vel_theta_radps=0.45, min_vel_theta_radps=-0.45
+    )
     speed.follow(Pose2D(2.5, 2.79))
     assert controller.params == limited
     speed.follow(Pose2D(2.5, 2.81))
@@ -121,8 +138,9 @@ def test_a_limit_of_the_same_parameters_replaces_the_first_and_counts_from_its_o
     speed.impose(LIMIT, HERE)
     faster = tuple((field, 0.4) for field, _ in LIMIT.greatest)
     speed.impose(ParameterLimit(faster, 1.0), Pose2D(2.5, 2.7))
-    assert controller.params == replace(usual, max_vel_x_mps=0.4, max_vel_theta_radps=0.4,
-                                        min_vel_theta_radps=-0.4)
+    assert controller.params == replace(
+        usual, max_vel_x_mps=0.4, max_vel_theta_radps=0.4, min_vel_theta_radps=-0.4
+    )
     speed.follow(Pose2D(2.5, 3.0))
     assert controller.params.max_vel_x_mps == 0.4
     speed.follow(Pose2D(2.5, 3.8))
@@ -143,7 +161,8 @@ def test_parameters_that_change_under_a_limit_come_into_force_with_its_end():
 
 TREE = {
     "recovery_behaviors": [{"name": "slow", "type": "move_slow_and_clear/MoveSlowAndClear"}],
-    "planner_patience": 0.5, "controller_frequency": 10.0,
+    "planner_patience": 0.5,
+    "controller_frequency": 10.0,
     "TrajectoryPlannerROS": {"max_vel_x": 0.6, "min_vel_x": 0.1},
     "global_costmap": {"width": 6, "height": 6, "resolution": 0.1},
     "local_costmap": {"width": 6, "height": 6, "resolution": 0.1},
@@ -165,7 +184,7 @@ class Stuck:
     def fly(self, pose, seconds):
         ticks, end_s = [], self.now_s + seconds
         while self.now_s <= end_s:
-            ticks.append(self.navigator.tick(self.now_s, Located(pose, pose), Twist2D()))
+            ticks.append(self.navigator.tick(self.now_s, RobotPoses(pose, pose), Twist2D()))
             self.now_s += 0.1
         return ticks
 
@@ -181,8 +200,9 @@ def stuck():
 
 def test_the_navigator_limits_its_controller_and_lifts_the_limit(stuck):
     assert [tick.recovery.name for tick in stuck.ticks if tick.recovery] == ["slow"]
-    assert ("not above 0.25 m/s and 0.45 rad/s for the next 0.3 m"
-            in [warning for tick in stuck.ticks for warning in tick.warnings])
+    assert "not above 0.25 m/s and 0.45 rad/s for the next 0.3 m" in [
+        warning for tick in stuck.ticks for warning in tick.warnings
+    ]
     assert stuck.max_vel_x_mps == 0.25
     stuck.fly(Pose2D(2.7, 2.5), 0.5)
     assert stuck.max_vel_x_mps == 0.25
@@ -222,15 +242,30 @@ def test_reconfiguration_does_not_lift_the_limit(stuck):
 
 
 def test_dwa_is_limited_in_all_its_speeds_and_flies_below_them():
-    dwa = {"base_local_planner": "dwa_local_planner/DWAPlannerROS",
-           "DWAPlannerROS": {"max_vel_trans": 0.8, "max_vel_x": 0.8, "min_vel_x": -0.6,
-                             "max_vel_y": 0.4, "min_vel_y": -0.4, "max_vel_theta": 2.0,
-                             "min_vel_theta": 0.5}}
+    dwa = {
+        "base_local_planner": "dwa_local_planner/DWAPlannerROS",
+        "DWAPlannerROS": {
+            "max_vel_trans": 0.8,
+            "max_vel_x": 0.8,
+            "min_vel_x": -0.6,
+            "max_vel_y": 0.4,
+            "min_vel_y": -0.4,
+            "max_vel_theta": 2.0,
+            "min_vel_theta": 0.5,
+        },
+    }
     stuck = Stuck({**TREE, **dwa})
     usual = build_navigator(stuck.configuration).controller.params
-    slow = replace(usual, max_vel_trans_mps=0.25, max_vel_x_mps=0.25, min_vel_x_mps=-0.25,
-                   max_vel_y_mps=0.25, min_vel_y_mps=-0.25, max_vel_theta_radps=0.45,
-                   min_vel_theta_radps=0.45)
+    slow = replace(
+        usual,
+        max_vel_trans_mps=0.25,
+        max_vel_x_mps=0.25,
+        min_vel_x_mps=-0.25,
+        max_vel_y_mps=0.25,
+        min_vel_y_mps=-0.25,
+        max_vel_theta_radps=0.45,
+        min_vel_theta_radps=0.45,
+    )
     assert stuck.navigator.controller.params == slow
     commands = [tick.command for tick in stuck.fly(Pose2D(2.6, 2.5), 2.0) if tick.control]
     assert 0.0 < max(np.hypot(command.vx_mps, command.vy_mps) for command in commands) <= 0.25

@@ -9,11 +9,11 @@ import pytest
 from hand_made_traces import TIMES_S, flight, robot
 
 from quad_nav.mission.flight_log import Contact
-from quad_nav.offline.report.encounter_picture import encounter_picture, frame_times
-from quad_nav.offline.report.encounters import encounters, gap_text
-from quad_nav.offline.report.measures import tracks
-from quad_nav.offline.report.paths_picture import paths_picture
-from quad_nav.offline.report.style import styled
+from quad_nav.report.encounter_picture import encounter_picture, frame_times
+from quad_nav.report.encounters import encounters, gap_text
+from quad_nav.report.measures import tracks
+from quad_nav.report.paths_picture import paths_picture
+from quad_nav.report.style import styled
 
 
 def found_in(trace, **options):
@@ -39,6 +39,7 @@ def test_farther_than_the_threshold_is_no_encounter():
 
 def test_what_repeats_soon_is_one_encounter():
     """The gap swings between 0.1 m and 1.1 m."""
+
     def swinging(period_s):
         other = robot(1, (2.2, 1.0))
         swing = 0.5 * (1.0 - np.cos(2.0 * math.pi * TIMES_S / period_s))
@@ -46,17 +47,28 @@ def test_what_repeats_soon_is_one_encounter():
         return flight(robot(0, (1.0, 1.0)), other)
 
     assert len(found_in(swinging(2.5))) == 1
-    assert [one.time_s for one in found_in(swinging(10.0))] == [pytest.approx(0.0),
-                                                               pytest.approx(10.0)]
+    assert [one.time_s for one in found_in(swinging(10.0))] == [
+        pytest.approx(0.0),
+        pytest.approx(10.0),
+    ]
 
 
 def test_contacts_with_obstacles_come_first_and_the_closest_next():
-    trace = flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0)), robot(2, (1.0, 1.8)), contacts=[
-        Contact(2.0, "quad2", "pillar", 5.0, 5.0), Contact(3.0, "quad2", "pillar", 5.0, 5.0),
-        Contact(8.0, "quad2", "pillar", 5.0, 5.0)])
+    trace = flight(
+        robot(0, (1.0, 1.0)),
+        robot(1, (2.0, 1.0)),
+        robot(2, (1.0, 1.8)),
+        contacts=[
+            Contact(2.0, "quad2", "pillar", 5.0, 5.0),
+            Contact(3.0, "quad2", "pillar", 5.0, 5.0),
+            Contact(8.0, "quad2", "pillar", 5.0, 5.0),
+        ],
+    )
     found = found_in(trace)
     assert [(one.names, one.time_s) for one in found[:2]] == [
-        (("quad2", "pillar"), 2.0), (("quad2", "pillar"), 8.0)]
+        (("quad2", "pillar"), 2.0),
+        (("quad2", "pillar"), 8.0),
+    ]
     assert found[0].other is None and (found[0].x_m, found[0].y_m) == (5.0, 5.0)
     assert [one.names for one in found[2:]] == [("quad0", "quad2"), ("quad0", "quad1")]
 
@@ -102,7 +114,9 @@ def test_frames_of_those_that_stand_and_at_the_begin():
     assert frame_times(trace, tracks(trace), one) == pytest.approx([0.0, 1.5, 3.0])
 
 
-@pytest.mark.parametrize("gap_m, text", [(0.4, "gap 0.40 m"), (-0.02, "overlap 0.02 m"),
-                                         (-0.004, "touching"), (0.004, "touching")])
+@pytest.mark.parametrize(
+    "gap_m, text",
+    [(0.4, "gap 0.40 m"), (-0.02, "overlap 0.02 m"), (-0.004, "touching"), (0.004, "touching")],
+)
 def test_gaps_in_words(gap_m, text):
     assert gap_text(gap_m) == text

@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 from quad_nav.cli import main
-from quad_nav.offline.report.figures import figures
 from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightOptions, read_setup
-from quad_nav.offline.trace import TraceObserver
+from quad_nav.recording.trace import TraceObserver
+from quad_nav.report.figures import figures
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import SimulationParams
 
@@ -22,9 +22,18 @@ FEW_BEAMS = LidarParams(step_size_rad=2 * np.pi / 128)
 
 def test_figures_are_those_of_the_summary():
     observer = TraceObserver()
-    summary = fly(read_setup(FlightOptions(
-        scene=ROOT / "scenes" / "arena.yaml", goals=ROOT / "goals", config="tutorial",
-        time_limit_s=6.0, simulation=SimulationParams(FEW_BEAMS, jitter_m=0.3))), [observer])
+    summary = fly(
+        read_setup(
+            FlightOptions(
+                scene=ROOT / "scenes" / "arena.yaml",
+                goals=ROOT / "goals",
+                config="tutorial",
+                time_limit_s=6.0,
+                simulation=SimulationParams(FEW_BEAMS, jitter_m=0.3),
+            )
+        ),
+        [observer],
+    )
     found = figures(observer.trace(summary.contacts, summary.reason))
     assert found.mission_s == pytest.approx(summary.sim_time_s, abs=1 / 40 + 1e-9)
     assert found.least_separation_m == pytest.approx(summary.min_separation_m, abs=1e-3)
@@ -39,9 +48,21 @@ def test_figures_are_those_of_the_summary():
 
 def test_quad_fly_writes_report_and_animation(tmp_path):
     report, animation = tmp_path / "new" / "flight.html", tmp_path / "flight.gif"
-    result = CliRunner().invoke(main, [
-        "fly", "--time-limit", "0.5", "--beams", "64", "--quiet", "--report", str(report),
-        "--animate", str(animation)])
+    result = CliRunner().invoke(
+        main,
+        [
+            "fly",
+            "--time-limit",
+            "0.5",
+            "--beams",
+            "64",
+            "--quiet",
+            "--report",
+            str(report),
+            "--animate",
+            str(animation),
+        ],
+    )
     assert result.exit_code == 1  # half a second is too short for any goal
     assert result.output == f"report: {report}\nanimation: {animation}\n"
     assert "arena, 2 quadcopters, default" in report.read_text(encoding="utf-8")

@@ -10,8 +10,8 @@ import pytest
 from hand_made_traces import RADIUS_M, SCENE, TIMES_S, flight, goal, robot
 
 from quad_nav.mission.flight_log import Contact
-from quad_nav.offline.report.figures import figures
-from quad_nav.offline.report.measures import (
+from quad_nav.report.figures import figures
+from quad_nav.report.measures import (
     clearances_m,
     runs,
     separations_m,
@@ -78,8 +78,10 @@ def test_spins_count_while_a_goal_is_flown():
 
 @pytest.mark.parametrize("velocity, turn_radps", [((0.1, 0.0), 0.5), ((0.0, 0.0), 0.1)])
 def test_flying_or_standing_is_no_spin(velocity, turn_radps):
-    assert spins(robot(0, (1.0, 1.0), velocity, turn_radps,
-                       goals=(goal(0, (1.0, 1.0), 0.0, 10.0),))) == []
+    assert (
+        spins(robot(0, (1.0, 1.0), velocity, turn_radps, goals=(goal(0, (1.0, 1.0), 0.0, 10.0),)))
+        == []
+    )
 
 
 def test_runs():
@@ -88,14 +90,21 @@ def test_runs():
 
 
 def test_straight_length_is_between_sending_and_end():
-    flown = robot(0, (1.0, 1.0), (0.5, 0.0), goals=(goal(0, (9.0, 9.0), 1.0, 4.0),
-                                                    goal(1, (9.0, 9.0), 4.0)))
+    flown = robot(
+        0, (1.0, 1.0), (0.5, 0.0), goals=(goal(0, (9.0, 9.0), 1.0, 4.0), goal(1, (9.0, 9.0), 4.0))
+    )
     assert straight_length_m(flown) == pytest.approx(1.5 + 3.0)
 
 
 def test_figures_of_a_flight():
-    done = robot(0, (1.0, 2.0), (0.5, 0.0), pitch_rad=0.1, recoveries=((3.0, "rotate_recovery"),),
-                 goals=(goal(0, (3.0, 2.0), 1.0, 4.0), goal(1, (5.0, 2.0), 4.0, 9.0)))
+    done = robot(
+        0,
+        (1.0, 2.0),
+        (0.5, 0.0),
+        pitch_rad=0.1,
+        recoveries=((3.0, "rotate_recovery"),),
+        goals=(goal(0, (3.0, 2.0), 1.0, 4.0), goal(1, (5.0, 2.0), 4.0, 9.0)),
+    )
     found = figures(flight(done, robot(1, (1.0, 4.0))))
     assert (found.sent, found.reached, found.contacts, found.recoveries) == (2, 2, 0, 1)
     assert found.mission_s == pytest.approx(8.0)
@@ -110,8 +119,9 @@ def test_figures_of_a_flight():
 
 def test_faults_say_why_a_flight_failed():
     failed = robot(0, (1.0, 2.0), goals=(goal(0, (3.0, 2.0), 1.0, 4.0, reached=False),))
-    found = figures(flight(failed, contacts=[Contact(2.0, "quad0", "pillar", 1.0, 2.0)],
-                           reason="interrupted"))
+    found = figures(
+        flight(failed, contacts=[Contact(2.0, "quad0", "pillar", 1.0, 2.0)], reason="interrupted")
+    )
     assert not found.success
     assert found.faults == ("it ended early (interrupted)", "1 of 1 goals not reached", "1 contact")
     assert found.robots[0].contacts == 1

@@ -12,13 +12,21 @@ import pytest
 from hand_made_traces import TIMES_S, fleet, flight, goal, robot
 from PIL import Image
 
-from quad_nav.offline.report.animation import animate_flight, animation_faults
-from quad_nav.offline.report.figures import figures
-from quad_nav.offline.report.page import MOST_STRIPS, Page, comparison_page, flight_page
-from quad_nav.offline.report.write import write_comparison, write_report
+from quad_nav.report.animation import animate_flight, animation_faults
+from quad_nav.report.figures import figures
+from quad_nav.report.page import MOST_STRIPS, Page, comparison_page, flight_page
+from quad_nav.report.write import write_comparison, write_report
 
-SECTIONS = ["paths", "encounters", "gaps", "timeline", "motion", "cycles", "goal-table",
-            "parameters"]
+SECTIONS = [
+    "paths",
+    "encounters",
+    "gaps",
+    "timeline",
+    "motion",
+    "cycles",
+    "goal-table",
+    "parameters",
+]
 PICTURES = ["paths", "distances", "timeline", "motion", "cycles"]
 NOBODY = np.empty(0)
 
@@ -92,14 +100,27 @@ def test_a_good_flight():
     assert "No other quadcopter came within 0.5 m" in html
 
 
-@pytest.mark.parametrize("trace", [
-    flight(),
-    flight(robot(0, (1.0, 1.0), times_s=NOBODY), reason="interrupted"),
-    flight(robot(0, (1.0, 1.0), times_s=TIMES_S[:1], goals=(goal(0, (2.0, 2.0), 0.0),)),
-           robot(1, (1.0, 2.0), times_s=NOBODY), reason="interrupted"),
-    flight(robot(0, (1.0, 1.0), (0.1, 0.1)), robot(1, (3.0, 1.0)), scene=None, seed=None,
-           config_name="", versions={}),
-], ids=["no robots", "no samples", "one sample", "no scene"])
+@pytest.mark.parametrize(
+    "trace",
+    [
+        flight(),
+        flight(robot(0, (1.0, 1.0), times_s=NOBODY), reason="interrupted"),
+        flight(
+            robot(0, (1.0, 1.0), times_s=TIMES_S[:1], goals=(goal(0, (2.0, 2.0), 0.0),)),
+            robot(1, (1.0, 2.0), times_s=NOBODY),
+            reason="interrupted",
+        ),
+        flight(
+            robot(0, (1.0, 1.0), (0.1, 0.1)),
+            robot(1, (3.0, 1.0)),
+            scene=None,
+            seed=None,
+            config_name="",
+            versions={},
+        ),
+    ],
+    ids=["no robots", "no samples", "one sample", "no scene"],
+)
 @pytest.mark.filterwarnings("error")
 def test_flights_that_hold_little(trace):
     page = flight_page(trace)
@@ -115,9 +136,15 @@ def test_text_is_escaped():
 
 
 def test_comparison_of_flights():
-    flights = [figures(fleet(2)), figures(flight(
-        robot(0, (1.0, 1.0), (0.3, 0.0), goals=(goal(0, (4.0, 1.0), 0.0, 10.0),)),
-        config_name="mine"))]
+    flights = [
+        figures(fleet(2)),
+        figures(
+            flight(
+                robot(0, (1.0, 1.0), (0.3, 0.0), goals=(goal(0, (4.0, 1.0), 0.0, 10.0),)),
+                config_name="mine",
+            )
+        ),
+    ]
     page = comparison_page([*flights, flights[1]])
     assert Parsed(page.html).sections == ["comparison", "flights"]
     assert_loads_nothing(page.html)
@@ -129,7 +156,8 @@ def test_files_of_one_and_of_several(tmp_path):
     write_report(fleet(2), tmp_path / "new" / "one.html", tmp_path / "pictures")
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["one.html"]
     assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == sorted(
-        f"{name}.png" for name in [*PICTURES, "encounter_A", "encounter_B"])
+        f"{name}.png" for name in [*PICTURES, "encounter_A", "encounter_B"]
+    )
     write_comparison([figures(fleet(2))] * 2, tmp_path / "two.html", tmp_path / "compared")
     assert [path.name for path in (tmp_path / "compared").iterdir()] == ["comparison.png"]
 

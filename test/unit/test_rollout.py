@@ -1,4 +1,5 @@
 """The cheapest sample is found without scoring all; it is the one that scoring all gives."""
+
 from __future__ import annotations
 
 import math
@@ -29,19 +30,32 @@ def random_rollout(seed, params):
     costs = np.zeros(WINDOW.shape, np.uint8)
     for _ in range(random.integers(0, 12)):
         y, x = random.integers(0, 56, 2)
-        costs[y:y + 4, x:x + 4] = random.choice([40, 120, 252, LETHAL])
+        costs[y : y + 4, x : x + 4] = random.choice([40, 120, 252, LETHAL])
     costs[24:36, 24:36] = FREE
     goal = random.uniform(-1.2, 1.2, 2)
-    plan = np.column_stack((np.linspace(0.0, goal[0], 30), np.linspace(0.0, goal[1], 30),
-                            np.zeros(30)))
-    return Rollout(params, WINDOW, costs, FOOTPRINT, plan,
-                   Pose2D(0.0, 0.0, random.uniform(-math.pi, math.pi)),
-                   Twist2D(random.uniform(0.0, 0.3), 0.0, random.uniform(-1.0, 1.0)))
+    plan = np.column_stack(
+        (np.linspace(0.0, goal[0], 30), np.linspace(0.0, goal[1], 30), np.zeros(30))
+    )
+    return Rollout(
+        params,
+        WINDOW,
+        costs,
+        FOOTPRINT,
+        plan,
+        Pose2D(0.0, 0.0, random.uniform(-math.pi, math.pi)),
+        Twist2D(random.uniform(0.0, 0.3), 0.0, random.uniform(-1.0, 1.0)),
+    )
 
 
 def samples():
-    return np.array([(vx, vy, vtheta) for vx in np.linspace(0.0, 0.5, 8) for vy in (0.0, 0.1)
-                     for vtheta in np.linspace(-1.0, 1.0, 9)])
+    return np.array(
+        [
+            (vx, vy, vtheta)
+            for vx in np.linspace(0.0, 0.5, 8)
+            for vy in (0.0, 0.1)
+            for vtheta in np.linspace(-1.0, 1.0, 9)
+        ]
+    )
 
 
 @pytest.mark.parametrize("variant", VARIANTS)

@@ -1,4 +1,5 @@
 """Scenes: distances by hand, the shipped arena, and what is said about faulty files."""
+
 from __future__ import annotations
 
 import math
@@ -59,10 +60,25 @@ def test_sphere_clearance():
 
 def test_the_nearest_of_many_solids_is_the_one_with_the_least_clearance():
     random = np.random.default_rng(0)
-    boxes = [Box(f"b{k}", *random.uniform(0.0, 10.0, 2), *random.uniform(0.1, 2.0, 3),
-                 random.uniform(-4.0, 4.0), random.uniform(0.0, 1.0)) for k in range(50)]
-    scene = Scene("s", 10.0, 10.0, 1.0, Walls(), (*boxes, Sphere("ball", 5.0, 5.0, 1.0, 0.5),
-                                                  Cylinder("pillar", 2.0, 8.0, 0.3, 2.0)), ())
+    boxes = [
+        Box(
+            f"b{k}",
+            *random.uniform(0.0, 10.0, 2),
+            *random.uniform(0.1, 2.0, 3),
+            random.uniform(-4.0, 4.0),
+            random.uniform(0.0, 1.0),
+        )
+        for k in range(50)
+    ]
+    scene = Scene(
+        "s",
+        10.0,
+        10.0,
+        1.0,
+        Walls(),
+        (*boxes, Sphere("ball", 5.0, 5.0, 1.0, 0.5), Cylinder("pillar", 2.0, 8.0, 0.3, 2.0)),
+        (),
+    )
     solids = [*scene.wall_boxes(), *scene.obstacles]
     for x, y, z in random.uniform(0.0, 10.0, (200, 3)):
         nearest = scene.nearest(x, y, z)
@@ -81,9 +97,21 @@ def test_clearances_of_many_points_are_those_of_each():
 
 
 def test_a_written_scene_reads_the_same(tmp_path):
-    scene = Scene("hall", 8.0, 6.0, 1.2, Walls(2.5, 0.2), (
-        Box("b", 1.0, 1.0, 0.5, 0.8, 2.0, 0.3, 0.5), Cylinder("c", 0.5, -1.0, 0.3, 2.0),
-        Sphere("s", -3.0, 1.0, 0.25, 0.5)), (Pose2D(-1.0, 0.0, 0.5),), -4.0, -3.0)
+    scene = Scene(
+        "hall",
+        8.0,
+        6.0,
+        1.2,
+        Walls(2.5, 0.2),
+        (
+            Box("b", 1.0, 1.0, 0.5, 0.8, 2.0, 0.3, 0.5),
+            Cylinder("c", 0.5, -1.0, 0.3, 2.0),
+            Sphere("s", -3.0, 1.0, 0.25, 0.5),
+        ),
+        (Pose2D(-1.0, 0.0, 0.5),),
+        -4.0,
+        -3.0,
+    )
     path = tmp_path / "s.yaml"
     write_scene(scene, path)
     assert load_scene(path) == scene
@@ -123,8 +151,11 @@ def test_arena_leaves_the_tutorial_goals_free():
 
 def test_arena_passages_let_an_inflated_quadcopter_through():
     scene = load_scene(ARENA)
-    solids = [s for s in (*scene.wall_boxes(), *scene.obstacles)
-              if s.bottom_m + s.height_m > scene.altitude_m]
+    solids = [
+        s
+        for s in (*scene.wall_boxes(), *scene.obstacles)
+        if s.bottom_m + s.height_m > scene.altitude_m
+    ]
     for k in range(240):
         for j in range(240):
             x, y = 0.025 + 0.05 * k, 0.025 + 0.05 * j
@@ -139,16 +170,30 @@ def test_defaults():
 
 
 def test_all_faults_are_listed_at_once():
-    problems = faults_of({
-        "size": [4.0, 6.0], "altitud": 1.0,
-        "obstacles": [
-            {"name": "a", "shape": "box", "centre": [1.0, float("nan")], "size": [1.0, -1.0],
-             "height": 2.0},
-            {"shape": "cone"},
-            {"shape": "cylinder", "centre": [2.0, 3.0], "radius": True, "height": "high",
-             "bottom": -1.0},
-        ],
-        "starts": [[9.0, 1.0], [1.0]]})
+    problems = faults_of(
+        {
+            "size": [4.0, 6.0],
+            "altitud": 1.0,
+            "obstacles": [
+                {
+                    "name": "a",
+                    "shape": "box",
+                    "centre": [1.0, float("nan")],
+                    "size": [1.0, -1.0],
+                    "height": 2.0,
+                },
+                {"shape": "cone"},
+                {
+                    "shape": "cylinder",
+                    "centre": [2.0, 3.0],
+                    "radius": True,
+                    "height": "high",
+                    "bottom": -1.0,
+                },
+            ],
+            "starts": [[9.0, 1.0], [1.0]],
+        }
+    )
     assert problems == [
         "s.yaml: altitud: unknown key; did you mean altitude?",
         "s.yaml: obstacles[0].centre[1]: nan, expected a finite number",
@@ -163,42 +208,68 @@ def test_all_faults_are_listed_at_once():
 
 
 def test_start_outside_inside_an_obstacle_and_too_close_to_another():
-    pillar = {"name": "pillar", "shape": "cylinder", "centre": [2.0, 3.0], "radius": 0.5,
-              "height": 2.0}
-    problems = faults_of(small_document(
-        obstacles=[pillar], starts=[[1.0, 1.0], [4.5, 1.0], [2.2, 3.0], [1.4, 1.0]]))
+    pillar = {
+        "name": "pillar",
+        "shape": "cylinder",
+        "centre": [2.0, 3.0],
+        "radius": 0.5,
+        "height": 2.0,
+    }
+    problems = faults_of(
+        small_document(obstacles=[pillar], starts=[[1.0, 1.0], [4.5, 1.0], [2.2, 3.0], [1.4, 1.0]])
+    )
     assert problems == [
         "s.yaml: starts[1]: (4.5, 1) is outside the arena, expected 0 < x < 4 and 0 < y < 6",
-        ("s.yaml: starts[2]: (2.2, 3) is -0.30 m from pillar, expected more than a quadcopter's "
-         f"radius, {BODY_RADIUS_M:g} m"),
+        (
+            "s.yaml: starts[2]: (2.2, 3) is -0.30 m from pillar, expected more than a quadcopter's "
+            f"radius, {BODY_RADIUS_M:g} m"
+        ),
         "s.yaml: starts[3]: is 0.40 m from starts[0], expected more than two body radii, 0.6 m",
     ]
 
 
-FLOOR_PILLAR = {"name": "floor", "shape": "cylinder", "centre": [3.0, 3.0], "radius": 0.2,
-                "height": 1.0}
+FLOOR_PILLAR = {
+    "name": "floor",
+    "shape": "cylinder",
+    "centre": [3.0, 3.0],
+    "radius": 0.2,
+    "height": 1.0,
+}
 
 
-@pytest.mark.parametrize("document, problem", [
-    (None, "missing, expected a mapping with name, size, origin, altitude, walls, obstacles, "
-           "starts, world, map, unknown"),
-    ({"size": [4.0, 4.0]}, "starts: missing, expected a list"),
-    (small_document(starts=[]), "starts: no start pose, expected at least one [x, y, yaw]"),
-    (small_document(size=[4.0, math.inf]), "size[1]: inf, expected a number above 0"),
-    (small_document(walls={"height": 0}), "walls.height: 0, expected a number above 0"),
-    (small_document(obstacles=[3]),
-     "obstacles[0]: 3, expected a mapping that describes an obstacle"),
-    (small_document(obstacles=[FLOOR_PILLAR]),
-     "obstacles: name 'floor' is taken, expected unique names"),
-])
+@pytest.mark.parametrize(
+    "document, problem",
+    [
+        (
+            None,
+            "missing, expected a mapping with name, size, origin, altitude, walls, obstacles, "
+            "starts, world, map, unknown",
+        ),
+        ({"size": [4.0, 4.0]}, "starts: missing, expected a list"),
+        (small_document(starts=[]), "starts: no start pose, expected at least one [x, y, yaw]"),
+        (small_document(size=[4.0, math.inf]), "size[1]: inf, expected a number above 0"),
+        (small_document(walls={"height": 0}), "walls.height: 0, expected a number above 0"),
+        (
+            small_document(obstacles=[3]),
+            "obstacles[0]: 3, expected a mapping that describes an obstacle",
+        ),
+        (
+            small_document(obstacles=[FLOOR_PILLAR]),
+            "obstacles: name 'floor' is taken, expected unique names",
+        ),
+    ],
+)
 def test_single_faults(document, problem):
     assert faults_of(document) == [f"s.yaml: {problem}"]
 
 
-@pytest.mark.parametrize("text, problem", [
-    ("size: [4.0, 6.0\nstarts: []\n", "line 2, column 7: expected ',' or ']', but got ':'"),
-    ("size: [4.0, 6.0]\nsize: [2.0, 2.0]\n", "line 2, column 1: key 'size' is given twice"),
-])
+@pytest.mark.parametrize(
+    "text, problem",
+    [
+        ("size: [4.0, 6.0\nstarts: []\n", "line 2, column 7: expected ',' or ']', but got ':'"),
+        ("size: [4.0, 6.0]\nsize: [2.0, 2.0]\n", "line 2, column 1: key 'size' is given twice"),
+    ],
+)
 def test_yaml_faults_name_the_line(tmp_path, text, problem):
     path = tmp_path / "bad.yaml"
     path.write_text(text)

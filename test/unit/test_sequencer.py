@@ -1,4 +1,5 @@
 """The sequencer's state machine: what it does about each thing that can happen."""
+
 import math
 
 import pytest
@@ -41,7 +42,8 @@ def test_goals_are_sent_one_by_one_to_the_end():
     assert s.tick(11.0, START) == []
     assert s.tick(20.0, at(A, 0.3)) == [
         GoalEnded(0, 1, A, True, 10.0, 1),
-        SendGoal(1, 1, Pose2D(3.0, 8.0, math.atan2(4, -0.3)), 1)]
+        SendGoal(1, 1, Pose2D(3.0, 8.0, math.atan2(4, -0.3)), 1),
+    ]
     assert not s.done and s.index == 1
     assert s.tick(25.0, at(B)) == [GoalEnded(1, 1, B, True, 5.0, 1), SequenceDone()]
     assert s.done and s.flight is None and s.index == 2
@@ -72,7 +74,9 @@ def test_an_aborted_goal_is_sent_again_then_skipped():
 def test_without_retries_the_first_failure_skips():
     s = flying(A, retries=0)
     assert s.tick(5.0, START, [ABORTED]) == [
-        GoalEnded(0, 1, A, False, 5.0, 1, "aborted: no plan"), SequenceDone()]
+        GoalEnded(0, 1, A, False, 5.0, 1, "aborted: no plan"),
+        SequenceDone(),
+    ]
 
 
 def test_each_attempt_has_the_whole_time():
@@ -91,7 +95,8 @@ def test_a_goal_that_is_reached_counts_whatever_the_navigator_says():
 def test_stopping_short_of_the_goal_is_a_failure():
     s = flying(A)
     assert s.tick(5.0, at(A, 0.5), [SUCCEEDED])[0].why == (
-        "the navigator stopped 0.50 m from it (goal_tolerance 0.40 m)")
+        "the navigator stopped 0.50 m from it (goal_tolerance 0.40 m)"
+    )
     assert s.flight.attempt == 2
 
 
@@ -108,7 +113,8 @@ def test_somebody_elses_goal_is_waited_for_and_costs_no_attempt(outcome):
     assert s.tick(2.0, START, [NavigatorReport(Verdict.REPLACED)]) == []
     assert s.tick(20.0, START) == []
     assert s.tick(21.0, START, [outcome]) == [
-        SendGoal(0, 1, s.flight.pose, 1, "the navigator is through with another node's goal")]
+        SendGoal(0, 1, s.flight.pose, 1, "the navigator is through with another node's goal")
+    ]
     assert s.tick(22.0, START, [outcome])[0].attempt == 2
 
 
@@ -118,7 +124,8 @@ def test_a_navigator_that_lost_its_goal_gets_it_again_in_the_same_attempt():
     assert s.tick(10.0, START, navigator_idle=True) == []
     assert s.tick(12.9, START, navigator_idle=True) == []
     assert s.tick(13.0, START, navigator_idle=True) == [
-        SendGoal(0, 1, s.flight.pose, 1, "the navigator has had no goal for 5 s")]
+        SendGoal(0, 1, s.flight.pose, 1, "the navigator has had no goal for 5 s")
+    ]
     assert s.tick(17.9, START, navigator_idle=True) == []
     assert s.tick(30.0, START)[0].why == "not reached in 30 s"
 

@@ -1,4 +1,5 @@
 """Flights of the whole simulation: tracking, hovering, contacts, scans, repeatability."""
+
 from __future__ import annotations
 
 import math
@@ -54,15 +55,25 @@ def fly(simulation: Simulation, seconds: float, *twists: Twist2D) -> np.ndarray:
             simulation.set_command(robot, twist)
         simulation.step()
         states = [simulation.state(robot) for robot in range(simulation.n_robots)]
-        rows.append([[s.twist.vx_mps, s.twist.vy_mps, s.twist.vyaw_radps, s.map_from_base.z_m]
-                     for s in states])
+        rows.append(
+            [
+                [s.twist.vx_mps, s.twist.vy_mps, s.twist.vyaw_radps, s.map_from_base.z_m]
+                for s in states
+            ]
+        )
     return np.array(rows)
 
 
-@pytest.mark.parametrize("command, axis, value", [
-    (Twist2D(0.3, 0.0, 0.0), 0, 0.3), (Twist2D(-0.3, 0.0, 0.0), 0, -0.3),
-    (Twist2D(0.0, 0.3, 0.0), 1, 0.3), (Twist2D(0.0, 0.0, 1.0), 2, 1.0),
-    (Twist2D(1.0, 0.0, 0.0), 0, 1.0)])
+@pytest.mark.parametrize(
+    "command, axis, value",
+    [
+        (Twist2D(0.3, 0.0, 0.0), 0, 0.3),
+        (Twist2D(-0.3, 0.0, 0.0), 0, -0.3),
+        (Twist2D(0.0, 0.3, 0.0), 1, 0.3),
+        (Twist2D(0.0, 0.0, 1.0), 2, 1.0),
+        (Twist2D(1.0, 0.0, 0.0), 0, 1.0),
+    ],
+)
 def test_step_settles_within_a_second_without_overshoot(make, command, axis, value):
     flown = fly(make(room(MIDDLE), 1), 2.5, command)
     relative = flown[:, 0, axis] / value
@@ -107,8 +118,11 @@ def test_hovers_when_commands_stop(make):
 
 def test_a_command_that_is_not_finite_never_reaches_the_body(make):
     simulation = make(room(MIDDLE), 1)
-    for bad in (Twist2D(math.nan, 0.0, 0.0), Twist2D(0.0, math.inf, 0.0),
-                Twist2D(0.0, 0.0, -math.inf)):
+    for bad in (
+        Twist2D(math.nan, 0.0, 0.0),
+        Twist2D(0.0, math.inf, 0.0),
+        Twist2D(0.0, 0.0, -math.inf),
+    ):
         with pytest.raises(ValueError, match="not finite"):
             simulation.set_command(0, bad)
     fly(simulation, 0.5)
@@ -177,8 +191,11 @@ def test_contact_log_needs_separation_before_a_new_contact():
 
 def test_scan_sees_walls_obstacles_and_the_peer_but_not_itself(make):
     params = SimulationParams(LidarParams(step_size_rad=math.pi / 2))
-    scene = room(MIDDLE, Pose2D(12.0, 10.0), obstacles=[
-        Box("box", 10.0, 13.0, 1.0, 1.0, 2.0), Cylinder("pillar", 10.0, 6.0, 0.5, 2.0)])
+    scene = room(
+        MIDDLE,
+        Pose2D(12.0, 10.0),
+        obstacles=[Box("box", 10.0, 13.0, 1.0, 1.0, 2.0), Cylinder("pillar", 10.0, 6.0, 0.5, 2.0)],
+    )
     ranges = make(scene, 2, params).scan(0).ranges_m
     west, pillar, peer, box = ranges
     assert (west, pillar, peer, box) == pytest.approx((10.0, 3.5, 1.7, 2.5), abs=1e-3)
@@ -187,16 +204,19 @@ def test_scan_sees_walls_obstacles_and_the_peer_but_not_itself(make):
 @pytest.mark.parametrize("caster", LIDAR_CASTERS)
 def test_scan_sees_spheres_at_their_height(make, caster):
     params = SimulationParams(LidarParams(step_size_rad=math.pi / 2), lidar_caster=caster)
-    scene = room(MIDDLE, obstacles=[Sphere("low", 8.0, 10.0, 0.5, 0.5),
-                                    Sphere("ahead", 10.0, 13.0, 1.06, 0.5)])
+    scene = room(
+        MIDDLE,
+        obstacles=[Sphere("low", 8.0, 10.0, 0.5, 0.5), Sphere("ahead", 10.0, 13.0, 1.06, 0.5)],
+    )
     west, _, _, ahead = make(scene, 1, params).scan(0).ranges_m
     assert (west, ahead) == pytest.approx((10.0, 2.5), abs=1e-3)
 
 
 def row_of_boxes(count: int) -> List[Box]:
     """A wall along y at x = 14 with gaps that no beam of the test looks through."""
-    return [Box(f"b{k}", 14.0, 20.0 * k / count, 0.4, 20.0 / count - 0.001, 2.0)
-            for k in range(count)]
+    return [
+        Box(f"b{k}", 14.0, 20.0 * k / count, 0.4, 20.0 / count - 0.001, 2.0) for k in range(count)
+    ]
 
 
 @pytest.mark.parametrize("caster", LIDAR_CASTERS)
@@ -236,8 +256,11 @@ def test_lidar_tilts_with_the_body(make):
 
 def test_same_seed_same_bits(make):
     params = SimulationParams(LidarParams(noise_std_m=0.01), jitter_m=0.3)
-    scene = room(Pose2D(9.0, 10.0), Pose2D(11.0, 10.0, math.pi),
-                 obstacles=[Cylinder("pillar", 10.0, 11.0, 0.3, 2.0)])
+    scene = room(
+        Pose2D(9.0, 10.0),
+        Pose2D(11.0, 10.0, math.pi),
+        obstacles=[Cylinder("pillar", 10.0, 11.0, 0.3, 2.0)],
+    )
     commands = Twist2D(0.5, 0.1, 0.2), Twist2D(0.5, -0.1, -0.3)
 
     def flight(simulation):
@@ -271,8 +294,9 @@ def test_reset_goes_back_to_the_start_and_lets_the_clock_go_on(make):
 
 
 def test_jittered_starts_are_free():
-    scene = room(Pose2D(1.0, 1.0), Pose2D(1.7, 1.0),
-                 obstacles=[Cylinder("pillar", 1.0, 2.0, 0.4, 2.0)])
+    scene = room(
+        Pose2D(1.0, 1.0), Pose2D(1.7, 1.0), obstacles=[Cylinder("pillar", 1.0, 2.0, 0.4, 2.0)]
+    )
     seen: Set[Tuple[float, float]] = set()
     for seed in range(50):
         starts = start_poses(scene, 2, 0.5, seed)
@@ -299,8 +323,9 @@ def test_bad_parameters_are_listed_together():
 @pytest.mark.parametrize("radius_m, touches", [(0.20, False), (0.30, True)])
 def test_a_body_touches_from_its_own_radius_on(make, radius_m, touches):
     pillar = Cylinder("pillar", 10.6, 10.0, 0.35, 2.0)  # its surface is 0.25 m ahead
-    simulation = make(room(MIDDLE, obstacles=[pillar]), 1,
-                      SimulationParams(airframe=Airframe(radius_m=radius_m)))
+    simulation = make(
+        room(MIDDLE, obstacles=[pillar]), 1, SimulationParams(airframe=Airframe(radius_m=radius_m))
+    )
     for _ in range(STEPS_PER_S // 10):
         simulation.step()
     assert bool(simulation.contacts) is touches
@@ -308,9 +333,15 @@ def test_a_body_touches_from_its_own_radius_on(make, radius_m, touches):
 
 @pytest.mark.parametrize("caster", LIDAR_CASTERS)
 def test_a_body_is_seen_with_its_own_radius(make, caster):
-    simulation = make(room(MIDDLE, Pose2D(12.0, 10.0)), 2, SimulationParams(
-        LidarParams(step_size_rad=math.pi / 2), airframe=Airframe(radius_m=0.2),
-        lidar_caster=caster))
+    simulation = make(
+        room(MIDDLE, Pose2D(12.0, 10.0)),
+        2,
+        SimulationParams(
+            LidarParams(step_size_rad=math.pi / 2),
+            airframe=Airframe(radius_m=0.2),
+            lidar_caster=caster,
+        ),
+    )
     assert simulation.scan(0).ranges_m[2] == pytest.approx(1.8, abs=0.01)  # the beam ahead
 
 
@@ -318,7 +349,7 @@ def test_starts_are_as_far_from_things_as_the_body_is_wide():
     scene = room(MIDDLE, obstacles=[Cylinder("pillar", 10.6, 10.0, 0.35, 2.0)])
     for seed in range(20):
         for radius_m in (0.2, 0.5):
-            start, = start_poses(scene, 1, 1.0, seed, radius_m)
+            (start,) = start_poses(scene, 1, 1.0, seed, radius_m)
             assert scene.flight_clearance_m(start.x_m, start.y_m) > radius_m
     with pytest.raises(InputError, match="leaves no free start"):
         start_poses(scene, 1, 0.2, 0, 0.6)

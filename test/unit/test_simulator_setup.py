@@ -1,4 +1,5 @@
 """A simulator's parameters: defaults, the tutorial's LIDAR, and every fault at once."""
+
 from __future__ import annotations
 
 import math
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quad_nav.errors import InputError
-from quad_nav.ros.simulator_setup import read_setup
+from quad_nav.scenario.simulator_setup import read_setup
 
 ARENA = str(Path(__file__).parents[2] / "scenes" / "arena.yaml")
 
@@ -29,8 +30,9 @@ def test_defaults():
 
 
 def test_the_physics_engine_casts_the_beams_if_asked_to():
-    assert read_setup({"scene": ARENA, "lidar": "bullet"},
-                      "simulator").params.lidar_caster == "bullet"
+    assert (
+        read_setup({"scene": ARENA, "lidar": "bullet"}, "simulator").params.lidar_caster == "bullet"
+    )
 
 
 def test_the_tutorials_half_turn_is_one_argument_away():
@@ -50,19 +52,27 @@ def test_every_fault_is_listed():
     ]
 
 
-@pytest.mark.parametrize("parameters, problem", [
-    ({"robots": 9}, "simulator: robots: 9, expected 1 to 8, the start poses of scene arena"),
-    ({"robots": True}, "simulator: robots: is True, expected a whole number, 1 or more"),
-    ({"lidar": "gazebo"}, "simulator: lidar: is 'gazebo', expected kernel or bullet"),
-    ({"scan_range": 3.0, "step_size": 4.0},
-     "simulator: step_size: 4.0, expected an angle that divides scan_range, 3.0, into 2 or more"),
-    ({"scan_range": 7.0, "step_size": 0.1},
-     "simulator: scan_range: 7.0, expected an angle in (0, 2 pi]"),
-])
+@pytest.mark.parametrize(
+    "parameters, problem",
+    [
+        ({"robots": 9}, "simulator: robots: 9, expected 1 to 8, the start poses of scene arena"),
+        ({"robots": True}, "simulator: robots: is True, expected a whole number, 1 or more"),
+        ({"lidar": "gazebo"}, "simulator: lidar: is 'gazebo', expected kernel or bullet"),
+        (
+            {"scan_range": 3.0, "step_size": 4.0},
+            "simulator: step_size: 4.0, expected an angle that divides scan_range, 3.0, into 2 or more",
+        ),
+        (
+            {"scan_range": 7.0, "step_size": 0.1},
+            "simulator: scan_range: 7.0, expected an angle in (0, 2 pi]",
+        ),
+    ],
+)
 def test_single_faults(parameters, problem):
     assert faults_of(**parameters) == [problem]
 
 
 def test_a_bad_scene_is_named(tmp_path):
     assert faults_of(scene=str(tmp_path / "none.yaml"))[0].startswith(
-        f"{tmp_path / 'none.yaml'}: cannot be read")
+        f"{tmp_path / 'none.yaml'}: cannot be read"
+    )

@@ -1,4 +1,5 @@
 """Nothing that a stranger may send becomes code, and nothing of the user's leaves with a flight."""
+
 from __future__ import annotations
 
 import ast
@@ -14,23 +15,33 @@ import pytest
 from click.testing import CliRunner
 
 from quad_nav.cli import main
-from quad_nav.offline.bag_info import checked_flight
+from quad_nav.recording.bag_info import checked_flight
 
 ROOT = Path(__file__).parents[2]
-SOURCES = sorted([*(ROOT / "src").rglob("*.py"), *(ROOT / "nodes").iterdir(),
-                  ROOT / "scripts" / "fly", ROOT / "scripts" / "quad"])
+SOURCES = sorted(
+    [
+        *(ROOT / "src").rglob("*.py"),
+        *(ROOT / "nodes").iterdir(),
+        ROOT / "scripts" / "fly",
+        ROOT / "scripts" / "quad",
+    ]
+)
 PLAIN_LOADERS = ("PlainLoader", "_Loader", "SafeLoader")
 # Its input is what roslaunch has just printed, or ships with the package.
-SAFE_LOAD_IN = ("ros/preflight.py", "ros/rviz_file.py")
+SAFE_LOAD_IN = ("ros/common/preflight.py", "topics/rviz_file.py")
 
 
 def dangers(source, name="x.py"):
     """Calls that make code, or far too much, of data."""
     tree = ast.parse(source)
-    imported = {alias.name.split(".")[0] for node in ast.walk(tree)
-                if isinstance(node, (ast.Import, ast.ImportFrom))
-                for alias in (node.names if isinstance(node, ast.Import)
-                              else [ast.alias(node.module or "")])}
+    imported = {
+        alias.name.split(".")[0]
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for alias in (
+            node.names if isinstance(node, ast.Import) else [ast.alias(node.module or "")]
+        )
+    }
     found = sorted(imported & {"pickle", "cPickle", "dill", "shelve", "marshal", "xml.etree"})
     for node in ast.walk(tree):
         if isinstance(node, ast.Call):
@@ -45,8 +56,11 @@ def _of_call(function, node, name):
     if function in ("yaml.load", "yaml.load_all"):
         loader = keywords.get("Loader")
         loader = loader or (node.args[1] if len(node.args) > 1 else None)
-        return [] if getattr(loader, "id", getattr(loader, "attr", "")) in PLAIN_LOADERS \
+        return (
+            []
+            if getattr(loader, "id", getattr(loader, "attr", "")) in PLAIN_LOADERS
             else [function]
+        )
     if function in ("yaml.unsafe_load", "yaml.full_load"):
         return [function]
     if function == "yaml.safe_load" and not name.endswith(SAFE_LOAD_IN):
@@ -70,11 +84,24 @@ def test_no_data_becomes_code(path):
     assert dangers(path.read_text(encoding="utf-8"), path.as_posix()) == []
 
 
-@pytest.mark.parametrize("source", [
-    "eval(x)", "exec(x)", "import pickle", "from pickle import load", "yaml.load(x)",
-    "yaml.load(x, Loader=yaml.Loader)", "yaml.load(x, yaml.FullLoader)", "yaml.unsafe_load(x)",
-    "yaml.safe_load(x)", "np.load(x)", "np.load(x, allow_pickle=True)",
-    "subprocess.run(x, shell=True)", "os.system(x)"])
+@pytest.mark.parametrize(
+    "source",
+    [
+        "eval(x)",
+        "exec(x)",
+        "import pickle",
+        "from pickle import load",
+        "yaml.load(x)",
+        "yaml.load(x, Loader=yaml.Loader)",
+        "yaml.load(x, yaml.FullLoader)",
+        "yaml.unsafe_load(x)",
+        "yaml.safe_load(x)",
+        "np.load(x)",
+        "np.load(x, allow_pickle=True)",
+        "subprocess.run(x, shell=True)",
+        "os.system(x)",
+    ],
+)
 def test_what_would_be_found(source):
     assert dangers(source)
 
@@ -82,9 +109,19 @@ def test_what_would_be_found(source):
 def test_parameters_in_recordings_load_no_plugins(monkeypatch):
     # They may name Python classes of the one who recorded; to show them is not to import them.
     named = []
-    monkeypatch.setattr("quad_nav.plugins.load_class", lambda name, _: named.append(name))
-    checked_flight({"robots": [{"parameters": {"base_global_planner": "antigravity.Planner",
-                                               "base_local_planner": "this.Planner"}}]})
+    monkeypatch.setattr("quad_nav.config.plugins.load_class", lambda name, _: named.append(name))
+    checked_flight(
+        {
+            "robots": [
+                {
+                    "parameters": {
+                        "base_global_planner": "antigravity.Planner",
+                        "base_local_planner": "this.Planner",
+                    }
+                }
+            ]
+        }
+    )
     assert named == []
     assert not {"antigravity", "this"} & set(sys.modules)
 
@@ -111,11 +148,29 @@ def _fly(home):
     (goals / "quad0_goals.json").write_text('{"goals": [[2.1, 1.9]]}')
     written = {name: home / f"flight.{name}" for name in ("bag", "mcap", "html", "json", "gif")}
     for record in ("bag", "mcap"):
-        result = CliRunner().invoke(main, [
-            "fly", "--robots", "1", "--config", str(home / "mine"), "--scene",
-            str(home / "place.yaml"), "--goals", str(goals), "--record", str(written[record]),
-            "--report", str(written["html"]), "--json", str(written["json"]), "--animate",
-            str(written["gif"]), "--quiet"])
+        result = CliRunner().invoke(
+            main,
+            [
+                "fly",
+                "--robots",
+                "1",
+                "--config",
+                str(home / "mine"),
+                "--scene",
+                str(home / "place.yaml"),
+                "--goals",
+                str(goals),
+                "--record",
+                str(written[record]),
+                "--report",
+                str(written["html"]),
+                "--json",
+                str(written["json"]),
+                "--animate",
+                str(written["gif"]),
+                "--quiet",
+            ],
+        )
         assert result.exit_code == 0, result.output
     return written
 
@@ -124,8 +179,13 @@ def _fly(home):
 def test_a_flights_files_tell_nothing_of_user_machine_or_folders(flown, kind):
     content = unpacked(flown[kind], kind)
     assert b"quad0" in content or kind == "gif"
-    for secret in ("marker-", str(flown[kind].parent), str(ROOT), str(Path.home()) + "/",
-                   f"/{getpass.getuser()}/"):
+    for secret in (
+        "marker-",
+        str(flown[kind].parent),
+        str(ROOT),
+        str(Path.home()) + "/",
+        f"/{getpass.getuser()}/",
+    ):
         assert secret.encode() not in content, secret
 
 

@@ -1,4 +1,5 @@
 """What was flown, as figures that can be worked out by hand."""
+
 import json
 
 import pytest
@@ -29,9 +30,20 @@ def fly(log, name, sequencer, samples):
 
 
 def leg(reached=True, **fields):
-    return Leg(0, 1, Goal(3.0, 4.0), reached,
-               **{"reason": "", "attempts": 1, "time_s": 10.0, "path_length_m": 7.0,
-                  "straight_length_m": 5.0, **fields})
+    return Leg(
+        0,
+        1,
+        Goal(3.0, 4.0),
+        reached,
+        **{
+            "reason": "",
+            "attempts": 1,
+            "time_s": 10.0,
+            "path_length_m": 7.0,
+            "straight_length_m": 5.0,
+            **fields,
+        },
+    )
 
 
 def mission(*legs, **fields):
@@ -73,13 +85,16 @@ def test_one_touch_is_one_contact_from_both_sides_and_while_it_lasts():
 CONTACT = Contact(5.0, "quad0", "pillar", 1.0, 2.0)
 
 
-@pytest.mark.parametrize("summary, status", [
-    (mission(), 0),
-    (mission(leg(), leg(False, reason="aborted")), 1),
-    (mission(contacts=(CONTACT,)), 1),
-    (mission(reason="interrupted"), 1),
-    (mission(problems=("f.json: goals: is empty",)), 2),
-])
+@pytest.mark.parametrize(
+    "summary, status",
+    [
+        (mission(), 0),
+        (mission(leg(), leg(False, reason="aborted")), 1),
+        (mission(contacts=(CONTACT,)), 1),
+        (mission(reason="interrupted"), 1),
+        (mission(problems=("f.json: goals: is empty",)), 2),
+    ],
+)
 def test_only_a_complete_flight_without_contact_is_a_success(summary, status):
     assert summary.exit_status == status
     assert summary.success is (status == 0)
@@ -87,39 +102,91 @@ def test_only_a_complete_flight_without_contact_is_a_success(summary, status):
 
 def test_the_table_fits_the_terminal_and_says_why():
     long_reason = "aborted: Failed to find a valid plan. Even after executing recovery behaviors."
-    text = table(mission(leg(), leg(False, reason=long_reason, attempts=2),
-                         Leg(2, 1, Goal(9.0, 9.0), False, "not sent", 0),
-                         contacts=(CONTACT,), sim_time_s=20.0, wall_time_s=10.0))
+    text = table(
+        mission(
+            leg(),
+            leg(False, reason=long_reason, attempts=2),
+            Leg(2, 1, Goal(9.0, 9.0), False, "not sent", 0),
+            contacts=(CONTACT,),
+            sim_time_s=20.0,
+            wall_time_s=10.0,
+        )
+    )
     assert max(map(len, text.splitlines())) <= 100
     assert f"quad0 goal 1: {long_reason}" in text
     assert "interrupted" in table(mission(leg(False, reason="interrupted")))
     assert "pillar" in text and "not sent" in text and "1.40" in text
-    assert text.splitlines()[-1] == ("Mission FAILED: 1 of 3 goals reached, 1 contact in 20.0 s "
-                                     "(wall 10.0 s, real-time factor 2.00).")
+    assert text.splitlines()[-1] == (
+        "Mission FAILED: 1 of 3 goals reached, 1 contact in 20.0 s "
+        "(wall 10.0 s, real-time factor 2.00)."
+    )
 
 
 def test_the_json_has_the_documented_keys(tmp_path):
-    summary = mission(leg(time_s=10.00049), contacts=(CONTACT,), sim_time_s=20.0, wall_time_s=10.0,
-                      robot_radius_m=0.3)
+    summary = mission(
+        leg(time_s=10.00049),
+        contacts=(CONTACT,),
+        sim_time_s=20.0,
+        wall_time_s=10.0,
+        robot_radius_m=0.3,
+    )
     path = tmp_path / "deep" / "result.json"
     write_json(summary, path)
-    assert json.loads(path.read_text()) == to_json(summary) == {
-        "success": False, "exit_status": 1, "reason": "", "problems": [],
-        "sim_time_s": 20.0, "wall_time_s": 10.0, "real_time_factor": 2.0, "robot_radius_m": 0.3,
-        "robots": [{
-            "robot": "quad0",
-            "goals": [{"goal": 1, "lap": 1, "x_m": 3.0, "y_m": 4.0, "yaw_rad": None,
-                       "reached": True, "time_s": 10.0, "reason": "", "attempts": 1,
-                       "path_length_m": 7.0, "straight_length_m": 5.0}],
-            "path_length_m": 7.0, "straight_length_m": 5.0, "min_clearance_m": None,
-            "min_separation_m": None, "recoveries": 0, "contacts": 0, "aborts": 0,
-            "spin_s": 0.0}],
-        "contacts": [{"time_s": 5.0, "robot": "quad0", "with": "pillar", "x_m": 1.0, "y_m": 2.0}],
-        "contacts_reported": True, "min_separation_m": None, "seed": None, "versions": {},
-    }
+    assert (
+        json.loads(path.read_text())
+        == to_json(summary)
+        == {
+            "success": False,
+            "exit_status": 1,
+            "reason": "",
+            "problems": [],
+            "sim_time_s": 20.0,
+            "wall_time_s": 10.0,
+            "real_time_factor": 2.0,
+            "robot_radius_m": 0.3,
+            "robots": [
+                {
+                    "robot": "quad0",
+                    "goals": [
+                        {
+                            "goal": 1,
+                            "lap": 1,
+                            "x_m": 3.0,
+                            "y_m": 4.0,
+                            "yaw_rad": None,
+                            "reached": True,
+                            "time_s": 10.0,
+                            "reason": "",
+                            "attempts": 1,
+                            "path_length_m": 7.0,
+                            "straight_length_m": 5.0,
+                        }
+                    ],
+                    "path_length_m": 7.0,
+                    "straight_length_m": 5.0,
+                    "min_clearance_m": None,
+                    "min_separation_m": None,
+                    "recoveries": 0,
+                    "contacts": 0,
+                    "aborts": 0,
+                    "spin_s": 0.0,
+                }
+            ],
+            "contacts": [
+                {"time_s": 5.0, "robot": "quad0", "with": "pillar", "x_m": 1.0, "y_m": 2.0}
+            ],
+            "contacts_reported": True,
+            "min_separation_m": None,
+            "seed": None,
+            "versions": {},
+        }
+    )
     assert list(path.parent.iterdir()) == [path]
 
 
 def test_a_mission_that_never_began_lists_its_goals():
     assert [(leg.index, leg.reached, leg.reason) for leg in unflown(GOALS)] == [
-        (0, False, "not sent"), (1, False, "not sent"), (2, False, "not sent")]
+        (0, False, "not sent"),
+        (1, False, "not sent"),
+        (2, False, "not sent"),
+    ]

@@ -1,4 +1,5 @@
 """Tuned values in move_base's files: what changes, and that nothing else does."""
+
 from __future__ import annotations
 
 import re
@@ -32,14 +33,14 @@ CHANGES = (
     Change("global_costmap/update_frequency", 2.0, "n"),
     Change("controller_frequency", 20.0, "n"),
     Change("planner_frequency", 2.0, "n"),
-    Change("mends/peer_margin", 0.1, "n"),
+    Change("fixes/peer_margin", 0.1, "n"),
 )
 
 
 def test_a_value_and_its_remark_are_replaced_and_nothing_else():
     assert replaced(TEXT, ["planner", "speed"], 0.5, "new") == TEXT.replace(
-        "speed: 0.3        # an old reason that\n                    # goes on",
-        "speed: 0.5  # new")
+        "speed: 0.3        # an old reason that\n                    # goes on", "speed: 0.5  # new"
+    )
     assert replaced(TEXT, ["top"], "x", "new") == TEXT.replace("Lidar$(arg i)", "x  # new")
     assert replaced(TEXT, ["planner", "turns", "max"], 2, "new") == TEXT.replace("1.0,", "2,")
     assert replaced(TEXT, ["planner", "frames"], "c", "new") == TEXT.replace("[a, b]", "c  # new")
@@ -47,7 +48,8 @@ def test_a_value_and_its_remark_are_replaced_and_nothing_else():
 
 def test_a_remark_of_several_lines_goes_also_when_the_value_gets_longer():
     assert replaced("a: 1  # long\n      # goes on\nb: 2\n", ["a"], 0.0125, "new") == (
-        "a: 0.0125  # new\nb: 2\n")
+        "a: 0.0125  # new\nb: 2\n"
+    )
 
 
 def test_what_is_not_there_is_not_replaced():
@@ -58,18 +60,21 @@ def test_what_is_not_there_is_not_replaced():
 
 def test_a_new_value_is_the_last_of_its_namespace():
     assert inserted(TEXT, ["planner", "x"], True, "new") == TEXT.replace(
-        "[a, b]\n", "[a, b]\n  x: true  # new\n")
-    assert inserted(TEXT, ["planner", "turns", "z"], 3, "new") == TEXT.replace(
-        "{max", "{z: 3, max")
+        "[a, b]\n", "[a, b]\n  x: true  # new\n"
+    )
+    assert inserted(TEXT, ["planner", "turns", "z"], 3, "new") == TEXT.replace("{max", "{z: 3, max")
     assert inserted(TEXT, ["a", "b"], 1, "new") == TEXT + "a:\n  b: 1  # new\n"
     assert inserted("", ["a"], 1, "new") == "a: 1  # new\n"
     assert inserted("# only a remark", ["a"], 1, "new") == "# only a remark\na: 1  # new\n"
     assert inserted("a: 1  # long\n      # goes on\n", ["b"], 2, "new") == (
-        "a: 1  # long\n      # goes on\nb: 2  # new\n")
+        "a: 1  # long\n      # goes on\nb: 2  # new\n"
+    )
 
 
-@pytest.mark.parametrize("value, expected", [
-    (0.0003, "0.0003"), (1e-05, "1.0e-05"), (True, "true"), (7, "7"), ("a: b", "'a: b'")])
+@pytest.mark.parametrize(
+    "value, expected",
+    [(0.0003, "0.0003"), (1e-05, "1.0e-05"), (True, "true"), (7, "7"), ("a: b", "'a: b'")],
+)
 def test_values_are_written_as_yaml_reads_them(value, expected):
     assert value_text(value) == expected
 
@@ -79,12 +84,16 @@ def test_the_files_load_as_the_base_with_the_changes(name, tmp_path):
     base = ROOT / "config" / name
     write_parameters(base, tmp_path / "tuned", CHANGES)
     assert sorted(path.name for path in (tmp_path / "tuned").iterdir()) == sorted(
-        path.name for path in base.glob("*.yaml"))
+        path.name for path in base.glob("*.yaml")
+    )
     tree = config.load_files(base, {"i": "1"})
     for change in CHANGES:
         first, _, rest = change.path.partition("/")
-        for path in ([f"global_costmap/{rest}", f"local_costmap/{rest}"] if first == "*_costmap"
-                     else [change.path]):
+        for path in (
+            [f"global_costmap/{rest}", f"local_costmap/{rest}"]
+            if first == "*_costmap"
+            else [change.path]
+        ):
             set_value(tree, path, change.value, "test")
     written = config.load(config.load_files(tmp_path / "tuned", {"i": "1"}))
     assert written.to_tree() == config.load(tree).to_tree()
@@ -104,8 +113,9 @@ def test_numbered_files_and_a_robots_own_are_changed_too(tmp_path):
     base = tmp_path / "base"
     shutil.copytree(ROOT / "config" / "tutorial", base)
     for number in "01":
-        shutil.copy(base / "costmap_common_params.yaml",
-                    base / f"costmap_common_params{number}.yaml")
+        shutil.copy(
+            base / "costmap_common_params.yaml", base / f"costmap_common_params{number}.yaml"
+        )
     (base / "costmap_common_params.yaml").unlink()
     (base / "robot1.yaml").write_text("local_costmap: {inflation_radius: 0.9}\n")
     write_parameters(base, tmp_path / "tuned", [Change("*_costmap/inflation_radius", 0.5, "why")])
@@ -119,9 +129,14 @@ def test_files_that_cannot_be_edited_are_not_half_written(tmp_path):
     base = tmp_path / "base"
     shutil.copytree(ROOT / "config" / "tutorial", base)
     path = base / "move_base_params.yaml"
-    path.write_text("".join(f"/move_base0:\n  {line}" if k == 0 else f"  {line}" for k, line in
-                            enumerate(["conservative_reset_dist: 1.0\n",
-                                       "controller_frequency: 1.0\n"])))
+    path.write_text(
+        "".join(
+            f"/move_base0:\n  {line}" if k == 0 else f"  {line}"
+            for k, line in enumerate(
+                ["conservative_reset_dist: 1.0\n", "controller_frequency: 1.0\n"]
+            )
+        )
+    )
     with pytest.raises(FilesDiffer, match="controller_frequency"):
         write_parameters(base, tmp_path / "tuned", [Change("controller_frequency", 5.0, "why")])
     assert not (tmp_path / "tuned").exists()
@@ -141,8 +156,11 @@ def test_the_bases_own_value_is_found_where_a_layer_has_it():
 def test_shipped_parameters_are_those_of_their_study(name):
     folder = ROOT / "config" / name
     tree = config.load_files(folder, {"i": "0"})
-    rows = re.findall(r"^\| (\S+) +\| (\S+) +\| (\S+) +\| \S.*\|$",
-                      (folder / "STUDY.md").read_text().partition("## What each change")[2], re.M)
+    rows = re.findall(
+        r"^\| (\S+) +\| (\S+) +\| (\S+) +\| \S.*\|$",
+        (folder / "STUDY.md").read_text().partition("## What each change")[2],
+        re.M,
+    )
     found = {path: value for path, _, value in rows if path != "parameter"}
     assert len(found) >= 6
     for path, value in found.items():

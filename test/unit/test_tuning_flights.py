@@ -1,4 +1,5 @@
 """Studies that really fly: courses, workers, the commands and what they write."""
+
 from __future__ import annotations
 
 import csv
@@ -24,12 +25,12 @@ from study_flights import (
 )
 
 from quad_nav import config
+from quad_nav.barn.protocol import Outcome
+from quad_nav.barn.runs import fly_world
+from quad_nav.barn.setup import BarnOptions, read_barn_setup
 from quad_nav.cli.sweep import sweep
 from quad_nav.cli.tune import tune
 from quad_nav.errors import InputError
-from quad_nav.offline.barn.protocol import Outcome
-from quad_nav.offline.barn.runs import fly_world
-from quad_nav.offline.barn.setup import BarnOptions, read_barn_setup
 from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionCourse, check_missions
 from quad_nav.tuning.evaluation import task_of
@@ -53,7 +54,8 @@ def test_the_number_of_workers_does_not_change_the_study(tmp_path):
 def test_flights_of_a_worker_that_dies_are_flown_again(tmp_path):
     flown = dict(fly_all(LocalWorkers(2), mortal_tasks(tmp_path / "deaths", 1)))
     assert {number: flight.reason for number, flight in flown.items()} == dict.fromkeys(
-        range(6), "flown")
+        range(6), "flown"
+    )
     assert (tmp_path / "deaths").read_text() == "xx"
 
 
@@ -65,14 +67,18 @@ def test_workers_that_die_again_and_again_end_it(tmp_path):
 
 def test_what_is_held_out_is_never_searched(tmp_path):
     mission = write_mission(tmp_path)
-    options = replace(mission_options(tmp_path), missions=(mission, Mission()), robots=1,
-                      parameters=())
+    options = replace(
+        mission_options(tmp_path), missions=(mission, Mission()), robots=1, parameters=()
+    )
     course = MissionCourse(options)
     searched_cases, held_out = course.search_cases(200), course.held_out_cases(100)
     assert not {case.seed for case in searched_cases} & {case.seed for case in held_out}
     assert searched_cases[:4] == (
-        Case(0, mission.name, 0), Case(1, "random", 0), Case(0, mission.name, 1),
-        Case(1, "random", 1))
+        Case(0, mission.name, 0),
+        Case(1, "random", 0),
+        Case(0, mission.name, 1),
+        Case(1, "random", 1),
+    )
     assert held_out[0] == Case(0, mission.name, HELD_OUT_SEED)
     # A random mission's scene is its seed's, so those that are held out are others too.
     scenes = [course.setup(case, ()).scene for case in (searched_cases[1], held_out[1])]
@@ -122,8 +128,12 @@ def barn_worlds(folder: Path) -> Path:
     """Twelve empty worlds; 0 and 6 are of the official sample."""
     numbers = np.arange(12, dtype=np.int32)
     way = np.array([[-2.25, 5.0], [-2.25, 9.0]], np.float32)
-    np.savez(folder / "worlds.npz", index=numbers, occupied=np.zeros((12, 64, 30), np.uint8),
-             **{f"path_{number}": way for number in numbers})
+    np.savez(
+        folder / "worlds.npz",
+        index=numbers,
+        occupied=np.zeros((12, 64, 30), np.uint8),
+        **{f"path_{number}": way for number in numbers},
+    )
     return folder / "worlds.npz"
 
 
@@ -132,7 +142,17 @@ def test_barn_is_searched_outside_of_the_official_sample(tmp_path):
     searched_worlds = [case.name for case in course.search_cases(10)]
     held_out = [case.name for case in course.held_out_cases(3)]
     assert sorted(int(name.split()[-1]) for name in searched_worlds) == [
-        1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
+        1,
+        2,
+        3,
+        4,
+        5,
+        7,
+        8,
+        9,
+        10,
+        11,
+    ]
     assert held_out == ["BARN world 0", "BARN world 6", "BARN world 0"]
     assert {int(name.split()[-1]) > 5 for name in searched_worlds[:2]} == {True, False}
     assert {case.seed for case in course.held_out_cases(3)} == {HELD_OUT_SEED, HELD_OUT_SEED + 1}
@@ -155,7 +175,10 @@ def test_a_flight_through_barn_counts_as_the_benchmark_counts_it(tmp_path):
 
 def test_the_front_holds_what_nothing_beats_in_both():
     assert front([(3.0, 0.3), (1.0, 0.1), (2.0, 0.05), (4.0, 0.3), (2.5, 0.2), (1.0, 0.05)]) == [
-        (1.0, 0.1), (2.5, 0.2), (3.0, 0.3)]
+        (1.0, 0.1),
+        (2.5, 0.2),
+        (3.0, 0.3),
+    ]
     assert front([]) == []
 
 
@@ -163,10 +186,31 @@ def test_tune_from_the_command_line_and_again(tmp_path):
     mission = write_mission(tmp_path)
     space = tmp_path / "space.yaml"
     space.write_text(SPACE)
-    arguments = ["--scene", str(mission.scene), "--goals", str(mission.goals), "--space",
-                 str(space), *SETS, "--candidates", "2", "--flights", "2", "--finalists", "1",
-                 "--final-flights", "2", "--held-out", "1", "--against", "tutorial",
-                 "--workers", "1", "--output", str(tmp_path / "out")]
+    arguments = [
+        "--scene",
+        str(mission.scene),
+        "--goals",
+        str(mission.goals),
+        "--space",
+        str(space),
+        *SETS,
+        "--candidates",
+        "2",
+        "--flights",
+        "2",
+        "--finalists",
+        "1",
+        "--final-flights",
+        "2",
+        "--held-out",
+        "1",
+        "--against",
+        "tutorial",
+        "--workers",
+        "1",
+        "--output",
+        str(tmp_path / "out"),
+    ]
     first = CliRunner().invoke(tune, arguments)
     assert first.exit_code == 0, first.output
     found = json.loads((tmp_path / "out" / "results.json").read_text())
@@ -183,21 +227,26 @@ def test_tune_from_the_command_line_and_again(tmp_path):
     again = CliRunner().invoke(tune, arguments)
     assert again.exit_code == 0
     assert "0 flights in" in again.output  # everything was there already
-    assert json.loads((tmp_path / "out" / "results.json").read_text())["held_out"] == (
-        found["held_out"])
+    assert (
+        json.loads((tmp_path / "out" / "results.json").read_text())["held_out"]
+        == (found["held_out"])
+    )
     other = CliRunner().invoke(tune, [*arguments, "--seed", "1"])
     assert other.exit_code == 2
     assert "seed was 0 and is 1" in other.output
 
 
-@pytest.mark.parametrize("arguments, words", [
-    (["--set", "a"], "expected PATH=VALUE"),
-    (["--config", "nowhere"], "expected a folder or the name of a shipped one"),
-    (["--worlds", "none.npz"], "none.npz"),
-    (["--worlds", "none.npz", "--robots", "2"], "goes without"),
-    (["--scene", "a.yaml", "--scene", "b.yaml", "--goals", "g"], "a folder of goals for each"),
-    (["--space", "none.yaml"], "none.yaml: cannot be read"),
-])
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["--set", "a"], "expected PATH=VALUE"),
+        (["--config", "nowhere"], "expected a folder or the name of a shipped one"),
+        (["--worlds", "none.npz"], "none.npz"),
+        (["--worlds", "none.npz", "--robots", "2"], "goes without"),
+        (["--scene", "a.yaml", "--scene", "b.yaml", "--goals", "g"], "a folder of goals for each"),
+        (["--space", "none.yaml"], "none.yaml: cannot be read"),
+    ],
+)
 def test_tune_refuses_what_it_cannot_use(arguments, words, tmp_path):
     told_ = CliRunner().invoke(tune, [*arguments, "--output", str(tmp_path / "out")])
     assert told_.exit_code == 2
@@ -207,18 +256,40 @@ def test_tune_refuses_what_it_cannot_use(arguments, words, tmp_path):
 
 def test_sweep_from_the_command_line(tmp_path):
     mission = write_mission(tmp_path)
-    arguments = ["--scene", str(mission.scene), "--goals", str(mission.goals), *SETS,
-                 "--flights", "1", "--workers", "1", "--journal", str(tmp_path / "flights.db"),
-                 "--csv", str(tmp_path / "s.csv"), "--json", str(tmp_path / "s.json"),
-                 "--report", str(tmp_path / "s.html"), "--png", str(tmp_path / "png")]
-    over = ["--over", "TrajectoryPlannerROS/max_vel_x=0.4,0.8",
-            "--over", "*_costmap/inflation_radius=0.4,0.6"]
+    arguments = [
+        "--scene",
+        str(mission.scene),
+        "--goals",
+        str(mission.goals),
+        *SETS,
+        "--flights",
+        "1",
+        "--workers",
+        "1",
+        "--journal",
+        str(tmp_path / "flights.db"),
+        "--csv",
+        str(tmp_path / "s.csv"),
+        "--json",
+        str(tmp_path / "s.json"),
+        "--report",
+        str(tmp_path / "s.html"),
+        "--png",
+        str(tmp_path / "png"),
+    ]
+    over = [
+        "--over",
+        "TrajectoryPlannerROS/max_vel_x=0.4,0.8",
+        "--over",
+        "*_costmap/inflation_radius=0.4,0.6",
+    ]
     done = CliRunner().invoke(sweep, [*over, *arguments])
     assert done.exit_code == 0, done.output
     with (tmp_path / "s.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert [(row["TrajectoryPlannerROS/max_vel_x"], row["*_costmap/inflation_radius"])
-            for row in rows] == [("0.4", "0.4"), ("0.4", "0.6"), ("0.8", "0.4"), ("0.8", "0.6")]
+    assert [
+        (row["TrajectoryPlannerROS/max_vel_x"], row["*_costmap/inflation_radius"]) for row in rows
+    ] == [("0.4", "0.4"), ("0.4", "0.6"), ("0.8", "0.4"), ("0.8", "0.6")]
     assert float(rows[2]["mean_time_s"]) < float(rows[0]["mean_time_s"])
     found = json.loads((tmp_path / "s.json").read_text())
     assert [len(row["flights"]) for row in found["rows"]] == [1, 1, 1, 1]
@@ -226,14 +297,17 @@ def test_sweep_from_the_command_line(tmp_path):
     assert "data:image/png;base64," in (tmp_path / "s.html").read_text()
 
 
-@pytest.mark.parametrize("arguments, words", [
-    ([], "expected --over"),
-    (["--over", "a"], "expected PATH=A,B"),
-    (["--over", "a=1,1"], "a value is there twice"),
-    (["--over", "a=1,2", "--over", "a=3"], "given twice"),
-    (["--over", "TrajectoryPlannerROS/max_vell_x=1,2"], "did you mean max_vel_x?"),
-    (["--over", "TrajectoryPlannerROS/sim_time=1,-2"], "sim_time=-2"),
-])
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ([], "expected --over"),
+        (["--over", "a"], "expected PATH=A,B"),
+        (["--over", "a=1,1"], "a value is there twice"),
+        (["--over", "a=1,2", "--over", "a=3"], "given twice"),
+        (["--over", "TrajectoryPlannerROS/max_vell_x=1,2"], "did you mean max_vel_x?"),
+        (["--over", "TrajectoryPlannerROS/sim_time=1,-2"], "sim_time=-2"),
+    ],
+)
 def test_sweep_refuses_what_it_cannot_use(arguments, words):
     told_ = CliRunner().invoke(sweep, arguments)
     assert told_.exit_code == 2
@@ -253,13 +327,22 @@ def test_points_from_a_file(tmp_path):
 
 
 def test_flying_does_not_wait_for_optuna():
-    code = ("import sys, quad_nav.cli.fly; "
-            "sys.exit(sorted({'optuna', 'joblib', 'sqlalchemy'} & set(sys.modules)) != [])")
+    code = (
+        "import sys, quad_nav.cli.fly; "
+        "sys.exit(sorted({'optuna', 'joblib', 'sqlalchemy'} & set(sys.modules)) != [])"
+    )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     assert subprocess.run([sys.executable, "-c", code], env=environment).returncode == 0
 
 
 def test_a_task_on_paper_is_refused_with_its_reason():
     assert fly_task(FlightTask(None, refused="why")) == replace(
-        FLOWN, goals=1, reached=0, time_s=0.0, straight_m=1.0, clearance_m=None,
-        roughness_mps2=0.0, reason="why")
+        FLOWN,
+        goals=1,
+        reached=0,
+        time_s=0.0,
+        straight_m=1.0,
+        clearance_m=None,
+        roughness_mps2=0.0,
+        reason="why",
+    )

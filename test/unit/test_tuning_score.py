@@ -1,4 +1,5 @@
 """The score of a flight, and figures of many, worked out by hand."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -11,18 +12,21 @@ from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.score import TERMS, cost, mean_cost
 
 
-@pytest.mark.parametrize("change, expected", [
-    ({}, 4.1),                                           # 40 s / 10 m, and 0.5 x 0.2 m/s2
-    ({"time_s": 20.0}, 2.1),
-    ({"time_s": 9999.0}, 30.1),
-    ({"clearance_m": 0.15}, 4.6),                        # half of what is comfortable
-    ({"separation_m": 0.0}, 5.1),
-    ({"clearance_m": None}, 4.1),
-    ({"contacts": 1, "clearance_m": -0.01}, 55.1),
-    ({"contacts": 2, "clearance_m": -0.01}, 80.1),
-    ({"reached": 1}, 10000.0 * 0.75 + 4.1),
-    ({"reached": 0}, 10000.0 + 4.1),
-])
+@pytest.mark.parametrize(
+    "change, expected",
+    [
+        ({}, 4.1),  # 40 s / 10 m, and 0.5 x 0.2 m/s2
+        ({"time_s": 20.0}, 2.1),
+        ({"time_s": 9999.0}, 30.1),
+        ({"clearance_m": 0.15}, 4.6),  # half of what is comfortable
+        ({"separation_m": 0.0}, 5.1),
+        ({"clearance_m": None}, 4.1),
+        ({"contacts": 1, "clearance_m": -0.01}, 55.1),
+        ({"contacts": 2, "clearance_m": -0.01}, 80.1),
+        ({"reached": 1}, 10000.0 * 0.75 + 4.1),
+        ({"reached": 0}, 10000.0 + 4.1),
+    ],
+)
 def test_the_cost_of_a_flight(change, expected):
     assert cost(replace(FLOWN, **change)) == pytest.approx(expected)
 
@@ -38,8 +42,11 @@ def test_what_comes_first_outweighs_everything_after_it():
 
 
 def test_figures_of_three_flights():
-    flights = [FLOWN, replace(FLOWN, time_s=50.0, clearance_m=0.1, recoveries=2),
-               replace(FLOWN, reached=1, time_s=300.0, contacts=2)]
+    flights = [
+        FLOWN,
+        replace(FLOWN, time_s=50.0, clearance_m=0.1, recoveries=2),
+        replace(FLOWN, reached=1, time_s=300.0, contacts=2),
+    ]
     found = figures(flights)
     assert (found.flights, found.completed, found.succeeded) == (3, 2, 2)
     assert (found.contacts, found.touched, found.recoveries) == (2, 1, 2)

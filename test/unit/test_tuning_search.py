@@ -1,4 +1,5 @@
 """Searching and refining on paper, where the best is known."""
+
 from __future__ import annotations
 
 import json
@@ -45,8 +46,9 @@ def run(folder: Path, options: SearchOptions = OPTIONS, watcher: Optional[Watche
     """The trials of a search, and the flights that it flew."""
     workers = PaperWorkers()
     with open_study(folder, IDENTITY) as study:
-        evaluation = Evaluation(PaperCourse(), PAPER_SPACE, workers, study.journal,
-                                watcher or Watcher())
+        evaluation = Evaluation(
+            PaperCourse(), PAPER_SPACE, workers, study.journal, watcher or Watcher()
+        )
         try:
             search(evaluation, study, PAPER_BASE, options)
         except KeyboardInterrupt:
@@ -82,7 +84,8 @@ def test_no_candidate_of_a_generation_knows_of_another(tmp_path):
 
 @pytest.mark.parametrize("flights", [5, 60])
 def test_an_interrupted_search_ends_as_an_uninterrupted_one_and_flies_nothing_again(
-        tmp_path, flights):
+    tmp_path, flights
+):
     whole, all_flown = run(tmp_path / "whole")
     _, before = run(tmp_path / "parts", watcher=StopsAfter(flights))
     assert len(before) == flights
@@ -131,7 +134,10 @@ def test_a_folder_keeps_to_its_study(tmp_path):
         with open_study(tmp_path, {"seed": 1, "space": [1, 3], "x": "y"}):
             pass
     assert [line.split(": ", 2)[2].split(";")[0] for line in raised.value.problems] == [
-        "seed was 0 and is 1", "space[1] was 2 and is 3", 'x was absent and is "y"']
+        "seed was 0 and is 1",
+        "space[1] was 2 and is 3",
+        'x was absent and is "y"',
+    ]
     assert unlike({"a": (1,)}, {"a": [2, 3]}) != []
     (tmp_path / "study.db").write_text("no database, but long enough to be looked at" * 100)
     with pytest.raises(InputError, match="cannot be read as a study"):
@@ -140,8 +146,10 @@ def test_a_folder_keeps_to_its_study(tmp_path):
 
 
 def test_a_candidate_is_dropped_above_the_median_of_those_that_flew_everything():
-    trials = [optuna.create_trial(value=1.0, intermediate_values={2: float(mean), 4: 1.0})
-              for mean in (1, 2, 3, 4, 5)]
+    trials = [
+        optuna.create_trial(value=1.0, intermediate_values={2: float(mean), 4: 1.0})
+        for mean in (1, 2, 3, 4, 5)
+    ]
     assert is_hopeless(trials, 2, 3.01)
     assert not is_hopeless(trials, 2, 3.0)
     assert not is_hopeless(trials[:4], 2, 99.0)  # too few to say
@@ -152,9 +160,13 @@ def test_a_candidate_is_dropped_above_the_median_of_those_that_flew_everything()
 def test_refining_keeps_what_helps_and_takes_back_what_does_not():
     workers, course = PaperWorkers(), PaperCourse()
     evaluation = Evaluation(course, PAPER_SPACE, workers, Journal(), Watcher())
-    refined = refine(evaluation, [{"speed": 0.5, "idle": 0.9, "bad": 0.0},
-                                  {"speed": 0.6, "idle": 0.2, "bad": 0.0}],
-                     PAPER_BASE, course.search_cases(2), course.search_cases(3))
+    refined = refine(
+        evaluation,
+        [{"speed": 0.5, "idle": 0.9, "bad": 0.0}, {"speed": 0.6, "idle": 0.2, "bad": 0.0}],
+        PAPER_BASE,
+        course.search_cases(2),
+        course.search_cases(3),
+    )
     assert refined.values == {"speed": 0.5}
     (gain,) = refined.gains
     assert (gain.path, gain.value, gain.base) == ("speed", 0.5, 0.1)
@@ -166,15 +178,22 @@ def test_refining_keeps_what_helps_and_takes_back_what_does_not():
 def test_nothing_is_changed_when_nothing_beats_the_base():
     course = PaperCourse()
     evaluation = Evaluation(course, PAPER_SPACE, PaperWorkers(), Journal(), Watcher())
-    refined = refine(evaluation, [{"speed": 0.99, "idle": 0.5, "bad": 0.0},
-                                  {"speed": 0.5, "idle": 0.5, "bad": 9.0}],
-                     {**PAPER_BASE, "speed": 0.1}, course.search_cases(2), course.search_cases(2))
+    refined = refine(
+        evaluation,
+        [{"speed": 0.99, "idle": 0.5, "bad": 0.0}, {"speed": 0.5, "idle": 0.5, "bad": 9.0}],
+        {**PAPER_BASE, "speed": 0.1},
+        course.search_cases(2),
+        course.search_cases(2),
+    )
     assert refined.values == {} and refined.gains == ()
 
 
 def test_the_best_are_those_that_flew_everything():
-    trials = [optuna.create_trial(value=2.0), optuna.create_trial(value=1.0),
-              optuna.create_trial(state=TrialState.PRUNED, value=0.0, intermediate_values={1: 0.0})]
+    trials = [
+        optuna.create_trial(value=2.0),
+        optuna.create_trial(value=1.0),
+        optuna.create_trial(state=TrialState.PRUNED, value=0.0, intermediate_values={1: 0.0}),
+    ]
     assert [trial.value for trial in best_first(trials)] == [1.0, 2.0]
 
 
@@ -185,7 +204,11 @@ def test_a_flight_is_known_by_parameters_mission_and_seed(tmp_path):
         evaluation = Evaluation(course, PAPER_SPACE, workers, Journal(tmp_path / "f.db"), Watcher())
         evaluation.flown([{"speed": 0.5}, {"speed": 0.5}, {"speed": 0.25}], course.search_cases(2))
     assert [json.loads(flown) for flown in workers.flown] == [
-        [{"speed": 0.5}, 0], [{"speed": 0.25}, 0], [{"speed": 0.5}, 1], [{"speed": 0.25}, 1]]
+        [{"speed": 0.5}, 0],
+        [{"speed": 0.25}, 0],
+        [{"speed": 0.5}, 1],
+        [{"speed": 0.25}, 1],
+    ]
 
 
 def test_the_parameter_that_counts_is_found(tmp_path):

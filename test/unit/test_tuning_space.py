@@ -1,4 +1,5 @@
 """Search spaces: what a file says, what is refused, and what a candidate sets."""
+
 from __future__ import annotations
 
 import shutil
@@ -22,18 +23,27 @@ def write(folder: Path, text: str) -> Path:
 
 
 def test_a_file_gives_ranges_choices_and_followers(tmp_path):
-    space = load_space(write(tmp_path, """\
+    space = load_space(
+        write(
+            tmp_path,
+            """\
 a: {range: [0.1, 10], log: true}
 b: {range: [3, 20], integer: true}
 c: {choices: [5.0, 10.0], follow: {d: -1}}
-"""))
+""",
+        )
+    )
     assert space.dimensions == (
-        Dimension("a", 0.1, 10.0, log=True), Dimension("b", 3.0, 20.0, integer=True),
-        Dimension("c", choices=(5.0, 10.0), follow=(("d", -1.0),)))
+        Dimension("a", 0.1, 10.0, log=True),
+        Dimension("b", 3.0, 20.0, integer=True),
+        Dimension("c", choices=(5.0, 10.0), follow=(("d", -1.0),)),
+    )
 
 
 def test_every_fault_of_a_file_is_told_at_once(tmp_path):
-    path = write(tmp_path, """\
+    path = write(
+        tmp_path,
+        """\
 a: {range: [2, 1]}
 b: 3
 c: {range: [0, 1], log: true}
@@ -42,7 +52,8 @@ e: {choices: [1]}
 f: {range: [0, 1], ragne: 2}
 g: {range: [0, 1], follow: {global_costmap/h: 1}}
 "*_costmap/h": {range: [0, 1]}
-""")
+""",
+    )
     with pytest.raises(InputError) as raised:
         load_space(path)
     assert raised.value.problems == [
@@ -56,8 +67,10 @@ g: {range: [0, 1], follow: {global_costmap/h: 1}}
     ]
 
 
-@pytest.mark.parametrize("value, expected", [
-    (0.123456, 0.123), (123.456, 123.0), (0.00098765, 0.000988), (-2.34567, -2.35), (0.0, 0.0)])
+@pytest.mark.parametrize(
+    "value, expected",
+    [(0.123456, 0.123), (123.456, 123.0), (0.00098765, 0.000988), (-2.34567, -2.35), (0.0, 0.0)],
+)
 def test_values_have_three_digits(value, expected):
     assert Dimension("a", -200.0, 200.0).rounded(value) == expected
 
@@ -72,10 +85,17 @@ def test_rounded_values_stay_in_the_range():
 def test_a_candidate_sets_both_costmaps_and_what_follows():
     space = SearchSpace("s", (TURN, RADIUS))
     assert dict(space.assignments({"P/max_turn": 0.7, "*_costmap/radius": 0.8})) == {
-        "P/max_turn": 0.7, "P/min_turn": -0.7, "global_costmap/x": 1.4, "local_costmap/x": 1.4,
-        "global_costmap/radius": 0.8, "local_costmap/radius": 0.8}
+        "P/max_turn": 0.7,
+        "P/min_turn": -0.7,
+        "global_costmap/x": 1.4,
+        "local_costmap/x": 1.4,
+        "global_costmap/radius": 0.8,
+        "local_costmap/radius": 0.8,
+    }
     assert dict(space.assignments({"*_costmap/radius": 0.8})) == {
-        "global_costmap/radius": 0.8, "local_costmap/radius": 0.8}
+        "global_costmap/radius": 0.8,
+        "local_costmap/radius": 0.8,
+    }
 
 
 def test_what_is_fixed_is_neither_searched_nor_followed():
@@ -87,8 +107,10 @@ def test_what_is_fixed_is_neither_searched_nor_followed():
     assert space.without(["global_costmap/radius"]).paths == ("P/max_turn", "*_costmap/radius")
 
 
-@pytest.mark.parametrize("base, name", [("default", "default"), ("tutorial", "default"),
-                                        ("barn", "default"), ("barn", "barn")])
+@pytest.mark.parametrize(
+    "base, name",
+    [("default", "default"), ("tutorial", "default"), ("barn", "default"), ("barn", "barn")],
+)
 def test_every_parameter_of_the_shipped_spaces_counts(base, name):
     space = load_space(ROOT / "spaces" / f"{name}.yaml")
     for values in space.corners():
@@ -107,7 +129,9 @@ def test_every_parameter_of_the_space_for_dwa_counts(tmp_path):
 def test_parameters_that_do_not_count_are_refused():
     faults = parameter_faults(
         [("DWAPlannerROS/max_vel_x", 0.3), ("TrajectoryPlannerROS/max_vell_x", 0.3)],
-        ROOT / "config" / "default", "space.yaml")
+        ROOT / "config" / "default",
+        "space.yaml",
+    )
     assert len(faults) == 2
     assert "DWAPlannerROS" in "".join(faults)
     assert "did you mean max_vel_x?" in "".join(faults)

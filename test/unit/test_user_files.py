@@ -1,4 +1,5 @@
 """Files that somebody else has made: what they may be, how large, and where they may lead."""
+
 from __future__ import annotations
 
 import os
@@ -6,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from quad_nav.barn.worlds import load_worlds
 from quad_nav.config.files import load_files
 from quad_nav.errors import MOST_PROBLEMS, InputError
+from quad_nav.files.user_files import named_in, open_file, read_bytes, read_text
 from quad_nav.geometry import Pose3D
 from quad_nav.mission.goal_file import (
     MOST_BYTES,
@@ -16,16 +19,19 @@ from quad_nav.mission.goal_file import (
     load_goals,
     parse_goals,
 )
-from quad_nav.offline import bag_trace
-from quad_nav.offline import record_messages as messages
-from quad_nav.offline.bag_trace import read_trace
-from quad_nav.offline.barn.worlds import load_worlds
-from quad_nav.offline.record_file import create
+from quad_nav.recording import bag_trace, messages
+from quad_nav.recording.bag_trace import read_trace
+from quad_nav.recording.record_file import create
 from quad_nav.sim.scene_file import load_scene
-from quad_nav.user_files import named_in, open_file, read_bytes, read_text
 
-READERS = {"goals.json": load_goals, "scene.yaml": load_scene, "place.world": load_scene,
-           "flight.bag": read_trace, "flight.mcap": read_trace, "worlds.npz": load_worlds}
+READERS = {
+    "goals.json": load_goals,
+    "scene.yaml": load_scene,
+    "place.world": load_scene,
+    "flight.bag": read_trace,
+    "flight.mcap": read_trace,
+    "worlds.npz": load_worlds,
+}
 SCENE = "origin: [0, 0]\nsize: [9, 9]\nstarts: [[4, 4]]\n"
 
 
@@ -48,8 +54,9 @@ def test_a_pipe_a_folder_and_a_device_are_refused_at_once(tmp_path, name, read):
     assert "is a device or socket; expected a file" in refusal(read, path)
 
 
-@pytest.mark.parametrize("name, read", [item for item in READERS.items() if item[0][-3:] not in (
-    "bag", "cap", "npz")])
+@pytest.mark.parametrize(
+    "name, read", [item for item in READERS.items() if item[0][-3:] not in ("bag", "cap", "npz")]
+)
 def test_a_file_of_a_gigabyte_is_refused_before_it_is_read(tmp_path, name, read):
     path = tmp_path / name
     with path.open("wb") as file:
@@ -59,8 +66,10 @@ def test_a_file_of_a_gigabyte_is_refused_before_it_is_read(tmp_path, name, read)
 
 def test_parameters_and_images_are_read_with_the_same_care(tmp_path):
     os.mkfifo(tmp_path / "costmap_common_params.yaml")
-    (tmp_path / "map.yaml").write_text("image: pipe.png\nresolution: 0.05\norigin: [0, 0, 0]\n"
-                                       "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n")
+    (tmp_path / "map.yaml").write_text(
+        "image: pipe.png\nresolution: 0.05\norigin: [0, 0, 0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    )
     os.mkfifo(tmp_path / "pipe.png")
     assert "is a pipe" in refusal(load_files, [tmp_path / "costmap_common_params.yaml"])
     assert "is a pipe" in refusal(load_scene, tmp_path / "map.yaml")
@@ -88,10 +97,12 @@ def test_goal_files_have_limits():
     goals = "[1, 2]," * MOST_GOALS
     assert len(parse_goals(f'{{"goals": [{goals[:-1]}]}}', "f").goals) == MOST_GOALS
     assert refusal(parse_goals, f'{{"goals": [{goals}[1, 2]]}}', "f") == (
-        f"f: goals: are {MOST_GOALS + 1}; expected {MOST_GOALS} at most")
+        f"f: goals: are {MOST_GOALS + 1}; expected {MOST_GOALS} at most"
+    )
     assert "bytes; expected" in refusal(parse_goals, " " * (MOST_BYTES + 1), "f")
     assert "x is 1e+07; expected 1e+06 metres at most" in refusal(
-        parse_goals, '{"goals": [[1e7, 1]]}', "f")
+        parse_goals, '{"goals": [[1e7, 1]]}', "f"
+    )
 
 
 def test_a_watched_file_that_becomes_a_pipe_is_a_changed_file(tmp_path):
@@ -122,7 +133,8 @@ def folder(tmp_path, monkeypatch):
     (tmp_path / "secret.world").write_text(
         '<sdf version="1.6"><model name="m"><pose>1 1 0.5 0 0 0</pose><link name="l">'
         '<collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision></link>'
-        "</model></sdf>")
+        "</model></sdf>"
+    )
     (tmp_path / "given" / "sub").mkdir(parents=True)
     return tmp_path / "given"
 
@@ -138,8 +150,10 @@ def test_a_link_that_the_user_names_is_followed(folder):
     assert len(load_scene(folder / "mine.yaml").obstacles) == 1
 
 
-@pytest.mark.parametrize("way", ["../secret.world", "sub/../../secret.world", "{outside}",
-                                 "link.world", "folder/secret.world"])
+@pytest.mark.parametrize(
+    "way",
+    ["../secret.world", "sub/../../secret.world", "{outside}", "link.world", "folder/secret.world"],
+)
 def test_a_scene_leads_nowhere_outside_its_folder(folder, way):
     (folder / "link.world").symlink_to(folder.parent / "secret.world")
     (folder / "folder").symlink_to(folder.parent)
@@ -160,7 +174,8 @@ def test_what_the_user_allows_may_be_reached(folder, monkeypatch):
 def test_an_image_leads_nowhere_outside_its_maps_folder(folder):
     (folder / "map.yaml").write_text(
         "image: ../../etc/passwd\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
-        "occupied_thresh: 0.65\nfree_thresh: 0.2\n")
+        "occupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    )
     assert "leads out of" in refusal(load_scene, folder / "map.yaml")
 
 
@@ -171,8 +186,10 @@ def test_a_models_config_leads_nowhere_outside(folder, named):
     named = named.format(outside=folder.parent / "secret.world")
     (model / "model.config").write_text(f"<model><sdf>{named}</sdf></model>")
     world = folder / "a.world"
-    world.write_text('<sdf version="1.6"><world name="w"><include><uri>model://crate</uri>'
-                     "</include></world></sdf>")
+    world.write_text(
+        '<sdf version="1.6"><world name="w"><include><uri>model://crate</uri>'
+        "</include></world></sdf>"
+    )
     assert f"leads out of {model}" in refusal(load_scene, world)
 
 
@@ -188,8 +205,9 @@ def recording(path, text):
     handle = file.add_topic("/quad/flight", "std_msgs/String", True, "/simulator")
     file.write(handle, 10**9, messages.encode(messages.text(text)))
     handle = file.add_topic("/odom0", "nav_msgs/Odometry", False, "/simulator")
-    still = messages.odometry(Pose3D(1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0),
-                              ("odom0", "base_link0"), 10**9)
+    still = messages.odometry(
+        Pose3D(1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), ("odom0", "base_link0"), 10**9
+    )
     file.write(handle, 10**9, messages.encode(still))
     file.close()
     return path
@@ -216,8 +234,12 @@ def test_worlds_that_include_each_other_come_to_an_end(tmp_path):
     for k in range(20):
         (tmp_path / f"{k}.sdf").write_text(
             '<sdf version="1.6"><model name="m"><link name="l"/>'
-            + f"<include><uri>{(k + 1) % 20}.sdf</uri></include>" * 4 + "</model></sdf>")
-    (tmp_path / "a.world").write_text('<sdf version="1.6"><world name="w"><include><uri>0.sdf</uri>'
-                                      "</include></world></sdf>")
+            + f"<include><uri>{(k + 1) % 20}.sdf</uri></include>" * 4
+            + "</model></sdf>"
+        )
+    (tmp_path / "a.world").write_text(
+        '<sdf version="1.6"><world name="w"><include><uri>0.sdf</uri></include></world></sdf>'
+    )
     assert "more than 200000 models, links and collisions" in refusal(
-        load_scene, tmp_path / "a.world")
+        load_scene, tmp_path / "a.world"
+    )

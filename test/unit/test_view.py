@@ -11,12 +11,12 @@ import pytest
 from recorded_flight import setup
 
 from quad_nav.errors import InputError
-from quad_nav.face.markers import CUBE, CUBE_LIST, CYLINDER, SPHERE, Marker
 from quad_nav.geometry import Pose3D, Scan, quaternion_from_yaw
-from quad_nav.offline import view
 from quad_nav.offline.run import fly
-from quad_nav.offline.view import View, scan_points
-from quad_nav.offline.view_solids import solid
+from quad_nav.recording import viewer as view
+from quad_nav.recording.viewer import View, scan_points
+from quad_nav.recording.viewer_solids import solid
+from quad_nav.topics.markers import CUBE, CUBE_LIST, CYLINDER, SPHERE, Marker
 
 
 class Made:
@@ -32,7 +32,8 @@ class FakeRerun(types.ModuleType):
     def __init__(self):
         super().__init__("rerun")
         self.components = types.SimpleNamespace(
-            FillMode=types.SimpleNamespace(Solid="solid", MajorWireframe="wires"))
+            FillMode=types.SimpleNamespace(Solid="solid", MajorWireframe="wires")
+        )
         self.ViewCoordinates = types.SimpleNamespace(RIGHT_HAND_Z_UP="z up")
         self.calls, self.logged, self.now_s = [], [], None
         blueprint = types.ModuleType("rerun.blueprint")
@@ -66,21 +67,27 @@ def rerun(monkeypatch):
 
 def test_beams_hit_where_they_look():
     """The LIDAR at (1, 2) looks along y; the beam to its left sees nothing."""
-    scan = Scan(0.0, 0.0, math.pi / 2, 0.02, 60.0,
-                np.array([3.0, np.inf, 0.5], dtype=np.float32))
+    scan = Scan(0.0, 0.0, math.pi / 2, 0.02, 60.0, np.array([3.0, np.inf, 0.5], dtype=np.float32))
     pose = Pose3D(1.0, 2.0, 1.06, quaternion_from_yaw(math.pi / 2))
-    assert scan_points(scan, pose) == pytest.approx(
-        np.array([[1.0, 5.0, 1.06], [1.0, 1.5, 1.06]]))
+    assert scan_points(scan, pose) == pytest.approx(np.array([[1.0, 5.0, 1.06], [1.0, 1.5, 1.06]]))
 
 
 def marker(kind, alpha=1.0, **fields):
-    return Marker("map", "solids", 0, kind, (1.0, 2.0, 3.0), (0.5, 0.5, 2.0),
-                  (1.0, 0.0, 0.2, alpha), **fields)
+    return Marker(
+        "map", "solids", 0, kind, (1.0, 2.0, 3.0), (0.5, 0.5, 2.0), (1.0, 0.0, 0.2, alpha), **fields
+    )
 
 
-@pytest.mark.parametrize("kind, alpha, made", [
-    (CUBE, 1.0, "Boxes3D"), (CUBE, 0.3, "Boxes3D"), (CYLINDER, 1.0, "Mesh3D"),
-    (CYLINDER, 0.3, "LineStrips3D"), (SPHERE, 1.0, "Ellipsoids3D")])
+@pytest.mark.parametrize(
+    "kind, alpha, made",
+    [
+        (CUBE, 1.0, "Boxes3D"),
+        (CUBE, 0.3, "Boxes3D"),
+        (CYLINDER, 1.0, "Mesh3D"),
+        (CYLINDER, 0.3, "LineStrips3D"),
+        (SPHERE, 1.0, "Ellipsoids3D"),
+    ],
+)
 def test_every_shape_has_its_solid(rerun, kind, alpha, made):
     shown = solid(rerun, marker(kind, alpha))
     assert shown.kind == made
@@ -93,14 +100,16 @@ def test_a_cylinder_s_mesh_is_closed_and_faces_outwards(rerun):
     """The signed volume of a prism of 24 sides is half of n r^2 sin(2 pi / n) h."""
     mesh = solid(rerun, marker(CYLINDER)).fields
     corners = mesh["vertex_positions"][mesh["triangle_indices"]] - (1.0, 2.0, 3.0)
-    volume = np.sum(np.einsum("ij,ij->i", corners[:, 0],
-                              np.cross(corners[:, 1], corners[:, 2]))) / 6.0
+    volume = (
+        np.sum(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
+    )
     assert volume == pytest.approx(12 * 0.25**2 * math.sin(2 * math.pi / 24) * 2.0)
 
 
 def test_a_list_s_cubes_are_turned_with_it(rerun):
-    boxes = solid(rerun, marker(CUBE_LIST, yaw_rad=math.pi / 2,
-                                points_m=((5.0, -3.0, 1.0), (5.0, -4.0, 1.0)))).fields
+    boxes = solid(
+        rerun, marker(CUBE_LIST, yaw_rad=math.pi / 2, points_m=((5.0, -3.0, 1.0), (5.0, -4.0, 1.0)))
+    ).fields
     assert boxes["centers"] == pytest.approx(np.array([[3.0, 5.0, 1.0], [4.0, 5.0, 1.0]]))
     assert len(boxes["sizes"]) == 2
 
@@ -110,9 +119,17 @@ def test_a_flight_is_saved_with_its_parts(rerun, tmp_path):
     summary = fly(setup(tmp_path, time_limit_s=1.0), [View(path)])
     assert [call[0] for call in rerun.calls] == ["init", "save", "send_blueprint", "disconnect"]
     entities = {entity for entity, _, _ in rerun.logged}
-    assert {"map/obstacles/0", "map/walls/0", "map/quad0/body/0", "map/quad1/body", "map/goals",
-            "map/quad0/scan", "map/quad0/plan", "map/quad1/local_plan",
-            "map/quad1/trail"} <= entities
+    assert {
+        "map/obstacles/0",
+        "map/walls/0",
+        "map/quad0/body/0",
+        "map/quad1/body",
+        "map/goals",
+        "map/quad0/scan",
+        "map/quad0/plan",
+        "map/quad1/local_plan",
+        "map/quad1/trail",
+    } <= entities
     bodies = [now_s for entity, now_s, _ in rerun.logged if entity == "map/quad0/body"]
     assert bodies == pytest.approx([k / 40 for k in range(41)])
     assert summary.sim_time_s == 1.0
@@ -137,7 +154,8 @@ def test_without_a_file_a_viewer_is_opened_that_only_this_machine_reaches(rerun,
     View()
     assert "--bind=127.0.0.1" in FakeViewer.command
     assert [call for call in rerun.calls if call[0] in ("save", "connect_tcp")] == [
-        ("connect_tcp", "127.0.0.1:9876")]
+        ("connect_tcp", "127.0.0.1:9876")
+    ]
 
 
 def test_without_a_display_no_viewer_is_opened(rerun, monkeypatch):
@@ -156,10 +174,13 @@ def test_a_viewer_that_does_not_start_is_told(rerun, monkeypatch):
         View()
 
 
-@pytest.mark.parametrize("name, problem", [
-    ("flight.bag", "expected a name that ends with .rrd"),
-    ("folder.rrd", "cannot be saved to: "),
-])
+@pytest.mark.parametrize(
+    "name, problem",
+    [
+        ("flight.bag", "expected a name that ends with .rrd"),
+        ("folder.rrd", "cannot be saved to: "),
+    ],
+)
 def test_a_file_that_cannot_be_made_is_refused(rerun, tmp_path, name, problem):
     (tmp_path / "folder.rrd").mkdir()
     with pytest.raises(InputError, match=problem):

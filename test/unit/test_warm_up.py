@@ -1,14 +1,15 @@
 """The little mission that compiles the kernels."""
+
 from __future__ import annotations
 
 import pytest
 
-from quad_nav import warm_up
-from quad_nav.assembly import GLOBAL_PLANNERS, LOCAL_PLANNERS
 from quad_nav.config import load
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.voxel import VoxelLayer
 from quad_nav.plan.global_planner import SearchPlanner
+from quad_nav.scenario import warm_up
+from quad_nav.scenario.assembly import GLOBAL_PLANNERS, LOCAL_PLANNERS
 from quad_nav.sim import casters
 
 
@@ -24,6 +25,7 @@ def missions(monkeypatch):
         navigator.tick = lambda *arguments: ticks.append(tick(*arguments)) or ticks[-1]
         flown.append((navigator, ticks))
         return navigator
+
     monkeypatch.setattr(warm_up, "build_navigator", recording)
     warm_up.main()
     return flown
@@ -40,8 +42,11 @@ def test_every_kernel_of_a_cycle_has_run(missions):
 
 def test_a_peer_is_left_out_of_the_last_scans(missions):
     for navigator, _ in missions:
-        layers = [layer for layer in navigator.local_costmap.layers.values()
-                  if isinstance(layer, ObstacleLayer)]
+        layers = [
+            layer
+            for layer in navigator.local_costmap.layers.values()
+            if isinstance(layer, ObstacleLayer)
+        ]
         assert layers and all(len(layer.left_out) == 1 for layer in layers)
 
 
@@ -59,8 +64,11 @@ def test_every_planner_and_obstacle_layer_flies(missions):
 
 
 def test_both_searches_and_both_paths_of_the_global_planner(missions):
-    params = [navigator.planner.params for navigator, _ in missions
-              if isinstance(navigator.planner, SearchPlanner)]
+    params = [
+        navigator.planner.params
+        for navigator, _ in missions
+        if isinstance(navigator.planner, SearchPlanner)
+    ]
     assert {one.use_dijkstra for one in params} == {True, False}
     assert {one.use_grid_path for one in params} == {True, False}
 

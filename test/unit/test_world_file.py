@@ -1,4 +1,5 @@
 """Gazebo worlds: poses by hand, what is left out and said, and what is refused."""
+
 from __future__ import annotations
 
 import math
@@ -17,11 +18,19 @@ SPHERE = "<sphere><radius>0.5</radius></sphere>"
 QUARTER = math.pi / 2
 
 
-def model(shape: str, pose: str = "0 0 0 0 0 0", name: str = "m", link: str = "", more: str = "",
-          static: str = "true") -> str:
-    return (f'<model name="{name}"><static>{static}</static><pose>{pose}</pose><link name="l">'
-            f'{link}<collision name="c">{more}<geometry>{shape}</geometry></collision></link>'
-            "</model>")
+def model(
+    shape: str,
+    pose: str = "0 0 0 0 0 0",
+    name: str = "m",
+    link: str = "",
+    more: str = "",
+    static: str = "true",
+) -> str:
+    return (
+        f'<model name="{name}"><static>{static}</static><pose>{pose}</pose><link name="l">'
+        f'{link}<collision name="c">{more}<geometry>{shape}</geometry></collision></link>'
+        "</model>"
+    )
 
 
 def written(folder: Path, *content: str, name: str = "a.world") -> Path:
@@ -39,7 +48,7 @@ def only(folder: Path, *content: str):
 
 def remarks(folder: Path, *content: str) -> list:
     path = written(folder, *content)
-    return [remark[len(f"{path}: "):] for remark in load_world(path).remarks]
+    return [remark[len(f"{path}: ") :] for remark in load_world(path).remarks]
 
 
 def faults(path: Path) -> list:
@@ -50,16 +59,21 @@ def faults(path: Path) -> list:
 
 def same(obstacle, other) -> None:
     assert type(obstacle) is type(other) and obstacle.name == other.name
-    values, expected = ([v for v in vars(o).values() if not isinstance(v, str)]
-                        for o in (obstacle, other))
+    values, expected = (
+        [v for v in vars(o).values() if not isinstance(v, str)] for o in (obstacle, other)
+    )
     assert values == pytest.approx(expected, abs=1e-9)
 
 
 def test_primitives_stand_where_they_stand_in_gazebo(tmp_path):
-    same(only(tmp_path, model(BOX, "4 5 1.5 0 0 0.3")),
-         Box("m/l/c", 4.0, 5.0, 1.0, 2.0, 3.0, 0.3, 0.0))
-    same(only(tmp_path, model(CYLINDER, "4 5 1.5 0 0 0.3")),
-         Cylinder("m/l/c", 4.0, 5.0, 0.5, 2.0, 0.5))
+    same(
+        only(tmp_path, model(BOX, "4 5 1.5 0 0 0.3")),
+        Box("m/l/c", 4.0, 5.0, 1.0, 2.0, 3.0, 0.3, 0.0),
+    )
+    same(
+        only(tmp_path, model(CYLINDER, "4 5 1.5 0 0 0.3")),
+        Cylinder("m/l/c", 4.0, 5.0, 0.5, 2.0, 0.5),
+    )
     same(only(tmp_path, model(SPHERE, "4 5 1.5 1 2 3")), Sphere("m/l/c", 4.0, 5.0, 1.5, 0.5))
 
 
@@ -78,17 +92,22 @@ def test_poses_are_composed_from_model_to_collision(tmp_path):
 
 def test_models_in_models(tmp_path):
     inner = model(SPHERE, "1 0 2 0 0 0", name="inner")
-    sphere = only(tmp_path, f'<model name="outer"><static>1</static><pose>5 5 0 0 0 {QUARTER}'
-                  f"</pose>{inner}</model>")
+    sphere = only(
+        tmp_path,
+        f'<model name="outer"><static>1</static><pose>5 5 0 0 0 {QUARTER}</pose>{inner}</model>',
+    )
     same(sphere, Sphere("outer/inner/l/c", 5.0, 6.0, 2.0, 0.5))
 
 
-@pytest.mark.parametrize("angles, size_x, size_y, height, yaw", [
-    (f"{QUARTER} 0 0", 3.0, 1.0, 2.0, QUARTER),   # y stands up, z lies along -y
-    (f"0 {QUARTER} 0", 2.0, 3.0, 1.0, QUARTER),   # x points down, z lies along x
-    (f"{math.pi} 0 0", 1.0, 2.0, 3.0, 0.0),
-    (f"{QUARTER} 0 0.3", 3.0, 1.0, 2.0, QUARTER + 0.3),
-])
+@pytest.mark.parametrize(
+    "angles, size_x, size_y, height, yaw",
+    [
+        (f"{QUARTER} 0 0", 3.0, 1.0, 2.0, QUARTER),  # y stands up, z lies along -y
+        (f"0 {QUARTER} 0", 2.0, 3.0, 1.0, QUARTER),  # x points down, z lies along x
+        (f"{math.pi} 0 0", 1.0, 2.0, 3.0, 0.0),
+        (f"{QUARTER} 0 0.3", 3.0, 1.0, 2.0, QUARTER + 0.3),
+    ],
+)
 def test_boxes_may_lie_on_any_side(tmp_path, angles, size_x, size_y, height, yaw):
     box = only(tmp_path, model(BOX, f"0 0 5 {angles}"))
     assert (box.size_x_m, box.size_y_m, box.height_m) == (size_x, size_y, height)
@@ -100,45 +119,65 @@ def test_boxes_may_lie_on_any_side(tmp_path, angles, size_x, size_y, height, yaw
 def test_degrees_and_quaternions(tmp_path):
     by_degrees = model(BOX).replace("<pose>0 0 0 0 0 0", '<pose degrees="true">0 0 2 0 0 90')
     assert only(tmp_path, by_degrees).yaw_rad == pytest.approx(QUARTER)
-    by_quaternion = model(BOX).replace("<pose>0 0 0 0 0 0",
-                                       '<pose rotation_format="quat_xyzw">0 0 2 0 0 1 1')
+    by_quaternion = model(BOX).replace(
+        "<pose>0 0 0 0 0 0", '<pose rotation_format="quat_xyzw">0 0 2 0 0 1 1'
+    )
     assert only(tmp_path, by_quaternion).yaw_rad == pytest.approx(QUARTER)
 
 
 def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
     plane = "<plane><normal>0 0 1</normal><size>100 100</size></plane>"
-    includes = "".join(f"<include><uri>model://{name}</uri></include>"
-                       for name in ("ground_plane", "sun"))
+    includes = "".join(
+        f"<include><uri>model://{name}</uri></include>" for name in ("ground_plane", "sun")
+    )
     assert only(tmp_path, model(plane, name="ground"), includes, model(SPHERE)).name == "m/l/c"
 
 
-@pytest.mark.parametrize("content, remark", [
-    (model(BOX, "0 0 2 0.1 0 0"), "left out, tilted box: m/l/c"),
-    (model(CYLINDER, "0 0 2 0 1.5 0"), "left out, tilted cylinder: m/l/c"),
-    (model("<mesh><uri>a.dae</uri></mesh>"), "left out, mesh: m/l/c"),
-    (model("<heightmap/>") + model("<heightmap/>", name="n"), "left out, heightmap: m/l/c, n/l/c"),
-    (model("<plane><normal>1 0 0</normal></plane>"),
-     "left out, plane that is not the floor: m/l/c"),
-    (model("<plane/>", "0 0 1 0 0 0"), "left out, plane that is not the floor: m/l/c"),
-    (model(BOX, "0 0 -1.5 0 0 0"), "left out, nothing above the floor: m/l/c"),
-    (model(BOX, more='<pose relative_to="f">0 0 0 0 0 0</pose>'),
-     "left out, pose relative to a named frame: m/l/c"),
-    ("<include><name>t</name><uri>model://table</uri></include>",
-     "left out, <include> of model://table, not found: t"),
-    ("<include><uri>model://../a</uri></include>",
-     "left out, <include> of model://../a, not found: a"),
-    ('<model name="m"><static>1</static><link name="l"><visual name="v"/></link></model>',
-     "left out, looks without a collision: m/l"),
-    ('<actor name="walker"/>', "left out, actor: walker"),
-    (model(BOX, static="false"), "not static in Gazebo, stands fixed here: m"),
-])
+@pytest.mark.parametrize(
+    "content, remark",
+    [
+        (model(BOX, "0 0 2 0.1 0 0"), "left out, tilted box: m/l/c"),
+        (model(CYLINDER, "0 0 2 0 1.5 0"), "left out, tilted cylinder: m/l/c"),
+        (model("<mesh><uri>a.dae</uri></mesh>"), "left out, mesh: m/l/c"),
+        (
+            model("<heightmap/>") + model("<heightmap/>", name="n"),
+            "left out, heightmap: m/l/c, n/l/c",
+        ),
+        (
+            model("<plane><normal>1 0 0</normal></plane>"),
+            "left out, plane that is not the floor: m/l/c",
+        ),
+        (model("<plane/>", "0 0 1 0 0 0"), "left out, plane that is not the floor: m/l/c"),
+        (model(BOX, "0 0 -1.5 0 0 0"), "left out, nothing above the floor: m/l/c"),
+        (
+            model(BOX, more='<pose relative_to="f">0 0 0 0 0 0</pose>'),
+            "left out, pose relative to a named frame: m/l/c",
+        ),
+        (
+            "<include><name>t</name><uri>model://table</uri></include>",
+            "left out, <include> of model://table, not found: t",
+        ),
+        (
+            "<include><uri>model://../a</uri></include>",
+            "left out, <include> of model://../a, not found: a",
+        ),
+        (
+            '<model name="m"><static>1</static><link name="l"><visual name="v"/></link></model>',
+            "left out, looks without a collision: m/l",
+        ),
+        ('<actor name="walker"/>', "left out, actor: walker"),
+        (model(BOX, static="false"), "not static in Gazebo, stands fixed here: m"),
+    ],
+)
 def test_what_is_left_out_is_named(tmp_path, content, remark):
     assert remarks(tmp_path, content) == [remark]
 
 
 def test_a_saved_state_has_the_last_word(tmp_path):
-    state = ('<state world_name="w"><model name="m"><pose>1 2 3 0 0 0</pose><link name="l">'
-             "<pose>7 8 9 0 0 0</pose></link></model></state>")
+    state = (
+        '<state world_name="w"><model name="m"><pose>1 2 3 0 0 0</pose><link name="l">'
+        "<pose>7 8 9 0 0 0</pose></link></model></state>"
+    )
     same(only(tmp_path, model(SPHERE), state), Sphere("m/l/c", 7.0, 8.0, 9.0, 0.5))
     scaled = state.replace("<pose>1", "<scale>2 2 2</scale><pose>1")
     assert remarks(tmp_path, model(SPHERE), scaled) == ["left out, scaled in <state>: m"]
@@ -148,17 +187,20 @@ def test_includes_are_found_beside_the_world_and_in_the_model_path(tmp_path, mon
     def place(folder: Path, radius: float) -> None:
         folder.mkdir(parents=True)
         (folder / "model.config").write_text(
-            '<model><sdf version="1.10">new.sdf</sdf><sdf version="1.9">old.sdf</sdf></model>')
+            '<model><sdf version="1.10">new.sdf</sdf><sdf version="1.9">old.sdf</sdf></model>'
+        )
         (folder / "new.sdf").write_text(
-            f'<sdf>{model(SPHERE.replace("0.5", str(radius)), "9 9 9 0 0 0")}</sdf>')
+            f"<sdf>{model(SPHERE.replace('0.5', str(radius)), '9 9 9 0 0 0')}</sdf>"
+        )
 
     place(tmp_path / "elsewhere" / "ball", 0.25)
-    include = ("<include><uri>model://ball</uri><name>b</name><pose>1 2 3 0 0 0</pose>"
-               "</include>")
+    include = "<include><uri>model://ball</uri><name>b</name><pose>1 2 3 0 0 0</pose></include>"
     path = written(tmp_path, include, include, model(CYLINDER, "9 9 1 0 0 0"))
     monkeypatch.setenv("GAZEBO_MODEL_PATH", f"/nowhere:{tmp_path / 'elsewhere'}")
-    assert load_scene(path).obstacles[:2] == (Sphere("b/l/c", 1.0, 2.0, 3.0, 0.25),
-                                              Sphere("b/l/c_2", 1.0, 2.0, 3.0, 0.25))
+    assert load_scene(path).obstacles[:2] == (
+        Sphere("b/l/c", 1.0, 2.0, 3.0, 0.25),
+        Sphere("b/l/c_2", 1.0, 2.0, 3.0, 0.25),
+    )
     place(tmp_path / "models" / "ball", 0.75)
     assert load_scene(path).obstacles[0].radius_m == 0.75
 
@@ -170,19 +212,28 @@ def test_a_model_that_includes_itself_is_refused(tmp_path):
     assert faults(path) == ["a.world: line 2: <include>: more than 16 files inside each other"]
 
 
-@pytest.mark.parametrize("content, problem", [
-    ("<model>", "line 4, column 3: mismatched tag"),
-    (model("<box><size>1 2</size></box>"),
-     "line 3: <size>: '1 2', expected three numbers of metres"),
-    (model("<sphere><radius>-1</radius></sphere>"),
-     "line 3: <radius>: '-1', expected a number of metres, above 0"),
-    (model("<sphere><radius>nan</radius></sphere>"),
-     "line 3: <radius>: 'nan', expected a number of metres"),
-    (model("<sphere/>"), "line 3: <sphere>: <radius> is missing, expected a number of metres"),
-    (model(SPHERE, "0 0 0 0 0"), "line 3: <pose>: '0 0 0 0 0', expected x y z roll pitch yaw"),
-    ("</world><world name='v'>", "line 3: a second <world>, expected one"),
-    ("<a>" * 99 + "</a>" * 99, "line 3: more than 100 elements inside each other"),
-])
+@pytest.mark.parametrize(
+    "content, problem",
+    [
+        ("<model>", "line 4, column 3: mismatched tag"),
+        (
+            model("<box><size>1 2</size></box>"),
+            "line 3: <size>: '1 2', expected three numbers of metres",
+        ),
+        (
+            model("<sphere><radius>-1</radius></sphere>"),
+            "line 3: <radius>: '-1', expected a number of metres, above 0",
+        ),
+        (
+            model("<sphere><radius>nan</radius></sphere>"),
+            "line 3: <radius>: 'nan', expected a number of metres",
+        ),
+        (model("<sphere/>"), "line 3: <sphere>: <radius> is missing, expected a number of metres"),
+        (model(SPHERE, "0 0 0 0 0"), "line 3: <pose>: '0 0 0 0 0', expected x y z roll pitch yaw"),
+        ("</world><world name='v'>", "line 3: a second <world>, expected one"),
+        ("<a>" * 99 + "</a>" * 99, "line 3: more than 100 elements inside each other"),
+    ],
+)
 def test_faults_have_a_line(tmp_path, content, problem):
     assert faults(written(tmp_path, content)) == [f"a.world: {problem}"]
 
@@ -208,15 +259,19 @@ def test_other_xml_and_missing_files(tmp_path):
 
 
 def test_a_bare_world_is_a_scene(tmp_path):
-    path = written(tmp_path, model(BOX, f"-3 -2 1.5 0 0 {QUARTER}", name="a"),
-                   model(CYLINDER, "4 4 1 0 0 0", name="b"))
+    path = written(
+        tmp_path,
+        model(BOX, f"-3 -2 1.5 0 0 {QUARTER}", name="a"),
+        model(CYLINDER, "4 4 1 0 0 0", name="b"),
+    )
     scene = load_scene(path)
     assert (scene.name, scene.altitude_m, len(scene.obstacles)) == ("a", 1.0, 2)
     assert (scene.origin_x_m, scene.origin_y_m) == pytest.approx((-4.0, -2.5))
     assert (scene.end_x_m, scene.end_y_m) == pytest.approx((4.5, 4.5))
     assert scene.starts[0].x_m == pytest.approx(0.25) and scene.starts[0].y_m == pytest.approx(1.0)
     assert scene.remarks[0].startswith(
-        f"{path}: starts: none are given, quadcopters start at [0.25, 1.00], ")
+        f"{path}: starts: none are given, quadcopters start at [0.25, 1.00], "
+    )
 
 
 def test_an_empty_world_needs_a_scene_around_it(tmp_path):

@@ -1,4 +1,5 @@
 """Navigators among each other: bodies that follow their commands exactly, no walls."""
+
 from __future__ import annotations
 
 import math
@@ -6,30 +7,47 @@ import math
 import numpy as np
 import pytest
 
-from quad_nav.assembly import apply_configuration, build_navigator
 from quad_nav.config import load, updated
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import LETHAL
-from quad_nav.peers import IDLE_RANK_S, Intention, peer_at
-from quad_nav.tick import Located, State
+from quad_nav.navigator.tick import RobotPoses, State
+from quad_nav.peers.peer import IDLE_RANK_S, Intention, peer_at
+from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
 STEP_S = 0.1
 RADIUS_M = 0.36  # the footprint's, padding included
 TREE = {
-    "controller_frequency": 5.0, "planner_frequency": 1.0,
-    "global_costmap": {"width": 10.0, "height": 10.0, "robot_radius": 0.35,
-                       "resolution": 0.1, "update_frequency": 5.0},
-    "local_costmap": {"width": 3.0, "height": 3.0, "robot_radius": 0.35,
-                      "rolling_window": True, "update_frequency": 5.0},
-    "TrajectoryPlannerROS": {"max_vel_x": 0.3, "min_vel_x": 0.1, "holonomic_robot": False,
-                             "max_vel_theta": 1.0, "yaw_goal_tolerance": 6.3}}
+    "controller_frequency": 5.0,
+    "planner_frequency": 1.0,
+    "global_costmap": {
+        "width": 10.0,
+        "height": 10.0,
+        "robot_radius": 0.35,
+        "resolution": 0.1,
+        "update_frequency": 5.0,
+    },
+    "local_costmap": {
+        "width": 3.0,
+        "height": 3.0,
+        "robot_radius": 0.35,
+        "rolling_window": True,
+        "update_frequency": 5.0,
+    },
+    "TrajectoryPlannerROS": {
+        "max_vel_x": 0.3,
+        "min_vel_x": 0.1,
+        "holonomic_robot": False,
+        "max_vel_theta": 1.0,
+        "yaw_goal_tolerance": 6.3,
+    },
+}
 
 
 class Fleet:
     """Navigators that know each other, and their bodies."""
 
-    def __init__(self, *poses, mends=None):
-        tree = {**TREE, "mends": mends or {}}
+    def __init__(self, *poses, fixes=None):
+        tree = {**TREE, "fixes": fixes or {}}
         self.navigators = [build_navigator(load({**tree, "robot": k})) for k in range(len(poses))]
         self.poses = list(poses)
         self.velocities = [Twist2D()] * len(poses)
@@ -42,19 +60,25 @@ class Fleet:
     def fly(self, seconds, until=lambda: False):
         end_s = self.now_s + seconds
         while self.now_s < end_s and not until():
-            seen = [peer_at(f"quad{k}", pose, velocity, self.now_s, navigator.intention)
-                    for k, (pose, velocity, navigator)
-                    in enumerate(zip(self.poses, self.velocities, self.navigators))]
+            seen = [
+                peer_at(f"quad{k}", pose, velocity, self.now_s, navigator.intention)
+                for k, (pose, velocity, navigator) in enumerate(
+                    zip(self.poses, self.velocities, self.navigators)
+                )
+            ]
             for k in range(len(self.poses)):
-                self._tick(k, seen[:k] + seen[k + 1:])
+                self._tick(k, seen[:k] + seen[k + 1 :])
             self.poses = [moved(p, v) for p, v in zip(self.poses, self.velocities)]
             self.now_s += STEP_S
-            self.nearest_m = min([self.nearest_m] + [
-                a.distance_to(b) for i, a in enumerate(self.poses) for b in self.poses[:i]])
+            self.nearest_m = min(
+                [self.nearest_m]
+                + [a.distance_to(b) for i, a in enumerate(self.poses) for b in self.poses[:i]]
+            )
 
     def _tick(self, k, peers):
-        tick = self.navigators[k].tick(self.now_s, Located(self.poses[k], self.poses[k]),
-                                       self.velocities[k], peers)
+        tick = self.navigators[k].tick(
+            self.now_s, RobotPoses(self.poses[k], self.poses[k]), self.velocities[k], peers
+        )
         if tick.command is not None:
             self.velocities[k] = tick.command
         if tick.outcome is not None:
@@ -66,8 +90,9 @@ class Fleet:
 def moved(pose, velocity):
     turn, length = velocity.vyaw_radps * STEP_S, velocity.vx_mps * STEP_S
     yaw = pose.yaw_rad + 0.5 * turn
-    return Pose2D(pose.x_m + length * math.cos(yaw), pose.y_m + length * math.sin(yaw),
-                  pose.yaw_rad + turn)
+    return Pose2D(
+        pose.x_m + length * math.cos(yaw), pose.y_m + length * math.sin(yaw), pose.yaw_rad + turn
+    )
 
 
 def test_head_on_one_goes_and_the_other_makes_room():
@@ -81,7 +106,7 @@ def test_head_on_one_goes_and_the_other_makes_room():
 
 
 def test_without_the_switch_they_do_not_see_each_other():
-    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), mends={"keep_off_peers": False})
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), fixes={"avoid_peers": False})
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
     fleet.navigators[1].set_goal(Pose2D(2.0, 5.0), 0.0)
     fleet.fly(20.0)
@@ -94,7 +119,7 @@ def test_the_switch_can_be_thrown_in_flight():
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
     fleet.fly(1.0)
     assert len(fleet.navigators[0]._yielding.traffic.peers) == 1
-    off = updated(load({**TREE, "robot": 0}), "mends", {"keep_off_peers": False})
+    off = updated(load({**TREE, "robot": 0}), "fixes", {"avoid_peers": False})
     apply_configuration(fleet.navigators[0], off)
     fleet.fly(0.5)
     assert fleet.navigators[0]._yielding.traffic.peers == []
@@ -115,7 +140,7 @@ def test_an_idle_robot_on_a_goal_makes_room_and_comes_back():
 
 
 def test_an_idle_robot_that_is_told_to_stay_stays():
-    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0), mends={"make_room_when_idle": False})
+    fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0), fixes={"yield_when_idle": False})
     fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
     fleet.fly(25.0)
     assert fleet.poses[1] == Pose2D(6.0, 5.0)
@@ -140,7 +165,9 @@ def test_one_that_gets_nowhere_lets_the_others_go_first():
     here = fleet.poses[0]
     while fleet.now_s < 20.0:
         peers = [peer_at("quad1", fleet.poses[1], Twist2D(), fleet.now_s)]
-        fleet.notes[0] += navigator.tick(fleet.now_s, Located(here, here), Twist2D(), peers).notes
+        fleet.notes[0] += navigator.tick(
+            fleet.now_s, RobotPoses(here, here), Twist2D(), peers
+        ).notes
         fleet.now_s += STEP_S
     assert navigator.intention.rank_s > rank_s + 15.0
     assert any("lets the others go first" in note for note in fleet.notes[0])
@@ -153,21 +180,25 @@ def test_a_lost_peer_is_left_to_the_lidar_and_said_once():
     notes = []
     for k in range(30):  # the frame of 0 s counts for half a second
         seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 0.0)]
-        notes += navigator.tick(k * STEP_S, Located(here, here), Twist2D(), seen).notes
+        notes += navigator.tick(k * STEP_S, RobotPoses(here, here), Twist2D(), seen).notes
     assert notes == ["nothing from quad1 for 0.5 s: only the LIDAR sees it"]
     seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 3.0)]
-    assert navigator.tick(3.0, Located(here, here), Twist2D(), seen).notes == [
-        "quad1 is heard of again"]
+    assert navigator.tick(3.0, RobotPoses(here, here), Twist2D(), seen).notes == [
+        "quad1 is heard of again"
+    ]
 
 
 @pytest.mark.parametrize("age_s, is_marked", [(0.0, False), (5.0, True)])
 def test_the_lidars_points_on_a_known_peer_are_left_out(age_s, is_marked):
-    source = {"observation_sources": "scan", "obstacle_range": 5.0, "scan": {
-        "data_type": "LaserScan", "marking": True, "max_obstacle_height": 2.0}}
+    source = {
+        "observation_sources": "scan",
+        "obstacle_range": 5.0,
+        "scan": {"data_type": "LaserScan", "marking": True, "max_obstacle_height": 2.0},
+    }
     navigator = build_navigator(load({"global_costmap": source, "local_costmap": source}))
     here = Pose2D(5.0, 5.0)
     seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 10.0 - age_s)]
-    navigator.tick(10.0, Located(here, here), Twist2D(), seen)
+    navigator.tick(10.0, RobotPoses(here, here), Twist2D(), seen)
     scan = Scan(10.0, 0.0, 0.01, 0.02, 60.0, np.full(2, 1.7, dtype=np.float32))
     layer = navigator.global_costmap.layers["obstacle_layer"]
     layer.add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), 10.0)
@@ -176,19 +207,22 @@ def test_the_lidars_points_on_a_known_peer_are_left_out(age_s, is_marked):
 
 
 def test_what_the_lidar_has_marked_of_a_peer_is_forgotten_when_it_is_known():
-    source = {"observation_sources": "scan", "obstacle_range": 5.0, "scan": {
-        "data_type": "LaserScan", "marking": True, "max_obstacle_height": 2.0}}
+    source = {
+        "observation_sources": "scan",
+        "obstacle_range": 5.0,
+        "scan": {"data_type": "LaserScan", "marking": True, "max_obstacle_height": 2.0},
+    }
     navigator = build_navigator(load({"global_costmap": source, "local_costmap": source}))
     here = Pose2D(5.0, 5.0)
     layer = navigator.global_costmap.layers["obstacle_layer"]
     scan = Scan(0.0, 0.0, 0.01, 0.02, 60.0, np.full(2, 1.7, dtype=np.float32))
     layer.add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), 0.0)
-    navigator.tick(0.0, Located(here, here), Twist2D())
+    navigator.tick(0.0, RobotPoses(here, here), Twist2D())
     assert (layer.grid.costs == LETHAL).any()
     nothing = Scan(1.0, 0.0, 0.01, 0.02, 60.0, np.full(2, math.inf, dtype=np.float32))
     layer.add_scan("scan", nothing, Pose3D(5.0, 5.0, 1.0), 1.0)
     seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 1.0)]
-    navigator.tick(1.0, Located(here, here), Twist2D(), seen)
+    navigator.tick(1.0, RobotPoses(here, here), Twist2D(), seen)
     navigator.global_costmap.update(1.0, here)
     assert not (layer.grid.costs == LETHAL).any()
 
@@ -206,7 +240,7 @@ def test_what_a_robot_tells_of_itself():
     assert idle.rank_s == IDLE_RANK_S + 0.03 and not len(idle.way)
     here = Pose2D(2.0, 5.0)
     navigator.set_goal(Pose2D(4.0, 5.0), 7.0)
-    navigator.tick(7.0, Located(here, here), Twist2D())
+    navigator.tick(7.0, RobotPoses(here, here), Twist2D())
     told: Intention = navigator.intention
     assert told.rank_s == pytest.approx(7.03)
     assert len(told.way) == pytest.approx(21, abs=2)  # 2 m, a point every 0.1 m
@@ -223,19 +257,20 @@ def test_rollouts_go_round_one_that_stands_whatever_it_says():
     def solid(now_s, x_m):
         way = Intention(0.0, np.array([[x_m, 5.0], [9.0, 5.0]]))
         seen = [peer_at("quad1", Pose2D(x_m, 5.0), Twist2D(), now_s).intending(way)]
-        navigator.tick(now_s, Located(here, here), Twist2D(), seen)
+        navigator.tick(now_s, RobotPoses(here, here), Twist2D(), seen)
         navigator.local_costmap.update(now_s, here)
         return np.count_nonzero(navigator.local_costmap.costs == LETHAL)
 
     assert [solid(now_s, 6.0) for now_s in (0.0, 4.0, 7.9)] == [0, 0, 0]
-    assert solid(9.0, 6.0) * 0.05 ** 2 == pytest.approx(
-        math.pi * (RADIUS_M + 2 * 0.05) ** 2, rel=0.05)
+    assert solid(9.0, 6.0) * 0.05**2 == pytest.approx(
+        math.pi * (RADIUS_M + 2 * 0.05) ** 2, rel=0.05
+    )
     assert solid(9.2, 6.15) == 0
 
 
 def test_an_idle_robot_makes_room_for_one_that_it_has_made_stand():
     """The goal is 0.71 m from the parked one; who stands for long is taken for parked, too."""
-    fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(4.72, 6.2, -1.0), mends={"make_room_when_idle": False})
+    fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(4.72, 6.2, -1.0), fixes={"yield_when_idle": False})
     fleet.navigators[1].set_goal(Pose2D(5.5, 5.5), 0.0)
     fleet.fly(12.0)
     assert fleet.outcomes[1] == [] and fleet.poses[1].distance_to(Pose2D(4.72, 6.2)) < 0.5

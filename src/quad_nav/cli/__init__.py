@@ -2,6 +2,7 @@
 
 A command is imported when it is called, so that none waits for what it does not need.
 """
+
 from __future__ import annotations
 
 import importlib

@@ -1,4 +1,5 @@
 """``python -m quad_nav.cli`` is ``quad``."""
+
 from __future__ import annotations
 
 from quad_nav.cli import main

@@ -1,4 +1,5 @@
 """``quad barn``: the benchmark of narrow worlds, offline."""
+
 from __future__ import annotations
 
 import json
@@ -12,44 +13,92 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from quad_nav.barn.protocol import Outcome, Run
+from quad_nav.barn.results import Results, text, to_json, write_csv
+from quad_nav.barn.runs import cores, fly_all
+from quad_nav.barn.setup import BarnOptions, BarnSetup, read_barn_setup
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED, EXIT_SUCCESS
 from quad_nav.cli.parameters import parameter
 from quad_nav.errors import InputError
-from quad_nav.offline.barn.protocol import Outcome, Run
-from quad_nav.offline.barn.results import Results, text, to_json, write_csv
-from quad_nav.offline.barn.runs import cores, fly_all
-from quad_nav.offline.barn.setup import BarnOptions, BarnSetup, read_barn_setup
-from quad_nav.warm_up import simulate, warm_up
+from quad_nav.scenario.warm_up import simulate, warm_up
 
 _OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # refused now, not after an hour
 
 
 @click.command()
-@click.option("--worlds", required=True, type=click.Path(dir_okay=False, path_type=Path),
-              help="The .npz with the worlds; docs/barn.md says what is in it.")
-@click.option("--params", default="barn", show_default=True, metavar="NAME|FOLDER",
-              help="move_base's parameters: the challenge's own folder, one that comes with quad,"
-              " or yours.")
-@click.option("--set", "parameters", multiple=True, metavar="PATH=VALUE",
-              help="A parameter on top of the folder's, as global_costmap/width=60; repeatable.")
+@click.option(
+    "--worlds",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The .npz with the worlds; docs/barn.md says what is in it.",
+)
+@click.option(
+    "--params",
+    default="barn",
+    show_default=True,
+    metavar="NAME|FOLDER",
+    help="move_base's parameters: the challenge's own folder, one that comes with quad, or yours.",
+)
+@click.option(
+    "--set",
+    "parameters",
+    multiple=True,
+    metavar="PATH=VALUE",
+    help="A parameter on top of the folder's, as global_costmap/width=60; repeatable.",
+)
 @click.option("--only", metavar="NUMBERS", default="", help="These worlds, as 0,6,12.")
 @click.option("--sample", is_flag=True, help="The worlds of the official sample.")
-@click.option("--runs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
-              help="Flights through each world; the seed counts up from --seed.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
-              help="For the LIDAR's noise; the same seed gives the same figures.")
-@click.option("--body-radius", "body_radius_m", default=0.20, show_default=True, metavar="M",
-              type=click.FloatRange(min=0.0, min_open=True), help="The quadcopter's.")
-@click.option("--workers", type=click.IntRange(min=1), default=cores, metavar="N",
-              help="Flights at the same time.  [default: as many as there are cores]")
+@click.option(
+    "--runs",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Flights through each world; the seed counts up from --seed.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="For the LIDAR's noise; the same seed gives the same figures.",
+)
+@click.option(
+    "--body-radius",
+    "body_radius_m",
+    default=0.20,
+    show_default=True,
+    metavar="M",
+    type=click.FloatRange(min=0.0, min_open=True),
+    help="The quadcopter's.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=cores,
+    metavar="N",
+    help="Flights at the same time.  [default: as many as there are cores]",
+)
 @click.option("--per-world", is_flag=True, help="A row for each world.")
-@click.option("--json", "json_file", type=_OUTPUT, metavar="FILE",
-              help="Write figures and flights there; - is the terminal.")
-@click.option("--csv", "csv_file", type=_OUTPUT, metavar="FILE", help="Write a line for each"
-              " flight there.")
+@click.option(
+    "--json",
+    "json_file",
+    type=_OUTPUT,
+    metavar="FILE",
+    help="Write figures and flights there; - is the terminal.",
+)
+@click.option(
+    "--csv", "csv_file", type=_OUTPUT, metavar="FILE", help="Write a line for each flight there."
+)
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def barn(workers: int, per_world: bool, json_file: Optional[TextIO], csv_file: Optional[TextIO],
-         quiet: bool, **given: Any) -> None:
+def barn(
+    workers: int,
+    per_world: bool,
+    json_file: Optional[TextIO],
+    csv_file: Optional[TextIO],
+    quiet: bool,
+    **given: Any,
+) -> None:
     """Fly through the worlds of the BARN benchmark without ROS, several at once.
 
     From (-2.25, 3) to within 1 m of (-2.25, 13), in 100 s, without any contact. Ctrl-C ends it
@@ -124,10 +173,17 @@ class _Bar:
     def __init__(self, wanted: int, quiet: bool):
         console = Console(stderr=True)
         self._progress = Progress(
-            TextColumn("flights"), BarColumn(), MofNCompleteColumn(),
-            TextColumn("{task.fields[told]}"), TimeRemainingColumn(elapsed_when_finished=True),
-            TextColumn("left"), console=console, transient=True, speed_estimate_period=300.0,
-            disable=quiet or not console.is_terminal)
+            TextColumn("flights"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[told]}"),
+            TimeRemainingColumn(elapsed_when_finished=True),
+            TextColumn("left"),
+            console=console,
+            transient=True,
+            speed_estimate_period=300.0,
+            disable=quiet or not console.is_terminal,
+        )
         self._task = self._progress.add_task("", total=wanted, told="")
         self._start_s = time.monotonic()
 
@@ -138,9 +194,11 @@ class _Bar:
         self._progress.stop()
 
     def show(self, runs: List[Run]) -> None:
-        counts = [f"{sum(run.outcome is outcome for run in runs)} {outcome.value}"
-                  for outcome in Outcome]
+        counts = [
+            f"{sum(run.outcome is outcome for run in runs)} {outcome.value}" for outcome in Outcome
+        ]
         per_minute = 60.0 * len(runs) / max(time.monotonic() - self._start_s, 1e-3)
-        self._progress.update(self._task, completed=len(runs),
-                              told=f"{', '.join(counts)}; {per_minute:.1f} a minute")
+        self._progress.update(
+            self._task, completed=len(runs), told=f"{', '.join(counts)}; {per_minute:.1f} a minute"
+        )
         self._progress.start()

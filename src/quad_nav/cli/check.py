@@ -1,4 +1,5 @@
 """``quad check``: what is to be said about somebody's YAML."""
+
 from __future__ import annotations
 
 import shutil
@@ -8,8 +9,8 @@ from typing import List, Optional, Sequence, Tuple
 
 import click
 
-from quad_nav.check import Report, check_files, check_folder, counts, report_text
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS
+from quad_nav.config.check import Report, check_files, check_folder, counts, report_text
 from quad_nav.config.files import PlacedFile
 from quad_nav.errors import InputError
 
@@ -20,9 +21,13 @@ _COSTMAPS = ("global_costmap", "local_costmap")
 
 @click.command()
 @click.argument("paths", nargs=-1, required=True, metavar="FOLDER | [COSTMAP=]FILE...")
-@click.option("--robot", type=click.IntRange(min=0), metavar="N",
-              help="Check what robot N flies with: $(arg i) is N, and files with that number go"
-                   " before those without. Otherwise every robot with files of its own.")
+@click.option(
+    "--robot",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Check what robot N flies with: $(arg i) is N, and files with that number go"
+    " before those without. Otherwise every robot with files of its own.",
+)
 @click.option("--strict", is_flag=True, help="Remarks count: exit status 1.")
 def check(paths: Tuple[str, ...], robot: Optional[int], strict: bool) -> None:
     """Check move_base's YAML without flying.

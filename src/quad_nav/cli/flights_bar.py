@@ -1,4 +1,5 @@
 """The progress of many flights in the terminal."""
+
 from __future__ import annotations
 
 import math
@@ -21,10 +22,17 @@ class FlightsBar(Watcher):
     def __init__(self, quiet: bool) -> None:
         console = Console(stderr=True)
         self._progress = Progress(
-            TextColumn("{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(),
-            TextColumn("{task.fields[told]}"), TimeRemainingColumn(elapsed_when_finished=True),
-            TextColumn("left"), console=console, transient=True, speed_estimate_period=300.0,
-            disable=quiet or not console.is_terminal)
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[told]}"),
+            TimeRemainingColumn(elapsed_when_finished=True),
+            TextColumn("left"),
+            console=console,
+            transient=True,
+            speed_estimate_period=300.0,
+            disable=quiet or not console.is_terminal,
+        )
         self._task = self._progress.add_task("starting", total=0.0, told="")
         self._best = math.inf
         self._candidates = 0
@@ -55,8 +63,10 @@ class FlightsBar(Watcher):
     def words(self) -> str:
         """What was flown, for the end."""
         kept = f"; {self.kept} were there already" if self.kept else ""
-        return (f"{self.flights} flights in {self.wall_time_s:.0f} s, {self.per_minute:.1f} a "
-                f"minute{kept}")
+        return (
+            f"{self.flights} flights in {self.wall_time_s:.0f} s, {self.per_minute:.1f} a "
+            f"minute{kept}"
+        )
 
     def expect(self, flights: int) -> None:
         self._expected += flights
@@ -79,7 +89,6 @@ class FlightsBar(Watcher):
         words = [f"{self.per_minute:.1f} a minute", f"{self.failed} failed"]
         if self._candidates:
             words.insert(0, f"{self._candidates} candidates, best {self._best:.3f}")
-        self._progress.update(self._task, completed=self.flights + self.kept,
-                              told="; ".join(words))
+        self._progress.update(self._task, completed=self.flights + self.kept, told="; ".join(words))
         if self.flights:
             self._progress.start()

@@ -1,4 +1,5 @@
 """``quad fly``: the mission offline."""
+
 from __future__ import annotations
 
 import json
@@ -17,13 +18,13 @@ from quad_nav.cli.parameters import parameter
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import InputError
+from quad_nav.files.shipped import shipped
 from quad_nav.mission.summary import table, to_json, write_json
-from quad_nav.offline.helper import processes_for
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import INTERRUPTED
 from quad_nav.offline.run import fly as fly_setup
-from quad_nav.offline.setup import FlightOptions, FlightSetup, read_setup
-from quad_nav.shipped import shipped
+from quad_nav.offline.worker_process import processes_for
+from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import LIDAR_CASTERS, SimulationParams
 
@@ -35,53 +36,147 @@ _AMOUNT = click.FloatRange(min=0.0)
 
 
 @click.command()
-@click.option("--scene", type=_A_FILE, help="Walls, obstacles and start poses. [default: the"
-              " arena that comes with quad]")
-@click.option("--goals", type=click.Path(file_okay=False, path_type=Path),
-              help="The folder with quad0_goals.json and so on. [default: the one that comes with"
-              " quad]")
-@click.option("--config", default="default", show_default=True, metavar="NAME|FOLDER",
-              help="move_base's parameters: 'default', 'tutorial' or a folder of yours.")
-@click.option("--set", "parameters", multiple=True, metavar="PATH=VALUE",
-              help="A parameter on top of the folder's, as global_costmap/width=60; repeatable.")
-@click.option("--robots", type=click.IntRange(min=1), metavar="N",
-              help="How many quadcopters. More than two, without --scene and --goals, get a mission"
-              " at random. [default: as many as there are goal files]")
-@click.option("--size", "size_m", type=_AMOUNT, default=0.0, metavar="M",
-              help="The side of a random mission's arena. [default: with room for all]")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
-              help="For the jitter and the noise; the same seed gives the same flight.")
-@click.option("--jitter", type=_AMOUNT, default=0.0, metavar="M",
-              help="How far the start positions are displaced at random.")
-@click.option("--time-limit", "time_limit_s", type=_POSITIVE, default=math.inf, metavar="S",
-              help="End after so many simulated seconds.")
-@click.option("--scan-range", type=_POSITIVE, default=2 * math.pi, metavar="RAD",
-              help="The LIDAR's field of view. [default: all around]")
-@click.option("--beams", type=click.IntRange(min=2), default=512, show_default=True,
-              help="Beams of a scan.")
-@click.option("--lidar-rate", "scans_per_s", type=_POSITIVE, default=20.0, show_default=True,
-              metavar="HZ", help="Scans per simulated second.")
-@click.option("--range-noise", type=_AMOUNT, default=0.0, metavar="M",
-              help="Standard deviation of the LIDAR's ranges.")
-@click.option("--lidar", type=click.Choice(LIDAR_CASTERS), default="kernel", show_default=True,
-              help="Who casts the beams: our kernel, or the physics engine.")
-@click.option("--processes", type=click.IntRange(min=1), metavar="N",
-              help="Processes that share the navigators; the flight is the same. [default: one for"
-              " ten quadcopters, as many as there are cores]")
-@click.option("--json", "json_path", type=click.Path(dir_okay=False, allow_dash=True),
-              metavar="FILE", help="Write the summary there; - is the terminal.")
-@click.option("--record", type=_A_FILE, metavar="FILE.bag|FILE.mcap",
-              help="Record the topics of the ROS face, for rosbag play and RViz.")
-@click.option("--view", is_flag=False, flag_value=_LIVE, metavar="[FILE.rrd]",
-              help="Show the flight in rerun's 3D viewer as it is flown, or save it for that.")
-@click.option("--report", type=_A_FILE, metavar="FILE.html",
-              help="Write a page with pictures of the flight.")
-@click.option("--animate", type=_A_FILE, metavar="FILE",
-              help="Write an animation: .gif, or .mp4 where there is ffmpeg.")
+@click.option(
+    "--scene",
+    type=_A_FILE,
+    help="Walls, obstacles and start poses. [default: the arena that comes with quad]",
+)
+@click.option(
+    "--goals",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="The folder with quad0_goals.json and so on. [default: the one that comes with quad]",
+)
+@click.option(
+    "--config",
+    default="default",
+    show_default=True,
+    metavar="NAME|FOLDER",
+    help="move_base's parameters: 'default', 'tutorial' or a folder of yours.",
+)
+@click.option(
+    "--set",
+    "parameters",
+    multiple=True,
+    metavar="PATH=VALUE",
+    help="A parameter on top of the folder's, as global_costmap/width=60; repeatable.",
+)
+@click.option(
+    "--robots",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="How many quadcopters. More than two, without --scene and --goals, get a mission"
+    " at random. [default: as many as there are goal files]",
+)
+@click.option(
+    "--size",
+    "size_m",
+    type=_AMOUNT,
+    default=0.0,
+    metavar="M",
+    help="The side of a random mission's arena. [default: with room for all]",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="For the jitter and the noise; the same seed gives the same flight.",
+)
+@click.option(
+    "--jitter",
+    type=_AMOUNT,
+    default=0.0,
+    metavar="M",
+    help="How far the start positions are displaced at random.",
+)
+@click.option(
+    "--time-limit",
+    "time_limit_s",
+    type=_POSITIVE,
+    default=math.inf,
+    metavar="S",
+    help="End after so many simulated seconds.",
+)
+@click.option(
+    "--scan-range",
+    type=_POSITIVE,
+    default=2 * math.pi,
+    metavar="RAD",
+    help="The LIDAR's field of view. [default: all around]",
+)
+@click.option(
+    "--beams", type=click.IntRange(min=2), default=512, show_default=True, help="Beams of a scan."
+)
+@click.option(
+    "--lidar-rate",
+    "scans_per_s",
+    type=_POSITIVE,
+    default=20.0,
+    show_default=True,
+    metavar="HZ",
+    help="Scans per simulated second.",
+)
+@click.option(
+    "--range-noise",
+    type=_AMOUNT,
+    default=0.0,
+    metavar="M",
+    help="Standard deviation of the LIDAR's ranges.",
+)
+@click.option(
+    "--lidar",
+    type=click.Choice(LIDAR_CASTERS),
+    default="kernel",
+    show_default=True,
+    help="Who casts the beams: our kernel, or the physics engine.",
+)
+@click.option(
+    "--processes",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes that share the navigators; the flight is the same. [default: one for"
+    " ten quadcopters, as many as there are cores]",
+)
+@click.option(
+    "--json",
+    "json_path",
+    type=click.Path(dir_okay=False, allow_dash=True),
+    metavar="FILE",
+    help="Write the summary there; - is the terminal.",
+)
+@click.option(
+    "--record",
+    type=_A_FILE,
+    metavar="FILE.bag|FILE.mcap",
+    help="Record the topics of the ROS face, for rosbag play and RViz.",
+)
+@click.option(
+    "--view",
+    is_flag=False,
+    flag_value=_LIVE,
+    metavar="[FILE.rrd]",
+    help="Show the flight in rerun's 3D viewer as it is flown, or save it for that.",
+)
+@click.option(
+    "--report", type=_A_FILE, metavar="FILE.html", help="Write a page with pictures of the flight."
+)
+@click.option(
+    "--animate",
+    type=_A_FILE,
+    metavar="FILE",
+    help="Write an animation: .gif, or .mp4 where there is ffmpeg.",
+)
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str],
-        report: Optional[Path], animate: Optional[Path], quiet: bool,
-        processes: Optional[int], **given: Any) -> None:
+def fly(
+    json_path: Optional[str],
+    record: Optional[Path],
+    view: Optional[str],
+    report: Optional[Path],
+    animate: Optional[Path],
+    quiet: bool,
+    processes: Optional[int],
+    **given: Any,
+) -> None:
     """Fly a mission without ROS, as fast as the machine can.
 
     Ctrl-C ends the flight and keeps what was flown.
@@ -103,13 +198,22 @@ def fly(json_path: Optional[str], record: Optional[Path], view: Optional[str],
     sys.exit(_fly(setup, watchers, json_path, pictures, quiet, processes))
 
 
-def _options(scan_range: float, beams: int, range_noise: float, jitter: float, lidar: str,
-             parameters: Tuple[str, ...], **given: Any) -> FlightOptions:
+def _options(
+    scan_range: float,
+    beams: int,
+    range_noise: float,
+    jitter: float,
+    lidar: str,
+    parameters: Tuple[str, ...],
+    **given: Any,
+) -> FlightOptions:
     """The options as a person gives them."""
     beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
     options = FlightOptions(
-        **given, parameters=tuple(map(parameter, parameters)),
-        simulation=SimulationParams(beam_params, jitter_m=jitter, lidar_caster=lidar))
+        **given,
+        parameters=tuple(map(parameter, parameters)),
+        simulation=SimulationParams(beam_params, jitter_m=jitter, lidar_caster=lidar),
+    )
     few = (options.robots or 0) <= _TUTORIAL_ROBOTS and not options.size_m
     if few and options.scene is None and options.goals is None:
         return replace(options, goals=shipped("goals"))
@@ -120,16 +224,24 @@ def _watchers(record: Optional[Path], view: Optional[str]) -> List[FlightObserve
     """Imported here: who neither records nor looks need not wait for it."""
     watchers: List[FlightObserver] = []
     if record is not None:
-        from quad_nav.offline.record import Recorder
+        from quad_nav.recording.recorder import Recorder
+
         watchers.append(Recorder(record))
     if view is not None:
-        from quad_nav.offline.view import View
+        from quad_nav.recording.viewer import View
+
         watchers.append(View(None if view == _LIVE else Path(view)))
     return watchers
 
 
-def _fly(setup: FlightSetup, watchers: Sequence[FlightObserver], json_path: Optional[str],
-         pictures: FlightPictures, quiet: bool, processes: int) -> int:
+def _fly(
+    setup: FlightSetup,
+    watchers: Sequence[FlightObserver],
+    json_path: Optional[str],
+    pictures: FlightPictures,
+    quiet: bool,
+    processes: int,
+) -> int:
     observers = [*watchers, *pictures.observers]
     if not quiet:
         observers.append(ProgressBar())
@@ -156,8 +268,7 @@ def _stop_on_signal() -> Iterator[Callable[[], bool]]:
         received.append(number)
         signal.signal(number, before[signal.Signals(number)])
 
-    before = {number: signal.signal(number, receive)
-              for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, receive) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield lambda: bool(received)
     finally:

@@ -1,12 +1,13 @@
 """Parameters on the command line."""
+
 from __future__ import annotations
 
 from typing import Any, Tuple
 
 import yaml
 
-from quad_nav import plain_yaml
 from quad_nav.errors import InputError
+from quad_nav.files import plain_yaml
 
 
 def parameter(text: str) -> Tuple[str, Any]:
@@ -21,5 +22,9 @@ def parameter(text: str) -> Tuple[str, Any]:
     try:
         return path, plain_yaml.load(value)
     except yaml.YAMLError as error:
-        raise InputError([f"--set {text}: {value!r} is not YAML, expected a value as in a "
-                          f"parameter file: {error}"]) from error
+        raise InputError(
+            [
+                f"--set {text}: {value!r} is not YAML, expected a value as in a "
+                f"parameter file: {error}"
+            ]
+        ) from error

@@ -1,4 +1,5 @@
 """Report and animation of a flight that is flown now."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -7,8 +8,8 @@ from typing import Iterator, Optional, Tuple
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.setup import FlightSetup
-from quad_nav.offline.trace import TraceObserver
+from quad_nav.recording.trace import TraceObserver
+from quad_nav.scenario.flight_setup import FlightSetup
 
 
 class FlightPictures:
@@ -22,9 +23,11 @@ class FlightPictures:
         self._report, self._animation = report, animation
         count = len(setup.robots)
         self._observer = TraceObserver(
-            f"{setup.scene.name}, {count} quadcopter{'s' * (count > 1)}, {setup.config_name}")
+            f"{setup.scene.name}, {count} quadcopter{'s' * (count > 1)}, {setup.config_name}"
+        )
         if animation is not None:
-            from quad_nav.offline.report.animation import animation_faults
+            from quad_nav.report.animation import animation_faults
+
             faults = animation_faults(animation)
             if faults:
                 raise InputError(faults)
@@ -39,10 +42,12 @@ class FlightPictures:
             return
         trace = self._observer.trace(summary.contacts, summary.reason)
         if self._report is not None:
-            from quad_nav.offline.report.write import write_report
+            from quad_nav.report.write import write_report
+
             write_report(trace, self._report, wall_time_s=summary.wall_time_s)
             yield f"report: {self._report}"
         if self._animation is not None:
-            from quad_nav.offline.report.animation import animate_flight
+            from quad_nav.report.animation import animate_flight
+
             animate_flight(trace, self._animation)
             yield f"animation: {self._animation}"

@@ -1,4 +1,5 @@
 """The progress of a flight in the terminal."""
+
 from __future__ import annotations
 
 import time
@@ -22,9 +23,16 @@ class ProgressBar(FlightObserver):
     def __init__(self) -> None:
         console = Console(stderr=True)
         self._progress = Progress(
-            TextColumn("goals"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f}"),
-            TextColumn("{task.fields[sim]}"), TimeElapsedColumn(), console=console,
-            auto_refresh=False, transient=True, disable=not console.is_terminal)
+            TextColumn("goals"),
+            BarColumn(),
+            TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+            TextColumn("{task.fields[sim]}"),
+            TimeElapsedColumn(),
+            console=console,
+            auto_refresh=False,
+            transient=True,
+            disable=not console.is_terminal,
+        )
         self._task: Optional[TaskID] = None
         self._ended = 0
         self._start_s = self._shown_s = 0.0
@@ -46,8 +54,12 @@ class ProgressBar(FlightObserver):
         self._shown_s = wall_s
         assert self._task is not None
         speed = flight.now_s / max(wall_s - self._start_s, 1e-3)
-        self._progress.update(self._task, completed=self._ended, refresh=True,
-                              sim=f"{flight.now_s:.1f} s simulated, {speed:.0f} x real time")
+        self._progress.update(
+            self._task,
+            completed=self._ended,
+            refresh=True,
+            sim=f"{flight.now_s:.1f} s simulated, {speed:.0f} x real time",
+        )
 
     def ended(self, flight: Flight) -> None:
         self._progress.stop()

@@ -1,4 +1,5 @@
 """``quad report``: pictures and a page of recorded flights."""
+
 from __future__ import annotations
 
 import sys
@@ -14,22 +15,39 @@ from quad_nav.cli import EXIT_BAD_INPUT
 from quad_nav.errors import InputError
 
 if TYPE_CHECKING:
-    from quad_nav.offline.trace import FlightTrace
+    from quad_nav.recording.trace import FlightTrace
 
 T = TypeVar("T")
 
 
 @click.command()
-@click.argument("flights", nargs=-1, required=True, metavar="FLIGHT...",
-                type=click.Path(path_type=Path))
-@click.option("--output", "-o", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
-              default=Path("report.html"), show_default=True, help="The page.")
-@click.option("--png", type=click.Path(file_okay=False, path_type=Path), metavar="FOLDER",
-              help="Write every picture there as well.")
-@click.option("--animate", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
-              help="Write an animation of the one FLIGHT: .gif, or .mp4 where there is ffmpeg.")
-def report(flights: Tuple[Path, ...], output: Path, png: Optional[Path],
-           animate: Optional[Path]) -> None:
+@click.argument(
+    "flights", nargs=-1, required=True, metavar="FLIGHT...", type=click.Path(path_type=Path)
+)
+@click.option(
+    "--output",
+    "-o",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    default=Path("report.html"),
+    show_default=True,
+    help="The page.",
+)
+@click.option(
+    "--png",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="FOLDER",
+    help="Write every picture there as well.",
+)
+@click.option(
+    "--animate",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write an animation of the one FLIGHT: .gif, or .mp4 where there is ffmpeg.",
+)
+def report(
+    flights: Tuple[Path, ...], output: Path, png: Optional[Path], animate: Optional[Path]
+) -> None:
     """Make a page with pictures of a recorded flight, or compare several.
 
     A FLIGHT is a bag or MCAP of quad fly --record, or a bag of rosbag record during roslaunch. The
@@ -37,9 +55,9 @@ def report(flights: Tuple[Path, ...], output: Path, png: Optional[Path],
 
     Exit status: 0, or 2 for input that cannot be used.
     """
-    from quad_nav.offline.report.animation import animate_flight, animation_faults
-    from quad_nav.offline.report.figures import figures
-    from quad_nav.offline.report.write import write_comparison, write_report
+    from quad_nav.report.animation import animate_flight, animation_faults
+    from quad_nav.report.figures import figures
+    from quad_nav.report.write import write_comparison, write_report
 
     try:
         faults = animation_faults(animate, len(flights)) if animate is not None else []
@@ -57,20 +75,23 @@ def report(flights: Tuple[Path, ...], output: Path, png: Optional[Path],
         click.echo(f"animation: {animate}")
 
 
-def _read(flights: Sequence[Path], reduce: Callable[[FlightTrace], T], faults: Sequence[str]
-          ) -> List[T]:
+def _read(
+    flights: Sequence[Path], reduce: Callable[[FlightTrace], T], faults: Sequence[str]
+) -> List[T]:
     """What ``reduce`` makes of each flight's trace; traces of many would fill the memory.
 
     Raises:
         InputError: the ``faults`` that were known before, and a line for every flight that cannot
             be read.
     """
-    from quad_nav.offline.bag_trace import read_trace
+    from quad_nav.recording.bag_trace import read_trace
+
     console = Console(stderr=True)
     found: List[T] = []
     problems = list(faults)
-    for path in track(flights, "reading", console=console, transient=True,
-                      disable=not console.is_terminal):
+    for path in track(
+        flights, "reading", console=console, transient=True, disable=not console.is_terminal
+    ):
         try:
             found.append(reduce(replace(read_trace(path), title=path.name)))
         except InputError as error:

@@ -1,4 +1,5 @@
 """``quad sweep``: how flights change with a parameter or two, offline."""
+
 from __future__ import annotations
 
 import json
@@ -10,7 +11,6 @@ from typing import Any, List, Optional, Sequence, TextIO, Tuple
 import click
 import yaml
 
-from quad_nav import plain_yaml
 from quad_nav.cli import EXIT_INTERRUPTED, EXIT_SUCCESS
 from quad_nav.cli.flights_bar import FlightsBar
 from quad_nav.cli.study_options import (
@@ -25,6 +25,7 @@ from quad_nav.cli.study_options import (
     workers_of,
 )
 from quad_nav.errors import InputError
+from quad_nav.files import plain_yaml
 from quad_nav.tuning.journal import Journal
 from quad_nav.tuning.sweep import (
     Point,
@@ -43,28 +44,63 @@ _OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # refused now, not afte
 
 
 @click.command()
-@click.option("--over", multiple=True, metavar="PATH=A,B,...", help="Values of a parameter;"
-              " repeatable for every combination. lidar/range, lidar/scan_range, lidar/beams and"
-              " lidar/noise are the LIDAR's own.")
-@click.option("--points", type=A_FILE, metavar="FILE.csv", help="Points instead: paths in the first"
-              " line, values in the others.")
+@click.option(
+    "--over",
+    multiple=True,
+    metavar="PATH=A,B,...",
+    help="Values of a parameter;"
+    " repeatable for every combination. lidar/range, lidar/scan_range, lidar/beams and"
+    " lidar/noise are the LIDAR's own.",
+)
+@click.option(
+    "--points",
+    type=A_FILE,
+    metavar="FILE.csv",
+    help="Points instead: paths in the first line, values in the others.",
+)
 @flown_options
-@click.option("--flights", type=COUNT, default=8, show_default=True, metavar="N",
-              help="Flights of each point.")
+@click.option(
+    "--flights",
+    type=COUNT,
+    default=8,
+    show_default=True,
+    metavar="N",
+    help="Flights of each point.",
+)
 @worker_options
-@click.option("--journal", type=A_FILE, metavar="FILE", help="Keep every flight there, and take"
-              " from there what was flown before.")
-@click.option("--json", "json_file", type=_OUTPUT, metavar="FILE",
-              help="Write points, figures and flights there; - is the terminal.")
-@click.option("--csv", "csv_file", type=_OUTPUT, metavar="FILE", help="Write a line for each point"
-              " there.")
+@click.option(
+    "--journal",
+    type=A_FILE,
+    metavar="FILE",
+    help="Keep every flight there, and take from there what was flown before.",
+)
+@click.option(
+    "--json",
+    "json_file",
+    type=_OUTPUT,
+    metavar="FILE",
+    help="Write points, figures and flights there; - is the terminal.",
+)
+@click.option(
+    "--csv", "csv_file", type=_OUTPUT, metavar="FILE", help="Write a line for each point there."
+)
 @click.option("--report", type=A_FILE, metavar="FILE.html", help="Write a page with pictures.")
 @click.option("--png", type=A_FOLDER, metavar="FOLDER", help="Write the pictures there.")
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def sweep(over: Tuple[str, ...], points: Optional[Path], flights: int, workers: Optional[int],
-          ray_address: Optional[str], journal: Optional[Path], quiet: bool,
-          report: Optional[Path], png: Optional[Path], json_file: Optional[TextIO],
-          csv_file: Optional[TextIO], **given: Any) -> None:
+def sweep(
+    over: Tuple[str, ...],
+    points: Optional[Path],
+    flights: int,
+    workers: Optional[int],
+    ray_address: Optional[str],
+    journal: Optional[Path],
+    quiet: bool,
+    report: Optional[Path],
+    png: Optional[Path],
+    json_file: Optional[TextIO],
+    csv_file: Optional[TextIO],
+    **given: Any,
+) -> None:
     """Fly with several values of some parameters, without ROS, and compare.
 
     Every point flies the same flights.
@@ -79,12 +115,16 @@ def sweep(over: Tuple[str, ...], points: Optional[Path], flights: int, workers: 
         if not quiet:
             for warning in setup.warnings:
                 click.echo(warning, err=True)
-            click.echo(f"{len(setup.points)} points, {flights} flights each, {crew.count} flights "
-                       "at a time", err=True)
+            click.echo(
+                f"{len(setup.points)} points, {flights} flights each, {crew.count} flights "
+                "at a time",
+                err=True,
+            )
         rows = _run(setup, crew, Journal(journal), quiet)
     if not quiet:
-        to_terminal = any(file is not None and file.name == "<stdout>"
-                          for file in (json_file, csv_file))
+        to_terminal = any(
+            file is not None and file.name == "<stdout>" for file in (json_file, csv_file)
+        )
         click.echo(table(rows), err=to_terminal)
     if json_file is not None:
         click.echo(json.dumps(to_json(setup, rows), indent=2, allow_nan=False), json_file)
@@ -132,18 +172,21 @@ def _axis(text: str) -> Tuple[str, List[Any]]:
     except yaml.YAMLError:
         values = []
     if not values or any(isinstance(value, (dict, list)) or value is None for value in values):
-        raise InputError([f"--over {text}: expected PATH=A,B,..., as "
-                          "TrajectoryPlannerROS/max_vel_x=0.2,0.3,0.5"])
+        raise InputError(
+            [f"--over {text}: expected PATH=A,B,..., as TrajectoryPlannerROS/max_vel_x=0.2,0.3,0.5"]
+        )
     if len({repr(value) for value in values}) < len(values):
         raise InputError([f"--over {text}: a value is there twice, expected each once"])
     return path, values
 
 
-def _draw(setup: SweepSetup, rows: Sequence[SweepRow], report: Optional[Path],
-          png: Optional[Path]) -> None:
+def _draw(
+    setup: SweepSetup, rows: Sequence[SweepRow], report: Optional[Path], png: Optional[Path]
+) -> None:
     """Imported here: who wants no pictures need not wait for them."""
     if report is None and png is None:
         return
     from quad_nav.tuning.report.sweep_page import write_sweep_report
+
     for path in write_sweep_report(setup, rows, report, png):
         click.echo(f"written: {path}", err=True)

@@ -1,4 +1,5 @@
 """``quad tune``: better parameters by many flights, offline."""
+
 from __future__ import annotations
 
 import shlex
@@ -32,32 +33,88 @@ from quad_nav.tuning.write import write_result
 
 @click.command()
 @flown_options
-@click.option("--held-out-scene", "held_out_scenes", type=A_FILE, multiple=True,
-              help="A scene that the search never sees; repeatable, each with its goals. [default:"
-              " the search's scenes with other seeds; of BARN the official sample]")
+@click.option(
+    "--held-out-scene",
+    "held_out_scenes",
+    type=A_FILE,
+    multiple=True,
+    help="A scene that the search never sees; repeatable, each with its goals. [default:"
+    " the search's scenes with other seeds; of BARN the official sample]",
+)
 @click.option("--held-out-goals", type=A_FOLDER, multiple=True, help="The goals for it.")
-@click.option("--space", type=A_FILE, help="Which parameters are searched, and between what."
-              " [default: spaces/default.yaml of quad, or barn.yaml, or dwa.yaml]")
-@click.option("--candidates", type=COUNT, default=60, show_default=True, metavar="N",
-              help="Sets of parameters to try. A study can be continued with more.")
-@click.option("--flights", type=COUNT, default=8, show_default=True, metavar="N",
-              help="Flights of each that is not dropped before.")
-@click.option("--finalists", type=COUNT, default=4, show_default=True, metavar="N",
-              help="The best so many fly --final-flights.")
-@click.option("--final-flights", type=COUNT, default=16, show_default=True, metavar="N",
-              help="Flights that decide between them.")
-@click.option("--held-out", type=COUNT, metavar="N", help="Flights with seeds that the search never"
-              " sees, for the figures. [default: 20, of BARN 50]")
-@click.option("--against", multiple=True, metavar="NAME|FOLDER", help="Fly these parameters too, as"
-              " they are, where the search never was; repeatable.")
-@click.option("--generation", type=COUNT, default=8, show_default=True, metavar="N",
-              help="Candidates at a time. It changes what is found; --workers does not.")
+@click.option(
+    "--space",
+    type=A_FILE,
+    help="Which parameters are searched, and between what."
+    " [default: spaces/default.yaml of quad, or barn.yaml, or dwa.yaml]",
+)
+@click.option(
+    "--candidates",
+    type=COUNT,
+    default=60,
+    show_default=True,
+    metavar="N",
+    help="Sets of parameters to try. A study can be continued with more.",
+)
+@click.option(
+    "--flights",
+    type=COUNT,
+    default=8,
+    show_default=True,
+    metavar="N",
+    help="Flights of each that is not dropped before.",
+)
+@click.option(
+    "--finalists",
+    type=COUNT,
+    default=4,
+    show_default=True,
+    metavar="N",
+    help="The best so many fly --final-flights.",
+)
+@click.option(
+    "--final-flights",
+    type=COUNT,
+    default=16,
+    show_default=True,
+    metavar="N",
+    help="Flights that decide between them.",
+)
+@click.option(
+    "--held-out",
+    type=COUNT,
+    metavar="N",
+    help="Flights with seeds that the search never"
+    " sees, for the figures. [default: 20, of BARN 50]",
+)
+@click.option(
+    "--against",
+    multiple=True,
+    metavar="NAME|FOLDER",
+    help="Fly these parameters too, as they are, where the search never was; repeatable.",
+)
+@click.option(
+    "--generation",
+    type=COUNT,
+    default=8,
+    show_default=True,
+    metavar="N",
+    help="Candidates at a time. It changes what is found; --workers does not.",
+)
 @worker_options
-@click.option("--output", "-o", type=A_FOLDER, default=Path("tuned"), show_default=True,
-              metavar="FOLDER", help="For the parameters, the study and the report.")
+@click.option(
+    "--output",
+    "-o",
+    type=A_FOLDER,
+    default=Path("tuned"),
+    show_default=True,
+    metavar="FOLDER",
+    help="For the parameters, the study and the report.",
+)
 @click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
-def tune(workers: Optional[int], ray_address: Optional[str], output: Path, quiet: bool,
-         **given: Any) -> None:
+def tune(
+    workers: Optional[int], ray_address: Optional[str], output: Path, quiet: bool, **given: Any
+) -> None:
     """Search for parameters that fly better, without ROS.
 
     Every candidate flies the same flights. What is found is written to --output as move_base's
@@ -81,24 +138,43 @@ def tune(workers: Optional[int], ray_address: Optional[str], output: Path, quiet
     sys.exit(EXIT_SUCCESS)
 
 
-def _options(output: Path, space: Optional[Path], candidates: int, flights: int, finalists: int,
-             final_flights: int, held_out: Optional[int], against: Tuple[str, ...],
-             generation: int, held_out_scenes: Tuple[Path, ...],
-             held_out_goals: Tuple[Path, ...], **given: Any) -> TuneOptions:
+def _options(
+    output: Path,
+    space: Optional[Path],
+    candidates: int,
+    flights: int,
+    finalists: int,
+    final_flights: int,
+    held_out: Optional[int],
+    against: Tuple[str, ...],
+    generation: int,
+    held_out_scenes: Tuple[Path, ...],
+    held_out_goals: Tuple[Path, ...],
+    **given: Any,
+) -> TuneOptions:
     course = course_of(**given, held_out=missions_of(held_out_scenes, held_out_goals, "held-out-"))
     default = 20 if given["worlds"] is None else 50
-    return TuneOptions(course, output, space,
-                       SearchOptions(candidates, flights, generation, given["seed"]),
-                       finalists, final_flights, held_out or default, against)
+    return TuneOptions(
+        course,
+        output,
+        space,
+        SearchOptions(candidates, flights, generation, given["seed"]),
+        finalists,
+        final_flights,
+        held_out or default,
+        against,
+    )
 
 
 def _announce(setup: TuneSetup, workers: Workers) -> None:
     for warning in setup.warnings:
         click.echo(warning, err=True)
     search = setup.options.search
-    click.echo(f"{search.candidates} candidates of up to {search.flights} flights, "
-               f"{len(setup.space.dimensions)} parameters, {workers.count} flights at a time",
-               err=True)
+    click.echo(
+        f"{search.candidates} candidates of up to {search.flights} flights, "
+        f"{len(setup.space.dimensions)} parameters, {workers.count} flights at a time",
+        err=True,
+    )
 
 
 def _run(setup: TuneSetup, workers: Workers, quiet: bool) -> TuneResult:
@@ -111,8 +187,11 @@ def _run(setup: TuneSetup, workers: Workers, quiet: bool) -> TuneResult:
             result = run_tune(setup, workers, bar)
         except KeyboardInterrupt:
             bar.__exit__()
-            click.echo(f"interrupted; {bar.flights + bar.kept} flights are kept, the same command "
-                       "goes on from here", err=True)
+            click.echo(
+                f"interrupted; {bar.flights + bar.kept} flights are kept, the same command "
+                "goes on from here",
+                err=True,
+            )
             sys.exit(EXIT_INTERRUPTED)
     if not quiet:
         click.echo(bar.words, err=True)

@@ -11,6 +11,7 @@ are), ``reader`` (how a namespace is checked), ``costmaps``, ``layers``,
 ``planners`` and ``recoveries`` (what move_base makes of each), ``configuration``
 (the whole), ``reconfiguration`` (changes in flight) and ``files`` (YAML).
 """
+
 from __future__ import annotations
 
 from quad_nav.config.configuration import Configuration, load
@@ -19,5 +20,13 @@ from quad_nav.config.notes import Remark
 from quad_nav.config.reconfiguration import reconfigurable, updated, values
 from quad_nav.config.spec import Parameter
 
-__all__ = ["Configuration", "Parameter", "Remark", "load", "load_files", "reconfigurable",
-           "updated", "values"]
+__all__ = [
+    "Configuration",
+    "Parameter",
+    "Remark",
+    "load",
+    "load_files",
+    "reconfigurable",
+    "updated",
+    "values",
+]

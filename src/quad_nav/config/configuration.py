@@ -1,4 +1,5 @@
 """A whole configuration, made from a parameter tree."""
+
 from __future__ import annotations
 
 import copy
@@ -16,6 +17,7 @@ from quad_nav.config.planners import (
     settle_planner_names,
     settle_planners,
 )
+from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import fields, settle, subtree
 from quad_nav.config.recoveries import (
     NamedTypes,
@@ -28,11 +30,10 @@ from quad_nav.config.recoveries import (
 from quad_nav.config.workload import workload_problems
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.errors import InputError
-from quad_nav.mends import Mends
-from quad_nav.navigator import NavigatorParams
-from quad_nav.plugins import plugin_name
+from quad_nav.navigator.fixes import Fixes
+from quad_nav.navigator.navigator import NavigatorParams
 
-MENDS = "mends"
+MENDS = "fixes"
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards, so they may stand at the node's level.
 _INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
@@ -52,7 +53,7 @@ class Configuration:
     """
 
     navigator: NavigatorParams
-    mends: Mends
+    fixes: Fixes
     global_costmap: CostmapParams
     local_costmap: CostmapParams
     global_planner: Any
@@ -106,7 +107,7 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
     pruned = _without_empty(settled)
     configuration = Configuration(
         navigator=navigator_params(settled, listed, given=tree),
-        mends=mends_of(settled),
+        fixes=fixes_of(settled),
         global_costmap=costmaps[0],
         local_costmap=costmaps[1],
         global_planner=planner_params(settled, "base_global_planner"),
@@ -118,30 +119,39 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
         robots=settled.get("robots", 1),
         remarks=tuple(notes.remarks),
         tree=pruned,
-        tree_at_start=pruned)
+        tree_at_start=pruned,
+    )
     for name, problem in workload_problems(configuration):
         notes.problem(name, problem)
     notes.raise_problems()
     return configuration
 
 
-def navigator_params(tree: Mapping[str, Any], listed: Optional[NamedTypes],
-                     given: Iterable[str]) -> NavigatorParams:
+def navigator_params(
+    tree: Mapping[str, Any], listed: Optional[NamedTypes], given: Iterable[str]
+) -> NavigatorParams:
     """The dataclass of a settled tree; ``given`` are the keys that somebody set."""
-    return NavigatorParams(recovery_behaviors=listed,
-                           **fields(tree, tables.NAVIGATOR.parameters, given))
+    return NavigatorParams(
+        recovery_behaviors=listed, **fields(tree, tables.NAVIGATOR.parameters, given)
+    )
 
 
-def mends_of(tree: Mapping[str, Any]) -> Mends:
+def fixes_of(tree: Mapping[str, Any]) -> Fixes:
     """The switches of a settled tree."""
-    return Mends(**fields(tree[MENDS], tables.MENDS.parameters))
+    return Fixes(**fields(tree[MENDS], tables.MENDS.parameters))
 
 
 def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     """Brings the whole tree into the state in which the original leaves it."""
     settle_planner_names(tree, notes)
-    known = [*COSTMAPS, MENDS, *planner_keys(tree), *_INHERITED, "recovery_behaviors",
-             *listed_names(tree)]
+    known = [
+        *COSTMAPS,
+        MENDS,
+        *planner_keys(tree),
+        *_INHERITED,
+        "recovery_behaviors",
+        *listed_names(tree),
+    ]
     settle(tree, "", tables.NAVIGATOR, notes, also_known=known)
     settle_planners(tree, notes)
     settle(subtree(tree, MENDS, "", notes), MENDS, tables.MENDS, notes)
@@ -155,8 +165,11 @@ def _remark_on_rates(tree: Mapping[str, Any], notes: Notes) -> None:
     loop_hz = tree["controller_frequency"]
     if own_hz is not None and own_hz != loop_hz:
         planner = plugin_name(tree["base_local_planner"])
-        notes.remark(join(planner, "controller_frequency"), CAUTION,
-                     f"rollouts reckon with {own_hz} Hz, while the loop runs at {loop_hz} Hz")
+        notes.remark(
+            join(planner, "controller_frequency"),
+            CAUTION,
+            f"rollouts reckon with {own_hz} Hz, while the loop runs at {loop_hz} Hz",
+        )
 
 
 def _without_empty(tree: Mapping[str, Any]) -> Dict[str, Any]:

@@ -3,6 +3,7 @@
 As in ``tables``; the descriptions are Costmap2D, ObstaclePlugin, VoxelPlugin,
 InflationPlugin and GenericPlugin.
 """
+
 from __future__ import annotations
 
 from quad_nav.config.spec import Choice, Domain, Table, double, flag, integer, text
@@ -14,146 +15,409 @@ ENABLED = flag("enabled", True, "enabled", "Whether to apply this plugin or not"
 
 COSTMAP = Table(
     reconfigurable=(
-        double("transform_tolerance", 0.3, "transform_tolerance_s", "seconds",
-                "Specifies the delay in transform (tf) data that is tolerable in seconds.",
-                low=0, high=10),
-        double("update_frequency", 5.0, "update_frequency_hz", "Hz",
-                "The frequency in Hz for the map to be updated.", low=0, high=100),
-        double("publish_frequency", 0.0, "publish_frequency_hz", "Hz",
-                "The frequency in Hz for the map to publish display information.",
-                low=0, high=100),
-        integer("width", 10, "width_m", "metres", "The width of the map in meters.", _POSITIVE,
-                0, convert=float),
-        integer("height", 10, "height_m", "metres", "The height of the map in meters.", _POSITIVE,
-                0, convert=float),
-        double("resolution", 0.05, "resolution_m", "metres",
-                "The resolution of the map in meters/cell.", _POSITIVE, 0, 50),
-        double("origin_x", 0.0, "origin_x_m", "metres",
-                "The x origin of the map in the global frame in meters.", _ANY),
-        double("origin_y", 0.0, "origin_y_m", "metres",
-                "The y origin of the map in the global frame in meters.", _ANY),
-        text("footprint", "[]", "footprint", "a list [[x1, y1], [x2, y2], [x3, y3], ...] of metres",
-             "The footprint of the robot specified in the robot_base_frame coordinate frame as a"
-             " list in the format: [ [x1, y1], [x2, y2], ...., [xn, yn] ].",
-             convert=polygon_from_text),
-        double("robot_radius", 0.46, "robot_radius_m", "metres",
-                "The radius of the robot in meters, this parameter should only be set for"
-                " circular robots, all others should use the footprint parameter described"
-                " above.", low=0, high=10),
-        double("footprint_padding", 0.01, "footprint_padding_m", "metres",
-                "How much to pad (increase the size of) the footprint, in meters.", _ANY)),
+        double(
+            "transform_tolerance",
+            0.3,
+            "transform_tolerance_s",
+            "seconds",
+            "Specifies the delay in transform (tf) data that is tolerable in seconds.",
+            low=0,
+            high=10,
+        ),
+        double(
+            "update_frequency",
+            5.0,
+            "update_frequency_hz",
+            "Hz",
+            "The frequency in Hz for the map to be updated.",
+            low=0,
+            high=100,
+        ),
+        double(
+            "publish_frequency",
+            0.0,
+            "publish_frequency_hz",
+            "Hz",
+            "The frequency in Hz for the map to publish display information.",
+            low=0,
+            high=100,
+        ),
+        integer(
+            "width",
+            10,
+            "width_m",
+            "metres",
+            "The width of the map in meters.",
+            _POSITIVE,
+            0,
+            convert=float,
+        ),
+        integer(
+            "height",
+            10,
+            "height_m",
+            "metres",
+            "The height of the map in meters.",
+            _POSITIVE,
+            0,
+            convert=float,
+        ),
+        double(
+            "resolution",
+            0.05,
+            "resolution_m",
+            "metres",
+            "The resolution of the map in meters/cell.",
+            _POSITIVE,
+            0,
+            50,
+        ),
+        double(
+            "origin_x",
+            0.0,
+            "origin_x_m",
+            "metres",
+            "The x origin of the map in the global frame in meters.",
+            _ANY,
+        ),
+        double(
+            "origin_y",
+            0.0,
+            "origin_y_m",
+            "metres",
+            "The y origin of the map in the global frame in meters.",
+            _ANY,
+        ),
+        text(
+            "footprint",
+            "[]",
+            "footprint",
+            "a list [[x1, y1], [x2, y2], [x3, y3], ...] of metres",
+            "The footprint of the robot specified in the robot_base_frame coordinate frame as a"
+            " list in the format: [ [x1, y1], [x2, y2], ...., [xn, yn] ].",
+            convert=polygon_from_text,
+        ),
+        double(
+            "robot_radius",
+            0.46,
+            "robot_radius_m",
+            "metres",
+            "The radius of the robot in meters, this parameter should only be set for"
+            " circular robots, all others should use the footprint parameter described"
+            " above.",
+            low=0,
+            high=10,
+        ),
+        double(
+            "footprint_padding",
+            0.01,
+            "footprint_padding_m",
+            "metres",
+            "How much to pad (increase the size of) the footprint, in meters.",
+            _ANY,
+        ),
+    ),
     fixed=(
         text("global_frame", "map", "global_frame", "a frame's name", "The costmap's frame."),
-        text("robot_base_frame", "base_link", "robot_base_frame", "a frame's name",
-             "The robot's frame."),
+        text(
+            "robot_base_frame",
+            "base_link",
+            "robot_base_frame",
+            "a frame's name",
+            "The robot's frame.",
+        ),
         flag("rolling_window", False, "rolling_window", "The map moves with the robot."),
-        flag("track_unknown_space", False, "track_unknown_space",
-              "Cells are unknown, not free, until they are seen."),
-        flag("always_send_full_costmap", False, "always_send_full_costmap",
-              "Publish the whole grid, never an update."),
+        flag(
+            "track_unknown_space",
+            False,
+            "track_unknown_space",
+            "Cells are unknown, not free, until they are seen.",
+        ),
+        flag(
+            "always_send_full_costmap",
+            False,
+            "always_send_full_costmap",
+            "Publish the whole grid, never an update.",
+        ),
         double("inscribed_radius", 0.325, "", "metres", "Of local_costmap: read and never used."),
-        double("circumscribed_radius", 0.46, "", "metres",
-                "Of local_costmap: a quarter of aggressive_reset/reset_distance.")))
+        double(
+            "circumscribed_radius",
+            0.46,
+            "",
+            "metres",
+            "Of local_costmap: a quarter of aggressive_reset/reset_distance.",
+        ),
+    ),
+)
 
-_FOOTPRINT_CLEARING = flag("footprint_clearing_enabled", True, "footprint_clearing_enabled",
-                           "Whether to clear the robot's footprint of lethal obstacles")
+_FOOTPRINT_CLEARING = flag(
+    "footprint_clearing_enabled",
+    True,
+    "footprint_clearing_enabled",
+    "Whether to clear the robot's footprint of lethal obstacles",
+)
 _MAX_OBSTACLE_HEIGHT = double(
-    "max_obstacle_height", 2.0, "max_obstacle_height_m", "metres",
-    "The maximum height of any obstacle to be inserted into the costmap in meters.", _ANY, 0, 50)
+    "max_obstacle_height",
+    2.0,
+    "max_obstacle_height_m",
+    "metres",
+    "The maximum height of any obstacle to be inserted into the costmap in meters.",
+    _ANY,
+    0,
+    50,
+)
 _COMBINATION_METHOD = integer(
-    "combination_method", 1, "combination_method", "", "Method for combining two layers",
-    choices=(Choice("Overwrite", 0, "Overwrite values"),
-             Choice("Maximum", 1, "Take the maximum of the values"),
-             Choice("Nothing", 99, "Do nothing")),
-    choices_description="Method for combining layers enum")
+    "combination_method",
+    1,
+    "combination_method",
+    "",
+    "Method for combining two layers",
+    choices=(
+        Choice("Overwrite", 0, "Overwrite values"),
+        Choice("Maximum", 1, "Take the maximum of the values"),
+        Choice("Nothing", 99, "Do nothing"),
+    ),
+    choices_description="Method for combining layers enum",
+)
 _SENSORS = (
-    double("obstacle_range", 2.5, "obstacle_range_m", "metres",
-            "Obstacles further off are not marked, for sources that set none."),
-    double("raytrace_range", 3.0, "raytrace_range_m", "metres",
-            "Space further off is not cleared, for sources that set none."),
-    flag("track_unknown_space", False, "track_unknown_space",
-          "When unset, as the costmap."),
-    text("observation_sources", "", "", "names separated by blanks",
-         "The sensors; each has a namespace of its name."))
+    double(
+        "obstacle_range",
+        2.5,
+        "obstacle_range_m",
+        "metres",
+        "Obstacles further off are not marked, for sources that set none.",
+    ),
+    double(
+        "raytrace_range",
+        3.0,
+        "raytrace_range_m",
+        "metres",
+        "Space further off is not cleared, for sources that set none.",
+    ),
+    flag("track_unknown_space", False, "track_unknown_space", "When unset, as the costmap."),
+    text(
+        "observation_sources",
+        "",
+        "",
+        "names separated by blanks",
+        "The sensors; each has a namespace of its name.",
+    ),
+)
 
 VOXEL_LAYER = Table(
     reconfigurable=(
         ENABLED,
         _FOOTPRINT_CLEARING,
         _MAX_OBSTACLE_HEIGHT,
-        double("origin_z", 0.0, "origin_z_m", "metres", "The z origin of the map in meters.",
-                _ANY, 0),
-        double("z_resolution", 0.2, "z_resolution_m", "metres",
-                "The z resolution of the map in meters/cell.", _POSITIVE, 0, 50),
-        integer("z_voxels", 10, "z_voxels", "", "The number of voxels in each vertical column.",
-                _POSITIVE, 0, 16),
-        integer("unknown_threshold", 15, "unknown_threshold", "",
-                "The number of unknown cells allowed in a column considered to be known",
-                low=0, high=16),
-        integer("mark_threshold", 0, "mark_threshold", "",
-                "The maximum number of marked cells allowed in a column considered to be free",
-                low=0, high=16),
-        _COMBINATION_METHOD),
+        double(
+            "origin_z", 0.0, "origin_z_m", "metres", "The z origin of the map in meters.", _ANY, 0
+        ),
+        double(
+            "z_resolution",
+            0.2,
+            "z_resolution_m",
+            "metres",
+            "The z resolution of the map in meters/cell.",
+            _POSITIVE,
+            0,
+            50,
+        ),
+        integer(
+            "z_voxels",
+            10,
+            "z_voxels",
+            "",
+            "The number of voxels in each vertical column.",
+            _POSITIVE,
+            0,
+            16,
+        ),
+        integer(
+            "unknown_threshold",
+            15,
+            "unknown_threshold",
+            "",
+            "The number of unknown cells allowed in a column considered to be known",
+            low=0,
+            high=16,
+        ),
+        integer(
+            "mark_threshold",
+            0,
+            "mark_threshold",
+            "",
+            "The maximum number of marked cells allowed in a column considered to be free",
+            low=0,
+            high=16,
+        ),
+        _COMBINATION_METHOD,
+    ),
     fixed=(
         *_SENSORS,
-        flag("publish_voxel_map", False, "publish_voxel_map",
-              "Publish the marked voxels, as markers.")))
+        flag(
+            "publish_voxel_map",
+            False,
+            "publish_voxel_map",
+            "Publish the marked voxels, as markers.",
+        ),
+    ),
+)
 
 # What a voxel layer has on top of an obstacle layer.
-VOXEL_PARAMETERS = ("origin_z", "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold",
-                    "publish_voxel_map")
+VOXEL_PARAMETERS = (
+    "origin_z",
+    "z_resolution",
+    "z_voxels",
+    "unknown_threshold",
+    "mark_threshold",
+    "publish_voxel_map",
+)
 
 OBSTACLE_LAYER = Table(
     reconfigurable=(ENABLED, _FOOTPRINT_CLEARING, _MAX_OBSTACLE_HEIGHT, _COMBINATION_METHOD),
     fixed=_SENSORS,
-    ignored=tuple((name, "only a costmap_2d::VoxelLayer reads it") for name in VOXEL_PARAMETERS))
+    ignored=tuple((name, "only a costmap_2d::VoxelLayer reads it") for name in VOXEL_PARAMETERS),
+)
 
-SOURCE = Table(fixed=(
-    text("topic", "", "topic", "a topic's name", "When unset, the source's name."),
-    text("sensor_frame", "", "sensor_frame", "a frame's name",
-         "Where the sensor is; when unset, the frame of its messages."),
-    text("data_type", "PointCloud", "data_type", "LaserScan, PointCloud or PointCloud2",
-         "The type of the topic."),
-    double("observation_persistence", 0.0, "observation_persistence_s", "seconds",
-            "How long an observation counts; 0 keeps only the newest."),
-    double("expected_update_rate", 0.0, "expected_update_period_s", "seconds",
+SOURCE = Table(
+    fixed=(
+        text("topic", "", "topic", "a topic's name", "When unset, the source's name."),
+        text(
+            "sensor_frame",
+            "",
+            "sensor_frame",
+            "a frame's name",
+            "Where the sensor is; when unset, the frame of its messages.",
+        ),
+        text(
+            "data_type",
+            "PointCloud",
+            "data_type",
+            "LaserScan, PointCloud or PointCloud2",
+            "The type of the topic.",
+        ),
+        double(
+            "observation_persistence",
+            0.0,
+            "observation_persistence_s",
+            "seconds",
+            "How long an observation counts; 0 keeps only the newest.",
+        ),
+        double(
+            "expected_update_rate",
+            0.0,
+            "expected_update_period_s",
+            "seconds",
             "Not a rate but a period: a sensor that is silent for longer makes the costmap"
-            " not current. 0 never does."),
-    double("min_obstacle_height", 0.0, "min_obstacle_height_m", "metres",
-            "Lower points are dropped.", _ANY),
-    double("max_obstacle_height", 2.0, "max_obstacle_height_m", "metres",
-            "Higher points are dropped.", _ANY),
-    double("obstacle_range", 2.5, "obstacle_range_m", "metres",
-            "Obstacles further off are not marked; when unset, the layer's."),
-    double("raytrace_range", 3.0, "raytrace_range_m", "metres",
-            "Space further off is not cleared; when unset, the layer's."),
-    flag("marking", True, "marking", "The sensor marks obstacles."),
-    flag("clearing", False, "clearing", "The sensor clears the space in front of them."),
-    flag("inf_is_valid", False, "inf_is_valid",
-          "Beams of a LaserScan that return inf clear up to range_max.")))
+            " not current. 0 never does.",
+        ),
+        double(
+            "min_obstacle_height",
+            0.0,
+            "min_obstacle_height_m",
+            "metres",
+            "Lower points are dropped.",
+            _ANY,
+        ),
+        double(
+            "max_obstacle_height",
+            2.0,
+            "max_obstacle_height_m",
+            "metres",
+            "Higher points are dropped.",
+            _ANY,
+        ),
+        double(
+            "obstacle_range",
+            2.5,
+            "obstacle_range_m",
+            "metres",
+            "Obstacles further off are not marked; when unset, the layer's.",
+        ),
+        double(
+            "raytrace_range",
+            3.0,
+            "raytrace_range_m",
+            "metres",
+            "Space further off is not cleared; when unset, the layer's.",
+        ),
+        flag("marking", True, "marking", "The sensor marks obstacles."),
+        flag("clearing", False, "clearing", "The sensor clears the space in front of them."),
+        flag(
+            "inf_is_valid",
+            False,
+            "inf_is_valid",
+            "Beams of a LaserScan that return inf clear up to range_max.",
+        ),
+    )
+)
 
-INFLATION_LAYER = Table(reconfigurable=(
-    ENABLED,
-    double("cost_scaling_factor", 10.0, "cost_scaling_factor", "1/m",
-            "A scaling factor to apply to cost values during inflation.", low=0, high=100),
-    double("inflation_radius", 0.55, "inflation_radius_m", "metres",
+INFLATION_LAYER = Table(
+    reconfigurable=(
+        ENABLED,
+        double(
+            "cost_scaling_factor",
+            10.0,
+            "cost_scaling_factor",
+            "1/m",
+            "A scaling factor to apply to cost values during inflation.",
+            low=0,
+            high=100,
+        ),
+        double(
+            "inflation_radius",
+            0.55,
+            "inflation_radius_m",
+            "metres",
             "The radius in meters to which the map inflates obstacle cost values.",
-            low=0, high=50),
-    flag("inflate_unknown", False, "inflate_unknown", "Whether to inflate unknown cells.")))
+            low=0,
+            high=50,
+        ),
+        flag("inflate_unknown", False, "inflate_unknown", "Whether to inflate unknown cells."),
+    )
+)
 
 STATIC_LAYER = Table(
     reconfigurable=(ENABLED,),
     fixed=(
         text("map_topic", "map", "map_topic", "a topic's name", "Where the map comes from."),
         flag("first_map_only", False, "first_map_only", "Later maps are ignored."),
-        flag("subscribe_to_updates", False, "subscribe_to_updates",
-              "Listen to map_topic_updates as well."),
-        flag("track_unknown_space", True, "track_unknown_space",
-              "Unknown cells of the map stay unknown."),
+        flag(
+            "subscribe_to_updates",
+            False,
+            "subscribe_to_updates",
+            "Listen to map_topic_updates as well.",
+        ),
+        flag(
+            "track_unknown_space",
+            True,
+            "track_unknown_space",
+            "Unknown cells of the map stay unknown.",
+        ),
         flag("use_maximum", False, "use_maximum", "Take the higher of map and master cost."),
-        integer("lethal_cost_threshold", 100, "lethal_cost_threshold", "",
-             "Occupancies from here on are obstacles.", low=0, high=100),
-        integer("unknown_cost_value", -1, "unknown_cost_value", "",
-             "The occupancy that means unknown.", low=-1, high=255),
-        flag("trinary_costmap", True, "trinary_costmap",
-              "Cells are free, unknown or obstacles, nothing between.")))
+        integer(
+            "lethal_cost_threshold",
+            100,
+            "lethal_cost_threshold",
+            "",
+            "Occupancies from here on are obstacles.",
+            low=0,
+            high=100,
+        ),
+        integer(
+            "unknown_cost_value",
+            -1,
+            "unknown_cost_value",
+            "",
+            "The occupancy that means unknown.",
+            low=-1,
+            high=255,
+        ),
+        flag(
+            "trinary_costmap",
+            True,
+            "trinary_costmap",
+            "Cells are free, unknown or obstacles, nothing between.",
+        ),
+    ),
+)

@@ -6,6 +6,7 @@ Hydro) and move_base moves them: ``observation_sources`` and the sources below
 ``obstacle_layer``, ``inflation_radius`` below ``inflation_layer``, and so on.
 In both styles some parameters of the costmap replace the layer's.
 """
+
 from __future__ import annotations
 
 from typing import Any, Dict, List, Mapping, Set, Tuple
@@ -13,13 +14,13 @@ from typing import Any, Dict, List, Mapping, Set, Tuple
 from quad_nav.config import costmap_tables as tables
 from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, settle_layer
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
+from quad_nav.config.plugins import PluginLayerParams, is_dotted
 from quad_nav.config.reader import Namespace, fields, settle, subtree
 from quad_nav.config.spec import Table
 from quad_nav.config.texts import polygon_from_list, text_from_polygon
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
-from quad_nav.plugins import PluginLayerParams, is_dotted
 
 OBSTACLE, VOXEL = "costmap_2d::ObstacleLayer", "costmap_2d::VoxelLayer"
 STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
@@ -66,11 +67,17 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
     """A costmap that nothing writes to is legal, and flies into things."""
-    if not any(isinstance(layer, (StaticLayerParams, PluginLayerParams))
-               or isinstance(layer, ObstacleLayerParams) and layer.sources
-               for _, layer in params.layers):
-        notes.remark(name, CAUTION, "no map and no observation_sources: there are no obstacles in"
-                     " this costmap")
+    if not any(
+        isinstance(layer, (StaticLayerParams, PluginLayerParams))
+        or isinstance(layer, ObstacleLayerParams)
+        and layer.sources
+        for _, layer in params.layers
+    ):
+        notes.remark(
+            name,
+            CAUTION,
+            "no map and no observation_sources: there are no obstacles in this costmap",
+        )
 
 
 def _settle_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:
@@ -85,8 +92,9 @@ def _settle_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Not
         polygon = polygon_from_list(costmap["footprint"])
     except ValueError as error:
         expected = tables.COSTMAP["footprint"].expected
-        notes.problem(join(name, "footprint"),
-                      f"{costmap['footprint']}: {error}; expected {expected}")
+        notes.problem(
+            join(name, "footprint"), f"{costmap['footprint']}: {error}; expected {expected}"
+        )
         polygon = None
     costmap["footprint"] = "[]" if polygon is None else text_from_polygon(polygon)
 
@@ -96,8 +104,10 @@ def _settle_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
     plugins: List[Tuple[str, str]] = []
     static_map = costmap.get("static_map", False)
     if not isinstance(static_map, bool):
-        notes.problem(join(name, "static_map"),
-                      f"{static_map!r} is neither true nor false; expected true or false")
+        notes.problem(
+            join(name, "static_map"),
+            f"{static_map!r} is neither true nor false; expected true or false",
+        )
     elif static_map:
         plugins.append(("static_layer", STATIC))
     voxels = costmap.get("map_type") == "voxel"
@@ -119,18 +129,29 @@ def _remark_on_old_style(costmap: Namespace, name: str, types: List[str], notes:
     """Old switches that promise a layer which plugins do not have."""
     for key, value, promised in (("static_map", True, STATIC), ("map_type", "voxel", VOXEL)):
         if costmap.get(key) == value and promised not in types:
-            notes.remark(join(name, key), IGNORED, "ignored by move_base: plugins say which layers"
-                         f" there are, and {promised} is not among them")
+            notes.remark(
+                join(name, key),
+                IGNORED,
+                "ignored by move_base: plugins say which layers"
+                f" there are, and {promised} is not among them",
+            )
 
 
-def _copy_parent_parameters(costmap: Namespace, name: str, layer: str, layer_type: str,
-                            notes: Notes) -> None:
+def _copy_parent_parameters(
+    costmap: Namespace, name: str, layer: str, layer_type: str, notes: Notes
+) -> None:
     for key in PARENT_PARAMETERS.get(layer_type, ()):
         below = costmap.get(layer)
-        if key in costmap and isinstance(below, dict) and below.get(key, costmap[key]) != (
-                costmap[key]):
-            notes.remark(join(name, layer, key), IGNORED,
-                         f"ignored by move_base: {join(name, key)} replaces it")
+        if (
+            key in costmap
+            and isinstance(below, dict)
+            and below.get(key, costmap[key]) != (costmap[key])
+        ):
+            notes.remark(
+                join(name, layer, key),
+                IGNORED,
+                f"ignored by move_base: {join(name, key)} replaces it",
+            )
         _move(costmap, name, layer, key, notes, keep=True)
 
 
@@ -154,7 +175,8 @@ def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[
     checked: List[Tuple[str, str]] = []
     for entry in plugins:
         if not isinstance(entry, dict) or not all(
-                isinstance(entry.get(key), str) for key in ("name", "type")):
+            isinstance(entry.get(key), str) for key in ("name", "type")
+        ):
             notes.problem(place, f"{entry!r} is no layer; expected {{name: , type: }}")
         elif entry["name"] in dict(checked):
             notes.problem(place, f"{entry['name']!r} is there twice; expected a name for each")
@@ -166,8 +188,12 @@ def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[
 
 def _remark_on_type(place: str, layer_type: str, notes: Notes) -> None:
     if layer_type not in LAYERS and not is_dotted(layer_type):
-        notes.remark(place, UNSUPPORTED, f"{layer_type} is not supported here, the layer is left"
-                     f" out; there are {', '.join(sorted(LAYERS))}")
+        notes.remark(
+            place,
+            UNSUPPORTED,
+            f"{layer_type} is not supported here, the layer is left"
+            f" out; there are {', '.join(sorted(LAYERS))}",
+        )
 
 
 def _table_with_misplaced(costmap: Namespace, known: Set[str]) -> Table:

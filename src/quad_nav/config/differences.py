@@ -1,4 +1,5 @@
 """What a parameter tree sets otherwise than the original would have it."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -9,10 +10,10 @@ from quad_nav.config.configuration import COSTMAPS, MENDS
 from quad_nav.config.layers import LAYERS
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_type
+from quad_nav.config.plugins import plugin_name
 from quad_nav.config.recoveries import TABLES as RECOVERY_TABLES
 from quad_nav.config.recoveries import full_type
 from quad_nav.config.spec import Table
-from quad_nav.plugins import plugin_name
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,11 @@ def differences(tree: Mapping[str, Any]) -> Tuple[Difference, ...]:
     default and are left out, and so are the distances of the default recoveries,
     which follow from other parameters.
     """
-    return tuple(difference for path, table, namespace in _namespaces(tree)
-                 for difference in _differences(path, table, namespace))
+    return tuple(
+        difference
+        for path, table, namespace in _namespaces(tree)
+        for difference in _differences(path, table, namespace)
+    )
 
 
 def _differences(path: str, table: Table, namespace: Mapping[str, Any]) -> Iterator[Difference]:
@@ -62,8 +66,9 @@ def _namespaces(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[s
     yield MENDS, tables.MENDS, _below(tree, MENDS)
 
 
-def _layers(path: str, costmap: Mapping[str, Any]
-            ) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
+def _layers(
+    path: str, costmap: Mapping[str, Any]
+) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
     for plugin in costmap.get("plugins", ()):
         if plugin["type"] not in LAYERS:
             continue

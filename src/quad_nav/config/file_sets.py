@@ -7,6 +7,7 @@ below a common one. So files are told apart by name and content; files of the sa
 kind in one folder are alternatives, of which each set holds one; and a folder's
 files are loaded after those of the folders above it.
 """
+
 from __future__ import annotations
 
 import os
@@ -29,13 +30,27 @@ from quad_nav.errors import InputError
 
 _COSTMAPS = ("global_costmap", "local_costmap")
 _OF_NODE = {parameter.name for parameter in tables.NAVIGATOR.parameters} | {
-    "recovery_behaviors", *planner_keys({}), *_COSTMAPS}
-_OF_COSTMAP = {parameter.name for table in (
-    costmap_tables.COSTMAP, costmap_tables.OBSTACLE_LAYER, costmap_tables.INFLATION_LAYER)
-    for parameter in table.parameters} | {"plugins", "map_type", "static_map"}
+    "recovery_behaviors",
+    *planner_keys({}),
+    *_COSTMAPS,
+}
+_OF_COSTMAP = {
+    parameter.name
+    for table in (
+        costmap_tables.COSTMAP,
+        costmap_tables.OBSTACLE_LAYER,
+        costmap_tables.INFLATION_LAYER,
+    )
+    for parameter in table.parameters
+} | {"plugins", "map_type", "static_map"}
 # Names that other nodes have as well do not make a costmap's file.
-_OF_COSTMAP_ONLY = {"plugins", "observation_sources", "rolling_window", "inflation_radius",
-                    "obstacle_range"}
+_OF_COSTMAP_ONLY = {
+    "plugins",
+    "observation_sources",
+    "rolling_window",
+    "inflation_radius",
+    "obstacle_range",
+}
 _OF_ONE_COSTMAP = {"rolling_window", "static_map", "global_frame", "width"}
 _NUMBERED = re.compile(f"(?:{'|'.join(REQUIRED + OPTIONAL)}|robot)([0-9]+)")
 
@@ -96,8 +111,11 @@ def _folders(top: Path) -> List[Tuple[Path, List[Path]]]:
     found = []
     for name, below, files in os.walk(top):
         below[:] = sorted(folder for folder in below if not folder.startswith("."))
-        paths = [Path(name, file) for file in sorted(files)
-                 if file.endswith((".yaml", ".yml")) and not file.startswith(".")]
+        paths = [
+            Path(name, file)
+            for file in sorted(files)
+            if file.endswith((".yaml", ".yml")) and not file.startswith(".")
+        ]
         found.append((Path(name), paths))
     return found
 
@@ -111,8 +129,10 @@ def _standard_sets(folder: Path, number: Optional[str]) -> List[FileSet]:
             paths = files_of(folder, one)
         except InputError:
             continue
-        files = tuple(PlacedFile(path, _COSTMAPS if path.name.startswith(REQUIRED[0]) else ("",))
-                      for path in paths)
+        files = tuple(
+            PlacedFile(path, _COSTMAPS if path.name.startswith(REQUIRED[0]) else ("",))
+            for path in paths
+        )
         sets.append(FileSet(folder, f"robot {one}" if numbers else "", files, one))
     return sets
 
@@ -173,9 +193,15 @@ def _sets_of(folder: Path, files: Sequence[_KnownFile], number: Optional[str]) -
     names = list(dict.fromkeys(name for choice in choices if len(choice) > 1 for name in choice))
     if number in names:
         names = [number]
-    return [FileSet(folder, name, tuple(choice.get(name, next(iter(choice.values())))
-                                        for choice in choices), number or "0")
-            for name in names or [""]]
+    return [
+        FileSet(
+            folder,
+            name,
+            tuple(choice.get(name, next(iter(choice.values()))) for choice in choices),
+            number or "0",
+        )
+        for name in names or [""]
+    ]
 
 
 def _alternatives(files: Sequence[PlacedFile]) -> Dict[str, PlacedFile]:

@@ -5,6 +5,7 @@ namespaces, or stand at the node's level. Later files win, key by key. Files may
 be numbered by hand (``costmap_common_params0.yaml``) or be one template in which
 roslaunch puts the robot's number for ``$(arg i)``.
 """
+
 from __future__ import annotations
 
 import re
@@ -16,8 +17,8 @@ import yaml
 
 from quad_nav.config.notes import CAUTION, Remark
 from quad_nav.errors import InputError
-from quad_nav.plain_yaml import MOST_BYTES, MOST_LEVELS, PlainLoader
-from quad_nav.user_files import read_text
+from quad_nav.files.plain_yaml import MOST_BYTES, MOST_LEVELS, PlainLoader
+from quad_nav.files.user_files import read_text
 
 COMMON = "costmap_common_params"
 REQUIRED = (COMMON, "local_costmap_params", "global_costmap_params", "base_local_planner_params")
@@ -54,8 +55,9 @@ class ParameterTree(Dict[str, Any]):
         self.remarks: List[Remark] = []
 
 
-def load_files(source: Union[str, Path, Sequence[FileName]],
-               substitutions: Optional[Mapping[str, str]] = None) -> ParameterTree:
+def load_files(
+    source: Union[str, Path, Sequence[FileName]], substitutions: Optional[Mapping[str, str]] = None
+) -> ParameterTree:
     """The parameter tree of one robot.
 
     Args:
@@ -70,11 +72,14 @@ def load_files(source: Union[str, Path, Sequence[FileName]],
     """
     arguments = {} if substitutions is None else dict(substitutions)
     if isinstance(source, (str, Path)):
-        files = [PlacedFile(path, _COSTMAPS if path.name.startswith(COMMON) else ("",))
-                 for path in files_of(Path(source), arguments.get("i"))]
+        files = [
+            PlacedFile(path, _COSTMAPS if path.name.startswith(COMMON) else ("",))
+            for path in files_of(Path(source), arguments.get("i"))
+        ]
     else:
-        files = [file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ())
-                 for file in source]
+        files = [
+            file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ()) for file in source
+        ]
     tree = ParameterTree()
     problems: List[str] = []
     for file in files:
@@ -86,8 +91,9 @@ def load_files(source: Union[str, Path, Sequence[FileName]],
         for namespace in file.namespaces or _namespaces(document):
             _merge(tree, document, namespace)
         for line, key in document.duplicates:
-            tree.remarks.append(Remark(key, CAUTION, "there twice; YAML takes the last one",
-                                       f"{file.path}:{line}"))
+            tree.remarks.append(
+                Remark(key, CAUTION, "there twice; YAML takes the last one", f"{file.path}:{line}")
+            )
     if problems:
         raise InputError(problems)
     return tree
@@ -166,8 +172,9 @@ class _Document:
 
     def enter(self, node: str) -> None:
         """Keeps what is below a node's name, as in a dump of a parameter server."""
-        self.values = [(path[1:], value) for path, value in self.values
-                       if path[0] == node and len(path) > 1]
+        self.values = [
+            (path[1:], value) for path, value in self.values if path[0] == node and len(path) > 1
+        ]
         self.lines = {path[1:]: line for path, line in self.lines.items() if path[0] == node}
 
 
@@ -215,8 +222,9 @@ def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
     return substituted
 
 
-def _collect(node: yaml.MappingNode, above: Tuple[str, ...], document: _Document,
-             loader: PlainLoader) -> None:
+def _collect(
+    node: yaml.MappingNode, above: Tuple[str, ...], document: _Document, loader: PlainLoader
+) -> None:
     """Walks the nodes rather than the values: only they have lines and duplicates."""
     seen = set()
     for key_node, _ in node.value:
@@ -224,7 +232,8 @@ def _collect(node: yaml.MappingNode, above: Tuple[str, ...], document: _Document
             continue
         if key_node.value in seen:
             document.duplicates.append(
-                (key_node.start_mark.line + 1, "/".join((*above, key_node.value))))
+                (key_node.start_mark.line + 1, "/".join((*above, key_node.value)))
+            )
         seen.add(key_node.value)
     loader.flatten_mapping(node)  # merge keys, "<<": what they bring in is no duplicate
     for key_node, value_node in node.value:
@@ -232,8 +241,12 @@ def _collect(node: yaml.MappingNode, above: Tuple[str, ...], document: _Document
         line = key_node.start_mark.line + 1
         path = above + tuple(filter(None, key.split("/")))
         if not above < path or len(path) > MOST_LEVELS:
-            raise InputError([f"{document.path}:{line}: {key[:40]!r} is no name of a parameter; "
-                              f"expected 1 to {MOST_LEVELS} names with / between them"])
+            raise InputError(
+                [
+                    f"{document.path}:{line}: {key[:40]!r} is no name of a parameter; "
+                    f"expected 1 to {MOST_LEVELS} names with / between them"
+                ]
+            )
         document.lines[path] = line
         if isinstance(value_node, yaml.MappingNode):
             document.values.append((path, {}))

@@ -1,4 +1,5 @@
 """The trees of a costmap's layers."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -6,6 +7,7 @@ from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple
 
 from quad_nav.config import costmap_tables as tables
 from quad_nav.config.notes import CAUTION, Notes, join
+from quad_nav.config.plugins import LAYER, Parameters, PluginLayerParams, is_dotted, load_class
 from quad_nav.config.reader import Namespace, check_class, fields, inherited, settle, subtree
 from quad_nav.config.spec import Table
 from quad_nav.costmap.inflation import InflationLayerParams
@@ -14,7 +16,6 @@ from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
-from quad_nav.plugins import LAYER, Parameters, PluginLayerParams, is_dotted, load_class
 
 Chain = Tuple[Tuple[str, Mapping[str, Any]], ...]
 _DATA_TYPES = ("LaserScan", "PointCloud", "PointCloud2")
@@ -26,8 +27,12 @@ _OBSTACLES = ("max_obstacle_height", *_RANGES, "track_unknown_space")
 
 # What a costmap hands down to a layer of each type, over the layer's own value.
 PARENT_PARAMETERS: Dict[str, Tuple[str, ...]] = {
-    "costmap_2d::StaticLayer": ("map_topic", "unknown_cost_value", "lethal_cost_threshold",
-                                "track_unknown_space"),
+    "costmap_2d::StaticLayer": (
+        "map_topic",
+        "unknown_cost_value",
+        "lethal_cost_threshold",
+        "track_unknown_space",
+    ),
     "costmap_2d::VoxelLayer": tables.VOXEL_PARAMETERS + _OBSTACLES,
     "costmap_2d::ObstacleLayer": _OBSTACLES,
     "costmap_2d::InflationLayer": ("cost_scaling_factor", "inflation_radius"),
@@ -42,8 +47,9 @@ class LayerType:
     params: Callable[[Mapping[str, Any], str], LayerParams]
 
 
-def settle_layer(costmap: Namespace, costmap_path: str, name: str, layer_type: str, chain: Chain,
-                 notes: Notes) -> None:
+def settle_layer(
+    costmap: Namespace, costmap_path: str, name: str, layer_type: str, chain: Chain, notes: Notes
+) -> None:
     """Brings one layer's namespace into the state in which the original leaves it.
 
     Args:
@@ -61,28 +67,36 @@ def settle_layer(costmap: Namespace, costmap_path: str, name: str, layer_type: s
     sources = _source_names(layer)
     described = {key for key, value in layer.items() if isinstance(value, dict)}
     for source in sorted(described.difference(sources)):
-        notes.remark(join(path, source), CAUTION, "looks like a source, and observation_sources"
-                     " does not name it: nothing reads it")
+        notes.remark(
+            join(path, source),
+            CAUTION,
+            "looks like a source, and observation_sources does not name it: nothing reads it",
+        )
     for source in sources:
         _settle_source(layer, path, source, notes)
     _take_ranges_from_above(layer, path, chain, notes)
     settle(layer, path, table, notes, also_known=described.union(sources))
 
 
-def layer_params(costmap: Mapping[str, Any], costmap_path: str, name: str,
-                 layer_type: str) -> Optional[LayerParams]:
+def layer_params(
+    costmap: Mapping[str, Any], costmap_path: str, name: str, layer_type: str
+) -> Optional[LayerParams]:
     """The dataclass of a layer of a settled costmap; None for a type that is not here."""
     if layer_type in LAYERS:
         return LAYERS[layer_type].params(costmap, name)
     if not is_dotted(layer_type):
         return None
     written = Parameters(costmap.get(name, {}), join(costmap_path, name))
-    return PluginLayerParams(enabled=written.get("enabled", True), parameters=written,
-                             plugin_class=load_class(layer_type, LAYER))
+    return PluginLayerParams(
+        enabled=written.get("enabled", True),
+        parameters=written,
+        plugin_class=load_class(layer_type, LAYER),
+    )
 
 
-def _settle_plugin(layer: Namespace, path: str, costmap_path: str, name: str, layer_type: str,
-                   notes: Notes) -> None:
+def _settle_plugin(
+    layer: Namespace, path: str, costmap_path: str, name: str, layer_type: str, notes: Notes
+) -> None:
     """A layer of the user's knows its parameters itself, but for the switch that all have."""
     settle(layer, path, Table(fixed=(tables.ENABLED,)), notes, also_known=layer)
     check_class(layer_type, LAYER, join(costmap_path, "plugins", name), notes)
@@ -101,13 +115,18 @@ def _settle_source(layer: Namespace, path: str, name: str, notes: Notes) -> None
     if data_type is None:
         notes.remark(place, CAUTION, "no data_type: move_base listens for a PointCloud")
     elif isinstance(data_type, str) and data_type not in _DATA_TYPES:
-        notes.problem(join(place, "data_type"), f"{data_type!r} is no sensor's type; expected"
-                      f" {tables.SOURCE['data_type'].expected}")
+        notes.problem(
+            join(place, "data_type"),
+            f"{data_type!r} is no sensor's type; expected {tables.SOURCE['data_type'].expected}",
+        )
     period = source.get("expected_update_rate")
     if isinstance(period, float) and period > _LONG_PERIOD_S:
-        notes.remark(join(place, "expected_update_rate"), CAUTION,
-                     f"{period} is a period in seconds, not a rate: the sensor may be silent for"
-                     " that long before it is missed")
+        notes.remark(
+            join(place, "expected_update_rate"),
+            CAUTION,
+            f"{period} is a period in seconds, not a rate: the sensor may be silent for"
+            " that long before it is missed",
+        )
 
 
 def _take_ranges_from_above(layer: Namespace, path: str, chain: Chain, notes: Notes) -> None:
@@ -121,13 +140,16 @@ def _take_ranges_from_above(layer: Namespace, path: str, chain: Chain, notes: No
 
 def _seeing(table: Table, params: Callable[..., ObstacleLayerParams]) -> LayerType:
     """A layer with sources."""
+
     def make(costmap: Mapping[str, Any], name: str) -> LayerParams:
         layer = costmap[name]
         arguments = fields(layer, table.parameters)
         arguments["track_unknown_space"] = layer.get("track_unknown_space")
-        sources = tuple(_source_params(layer.get(source, {}), source)
-                        for source in _source_names(layer))
+        sources = tuple(
+            _source_params(layer.get(source, {}), source) for source in _source_names(layer)
+        )
         return params(sources=sources, **arguments)
+
     return LayerType(table, make)
 
 
@@ -143,6 +165,7 @@ def _source_params(source: Mapping[str, Any], name: str) -> SourceParams:
 def _plain(table: Table, params: Callable[..., LayerParams]) -> LayerType:
     def make(costmap: Mapping[str, Any], name: str) -> LayerParams:
         return params(**fields(costmap[name], table.parameters))
+
     return LayerType(table, make)
 
 
@@ -156,5 +179,8 @@ LAYERS: Dict[str, LayerType] = {
 
 def layer_tables(plugins: Iterable[Mapping[str, str]]) -> Dict[str, Table]:
     """The table of each supported layer, by the layer's name."""
-    return {plugin["name"]: LAYERS[plugin["type"]].table for plugin in plugins
-            if plugin["type"] in LAYERS}
+    return {
+        plugin["name"]: LAYERS[plugin["type"]].table
+        for plugin in plugins
+        if plugin["type"] in LAYERS
+    }

@@ -1,4 +1,5 @@
 """What is to be said about a configuration: every fault and every remark, with its place."""
+
 from __future__ import annotations
 
 import difflib

@@ -3,6 +3,7 @@
 A planner of another kind is one line in ``GLOBAL_PLANNERS`` or
 ``LOCAL_PLANNERS``, and one in ``assembly``.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -11,6 +12,16 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 from quad_nav.config import global_planner_tables, tables
 from quad_nav.config.dwa_table import DWA_TABLE, LATCH, dwa_params, settle_dwa
 from quad_nav.config.notes import RENAMED, UNSUPPORTED, UNUSED, Notes
+from quad_nav.config.plugins import (
+    GLOBAL_PLANNER,
+    LOCAL_PLANNER,
+    Interface,
+    Parameters,
+    Plugin,
+    is_dotted,
+    load_class,
+    plugin_name,
+)
 from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
 from quad_nav.config.spec import Table
 from quad_nav.config.trajectory_planner_tree import (
@@ -21,16 +32,6 @@ from quad_nav.config.trajectory_planner_tree import (
 from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
-from quad_nav.plugins import (
-    GLOBAL_PLANNER,
-    LOCAL_PLANNER,
-    Interface,
-    Parameters,
-    Plugin,
-    is_dotted,
-    load_class,
-    plugin_name,
-)
 
 SEARCH_PLANNER = "global_planner/GlobalPlanner"
 CARROT = "carrot_planner/CarrotPlanner"
@@ -58,19 +59,22 @@ def _plain(plugin: str, table: Table, params: Callable[..., Any]) -> PlannerType
     return PlannerType(
         table,
         settle=lambda tree, notes: settle(subtree(tree, name, "", notes), name, table, notes),
-        params=lambda tree: params(**fields(tree.get(name, {}), table.parameters)))
+        params=lambda tree: params(**fields(tree.get(name, {}), table.parameters)),
+    )
 
 
 # The first of each flies in the place of planners that are not here.
 GLOBAL_PLANNERS: Dict[str, PlannerType] = {
     tables.GLOBAL_PLANNER: _plain(tables.GLOBAL_PLANNER, tables.NAVFN, NavfnParams),
     SEARCH_PLANNER: _plain(
-        SEARCH_PLANNER, global_planner_tables.SEARCH_PLANNER, SearchPlannerParams),
+        SEARCH_PLANNER, global_planner_tables.SEARCH_PLANNER, SearchPlannerParams
+    ),
     CARROT: _plain(CARROT, global_planner_tables.CARROT, CarrotParams),
 }
 LOCAL_PLANNERS: Dict[str, PlannerType] = {
     tables.LOCAL_PLANNER: PlannerType(
-        tables.TRAJECTORY_PLANNER, settle_trajectory_planner, trajectory_planner_params),
+        tables.TRAJECTORY_PLANNER, settle_trajectory_planner, trajectory_planner_params
+    ),
     DWA_PLANNER: PlannerType(DWA_TABLE, settle_dwa, dwa_params, inherited=(LATCH.name,)),
 }
 
@@ -88,8 +92,7 @@ SLOTS: Dict[str, Slot] = {
     "base_global_planner": Slot(GLOBAL_PLANNERS, GLOBAL_PLANNER),
 }
 # Namespaces of planners that people configure beside the one that they fly.
-_OTHER_PLANNERS = ("TebLocalPlannerROS", "EBandPlannerROS", "DWBLocalPlanner",
-                   "SBPLLatticePlanner")
+_OTHER_PLANNERS = ("TebLocalPlannerROS", "EBandPlannerROS", "DWBLocalPlanner", "SBPLLatticePlanner")
 _DEFAULT_RATE_HZ = 20.0
 
 
@@ -119,8 +122,9 @@ def settle_planner_names(tree: Namespace, notes: Notes) -> None:
             notes.remark(key, RENAMED, f"{name} is called {tree[key]} today")
         else:
             tree[key] = next(iter(slot.types))
-            notes.remark(key, UNSUPPORTED,
-                         f"{name} is not supported here; {tree[key]} flies instead")
+            notes.remark(
+                key, UNSUPPORTED, f"{name} is not supported here; {tree[key]} flies instead"
+            )
 
 
 def settle_planners(tree: Namespace, notes: Notes) -> None:
@@ -152,8 +156,7 @@ def planner_params(tree: Mapping[str, Any], key: str) -> Any:
     if own is not None:
         return own.params(tree)
     name = plugin_name(tree[key])
-    return Plugin(load_class(tree[key], SLOTS[key].interface),
-                  Parameters(tree.get(name, {}), name))
+    return Plugin(load_class(tree[key], SLOTS[key].interface), Parameters(tree.get(name, {}), name))
 
 
 def reconfigurable_planners(tree: Mapping[str, Any]) -> Dict[str, Table]:
@@ -191,4 +194,3 @@ def _settle_unused(tree: Namespace, name: str, reason: str, notes: Notes) -> Non
         settle(planner, name, Table(fixed=tables.ROTATE_FROM_PLANNER), notes, also_known=planner)
         reason += "; recoveries that turn take its limits all the same"
     notes.remark(name, UNUSED, reason)
-

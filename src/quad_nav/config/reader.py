@@ -5,20 +5,22 @@ the parameter server: types made right, ranges clamped, reconfigurable
 parameters all present. Dataclasses are then made from settled namespaces, where
 nothing can be wrong any more.
 """
+
 from __future__ import annotations
 
 from typing import Any, Dict, Iterable, Mapping, Tuple
 
 from quad_nav.config.notes import CLAMPED, IGNORED, UNSUPPORTED, Notes, join
-from quad_nav.config.spec import Parameter, Table, Unusable
+from quad_nav.config.plugins import Interface, load_class
+from quad_nav.config.spec import InvalidValue, Parameter, Table
 from quad_nav.errors import InputError
-from quad_nav.plugins import Interface, load_class
 
 Namespace = Dict[str, Any]
 
 
-def settle(namespace: Namespace, path: str, table: Table, notes: Notes,
-           also_known: Iterable[str] = ()) -> None:
+def settle(
+    namespace: Namespace, path: str, table: Table, notes: Notes, also_known: Iterable[str] = ()
+) -> None:
     """Checks and completes a namespace in place; faults and remarks go to ``notes``.
 
     Args:
@@ -38,7 +40,7 @@ def _settle_value(namespace: Namespace, path: str, parameter: Parameter, notes: 
     place = join(path, parameter.name)
     try:
         checked = parameter.check(given)
-    except Unusable as problem:
+    except InvalidValue as problem:
         notes.problem(place, str(problem))
         return
     value = parameter.clamp(checked)
@@ -50,8 +52,9 @@ def _settle_value(namespace: Namespace, path: str, parameter: Parameter, notes: 
     namespace[parameter.name] = value
 
 
-def _remark_on_other_keys(namespace: Namespace, path: str, table: Table, notes: Notes,
-                          also_known: Iterable[str]) -> None:
+def _remark_on_other_keys(
+    namespace: Namespace, path: str, table: Table, notes: Notes, also_known: Iterable[str]
+) -> None:
     names = {parameter.name for parameter in table.parameters} | set(also_known)
     for key in namespace:
         if key in names:
@@ -66,8 +69,9 @@ def _remark_on_other_keys(namespace: Namespace, path: str, table: Table, notes: 
             notes.unknown(place, str(key), names)
 
 
-def fields(namespace: Mapping[str, Any], parameters: Iterable[Parameter],
-           given: Iterable[str] = ()) -> Dict[str, Any]:
+def fields(
+    namespace: Mapping[str, Any], parameters: Iterable[Parameter], given: Iterable[str] = ()
+) -> Dict[str, Any]:
     """Arguments of a dataclass from a settled namespace.
 
     A parameter with a value of its own until the first reconfiguration has that

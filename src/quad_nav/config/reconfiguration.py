@@ -1,4 +1,5 @@
 """Changing a configuration while it is in force, as dynamic_reconfigure does."""
+
 from __future__ import annotations
 
 import copy
@@ -6,18 +7,12 @@ from dataclasses import replace
 from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config import costmap_tables, tables
-from quad_nav.config.configuration import (
-    COSTMAPS,
-    MENDS,
-    Configuration,
-    mends_of,
-    navigator_params,
-)
+from quad_nav.config.configuration import COSTMAPS, MENDS, Configuration, fixes_of, navigator_params
 from quad_nav.config.costmaps import costmap_params
 from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
-from quad_nav.config.spec import Parameter, Unusable
+from quad_nav.config.spec import InvalidValue, Parameter
 from quad_nav.config.workload import workload_problems
 from quad_nav.errors import InputError
 
@@ -42,12 +37,15 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
 def values(configuration: Configuration, namespace: str) -> Dict[str, Any]:
     """The ROS values in force of a namespace's reconfigurable parameters."""
     settled = _below(configuration.tree, namespace)
-    return {parameter.name: settled[parameter.name]
-            for parameter in reconfigurable(configuration)[namespace]}
+    return {
+        parameter.name: settled[parameter.name]
+        for parameter in reconfigurable(configuration)[namespace]
+    }
 
 
-def updated(configuration: Configuration, namespace: str,
-            changes: Mapping[str, Any]) -> Configuration:
+def updated(
+    configuration: Configuration, namespace: str, changes: Mapping[str, Any]
+) -> Configuration:
     """The configuration with some parameters of one namespace changed.
 
     Values are clamped to their ranges. ``restore_defaults`` puts the namespace
@@ -74,8 +72,12 @@ def updated(configuration: Configuration, namespace: str,
     return changed
 
 
-def _checked(parameters: Tuple[Parameter, ...], namespace: str,
-             changes: Mapping[str, Any], tree: Mapping[str, Any]) -> Dict[str, Any]:
+def _checked(
+    parameters: Tuple[Parameter, ...],
+    namespace: str,
+    changes: Mapping[str, Any],
+    tree: Mapping[str, Any],
+) -> Dict[str, Any]:
     known = {parameter.name: parameter for parameter in parameters}
     checked: Dict[str, Any] = {}
     problems: List[str] = []
@@ -90,7 +92,7 @@ def _checked(parameters: Tuple[Parameter, ...], namespace: str,
         else:
             try:
                 checked[name] = _clamped(known[name], value)
-            except Unusable as problem:
+            except InvalidValue as problem:
                 problems.append(f"{place}: {problem}")
     if problems:
         raise InputError(problems)
@@ -111,10 +113,13 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
         listed = configuration.navigator.recovery_behaviors
         return replace(configuration, navigator=navigator_params(tree, listed, given=tree))
     if namespace == MENDS:
-        return replace(configuration, mends=mends_of(tree))
+        return replace(configuration, fixes=fixes_of(tree))
     if namespace in reconfigurable_planners(tree):
-        return replace(configuration, global_planner=planner_params(tree, "base_global_planner"),
-                       local_planner=planner_params(tree, "base_local_planner"))
+        return replace(
+            configuration,
+            global_planner=planner_params(tree, "base_global_planner"),
+            local_planner=planner_params(tree, "base_local_planner"),
+        )
     costmap = namespace.split("/")[0]
     params = costmap_params(tree, costmap)
     if costmap == "global_costmap":

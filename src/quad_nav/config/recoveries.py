@@ -1,4 +1,5 @@
 """The recovery behaviours: move_base's default sequence, or a list of one's own."""
+
 from __future__ import annotations
 
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
@@ -6,16 +7,12 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 from quad_nav.config import tables
 from quad_nav.config.costmap_tables import COSTMAP
 from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
+from quad_nav.config.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
 from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
 from quad_nav.config.spec import Table
 from quad_nav.config.speed_limits import check_slow, slow_params
 from quad_nav.config.trajectory_planner_tree import TRAJECTORY_PLANNER
-from quad_nav.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
-from quad_nav.recovery import (
-    ClearCostmapParams,
-    MoveSlowAndClearParams,
-    RotateParams,
-)
+from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
 
 RecoveryParams = Union[ClearCostmapParams, RotateParams, MoveSlowAndClearParams, Plugin]
 NamedTypes = Tuple[Tuple[str, str], ...]
@@ -24,7 +21,10 @@ CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
 ROTATE = "rotate_recovery/RotateRecovery"
 MOVE_SLOW = "move_slow_and_clear/MoveSlowAndClear"
 TABLES: Dict[str, Table] = {
-    CLEAR: tables.CLEAR_COSTMAP, ROTATE: tables.ROTATE, MOVE_SLOW: tables.MOVE_SLOW}
+    CLEAR: tables.CLEAR_COSTMAP,
+    ROTATE: tables.ROTATE,
+    MOVE_SLOW: tables.MOVE_SLOW,
+}
 _CONSERVATIVE, _AGGRESSIVE, _ROTATE = "conservative_reset", "aggressive_reset", "rotate_recovery"
 _AFFECTED_MAPS = ("local", "global", "both")
 
@@ -54,8 +54,9 @@ def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
     return listed
 
 
-def recoveries(tree: Mapping[str, Any],
-               listed: Optional[NamedTypes]) -> Tuple[Tuple[str, RecoveryParams], ...]:
+def recoveries(
+    tree: Mapping[str, Any], listed: Optional[NamedTypes]
+) -> Tuple[Tuple[str, RecoveryParams], ...]:
     """(name, parameters) in the order in which they are tried, of a settled tree."""
     sequence = _default_sequence(tree) if listed is None else listed
     return tuple((name, _params(name, kind, tree)) for name, kind in sequence)
@@ -83,8 +84,11 @@ def _settle_default_distances(tree: Namespace, notes: Notes) -> None:
     for name, distance in distances.items():
         namespace = subtree(tree, name, "", notes)
         if namespace.get("reset_distance", distance) != distance:
-            notes.remark(join(name, "reset_distance"), IGNORED,
-                         f"ignored by move_base: without recovery_behaviors it is {distance}")
+            notes.remark(
+                join(name, "reset_distance"),
+                IGNORED,
+                f"ignored by move_base: without recovery_behaviors it is {distance}",
+            )
         namespace["reset_distance"] = distance
 
 
@@ -94,27 +98,35 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         return None
     entries = tree["recovery_behaviors"]
     if not isinstance(entries, list):
-        notes.problem("recovery_behaviors",
-                      f"{entries!r} is not a list; expected a list of {{name: , type: }}")
+        notes.problem(
+            "recovery_behaviors",
+            f"{entries!r} is not a list; expected a list of {{name: , type: }}",
+        )
         return ()
     listed: Dict[str, str] = {}
     for entry in entries:
         if not isinstance(entry, dict) or not all(
-                isinstance(entry.get(key), str) for key in ("name", "type")):
-            notes.problem("recovery_behaviors",
-                          f"{entry!r} is no behaviour; expected {{name: , type: }}")
+            isinstance(entry.get(key), str) for key in ("name", "type")
+        ):
+            notes.problem(
+                "recovery_behaviors", f"{entry!r} is no behaviour; expected {{name: , type: }}"
+            )
         elif entry["name"] in listed:
-            notes.problem("recovery_behaviors",
-                          f"{entry['name']!r} is there twice; expected a name for each")
+            notes.problem(
+                "recovery_behaviors", f"{entry['name']!r} is there twice; expected a name for each"
+            )
         else:
             listed[entry["name"]] = full_type(entry["type"])
     for name in [name for name, kind in listed.items() if kind not in TABLES]:
         if is_dotted(listed[name]):
             check_class(listed[name], RECOVERY, join("recovery_behaviors", name), notes)
             continue
-        notes.remark(join("recovery_behaviors", name), UNSUPPORTED,
-                     f"{listed.pop(name)} is not supported here, the behaviour is left out;"
-                     f" there are {', '.join(TABLES)}")
+        notes.remark(
+            join("recovery_behaviors", name),
+            UNSUPPORTED,
+            f"{listed.pop(name)} is not supported here, the behaviour is left out;"
+            f" there are {', '.join(TABLES)}",
+        )
     return tuple(listed.items())
 
 
@@ -142,8 +154,10 @@ def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
         notes.problem(join(name, "affected_maps"), f"{maps!r} is no choice; expected {expected}")
     layers = namespace.get("layer_names", [])
     if not isinstance(layers, list) or not all(isinstance(layer, str) for layer in layers):
-        notes.problem(join(name, "layer_names"), f"{layers!r} is no list of names; expected the"
-                      " names of layers, as in [obstacle_layer]")
+        notes.problem(
+            join(name, "layer_names"),
+            f"{layers!r} is no list of names; expected the names of layers, as in [obstacle_layer]",
+        )
 
 
 def _params(name: str, kind: str, tree: Mapping[str, Any]) -> RecoveryParams:
@@ -159,10 +173,13 @@ def _params(name: str, kind: str, tree: Mapping[str, Any]) -> RecoveryParams:
 
 def _clear_params(namespace: Mapping[str, Any]) -> ClearCostmapParams:
     names = namespace.get("layer_names")
-    return ClearCostmapParams(layer_names=None if names is None else tuple(names),
-                              **fields(namespace, tables.CLEAR_COSTMAP.parameters))
+    return ClearCostmapParams(
+        layer_names=None if names is None else tuple(names),
+        **fields(namespace, tables.CLEAR_COSTMAP.parameters),
+    )
 
 
 def _rotate_params(namespace: Mapping[str, Any], planner: Mapping[str, Any]) -> RotateParams:
-    return RotateParams(**fields(namespace, tables.ROTATE.parameters),
-                        **fields(planner, tables.ROTATE_FROM_PLANNER))
+    return RotateParams(
+        **fields(namespace, tables.ROTATE.parameters), **fields(planner, tables.ROTATE_FROM_PLANNER)
+    )

@@ -1,7 +1,8 @@
 """The reference page of parameters, written from the tables: ``docs/parameters.md``.
 
-    python -m quad_nav.config.reference > docs/parameters.md
+python -m quad_nav.config.reference > docs/parameters.md
 """
+
 from __future__ import annotations
 
 from typing import Iterable, List, Tuple
@@ -64,31 +65,57 @@ def reference() -> str:
 
 def _sections() -> Iterable[Tuple[str, str, Table]]:
     yield "move_base", "At the node's level.", tables.NAVIGATOR
-    yield ("TrajectoryPlannerROS", f"The local planner `{tables.LOCAL_PLANNER}`.",
-           tables.TRAJECTORY_PLANNER)
+    yield (
+        "TrajectoryPlannerROS",
+        f"The local planner `{tables.LOCAL_PLANNER}`.",
+        tables.TRAJECTORY_PLANNER,
+    )
     yield "DWAPlannerROS", "The local planner `dwa_local_planner/DWAPlannerROS`.", DWA_TABLE
     yield "NavfnROS", f"The global planner `{tables.GLOBAL_PLANNER}`.", tables.NAVFN
-    yield ("GlobalPlanner", "The global planner `global_planner/GlobalPlanner`.",
-           global_planner_tables.SEARCH_PLANNER)
-    yield ("CarrotPlanner", "The global planner `carrot_planner/CarrotPlanner`: straight for the"
-           " goal.", global_planner_tables.CARROT)
-    yield ("mends", "Not in the original: its faults, mended; see [faults](faults.md).",
-           tables.MENDS)
+    yield (
+        "GlobalPlanner",
+        "The global planner `global_planner/GlobalPlanner`.",
+        global_planner_tables.SEARCH_PLANNER,
+    )
+    yield (
+        "CarrotPlanner",
+        "The global planner `carrot_planner/CarrotPlanner`: straight for the goal.",
+        global_planner_tables.CARROT,
+    )
+    yield (
+        "fixes",
+        "Not in the original: its faults, mended; see [faults](faults.md).",
+        tables.MENDS,
+    )
     yield "Costmaps", "Below `global_costmap` and `local_costmap`.", costmap_tables.COSTMAP
     yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", costmap_tables.OBSTACLE_LAYER)
     yield ("Voxel layer", "`costmap_2d::VoxelLayer`.", costmap_tables.VOXEL_LAYER)
-    yield ("Sources", "Each name in `observation_sources` is a namespace below the layer.",
-           costmap_tables.SOURCE)
+    yield (
+        "Sources",
+        "Each name in `observation_sources` is a namespace below the layer.",
+        costmap_tables.SOURCE,
+    )
     yield ("Inflation layer", "`costmap_2d::InflationLayer`.", costmap_tables.INFLATION_LAYER)
     yield "Static layer", "`costmap_2d::StaticLayer`.", costmap_tables.STATIC_LAYER
-    yield ("Clearing", "`clear_costmap_recovery/ClearCostmapRecovery`, below the behaviour's name."
-           " `layer_names` lists the layers that are cleared; the obstacle layers when unset.",
-           tables.CLEAR_COSTMAP)
-    yield ("Turning", "`rotate_recovery/RotateRecovery`, below the behaviour's name. Speeds and"
-           " accelerations are those of TrajectoryPlannerROS.", tables.ROTATE)
-    yield ("Going slowly", "`move_slow_and_clear/MoveSlowAndClear`, below the behaviour's name. It"
-           " frees the obstacle layers around the robot and limits the local planner's speeds,"
-           " forwards, backwards and turning, until the robot has moved away.", tables.MOVE_SLOW)
+    yield (
+        "Clearing",
+        "`clear_costmap_recovery/ClearCostmapRecovery`, below the behaviour's name."
+        " `layer_names` lists the layers that are cleared; the obstacle layers when unset.",
+        tables.CLEAR_COSTMAP,
+    )
+    yield (
+        "Turning",
+        "`rotate_recovery/RotateRecovery`, below the behaviour's name. Speeds and"
+        " accelerations are those of TrajectoryPlannerROS.",
+        tables.ROTATE,
+    )
+    yield (
+        "Going slowly",
+        "`move_slow_and_clear/MoveSlowAndClear`, below the behaviour's name. It"
+        " frees the obstacle layers around the robot and limits the local planner's speeds,"
+        " forwards, backwards and turning, until the robot has moved away.",
+        tables.MOVE_SLOW,
+    )
 
 
 def _rows(table: Table) -> List[str]:
@@ -96,8 +123,10 @@ def _rows(table: Table) -> List[str]:
     for parameter in table.parameters:
         mark = " (R)" if parameter in table.reconfigurable else ""
         unit = "" if parameter.kind == "str" else parameter.unit
-        rows.append(f"| `{parameter.name}`{mark} | {_default(parameter)} | {_range(parameter)} |"
-                    f" {unit} | {parameter.description} |")
+        rows.append(
+            f"| `{parameter.name}`{mark} | {_default(parameter)} | {_range(parameter)} |"
+            f" {unit} | {parameter.description} |"
+        )
     for name, reason in table.unsupported:
         rows.append(f"| `{name}` | | | | not supported here: {reason} |")
     for name, reason in table.ignored:

@@ -1,4 +1,5 @@
 """What a parameter is: its ROS spelling, its type, its range and the field that it fills."""
+
 from __future__ import annotations
 
 import enum
@@ -24,7 +25,7 @@ class Choice:
     description: str
 
 
-class Unusable(ValueError):
+class InvalidValue(ValueError):
     """A value that no parameter of this kind can have; says what was expected."""
 
 
@@ -79,11 +80,11 @@ class Parameter:
         """The value in this parameter's own type, not yet clamped.
 
         Raises:
-            Unusable: wrong type, not finite, or outside the domain.
+            InvalidValue: wrong type, not finite, or outside the domain.
         """
         if self.kind == "bool":
             if not isinstance(value, bool):
-                raise Unusable(f"{value!r} is neither true nor false; expected {self.expected}")
+                raise InvalidValue(f"{value!r} is neither true nor false; expected {self.expected}")
             return value
         if self.kind == "str":
             return self._checked_text(value)
@@ -91,24 +92,27 @@ class Parameter:
 
     def _checked_text(self, value: Any) -> str:
         if not isinstance(value, str):
-            raise Unusable(f"{value!r} is not a text; expected {self.expected}")
+            raise InvalidValue(f"{value!r} is not a text; expected {self.expected}")
         try:
             self.field_value(value)
         except ValueError as error:
-            raise Unusable(f"{value!r}: {error}; expected {self.expected}") from error
+            raise InvalidValue(f"{value!r}: {error}; expected {self.expected}") from error
         return value
 
     def _checked_number(self, value: Any) -> Any:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise Unusable(f"{value!r} is not a number{_hint(value)}; expected {self.expected}")
+            raise InvalidValue(f"{value!r} is not a number{_hint(value)}; expected {self.expected}")
         if not math.isfinite(value):
-            raise Unusable(f"{value} is not finite; expected {self.expected}")
-        if value < 0 and self.domain is not Domain.ANY or (
-                value == 0 and self.domain is Domain.POSITIVE):
-            raise Unusable(f"{value} cannot be; expected {self.expected}")
+            raise InvalidValue(f"{value} is not finite; expected {self.expected}")
+        if (
+            value < 0
+            and self.domain is not Domain.ANY
+            or (value == 0 and self.domain is Domain.POSITIVE)
+        ):
+            raise InvalidValue(f"{value} cannot be; expected {self.expected}")
         if self.choices and value not in [choice.value for choice in self.choices]:
             names = ", ".join(f"{choice.value} ({choice.name})" for choice in self.choices)
-            raise Unusable(f"{value} is no choice; expected one of {names}")
+            raise InvalidValue(f"{value} is no choice; expected one of {names}")
         # roscpp rounds a double that is read as an int, halves upwards.
         return float(value) if self.kind == "double" else math.floor(value + 0.5)
 
@@ -148,15 +152,31 @@ class Table:
         raise KeyError(name)
 
 
-def double(name: str, default: float, field: str, unit: str, description: str,
-           domain: Domain = Domain.NOT_NEGATIVE, low: Any = None, high: Any = None,
-           **more: Any) -> Parameter:
+def double(
+    name: str,
+    default: float,
+    field: str,
+    unit: str,
+    description: str,
+    domain: Domain = Domain.NOT_NEGATIVE,
+    low: Any = None,
+    high: Any = None,
+    **more: Any,
+) -> Parameter:
     return Parameter(name, "double", default, field, description, unit, domain, low, high, **more)
 
 
-def integer(name: str, default: int, field: str, unit: str, description: str,
-            domain: Domain = Domain.ANY, low: Any = None, high: Any = None,
-            **more: Any) -> Parameter:
+def integer(
+    name: str,
+    default: int,
+    field: str,
+    unit: str,
+    description: str,
+    domain: Domain = Domain.ANY,
+    low: Any = None,
+    high: Any = None,
+    **more: Any,
+) -> Parameter:
     return Parameter(name, "int", default, field, description, unit, domain, low, high, **more)
 
 
@@ -164,8 +184,9 @@ def flag(name: str, default: bool, field: str, description: str) -> Parameter:
     return Parameter(name, "bool", default, field, description)
 
 
-def text(name: str, default: str, field: str, expected: str, description: str,
-         **more: Any) -> Parameter:
+def text(
+    name: str, default: str, field: str, expected: str, description: str, **more: Any
+) -> Parameter:
     return Parameter(name, "str", default, field, description, expected, **more)
 
 

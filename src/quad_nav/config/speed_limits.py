@@ -4,6 +4,7 @@ The original changes two parameters of a planner that is named; which, suits one
 Here it is always the planner that flies, and all of its speeds: one that may still go
 backwards fast is not slow.
 """
+
 from __future__ import annotations
 
 import difflib
@@ -14,9 +15,9 @@ from quad_nav.config import tables
 from quad_nav.config.dwa_table import DWA_TABLE
 from quad_nav.config.notes import CAUTION, Notes, join
 from quad_nav.config.planners import DWA_PLANNER
+from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import fields
 from quad_nav.config.spec import Table
-from quad_nav.plugins import plugin_name
 from quad_nav.recovery import MoveSlowAndClearParams
 
 
@@ -31,20 +32,32 @@ class Speeds:
     @property
     def fields(self) -> Dict[str, str]:
         """Parameter -> field of everything that a limit can be put on."""
-        return {parameter.name: parameter.field for parameter in self.table.parameters
-                if parameter.unit in ("m/s", "rad/s") and parameter.kind == "double"}
+        return {
+            parameter.name: parameter.field
+            for parameter in self.table.parameters
+            if parameter.unit in ("m/s", "rad/s") and parameter.kind == "double"
+        }
 
 
 # A user's planner is not among them: it has no parameters that change.
 SPEEDS: Dict[str, Speeds] = {
     tables.LOCAL_PLANNER: Speeds(
-        tables.TRAJECTORY_PLANNER, translation=("max_vel_x", "min_vel_x", "escape_vel"),
-        rotation=("max_vel_theta", "min_vel_theta", "min_in_place_vel_theta",
-                  "max_rotational_vel")),
+        tables.TRAJECTORY_PLANNER,
+        translation=("max_vel_x", "min_vel_x", "escape_vel"),
+        rotation=("max_vel_theta", "min_vel_theta", "min_in_place_vel_theta", "max_rotational_vel"),
+    ),
     DWA_PLANNER: Speeds(
-        DWA_TABLE, translation=("max_vel_trans", "min_vel_trans", "max_vel_x", "min_vel_x",
-                                "max_vel_y", "min_vel_y"),
-        rotation=("max_vel_theta", "min_vel_theta")),
+        DWA_TABLE,
+        translation=(
+            "max_vel_trans",
+            "min_vel_trans",
+            "max_vel_x",
+            "min_vel_x",
+            "max_vel_y",
+            "min_vel_y",
+        ),
+        rotation=("max_vel_theta", "min_vel_theta"),
+    ),
 }
 # The parameters that name one more speed, and what they are in the original when unset.
 _NAMES = {"max_trans_param_name": "max_trans_vel", "max_rot_param_name": "max_rot_vel"}
@@ -58,14 +71,19 @@ def check_slow(namespace: Mapping[str, Any], name: str, planner: str, notes: Not
         return
     given = namespace.get("planner_namespace", "")
     if isinstance(given, str) and given.strip("/") not in ("", own):
-        notes.remark(join(name, "planner_namespace"), CAUTION,
-                     f"{given} does not fly here: {own} is limited")
+        notes.remark(
+            join(name, "planner_namespace"), CAUTION, f"{given} does not fly here: {own} is limited"
+        )
         return
     for key, original in _NAMES.items():
         speed = namespace.get(key, "")
         if isinstance(speed, str) and speed not in ("", original, *speeds.fields):
-            notes.remark(join(name, key), CAUTION, f"{own} has no speed of the name {speed}",
-                         *difflib.get_close_matches(speed, speeds.fields, n=1))
+            notes.remark(
+                join(name, key),
+                CAUTION,
+                f"{own} has no speed of the name {speed}",
+                *difflib.get_close_matches(speed, speeds.fields, n=1),
+            )
 
 
 def slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearParams:
@@ -74,10 +92,12 @@ def slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearP
 
     def limited(names: Tuple[str, ...], key: str) -> Tuple[str, ...]:
         known = speeds.fields if speeds else {}
-        return tuple(dict.fromkeys(known[name] for name in (*names, namespace.get(key, ""))
-                                   if name in known))
+        return tuple(
+            dict.fromkeys(known[name] for name in (*names, namespace.get(key, "")) if name in known)
+        )
 
     return MoveSlowAndClearParams(
         translation_fields=limited(speeds.translation if speeds else (), "max_trans_param_name"),
         rotation_fields=limited(speeds.rotation if speeds else (), "max_rot_param_name"),
-        **fields(namespace, tables.MOVE_SLOW.parameters))
+        **fields(namespace, tables.MOVE_SLOW.parameters),
+    )

@@ -1,4 +1,5 @@
 """Parameters that are lists of numbers written as text."""
+
 from __future__ import annotations
 
 from typing import Any, Optional, Sequence, Tuple
@@ -6,7 +7,7 @@ from typing import Any, Optional, Sequence, Tuple
 import numpy as np
 import yaml
 
-from quad_nav import plain_yaml
+from quad_nav.files import plain_yaml
 
 Polygon = Tuple[Tuple[float, float], ...]
 
@@ -55,8 +56,11 @@ def _vertex(point: Any) -> Tuple[float, float]:
     if not isinstance(point, list) or len(point) != 2:
         raise ValueError(f"{point!r} is not a point [x, y]")
     for number in point:
-        if isinstance(number, bool) or not isinstance(number, (int, float)) or (
-                not np.isfinite(number)):
+        if (
+            isinstance(number, bool)
+            or not isinstance(number, (int, float))
+            or (not np.isfinite(number))
+        ):
             raise ValueError(f"{number!r} is not a number")
     # Through six digits and float32, the way that the original takes them.
     x, y = (float(np.float32(f"{number:g}")) for number in point)

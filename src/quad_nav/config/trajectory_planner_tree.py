@@ -1,4 +1,5 @@
 """The tree of TrajectoryPlannerROS: old names, and what is odd about its parameters."""
+
 from __future__ import annotations
 
 from typing import Any, Dict, Mapping
@@ -25,22 +26,29 @@ def settle_trajectory_planner(tree: Namespace, notes: Notes) -> None:
             _take_old_name(planner, old, new, notes)
     settle(planner, TRAJECTORY_PLANNER, tables.TRAJECTORY_PLANNER, notes, also_known=_RENAMED)
     if planner.get("meter_scoring") is False and not _is_heeded(tree):
-        notes.remark(join(TRAJECTORY_PLANNER, "meter_scoring"), IGNORED,
-                     "ignored by move_base: distances are always scored in metres")
+        notes.remark(
+            join(TRAJECTORY_PLANNER, "meter_scoring"),
+            IGNORED,
+            "ignored by move_base: distances are always scored in metres",
+        )
     if isinstance(planner.get("escape_vel"), float) and planner["escape_vel"] > 0.0:
-        notes.remark(join(TRAJECTORY_PLANNER, "escape_vel"), CAUTION,
-                     "the robot escapes forwards: a velocity below 0 backs up")
+        notes.remark(
+            join(TRAJECTORY_PLANNER, "escape_vel"),
+            CAUTION,
+            "the robot escapes forwards: a velocity below 0 backs up",
+        )
 
 
 def _is_heeded(tree: Namespace) -> bool:
-    mends = tree.get("mends")
-    return isinstance(mends, dict) and mends.get("heed_meter_scoring") is True
+    fixes = tree.get("fixes")
+    return isinstance(fixes, dict) and fixes.get("respect_meter_scoring") is True
 
 
 def trajectory_planner_params(tree: Mapping[str, Any]) -> TrajectoryPlannerParams:
     """The dataclass of a settled tree."""
     return TrajectoryPlannerParams(
-        **fields(tree[TRAJECTORY_PLANNER], tables.TRAJECTORY_PLANNER.parameters))
+        **fields(tree[TRAJECTORY_PLANNER], tables.TRAJECTORY_PLANNER.parameters)
+    )
 
 
 def _take_old_name(planner: Namespace, old: str, new: str, notes: Notes) -> None:

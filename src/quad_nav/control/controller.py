@@ -1,4 +1,5 @@
 """What the navigator asks of a local planner."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -40,8 +41,14 @@ class LocalPlanner(Protocol):
         """The padded footprint, float64[n, 2] in the robot's frame."""
         ...
 
-    def compute_velocity(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
-                         local_from_plan: Pose2D = IDENTITY) -> Control:
+    def compute_velocity(
+        self,
+        spec: GridSpec,
+        costs: np.ndarray,
+        pose: Pose2D,
+        velocity: Twist2D,
+        local_from_plan: Pose2D = IDENTITY,
+    ) -> Control:
         """The command for now. Raises a ``ControlError`` when there is none."""
         ...
 

@@ -23,6 +23,7 @@ Distances are those of the trajectory's last pose over the free cells, in metres
 obstacles. No pose and no nose may be off the map. A critic of weight 0 is not
 asked at all, not even whether a trajectory is legal.
 """
+
 from __future__ import annotations
 
 import math
@@ -64,9 +65,17 @@ class Critics:
     of an earlier call to go on with; without them they are measured.
     """
 
-    def __init__(self, params: DwaParams, spec: GridSpec, costs: np.ndarray,
-                 footprint: np.ndarray, plan: np.ndarray, pose: Pose2D, velocity: Twist2D,
-                 grids: Optional[DwaGrids] = None):
+    def __init__(
+        self,
+        params: DwaParams,
+        spec: GridSpec,
+        costs: np.ndarray,
+        footprint: np.ndarray,
+        plan: np.ndarray,
+        pose: Pose2D,
+        velocity: Twist2D,
+        grids: Optional[DwaGrids] = None,
+    ):
         self.params = params
         self.spec = spec
         # The original keeps the robot's state in single precision.
@@ -86,12 +95,17 @@ class Critics:
         goal = Pose2D(*single(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad))
         samples = velocity_samples(self.params, self.pose, self.velocity, goal, control_period_s)
         commands, distances, legal = kernel.travel(
-            self.motion, self.map_grids, self.start, self.velocity, samples)
+            self.motion, self.map_grids, self.start, self.velocity, samples
+        )
         legal &= ~oscillation.forbids(commands)
         scales = footprint_scales(self.params, commands)
         k, cost = kernel.cheapest(
-            self.motion, self.obstacles(scales[legal]), self.start, self.velocity,
-            kernel.Candidates(samples, self.terms(commands, distances), legal, scales))
+            self.motion,
+            self.obstacles(scales[legal]),
+            self.start,
+            self.velocity,
+            kernel.Candidates(samples, self.terms(commands, distances), legal, scales),
+        )
         if k < 0:
             return Trajectory((0.0, 0.0, 0.0), NO_LEGAL_TRAJECTORY, np.zeros((0, 3)))
         points, command = self.simulate(samples[k])
@@ -104,8 +118,10 @@ class Critics:
         """
         points, command = self.simulate(np.array(single(*sample)))
         scale = footprint_scales(self.params, np.array([command]))
-        if self.params.occdist_scale != 0.0 and kernel.obstacle_cost(
-                self.obstacles(scale), scale[0], points, len(points)) < 0.0:
+        if (
+            self.params.occdist_scale != 0.0
+            and kernel.obstacle_cost(self.obstacles(scale), scale[0], points, len(points)) < 0.0
+        ):
             return False
         return kernel.is_within_reach(self.map_grids, points, len(points), np.zeros(4))
 
@@ -129,18 +145,24 @@ class Critics:
         nowhere = np.zeros(self.window.costs.shape, dtype=np.bool_)
         cells = cells_on_plan(self.window, plan_xy)
         front_cells = cells_on_plan(self.window, front_xy)
-        path, goal, goal_front = (spread(self.window.costs, nowhere, sources)
-                                  for sources in (cells, cells[-1:], front_cells[-1:]))
+        path, goal, goal_front = (
+            spread(self.window.costs, nowhere, sources)
+            for sources in (cells, cells[-1:], front_cells[-1:])
+        )
         return DwaGrids(path, goal, goal_front)
 
     def _weighed_grids(self) -> kernel.MapGrids:
         follows_path = self.params.path_distance_bias != 0.0
-        near_m2 = self.params.forward_point_distance_m ** 2 * self.params.cheat_factor
-        to_goal_m2 = ((self.pose.x_m - self.goal.x_m) ** 2 + (self.pose.y_m - self.goal.y_m) ** 2)
+        near_m2 = self.params.forward_point_distance_m**2 * self.params.cheat_factor
+        to_goal_m2 = (self.pose.x_m - self.goal.x_m) ** 2 + (self.pose.y_m - self.goal.y_m) ** 2
         return kernel.MapGrids(
-            self.window, *self.grids, float(self.params.forward_point_distance_m),
-            follows_path=follows_path, follows_goal=self.params.goal_distance_bias != 0.0,
-            aligns=follows_path and to_goal_m2 > near_m2)
+            self.window,
+            *self.grids,
+            float(self.params.forward_point_distance_m),
+            follows_path=follows_path,
+            follows_goal=self.params.goal_distance_bias != 0.0,
+            aligns=follows_path and to_goal_m2 > near_m2,
+        )
 
     def terms(self, commands: np.ndarray, distances: np.ndarray) -> np.ndarray:
         """float64[n, 5]: every critic's part of the cost but the obstacles', in their order."""
@@ -155,8 +177,12 @@ class Critics:
         largest = float(np.max(np.abs(scales[np.isfinite(scales)]), initial=1.0))
         reach_m = footprint_reach_m(self.footprint) * largest
         return kernel.Obstacles(
-            self.window, highest_near(self.window, reach_m), self.footprint,
-            scale=float(self.params.occdist_scale), sums=bool(self.params.sum_scores))
+            self.window,
+            highest_near(self.window, reach_m),
+            self.footprint,
+            scale=float(self.params.occdist_scale),
+            sums=bool(self.params.sum_scores),
+        )
 
 
 def footprint_scales(params: DwaParams, commands: np.ndarray) -> np.ndarray:
@@ -178,4 +204,5 @@ def _motion(params: DwaParams) -> kernel.Motion:
         min_vel_trans_mps=float(params.min_vel_trans_mps),
         max_vel_trans_mps=float(params.max_vel_trans_mps),
         min_vel_theta_radps=float(params.min_vel_theta_radps),
-        accelerates=not params.use_dwa)
+        accelerates=not params.use_dwa,
+    )

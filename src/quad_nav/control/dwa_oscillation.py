@@ -4,6 +4,7 @@ A command that reverses the direction of an earlier one forbids the direction
 given up, until the robot has moved or turned far enough. Sideways motion and
 turns count only while the robot hardly moves forward.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -62,8 +63,14 @@ class OscillationCritic:
         forbidden = [axis.forbids(commands[:, k]) for k, axis in enumerate(self.axes)]
         return np.logical_or.reduce(forbidden)
 
-    def note(self, command: Triple, pose: Pose2D, slow_mps: float, reset_dist_m: float,
-             reset_angle_rad: float) -> None:
+    def note(
+        self,
+        command: Triple,
+        pose: Pose2D,
+        slow_mps: float,
+        reset_dist_m: float,
+        reset_angle_rad: float,
+    ) -> None:
         """A chosen command; ``slow_mps`` is the forward speed up to which all axes count."""
         reversals = [self.forward.note(command[0])]
         if abs(command[0]) <= slow_mps:

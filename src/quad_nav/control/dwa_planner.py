@@ -5,6 +5,7 @@ Each call cuts the global plan to the local window, samples velocities
 (``dwa_critics``, ``dwa_oscillation``). Within ``xy_goal_tolerance_m`` of the
 global plan's end it stops and turns in place instead (``goal``).
 """
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -49,8 +50,14 @@ class DwaPlanner(PlanFollower):
         super().set_plan(plan)
         self.oscillation.reset()
 
-    def compute_velocity(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
-                         local_from_plan: Pose2D = IDENTITY) -> Control:
+    def compute_velocity(
+        self,
+        spec: GridSpec,
+        costs: np.ndarray,
+        pose: Pose2D,
+        velocity: Twist2D,
+        local_from_plan: Pose2D = IDENTITY,
+    ) -> Control:
         """The command for a robot at ``pose`` on ``costs``, uint8[H, W] on ``spec``.
 
         ``velocity`` is the odometry's, in the body frame. Raises NoLocalPlan
@@ -63,16 +70,18 @@ class DwaPlanner(PlanFollower):
         goal = plan_end(self.plan, local_from_plan)
         if self._is_at(goal, pose):
             self.xy_tolerance_latch = True
-            self._goal_reached = (
-                abs(angle_difference(goal.yaw_rad, pose.yaw_rad))
-                <= self.params.yaw_goal_tolerance_rad and is_stopped(velocity, self.params))
+            self._goal_reached = abs(
+                angle_difference(goal.yaw_rad, pose.yaw_rad)
+            ) <= self.params.yaw_goal_tolerance_rad and is_stopped(velocity, self.params)
             command = self._command_at_goal(spec, costs, pose, velocity, goal)
             return Control(command, float("nan"), NO_POSES, plan, goal_mode=True)
         best = self._search(spec, costs, pose, velocity)
         if best.cost < 0.0:
-            raise NoValidTrajectory(f"none of the sampled velocities is legal from "
-                                    f"({pose.x_m:.2f}, {pose.y_m:.2f}) m: all collide, are too "
-                                    f"slow or too fast, or lose the way to the path or its end")
+            raise NoValidTrajectory(
+                f"none of the sampled velocities is legal from "
+                f"({pose.x_m:.2f}, {pose.y_m:.2f}) m: all collide, are too "
+                f"slow or too fast, or lose the way to the path or its end"
+            )
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
     def cost_cloud(self) -> np.ndarray:
@@ -84,15 +93,24 @@ class DwaPlanner(PlanFollower):
             return np.zeros((0, 7), dtype=np.float32)
         critics, costs = self.critics, self.critics.window.costs
         usable = (critics.grids.path < costs.size) & (costs < INSCRIBED)
-        return cost_cloud(critics.spec, costs, critics.grids.path, critics.grids.goal, usable,
-                          critics.path_scale, critics.goal_scale, critics.params.occdist_scale)
+        return cost_cloud(
+            critics.spec,
+            costs,
+            critics.grids.path,
+            critics.grids.goal,
+            usable,
+            critics.path_scale,
+            critics.goal_scale,
+            critics.params.occdist_scale,
+        )
 
     def _is_at(self, goal: Pose2D, pose: Pose2D) -> bool:
         latched = self.params.latch_xy_goal_tolerance and self.xy_tolerance_latch
         return latched or pose.distance_to(goal) <= self.params.xy_goal_tolerance_m
 
-    def _command_at_goal(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
-                         goal: Pose2D) -> Twist2D:
+    def _command_at_goal(
+        self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D, goal: Pose2D
+    ) -> Twist2D:
         turn_rad = angle_difference(goal.yaw_rad, pose.yaw_rad)
         if abs(turn_rad) <= self.params.yaw_goal_tolerance_rad:
             self.rotating_to_goal = False
@@ -108,23 +126,31 @@ class DwaPlanner(PlanFollower):
         grids = self._grids
         if grids is None or grids.path.shape != costs.shape:
             grids = DwaGrids(*np.zeros((3, *costs.shape), dtype=np.int32))
-        self.critics = Critics(self.params, spec, costs, self.footprint, self.local_global_plan,
-                               pose, velocity, grids)
+        self.critics = Critics(
+            self.params, spec, costs, self.footprint, self.local_global_plan, pose, velocity, grids
+        )
         if not self.critics.is_legal((command.vx_mps, command.vy_mps, command.vyaw_radps)):
-            raise NoValidTrajectory(f"no room to stop and turn at the goal, "
-                                    f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+            raise NoValidTrajectory(
+                f"no room to stop and turn at the goal, ({pose.x_m:.2f}, {pose.y_m:.2f}) m"
+            )
         return command
 
-    def _search(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D,
-                velocity: Twist2D) -> Trajectory:
-        self.critics = Critics(self.params, spec, costs, self.footprint, self.local_global_plan,
-                               pose, velocity)
+    def _search(
+        self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D
+    ) -> Trajectory:
+        self.critics = Critics(
+            self.params, spec, costs, self.footprint, self.local_global_plan, pose, velocity
+        )
         self._grids = self.critics.grids
         self.best = self.critics.choose(self.oscillation, self.control_period_s)
         if self.best.cost >= 0.0:
             self.oscillation.note(
-                self.best.sample, self.critics.pose, self.params.min_vel_trans_mps,
-                self.params.oscillation_reset_dist_m, self.params.oscillation_reset_angle_rad)
+                self.best.sample,
+                self.critics.pose,
+                self.params.min_vel_trans_mps,
+                self.params.oscillation_reset_dist_m,
+                self.params.oscillation_reset_angle_rad,
+            )
         return self.best
 
 

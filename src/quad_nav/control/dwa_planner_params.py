@@ -1,4 +1,5 @@
 """Parameters of the dynamic window controller."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

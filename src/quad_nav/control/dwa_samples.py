@@ -5,6 +5,7 @@ period with ``use_dwa`` (the dynamic window of D. Fox, W. Burgard and S. Thrun
 1997, "The dynamic window approach to collision avoidance"), else in
 ``sim_time_s``, and then no faster than would overshoot the local goal.
 """
+
 from __future__ import annotations
 
 from typing import List, Tuple
@@ -16,8 +17,9 @@ from quad_nav.control.rollout import Triple, single
 from quad_nav.geometry import Pose2D
 
 
-def velocity_samples(params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D,
-                     control_period_s: float) -> np.ndarray:
+def velocity_samples(
+    params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D, control_period_s: float
+) -> np.ndarray:
     """float64[n, 3] rows vx, vy, vtheta of single precision; vtheta varies fastest.
 
     ``goal`` is the end of the plan in the local window.
@@ -49,8 +51,9 @@ def acceleration_limits(params: DwaParams) -> Triple:
     return single(params.acc_lim_x_mps2, params.acc_lim_y_mps2, params.acc_lim_theta_radps2)
 
 
-def _velocity_window(params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D,
-                     control_period_s: float) -> Tuple[Triple, Triple]:
+def _velocity_window(
+    params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D, control_period_s: float
+) -> Tuple[Triple, Triple]:
     fastest_x, fastest_y = params.max_vel_x_mps, params.max_vel_y_mps
     period_s = control_period_s
     if not params.use_dwa:
@@ -61,5 +64,7 @@ def _velocity_window(params: DwaParams, pose: Pose2D, velocity: Triple, goal: Po
     slowest = params.min_vel_x_mps, params.min_vel_y_mps, -params.max_vel_theta_radps
     fastest = fastest_x, fastest_y, params.max_vel_theta_radps
     change = [limit * period_s for limit in acceleration_limits(params)]
-    return (single(*(max(a, v - c) for a, v, c in zip(slowest, velocity, change))),
-            single(*(min(a, v + c) for a, v, c in zip(fastest, velocity, change))))
+    return (
+        single(*(max(a, v - c) for a, v, c in zip(slowest, velocity, change))),
+        single(*(min(a, v + c) for a, v, c in zip(fastest, velocity, change))),
+    )

@@ -1,4 +1,5 @@
 """At the goal's position: stop, then turn to the goal's heading."""
+
 from __future__ import annotations
 
 import math
@@ -36,9 +37,11 @@ class GoalLimits(Protocol):
 
 
 def is_stopped(velocity: Twist2D, params: GoalLimits) -> bool:
-    return (abs(velocity.vyaw_radps) <= params.rot_stopped_velocity_radps
-            and abs(velocity.vx_mps) <= params.trans_stopped_velocity_mps
-            and abs(velocity.vy_mps) <= params.trans_stopped_velocity_mps)
+    return (
+        abs(velocity.vyaw_radps) <= params.rot_stopped_velocity_radps
+        and abs(velocity.vx_mps) <= params.trans_stopped_velocity_mps
+        and abs(velocity.vy_mps) <= params.trans_stopped_velocity_mps
+    )
 
 
 def stopping_command(velocity: Twist2D, params: GoalLimits, control_period_s: float) -> Twist2D:
@@ -46,11 +49,13 @@ def stopping_command(velocity: Twist2D, params: GoalLimits, control_period_s: fl
     return Twist2D(
         _slowed(velocity.vx_mps, params.acc_lim_x_mps2 * control_period_s),
         _slowed(velocity.vy_mps, params.acc_lim_y_mps2 * control_period_s),
-        _slowed(velocity.vyaw_radps, params.acc_lim_theta_radps2 * control_period_s))
+        _slowed(velocity.vyaw_radps, params.acc_lim_theta_radps2 * control_period_s),
+    )
 
 
-def turning_command(turn_rad: float, velocity: Twist2D, params: GoalLimits,
-                    control_period_s: float) -> Twist2D:
+def turning_command(
+    turn_rad: float, velocity: Twist2D, params: GoalLimits, control_period_s: float
+) -> Twist2D:
     """Turn in place by ``turn_rad``, fast enough for the base and slow enough to stop there.
 
     In order of strength: at least ``min_in_place_vel_theta`` and at most
@@ -73,8 +78,9 @@ def turning_command(turn_rad: float, velocity: Twist2D, params: GoalLimits,
 
 
 def _in_place_speed(speed_radps: float, params: GoalLimits) -> float:
-    return min(params.max_rotational_vel_radps,
-               max(params.min_in_place_vel_theta_radps, speed_radps))
+    return min(
+        params.max_rotational_vel_radps, max(params.min_in_place_vel_theta_radps, speed_radps)
+    )
 
 
 def _slowed(velocity: float, max_change: float) -> float:

@@ -6,6 +6,7 @@ Cells under the robot's footprint count as free for the path distance, so that
 a robot at an obstacle still finds its way to the plan; not so for the goal
 distance.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -30,8 +31,9 @@ class DistanceGrids:
     within_robot: np.ndarray
 
 
-def distance_grids(window: Window, plan_xy: np.ndarray, footprint: np.ndarray,
-                   pose: Pose2D) -> DistanceGrids:
+def distance_grids(
+    window: Window, plan_xy: np.ndarray, footprint: np.ndarray, pose: Pose2D
+) -> DistanceGrids:
     """Distance grids of a plan, float64[m, 2], for a robot at a pose.
 
     Without a point of the plan on known ground, nothing is reached.
@@ -40,6 +42,8 @@ def distance_grids(window: Window, plan_xy: np.ndarray, footprint: np.ndarray,
     within_robot = nowhere.copy()
     mark_footprint(window, footprint, pose.x_m, pose.y_m, pose.yaw_rad, within_robot)
     cells = cells_on_plan(window, plan_xy)
-    return DistanceGrids(path=spread(window.costs, within_robot, cells),
-                         goal=spread(window.costs, nowhere, cells[-1:]),
-                         within_robot=within_robot)
+    return DistanceGrids(
+        path=spread(window.costs, within_robot, cells),
+        goal=spread(window.costs, nowhere, cells[-1:]),
+        within_robot=within_robot,
+    )

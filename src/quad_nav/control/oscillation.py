@@ -4,6 +4,7 @@ Turning or strafing without moving forward is remembered until the robot has
 moved; a direction that was already tried is then not taken again. Backing out
 ("escaping") likewise lasts until the robot has moved or turned far enough.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ class Oscillation:
     stuck_left_strafe: bool = False
     stuck_right_strafe: bool = False
     escaping: bool = False
-    since: Pose2D = Pose2D(0.0, 0.0, 0.0)        # where it last turned or strafed
+    since: Pose2D = Pose2D(0.0, 0.0, 0.0)  # where it last turned or strafed
     escape_from: Pose2D = Pose2D(0.0, 0.0, 0.0)  # where it last began to back out
 
     def note_turn(self, sample: Triple, pose: Pose2D) -> None:
@@ -72,10 +73,9 @@ class Oscillation:
             self.strafe_left = self.strafe_right = False
             self.stuck_left_strafe = self.stuck_right_strafe = False
 
-    def end_escape_if_moved(self, pose: Pose2D, reset_dist_m: float,
-                            reset_theta_rad: float) -> None:
+    def end_escape_if_moved(
+        self, pose: Pose2D, reset_dist_m: float, reset_theta_rad: float
+    ) -> None:
         turned_rad = abs(angle_difference(pose.yaw_rad, self.escape_from.yaw_rad))
         if self.escape_from.distance_to(pose) > reset_dist_m or turned_rad > reset_theta_rad:
             self.escaping = False
-
-

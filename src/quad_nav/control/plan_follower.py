@@ -1,4 +1,5 @@
 """What the local planners have in common: a plan that is cut and pruned, a goal, a footprint."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -60,7 +61,9 @@ class PlanFollower:
             passed = count_passed(plan, pose)
             plan, self.plan = plan[passed:], self.plan[passed:]
         if not len(plan):
-            raise NoLocalPlan(f"the global plan does not come near the robot at "
-                              f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+            raise NoLocalPlan(
+                f"the global plan does not come near the robot at "
+                f"({pose.x_m:.2f}, {pose.y_m:.2f}) m"
+            )
         self.local_global_plan = plan
         return plan

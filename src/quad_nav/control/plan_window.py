@@ -1,4 +1,5 @@
 """The part of a global plan that matters here and now."""
+
 from __future__ import annotations
 
 import math
@@ -11,8 +12,9 @@ from quad_nav.grid import GridSpec
 _PASSED_BEYOND_M = 1.0
 
 
-def plan_in_window(plan: np.ndarray, spec: GridSpec, pose: Pose2D,
-                   local_from_plan: Pose2D) -> np.ndarray:
+def plan_in_window(
+    plan: np.ndarray, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D
+) -> np.ndarray:
     """The plan's first stretch near the robot, float64[m, 3] in the local frame.
 
     Near is half the window's longer side. The stretch begins with the first
@@ -49,13 +51,18 @@ def _distance2(plan: np.ndarray, pose: Pose2D) -> np.ndarray:
 def _transform(a_from_b: Pose2D, poses: np.ndarray) -> np.ndarray:
     cos_yaw, sin_yaw = math.cos(a_from_b.yaw_rad), math.sin(a_from_b.yaw_rad)
     x, y, yaw = poses.T
-    return np.column_stack((cos_yaw * x - sin_yaw * y + a_from_b.x_m,
-                            sin_yaw * x + cos_yaw * y + a_from_b.y_m,
-                            yaw + a_from_b.yaw_rad))
+    return np.column_stack(
+        (
+            cos_yaw * x - sin_yaw * y + a_from_b.x_m,
+            sin_yaw * x + cos_yaw * y + a_from_b.y_m,
+            yaw + a_from_b.yaw_rad,
+        )
+    )
 
 
 def _inverse_transform(a_from_b: Pose2D, pose: Pose2D) -> Pose2D:
     cos_yaw, sin_yaw = math.cos(a_from_b.yaw_rad), math.sin(a_from_b.yaw_rad)
     dx, dy = pose.x_m - a_from_b.x_m, pose.y_m - a_from_b.y_m
-    return Pose2D(cos_yaw * dx + sin_yaw * dy, cos_yaw * dy - sin_yaw * dx,
-                  pose.yaw_rad - a_from_b.yaw_rad)
+    return Pose2D(
+        cos_yaw * dx + sin_yaw * dy, cos_yaw * dy - sin_yaw * dx, pose.yaw_rad - a_from_b.yaw_rad
+    )

@@ -16,6 +16,7 @@ farthest visible plan point counts as well; with ``simple_attractor``, only the
 squared distance to the plan's end counts. B. Gerkey and K. Konolige 2008,
 "Planning and control in unstructured terrain".
 """
+
 from __future__ import annotations
 
 import math
@@ -50,8 +51,16 @@ class Rollout:
     ``plan`` is float64[m, 3], m >= 1, in the costmap's frame.
     """
 
-    def __init__(self, params: TrajectoryPlannerParams, spec: GridSpec, costs: np.ndarray,
-                 footprint: np.ndarray, plan: np.ndarray, pose: Pose2D, velocity: Twist2D):
+    def __init__(
+        self,
+        params: TrajectoryPlannerParams,
+        spec: GridSpec,
+        costs: np.ndarray,
+        footprint: np.ndarray,
+        plan: np.ndarray,
+        pose: Pose2D,
+        velocity: Twist2D,
+    ):
         self.spec = spec
         # The original keeps the robot's state in single precision.
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
@@ -61,23 +70,29 @@ class Rollout:
         self.goal_x_m, self.goal_y_m = plan_xy[-1]
         self.grids = distance_grids(window, plan_xy, footprint, self.pose)
         self.scene = kernel.Scene(
-            window, highest_near(window, footprint_reach_m(footprint)), footprint, self.grids.path,
-            self.grids.goal, plan_xy)
+            window,
+            highest_near(window, footprint_reach_m(footprint)),
+            footprint,
+            self.grids.path,
+            self.grids.goal,
+            plan_xy,
+        )
         self.rules = _rules(params, spec.resolution_m)
 
-    def score(self, samples: np.ndarray, limit: float = math.inf
-              ) -> Tuple[np.ndarray, np.ndarray]:
+    def score(self, samples: np.ndarray, limit: float = math.inf) -> Tuple[np.ndarray, np.ndarray]:
         """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3].
 
         A cost may be infinite if it is above ``limit``.
         """
-        return kernel.score(self.scene, self.rules, _triple(self.pose), self.velocity, samples,
-                            limit)
+        return kernel.score(
+            self.scene, self.rules, _triple(self.pose), self.velocity, samples, limit
+        )
 
     def cheapest(self, samples: np.ndarray) -> Optional[Tuple[int, float]]:
         """Index and cost of the cheapest legal sample, the first of equals; None if none is."""
-        k, cost = kernel.cheapest(self.scene, self.rules, _triple(self.pose), self.velocity,
-                                  samples)
+        k, cost = kernel.cheapest(
+            self.scene, self.rules, _triple(self.pose), self.velocity, samples
+        )
         return (k, cost) if k >= 0 else None
 
     def trajectory(self, sample: Triple) -> Trajectory:
@@ -85,8 +100,10 @@ class Rollout:
 
     def is_valid(self, pose: Pose2D, velocity: Twist2D, command: Twist2D) -> bool:
         """Whether a command from the given state, in double precision, hits nothing."""
-        return self._simulate(_triple(pose), _twist_triple(velocity),
-                              _twist_triple(command)).cost >= 0.0
+        return (
+            self._simulate(_triple(pose), _twist_triple(velocity), _twist_triple(command)).cost
+            >= 0.0
+        )
 
     def is_free(self, pose: Pose2D) -> bool:
         """Whether nothing is under the footprint at a pose, within its outline neither."""
@@ -120,19 +137,29 @@ class Rollout:
         """
         costs, path = self.scene.window.costs, self.grids.path
         usable = (path < costs.size) & (costs < INSCRIBED) & ~self.grids.within_robot
-        return cost_cloud(self.spec, costs, path, self.grids.goal, usable, self.rules.path_scale,
-                          self.rules.goal_scale, self.rules.occupancy_scale)
+        return cost_cloud(
+            self.spec,
+            costs,
+            path,
+            self.grids.goal,
+            usable,
+            self.rules.path_scale,
+            self.rules.goal_scale,
+            self.rules.occupancy_scale,
+        )
 
 
 def kernel_window(spec: GridSpec, costs: np.ndarray) -> collision.Window:
     """A costmap, uint8[H, W] on ``spec``, as the kernels take it."""
-    return collision.Window(costs=np.ascontiguousarray(costs), origin_x_m=float(spec.origin_x_m),
-                            origin_y_m=float(spec.origin_y_m),
-                            resolution_m=float(spec.resolution_m))
+    return collision.Window(
+        costs=np.ascontiguousarray(costs),
+        origin_x_m=float(spec.origin_x_m),
+        origin_y_m=float(spec.origin_y_m),
+        resolution_m=float(spec.resolution_m),
+    )
 
 
-def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray,
-                   pose: Pose2D) -> float:
+def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray, pose: Pose2D) -> float:
     """The highest cost under the outline of a footprint, float64[n, 2], at a pose.
 
     Negative where it cannot be: -1 on a lethal cell, -2 on an unknown one, -3
@@ -180,7 +207,8 @@ def _rules(params: TrajectoryPlannerParams, resolution_m: float) -> kernel.Rules
         occupancy_scale=float(params.occdist_scale),
         heading_scoring=bool(params.heading_scoring),
         heading_scoring_timestep_s=float(params.heading_scoring_timestep_s),
-        simple_attractor=bool(params.simple_attractor))
+        simple_attractor=bool(params.simple_attractor),
+    )
 
 
 def single(*values: float) -> Triple:

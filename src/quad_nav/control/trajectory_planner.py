@@ -5,6 +5,7 @@ Each call cuts the global plan to the local window, measures distances to it
 (``velocity_search``). Within ``xy_goal_tolerance_m`` of the plan's last pose in
 the window it stops and turns in place instead (``goal``).
 """
+
 from __future__ import annotations
 
 from typing import Optional
@@ -34,15 +35,22 @@ class TrajectoryPlanner(PlanFollower):
     any call since ``set_plan`` has found the robot there.
     """
 
-    def __init__(self, params: TrajectoryPlannerParams, footprint: np.ndarray,
-                 control_period_s: float):
+    def __init__(
+        self, params: TrajectoryPlannerParams, footprint: np.ndarray, control_period_s: float
+    ):
         super().__init__(params, footprint, control_period_s)
         self.oscillation = Oscillation()
         self.best: Optional[Trajectory] = None
         self.rollout: Optional[Rollout] = None
 
-    def compute_velocity(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
-                         local_from_plan: Pose2D = IDENTITY) -> Control:
+    def compute_velocity(
+        self,
+        spec: GridSpec,
+        costs: np.ndarray,
+        pose: Pose2D,
+        velocity: Twist2D,
+        local_from_plan: Pose2D = IDENTITY,
+    ) -> Control:
         """The command for a robot at ``pose`` on ``costs``, uint8[H, W] on ``spec``.
 
         ``velocity`` is the odometry's, in the body frame. Raises NoLocalPlan
@@ -58,8 +66,11 @@ class TrajectoryPlanner(PlanFollower):
             return Control(command, float("nan"), NO_POSES, plan, goal_mode=True)
         best = self._search(spec, costs, pose, velocity)
         if best.cost < 0.0:
-            reason = ("the global plan or its end in the local costmap is out of reach"
-                      if best.cost == NO_WAY else "every trajectory hits something")
+            reason = (
+                "the global plan or its end in the local costmap is out of reach"
+                if best.cost == NO_WAY
+                else "every trajectory hits something"
+            )
             raise NoValidTrajectory(f"{reason} from ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
@@ -72,8 +83,9 @@ class TrajectoryPlanner(PlanFollower):
             return np.zeros((0, 7), dtype=np.float32)
         return self.rollout.cost_cloud()
 
-    def _command_at_goal(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D,
-                         goal: Pose2D) -> Twist2D:
+    def _command_at_goal(
+        self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D, goal: Pose2D
+    ) -> Twist2D:
         turn_rad = angle_difference(goal.yaw_rad, pose.yaw_rad)
         if abs(turn_rad) <= self.params.yaw_goal_tolerance_rad:
             self.rotating_to_goal = self.xy_tolerance_latch = False
@@ -87,14 +99,18 @@ class TrajectoryPlanner(PlanFollower):
             command = turning_command(turn_rad, velocity, self.params, self.control_period_s)
         assert self.rollout is not None
         if not self.rollout.is_valid(pose, velocity, command):
-            raise NoValidTrajectory(f"no room to stop and turn at the goal, "
-                                    f"({pose.x_m:.2f}, {pose.y_m:.2f}) m")
+            raise NoValidTrajectory(
+                f"no room to stop and turn at the goal, ({pose.x_m:.2f}, {pose.y_m:.2f}) m"
+            )
         return command
 
-    def _search(self, spec: GridSpec, costs: np.ndarray, pose: Pose2D,
-                velocity: Twist2D) -> Trajectory:
-        self.rollout = Rollout(self.params, spec, costs, self.footprint, self.local_global_plan,
-                               pose, velocity)
-        self.best = choose_trajectory(self.rollout, self.params, self.oscillation,
-                                      self.control_period_s)
+    def _search(
+        self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D
+    ) -> Trajectory:
+        self.rollout = Rollout(
+            self.params, spec, costs, self.footprint, self.local_global_plan, pose, velocity
+        )
+        self.best = choose_trajectory(
+            self.rollout, self.params, self.oscillation, self.control_period_s
+        )
         return self.best

@@ -1,4 +1,5 @@
 """Parameters of the trajectory rollout controller."""
+
 from __future__ import annotations
 
 import math
@@ -64,5 +65,5 @@ class TrajectoryPlannerParams:
     prune_plan: bool = True
 
     # Mended faults; False is the original's behaviour
-    refuse_colliding_escape: bool = False  # escape backwards only where nothing is hit
+    reject_colliding_escape: bool = False  # escape backwards only where nothing is hit
     predict_goal_turn: bool = False  # turn no farther in one control period than is left

@@ -8,9 +8,10 @@ In order, the first stage that yields a legal trajectory wins:
    the goal. While escaping only turns are tried.
 2. sideways, for a holonomic robot, by the same rule.
 3. backwards at ``escape_vel_mps``: taken even if it collides, unless path or
-   goal are out of reach. With ``refuse_colliding_escape`` it must lead out of
+   goal are out of reach. With ``reject_colliding_escape`` it must lead out of
    the collision.
 """
+
 from __future__ import annotations
 
 import math
@@ -46,15 +47,20 @@ class _Candidate:
     cost: float
 
 
-def choose_trajectory(rollout: Rollout, params: TrajectoryPlannerParams,
-                      oscillation: Oscillation, control_period_s: float) -> Trajectory:
+def choose_trajectory(
+    rollout: Rollout,
+    params: TrajectoryPlannerParams,
+    oscillation: Oscillation,
+    control_period_s: float,
+) -> Trajectory:
     """The trajectory to follow; its cost is negative when there is none.
 
     Changes ``oscillation``.
     """
     window = velocity_window(rollout, params, control_period_s)
-    thetas, theta_step = spaced(window.min_vtheta_radps, window.max_vtheta_radps,
-                                params.vtheta_samples)
+    thetas, theta_step = spaced(
+        window.min_vtheta_radps, window.max_vtheta_radps, params.vtheta_samples
+    )
     best = None
     if not oscillation.escaping:
         best = _cheapest(rollout, _forward_samples(window, thetas, params))
@@ -70,24 +76,29 @@ def choose_trajectory(rollout: Rollout, params: TrajectoryPlannerParams,
     return _escape(rollout, params, oscillation)
 
 
-def velocity_window(rollout: Rollout, params: TrajectoryPlannerParams,
-                    control_period_s: float) -> VelocityWindow:
+def velocity_window(
+    rollout: Rollout, params: TrajectoryPlannerParams, control_period_s: float
+) -> VelocityWindow:
     """Velocities reachable in one control period with ``dwa``, else in ``sim_time_s``.
 
     vx is also kept low enough not to overshoot the local goal.
     """
     period_s = control_period_s if params.dwa else params.sim_time_s
     vx, _, vtheta = rollout.velocity
-    to_goal_m = float(np.hypot(rollout.goal_x_m - rollout.pose.x_m,
-                               rollout.goal_y_m - rollout.pose.y_m))
-    change_x, change_theta = (params.acc_lim_x_mps2 * period_s,
-                              params.acc_lim_theta_radps2 * period_s)
+    to_goal_m = float(
+        np.hypot(rollout.goal_x_m - rollout.pose.x_m, rollout.goal_y_m - rollout.pose.y_m)
+    )
+    change_x, change_theta = (
+        params.acc_lim_x_mps2 * period_s,
+        params.acc_lim_theta_radps2 * period_s,
+    )
     max_vx = min(params.max_vel_x_mps, to_goal_m / params.sim_time_s, vx + change_x)
     return VelocityWindow(
         min_vx_mps=max(params.min_vel_x_mps, vx - change_x),
         max_vx_mps=max(max_vx, params.min_vel_x_mps),
         min_vtheta_radps=max(params.min_vel_theta_radps, vtheta - change_theta),
-        max_vtheta_radps=min(params.max_vel_theta_radps, vtheta + change_theta))
+        max_vtheta_radps=min(params.max_vel_theta_radps, vtheta + change_theta),
+    )
 
 
 def spaced(start: float, end: float, count: int) -> Tuple[np.ndarray, float]:
@@ -105,8 +116,9 @@ def spaced(start: float, end: float, count: int) -> Tuple[np.ndarray, float]:
     return np.add.accumulate(values), step
 
 
-def _forward_samples(window: VelocityWindow, thetas: np.ndarray,
-                     params: TrajectoryPlannerParams) -> np.ndarray:
+def _forward_samples(
+    window: VelocityWindow, thetas: np.ndarray, params: TrajectoryPlannerParams
+) -> np.ndarray:
     """float64[n, 3]: for each vx straight ahead, then all vtheta but the last."""
     speeds, _ = spaced(window.min_vx_mps, window.max_vx_mps, params.vx_samples)
     turns = np.concatenate(([0.0], thetas[:-1]))
@@ -122,14 +134,20 @@ def _cheapest(rollout: Rollout, samples: np.ndarray) -> Optional[_Candidate]:
     return _Candidate(_row(samples, found[0]), found[1]) if found is not None else None
 
 
-def _turn_in_place(rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation,
-                   thetas: np.ndarray, theta_step: float, best: Optional[_Candidate]
-                   ) -> Tuple[Optional[_Candidate], float]:
+def _turn_in_place(
+    rollout: Rollout,
+    params: TrajectoryPlannerParams,
+    oscillation: Oscillation,
+    thetas: np.ndarray,
+    theta_step: float,
+    best: Optional[_Candidate],
+) -> Tuple[Optional[_Candidate], float]:
     """The best candidate so far or a turn, and the goal distance that the turn faces."""
     slowest = params.min_in_place_vel_theta_radps
     samples = np.zeros((len(thetas), 3))
-    samples[:, 2] = np.where(thetas > 0.0, np.maximum(thetas, slowest),
-                             np.minimum(thetas, -slowest))
+    samples[:, 2] = np.where(
+        thetas > 0.0, np.maximum(thetas, slowest), np.minimum(thetas, -slowest)
+    )
     must_not_cost_more = best is not None and best.sample[1] == 0.0
     costs, ends = rollout.score(samples, best.cost if best and must_not_cost_more else math.inf)
     facing = math.inf
@@ -144,8 +162,9 @@ def _turn_in_place(rollout: Rollout, params: TrajectoryPlannerParams, oscillatio
     return best, facing
 
 
-def _strafe(rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation,
-            facing: float) -> Optional[_Candidate]:
+def _strafe(
+    rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation, facing: float
+) -> Optional[_Candidate]:
     samples = np.zeros((len(params.y_vels_mps), 3))
     samples[:, 1] = params.y_vels_mps
     costs, ends = rollout.score(samples)
@@ -161,20 +180,27 @@ def _strafe(rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Osci
     return best
 
 
-def _distance_ahead(rollout: Rollout, params: TrajectoryPlannerParams,
-                    end: np.ndarray) -> Optional[int]:
+def _distance_ahead(
+    rollout: Rollout, params: TrajectoryPlannerParams, end: np.ndarray
+) -> Optional[int]:
     """Goal distance of the cell that a pose faces, None off the map."""
     x, y, theta = (float(value) for value in end)
-    return rollout.goal_distance_at(x + params.heading_lookahead_m * math.cos(theta),
-                                    y + params.heading_lookahead_m * math.sin(theta))
+    return rollout.goal_distance_at(
+        x + params.heading_lookahead_m * math.cos(theta),
+        y + params.heading_lookahead_m * math.sin(theta),
+    )
 
 
-def _escape(rollout: Rollout, params: TrajectoryPlannerParams,
-            oscillation: Oscillation) -> Trajectory:
+def _escape(
+    rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation
+) -> Trajectory:
     trajectory = rollout.trajectory((params.escape_vel_mps, 0.0, 0.0))
     oscillation.forget_if_moved(rollout.pose, params.oscillation_reset_dist_m)
-    is_refused = (params.refuse_colliding_escape and trajectory.cost == COLLIDES
-                  and not _leads_out(rollout, params))
+    is_refused = (
+        params.reject_colliding_escape
+        and trajectory.cost == COLLIDES
+        and not _leads_out(rollout, params)
+    )
     if trajectory.cost > NO_WAY and not is_refused:
         oscillation.begin_escape(rollout.pose)
     _end_escape(rollout, params, oscillation)
@@ -190,17 +216,20 @@ def _leads_out(rollout: Rollout, params: TrajectoryPlannerParams) -> bool:
     return rollout.is_free(Pose2D(x + back_m * math.cos(yaw), y + back_m * math.sin(yaw), yaw))
 
 
-def _settle(rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation,
-            best: _Candidate) -> Trajectory:
+def _settle(
+    rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation, best: _Candidate
+) -> Trajectory:
     oscillation.forget_if_moved(rollout.pose, params.oscillation_reset_dist_m)
     _end_escape(rollout, params, oscillation)
     return rollout.trajectory(best.sample)
 
 
-def _end_escape(rollout: Rollout, params: TrajectoryPlannerParams,
-                oscillation: Oscillation) -> None:
-    oscillation.end_escape_if_moved(rollout.pose, params.escape_reset_dist_m,
-                                    params.escape_reset_theta_rad)
+def _end_escape(
+    rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation
+) -> None:
+    oscillation.end_escape_if_moved(
+        rollout.pose, params.escape_reset_dist_m, params.escape_reset_theta_rad
+    )
 
 
 def _row(samples: np.ndarray, k: int) -> Triple:

@@ -1,4 +1,5 @@
 """A grid of costs that can move, and the parts of it that change."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -28,8 +29,12 @@ class Window:
         """The smallest window that holds both; an empty one adds nothing."""
         if self.is_empty or other.is_empty:
             return other if self.is_empty else self
-        return Window(min(self.x0, other.x0), max(self.xn, other.xn),
-                      min(self.y0, other.y0), max(self.yn, other.yn))
+        return Window(
+            min(self.x0, other.x0),
+            max(self.xn, other.xn),
+            min(self.y0, other.y0),
+            max(self.yn, other.yn),
+        )
 
     @property
     def slices(self) -> Tuple[slice, slice]:
@@ -50,12 +55,20 @@ class Bounds:
     max_y_m: float
 
     def union(self, other: Bounds) -> Bounds:
-        return Bounds(min(self.min_x_m, other.min_x_m), min(self.min_y_m, other.min_y_m),
-                      max(self.max_x_m, other.max_x_m), max(self.max_y_m, other.max_y_m))
+        return Bounds(
+            min(self.min_x_m, other.min_x_m),
+            min(self.min_y_m, other.min_y_m),
+            max(self.max_x_m, other.max_x_m),
+            max(self.max_y_m, other.max_y_m),
+        )
 
     def grown(self, margin_m: float) -> Bounds:
-        return Bounds(self.min_x_m - margin_m, self.min_y_m - margin_m,
-                      self.max_x_m + margin_m, self.max_y_m + margin_m)
+        return Bounds(
+            self.min_x_m - margin_m,
+            self.min_y_m - margin_m,
+            self.max_x_m + margin_m,
+            self.max_y_m + margin_m,
+        )
 
     def including(self, points: np.ndarray) -> Bounds:
         """points: float64[n, 2]"""
@@ -99,8 +112,11 @@ class CostGrid:
         if move_x == 0 and move_y == 0:
             return 0, 0
         shift(self.costs, move_x, move_y, self.default_cost)
-        self.spec = replace(spec, origin_x_m=spec.origin_x_m + move_x * res,
-                            origin_y_m=spec.origin_y_m + move_y * res)
+        self.spec = replace(
+            spec,
+            origin_x_m=spec.origin_x_m + move_x * res,
+            origin_y_m=spec.origin_y_m + move_y * res,
+        )
         return move_x, move_y
 
     def window_of(self, bounds: Bounds) -> Window:
@@ -127,12 +143,14 @@ class CostGrid:
     def fill_square(self, centre_x_m: float, centre_y_m: float, size_m: float, cost: int) -> bool:
         """Set the cells of a square; does nothing and returns False when it leaves the grid."""
         half_m = 0.5 * size_m
-        corners = np.array([[-half_m, -half_m], [-half_m, half_m],
-                            [half_m, half_m], [half_m, -half_m]])
+        corners = np.array(
+            [[-half_m, -half_m], [-half_m, half_m], [half_m, half_m], [half_m, -half_m]]
+        )
         return self.fill_polygon(corners + (centre_x_m, centre_y_m), cost)
 
-    def forget_area(self, centre_x_m: float, centre_y_m: float, size_m: float,
-                    keep_inside: bool) -> None:
+    def forget_area(
+        self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
+    ) -> None:
         """Make unknown all cells outside a square (``keep_inside``), or those inside.
 
         The cells of the square's border count as outside.
@@ -143,7 +161,7 @@ class CostGrid:
         high_x = _cell(centre_x_m - size_m / 2 + size_m, spec.origin_x_m, spec.resolution_m)
         high_y = _cell(centre_y_m - size_m / 2 + size_m, spec.origin_y_m, spec.resolution_m)
         inside = np.zeros(spec.shape, dtype=bool)
-        inside[max(0, low_y + 1):max(0, high_y), max(0, low_x + 1):max(0, high_x)] = True
+        inside[max(0, low_y + 1) : max(0, high_y), max(0, low_x + 1) : max(0, high_x)] = True
         self.costs[~inside if keep_inside else inside] = UNKNOWN
 
 

@@ -7,6 +7,7 @@ cost scaling factor, cut to a whole number; nothing beyond the inflation radius.
 Obstacles just outside a window reach into it, so seeds are taken from one inflation radius
 around the window, and cells up to two radii away can change.
 """
+
 from __future__ import annotations
 
 import math
@@ -29,8 +30,7 @@ class InflationLayerParams(LayerParams):
     cost_scaling_factor: float = 10.0
     inflate_unknown: bool = False
 
-    def make_layer(self, spec: GridSpec, rolling_window: bool,
-                   default_cost: int) -> InflationLayer:
+    def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> InflationLayer:
         return InflationLayer(self, spec.resolution_m)
 
 
@@ -43,8 +43,9 @@ class InflationLayer(Layer):
 
     params: InflationLayerParams
 
-    def __init__(self, params: InflationLayerParams, resolution_m: float,
-                 inscribed_radius_m: float = 0.0):
+    def __init__(
+        self, params: InflationLayerParams, resolution_m: float, inscribed_radius_m: float = 0.0
+    ):
         super().__init__(params)
         self._resolution_m = resolution_m
         self._inscribed_radius_m = inscribed_radius_m
@@ -80,21 +81,29 @@ class InflationLayer(Layer):
         if self.radius_cells == 0:
             return
         reach, spec = self.radius_cells, master.spec
-        inflate(master.costs, max(0, window.x0 - reach), min(spec.size_x, window.xn + reach),
-                max(0, window.y0 - reach), min(spec.size_y, window.yn + reach),
-                self.cost_table, self._rank_table, self.params.inflate_unknown)
+        inflate(
+            master.costs,
+            max(0, window.x0 - reach),
+            min(spec.size_x, window.xn + reach),
+            max(0, window.y0 - reach),
+            min(spec.size_y, window.yn + reach),
+            self.cost_table,
+            self._rank_table,
+            self.params.inflate_unknown,
+        )
 
     def _make_tables(self) -> None:
-        self.radius_cells = int(max(0.0, math.ceil(
-            self.params.inflation_radius_m / self._resolution_m)))
+        self.radius_cells = int(
+            max(0.0, math.ceil(self.params.inflation_radius_m / self._resolution_m))
+        )
         self._redo_everything = True
         n = self.radius_cells + 2
         squared = np.array([[dx * dx + dy * dy for dx in range(n)] for dy in range(n)])
-        self.cost_table = np.array([[self.cost_at(math.sqrt(d)) for d in row] for row in squared],
-                                   dtype=np.uint8)
+        self.cost_table = np.array(
+            [[self.cost_at(math.sqrt(d)) for d in row] for row in squared], dtype=np.uint8
+        )
         # Everything beyond the radius has one rank, the last.
-        _, ranks = np.unique(np.minimum(squared, self.radius_cells ** 2 + 1),
-                             return_inverse=True)
+        _, ranks = np.unique(np.minimum(squared, self.radius_cells**2 + 1), return_inverse=True)
         self._rank_table = ranks.reshape(n, n).astype(np.int32)
 
     def cost_at(self, distance_cells: float) -> int:
@@ -105,4 +114,3 @@ class InflationLayer(Layer):
         if distance_cells * self._resolution_m <= self._inscribed_radius_m:
             return INSCRIBED
         return int((INSCRIBED - 1) * math.exp(-1.0 * self.params.cost_scaling_factor * beyond_m))
-

@@ -8,6 +8,7 @@ A layer of your own: derive its parameters from ``LayerParams`` with a ``make_la
 returns your ``Layer`` (or ``GridLayer``, if it keeps costs of its own between updates),
 and name it in ``CostmapParams.layers``.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -64,8 +65,9 @@ class Layer:
     def reset(self, now_s: float) -> None:
         """Forget what was collected."""
 
-    def clear_area(self, centre_x_m: float, centre_y_m: float, size_m: float,
-                   keep_inside: bool) -> bool:
+    def clear_area(
+        self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
+    ) -> bool:
         """Forget a square's inside or its outside; False if there is nothing to forget."""
         return False
 
@@ -100,8 +102,9 @@ class GridLayer(Layer):
         self._awaits_update = False
         return bounds
 
-    def clear_area(self, centre_x_m: float, centre_y_m: float, size_m: float,
-                   keep_inside: bool) -> bool:
+    def clear_area(
+        self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
+    ) -> bool:
         """As ``clear_costmap_recovery`` does: cells become unknown, which is "no opinion".
 
         The layer is not current until the next update has carried this to the master.
@@ -120,6 +123,9 @@ class GridLayer(Layer):
 
     def _whole_map(self) -> Bounds:
         spec = self.grid.spec
-        return Bounds(spec.origin_x_m, spec.origin_y_m,
-                      spec.origin_x_m + spec.size_x * spec.resolution_m,
-                      spec.origin_y_m + spec.size_y * spec.resolution_m)
+        return Bounds(
+            spec.origin_x_m,
+            spec.origin_y_m,
+            spec.origin_x_m + spec.size_x * spec.resolution_m,
+            spec.origin_y_m + spec.size_y * spec.resolution_m,
+        )

@@ -6,6 +6,7 @@ An update moves the grid along with the robot if it is a rolling window, asks ea
 what has to be made again, resets the smallest window that holds all of it, and lets the
 layers write into that window.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -49,14 +50,20 @@ class CostmapParams:
     robot_radius_m: float = 0.46
     footprint_padding_m: float = 0.01
     transform_tolerance_s: float = 0.3
-    layers: NamedLayers = (("obstacle_layer", ObstacleLayerParams()),
-                           ("inflation_layer", InflationLayerParams()))
+    layers: NamedLayers = (
+        ("obstacle_layer", ObstacleLayerParams()),
+        ("inflation_layer", InflationLayerParams()),
+    )
 
     @property
     def spec(self) -> GridSpec:
-        return GridSpec(int(self.width_m / self.resolution_m),
-                        int(self.height_m / self.resolution_m),
-                        self.resolution_m, self.origin_x_m, self.origin_y_m)
+        return GridSpec(
+            int(self.width_m / self.resolution_m),
+            int(self.height_m / self.resolution_m),
+            self.resolution_m,
+            self.origin_x_m,
+            self.origin_y_m,
+        )
 
     @property
     def unpadded_footprint(self) -> np.ndarray:
@@ -80,7 +87,8 @@ class LayeredCostmap:
         self._size_locked = False
         self.layers: Dict[str, Layer] = {
             name: layer_params.make_layer(params.spec, params.rolling_window, default_cost)
-            for name, layer_params in params.layers}
+            for name, layer_params in params.layers
+        }
         self.set_footprint(params.unpadded_footprint)
         if static_map is not None:
             self.set_map(static_map)
@@ -120,8 +128,12 @@ class LayeredCostmap:
 
     def stale_sources(self, now_s: float) -> List[Tuple[str, float]]:
         """(layer/sensor, seconds since its last message) of each sensor that is silent."""
-        return [(f"{name}/{source}", age_s) for name, layer in self.layers.items()
-                if layer.params.enabled for source, age_s in layer.stale_sources(now_s)]
+        return [
+            (f"{name}/{source}", age_s)
+            for name, layer in self.layers.items()
+            if layer.params.enabled
+            for source, age_s in layer.stale_sources(now_s)
+        ]
 
     def reset_layers(self, now_s: float) -> None:
         """Forget all costs, as the service ``clear_costmaps`` does."""
@@ -129,15 +141,24 @@ class LayeredCostmap:
         for layer in self.layers.values():
             layer.reset(now_s)
 
-    def clear_area(self, layer_names: Iterable[str], centre_x_m: float, centre_y_m: float,
-                   size_m: float, keep_inside: bool) -> List[str]:
+    def clear_area(
+        self,
+        layer_names: Iterable[str],
+        centre_x_m: float,
+        centre_y_m: float,
+        size_m: float,
+        keep_inside: bool,
+    ) -> List[str]:
         """Forget, in the named layers, everything outside a square around a point, or
         with ``keep_inside`` False everything inside it. The master follows at the next
         update. Returns the layers that were cleared: names can be wrong.
         """
         wanted = set(layer_names)
-        return [name for name, layer in self.layers.items() if name in wanted
-                and layer.clear_area(centre_x_m, centre_y_m, size_m, keep_inside)]
+        return [
+            name
+            for name, layer in self.layers.items()
+            if name in wanted and layer.clear_area(centre_x_m, centre_y_m, size_m, keep_inside)
+        ]
 
     def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> None:
         """Make the master free in a square; layers that still know better put it right
@@ -149,8 +170,11 @@ class LayeredCostmap:
 
         Returns the layers where that was done: none when the square leaves the map.
         """
-        return [name for name, layer in self.layers.items()
-                if layer.free_square(centre_x_m, centre_y_m, size_m)]
+        return [
+            name
+            for name, layer in self.layers.items()
+            if layer.free_square(centre_x_m, centre_y_m, size_m)
+        ]
 
     def set_footprint(self, footprint: footprints.Footprint) -> None:
         """Take an unpadded footprint, float64[n, 2] in the robot's frame."""

@@ -1,4 +1,5 @@
 """What one sensor saw lately: points in the global frame, and for how long they count."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -81,8 +82,9 @@ class ObservationBuffer:
             begins = np.array(self._begins[:count], np.int64)
             lengths = np.array([len(one.points) for one in self.observations], np.int64)
             sensors = [one.sensor for one in self.observations] or [np.empty(0)]
-            self._stack = ObservationStack(np.concatenate(sensors).reshape(count, 3),
-                                           self._points, begins, begins + lengths)
+            self._stack = ObservationStack(
+                np.concatenate(sensors).reshape(count, 3), self._points, begins, begins + lengths
+            )
         return self._stack
 
     def add(self, observation: Observation, now_s: float) -> None:
@@ -114,7 +116,7 @@ class ObservationBuffer:
     def _store(self, points: np.ndarray) -> None:
         """Behind the others' points; if there is no room, all move to an array with more."""
         if self._end + len(points) <= len(self._points):
-            self._points[self._end:self._end + len(points)] = points
+            self._points[self._end : self._end + len(points)] = points
             self._end += len(points)
             return
         clouds = [one.points for one in reversed(self.observations)]

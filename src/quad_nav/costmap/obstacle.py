@@ -3,6 +3,7 @@
 At every update all kept observations are ray traced first, then all are marked. A point
 that a newer scan cleared therefore comes back until its own scan expires.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -39,8 +40,7 @@ class ObstacleLayerParams(LayerParams):
     track_unknown_space: Optional[bool] = None
     sources: Tuple[SourceParams, ...] = ()
 
-    def make_layer(self, spec: GridSpec, rolling_window: bool,
-                   default_cost: int) -> ObstacleLayer:
+    def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> ObstacleLayer:
         return ObstacleLayer(self, spec, rolling_window, self.cost_of_unseen(default_cost))
 
     def cost_of_unseen(self, default_cost: int) -> int:
@@ -60,18 +60,26 @@ class ObstacleLayer(GridLayer):
 
     params: ObstacleLayerParams
 
-    def __init__(self, params: ObstacleLayerParams, spec: GridSpec, rolling_window: bool,
-                 default_cost: int):
+    def __init__(
+        self, params: ObstacleLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
+    ):
         super().__init__(params, spec, default_cost)
         self.buffers: Dict[str, ObservationBuffer] = {
-            source.name: ObservationBuffer(source) for source in params.sources}
+            source.name: ObservationBuffer(source) for source in params.sources
+        }
         self._rolling_window = rolling_window
         self._footprint = np.empty((0, 2))
         self._footprint_now = np.empty((0, 2))
         self.left_out = np.empty((0, 3))
 
-    def add_scan(self, source_name: str, scan: Scan, global_from_sensor: Pose3D, now_s: float,
-                 global_from_origin: Optional[Pose3D] = None) -> None:
+    def add_scan(
+        self,
+        source_name: str,
+        scan: Scan,
+        global_from_sensor: Pose3D,
+        now_s: float,
+        global_from_origin: Optional[Pose3D] = None,
+    ) -> None:
         """Take a scan; ``now_s`` is when it arrived.
 
         ``global_from_sensor`` is the pose of the scan's frame at its stamp. Rays start at
@@ -79,12 +87,19 @@ class ObstacleLayer(GridLayer):
         other than the scan's.
         """
         points = scan_points(scan, self.buffers[source_name].params.inf_is_valid)
-        self.add_cloud(source_name, points, global_from_sensor, scan.stamp_s, now_s,
-                       global_from_origin)
+        self.add_cloud(
+            source_name, points, global_from_sensor, scan.stamp_s, now_s, global_from_origin
+        )
 
-    def add_cloud(self, source_name: str, points: np.ndarray, global_from_sensor: Pose3D,
-                  stamp_s: float, now_s: float,
-                  global_from_origin: Optional[Pose3D] = None) -> None:
+    def add_cloud(
+        self,
+        source_name: str,
+        points: np.ndarray,
+        global_from_sensor: Pose3D,
+        stamp_s: float,
+        now_s: float,
+        global_from_origin: Optional[Pose3D] = None,
+    ) -> None:
         """Take points, float32[n, 3] in the sensor's frame; the rest as ``add_scan``.
 
         Only points within the source's heights count, for marking and for clearing.
@@ -132,9 +147,11 @@ class ObstacleLayer(GridLayer):
         return super().is_current(now_s) and not self.stale_sources(now_s)
 
     def stale_sources(self, now_s: float) -> List[Tuple[str, float]]:
-        return [(name, buffer.silence_s(now_s)) for name, buffer in self.buffers.items()
-                if (buffer.params.marking or buffer.params.clearing)
-                and not buffer.is_current(now_s)]
+        return [
+            (name, buffer.silence_s(now_s))
+            for name, buffer in self.buffers.items()
+            if (buffer.params.marking or buffer.params.clearing) and not buffer.is_current(now_s)
+        ]
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
         if self._rolling_window:
@@ -171,14 +188,34 @@ class ObstacleLayer(GridLayer):
 
     def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         spec, seen = self.grid.spec, buffer.stack
-        clear_all_rays(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
-                       seen.sensors, seen.points, seen.begins, seen.ends, range_m, touched)
+        clear_all_rays(
+            self.grid.costs,
+            spec.origin_x_m,
+            spec.origin_y_m,
+            spec.resolution_m,
+            seen.sensors,
+            seen.points,
+            seen.begins,
+            seen.ends,
+            range_m,
+            touched,
+        )
 
     def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         spec, seen = self.grid.spec, buffer.stack
-        mark_all_points(self.grid.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m,
-                        seen.sensors, seen.points, seen.begins, seen.ends, range_m,
-                        self.params.max_obstacle_height_m, touched)
+        mark_all_points(
+            self.grid.costs,
+            spec.origin_x_m,
+            spec.origin_y_m,
+            spec.resolution_m,
+            seen.sensors,
+            seen.points,
+            seen.begins,
+            seen.ends,
+            range_m,
+            self.params.max_obstacle_height_m,
+            touched,
+        )
 
     def _raytrace_range(self, source: SourceParams) -> float:
         range_m = source.raytrace_range_m

@@ -1,4 +1,5 @@
 """Costs as occupancies, for ``nav_msgs/OccupancyGrid``."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -4,6 +4,7 @@ Costs depend on the cell a point falls into, so the arithmetic is the same to th
 beam angles and products in float64, points rounded to float32, and the transform
 ((r0 x + r1 y) + r2 z) + t in float32 with the rotation matrix made in float32.
 """
+
 from __future__ import annotations
 
 import math
@@ -22,20 +23,27 @@ def scan_points(scan: Scan, inf_is_valid: bool) -> np.ndarray:
     without return counts as ending 0.1 mm before ``range_max_m``.
     """
     ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
-    directions = _directions(float(np.float32(scan.angle_min_rad)),
-                             float(np.float32(scan.angle_increment_rad)), len(ranges))
+    directions = _directions(
+        float(np.float32(scan.angle_min_rad)),
+        float(np.float32(scan.angle_increment_rad)),
+        len(ranges),
+    )
     range_max = np.float32(scan.range_max_m)
     inf_range = range_max - np.float32(0.0001) if inf_is_valid else np.float32(np.inf)
     return project_ranges(ranges, directions, np.float32(scan.range_min_m), range_max, inf_range)
 
 
-def transform_points(points: np.ndarray, a_from_b: Pose3D, min_z_m: float = -math.inf,
-                     max_z_m: float = math.inf) -> np.ndarray:
+def transform_points(
+    points: np.ndarray, a_from_b: Pose3D, min_z_m: float = -math.inf, max_z_m: float = math.inf
+) -> np.ndarray:
     """float32[n, 3] of frame b in frame a; only those whose height in a is within limits."""
     return transform_between_heights(
-        np.ascontiguousarray(points, dtype=np.float32), _rotation_float32(a_from_b.quaternion),
+        np.ascontiguousarray(points, dtype=np.float32),
+        _rotation_float32(a_from_b.quaternion),
         np.array([a_from_b.x_m, a_from_b.y_m, a_from_b.z_m], dtype=np.float32),
-        min_z_m, max_z_m)
+        min_z_m,
+        max_z_m,
+    )
 
 
 @lru_cache(maxsize=64)
@@ -51,7 +59,11 @@ def _rotation_float32(quaternion: Quaternion) -> np.ndarray:
     x, y, z, w = np.array(quaternion, dtype=np.float32)
     two, one = np.float32(2.0), np.float32(1.0)
     tx, ty, tz = two * x, two * y, two * z
-    return np.array([
-        [one - (ty * y + tz * z), ty * x - tz * w, tz * x + ty * w],
-        [ty * x + tz * w, one - (tx * x + tz * z), tz * y - tx * w],
-        [tz * x - ty * w, tz * y + tx * w, one - (tx * x + ty * y)]], dtype=np.float32)
+    return np.array(
+        [
+            [one - (ty * y + tz * z), ty * x - tz * w, tz * x + ty * w],
+            [ty * x + tz * w, one - (tx * x + tz * z), tz * y - tx * w],
+            [tz * x - ty * w, tz * y + tx * w, one - (tx * x + ty * y)],
+        ],
+        dtype=np.float32,
+    )

@@ -1,4 +1,5 @@
 """The static layer: a map made beforehand."""
+
 from __future__ import annotations
 
 import math
@@ -48,8 +49,9 @@ class StaticLayer(GridLayer):
 
     params: StaticLayerParams
 
-    def __init__(self, params: StaticLayerParams, spec: GridSpec, rolling_window: bool,
-                 default_cost: int):
+    def __init__(
+        self, params: StaticLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
+    ):
         super().__init__(params, spec, default_cost)
         self.map_from_global = Pose2D(0.0, 0.0)
         self._rolling_window = rolling_window
@@ -83,11 +85,15 @@ class StaticLayer(GridLayer):
             return
         height, width = occupancy.shape
         spec = self.grid.spec
-        area = Window(max(0, cell_x), min(spec.size_x, cell_x + width),
-                      max(0, cell_y), min(spec.size_y, cell_y + height))
+        area = Window(
+            max(0, cell_x),
+            min(spec.size_x, cell_x + width),
+            max(0, cell_y),
+            min(spec.size_y, cell_y + height),
+        )
         if area.is_empty:
             return
-        part = occupancy[area.y0 - cell_y:area.yn - cell_y, area.x0 - cell_x:area.xn - cell_x]
+        part = occupancy[area.y0 - cell_y : area.yn - cell_y, area.x0 - cell_x : area.xn - cell_x]
         self.grid.costs[area.slices] = self.costs_of(part)
         self._changed = self._changed.union(area)
 
@@ -126,8 +132,9 @@ class StaticLayer(GridLayer):
         if area.is_empty:
             return bounds
         spec = self.grid.spec
-        corners = np.array([spec.centre_of(x, y) for x in (area.x0, area.xn)
-                            for y in (area.y0, area.yn)])
+        corners = np.array(
+            [spec.centre_of(x, y) for x in (area.x0, area.xn) for y in (area.y0, area.yn)]
+        )
         return bounds.including(self._global_points(corners))
 
     def update_costs(self, master: CostGrid, window: Window) -> None:

@@ -12,6 +12,7 @@ changes, its column becomes one cost:
 The robot's footprint and the clearing recoveries clear costs only, as in the original:
 the voxels stay, and count again when a sensor sees something in their column.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -50,8 +51,9 @@ class VoxelLayer(ObstacleLayer):
 
     params: VoxelLayerParams
 
-    def __init__(self, params: VoxelLayerParams, spec: GridSpec, rolling_window: bool,
-                 default_cost: int):
+    def __init__(
+        self, params: VoxelLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
+    ):
         super().__init__(params, spec, rolling_window, default_cost)
         self._make_voxels()
 
@@ -78,8 +80,9 @@ class VoxelLayer(ObstacleLayer):
         return self._origin + (np.column_stack((x, y, z)) + 0.5) * self._voxel_size
 
     def _make_voxels(self) -> None:
-        self.voxels = np.full((*self.grid.spec.shape, self.params.z_voxels), UNKNOWN,
-                              dtype=np.uint8)
+        self.voxels = np.full(
+            (*self.grid.spec.shape, self.params.z_voxels), UNKNOWN, dtype=np.uint8
+        )
 
     @property
     def _origin(self) -> np.ndarray:
@@ -99,14 +102,32 @@ class VoxelLayer(ObstacleLayer):
     def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         params = self.params
         for observation in buffer.observations:
-            clear_voxel_rays(self.voxels, self.grid.costs, self._origin, self._voxel_size,
-                             observation.sensor, observation.points, range_m,
-                             params.max_obstacle_height_m, params.unknown_threshold,
-                             params.mark_threshold, touched)
+            clear_voxel_rays(
+                self.voxels,
+                self.grid.costs,
+                self._origin,
+                self._voxel_size,
+                observation.sensor,
+                observation.points,
+                range_m,
+                params.max_obstacle_height_m,
+                params.unknown_threshold,
+                params.mark_threshold,
+                touched,
+            )
 
     def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
         params = self.params
         for observation in buffer.observations:
-            mark_voxels(self.voxels, self.grid.costs, self._origin, self._voxel_size,
-                        observation.sensor, observation.points, range_m,
-                        params.max_obstacle_height_m, params.mark_threshold, touched)
+            mark_voxels(
+                self.voxels,
+                self.grid.costs,
+                self._origin,
+                self._voxel_size,
+                observation.sensor,
+                observation.points,
+                range_m,
+                params.max_obstacle_height_m,
+                params.mark_threshold,
+                touched,
+            )

@@ -1,4 +1,5 @@
 """World coordinate to cell index along one axis."""
+
 from __future__ import annotations
 
 from numba import njit

@@ -1,4 +1,5 @@
 """Loops over the cells that a footprint covers."""
+
 from __future__ import annotations
 
 import math
@@ -29,8 +30,10 @@ class Window(NamedTuple):
 def cell_of(window, x, y):
     """Cell (x, y) of a world point; an index is negative where the point is off the map."""
     size_y, size_x = window.costs.shape
-    return (cell_index(x, window.origin_x_m, window.resolution_m, size_x),
-            cell_index(y, window.origin_y_m, window.resolution_m, size_y))
+    return (
+        cell_index(x, window.origin_x_m, window.resolution_m, size_x),
+        cell_index(y, window.origin_y_m, window.resolution_m, size_y),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -109,8 +112,11 @@ def footprint_cost(window, footprint, x, y, theta):
 @njit(cache=True, nogil=True)
 def _vertex_cell(window, footprint, k, x, y, cos_theta, sin_theta):
     vertex_x, vertex_y = footprint[k, 0], footprint[k, 1]
-    return cell_of(window, x + (vertex_x * cos_theta - vertex_y * sin_theta),
-                   y + (vertex_x * sin_theta + vertex_y * cos_theta))
+    return cell_of(
+        window,
+        x + (vertex_x * cos_theta - vertex_y * sin_theta),
+        y + (vertex_x * sin_theta + vertex_y * cos_theta),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -125,8 +131,9 @@ def mark_footprint(window, footprint, x, y, theta, mask):
         vertices[k] = _vertex_cell(window, footprint, k, x, y, cos_theta, sin_theta)
         if vertices[k, 0] < 0 or vertices[k, 1] < 0:
             for j in range(k - 1):
-                _mark_line(mask, vertices[j, 0], vertices[j, 1],
-                           vertices[j + 1, 0], vertices[j + 1, 1])
+                _mark_line(
+                    mask, vertices[j, 0], vertices[j, 1], vertices[j + 1, 0], vertices[j + 1, 1]
+                )
             return
     fill_convex_polygon(mask, vertices, True)
 

@@ -3,6 +3,7 @@
 Grids are flat arrays, cell = y * size_x + x. A position is a cell and an offset
 from its centre, in cells, right (dx) and up (dy).
 """
+
 from __future__ import annotations
 
 import math
@@ -100,8 +101,9 @@ def step_down(potential, size_x, cell, dx, dy, path, last):
     to the centre of the lowest of them; so too when ``path[last]`` is where the
     path was two points ago.
     """
-    oscillates = (last > 1 and path[last, 0] == path[last - 2, 0]
-                  and path[last, 1] == path[last - 2, 1])
+    oscillates = (
+        last > 1 and path[last, 0] == path[last - 2, 0] and path[last, 1] == path[last - 2, 1]
+    )
     lowest, all_reached = _lowest_around(potential, size_x, cell)
     if oscillates or not all_reached:
         return potential[lowest] < NOT_REACHED, lowest, np.float32(0.0), np.float32(0.0)

@@ -1,4 +1,5 @@
 """Discs on a grid, and the nearest cell outside of them."""
+
 from __future__ import annotations
 
 import math
@@ -20,8 +21,9 @@ def raise_discs(cells, origin_x_m, origin_y_m, resolution_m, centres, radius_m, 
         reach = radius_m / resolution_m
         for row in range(max(0, math.ceil(y - reach)), min(size_y - 1, math.floor(y + reach)) + 1):
             half = math.sqrt(max(reach * reach - (row - y) * (row - y), 0.0))
-            for column in range(max(0, math.ceil(x - half)),
-                                min(size_x - 1, math.floor(x + half)) + 1):
+            for column in range(
+                max(0, math.ceil(x - half)), min(size_x - 1, math.floor(x + half)) + 1
+            ):
                 if cells[row, column] < value:
                     cells[row, column] = value
 
@@ -46,8 +48,12 @@ def nearest_cell(blocked, unwanted, start_x, start_y):
             return x, y
         for dx, dy in ((1, 0), (0, 1), (-1, 0), (0, -1)):
             to_x, to_y = x + dx, y + dy
-            if (0 <= to_x < size_x and 0 <= to_y < size_y and not seen[to_y, to_x]
-                    and not blocked[to_y, to_x]):
+            if (
+                0 <= to_x < size_x
+                and 0 <= to_y < size_y
+                and not seen[to_y, to_x]
+                and not blocked[to_y, to_x]
+            ):
                 seen[to_y, to_x] = True
                 queue[tail, 0], queue[tail, 1] = to_x, to_y
                 tail += 1

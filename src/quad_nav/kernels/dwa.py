@@ -3,6 +3,7 @@
 The maths is in ``control/dwa_critics.py``. Poses and velocities are rounded to
 single precision at every step, as the original keeps them.
 """
+
 from __future__ import annotations
 
 import math
@@ -49,17 +50,17 @@ class Obstacles(NamedTuple):
 
     window: Window
     highest_near: np.ndarray  # uint8[H, W], no less than the highest cost under any footprint
-    footprint: np.ndarray     # float64[n, 2], robot frame, not scaled
-    scale: float              # 0: obstacles are not looked at
-    sums: bool                # along the trajectory; else the highest counts
+    footprint: np.ndarray  # float64[n, 2], robot frame, not scaled
+    scale: float  # 0: obstacles are not looked at
+    sums: bool  # along the trajectory; else the highest counts
 
 
 class Candidates(NamedTuple):
     """Samples and what is known of them before obstacles are looked at."""
 
-    samples: np.ndarray           # float64[n, 3]
-    terms: np.ndarray             # float64[n, 5], the other critics' parts of the cost
-    legal: np.ndarray             # bool[n]
+    samples: np.ndarray  # float64[n, 3]
+    terms: np.ndarray  # float64[n, 5], the other critics' parts of the cost
+    legal: np.ndarray  # bool[n]
     footprint_scales: np.ndarray  # float64[n]
 
 
@@ -67,14 +68,23 @@ class Candidates(NamedTuple):
 def step_count(motion, sample):
     """Into how many steps a sample's simulation is cut; 0 for one outside the speed limits."""
     speed, turn = math.hypot(sample[0], sample[1]), abs(sample[2])
-    if (0.0 <= motion.min_vel_trans_mps and speed + _TOLERANCE < motion.min_vel_trans_mps
-            and 0.0 <= motion.min_vel_theta_radps
-            and turn + _TOLERANCE < motion.min_vel_theta_radps):
+    if (
+        0.0 <= motion.min_vel_trans_mps
+        and speed + _TOLERANCE < motion.min_vel_trans_mps
+        and 0.0 <= motion.min_vel_theta_radps
+        and turn + _TOLERANCE < motion.min_vel_theta_radps
+    ):
         return 0
     if 0.0 <= motion.max_vel_trans_mps < speed - _TOLERANCE:
         return 0
-    return int(math.ceil(max(speed * motion.sim_time_s / motion.sim_granularity_m,
-                             turn * motion.sim_time_s / motion.angular_sim_granularity_rad)))
+    return int(
+        math.ceil(
+            max(
+                speed * motion.sim_time_s / motion.sim_granularity_m,
+                turn * motion.sim_time_s / motion.angular_sim_granularity_rad,
+            )
+        )
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -108,8 +118,11 @@ def simulate(motion, pose, velocity, sample, points):
 @njit(cache=True, nogil=True)
 def _accelerated(motion, sample, vx, vy, vtheta, dt):
     limit_x, limit_y, limit_theta = motion.acceleration_limits
-    return (_approach(sample[0], vx, limit_x * dt), _approach(sample[1], vy, limit_y * dt),
-            _approach(sample[2], vtheta, limit_theta * dt))
+    return (
+        _approach(sample[0], vx, limit_x * dt),
+        _approach(sample[1], vy, limit_y * dt),
+        _approach(sample[2], vtheta, limit_theta * dt),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -159,8 +172,9 @@ def _has_nose_on_map(grids, points, count, distances):
         x, y = points[k, 0], points[k, 1]
         if k < count - 1 and min_x < x < max_x and min_y < y < max_y:
             continue  # too far inside for any heading to matter
-        cell_x, cell_y = cell_of(grids.window, x + forward * math.cos(points[k, 2]),
-                                 y + forward * math.sin(points[k, 2]))
+        cell_x, cell_y = cell_of(
+            grids.window, x + forward * math.cos(points[k, 2]), y + forward * math.sin(points[k, 2])
+        )
         if cell_x < 0 or cell_y < 0:
             return False
         if grids.follows_goal:

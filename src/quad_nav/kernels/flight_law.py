@@ -1,4 +1,5 @@
 """The flight law's loop over quadcopters; ``sim/flight.py`` has the formulas and their reasons."""
+
 from __future__ import annotations
 
 import math
@@ -39,8 +40,9 @@ def fly(rows, commands, altitude, gravity, airframe, law, forces, torques):
     for k in range(rows.shape[0]):
         height, velocity, angular = rows[k, 2], rows[k, 7:10], rows[k, 10:13]
         rotation_from_quaternion(rows[k, 3:7], r)
-        ax, ay = _horizontal_acceleration(r, velocity, angular[2], commands[k], gain,
-                                          max_acceleration)
+        ax, ay = _horizontal_acceleration(
+            r, velocity, angular[2], commands[k], gain, max_acceleration
+        )
         length = math.sqrt(ax * ax + ay * ay + gravity * gravity)
         up_x, up_y, up_z = ax / length, ay / length, gravity / length
 
@@ -49,8 +51,9 @@ def fly(rows, commands, altitude, gravity, airframe, law, forces, torques):
         thrust = min(max(thrust, 0.0), max_thrust)
         for axis in range(3):
             forces[k, axis] = thrust * r[axis, 2]
-            omega[axis] = (r[0, axis] * angular[0] + r[1, axis] * angular[1]
-                           + r[2, axis] * angular[2])
+            omega[axis] = (
+                r[0, axis] * angular[0] + r[1, axis] * angular[1] + r[2, axis] * angular[2]
+            )
 
         goal_x = r[0, 0] * up_x + r[1, 0] * up_y + r[2, 0] * up_z
         goal_y = r[0, 1] * up_x + r[1, 1] * up_y + r[2, 1] * up_z
@@ -58,11 +61,13 @@ def fly(rows, commands, altitude, gravity, airframe, law, forces, torques):
         body_torque[1] = attitude * attitude * goal_x - 2 * attitude * omega[1]
         body_torque[2] = _limited(yaw_gain * (commands[k, 2] - omega[2]), max_yaw_acceleration)
         for axis in range(3):
-            body_torque[axis] = _limited(body_torque[axis] * airframe[2 + axis],
-                                         airframe[5 + axis])
+            body_torque[axis] = _limited(body_torque[axis] * airframe[2 + axis], airframe[5 + axis])
         for axis in range(3):
-            torques[k, axis] = (r[axis, 0] * body_torque[0] + r[axis, 1] * body_torque[1]
-                                + r[axis, 2] * body_torque[2])
+            torques[k, axis] = (
+                r[axis, 0] * body_torque[0]
+                + r[axis, 1] * body_torque[1]
+                + r[axis, 2] * body_torque[2]
+            )
 
 
 @njit(cache=True, nogil=True)

@@ -4,6 +4,7 @@ Grids are flat arrays, cell = y * size_x + x; no cell of the outermost ring may
 be entered. The maths is in ``plan/global_planner.py``, the wavefront of
 Dijkstra's search in ``wave.py``.
 """
+
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -19,7 +20,7 @@ class Queue(NamedTuple):
     """A binary heap of cells, the lowest priority on top, of equal ones as the original has it."""
 
     priorities: np.ndarray  # float32[n]
-    cells: np.ndarray       # int64[n]
+    cells: np.ndarray  # int64[n]
 
 
 @njit(cache=True, nogil=True)
@@ -73,16 +74,20 @@ def a_star(step_costs, enterable, potential, size_x, start, goal, neutral, plana
             return True
         for offset in (1, -1, size_x, -size_x):
             following = cell + offset
-            if not (0 <= following < size and enterable[following]
-                    and potential[following] >= NOT_REACHED):
+            if not (
+                0 <= following < size
+                and enterable[following]
+                and potential[following] >= NOT_REACHED
+            ):
                 continue
             cost = step_costs[following]
             if planar:
                 potential[following] = arrival_at(potential, size_x, following, cost, True)
             else:
                 potential[following] = potential[cell] + np.float32(cost)
-            blocks = (abs(goal % size_x - following % size_x)
-                      + abs(goal // size_x - following // size_x))
+            blocks = abs(goal % size_x - following % size_x) + abs(
+                goal // size_x - following // size_x
+            )
             priority = np.float32(potential[following] + np.float32(blocks * neutral))
             _sift_up(queue, count, priority, following)
             count += 1
@@ -144,8 +149,12 @@ def grid_path(potential, size_x, start_x, start_y, goal_x, goal_y, path):
         for step_x in (-1, 0, 1):
             for step_y in (-1, 0, 1):
                 next_x, next_y = int(from_x + step_x), int(from_y + step_y)
-                if ((step_x != 0 or step_y != 0) and 0 <= next_x < size_x and 0 <= next_y < size_y
-                        and potential[next_y * size_x + next_x] < lowest):
+                if (
+                    (step_x != 0 or step_y != 0)
+                    and 0 <= next_x < size_x
+                    and 0 <= next_y < size_y
+                    and potential[next_y * size_x + next_x] < lowest
+                ):
                     lowest = potential[next_y * size_x + next_x]
                     lowest_x, lowest_y = next_x, next_y
         if lowest_x < 0:

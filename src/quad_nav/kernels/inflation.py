@@ -1,4 +1,5 @@
 """The wavefront of the inflation layer."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -59,8 +60,9 @@ def inflate(costs, x0, xn, y0, yn, cost_table, rank_table, inflate_unknown):
                     n_rank = rank_table[abs(dx + step_x), abs(dy + step_y)]
                     if rank <= n_rank < waiting[ny, nx]:
                         waiting[ny, nx] = n_rank
-                        _append(queue, first, last, queued, n_rank, nx, ny,
-                                dx + step_x, dy + step_y)
+                        _append(
+                            queue, first, last, queued, n_rank, nx, ny, dx + step_x, dy + step_y
+                        )
                         queued += 1
             entry = queue[entry, 0]
 

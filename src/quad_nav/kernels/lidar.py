@@ -5,6 +5,7 @@ projected: its sector says which beams can meet it, and only those are tried. Th
 quickest for some hundreds. The solids of a ``SolidGrid`` lie in square columns, and each beam
 walks from column to column until it has hit something: the quickest for thousands.
 """
+
 from __future__ import annotations
 
 import math
@@ -79,8 +80,9 @@ def cast_scans(origins, rotations, beams, solids, grid, ranges):
         if grid.members.shape[0] > 0:
             for beam in range(row.shape[0]):
                 direction = _in_map(rotation, beams.directions[beam])
-                row[beam] = cast_through_grid(grid, origin, direction, beams.near_m,
-                                              min(row[beam], beams.far_m), row[beam])
+                row[beam] = cast_through_grid(
+                    grid, origin, direction, beams.near_m, min(row[beam], beams.far_m), row[beam]
+                )
         for beam in range(row.shape[0]):
             if row[beam] > beams.far_m:
                 row[beam] = math.inf
@@ -89,9 +91,11 @@ def cast_scans(origins, rotations, beams, solids, grid, ranges):
 @njit(cache=True, nogil=True)
 def _in_map(rotation, direction):
     """A beam's direction in ``map``."""
-    return (rotation[0, 0] * direction[0] + rotation[0, 1] * direction[1],
-            rotation[1, 0] * direction[0] + rotation[1, 1] * direction[1],
-            rotation[2, 0] * direction[0] + rotation[2, 1] * direction[1])
+    return (
+        rotation[0, 0] * direction[0] + rotation[0, 1] * direction[1],
+        rotation[1, 0] * direction[0] + rotation[1, 1] * direction[1],
+        rotation[2, 0] * direction[0] + rotation[2, 1] * direction[1],
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -100,8 +104,9 @@ def _cast_at_floor(row, origin, rotation, beams):
     if math.hypot(rotation[2, 0], rotation[2, 1]) * beams.far_m < origin[2]:
         return
     for beam in range(row.shape[0]):
-        rise = (rotation[2, 0] * beams.directions[beam, 0]
-                + rotation[2, 1] * beams.directions[beam, 1])
+        rise = (
+            rotation[2, 0] * beams.directions[beam, 0] + rotation[2, 1] * beams.directions[beam, 1]
+        )
         if rise < 0.0:
             distance = origin[2] / -rise
             if distance >= beams.near_m:
@@ -115,7 +120,7 @@ def _cast_at_solid(row, origin, rotation, beams, solids, solid):
     sizes = triple(solids.sizes[solid])
     offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
     radius = math.sqrt(dot(sizes, sizes))  # of a ball around any kind
-    above = (rotation[0, 2] * offset[0] + rotation[1, 2] * offset[1] + rotation[2, 2] * offset[2])
+    above = rotation[0, 2] * offset[0] + rotation[1, 2] * offset[1] + rotation[2, 2] * offset[2]
     if abs(above) > radius or dot(offset, offset) > (beams.far_m + radius) ** 2:
         return
     kind, to_solid = solids.kinds[solid], solids.rotations[solid]
@@ -133,8 +138,9 @@ def _cast_at_solid(row, origin, rotation, beams, solids, solid):
     _shorten(row, first_beam, int(math.floor(last)), kind, eye, ahead, left, sizes, beams)
     last -= 2.0 * math.pi / beams.step_rad  # what is left of it after a full turn
     if last >= 0.0:
-        _shorten(row, 0, min(int(math.floor(last)), first_beam - 1), kind, eye, ahead, left,
-                 sizes, beams)
+        _shorten(
+            row, 0, min(int(math.floor(last)), first_beam - 1), kind, eye, ahead, left, sizes, beams
+        )
 
 
 @njit(cache=True, nogil=True)
@@ -164,14 +170,17 @@ def _shorten(row, first, last, kind, eye, ahead, left, sizes, beams):
     """Shorten the beams first .. last to where they enter the solid."""
     for beam in range(first, min(last + 1, row.shape[0])):
         cos, sin = beams.directions[beam, 0], beams.directions[beam, 1]
-        direction = (cos * ahead[0] + sin * left[0], cos * ahead[1] + sin * left[1],
-                     cos * ahead[2] + sin * left[2])
+        direction = (
+            cos * ahead[0] + sin * left[0],
+            cos * ahead[1] + sin * left[1],
+            cos * ahead[2] + sin * left[2],
+        )
         entry = enter_solid(kind, eye, direction, sizes)
         if beams.near_m <= entry < row[beam]:
             row[beam] = entry
 
 
-@njit(cache=True, nogil=True, inline='always')
+@njit(cache=True, nogil=True, inline="always")
 def cast_through_grid(grid, origin, direction, near, far, hit):
     """The first hit from ``near`` on, or ``hit`` if that or ``far`` comes before.
 
@@ -185,10 +194,12 @@ def cast_through_grid(grid, origin, direction, near, far, hit):
     if begin > end:
         return hit
     rows, columns = grid.starts.shape[0], grid.starts.shape[1] - 1
-    x, step_x, next_x, pitch_x = _walk(origin[0], direction[0], grid.low[0], begin, grid.cell_m,
-                                       columns)
-    y, step_y, next_y, pitch_y = _walk(origin[1], direction[1], grid.low[1], begin, grid.cell_m,
-                                       rows)
+    x, step_x, next_x, pitch_x = _walk(
+        origin[0], direction[0], grid.low[0], begin, grid.cell_m, columns
+    )
+    y, step_y, next_y, pitch_y = _walk(
+        origin[1], direction[1], grid.low[1], begin, grid.cell_m, rows
+    )
     while 0 <= x < columns and 0 <= y < rows:
         for member in range(grid.starts[y, x], grid.starts[y, x + 1]):
             entry = _enter_in_map(grid.solids, grid.members[member], origin, direction)
@@ -215,10 +226,14 @@ def _walk(origin, direction, low, begin, cell, cells):
     return index, 0, math.inf, math.inf
 
 
-@njit(cache=True, nogil=True, inline='always')
+@njit(cache=True, nogil=True, inline="always")
 def _enter_in_map(solids, solid, origin, direction):
     """``enter_solid`` of a ray in ``map``."""
     centre, to_solid = solids.centres[solid], solids.rotations[solid]
     offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
-    return enter_solid(solids.kinds[solid], turn(to_solid, offset), turn(to_solid, direction),
-                       triple(solids.sizes[solid]))
+    return enter_solid(
+        solids.kinds[solid],
+        turn(to_solid, offset),
+        turn(to_solid, direction),
+        triple(solids.sizes[solid]),
+    )

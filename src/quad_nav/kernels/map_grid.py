@@ -1,4 +1,5 @@
 """Loops of the distance grids: the plan's cells, and steps from them."""
+
 from __future__ import annotations
 
 import math

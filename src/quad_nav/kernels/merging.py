@@ -1,4 +1,5 @@
 """One grid of costs into another."""
+
 from __future__ import annotations
 
 from numba import njit

@@ -2,6 +2,7 @@
 
 The wavefront is in ``wave.py``, the maths in ``plan/navfn.py``.
 """
+
 from __future__ import annotations
 
 import math
@@ -11,8 +12,8 @@ from numba import njit
 
 from quad_nav.kernels.descent import leaves_map, step_down
 
-OBSTACLE = 254            # cells of this cost are never entered
-NEUTRAL = 50              # cost of a free cell
+OBSTACLE = 254  # cells of this cost are never entered
+NEUTRAL = 50  # cost of a free cell
 
 
 @njit(cache=True, nogil=True)

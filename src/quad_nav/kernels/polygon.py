@@ -1,4 +1,5 @@
 """Filling a convex polygon on a grid."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -19,8 +20,9 @@ def fill_convex_polygon(costs, vertices, value):
     n = vertices.shape[0]
     for k in range(n):
         after = (k + 1) % n
-        _span_line(lowest, highest, vertices[k, 0], vertices[k, 1],
-                   vertices[after, 0], vertices[after, 1])
+        _span_line(
+            lowest, highest, vertices[k, 0], vertices[k, 1], vertices[after, 0], vertices[after, 1]
+        )
     for x in range(size_x):
         for y in range(lowest[x], highest[x] + 1):
             costs[y, x] = value

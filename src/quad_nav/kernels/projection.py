@@ -1,4 +1,5 @@
 """Scan to points, and points from frame to frame, in float32 (see costmap/projection.py)."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -35,8 +36,12 @@ def transform_between_heights(points, rotation, translation, min_z, max_z):
     for k in range(len(points)):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         for row in range(3):
-            moved[m, row] = (rotation[row, 0] * x + rotation[row, 1] * y
-                             + rotation[row, 2] * z + translation[row])
+            moved[m, row] = (
+                rotation[row, 0] * x
+                + rotation[row, 1] * y
+                + rotation[row, 2] * z
+                + translation[row]
+            )
         if min_z <= np.float64(moved[m, 2]) <= max_z:
             m += 1
     return moved[:m].copy()

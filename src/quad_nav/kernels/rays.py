@@ -11,6 +11,7 @@ inside or beyond, inf for a miss. A solid is a kind and three sizes:
 A convex solid is what several pieces have in common (slabs between two parallel faces, a
 tube). A ray is in all of them from its last entry to its first exit, if that is later.
 """
+
 from __future__ import annotations
 
 import math
@@ -62,8 +63,9 @@ def enter_ball(squared, along, excess):
 def enter_cylinder(origin, direction, sizes):
     """Entry into the tube x^2 + y^2 <= sizes[0]^2 and the slab |z| <= sizes[2]."""
     x, y, dx, dy, radius = origin[0], origin[1], direction[0], direction[1], sizes[0]
-    in_tube, out_tube = enter_ball(dx * dx + dy * dy, x * dx + y * dy,
-                                   x * x + y * y - radius * radius)
+    in_tube, out_tube = enter_ball(
+        dx * dx + dy * dy, x * dx + y * dy, x * x + y * y - radius * radius
+    )
     in_z, out_z = through_slab(origin[2], direction[2], -sizes[2], sizes[2])
     entry = max(in_tube, in_z)
     return entry if entry <= min(out_tube, out_z) else math.inf
@@ -72,8 +74,9 @@ def enter_cylinder(origin, direction, sizes):
 @njit(cache=True, nogil=True)
 def enter_sphere(origin, direction, sizes):
     """Entry into x^2 + y^2 + z^2 <= sizes[0]^2."""
-    entry, _ = enter_ball(dot(direction, direction), dot(origin, direction),
-                          dot(origin, origin) - sizes[0] * sizes[0])
+    entry, _ = enter_ball(
+        dot(direction, direction), dot(origin, direction), dot(origin, origin) - sizes[0] * sizes[0]
+    )
     return entry
 
 
@@ -96,9 +99,11 @@ def dot(a, b):
 @njit(cache=True, nogil=True)
 def turn(rotation, vector):
     """``rotation @ vector`` of float64[3, 3] and a triple."""
-    return (rotation[0, 0] * vector[0] + rotation[0, 1] * vector[1] + rotation[0, 2] * vector[2],
-            rotation[1, 0] * vector[0] + rotation[1, 1] * vector[1] + rotation[1, 2] * vector[2],
-            rotation[2, 0] * vector[0] + rotation[2, 1] * vector[1] + rotation[2, 2] * vector[2])
+    return (
+        rotation[0, 0] * vector[0] + rotation[0, 1] * vector[1] + rotation[0, 2] * vector[2],
+        rotation[1, 0] * vector[0] + rotation[1, 1] * vector[1] + rotation[1, 2] * vector[2],
+        rotation[2, 0] * vector[0] + rotation[2, 1] * vector[1] + rotation[2, 2] * vector[2],
+    )
 
 
 @njit(cache=True, nogil=True)

@@ -1,4 +1,5 @@
 """Loops of the obstacle layer: Bresenham rays that clear, points that mark."""
+
 from __future__ import annotations
 
 import math
@@ -11,7 +12,7 @@ from quad_nav.kernels.cells import cell_index
 
 SECTORS = 1024
 MOST_OBSTRUCTED = 512  # cells that are worth looking for lines towards them
-MOST_LINES = 2 ** 16  # that an update remembers: in grids up to 256 x 256 one to each cell
+MOST_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
 
 
 @njit(cache=True, nogil=True)
@@ -66,8 +67,19 @@ def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
 
 
 @njit(cache=True, nogil=True)
-def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points, range_m,
-               sectors, cleared, bounds):
+def clear_rays(
+    costs,
+    origin_x,
+    origin_y,
+    resolution,
+    sensor_x,
+    sensor_y,
+    points,
+    range_m,
+    sectors,
+    cleared,
+    bounds,
+):
     """Free the cells between the sensor and each point, up to ``range_m``.
 
     points: float32[n, 3] in the frame of the grid. Lines into sectors, bool[SECTORS], that
@@ -85,8 +97,12 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
     include(bounds, sensor_x, sensor_y)
     high_x, high_y = origin_x + size_x * resolution, origin_y + size_y * resolution
     # A ray that leaves the grid ends in it. The last millimetre makes no other cell.
-    whole = (bounds[0] <= origin_x and bounds[1] <= origin_y
-             and bounds[2] >= high_x - 0.001 and bounds[3] >= high_y - 0.001)
+    whole = (
+        bounds[0] <= origin_x
+        and bounds[1] <= origin_y
+        and bounds[2] >= high_x - 0.001
+        and bounds[3] >= high_y - 0.001
+    )
     max_cells = max(0.0, math.ceil(range_m / resolution))
     flat_costs = costs.reshape(-1)
     start = y0 * size_x + x0
@@ -100,8 +116,9 @@ def clear_rays(costs, origin_x, origin_y, resolution, sensor_x, sensor_y, points
                 continue
             if whole and not (origin_x <= x <= high_x and origin_y <= y <= high_y):
                 continue
-            if _range_ends_inside(bounds, sensor_x, sensor_y, x - sensor_x, y - sensor_y,
-                                  surely_far):
+            if _range_ends_inside(
+                bounds, sensor_x, sensor_y, x - sensor_x, y - sensor_y, surely_far
+            ):
                 continue
         x, y = clip_to_grid(sensor_x, sensor_y, x, y, origin_x, origin_y, high_x, high_y)
         x1 = cell_index(x, origin_x, resolution, size_x)
@@ -133,13 +150,15 @@ def _range_ends_inside(bounds, x, y, dx, dy, square_m2):
     to_x = bounds[2] - x if dx > 0.0 else x - bounds[0]
     to_y = bounds[3] - y if dy > 0.0 else y - bounds[1]
     length = dx * dx + dy * dy
-    return (length * to_x * to_x >= square_m2 * dx * dx
-            and length * to_y * to_y >= square_m2 * dy * dy)
+    return (
+        length * to_x * to_x >= square_m2 * dx * dx and length * to_y * to_y >= square_m2 * dy * dy
+    )
 
 
 @njit(cache=True, nogil=True)
-def clear_all_rays(costs, origin_x, origin_y, resolution, sensors, points, begins, ends, range_m,
-                   bounds):
+def clear_all_rays(
+    costs, origin_x, origin_y, resolution, sensors, points, begins, ends, range_m, bounds
+):
     """``clear_rays`` of several observations, in order.
 
     Observation k has sensors[k], float64[3], and points from begins[k] to ends[k].
@@ -155,22 +174,60 @@ def clear_all_rays(costs, origin_x, origin_y, resolution, sensors, points, begin
     window = _reached(costs, origin_x, origin_y, resolution, sensors, range_m)
     count = find_obstructed(costs, window, obstructed)
     for k in range(len(ends)):
-        seen = points[begins[k]:ends[k]]
+        seen = points[begins[k] : ends[k]]
         x, y = sensors[k, 0], sensors[k, 1]
         if count == 0:
-            clear_rays(costs, origin_x, origin_y, resolution, x, y, seen, range_m,
-                       everywhere[:0], no_lines, bounds)
+            clear_rays(
+                costs,
+                origin_x,
+                origin_y,
+                resolution,
+                x,
+                y,
+                seen,
+                range_m,
+                everywhere[:0],
+                no_lines,
+                bounds,
+            )
         elif count <= MOST_OBSTRUCTED:
-            _find_sectors(obstructed[:count], costs.shape[1], (x - origin_x) / resolution,
-                          (y - origin_y) / resolution, sectors)
-            clear_rays(costs, origin_x, origin_y, resolution, x, y, seen, range_m,
-                       sectors, no_lines, bounds)
+            _find_sectors(
+                obstructed[:count],
+                costs.shape[1],
+                (x - origin_x) / resolution,
+                (y - origin_y) / resolution,
+                sectors,
+            )
+            clear_rays(
+                costs,
+                origin_x,
+                origin_y,
+                resolution,
+                x,
+                y,
+                seen,
+                range_m,
+                sectors,
+                no_lines,
+                bounds,
+            )
             count = _keep_obstructed(costs.reshape(-1), obstructed, count)
         else:
             if lines.size == 0:
                 lines = np.full(_power_of_two(costs.size), -1, dtype=np.int64)
-            clear_rays(costs, origin_x, origin_y, resolution, x, y, seen, range_m,
-                       everywhere, lines, bounds)
+            clear_rays(
+                costs,
+                origin_x,
+                origin_y,
+                resolution,
+                x,
+                y,
+                seen,
+                range_m,
+                everywhere,
+                lines,
+                bounds,
+            )
             if k == 0:  # what is still much after the first mostly stays so
                 count = find_obstructed(costs, window, obstructed)
 
@@ -277,17 +334,38 @@ def _power_of_two(cells):
 
 
 @njit(cache=True, nogil=True)
-def mark_all_points(costs, origin_x, origin_y, resolution, sensors, points, begins, ends, range_m,
-                    max_height_m, bounds):
+def mark_all_points(
+    costs,
+    origin_x,
+    origin_y,
+    resolution,
+    sensors,
+    points,
+    begins,
+    ends,
+    range_m,
+    max_height_m,
+    bounds,
+):
     """``mark_points`` of several observations, as in ``clear_all_rays``."""
     for k in range(len(ends)):
-        mark_points(costs, origin_x, origin_y, resolution, sensors[k],
-                    points[begins[k]:ends[k]], range_m, max_height_m, bounds)
+        mark_points(
+            costs,
+            origin_x,
+            origin_y,
+            resolution,
+            sensors[k],
+            points[begins[k] : ends[k]],
+            range_m,
+            max_height_m,
+            bounds,
+        )
 
 
 @njit(cache=True, nogil=True)
-def mark_points(costs, origin_x, origin_y, resolution, sensor, points, range_m, max_height_m,
-                bounds):
+def mark_points(
+    costs, origin_x, origin_y, resolution, sensor, points, range_m, max_height_m, bounds
+):
     """Make lethal the cell of each point nearer than ``range_m`` and not too high.
 
     sensor: float64[3], points: float32[n, 3], in the frame of the grid. ``bounds`` as

@@ -1,4 +1,5 @@
 """Marked cells covered with few rectangles."""
+
 from __future__ import annotations
 
 from numba import njit

@@ -1,4 +1,5 @@
 """Loops over quadcopters that touch nothing: how they move, until one may touch something."""
+
 from __future__ import annotations
 
 import math
@@ -12,8 +13,22 @@ NOBODY = -1
 
 
 @njit(cache=True, nogil=True)
-def fly_freely(rows, commands, held, steps, step_s, altitude, gravity, airframe, law, mount_m,
-               pair_m, known_m, rooms_m, centres_m):
+def fly_freely(
+    rows,
+    commands,
+    held,
+    steps,
+    step_s,
+    altitude,
+    gravity,
+    airframe,
+    law,
+    mount_m,
+    pair_m,
+    known_m,
+    rooms_m,
+    centres_m,
+):
     """Up to so many steps, in place, as long as nothing may be touched.
 
     Those that are held, bool[n], stand still: something else moves them. The other arguments
@@ -54,14 +69,16 @@ def step_freely(rows, held, forces, torques, airframe, gravity, step_s):
         rotation_from_quaternion(row[3:7], r)
         for axis in range(3):
             omega[axis] = r[0, axis] * row[10] + r[1, axis] * row[11] + r[2, axis] * row[12]
-            torque[axis] = (r[0, axis] * torques[k, 0] + r[1, axis] * torques[k, 1]
-                            + r[2, axis] * torques[k, 2])
+            torque[axis] = (
+                r[0, axis] * torques[k, 0] + r[1, axis] * torques[k, 1] + r[2, axis] * torques[k, 2]
+            )
         spin_up_x = (torque[0] - (inertia[2] - inertia[1]) * omega[1] * omega[2]) / inertia[0]
         spin_up_y = (torque[1] - (inertia[0] - inertia[2]) * omega[2] * omega[0]) / inertia[1]
         spin_up_z = (torque[2] - (inertia[1] - inertia[0]) * omega[0] * omega[1]) / inertia[2]
         for axis in range(3):
             row[10 + axis] += step_s * (
-                r[axis, 0] * spin_up_x + r[axis, 1] * spin_up_y + r[axis, 2] * spin_up_z)
+                r[axis, 0] * spin_up_x + r[axis, 1] * spin_up_y + r[axis, 2] * spin_up_z
+            )
         _turn(row[3:7], row[10:13], step_s)
 
 
@@ -78,8 +95,12 @@ def _turn(quaternion, omega, step_s):
     quaternion[1] = aw * by - ax * bz + ay * bw + az * bx
     quaternion[2] = aw * bz + ax * by - ay * bx + az * bw
     quaternion[3] = aw * bw - ax * bx - ay * by - az * bz
-    quaternion /= math.sqrt(quaternion[0] * quaternion[0] + quaternion[1] * quaternion[1]
-                            + quaternion[2] * quaternion[2] + quaternion[3] * quaternion[3])
+    quaternion /= math.sqrt(
+        quaternion[0] * quaternion[0]
+        + quaternion[1] * quaternion[1]
+        + quaternion[2] * quaternion[2]
+        + quaternion[3] * quaternion[3]
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -102,8 +123,9 @@ def find_near(rows, held, mount_m, pair_m, known_m, rooms_m, centres_m):
             return k, NOBODY
     for k in range(rows.shape[0]):
         for other in range(k):
-            if (_square_m2(centres_m[k], centres_m[other]) < pair_m * pair_m
-                    and not (held[k] and held[other])):
+            if _square_m2(centres_m[k], centres_m[other]) < pair_m * pair_m and not (
+                held[k] and held[other]
+            ):
                 return (other, k) if held[k] else (k, other)
     return NOBODY, NOBODY
 

@@ -2,6 +2,7 @@
 
 The maths is in ``control/rollout.py``.
 """
+
 from __future__ import annotations
 
 import math
@@ -22,11 +23,11 @@ class Scene(NamedTuple):
     """What trajectories are scored against."""
 
     window: Window
-    highest_near: np.ndarray   # uint8[H, W], no less than the highest cost under the footprint
-    footprint: np.ndarray      # float64[n, 2], robot frame
+    highest_near: np.ndarray  # uint8[H, W], no less than the highest cost under the footprint
+    footprint: np.ndarray  # float64[n, 2], robot frame
     path_distance: np.ndarray  # int32[H, W]
     goal_distance: np.ndarray  # int32[H, W]
-    plan: np.ndarray           # float64[m, 2], m >= 1
+    plan: np.ndarray  # float64[m, 2], m >= 1
 
 
 class Rules(NamedTuple):
@@ -53,8 +54,13 @@ def step_count(rules, sample):
         steps = int(rules.sim_time_s / rules.sim_granularity_m + 0.5)
     else:
         speed = math.hypot(sample[0], sample[1])
-        steps = int(max(speed * rules.sim_time_s / rules.sim_granularity_m,
-                        abs(sample[2]) / rules.angular_sim_granularity_rad) + 0.5)
+        steps = int(
+            max(
+                speed * rules.sim_time_s / rules.sim_granularity_m,
+                abs(sample[2]) / rules.angular_sim_granularity_rad,
+            )
+            + 0.5
+        )
     return max(steps, 1)
 
 
@@ -115,10 +121,17 @@ def simulate(scene, rules, pose, velocity, sample, headings, points, with_footpr
         y += speed_y * dt
         time += dt
     if rules.heading_scoring:
-        return (rules.occupancy_scale * occupancy + rules.path_scale * path_distance
-                + _HEADING_SCALE * heading + goal_distance * rules.goal_scale), steps
-    return (rules.path_scale * path_distance + goal_distance * rules.goal_scale
-            + rules.occupancy_scale * occupancy), steps
+        return (
+            rules.occupancy_scale * occupancy
+            + rules.path_scale * path_distance
+            + _HEADING_SCALE * heading
+            + goal_distance * rules.goal_scale
+        ), steps
+    return (
+        rules.path_scale * path_distance
+        + goal_distance * rules.goal_scale
+        + rules.occupancy_scale * occupancy
+    ), steps
 
 
 @njit(cache=True, nogil=True)
@@ -166,7 +179,7 @@ def score(scene, rules, pose, velocity, samples, limit):
         if bounds[k] > limit:
             costs[k] = np.inf
             continue
-        turned = headings[places[k], :step_count(rules, samples[k])]
+        turned = headings[places[k], : step_count(rules, samples[k])]
         costs[k], count = simulate(scene, rules, pose, velocity, samples[k], turned, points)
         if count > 0:
             ends[k] = points[count - 1]
@@ -189,7 +202,7 @@ def cheapest(scene, rules, pose, velocity, samples):
             break
         if bounds[k] == COLLIDES or bounds[k] == NO_WAY:
             continue
-        turned = headings[places[k], :step_count(rules, samples[k])]
+        turned = headings[places[k], : step_count(rules, samples[k])]
         cost, _ = simulate(scene, rules, pose, velocity, samples[k], turned, points)
         if cost >= 0.0 and (cost < best_cost or (cost == best_cost and k < best)):
             best, best_cost = k, cost
@@ -202,9 +215,8 @@ def _lower_bounds(scene, rules, pose, velocity, samples, headings, places, point
     bounds = np.full(samples.shape[0], -np.inf)
     if rules.occupancy_scale >= 0.0:
         for k in range(samples.shape[0]):
-            turned = headings[places[k], :step_count(rules, samples[k])]
-            bounds[k], _ = simulate(scene, rules, pose, velocity, samples[k], turned, points,
-                                    False)
+            turned = headings[places[k], : step_count(rules, samples[k])]
+            bounds[k], _ = simulate(scene, rules, pose, velocity, samples[k], turned, points, False)
     return bounds
 
 
@@ -233,6 +245,5 @@ def _all_turns(rules, pose, velocity, samples):
             known += 1
     headings = np.empty((known, longest, 3))
     for place in range(known):
-        turn(rules, pose[2], velocity[2], turns[place, 1],
-             headings[place, :int(turns[place, 0])])
+        turn(rules, pose[2], velocity[2], turns[place, 1], headings[place, : int(turns[place, 0])])
     return headings, places

@@ -8,6 +8,7 @@ but never too narrow.
 A view of a solid is given in the solid's own frame: ``eye``, the LIDAR's place, and its axes
 ``ahead``, ``left`` and ``up``, as triples. Kinds and sizes as in ``rays``.
 """
+
 from __future__ import annotations
 
 import math
@@ -35,8 +36,9 @@ def sector_of(kind, eye, ahead, left, up, sizes):
         return _cylinder_sector(eye, ahead, left, up, sizes)
     if height > sizes[0]:
         return EMPTY
-    return _disc_sector(-dot(ahead, eye), -dot(left, eye),
-                        math.sqrt(sizes[0] * sizes[0] - height * height))
+    return _disc_sector(
+        -dot(ahead, eye), -dot(left, eye), math.sqrt(sizes[0] * sizes[0] - height * height)
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -74,8 +76,9 @@ def _cylinder_sector(eye, ahead, left, up, sizes):
     """
     if abs(up[2]) > _STANDING:
         z = dot(up, eye) / up[2]  # where the axis meets the plane
-        return _disc_sector(ahead[2] * z - dot(ahead, eye), left[2] * z - dot(left, eye),
-                            sizes[0] / abs(up[2]))
+        return _disc_sector(
+            ahead[2] * z - dot(ahead, eye), left[2] * z - dot(left, eye), sizes[0] / abs(up[2])
+        )
     return _disc_sector(-dot(ahead, eye), -dot(left, eye), math.hypot(sizes[0], sizes[2]))
 
 

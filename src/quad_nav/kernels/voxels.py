@@ -4,6 +4,7 @@
 their columns come to. ``origin`` and ``size``, float64[3], are the corner of voxel
 (0, 0, 0) and the edges of one voxel, x, y, z in metres.
 """
+
 from __future__ import annotations
 
 import math
@@ -16,8 +17,19 @@ from quad_nav.kernels.raytrace import include
 
 
 @njit(cache=True, nogil=True)
-def clear_voxel_rays(voxels, costs, origin, size, sensor, points, range_m, max_height_m,
-                     unknown_threshold, mark_threshold, bounds):
+def clear_voxel_rays(
+    voxels,
+    costs,
+    origin,
+    size,
+    sensor,
+    points,
+    range_m,
+    max_height_m,
+    unknown_threshold,
+    mark_threshold,
+    bounds,
+):
     """Free the voxels from the sensor towards each point, and their columns' costs.
 
     sensor: float64[3], points: float32[n, 3], in the frame of the grid. ``bounds``,
@@ -25,23 +37,35 @@ def clear_voxel_rays(voxels, costs, origin, size, sensor, points, range_m, max_h
     outside the voxels clears nothing: returns False.
     """
     size_y, size_x, size_z = voxels.shape
-    if (cell_index(sensor[0], origin[0], size[0], size_x) < 0
-            or cell_index(sensor[1], origin[1], size[1], size_y) < 0
-            or cell_index(sensor[2], origin[2], size[2], size_z) < 0):
+    if (
+        cell_index(sensor[0], origin[0], size[0], size_x) < 0
+        or cell_index(sensor[1], origin[1], size[1], size_y) < 0
+        or cell_index(sensor[2], origin[2], size[2], size_z) < 0
+    ):
         return False
     include(bounds, sensor[0], sensor[1])
     max_voxels = max(0.0, math.ceil(range_m / size[0]))
     for k in range(points.shape[0]):
         x, y, z = ray_end(origin, size, size_x, size_y, sensor, points[k], max_height_m)
-        if (cell_index(x, origin[0], size[0], size_x) < 0
-                or cell_index(y, origin[1], size[1], size_y) < 0
-                or cell_index(z, origin[2], size[2], size_z) < 0):
+        if (
+            cell_index(x, origin[0], size[0], size_x) < 0
+            or cell_index(y, origin[1], size[1], size_y) < 0
+            or cell_index(z, origin[2], size[2], size_z) < 0
+        ):
             continue
         clear_voxel_line(
-            voxels, costs, (sensor[0] - origin[0]) / size[0], (sensor[1] - origin[1]) / size[1],
-            (sensor[2] - origin[2]) / size[2], (x - origin[0]) / size[0],
-            (y - origin[1]) / size[1], (z - origin[2]) / size[2], max_voxels,
-            unknown_threshold, mark_threshold)
+            voxels,
+            costs,
+            (sensor[0] - origin[0]) / size[0],
+            (sensor[1] - origin[1]) / size[1],
+            (sensor[2] - origin[2]) / size[2],
+            (x - origin[0]) / size[0],
+            (y - origin[1]) / size[1],
+            (z - origin[2]) / size[2],
+            max_voxels,
+            unknown_threshold,
+            mark_threshold,
+        )
         dx, dy = x - sensor[0], y - sensor[1]
         length = math.hypot(dx, dy)
         scale = range_m / length if length > range_m else 1.0
@@ -76,8 +100,11 @@ def ray_end(origin, size, size_x, size_y, sensor, point, max_height_m):
     if y > high_y:
         t = _cut(t, high_y - sensor[1], dy)
     # Rounding must not put an end on the low border outside.
-    return (max(sensor[0] + dx * t, origin[0]), max(sensor[1] + dy * t, origin[1]),
-            max(sensor[2] + dz * t, origin[2]))
+    return (
+        max(sensor[0] + dx * t, origin[0]),
+        max(sensor[1] + dy * t, origin[1]),
+        max(sensor[2] + dz * t, origin[2]),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -89,8 +116,9 @@ def _cut(t, to_border, step):
 
 
 @njit(cache=True, nogil=True)
-def clear_voxel_line(voxels, costs, x0, y0, z0, x1, y1, z1, max_voxels, unknown_threshold,
-                     mark_threshold):
+def clear_voxel_line(
+    voxels, costs, x0, y0, z0, x1, y1, z1, max_voxels, unknown_threshold, mark_threshold
+):
     """Free the voxels between two points, in voxels from the corner, both ends included.
 
     Bresenham's line in three dimensions, cut to about ``max_voxels`` along it.
@@ -134,8 +162,9 @@ def clear_voxel(voxels, costs, x, y, z, unknown_threshold, mark_threshold):
 
 
 @njit(cache=True, nogil=True)
-def mark_voxels(voxels, costs, origin, size, sensor, points, range_m, max_height_m,
-                mark_threshold, bounds):
+def mark_voxels(
+    voxels, costs, origin, size, sensor, points, range_m, max_height_m, mark_threshold, bounds
+):
     """Mark the voxel of each point nearer than ``range_m`` and not too high.
 
     The cost is lethal in columns with more than ``mark_threshold`` marked voxels. What is

@@ -5,6 +5,7 @@ be obstacles, which keeps every neighbour inside. The maths is in
 ``plan/navfn.py``. All sums are float32 in the order that the recorded
 potentials demand.
 """
+
 from __future__ import annotations
 
 import math
@@ -14,7 +15,7 @@ import numpy as np
 from numba import njit
 
 NOT_REACHED = np.float32(1e10)
-BUCKET_SIZE = 10000       # cells that one bucket holds; further ones are dropped
+BUCKET_SIZE = 10000  # cells that one bucket holds; further ones are dropped
 
 _INVERSE_SQRT2 = 0.707106781
 
@@ -23,8 +24,8 @@ class Rules(NamedTuple):
     """What a wave's potentials are made of."""
 
     obstacle: int  # cells of this cost are never entered
-    neutral: int   # cost of a free cell
-    planar: bool   # as of a planar wave; else a step from the lowest neighbour
+    neutral: int  # cost of a free cell
+    planar: bool  # as of a planar wave; else a step from the lowest neighbour
 
 
 @njit(cache=True, nogil=True)
@@ -47,8 +48,14 @@ def arrival(cost, left, right, below, above, planar):
 @njit(cache=True, nogil=True)
 def arrival_at(potential, size_x, cell, cost, planar):
     """``arrival`` at a cell that is not of the outermost ring."""
-    return arrival(np.float32(cost), potential[cell - 1], potential[cell + 1],
-                   potential[cell - size_x], potential[cell + size_x], planar)
+    return arrival(
+        np.float32(cost),
+        potential[cell - 1],
+        potential[cell + 1],
+        potential[cell - size_x],
+        potential[cell + size_x],
+        planar,
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -70,9 +77,18 @@ def start_between_cells(potential, source, size_x, dx, dy, neutral):
     _seed(potential, source + 1, twice * (one - dx) * dy)
     _seed(potential, source + size_x, twice * dx * (one - dy))
     _seed(potential, source + size_x + 1, twice * (one - dx) * (one - dy))
-    return np.array([source + 2, source - 1, source + size_x - 1, source + size_x + 2,
-                     source - size_x, source - size_x + 1, source + 2 * size_x,
-                     source + 2 * size_x + 1])
+    return np.array(
+        [
+            source + 2,
+            source - 1,
+            source + size_x - 1,
+            source + size_x + 2,
+            source - size_x,
+            source - size_x + 1,
+            source + 2 * size_x,
+            source + 2 * size_x + 1,
+        ]
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -83,8 +99,9 @@ def _seed(potential, cell, value):
 
 @njit(cache=True, nogil=True)
 def _distance_cost(cell, other, size_x, neutral):
-    return np.float32(math.hypot(cell % size_x - other % size_x,
-                                 cell // size_x - other // size_x) * neutral)
+    return np.float32(
+        math.hypot(cell % size_x - other % size_x, cell // size_x - other // size_x) * neutral
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -100,8 +117,18 @@ def _enter_front(costs, pending, front, cells, obstacle):
 
 
 @njit(cache=True, nogil=True)
-def propagate(costs, potential, first_front, rules, source, target, size_x, max_fronts,
-              stop_at_target, heuristic):
+def propagate(
+    costs,
+    potential,
+    first_front,
+    rules,
+    source,
+    target,
+    size_x,
+    max_fronts,
+    stop_at_target,
+    heuristic,
+):
     """Spread a potential that has begun at ``source``, at most ``max_fronts`` fronts.
 
     ``costs`` uint8[n] or float32[n], at most ``rules.obstacle``; ``potential``
@@ -129,23 +156,32 @@ def propagate(costs, potential, first_front, rules, source, target, size_x, max_
         for k in range(in_front):
             cell = front[k]
             neighbours = (cell - one, cell + one, cell - stride, cell + stride)
-            around = (potential[neighbours[0]], potential[neighbours[1]],
-                      potential[neighbours[2]], potential[neighbours[3]])
+            around = (
+                potential[neighbours[0]],
+                potential[neighbours[1]],
+                potential[neighbours[2]],
+                potential[neighbours[3]],
+            )
             # Potentials are made of whole costs, the comparison below is of exact ones.
-            here = arrival(np.float32(int(costs[cell])), around[0], around[1], around[2],
-                           around[3], planar)
+            here = arrival(
+                np.float32(int(costs[cell])), around[0], around[1], around[2], around[3], planar
+            )
             if here >= potential[cell]:
                 continue
             potential[cell] = here
             priority = here
             if heuristic:
                 priority = np.float32(
-                    here + _distance_cost(np.int64(cell), target, size_x, neutral))
+                    here + _distance_cost(np.int64(cell), target, size_x, neutral)
+                )
             for j in range(4):
                 cost = costs[neighbours[j]]
                 crossing = np.float32(_INVERSE_SQRT2 * np.float64(cost))
-                if (around[j] <= np.float32(priority + crossing) or cost >= obstacle
-                        or pending[neighbours[j]]):
+                if (
+                    around[j] <= np.float32(priority + crossing)
+                    or cost >= obstacle
+                    or pending[neighbours[j]]
+                ):
                     continue
                 if priority < threshold and in_ahead < BUCKET_SIZE:
                     ahead[in_ahead] = neighbours[j]

@@ -4,6 +4,7 @@ Gaps are between hulls: a quadcopter is a disc of ``robot_radius_m``, so the
 gap to an obstacle is the centre's distance to its surface less one radius, and
 the gap between two quadcopters their centres' distance less both radii.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -91,8 +92,16 @@ class RobotLog:
     @property
     def flown(self) -> Flown:
         """Up to now."""
-        return Flown(tuple(self.legs), self.path_length_m, self.recoveries, self.aborts,
-                     self.spin_s, self._leg_start, self._leg_start_length_m, self._pose)
+        return Flown(
+            tuple(self.legs),
+            self.path_length_m,
+            self.recoveries,
+            self.aborts,
+            self.spin_s,
+            self._leg_start,
+            self._leg_start_length_m,
+            self._pose,
+        )
 
     def move(self, stamp_s: float, pose: Pose2D) -> bool:
         """Take a pose; False for one that is not newer than the last."""
@@ -118,8 +127,15 @@ class RobotLog:
             self._leg_start, self._leg_start_length_m = self._pose, self.path_length_m
         if not isinstance(action, GoalEnded):
             return None
-        leg = self._leg(action.index, action.lap, action.goal, action.reached, action.reason,
-                        action.attempts, action.time_s)
+        leg = self._leg(
+            action.index,
+            action.lap,
+            action.goal,
+            action.reached,
+            action.reason,
+            action.attempts,
+            action.time_s,
+        )
         self.legs.append(leg)
         return leg
 
@@ -129,26 +145,53 @@ class RobotLog:
         rest: List[Leg] = []
         for number, goal in enumerate(sequencer.sequence.goals[index:], start=index):
             if flight is not None and number == index:
-                rest.append(self._leg(number, lap, goal, False, INTERRUPTED, flight.attempt,
-                                      now_s - flight.first_sent_s))
+                rest.append(
+                    self._leg(
+                        number,
+                        lap,
+                        goal,
+                        False,
+                        INTERRUPTED,
+                        flight.attempt,
+                        now_s - flight.first_sent_s,
+                    )
+                )
             else:
                 rest.append(Leg(number, lap, goal, False, NOT_SENT, 0))
         return self.legs + rest
 
-    def _leg(self, index: int, lap: int, goal: Goal, reached: bool, reason: str, attempts: int,
-             time_s: float) -> Leg:
+    def _leg(
+        self,
+        index: int,
+        lap: int,
+        goal: Goal,
+        reached: bool,
+        reason: str,
+        attempts: int,
+        time_s: float,
+    ) -> Leg:
         straight_m = 0.0
         if self._leg_start is not None and self._pose is not None:
             straight_m = self._leg_start.distance_to(self._pose)
-        return Leg(index, lap, goal, reached, reason, attempts, time_s,
-                   self.path_length_m - self._leg_start_length_m, straight_m)
+        return Leg(
+            index,
+            lap,
+            goal,
+            reached,
+            reason,
+            attempts,
+            time_s,
+            self.path_length_m - self._leg_start_length_m,
+            straight_m,
+        )
 
 
 class FlightLog:
     """What all quadcopters of a mission have flown."""
 
-    def __init__(self, names: Sequence[str], robot_radius_m: float,
-                 clearances_m: Optional[Clearances] = None):
+    def __init__(
+        self, names: Sequence[str], robot_radius_m: float, clearances_m: Optional[Clearances] = None
+    ):
         self.robots: Dict[str, RobotLog] = {name: RobotLog(name) for name in names}
         self.robot_radius_m = robot_radius_m
         self.contacts: List[Contact] = []
@@ -170,8 +213,9 @@ class FlightLog:
         self.contacts.append(contact)
         return True
 
-    def go_on(self, name: str, before: Flown, clearance_m: Optional[float],
-              separation_m: Optional[float]) -> None:
+    def go_on(
+        self, name: str, before: Flown, clearance_m: Optional[float], separation_m: Optional[float]
+    ) -> None:
         """Take over what a quadcopter has flown, and its smallest gaps, from another log."""
         self.robots[name] = RobotLog(name, before)
         self.gaps.know(name, clearance_m, separation_m)
@@ -183,4 +227,3 @@ class FlightLog:
 def unflown(sequence: GoalSequence) -> List[Leg]:
     """The legs of a mission that never began."""
     return [Leg(index, 1, goal, False, NOT_SENT, 0) for index, goal in enumerate(sequence.goals)]
-

@@ -3,6 +3,7 @@
 Poses are gathered and compared some seconds at a time: one comparison of arrays costs about
 as much as one of two numbers.
 """
+
 from __future__ import annotations
 
 import math
@@ -25,8 +26,9 @@ class GapLog:
     other one was at that time, on the straight line between two of its poses.
     """
 
-    def __init__(self, names: Sequence[str], radius_m: float,
-                 clearances_m: Optional[Clearances] = None):
+    def __init__(
+        self, names: Sequence[str], radius_m: float, clearances_m: Optional[Clearances] = None
+    ):
         self._radius_m = radius_m
         self._clearances_m = clearances_m
         self._samples: Dict[str, List[Tuple[float, float, float]]] = {name: [] for name in names}
@@ -68,12 +70,12 @@ class GapLog:
             if self._clearances_m is not None:
                 gap_m = float(self._clearances_m(track[:, 1:]).min()) - self._radius_m
                 self._clearance_m[name] = min(self._clearance_m[name], gap_m)
-            for other, there in tracks[index + 1:]:
+            for other, there in tracks[index + 1 :]:
                 self._compare_two(name, track, other, there)
         newest_s = max((track[-1, 0] for _, track in tracks), default=0.0)
         for name, track in tracks:
             kept = int(np.searchsorted(track[:, 0], newest_s - LATE_S, side="right"))
-            del self._samples[name][:max(kept - 1, 0)]
+            del self._samples[name][: max(kept - 1, 0)]
 
     def _compare_two(self, name: str, track: np.ndarray, other: str, there: np.ndarray) -> None:
         known_m = max(self._separation_m[name], self._separation_m[other])
@@ -87,8 +89,10 @@ class GapLog:
 def _nearest_m(track: np.ndarray, other: np.ndarray) -> float:
     """Smallest distance at the stamps of one track; tracks are (stamp, x, y), float64[n, 3]."""
     stamps_s = track[:, 0]
-    x_m, y_m = (np.interp(stamps_s, other[:, 0], other[:, column], left=np.inf, right=np.inf)
-                for column in (1, 2))
+    x_m, y_m = (
+        np.interp(stamps_s, other[:, 0], other[:, column], left=np.inf, right=np.inf)
+        for column in (1, 2)
+    )
     return float(np.min(np.hypot(track[:, 1] - x_m, track[:, 2] - y_m)))
 
 

@@ -4,6 +4,7 @@ A file is refused as a whole and every fault in it is listed at once, each as
 ``file: place: what is wrong; what was expected``. ``goals/schema.json`` says
 the same to an editor, ``docs/goals.md`` to a person.
 """
+
 from __future__ import annotations
 
 import dataclasses
@@ -16,8 +17,8 @@ from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Opt
 import numpy as np
 
 from quad_nav.errors import InputError
+from quad_nav.files.user_files import read_bytes
 from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, Goal, GoalSequence, SequenceSettings
-from quad_nav.user_files import read_bytes
 
 MOST_BYTES = 4 * 1024 * 1024
 MOST_GOALS = 10_000
@@ -41,25 +42,41 @@ def _is_number(value: Any) -> bool:
 
 
 SETTINGS: Dict[str, _Setting] = {
-    "goal_tolerance": _Setting("goal_tolerance_m", lambda v: _is_number(v) and 0 < v <= LONGEST_M,
-                               f"a number of metres above 0, {LONGEST_M:g} at most"),
-    "goal_timeout": _Setting("goal_timeout_s", lambda v: _is_number(v) and 0 < v <= LONGEST_S,
-                             f"a number of seconds above 0, {LONGEST_S:g} at most"),
-    "retries": _Setting("retries", lambda v: _is_number(v) and 0 <= v <= MOST_GOALS and v == int(v),
-                        f"a whole number, 0 to {MOST_GOALS}"),
+    "goal_tolerance": _Setting(
+        "goal_tolerance_m",
+        lambda v: _is_number(v) and 0 < v <= LONGEST_M,
+        f"a number of metres above 0, {LONGEST_M:g} at most",
+    ),
+    "goal_timeout": _Setting(
+        "goal_timeout_s",
+        lambda v: _is_number(v) and 0 < v <= LONGEST_S,
+        f"a number of seconds above 0, {LONGEST_S:g} at most",
+    ),
+    "retries": _Setting(
+        "retries",
+        lambda v: _is_number(v) and 0 <= v <= MOST_GOALS and v == int(v),
+        f"a whole number, 0 to {MOST_GOALS}",
+    ),
     "loop": _Setting("loop", lambda v: isinstance(v, bool), "true or false"),
 }
 KEYS: Tuple[str, ...] = ("goals", "$schema", *SETTINGS)
 
 
-def load_goals(path: Union[str, Path], check_place: Optional[PlaceCheck] = None,
-               defaults: SequenceSettings = DEFAULT_SETTINGS) -> GoalSequence:
+def load_goals(
+    path: Union[str, Path],
+    check_place: Optional[PlaceCheck] = None,
+    defaults: SequenceSettings = DEFAULT_SETTINGS,
+) -> GoalSequence:
     """The sequence in a goal file; raises InputError with every fault in it."""
     return parse_goals(read_bytes(Path(path), MOST_BYTES), str(path), check_place, defaults)
 
 
-def parse_goals(content: Union[bytes, str], name: str, check_place: Optional[PlaceCheck] = None,
-                defaults: SequenceSettings = DEFAULT_SETTINGS) -> GoalSequence:
+def parse_goals(
+    content: Union[bytes, str],
+    name: str,
+    check_place: Optional[PlaceCheck] = None,
+    defaults: SequenceSettings = DEFAULT_SETTINGS,
+) -> GoalSequence:
     """The sequence in a goal file's content; ``name`` stands for the file in messages.
 
     ``defaults`` are the settings that the file does not give itself.
@@ -81,12 +98,15 @@ def parse_goals(content: Union[bytes, str], name: str, check_place: Optional[Pla
     return GoalSequence(tuple(goals), settings)
 
 
-def read_settings(values: Mapping[str, Any], name: str,
-                  defaults: SequenceSettings = DEFAULT_SETTINGS
-                  ) -> Tuple[SequenceSettings, List[str]]:
+def read_settings(
+    values: Mapping[str, Any], name: str, defaults: SequenceSettings = DEFAULT_SETTINGS
+) -> Tuple[SequenceSettings, List[str]]:
     """Settings by their names in a goal file, and what is wrong with them."""
-    problems = [f"{name}: {key}: is {_show(value)}; expected {SETTINGS[key].expected}"
-                for key, value in values.items() if not SETTINGS[key].accepts(value)]
+    problems = [
+        f"{name}: {key}: is {_show(value)}; expected {SETTINGS[key].expected}"
+        for key, value in values.items()
+        if not SETTINGS[key].accepts(value)
+    ]
     if problems:
         return defaults, problems
     fields = {SETTINGS[key].field: value for key, value in values.items()}
@@ -95,13 +115,17 @@ def read_settings(values: Mapping[str, Any], name: str,
     return dataclasses.replace(defaults, **fields), []
 
 
-def clearance_check(contains: Callable[[float, float], bool],
-                    clearance_m: Callable[[float, float], float],
-                    robot_radius_m: float, arena: str = "the arena") -> PlaceCheck:
+def clearance_check(
+    contains: Callable[[float, float], bool],
+    clearance_m: Callable[[float, float], float],
+    robot_radius_m: float,
+    arena: str = "the arena",
+) -> PlaceCheck:
     """Places in the arena and no nearer to anything than the robot's radius.
 
     ``clearance_m(x, y)`` is the distance to the nearest surface, negative inside.
     """
+
     def check(x_m: float, y_m: float) -> Optional[str]:
         if not contains(x_m, y_m):
             return f"is outside the arena; expected a place in {arena}"
@@ -109,17 +133,24 @@ def clearance_check(contains: Callable[[float, float], bool],
         if clearance <= 0.0:
             return f"is inside an obstacle; expected {robot_radius_m:.2f} m of room around it"
         if clearance < robot_radius_m:
-            return (f"is {clearance:.2f} m from an obstacle or a wall; "
-                    f"expected at least the robot's radius, {robot_radius_m:.2f} m")
+            return (
+                f"is {clearance:.2f} m from an obstacle or a wall; "
+                f"expected at least the robot's radius, {robot_radius_m:.2f} m"
+            )
         return None
+
     return check
 
 
 class WatchedGoalFile:
     """A goal file that a person may edit while the mission flies."""
 
-    def __init__(self, path: Union[str, Path], check_place: Optional[PlaceCheck] = None,
-                 defaults: SequenceSettings = DEFAULT_SETTINGS):
+    def __init__(
+        self,
+        path: Union[str, Path],
+        check_place: Optional[PlaceCheck] = None,
+        defaults: SequenceSettings = DEFAULT_SETTINGS,
+    ):
         self.path = Path(path)
         self._check_place = check_place
         self._defaults = defaults
@@ -170,27 +201,31 @@ def _decode(content: Union[bytes, str], name: str) -> Tuple[Any, List[str]]:
     try:
         text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
     except UnicodeDecodeError as error:
-        raise InputError([f"{name}: byte {error.start} is not UTF-8; expected a JSON text"]
-                         ) from error
+        raise InputError(
+            [f"{name}: byte {error.start} is not UTF-8; expected a JSON text"]
+        ) from error
     # The tutorial prints its goal files without the braces around them.
     bare = text.lstrip().startswith('"goals"')
     try:
         # parse_int=float: a whole number with a thousand digits becomes infinity, as 1e999 does.
-        return json.loads("{" + text + "}" if bare else text, object_pairs_hook=unique,
-                          parse_int=float), problems
+        return json.loads(
+            "{" + text + "}" if bare else text, object_pairs_hook=unique, parse_int=float
+        ), problems
     except json.JSONDecodeError as error:
         column = error.colno - (bare and error.lineno == 1)
-        problem = f'{name}:{error.lineno}:{column}: is not JSON: {error.msg}; '
+        problem = f"{name}:{error.lineno}:{column}: is not JSON: {error.msg}; "
         raise InputError([problem + 'expected {"goals": [[x, y], [x, y, yaw], ...]}']) from error
     except RecursionError as error:
-        raise InputError([f'{name}: is nested too deeply; expected {{"goals": [[x, y], ...]}}']
-                         ) from error
+        raise InputError(
+            [f'{name}: is nested too deeply; expected {{"goals": [[x, y], ...]}}']
+        ) from error
 
 
-def _read_goals(tree: Dict[str, Any], name: str, check_place: Optional[PlaceCheck]
-                ) -> Tuple[List[Goal], List[str]]:
+def _read_goals(
+    tree: Dict[str, Any], name: str, check_place: Optional[PlaceCheck]
+) -> Tuple[List[Goal], List[str]]:
     if "goals" not in tree:
-        return [], [f"{name}: has no goals; expected \"goals\": [[x, y], ...]"]
+        return [], [f'{name}: has no goals; expected "goals": [[x, y], ...]']
     entries = tree["goals"]
     if not isinstance(entries, list):
         return [], [f"{name}: goals: is {_kind(entries)}; expected a list [[x, y], ...]"]
@@ -224,8 +259,10 @@ def _goal_faults(entry: Any) -> Iterable[str]:
         elif label != "yaw" and abs(value) > LONGEST_M:
             yield f": {label} is {value:g}; expected {LONGEST_M:g} metres at most"
         elif label == "yaw" and abs(value) > 2 * math.pi:
-            yield (f": yaw is {value:g}; expected radians between -2 pi and 2 pi "
-                   f"({value:g} degrees are {math.radians(value):.4g})")
+            yield (
+                f": yaw is {value:g}; expected radians between -2 pi and 2 pi "
+                f"({value:g} degrees are {math.radians(value):.4g})"
+            )
 
 
 def _loop_faults(goals: List[Goal], tolerance_m: float, name: str) -> List[str]:

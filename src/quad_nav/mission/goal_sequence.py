@@ -1,4 +1,5 @@
 """The goals of one quadcopter and how they are flown."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -4,6 +4,7 @@ Lines are JSON objects, appended and forced to the disk before the quadcopters a
 of what is in them. So whoever is killed, nothing that was flown is flown again. The end
 of a line that was never finished counts for nothing.
 """
+
 from __future__ import annotations
 
 import fcntl
@@ -45,8 +46,12 @@ class Journal:
         except FileNotFoundError:
             return []
         except OSError as error:
-            raise InputError([f"{self.path}: cannot be read: {error.strerror}; expected the "
-                              "journal of a mission"]) from error
+            raise InputError(
+                [
+                    f"{self.path}: cannot be read: {error.strerror}; expected the "
+                    "journal of a mission"
+                ]
+            ) from error
         records, self._size = _records(content, self.path)
         return records
 
@@ -62,9 +67,14 @@ class Journal:
         try:
             self._write(b"".join(self._waiting))
         except OSError as error:
-            news = "" if self._is_failing else (
-                f"{self.path}: cannot be written: {error.strerror or error}; the flight goes on, "
-                "and so does the journal as soon as it can")
+            news = (
+                ""
+                if self._is_failing
+                else (
+                    f"{self.path}: cannot be written: {error.strerror or error}; the flight goes on, "
+                    "and so does the journal as soon as it can"
+                )
+            )
             self._is_failing = True
             return news
         news = f"{self.path}: written again, nothing is missing" if self._is_failing else ""
@@ -114,7 +124,11 @@ def _records(content: bytes, path: Path) -> Tuple[List[Dict[str, Any]], int]:
         except ValueError:
             record = None
         if not isinstance(record, dict):
-            raise InputError([f"{path}:{number}: is no line of a journal; expected a JSON object. "
-                              "Remove the file to begin with the first goals"])
+            raise InputError(
+                [
+                    f"{path}:{number}: is no line of a journal; expected a JSON object. "
+                    "Remove the file to begin with the first goals"
+                ]
+            )
         records.append(record)
     return records, sum(len(line) + 1 for line in lines)

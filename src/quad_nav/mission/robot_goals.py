@@ -1,4 +1,5 @@
 """The goal files of all quadcopters of a mission."""
+
 from __future__ import annotations
 
 import itertools
@@ -23,21 +24,28 @@ class RobotGoals:
 def goal_paths(folder: Path, robots: int) -> Tuple[List[Path], List[str]]:
     """``quad0_goals.json`` and so on as far as they are there, and what is missing."""
     if not folder.is_dir():
-        return [], [f"goals: there is no folder {folder}; expected one with quad0_goals.json "
-                    "and so on"]
+        return [], [
+            f"goals: there is no folder {folder}; expected one with quad0_goals.json and so on"
+        ]
     paths = [folder / f"quad{index}_goals.json" for index in range(robots)]
     missing = [path.name for path in paths if not path.exists()]
     if not missing:
         return paths, []
     there = sorted(path.name for path in folder.glob("*.json")) or ["no JSON file"]
-    return ([path for path in paths if path.exists()],
-            [f"{folder}: has no {_listed(missing)}; expected a goal file for each of {robots} "
-             f"robots; there is {_listed(there)}"])
+    return (
+        [path for path in paths if path.exists()],
+        [
+            f"{folder}: has no {_listed(missing)}; expected a goal file for each of {robots} "
+            f"robots; there is {_listed(there)}"
+        ],
+    )
 
 
-def load_robot_goals(paths: Sequence[Path], check_place: Optional[PlaceCheck] = None,
-                     settings: SequenceSettings = DEFAULT_SETTINGS
-                     ) -> Tuple[List[RobotGoals], List[str]]:
+def load_robot_goals(
+    paths: Sequence[Path],
+    check_place: Optional[PlaceCheck] = None,
+    settings: SequenceSettings = DEFAULT_SETTINGS,
+) -> Tuple[List[RobotGoals], List[str]]:
     """Every quadcopter's goals that can be read, and every fault in the other files."""
     robots: List[RobotGoals] = []
     problems: List[str] = []
@@ -55,10 +63,12 @@ def close_ends(robots: Sequence[RobotGoals], radius_m: float) -> List[str]:
     staying = [robot for robot in robots if robot.sequence.settings.loop is False]
     warnings = []
     for a, b in itertools.combinations(staying, 2):
-        apart_m = a.sequence.goals[-1].pose.distance_to(b.sequence.goals[-1].pose)
-        if apart_m < 2 * radius_m:
-            warnings.append(f"the last goals of {a.name} and {b.name} are {apart_m:.2f} m apart: "
-                            f"they would touch there (two radii are {2 * radius_m:.2f} m)")
+        distance_m = a.sequence.goals[-1].pose.distance_to(b.sequence.goals[-1].pose)
+        if distance_m < 2 * radius_m:
+            warnings.append(
+                f"the last goals of {a.name} and {b.name} are {distance_m:.2f} m apart: "
+                f"they would touch there (two radii are {2 * radius_m:.2f} m)"
+            )
     return warnings
 
 

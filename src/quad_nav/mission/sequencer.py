@@ -11,6 +11,7 @@ odometry says; the navigator's own opinion only tells when to try again.
               +-> forgotten by the navigator (restarted) or finished with
                   somebody else's goal -> send again, not counted
 """
+
 from __future__ import annotations
 
 import dataclasses
@@ -156,8 +157,13 @@ class Sequencer:
         if self._flight is not None and self._flight.goal != current:
             self._flight = None
 
-    def tick(self, now_s: float, pose: Pose2D, reports: Sequence[NavigatorReport] = (),
-             navigator_idle: bool = False) -> List[Action]:
+    def tick(
+        self,
+        now_s: float,
+        pose: Pose2D,
+        reports: Sequence[NavigatorReport] = (),
+        navigator_idle: bool = False,
+    ) -> List[Action]:
         """What to do now.
 
         ``pose`` is the quadcopter's in ``map``; ``reports`` came since the
@@ -184,8 +190,13 @@ class Sequencer:
             return [self._send(now_s, dataclasses.replace(flight, replaced=False), lost)]
         failure = self._why_failed(flight, now_s, pose, reports)
         if failure and flight.attempt <= settings.retries:
-            return [self._send(now_s, dataclasses.replace(flight, sent_s=now_s,
-                                                          attempt=flight.attempt + 1), failure)]
+            return [
+                self._send(
+                    now_s,
+                    dataclasses.replace(flight, sent_s=now_s, attempt=flight.attempt + 1),
+                    failure,
+                )
+            ]
         return self._end(flight, now_s, pose, failure) if failure else []
 
     def _why_lost(self, flight: Flight, now_s: float, reports: Sequence[NavigatorReport]) -> str:
@@ -199,15 +210,18 @@ class Sequencer:
             return f"the navigator has had no goal for {FORGOTTEN_AFTER_S:.0f} s"
         return ""
 
-    def _why_failed(self, flight: Flight, now_s: float, pose: Pose2D,
-                    reports: Sequence[NavigatorReport]) -> str:
+    def _why_failed(
+        self, flight: Flight, now_s: float, pose: Pose2D, reports: Sequence[NavigatorReport]
+    ) -> str:
         settings = self._sequence.settings
         for report in reports:
             if report.verdict is Verdict.ABORTED:
                 return f"aborted: {report.text}" if report.text else "aborted"
             if report.verdict is Verdict.SUCCEEDED:
-                return (f"the navigator stopped {pose.distance_to(flight.pose):.2f} m from it "
-                        f"(goal_tolerance {settings.goal_tolerance_m:.2f} m)")
+                return (
+                    f"the navigator stopped {pose.distance_to(flight.pose):.2f} m from it "
+                    f"(goal_tolerance {settings.goal_tolerance_m:.2f} m)"
+                )
         if now_s - flight.sent_s >= settings.goal_timeout_s:
             return f"not reached in {settings.goal_timeout_s:g} s"
         return ""
@@ -229,8 +243,15 @@ class Sequencer:
 
     def _end(self, flight: Flight, now_s: float, pose: Pose2D, reason: str) -> List[Action]:
         """Reached without a reason, skipped with one; then the next goal."""
-        ended = GoalEnded(self._index, self._lap, flight.goal, not reason,
-                          now_s - flight.first_sent_s, flight.attempt, reason)
+        ended = GoalEnded(
+            self._index,
+            self._lap,
+            flight.goal,
+            not reason,
+            now_s - flight.first_sent_s,
+            flight.attempt,
+            reason,
+        )
         self._flight = None
         self._index += 1
         return [ended, *self._next(now_s, pose)]

@@ -2,6 +2,7 @@
 
 The keys of the JSON are documented in ``docs/goals.md``.
 """
+
 from __future__ import annotations
 
 import json
@@ -41,8 +42,9 @@ class RobotSummary:
 
     @property
     def skipped(self) -> int:
-        return sum(not leg.reached and leg.attempts > 0 and leg.reason != INTERRUPTED
-                   for leg in self.legs)
+        return sum(
+            not leg.reached and leg.attempts > 0 and leg.reason != INTERRUPTED for leg in self.legs
+        )
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,12 @@ class MissionSummary:
     @property
     def success(self) -> bool:
         """Every goal was reached and nothing touched."""
-        return (not self.reason and not self.problems and not self.contacts
-                and all(leg.reached for robot in self.robots for leg in robot.legs))
+        return (
+            not self.reason
+            and not self.problems
+            and not self.contacts
+            and all(leg.reached for robot in self.robots for leg in robot.legs)
+        )
 
     @property
     def exit_status(self) -> int:
@@ -85,9 +91,17 @@ class MissionSummary:
 
 def summarize_robot(log: FlightLog, name: str, legs: Sequence[Leg]) -> RobotSummary:
     robot = log.robots[name]
-    return RobotSummary(name, tuple(legs), robot.path_length_m, log.gaps.clearance_m(name),
-                        log.gaps.separation_m(name), robot.recoveries, log.contacts_of(name),
-                        robot.aborts, robot.spin_s)
+    return RobotSummary(
+        name,
+        tuple(legs),
+        robot.path_length_m,
+        log.gaps.clearance_m(name),
+        log.gaps.separation_m(name),
+        robot.recoveries,
+        log.contacts_of(name),
+        robot.aborts,
+        robot.spin_s,
+    )
 
 
 def to_json(summary: MissionSummary) -> Dict[str, Any]:
@@ -102,9 +116,16 @@ def to_json(summary: MissionSummary) -> Dict[str, Any]:
         "real_time_factor": _rounded(summary.real_time_factor),
         "robot_radius_m": summary.robot_radius_m,
         "robots": [_robot_json(robot) for robot in summary.robots],
-        "contacts": [{"time_s": _rounded(contact.time_s), "robot": contact.robot,
-                      "with": contact.other, "x_m": _rounded(contact.x_m),
-                      "y_m": _rounded(contact.y_m)} for contact in summary.contacts],
+        "contacts": [
+            {
+                "time_s": _rounded(contact.time_s),
+                "robot": contact.robot,
+                "with": contact.other,
+                "x_m": _rounded(contact.x_m),
+                "y_m": _rounded(contact.y_m),
+            }
+            for contact in summary.contacts
+        ],
         "contacts_reported": summary.contacts_reported,
         "min_separation_m": _rounded(summary.min_separation_m),
         "seed": summary.seed,
@@ -117,8 +138,9 @@ def write_json(summary: MissionSummary, path: Union[str, Path]) -> None:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    partial.write_text(json.dumps(to_json(summary), indent=2, allow_nan=False) + "\n",
-                       encoding="utf-8")
+    partial.write_text(
+        json.dumps(to_json(summary), indent=2, allow_nan=False) + "\n", encoding="utf-8"
+    )
     partial.replace(path)
 
 
@@ -133,8 +155,18 @@ def table(summary: MissionSummary) -> str:
 
 def _goal_table(robots: Sequence[RobotSummary]) -> str:
     laps = any(leg.lap > 1 for robot in robots for leg in robot.legs)
-    header = ["robot", "goal", "x\nm", "y\nm", "result", "time\ns", "tries", "path\nm",
-              "straight\nm", "path /\nstraight"]
+    header = [
+        "robot",
+        "goal",
+        "x\nm",
+        "y\nm",
+        "result",
+        "time\ns",
+        "tries",
+        "path\nm",
+        "straight\nm",
+        "path /\nstraight",
+    ]
     rows: List[Sequence[str]] = []
     notes: List[str] = []
     for robot in robots:
@@ -147,42 +179,88 @@ def _goal_table(robots: Sequence[RobotSummary]) -> str:
                 notes.append(f"{robot.robot} goal {goal}: {leg.reason}")
     if laps:
         header[1] = "lap/goal"
-    text = tabulate.tabulate(rows, header, tablefmt="simple", disable_numparse=True,
-                             colalign=("left", "right", "right", "right", "left") + ("right",) * 5)
+    text = tabulate.tabulate(
+        rows,
+        header,
+        tablefmt="simple",
+        disable_numparse=True,
+        colalign=("left", "right", "right", "right", "left") + ("right",) * 5,
+    )
     return "\n".join([text, *notes])
 
 
 def _goal_row(robot: str, goal: str, leg: Leg) -> List[str]:
     flown = leg.time_s is not None
-    result = "reached" if leg.reached else (
-        leg.reason if leg.reason == INTERRUPTED or not flown else "skipped")
-    return [robot, goal, f"{leg.goal.x_m:.2f}", f"{leg.goal.y_m:.2f}", result,
-            _figure(leg.time_s, 1), str(leg.attempts),
-            _figure(leg.path_length_m if flown else None, 2),
-            _figure(leg.straight_length_m if flown else None, 2),
-            _ratio(leg.path_length_m, leg.straight_length_m)]
+    result = (
+        "reached"
+        if leg.reached
+        else (leg.reason if leg.reason == INTERRUPTED or not flown else "skipped")
+    )
+    return [
+        robot,
+        goal,
+        f"{leg.goal.x_m:.2f}",
+        f"{leg.goal.y_m:.2f}",
+        result,
+        _figure(leg.time_s, 1),
+        str(leg.attempts),
+        _figure(leg.path_length_m if flown else None, 2),
+        _figure(leg.straight_length_m if flown else None, 2),
+        _ratio(leg.path_length_m, leg.straight_length_m),
+    ]
 
 
 def _robot_table(summary: MissionSummary) -> str:
-    rows = [[robot.robot, f"{robot.reached} of {len(robot.legs)}", str(robot.skipped),
-             str(robot.recoveries), str(robot.contacts) if summary.contacts_reported else "-",
-             f"{robot.path_length_m:.2f}", _ratio(robot.path_length_m, robot.straight_length_m),
-             _figure(robot.min_clearance_m, 2), _figure(robot.min_separation_m, 2)]
-            for robot in summary.robots]
-    header = ["robot", "reached", "skipped", "recov-\neries", "con-\ntacts", "path\nm",
-              "path /\nstraight", "least gap to\nobstacle, m", "least gap to\nrobot, m"]
-    text = tabulate.tabulate(rows, header, tablefmt="simple", disable_numparse=True,
-                             colalign=("left",) + ("right",) * 8)
+    rows = [
+        [
+            robot.robot,
+            f"{robot.reached} of {len(robot.legs)}",
+            str(robot.skipped),
+            str(robot.recoveries),
+            str(robot.contacts) if summary.contacts_reported else "-",
+            f"{robot.path_length_m:.2f}",
+            _ratio(robot.path_length_m, robot.straight_length_m),
+            _figure(robot.min_clearance_m, 2),
+            _figure(robot.min_separation_m, 2),
+        ]
+        for robot in summary.robots
+    ]
+    header = [
+        "robot",
+        "reached",
+        "skipped",
+        "recov-\neries",
+        "con-\ntacts",
+        "path\nm",
+        "path /\nstraight",
+        "least gap to\nobstacle, m",
+        "least gap to\nrobot, m",
+    ]
+    text = tabulate.tabulate(
+        rows, header, tablefmt="simple", disable_numparse=True, colalign=("left",) + ("right",) * 8
+    )
     note = f"Gaps are between hulls: discs of {summary.robot_radius_m:.2f} m radius."
     return f"{text}\n{note}"
 
 
 def _contact_table(contacts: Sequence[Contact]) -> str:
-    rows = [[f"{contact.time_s:.2f}", contact.robot, contact.other, f"{contact.x_m:.2f}",
-             f"{contact.y_m:.2f}"] for contact in contacts]
-    return tabulate.tabulate(rows, ["contact at\ns", "robot", "touched", "x\nm", "y\nm"],
-                             tablefmt="simple", disable_numparse=True,
-                             colalign=("right", "left", "left", "right", "right"))
+    rows = [
+        [
+            f"{contact.time_s:.2f}",
+            contact.robot,
+            contact.other,
+            f"{contact.x_m:.2f}",
+            f"{contact.y_m:.2f}",
+        ]
+        for contact in contacts
+    ]
+    return tabulate.tabulate(
+        rows,
+        ["contact at\ns", "robot", "touched", "x\nm", "y\nm"],
+        tablefmt="simple",
+        disable_numparse=True,
+        colalign=("right", "left", "left", "right", "right"),
+    )
 
 
 def _verdict(summary: MissionSummary) -> str:
@@ -192,9 +270,11 @@ def _verdict(summary: MissionSummary) -> str:
     speed = f", real-time factor {factor:.2f}" if factor is not None else ""
     touched = f", {len(summary.contacts)} contact{'s' * (len(summary.contacts) != 1)}"
     reason = f"\nIt ended early: {summary.reason}." if summary.reason else ""
-    return (f"Mission {'flown' if summary.success else 'FAILED'}: {reached} of {len(legs)} goals "
-            f"reached{touched if summary.contacts_reported else ''} "
-            f"in {summary.sim_time_s:.1f} s (wall {summary.wall_time_s:.1f} s{speed}).{reason}")
+    return (
+        f"Mission {'flown' if summary.success else 'FAILED'}: {reached} of {len(legs)} goals "
+        f"reached{touched if summary.contacts_reported else ''} "
+        f"in {summary.sim_time_s:.1f} s (wall {summary.wall_time_s:.1f} s{speed}).{reason}"
+    )
 
 
 def _figure(value: Optional[float], decimals: int) -> str:
@@ -212,11 +292,22 @@ def _rounded(value: Optional[float]) -> Optional[float]:
 def _robot_json(robot: RobotSummary) -> Dict[str, Any]:
     return {
         "robot": robot.robot,
-        "goals": [{"goal": leg.index + 1, "lap": leg.lap, "x_m": leg.goal.x_m,
-                   "y_m": leg.goal.y_m, "yaw_rad": leg.goal.yaw_rad, "reached": leg.reached,
-                   "time_s": _rounded(leg.time_s), "reason": leg.reason,
-                   "attempts": leg.attempts, "path_length_m": _rounded(leg.path_length_m),
-                   "straight_length_m": _rounded(leg.straight_length_m)} for leg in robot.legs],
+        "goals": [
+            {
+                "goal": leg.index + 1,
+                "lap": leg.lap,
+                "x_m": leg.goal.x_m,
+                "y_m": leg.goal.y_m,
+                "yaw_rad": leg.goal.yaw_rad,
+                "reached": leg.reached,
+                "time_s": _rounded(leg.time_s),
+                "reason": leg.reason,
+                "attempts": leg.attempts,
+                "path_length_m": _rounded(leg.path_length_m),
+                "straight_length_m": _rounded(leg.straight_length_m),
+            }
+            for leg in robot.legs
+        ],
         "path_length_m": _rounded(robot.path_length_m),
         "straight_length_m": _rounded(robot.straight_length_m),
         "min_clearance_m": _rounded(robot.min_clearance_m),

@@ -1,4 +1,5 @@
 """A flight that is over when something touches."""
+
 from __future__ import annotations
 
 from quad_nav.offline.observer import FlightObserver

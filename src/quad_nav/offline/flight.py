@@ -5,6 +5,7 @@ their own steps; every 1/40 s there is odometry, the sequencers look at it, and 
 navigators do what is due. This is what the nodes do on ROS, less the transport.
 Equal setups give equal flights, bit for bit.
 """
+
 from __future__ import annotations
 
 from operator import attrgetter
@@ -14,22 +15,16 @@ from quad_nav.config import Configuration
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.flight_log import RobotLog
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import (
-    Action,
-    NavigatorReport,
-    SendGoal,
-    Sequencer,
-    Verdict,
-)
-from quad_nav.offline.crew import Crew, Navigated
-from quad_nav.offline.helper import Helper
+from quad_nav.mission.sequencer import Action, NavigatorReport, SendGoal, Sequencer, Verdict
+from quad_nav.navigator.tick import State, Tick
+from quad_nav.offline.navigator_group import Navigated, NavigatorGroup
 from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.pilot import Pilot
-from quad_nav.offline.setup import FlightSetup
-from quad_nav.peers import Intention
+from quad_nav.offline.offline_robot import OfflineRobot
+from quad_nav.offline.worker_process import WorkerProcess
+from quad_nav.peers.peer import Intention
+from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.simulation import STEPS_PER_S, RobotStates, Simulation
-from quad_nav.tick import State, Tick
 
 STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 
@@ -52,8 +47,9 @@ class FlightRobot:
     def sequence(self, now_s: float, pose: Pose2D) -> List[Action]:
         """Lets the sequencer look at the odometry; its actions."""
         self.log.move(now_s, pose)
-        actions = self.sequencer.tick(now_s, pose, self._reports,
-                                      self._is_idle and not self.goal_waits)
+        actions = self.sequencer.tick(
+            now_s, pose, self._reports, self._is_idle and not self.goal_waits
+        )
         self._reports = []
         for action in actions:
             self.log.act(action)
@@ -81,21 +77,28 @@ class Flight:
     is only one when an observer looks inside, or when the engine casts the beams.
     """
 
-    def __init__(self, setup: FlightSetup, observers: Sequence[FlightObserver] = (),
-                 processes: int = 1):
+    def __init__(
+        self, setup: FlightSetup, observers: Sequence[FlightObserver] = (), processes: int = 1
+    ):
         self.setup = setup
         self._observers = tuple(observers)
-        if (any(observer.looks_inside for observer in self._observers)
-                or setup.simulation.lidar_caster != "kernel"):
+        if (
+            any(observer.looks_inside for observer in self._observers)
+            or setup.simulation.lidar_caster != "kernel"
+        ):
             processes = 1
-        self.robots = [FlightRobot(goals, configuration)
-                       for goals, configuration in zip(setup.robots, setup.configurations)]
-        shares = [range(first, len(self.robots), processes)
-                  for first in range(min(processes, len(self.robots)))]
+        self.robots = [
+            FlightRobot(goals, configuration)
+            for goals, configuration in zip(setup.robots, setup.configurations)
+        ]
+        shares = [
+            range(first, len(self.robots), processes)
+            for first in range(min(processes, len(self.robots)))
+        ]
         # Before the engine is there: processes that begin as copies need none.
-        self._helpers = [Helper(setup, share) for share in shares[1:]]
+        self._helpers = [WorkerProcess(setup, share) for share in shares[1:]]
         self.simulation = Simulation(setup.scene, len(setup.robots), setup.simulation, setup.seed)
-        self._crew = Crew(setup, shares[0], self.simulation.lidars)
+        self._crew = NavigatorGroup(setup, shares[0], self.simulation.lidars)
         self._new_goals: Dict[int, Pose2D] = {}
         self._news: Dict[int, Intention] = {}  # of what the last ticks changed
         self.reason = ""  # why it ended before its goals did, if it did
@@ -105,7 +108,7 @@ class Flight:
         self._scan()
 
     @property
-    def pilots(self) -> Mapping[int, Pilot]:
+    def pilots(self) -> Mapping[int, OfflineRobot]:
         """By the quadcopters' numbers, as far as they are in this process."""
         return self._crew.pilots
 
@@ -189,11 +192,17 @@ class Flight:
         now_s, states = self.now_s, self.states
         for helper in self._helpers:
             helper.begin_navigating(
-                now_s, states, {robot: goals[robot] for robot in helper.robots if robot in goals},
-                news)
+                now_s,
+                states,
+                {robot: goals[robot] for robot in helper.robots if robot in goals},
+                news,
+            )
         done = self._crew.navigate(
-            now_s, states, {robot: goals[robot] for robot in self._crew.pilots if robot in goals},
-            news)
+            now_s,
+            states,
+            {robot: goals[robot] for robot in self._crew.pilots if robot in goals},
+            news,
+        )
         for helper in self._helpers:
             done += helper.navigated()
         self._new_goals = {}

@@ -3,6 +3,7 @@
 Positions are gathered and compared in blocks: one comparison of arrays costs about
 as much as one of two numbers, and a long flight needs no more memory than a short one.
 """
+
 from __future__ import annotations
 
 from typing import List
@@ -44,11 +45,13 @@ class Gaps(FlightObserver):
             return
         positions = np.array(self._waiting)[:, :, :2]
         self._waiting = []
-        nearest_m = [self._scene.flight_clearances_m(positions[:, robot]).min()
-                     for robot in range(positions.shape[1])]  # each is near few obstacles
+        nearest_m = [
+            self._scene.flight_clearances_m(positions[:, robot]).min()
+            for robot in range(positions.shape[1])
+        ]  # each is near few obstacles
         self.clearances_m = np.minimum(self.clearances_m, np.array(nearest_m) - self._radius_m)
-        apart_m = _nearest_other_m(positions) - 2 * self._radius_m
-        self.separations_m = np.minimum(self.separations_m, apart_m)
+        distance_m = _nearest_other_m(positions) - 2 * self._radius_m
+        self.separations_m = np.minimum(self.separations_m, distance_m)
 
 
 def _nearest_other_m(positions: np.ndarray) -> np.ndarray:

@@ -1,12 +1,13 @@
 """Who watches a flight: the recorder, the trace for reports, the view, the progress bar."""
+
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.mission.sequencer import Action
+from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.sim.contacts import Contact
-from quad_nav.tick import Located, Tick
 
 if TYPE_CHECKING:
     from quad_nav.offline.flight import Flight
@@ -41,7 +42,7 @@ class FlightObserver:
     def acted(self, robot: int, now_s: float, action: Action) -> None:
         """The sequencer sends a goal, or a goal or all of them have ended."""
 
-    def ticked(self, robot: int, tick: Tick, located: Located, wall_s: float) -> None:
+    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         """The navigator has done what was due, in ``wall_s`` seconds of wall time."""
 
     def ended(self, flight: Flight) -> None:

@@ -1,4 +1,5 @@
 """Flies a setup to its end and sums it up."""
+
 from __future__ import annotations
 
 import time
@@ -9,15 +10,19 @@ from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.gaps import Gaps
 from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.setup import FlightSetup
+from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
 from quad_nav.versions import versions
 
 INTERRUPTED = "interrupted"
 
 
-def fly(setup: FlightSetup, observers: Sequence[FlightObserver] = (),
-        is_stopped: Optional[Callable[[], bool]] = None, processes: int = 1) -> MissionSummary:
+def fly(
+    setup: FlightSetup,
+    observers: Sequence[FlightObserver] = (),
+    is_stopped: Optional[Callable[[], bool]] = None,
+    processes: int = 1,
+) -> MissionSummary:
     """Fly until every goal is through, time is up, or ``is_stopped`` says so.
 
     The navigators share so many ``processes``.
@@ -53,12 +58,26 @@ def _advance_to_end(flight: Flight, is_stopped: Optional[Callable[[], bool]]) ->
 def _summary(flight: Flight, gaps: Gaps, wall_time_s: float, reason: str) -> MissionSummary:
     setup = flight.setup
     contacts = tuple(
-        flight_log.Contact(contact.time_s, f"quad{contact.robot}", _name(contact),
-                           contact.position_m[0], contact.position_m[1])
-        for contact in flight.contacts)
+        flight_log.Contact(
+            contact.time_s,
+            f"quad{contact.robot}",
+            _name(contact),
+            contact.position_m[0],
+            contact.position_m[1],
+        )
+        for contact in flight.contacts
+    )
     robots = tuple(_robot_summary(flight, gaps, index) for index in range(len(flight.robots)))
-    return MissionSummary(robots, contacts, setup.robot_radius_m, flight.now_s, wall_time_s,
-                          reason, seed=setup.seed, versions=versions())
+    return MissionSummary(
+        robots,
+        contacts,
+        setup.robot_radius_m,
+        flight.now_s,
+        wall_time_s,
+        reason,
+        seed=setup.seed,
+        versions=versions(),
+    )
 
 
 def _name(contact: Contact) -> str:
@@ -68,8 +87,13 @@ def _name(contact: Contact) -> str:
 def _robot_summary(flight: Flight, gaps: Gaps, index: int) -> RobotSummary:
     robot, log = flight.robots[index], flight.robots[index].log
     return RobotSummary(
-        robot.name, tuple(log.all_legs(robot.sequencer, flight.now_s)), log.path_length_m,
+        robot.name,
+        tuple(log.all_legs(robot.sequencer, flight.now_s)),
+        log.path_length_m,
         float(gaps.clearances_m[index]),
         float(gaps.separations_m[index]) if len(flight.robots) > 1 else None,
-        log.recoveries, sum(contact.involves(index) for contact in flight.contacts), log.aborts,
-        log.spin_s)
+        log.recoveries,
+        sum(contact.involves(index) for contact in flight.contacts),
+        log.aborts,
+        log.spin_s,
+    )

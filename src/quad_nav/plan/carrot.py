@@ -5,6 +5,7 @@ a hundredth of the way at a time, until the footprint's outline at that pose
 touches neither lethal nor unknown cells. What lies between is left to the local
 planner.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -35,24 +36,33 @@ class Carrot:
         self.params = params
         self.footprint = np.array(footprint, dtype=np.float64)
 
-    def make_plan(self, spec: GridSpec, costs: np.ndarray, start: Pose2D,
-                  goal: Pose2D) -> np.ndarray:
+    def make_plan(
+        self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D
+    ) -> np.ndarray:
         """The start and the nearest pose to the goal that the robot fits in, float64[2, 3].
 
         ``costs`` is uint8[H, W] on ``spec``. Raises NoPath when the robot fits
         nowhere on the line, not even where it stands.
         """
         if len(self.footprint) >= _CORNERS_NEEDED:
-            window = collision.Window(np.ascontiguousarray(costs), float(spec.origin_x_m),
-                                      float(spec.origin_y_m), float(spec.resolution_m))
+            window = collision.Window(
+                np.ascontiguousarray(costs),
+                float(spec.origin_x_m),
+                float(spec.origin_y_m),
+                float(spec.resolution_m),
+            )
             turn_rad = angle_difference(goal.yaw_rad, start.yaw_rad)
             share = 1.0
             while share >= 0.0:
-                pose = (start.x_m + share * (goal.x_m - start.x_m),
-                        start.y_m + share * (goal.y_m - start.y_m),
-                        normalize_angle(start.yaw_rad + share * turn_rad))
+                pose = (
+                    start.x_m + share * (goal.x_m - start.x_m),
+                    start.y_m + share * (goal.y_m - start.y_m),
+                    normalize_angle(start.yaw_rad + share * turn_rad),
+                )
                 if collision.footprint_cost(window, self.footprint, *pose) >= 0.0:
                     return np.array([(start.x_m, start.y_m, start.yaw_rad), pose])
                 share -= _SHARE_STEP
-        raise NoPath(f"the robot fits nowhere on the line from ({start.x_m:.2f}, {start.y_m:.2f}) "
-                     f"to ({goal.x_m:.2f}, {goal.y_m:.2f}) m")
+        raise NoPath(
+            f"the robot fits nowhere on the line from ({start.x_m:.2f}, {start.y_m:.2f}) "
+            f"to ({goal.x_m:.2f}, {goal.y_m:.2f}) m"
+        )

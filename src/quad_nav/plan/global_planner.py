@@ -21,6 +21,7 @@ a cell belongs to the neighbour's, and when that is an obstacle there is no plan
 For the gradient's sake every cell within two cells of the goal then gets a
 potential, obstacles as well: so near the goal a path may cut a corner of one.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -76,8 +77,9 @@ class SearchPlanner:
         self.params = params
         self.potential: Optional[np.ndarray] = None
 
-    def make_plan(self, spec: GridSpec, costs: np.ndarray, start: Pose2D,
-                  goal: Pose2D) -> np.ndarray:
+    def make_plan(
+        self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D
+    ) -> np.ndarray:
         """A plan from start to goal, float64[n, 3] rows x, y, yaw; the last row is the goal.
 
         ``costs`` is uint8[H, W] on ``spec``; in place, the start's cell is set to
@@ -87,12 +89,16 @@ class SearchPlanner:
         """
         start_cell = spec.cell_of(start.x_m, start.y_m)
         if start_cell is None:
-            raise StartOutsideMap(f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
-                                  f"the global costmap, {spec.extent}")
+            raise StartOutsideMap(
+                f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
+                f"the global costmap, {spec.extent}"
+            )
         goal_cell = spec.cell_of(goal.x_m, goal.y_m)
         if goal_cell is None:
-            raise GoalOutsideMap(f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
-                                 f"the global costmap, {spec.extent}")
+            raise GoalOutsideMap(
+                f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
+                f"the global costmap, {spec.extent}"
+            )
         costs[start_cell[1], start_cell[0]] = FREE
         if self.params.outline_map:
             _outline(costs)
@@ -100,14 +106,18 @@ class SearchPlanner:
         else:
             path = self._path_to_the_border(spec, costs, start, goal, goal_cell)
         if not len(path):
-            raise NoPath(f"no way from ({start.x_m:.2f}, {start.y_m:.2f}) to "
-                         f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap")
+            raise NoPath(
+                f"no way from ({start.x_m:.2f}, {start.y_m:.2f}) to "
+                f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap"
+            )
         plan = np.zeros((len(path) + self._goals_appended, 3))
-        plan[:len(path), :2] = ((path[::-1].astype(np.float64) + self._offset) * spec.resolution_m
-                                + (spec.origin_x_m, spec.origin_y_m))
-        plan[len(path):] = goal.x_m, goal.y_m, goal.yaw_rad
-        return with_headings(plan, start.yaw_rad, self.params.orientation_mode,
-                             self.params.orientation_window_size)
+        plan[: len(path), :2] = (
+            path[::-1].astype(np.float64) + self._offset
+        ) * spec.resolution_m + (spec.origin_x_m, spec.origin_y_m)
+        plan[len(path) :] = goal.x_m, goal.y_m, goal.yaw_rad
+        return with_headings(
+            plan, start.yaw_rad, self.params.orientation_mode, self.params.orientation_window_size
+        )
 
     @property
     def _offset(self) -> float:
@@ -127,21 +137,31 @@ class SearchPlanner:
             return float(int(x)), float(int(y))
         return x - self._offset, y - self._offset
 
-    def _path_to_the_border(self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D,
-                            goal_cell: Tuple[int, int]) -> np.ndarray:
+    def _path_to_the_border(
+        self,
+        spec: GridSpec,
+        costs: np.ndarray,
+        start: Pose2D,
+        goal: Pose2D,
+        goal_cell: Tuple[int, int],
+    ) -> np.ndarray:
         """The path on a map whose outermost cells may be used, with obstacles around them."""
         padded = np.pad(costs, _MARGIN, constant_values=LETHAL)
         start_x, start_y = self._point(spec, start)
         goal_x, goal_y = self._point(spec, goal)
-        path = self._path(padded, (start_x + _MARGIN, start_y + _MARGIN),
-                          (goal_x + _MARGIN, goal_y + _MARGIN),
-                          (goal_cell[0] + _MARGIN, goal_cell[1] + _MARGIN))
+        path = self._path(
+            padded,
+            (start_x + _MARGIN, start_y + _MARGIN),
+            (goal_x + _MARGIN, goal_y + _MARGIN),
+            (goal_cell[0] + _MARGIN, goal_cell[1] + _MARGIN),
+        )
         assert self.potential is not None
         self.potential = self.potential[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN]
         return path - _MARGIN
 
-    def _path(self, costs: np.ndarray, start: Point, goal: Point,
-              goal_cell: Tuple[int, int]) -> np.ndarray:
+    def _path(
+        self, costs: np.ndarray, start: Point, goal: Point, goal_cell: Tuple[int, int]
+    ) -> np.ndarray:
         """Points float32[n, 2] from goal to start in cell coordinates; none if there is no way."""
         params, size_x = self.params, costs.shape[1]
         if params.use_dijkstra:
@@ -149,14 +169,19 @@ class SearchPlanner:
         else:
             potential, arrived = self._a_star(costs, start, goal)
         if not params.old_navfn_behavior:
-            kernel.fill_around(byte_costs(costs, params), potential, size_x,
-                               _flat(goal_cell, size_x), params.use_quadratic)
+            kernel.fill_around(
+                byte_costs(costs, params),
+                potential,
+                size_x,
+                _flat(goal_cell, size_x),
+                params.use_quadratic,
+            )
         self.potential = potential.reshape(costs.shape)
         path = np.empty((4 * costs.size, 2), dtype=np.float32)
         if not arrived:
             return path[:0]
         descend = kernel.grid_path if params.use_grid_path else kernel.gradient_path
-        return path[:descend(potential, size_x, *start, *goal, path)]
+        return path[: descend(potential, size_x, *start, *goal, path)]
 
     def _dijkstra(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:
         params, size_x = self.params, costs.shape[1]
@@ -166,28 +191,51 @@ class SearchPlanner:
             front = wavefront.start_at_cell(potential, source, size_x)
         else:
             front = wavefront.start_between_cells(
-                potential, source, size_x, _hundredths(start[0]), _hundredths(start[1]),
-                params.neutral_cost)
+                potential,
+                source,
+                size_x,
+                _hundredths(start[0]),
+                _hundredths(start[1]),
+                params.neutral_cost,
+            )
         rules = wavefront.Rules(params.lethal_cost, params.neutral_cost, params.use_quadratic)
         arrived = wavefront.propagate(
-            wave_costs(costs, params).ravel(), potential, front, rules, source,
-            _flat(goal, size_x), size_x, 2 * costs.size, stop_at_target=True, heuristic=False)
+            wave_costs(costs, params).ravel(),
+            potential,
+            front,
+            rules,
+            source,
+            _flat(goal, size_x),
+            size_x,
+            2 * costs.size,
+            stop_at_target=True,
+            heuristic=False,
+        )
         return potential, arrived
 
     def _a_star(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:
         params, size_x = self.params, costs.shape[1]
         potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
-        arrived = kernel.a_star(byte_costs(costs, params), _enterable(costs, params), potential,
-                                size_x, _flat(start, size_x), _flat(goal, size_x),
-                                params.neutral_cost, params.use_quadratic, 2 * costs.size)
+        arrived = kernel.a_star(
+            byte_costs(costs, params),
+            _enterable(costs, params),
+            potential,
+            size_x,
+            _flat(start, size_x),
+            _flat(goal, size_x),
+            params.neutral_cost,
+            params.use_quadratic,
+            2 * costs.size,
+        )
         return potential, arrived
 
 
 def wave_costs(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
     """What Dijkstra's search takes for the cost of each cell, float32[H, W]."""
     lethal = params.lethal_cost
-    table = np.minimum(np.arange(256) * np.float32(params.cost_factor) + params.neutral_cost,
-                       lethal - 1)
+    table = np.minimum(
+        np.arange(256) * np.float32(params.cost_factor) + params.neutral_cost, lethal - 1
+    )
     passable = np.arange(256) < lethal - 1
     passable[UNKNOWN] |= params.allow_unknown
     table = np.where(passable, table, lethal).astype(np.float32)[costs]

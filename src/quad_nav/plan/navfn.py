@@ -18,6 +18,7 @@ for real-time robot navigation") as ROS navigation has it, limits included:
 * a path has at most ``4 * size_x`` points. A longer one is cut, and then begins
   somewhere between robot and goal.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -58,8 +59,9 @@ class Navfn:
         self.params = params
         self.potential: Optional[np.ndarray] = None
 
-    def make_plan(self, spec: GridSpec, costs: np.ndarray, start: Pose2D,
-                  goal: Pose2D) -> np.ndarray:
+    def make_plan(
+        self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D
+    ) -> np.ndarray:
         """A plan from start to goal, float64[n, 3] rows x, y, yaw.
 
         ``costs`` is uint8[H, W] on ``spec``; the start's cell is set to FREE in
@@ -73,21 +75,31 @@ class Navfn:
         """
         start_cell = spec.cell_of(start.x_m, start.y_m)
         if start_cell is None:
-            raise StartOutsideMap(f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
-                                  f"the global costmap, {spec.extent}")
+            raise StartOutsideMap(
+                f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
+                f"the global costmap, {spec.extent}"
+            )
         costs[start_cell[1], start_cell[0]] = FREE
         goal_cell = spec.cell_of(goal.x_m, goal.y_m)
         if goal_cell is None:
             if self.params.default_tolerance_m <= 0.0:
-                raise GoalOutsideMap(f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
-                                     f"the global costmap, {spec.extent}")
+                raise GoalOutsideMap(
+                    f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
+                    f"the global costmap, {spec.extent}"
+                )
             goal_cell = (0, 0)  # a border cell is never reached, so the wave covers the map
-        self.potential = potential_from(navigation_costs(costs, self.params.allow_unknown),
-                                        source=start_cell, target=goal_cell, stop_at_target=True)
+        self.potential = potential_from(
+            navigation_costs(costs, self.params.allow_unknown),
+            source=start_cell,
+            target=goal_cell,
+            stop_at_target=True,
+        )
         end = self._reached_pose_near(spec, goal)
         if end is None:
-            raise NoPath(f"no way from ({start.x_m:.2f}, {start.y_m:.2f}) to "
-                         f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap")
+            raise NoPath(
+                f"no way from ({start.x_m:.2f}, {start.y_m:.2f}) to "
+                f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap"
+            )
         return self._plan_to(spec, start_cell, end)
 
     def _reached_pose_near(self, spec: GridSpec, goal: Pose2D) -> Optional[Pose2D]:
@@ -117,8 +129,10 @@ class Navfn:
             raise NoPath(f"the potential has no descent from ({end.x_m:.2f}, {end.y_m:.2f}) m")
         plan = np.zeros((len(path) + 1, 3))
         # The original takes a path cell's lower left corner for its position, not its centre.
-        plan[:-1, :2] = (path[::-1].astype(np.float64) * spec.resolution_m
-                         + (spec.origin_x_m, spec.origin_y_m))
+        plan[:-1, :2] = path[::-1].astype(np.float64) * spec.resolution_m + (
+            spec.origin_x_m,
+            spec.origin_y_m,
+        )
         plan[-1] = end.x_m, end.y_m, end.yaw_rad
         return plan
 
@@ -130,8 +144,7 @@ def navigation_costs(costs: np.ndarray, allow_unknown: bool) -> np.ndarray:
     253 or obstacles; the outermost ring of cells is always an obstacle.
     """
     table = np.full(256, kernel.OBSTACLE, dtype=np.uint8)
-    table[:INSCRIBED] = np.minimum(kernel.NEUTRAL + 0.8 * np.arange(INSCRIBED),
-                                   kernel.OBSTACLE - 1)
+    table[:INSCRIBED] = np.minimum(kernel.NEUTRAL + 0.8 * np.arange(INSCRIBED), kernel.OBSTACLE - 1)
     if allow_unknown:
         table[UNKNOWN] = kernel.OBSTACLE - 1
     nav_costs = table[costs]
@@ -140,8 +153,9 @@ def navigation_costs(costs: np.ndarray, allow_unknown: bool) -> np.ndarray:
     return nav_costs
 
 
-def potential_from(nav_costs: np.ndarray, source: Cell, target: Cell, stop_at_target: bool,
-                   heuristic: bool = False) -> np.ndarray:
+def potential_from(
+    nav_costs: np.ndarray, source: Cell, target: Cell, stop_at_target: bool, heuristic: bool = False
+) -> np.ndarray:
     """Potential float32[H, W] of the wave from ``source``.
 
     With ``stop_at_target`` it stops at the front that reaches the target, and
@@ -152,9 +166,18 @@ def potential_from(nav_costs: np.ndarray, source: Cell, target: Cell, stop_at_ta
     source_cell, target_cell = _flat(source, size_x), _flat(target, size_x)
     potential = np.full(cells, NOT_REACHED, dtype=np.float32)
     first_front = wavefront.start_at_cell(potential, source_cell, size_x)
-    wavefront.propagate(nav_costs.ravel(), potential, first_front, _RULES, source_cell,
-                        target_cell, size_x, max(cells // 20, size_x + size_y), stop_at_target,
-                        heuristic)
+    wavefront.propagate(
+        nav_costs.ravel(),
+        potential,
+        first_front,
+        _RULES,
+        source_cell,
+        target_cell,
+        size_x,
+        max(cells // 20, size_x + size_y),
+        stop_at_target,
+        heuristic,
+    )
     return potential.reshape(nav_costs.shape)
 
 
@@ -166,8 +189,9 @@ def path_from(potential: np.ndarray, start: Cell, source: Cell) -> Tuple[np.ndar
     """
     size_x = potential.shape[1]
     path = np.empty((4 * size_x, 2), dtype=np.float32)
-    points, arrived = kernel.descend(potential.ravel(), size_x, _flat(start, size_x),
-                                     _flat(source, size_x), path)
+    points, arrived = kernel.descend(
+        potential.ravel(), size_x, _flat(start, size_x), _flat(source, size_x), path
+    )
     return path[:points], bool(arrived)
 
 

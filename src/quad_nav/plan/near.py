@@ -1,4 +1,5 @@
 """A plan to a goal or, failing that, to a point near it."""
+
 from __future__ import annotations
 
 import itertools
@@ -13,8 +14,15 @@ from quad_nav.grid import GridSpec
 from quad_nav.plan.planner import GlobalPlanner
 
 
-def plan_near(planner: GlobalPlanner, spec: GridSpec, costs: np.ndarray, start: Pose2D,
-              goal: Pose2D, tolerance_m: float, append_goal: bool) -> np.ndarray:
+def plan_near(
+    planner: GlobalPlanner,
+    spec: GridSpec,
+    costs: np.ndarray,
+    start: Pose2D,
+    goal: Pose2D,
+    tolerance_m: float,
+    append_goal: bool,
+) -> np.ndarray:
     """The plan to the goal, or to the first point around it that has one.
 
     The points lie on square rings three cells apart (or one tolerance, if that is

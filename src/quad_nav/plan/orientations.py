@@ -1,4 +1,5 @@
 """Headings for the points of a path, as ``global_planner/GlobalPlanner`` gives them."""
+
 from __future__ import annotations
 
 import enum
@@ -22,9 +23,13 @@ class OrientationMode(enum.IntEnum):
 
 
 # From the path's direction to the robot's heading.
-_TURNED_RAD = {OrientationMode.FORWARD: 0.0, OrientationMode.FORWARD_THEN_INTERPOLATE: 0.0,
-               OrientationMode.BACKWARD: np.pi, OrientationMode.LEFTWARD: -np.pi / 2,
-               OrientationMode.RIGHTWARD: np.pi / 2}
+_TURNED_RAD = {
+    OrientationMode.FORWARD: 0.0,
+    OrientationMode.FORWARD_THEN_INTERPOLATE: 0.0,
+    OrientationMode.BACKWARD: np.pi,
+    OrientationMode.LEFTWARD: -np.pi / 2,
+    OrientationMode.RIGHTWARD: np.pi / 2,
+}
 
 
 def with_headings(plan: np.ndarray, start_yaw_rad: float, mode: int, window: int) -> np.ndarray:

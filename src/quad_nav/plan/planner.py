@@ -1,4 +1,5 @@
 """What the navigator asks of a global planner."""
+
 from __future__ import annotations
 
 from typing import Protocol
@@ -12,8 +13,9 @@ from quad_nav.grid import GridSpec
 class GlobalPlanner(Protocol):
     """Makes a path over the global costmap."""
 
-    def make_plan(self, spec: GridSpec, costs: np.ndarray, start: Pose2D,
-                  goal: Pose2D) -> np.ndarray:
+    def make_plan(
+        self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D
+    ) -> np.ndarray:
         """A plan from start to goal, float64[n, 3] rows x, y, yaw.
 
         ``costs`` is the global costmap's own uint8[H, W] on ``spec``; start, goal

@@ -1,4 +1,5 @@
 """The recovery ``clear_costmap_recovery/ClearCostmapRecovery``: forget obstacles."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -6,7 +7,7 @@ from typing import Iterable, Optional, Tuple
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
-from quad_nav.recovery.recovery import Step, Surroundings
+from quad_nav.recovery.recovery import RecoveryContext, Step
 
 # What the original clears by default, a name that its own loader never gives: it
 # calls the layer "obstacle_layer".
@@ -39,22 +40,27 @@ class ClearCostmap:
     def __init__(self, params: ClearCostmapParams):
         self.params = params
 
-    def start(self, surroundings: Surroundings) -> None:
+    def start(self, context: RecoveryContext) -> None:
         pass
 
-    def step(self, surroundings: Surroundings) -> Step:
+    def step(self, context: RecoveryContext) -> Step:
         params = self.params
         skipped = []
-        for name, costmap, pose in surroundings.costmaps:
+        for name, costmap, pose in context.costmaps:
             if params.affected_maps not in (name, "both"):
                 continue
             if pose is None:
                 skipped.append(name)
                 continue
-            costmap.clear_area(self._names(costmap), pose.x_m, pose.y_m,
-                               params.reset_distance_m, keep_inside=not params.invert_area_to_clear)
+            costmap.clear_area(
+                self._names(costmap),
+                pose.x_m,
+                pose.y_m,
+                params.reset_distance_m,
+                keep_inside=not params.invert_area_to_clear,
+            )
             if params.force_updating:
-                costmap.update(surroundings.now_s, pose)
+                costmap.update(context.now_s, pose)
         message = ""
         if skipped:
             message = "not cleared, the robot's pose is unknown: " + ", ".join(skipped)

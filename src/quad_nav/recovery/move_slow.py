@@ -3,12 +3,13 @@
 The obstacles that are forgotten may be there: the robot can hit them, but not fast. They
 come back with the next observation that shows them.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Tuple
 
-from quad_nav.recovery.recovery import ParameterLimit, Step, Surroundings
+from quad_nav.recovery.recovery import ParameterLimit, RecoveryContext, Step
 
 
 @dataclass(frozen=True)
@@ -42,22 +43,26 @@ class MoveSlowAndClear:
     def __init__(self, params: MoveSlowAndClearParams):
         self.params = params
 
-    def start(self, surroundings: Surroundings) -> None:
+    def start(self, context: RecoveryContext) -> None:
         pass
 
-    def step(self, surroundings: Surroundings) -> Step:
+    def step(self, context: RecoveryContext) -> Step:
         params = self.params
         messages = []
-        for name, costmap, pose in surroundings.costmaps:
+        for name, costmap, pose in context.costmaps:
             if pose is None:
                 messages.append(f"{name} costmap not cleared: the robot's pose is unknown")
             elif not costmap.free_obstacles(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m):
-                messages.append(f"{name} costmap not cleared: it has no obstacle layer, or"
-                                f" ends within {params.clearing_distance_m:g} m of the robot")
+                messages.append(
+                    f"{name} costmap not cleared: it has no obstacle layer, or"
+                    f" ends within {params.clearing_distance_m:g} m of the robot"
+                )
         limit = params.limit
-        if surroundings.pose_in_global is None or not limit.greatest:
+        if context.pose_in_global is None or not limit.greatest:
             return Step(done=True, message="; ".join(messages))
-        messages.append(f"not above {params.limited_trans_speed_mps:g} m/s and"
-                        f" {params.limited_rot_speed_radps:g} rad/s for the next"
-                        f" {params.limited_distance_m:g} m")
+        messages.append(
+            f"not above {params.limited_trans_speed_mps:g} m/s and"
+            f" {params.limited_rot_speed_radps:g} rad/s for the next"
+            f" {params.limited_distance_m:g} m"
+        )
         return Step(done=True, message="; ".join(messages), limit=limit)

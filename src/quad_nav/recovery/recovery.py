@@ -1,4 +1,5 @@
 """What a recovery behaviour is, and what it may look at, change and ask for."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from quad_nav.geometry import Pose2D, Twist2D
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class RecoveryContext:
     """What a recovery may look at and change. Poses are None when unknown."""
 
     now_s: float
@@ -21,8 +22,10 @@ class Surroundings:
     @property
     def costmaps(self) -> Tuple[Tuple[str, LayeredCostmap, Optional[Pose2D]], ...]:
         """(name, costmap, the robot's pose on it): global, local."""
-        return (("global", self.global_costmap, self.pose_in_global),
-                ("local", self.local_costmap, self.pose_in_local))
+        return (
+            ("global", self.global_costmap, self.pose_in_global),
+            ("local", self.local_costmap, self.pose_in_local),
+        )
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,6 @@ class Recovery(Protocol):
 
     period_s: float
 
-    def start(self, surroundings: Surroundings) -> None: ...
+    def start(self, context: RecoveryContext) -> None: ...
 
-    def step(self, surroundings: Surroundings) -> Step: ...
+    def step(self, context: RecoveryContext) -> Step: ...

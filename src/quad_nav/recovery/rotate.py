@@ -1,4 +1,5 @@
 """The recovery ``rotate_recovery/RotateRecovery``: look around."""
+
 from __future__ import annotations
 
 import math
@@ -9,7 +10,7 @@ import numpy as np
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
-from quad_nav.recovery.recovery import Step, Surroundings
+from quad_nav.recovery.recovery import RecoveryContext, Step
 
 
 @dataclass(frozen=True)
@@ -42,12 +43,12 @@ class Rotate:
         self._start_yaw_rad: Optional[float] = None
         self._past_half_turn = False
 
-    def start(self, surroundings: Surroundings) -> None:
+    def start(self, context: RecoveryContext) -> None:
         self._start_yaw_rad = None
         self._past_half_turn = False
 
-    def step(self, surroundings: Surroundings) -> Step:
-        pose = surroundings.pose_in_local
+    def step(self, context: RecoveryContext) -> Step:
+        pose = context.pose_in_local
         if pose is None:
             return self._end("rotation ended: the robot's pose is unknown", stop=True)
         if self._start_yaw_rad is None:
@@ -55,7 +56,7 @@ class Rotate:
         left_rad = self._angle_left(pose.yaw_rad)
         if left_rad is None:
             return self._end("", stop=self.params.stop_afterwards)
-        if not self._is_free(surroundings.local_costmap, pose, left_rad):
+        if not self._is_free(context.local_costmap, pose, left_rad):
             return self._end("rotation ended: the footprint would touch an obstacle", stop=True)
         return Step(command=Twist2D(vyaw_radps=self._speed(left_rad)))
 
@@ -76,7 +77,8 @@ class Rotate:
     def _is_free(self, costmap: LayeredCostmap, pose: Pose2D, left_rad: float) -> bool:
         return all(
             self._footprint_cost(costmap, Pose2D(pose.x_m, pose.y_m, pose.yaw_rad + turn)) >= 0.0
-            for turn in np.arange(0.0, left_rad, self.params.sim_granularity_rad))
+            for turn in np.arange(0.0, left_rad, self.params.sim_granularity_rad)
+        )
 
     def _speed(self, left_rad: float) -> float:
         params = self.params

@@ -4,6 +4,7 @@ A quadcopter touches and is seen as an upright cylinder, its propeller guard. It
 is centred on its own LIDAR, so that two level quadcopters see each other, also
 while one of them tilts by a few degrees.
 """
+
 from __future__ import annotations
 
 import ctypes
@@ -44,8 +45,14 @@ class World:
     With ``gui`` pybullet opens a window; ``InputError`` if there is no display.
     """
 
-    def __init__(self, scene: Scene, starts: Sequence[Pose2D], airframe: Airframe, step_s: float,
-                 gui: bool = False):
+    def __init__(
+        self,
+        scene: Scene,
+        starts: Sequence[Pose2D],
+        airframe: Airframe,
+        step_s: float,
+        gui: bool = False,
+    ):
         self._scene = scene
         self._airframe = airframe
         self._step_s = step_s
@@ -60,12 +67,13 @@ class World:
         pybullet.resetSimulation(physicsClientId=client)
         self._draw(False)
         pybullet.setGravity(0.0, 0.0, -GRAVITY_MPS2, physicsClientId=client)
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=self._step_s,
-                                           deterministicOverlappingPairs=1,
-                                           physicsClientId=client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=self._step_s, deterministicOverlappingPairs=1, physicsClientId=client
+        )
         floor = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
         self._names: Dict[int, Optional[str]] = {
-            pybullet.createMultiBody(0.0, floor, physicsClientId=client): "floor"}
+            pybullet.createMultiBody(0.0, floor, physicsClientId=client): "floor"
+        }
         single, grouped = _by_number((*self._scene.wall_boxes(), *self._scene.obstacles))
         for solid in single:
             self._names[self._add_obstacle(solid)] = solid.name
@@ -117,8 +125,9 @@ class World:
         Under forces at the bodies' centres and torques, float64[n, 3] in map.
         """
         client, in_map = self._client, pybullet.WORLD_FRAME
-        positions, forces, torques = (rows.tolist() for rows in (
-            state.positions_m, forces_n, torques_nm))
+        positions, forces, torques = (
+            rows.tolist() for rows in (state.positions_m, forces_n, torques_nm)
+        )
         for robot in self._engaged:
             body = self._robots[robot]
             pybullet.applyExternalForce(body, -1, forces[robot], positions[robot], in_map, client)
@@ -153,9 +162,12 @@ class World:
         hits: List[float] = []
         for k in range(0, len(starts), _MAX_RAYS_PER_CALL):
             chunk = slice(k, k + _MAX_RAYS_PER_CALL)
-            hits += [hit[2] if hit[0] >= 0 else np.inf
-                     for hit in pybullet.rayTestBatch(starts[chunk], ends[chunk], numThreads=1,
-                                                      physicsClientId=self._client)]
+            hits += [
+                hit[2] if hit[0] >= 0 else np.inf
+                for hit in pybullet.rayTestBatch(
+                    starts[chunk], ends[chunk], numThreads=1, physicsClientId=self._client
+                )
+            ]
         return np.array(hits)
 
     def show_goals(self, spheres: Sequence[GoalSphere]) -> None:
@@ -165,10 +177,14 @@ class World:
             pybullet.removeBody(goal, physicsClientId=client)
         self._goal_ids = []
         for centre, radius, rgba in spheres:
-            shape = pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=radius,
-                                               rgbaColor=rgba, physicsClientId=client)
-            self._goal_ids.append(pybullet.createMultiBody(
-                0.0, baseVisualShapeIndex=shape, basePosition=centre, physicsClientId=client))
+            shape = pybullet.createVisualShape(
+                pybullet.GEOM_SPHERE, radius=radius, rgbaColor=rgba, physicsClientId=client
+            )
+            self._goal_ids.append(
+                pybullet.createMultiBody(
+                    0.0, baseVisualShapeIndex=shape, basePosition=centre, physicsClientId=client
+                )
+            )
 
     def _draw(self, on: bool) -> None:
         """Stop drawing while bodies are added, which is slow otherwise, and go on after it."""
@@ -177,15 +193,24 @@ class World:
         client, scene = self._client, self._scene
         for option, value in ((pybullet.COV_ENABLE_GUI, 0), (pybullet.COV_ENABLE_RENDERING, on)):
             pybullet.configureDebugVisualizer(option, int(value), physicsClientId=client)
-        pybullet.resetDebugVisualizerCamera(0.9 * max(scene.size_x_m, scene.size_y_m), 0.0, -60.0,
-                                            [*scene.centre, 0.0], physicsClientId=client)
+        pybullet.resetDebugVisualizerCamera(
+            0.9 * max(scene.size_x_m, scene.size_y_m),
+            0.0,
+            -60.0,
+            [*scene.centre, 0.0],
+            physicsClientId=client,
+        )
 
     def _touch(self, body_a: int, body_b: int, position: Tuple[float, float, float]) -> Touch:
-        numbers = sorted(self._robots.index(body) for body in (body_a, body_b)
-                         if body not in self._names)
+        numbers = sorted(
+            self._robots.index(body) for body in (body_a, body_b) if body not in self._names
+        )
         other: Optional[int] = numbers[1] if len(numbers) == 2 else None
-        name = (f"quadcopter {other}" if other is not None
-                else self._names[body_a if body_a in self._names else body_b])
+        name = (
+            f"quadcopter {other}"
+            if other is not None
+            else self._names[body_a if body_a in self._names else body_b]
+        )
         return Touch(numbers[0], name or self._scene.nearest(*position).name, other, position)
 
     def _add_obstacle(self, solid: Obstacle) -> int:
@@ -193,20 +218,29 @@ class World:
         if isinstance(solid, Box):
             yaw = solid.yaw_rad
             shape = pybullet.createCollisionShape(
-                pybullet.GEOM_BOX, physicsClientId=client,
-                halfExtents=[solid.size_x_m / 2, solid.size_y_m / 2, height / 2])
+                pybullet.GEOM_BOX,
+                physicsClientId=client,
+                halfExtents=[solid.size_x_m / 2, solid.size_y_m / 2, height / 2],
+            )
         elif isinstance(solid, Sphere):
             yaw = 0.0
             shape = pybullet.createCollisionShape(
-                pybullet.GEOM_SPHERE, radius=solid.radius_m, physicsClientId=client)
+                pybullet.GEOM_SPHERE, radius=solid.radius_m, physicsClientId=client
+            )
         else:
             yaw = 0.0
             shape = pybullet.createCollisionShape(
-                pybullet.GEOM_CYLINDER, radius=solid.radius_m, height=height,
-                physicsClientId=client)
-        return int(pybullet.createMultiBody(
-            0.0, shape, basePosition=[solid.x_m, solid.y_m, solid.bottom_m + height / 2],
-            baseOrientation=quaternion_from_yaw(yaw), physicsClientId=client))
+                pybullet.GEOM_CYLINDER, radius=solid.radius_m, height=height, physicsClientId=client
+            )
+        return int(
+            pybullet.createMultiBody(
+                0.0,
+                shape,
+                basePosition=[solid.x_m, solid.y_m, solid.bottom_m + height / 2],
+                baseOrientation=quaternion_from_yaw(yaw),
+                physicsClientId=client,
+            )
+        )
 
     def _add_boxes(self, boxes: Sequence[Box]) -> int:
         """Boxes as one body: each step goes through all bodies, which tells from thousands on."""
@@ -215,27 +249,52 @@ class World:
             halfExtents=[[b.size_x_m / 2, b.size_y_m / 2, b.height_m / 2] for b in boxes],
             collisionFramePositions=[[b.x_m, b.y_m, b.bottom_m + b.height_m / 2] for b in boxes],
             collisionFrameOrientations=[quaternion_from_yaw(b.yaw_rad) for b in boxes],
-            physicsClientId=self._client)
-        return int(pybullet.createMultiBody(0.0, shape, useMaximalCoordinates=1,
-                                            physicsClientId=self._client))
+            physicsClientId=self._client,
+        )
+        return int(
+            pybullet.createMultiBody(
+                0.0, shape, useMaximalCoordinates=1, physicsClientId=self._client
+            )
+        )
 
     def _add_quadcopter(self, number: int, start: Pose2D) -> int:
         client, offset = self._client, [0.0, 0.0, MOUNT_HEIGHT_M]
         radius = self._airframe.radius_m
         guard = pybullet.createCollisionShape(
-            pybullet.GEOM_CYLINDER, radius=radius, height=GUARD_HEIGHT_M,
-            collisionFramePosition=offset, physicsClientId=client)
+            pybullet.GEOM_CYLINDER,
+            radius=radius,
+            height=GUARD_HEIGHT_M,
+            collisionFramePosition=offset,
+            physicsClientId=client,
+        )
         looks = pybullet.createVisualShape(
-            pybullet.GEOM_CYLINDER, radius=radius, length=GUARD_HEIGHT_M,
+            pybullet.GEOM_CYLINDER,
+            radius=radius,
+            length=GUARD_HEIGHT_M,
             rgbaColor=robot_rgba(number),
-            visualFramePosition=offset, physicsClientId=client)
-        body = int(pybullet.createMultiBody(
-            self._airframe.mass_kg, guard, looks,
-            basePosition=[start.x_m, start.y_m, self._scene.altitude_m],
-            baseOrientation=quaternion_from_yaw(start.yaw_rad), physicsClientId=client))
+            visualFramePosition=offset,
+            physicsClientId=client,
+        )
+        body = int(
+            pybullet.createMultiBody(
+                self._airframe.mass_kg,
+                guard,
+                looks,
+                basePosition=[start.x_m, start.y_m, self._scene.altitude_m],
+                baseOrientation=quaternion_from_yaw(start.yaw_rad),
+                physicsClientId=client,
+            )
+        )
         pybullet.changeDynamics(
-            body, -1, localInertiaDiagonal=self._airframe.inertia_kgm2, linearDamping=0.0,
-            angularDamping=0.0, restitution=0.0, lateralFriction=0.2, physicsClientId=client)
+            body,
+            -1,
+            localInertiaDiagonal=self._airframe.inertia_kgm2,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            restitution=0.0,
+            lateralFriction=0.2,
+            physicsClientId=client,
+        )
         return body
 
 
@@ -248,8 +307,10 @@ def _by_number(solids: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], List[Lis
     if len(boxes) < _MANY_BOXES:
         return solids, []
     boxes.sort(key=lambda b: (b.x_m // _STRIPE_M, b.y_m))
-    return ([solid for solid in solids if not isinstance(solid, Box)],
-            [boxes[k:k + _BOXES_PER_BODY] for k in range(0, len(boxes), _BOXES_PER_BODY)])
+    return (
+        [solid for solid in solids if not isinstance(solid, Box)],
+        [boxes[k : k + _BOXES_PER_BODY] for k in range(0, len(boxes), _BOXES_PER_BODY)],
+    )
 
 
 def _connect(gui: bool) -> int:

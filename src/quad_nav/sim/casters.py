@@ -2,6 +2,7 @@
 
 Both know the same shapes; the kernel is some ten times as fast and exact.
 """
+
 from __future__ import annotations
 
 from typing import Protocol, Sequence
@@ -60,19 +61,26 @@ class WorldCaster:
 class KernelCaster:
     """Casts at a scene's shapes, the floor and the guards of quadcopters."""
 
-    def __init__(self, params: LidarParams, scene: Scene, n_robots: int,
-                 body_radius_m: float = BODY_RADIUS_M):
+    def __init__(
+        self, params: LidarParams, scene: Scene, n_robots: int, body_radius_m: float = BODY_RADIUS_M
+    ):
         directions = np.ascontiguousarray(beam_directions(params)[:, :2])
-        self._beams = Beams(directions, params.angle_min_rad, params.step_size_rad,
-                            params.range_min_m, params.range_max_m)
+        self._beams = Beams(
+            directions,
+            params.angle_min_rad,
+            params.step_size_rad,
+            params.range_min_m,
+            params.range_max_m,
+        )
         resting, self._grid = split_scene(scene)
         self._solids = join(resting, _guards(n_robots, body_radius_m))
         self._guards = slice(len(resting.kinds), None)
 
     def cast(self, bodies: BodyState, robots: Sequence[int]) -> np.ndarray:
         """See ``Caster``."""
-        self._solids.centres[self._guards] = (bodies.positions_m
-                                              + MOUNT_HEIGHT_M * bodies.rotations[:, :, 2])
+        self._solids.centres[self._guards] = (
+            bodies.positions_m + MOUNT_HEIGHT_M * bodies.rotations[:, :, 2]
+        )
         self._solids.rotations[self._guards] = np.swapaxes(bodies.rotations, 1, 2)
         origins, rotations = lidar_poses(bodies, robots)
         distances = np.empty((len(robots), len(self._beams.directions)))
@@ -83,5 +91,9 @@ class KernelCaster:
 def _guards(count: int, radius_m: float) -> Solids:
     """Cylinders of quadcopters, anywhere."""
     sizes = (radius_m, radius_m, GUARD_HEIGHT_M / 2)
-    return Solids(np.full(count, CYLINDER, np.int64), np.zeros((count, 3)),
-                  np.zeros((count, 3, 3)), np.tile(sizes, (count, 1)))
+    return Solids(
+        np.full(count, CYLINDER, np.int64),
+        np.zeros((count, 3)),
+        np.zeros((count, 3, 3)),
+        np.tile(sizes, (count, 1)),
+    )

@@ -1,4 +1,5 @@
 """Contacts: from bodies that touch at each step to events that can be counted."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -56,8 +57,9 @@ class ContactLog:
             pair = (touch.robot, touch.other)
             last_s = self._last_touch_s.get(pair)
             if last_s is None or now_s - last_s > SEPARATION_S:
-                begun.append(Contact(now_s, touch.robot, touch.other, touch.other_robot,
-                                     touch.position_m))
+                begun.append(
+                    Contact(now_s, touch.robot, touch.other, touch.other_robot, touch.position_m)
+                )
             self._last_touch_s[pair] = now_s
         self.contacts.extend(begun)
         return begun

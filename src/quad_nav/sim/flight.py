@@ -21,6 +21,7 @@ overshoot. With ``w_a = 25 rad/s`` a step is within 5 % after 0.76 s.
 
 The law has no memory: equal states and commands give equal forces.
 """
+
 from __future__ import annotations
 
 import math
@@ -118,8 +119,11 @@ def limit_command(twist: Twist2D, params: FlightParams) -> Tuple[float, float, f
     speed = math.hypot(twist.vx_mps, twist.vy_mps)
     shorten = min(1.0, params.max_speed_mps / speed) if speed > 0.0 else 1.0
     limit = params.max_yaw_rate_radps
-    return (shorten * twist.vx_mps, shorten * twist.vy_mps,
-            min(max(twist.vyaw_radps, -limit), limit))
+    return (
+        shorten * twist.vx_mps,
+        shorten * twist.vy_mps,
+        min(max(twist.vyaw_radps, -limit), limit),
+    )
 
 
 class FlightLaw:
@@ -129,22 +133,34 @@ class FlightLaw:
     """
 
     def __init__(self, airframe: Airframe, params: FlightParams):
-        limit_mps2 = min(params.max_acceleration_mps2,
-                         GRAVITY_MPS2 * math.tan(params.max_tilt_rad))
-        self.law = (params.velocity_gain_per_s, params.attitude_bandwidth_radps,
-                    params.altitude_bandwidth_radps, params.yaw_rate_gain_per_s, limit_mps2,
-                    params.max_yaw_acceleration_radps2)
-        self.airframe = np.array([airframe.mass_kg, airframe.max_thrust_n,
-                                  *airframe.inertia_kgm2, *airframe.max_torques_nm])
+        limit_mps2 = min(params.max_acceleration_mps2, GRAVITY_MPS2 * math.tan(params.max_tilt_rad))
+        self.law = (
+            params.velocity_gain_per_s,
+            params.attitude_bandwidth_radps,
+            params.altitude_bandwidth_radps,
+            params.yaw_rate_gain_per_s,
+            limit_mps2,
+            params.max_yaw_acceleration_radps2,
+        )
+        self.airframe = np.array(
+            [
+                airframe.mass_kg,
+                airframe.max_thrust_n,
+                *airframe.inertia_kgm2,
+                *airframe.max_torques_nm,
+            ]
+        )
 
-    def thrust_and_torque(self, state: BodyState, commands: np.ndarray, altitude_m: float
-                          ) -> Tuple[np.ndarray, np.ndarray]:
+    def thrust_and_torque(
+        self, state: BodyState, commands: np.ndarray, altitude_m: float
+    ) -> Tuple[np.ndarray, np.ndarray]:
         """Forces and torques float64[n, 3] in ``map`` that track the commands.
 
         ``commands`` float64[n, 3] are (vx, vy, vyaw) as from ``limit_command``: m/s
         ahead and to the left of the heading, rad/s.
         """
         forces, torques = np.empty_like(commands), np.empty_like(commands)
-        flight_law.fly(state.rows, commands, altitude_m, GRAVITY_MPS2, self.airframe, self.law,
-                       forces, torques)
+        flight_law.fly(
+            state.rows, commands, altitude_m, GRAVITY_MPS2, self.airframe, self.law, forces, torques
+        )
         return forces, torques

@@ -3,6 +3,7 @@
 As long as a quadcopter can touch nothing, only its own thrust moves it. A clearance changes
 by no more than the way flown since it was taken, so that it is asked for only now and then.
 """
+
 from __future__ import annotations
 
 import math
@@ -22,8 +23,7 @@ _MARGIN_M = 0.03
 class FreeFlight:
     """Moves ``n_robots`` quadcopters with guards of a radius through a scene."""
 
-    def __init__(self, scene: Scene, n_robots: int, radius_m: float, law: FlightLaw,
-                 step_s: float):
+    def __init__(self, scene: Scene, n_robots: int, radius_m: float, law: FlightLaw, step_s: float):
         self._scene = scene
         self._law = law
         self._step_s = step_s
@@ -33,8 +33,9 @@ class FreeFlight:
         self._known_m = np.zeros((n_robots, 3))
         self._rooms_m = np.zeros(n_robots)  # around known_m, no clearance is known yet
 
-    def advance(self, bodies: BodyState, commands: np.ndarray, held: np.ndarray, steps: int
-                ) -> Tuple[BodyState, int, List[int]]:
+    def advance(
+        self, bodies: BodyState, commands: np.ndarray, held: np.ndarray, steps: int
+    ) -> Tuple[BodyState, int, List[int]]:
         """Move all but those that are held, bool[n], by up to so many steps.
 
         ``commands`` as for the flight law. Returns the bodies after it, the steps done, and
@@ -43,9 +44,21 @@ class FreeFlight:
         rows, done = bodies.rows.copy(), 0
         while done < steps:
             more, found, other = fly_freely(
-                rows, commands, held, steps - done, self._step_s, self._scene.altitude_m,
-                GRAVITY_MPS2, self._law.airframe, self._law.law, MOUNT_HEIGHT_M,
-                2 * self._reach_m, self._known_m, self._rooms_m, self._centres_m)
+                rows,
+                commands,
+                held,
+                steps - done,
+                self._step_s,
+                self._scene.altitude_m,
+                GRAVITY_MPS2,
+                self._law.airframe,
+                self._law.law,
+                MOUNT_HEIGHT_M,
+                2 * self._reach_m,
+                self._known_m,
+                self._rooms_m,
+                self._centres_m,
+            )
             done += more
             if other != NOBODY:
                 return BodyState(rows), done, [found, other]

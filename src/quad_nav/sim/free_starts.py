@@ -1,4 +1,5 @@
 """Start poses for places that come without: maps and Gazebo worlds."""
+
 from __future__ import annotations
 
 import itertools
@@ -28,8 +29,7 @@ def with_free_starts(scene: Scene, may_start: Callable[[float, float], bool]) ->
     looked_at = 0
     for x_m, y_m in _places(scene):
         place = Pose2D(x_m, y_m)
-        if not may_start(x_m, y_m) or any(place.distance_to(start) < SPACING_M
-                                          for start in starts):
+        if not may_start(x_m, y_m) or any(place.distance_to(start) < SPACING_M for start in starts):
             continue
         looked_at += 1
         if scene.clearance_m(x_m, y_m, scene.altitude_m) >= CLEARANCE_M:

@@ -2,6 +2,7 @@
 
 What the beams hit is somebody else's business, see ``casters.Caster``.
 """
+
 from __future__ import annotations
 
 import math
@@ -39,11 +40,15 @@ class LidarParams:
             problems.append(f"scan_range: {self.scan_range_rad}, expected an angle in (0, 2 pi]")
         beams = self.scan_range_rad / self.step_size_rad if self.step_size_rad > 0.0 else 0.0
         if not (1.5 < beams < math.inf and abs(beams - round(beams)) < 0.01):
-            problems.append(f"step_size: {self.step_size_rad}, expected an angle that divides "
-                            f"scan_range, {self.scan_range_rad}, into 2 or more")
+            problems.append(
+                f"step_size: {self.step_size_rad}, expected an angle that divides "
+                f"scan_range, {self.scan_range_rad}, into 2 or more"
+            )
         if not 0.0 <= self.range_min_m < self.range_max_m < math.inf:
-            problems.append(f"range_min, range_max: {self.range_min_m}, {self.range_max_m}, "
-                            "expected 0 <= range_min < range_max")
+            problems.append(
+                f"range_min, range_max: {self.range_min_m}, {self.range_max_m}, "
+                "expected 0 <= range_min < range_max"
+            )
         if not 0.0 <= self.noise_std_m < math.inf:
             problems.append(f"range_noise: {self.noise_std_m}, expected metres, 0 or more")
         if problems:
@@ -79,8 +84,12 @@ def lidar_poses(bodies: BodyState, robots: Sequence[int]) -> Tuple[np.ndarray, n
     return bodies.positions_m[chosen] + rotations @ base_from_lidar.translation, rotations
 
 
-def make_scan(params: LidarParams, stamp_s: float, distances_m: np.ndarray,
-              random: Optional[np.random.Generator] = None) -> Scan:
+def make_scan(
+    params: LidarParams,
+    stamp_s: float,
+    distances_m: np.ndarray,
+    random: Optional[np.random.Generator] = None,
+) -> Scan:
     """One turn, taken at an instant, of distances float64[beams], +inf for no hit.
 
     ``random`` is needed when there is noise.
@@ -89,13 +98,21 @@ def make_scan(params: LidarParams, stamp_s: float, distances_m: np.ndarray,
         if random is None:
             raise ValueError("a LIDAR with noise needs a random generator")
         distances_m = _with_noise(params, distances_m, random)
-    return Scan(stamp_s, params.angle_min_rad, params.step_size_rad, params.range_min_m,
-                params.range_max_m, distances_m.astype(np.float32))
+    return Scan(
+        stamp_s,
+        params.angle_min_rad,
+        params.step_size_rad,
+        params.range_min_m,
+        params.range_max_m,
+        distances_m.astype(np.float32),
+    )
 
 
-def _with_noise(params: LidarParams, distances_m: np.ndarray,
-                random: np.random.Generator) -> np.ndarray:
+def _with_noise(
+    params: LidarParams, distances_m: np.ndarray, random: np.random.Generator
+) -> np.ndarray:
     """Gaussian noise on the hits; a return stays within what the sensor can tell."""
     noisy = distances_m + random.normal(0.0, params.noise_std_m, len(distances_m))
-    return np.where(np.isfinite(distances_m),
-                    np.clip(noisy, params.range_min_m, params.range_max_m), np.inf)
+    return np.where(
+        np.isfinite(distances_m), np.clip(noisy, params.range_min_m, params.range_max_m), np.inf
+    )

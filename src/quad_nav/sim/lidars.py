@@ -1,4 +1,5 @@
 """The LIDARs of all quadcopters."""
+
 from __future__ import annotations
 
 from typing import List, Sequence
@@ -22,11 +23,18 @@ class Lidars:
 
     def scan(self, bodies: BodyState, robots: Sequence[int], now_s: float) -> List[Scan]:
         """What those of some quadcopters see at this instant; ``bodies`` are all quadcopters."""
-        return [make_scan(self.params, now_s, row, self._noise[robot])
-                for robot, row in zip(robots, self._caster.cast(bodies, robots))]
+        return [
+            make_scan(self.params, now_s, row, self._noise[robot])
+            for robot, row in zip(robots, self._caster.cast(bodies, robots))
+        ]
 
 
-def kernel_lidars(params: LidarParams, scene: Scene, n_robots: int, seed: int,
-                  body_radius_m: float = BODY_RADIUS_M) -> Lidars:
+def kernel_lidars(
+    params: LidarParams,
+    scene: Scene,
+    n_robots: int,
+    seed: int,
+    body_radius_m: float = BODY_RADIUS_M,
+) -> Lidars:
     """LIDARs that need no physics engine."""
     return Lidars(params, KernelCaster(params, scene, n_robots, body_radius_m), n_robots, seed)

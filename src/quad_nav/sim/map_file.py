@@ -13,6 +13,7 @@ Occupied cells stand up as boxes, as high as the scene's walls. Cells are read a
 ``costmap_2d``'s static layer has a lethal cost by its default parameters, see
 ``occupancy_of``.
 """
+
 from __future__ import annotations
 
 import math
@@ -23,12 +24,12 @@ from typing import Any, List, Optional, Tuple
 import numpy as np
 
 from quad_nav.errors import InputError
+from quad_nav.files.document import Checker, kind
+from quad_nav.files.user_files import named_in
 from quad_nav.geometry import Pose2D
 from quad_nav.kernels.rectangles import cover
-from quad_nav.sim.document import Checker, kind
 from quad_nav.sim.map_image import Pixels, read_pixels
 from quad_nav.sim.scene import Box
-from quad_nav.user_files import named_in
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 MAX_BOXES = 200_000
@@ -62,8 +63,11 @@ class OccupancyMap:
 
     def occupied(self, unknown_too: bool) -> np.ndarray:
         """bool[H, W]: where obstacles stand."""
-        return ((self.occupancy >= OCCUPIED) | (self.occupancy == UNKNOWN) if unknown_too
-                else self.occupancy >= OCCUPIED)
+        return (
+            (self.occupancy >= OCCUPIED) | (self.occupancy == UNKNOWN)
+            if unknown_too
+            else self.occupancy >= OCCUPIED
+        )
 
     def is_free(self, x_m: float, y_m: float) -> bool:
         """Whether the cell under a point in ``map`` is known to be free."""
@@ -93,14 +97,27 @@ class OccupancyMap:
         """
         rectangles = rectangles_of(self.occupied(unknown_too)).tolist()
         if len(rectangles) > MAX_BOXES:
-            raise InputError([f"{self.fields.image}: occupied cells make {len(rectangles)} boxes, "
-                              f"expected {MAX_BOXES} at most; is it a map without specks?"])
+            raise InputError(
+                [
+                    f"{self.fields.image}: occupied cells make {len(rectangles)} boxes, "
+                    f"expected {MAX_BOXES} at most; is it a map without specks?"
+                ]
+            )
         resolution_m, yaw_rad = self.fields.resolution_m, self.fields.origin.yaw_rad
         boxes = []
         for number, (column, row, width, height) in enumerate(rectangles):
             x_m, y_m = self._in_map(column + width / 2, row + height / 2)
-            boxes.append(Box(f"map_{number}", x_m, y_m, width * resolution_m,
-                             height * resolution_m, height_m, yaw_rad))
+            boxes.append(
+                Box(
+                    f"map_{number}",
+                    x_m,
+                    y_m,
+                    width * resolution_m,
+                    height * resolution_m,
+                    height_m,
+                    yaw_rad,
+                )
+            )
         return boxes
 
 
@@ -111,8 +128,11 @@ def load_map(document: Any, path: Path) -> OccupancyMap:
     if check.problems or fields is None:
         raise InputError(check.problems)
     pixels = read_pixels(fields.image, fields.mode == "trinary")
-    remarks = tuple(f"{path}: {key}: is not read, map_server has no such key"
-                    for key in document if key not in _KEYS)
+    remarks = tuple(
+        f"{path}: {key}: is not read, map_server has no such key"
+        for key in document
+        if key not in _KEYS
+    )
     return OccupancyMap(fields, occupancy_of(pixels, fields), remarks)
 
 
@@ -173,18 +193,22 @@ def _read_fields(check: Checker, document: Any, folder: Path) -> Optional[MapFie
     negate = document.get("negate")
     if not isinstance(negate, int) or negate not in _NEGATE:
         check.fault("negate", f"{kind(negate)}, expected 0 or 1")
-    occupied, free = (_threshold(check, document, key) for key in ("occupied_thresh",
-                                                                  "free_thresh"))
+    occupied, free = (
+        _threshold(check, document, key) for key in ("occupied_thresh", "free_thresh")
+    )
     if free > occupied:
         check.fault("free_thresh", f"{free:g} is above occupied_thresh, {occupied:g}")
     mode = document.get("mode", "trinary")
     if not isinstance(mode, str) or mode not in _MODES:
         check.fault("mode", f"{kind(mode)}, expected {', '.join(_MODES)}")
     if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
-        check.fault("resolution", f"{resolution_m:g} m, expected {MIN_RESOLUTION_M:g} to "
-                    f"{MAX_RESOLUTION_M:g}")
-    return MapFields(_image_path(check, folder, image), resolution_m, origin, bool(negate),
-                     occupied, free, mode)
+        check.fault(
+            "resolution",
+            f"{resolution_m:g} m, expected {MIN_RESOLUTION_M:g} to {MAX_RESOLUTION_M:g}",
+        )
+    return MapFields(
+        _image_path(check, folder, image), resolution_m, origin, bool(negate), occupied, free, mode
+    )
 
 
 def _image_path(check: Checker, folder: Path, image: str) -> Path:

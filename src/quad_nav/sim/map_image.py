@@ -1,4 +1,5 @@
 """Images of maps as numbers, the only file that imports pillow."""
+
 from __future__ import annotations
 
 import warnings
@@ -9,7 +10,7 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from quad_nav.errors import InputError
-from quad_nav.user_files import open_file
+from quad_nav.files.user_files import open_file
 
 MAX_CELLS = 10_000 * 10_000
 MAX_BYTES = 512 * 1024 * 1024
@@ -49,8 +50,9 @@ def read_pixels(path: Path, alpha_counts: bool) -> Pixels:
 def _check_size(path: Path, image: Image.Image) -> None:
     width, height = image.size
     if not 0 < width * height <= MAX_CELLS:
-        raise InputError([f"{path}: is {width} x {height} pixels, "
-                          f"expected 1 to {MAX_CELLS:g} pixels"])
+        raise InputError(
+            [f"{path}: is {width} x {height} pixels, expected 1 to {MAX_CELLS:g} pixels"]
+        )
     if image.mode == "F":
         raise InputError([f"{path}: has pixels with fractions, expected PGM or PNG"])
 

@@ -1,4 +1,5 @@
 """Where Gazebo's ``model://`` addresses are looked for."""
+
 from __future__ import annotations
 
 import os
@@ -6,8 +7,8 @@ import re
 from pathlib import Path, PurePosixPath
 from typing import Optional, Sequence
 
+from quad_nav.files.user_files import named_in
 from quad_nav.sim.xml_tree import read_xml
-from quad_nav.user_files import named_in
 
 _SCHEME = "model://"
 
@@ -20,8 +21,8 @@ def find_model(uri: str, folders: Sequence[Path]) -> Optional[Path]:
     that lead out of the folders are not found. Raises ``InputError`` for links and
     ``model.config``s that do.
     """
-    name = PurePosixPath(uri[len(_SCHEME):] if uri.startswith(_SCHEME) else uri)
-    if "://" in str(uri[len(_SCHEME):]) or name.is_absolute() or ".." in name.parts:
+    name = PurePosixPath(uri[len(_SCHEME) :] if uri.startswith(_SCHEME) else uri)
+    if "://" in str(uri[len(_SCHEME) :]) or name.is_absolute() or ".." in name.parts:
         return None
     if not name.parts:
         return None
@@ -40,8 +41,10 @@ def _sdf_in(folder: Path, folders: Sequence[Path]) -> Path:
     config = folder / "model.config"
     if not config.exists():
         return folder / "model.sdf"
-    named = [(_version(sdf.attributes.get("version", "")), sdf.text.strip())
-             for sdf in read_xml(config).all("sdf")]
+    named = [
+        (_version(sdf.attributes.get("version", "")), sdf.text.strip())
+        for sdf in read_xml(config).all("sdf")
+    ]
     return named_in(folder, max(named)[1] if named else "model.sdf", folders)
 
 

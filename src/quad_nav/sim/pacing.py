@@ -1,4 +1,5 @@
 """How fast simulated time runs against the clock on the wall."""
+
 from __future__ import annotations
 
 _MAX_LAG_S = 0.1

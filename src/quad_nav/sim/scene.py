@@ -6,6 +6,7 @@ Walls stand outside the arena, with their inner faces on its border.
 
 Scenes are read from files by ``scene_file.load_scene``.
 """
+
 from __future__ import annotations
 
 import math
@@ -42,9 +43,11 @@ class Box:
         """Distance from a point, or from each of many, to the surface; negative inside."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         dx, dy = x_m - self.x_m, y_m - self.y_m
-        outside = (np.abs(cos * dx + sin * dy) - self.size_x_m / 2.0,
-                   np.abs(-sin * dx + cos * dy) - self.size_y_m / 2.0,
-                   _outside_slab(z_m, self.bottom_m, self.height_m))
+        outside = (
+            np.abs(cos * dx + sin * dy) - self.size_x_m / 2.0,
+            np.abs(-sin * dx + cos * dy) - self.size_y_m / 2.0,
+            _outside_slab(z_m, self.bottom_m, self.height_m),
+        )
         return _signed_distance(outside)
 
 
@@ -61,8 +64,10 @@ class Cylinder:
 
     def clearance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
         """Distance from a point, or from each of many, to the surface; negative inside."""
-        outside = (np.hypot(x_m - self.x_m, y_m - self.y_m) - self.radius_m,
-                   _outside_slab(z_m, self.bottom_m, self.height_m))
+        outside = (
+            np.hypot(x_m - self.x_m, y_m - self.y_m) - self.radius_m,
+            _outside_slab(z_m, self.bottom_m, self.height_m),
+        )
         return _signed_distance(outside)
 
 

@@ -1,4 +1,5 @@
 """A scene as the document that ``scene_file`` reads, with every shape spelt out."""
+
 from __future__ import annotations
 
 from typing import Any, Dict
@@ -20,12 +21,19 @@ def scene_document(scene: Scene) -> Dict[str, Any]:
 
 
 def _obstacle(obstacle: Obstacle) -> Dict[str, Any]:
-    fields = {"name": obstacle.name, "centre": [obstacle.x_m, obstacle.y_m],
-              "bottom": obstacle.bottom_m}
+    fields = {
+        "name": obstacle.name,
+        "centre": [obstacle.x_m, obstacle.y_m],
+        "bottom": obstacle.bottom_m,
+    }
     if isinstance(obstacle, Sphere):
         return {**fields, "shape": "sphere", "radius": obstacle.radius_m}
     fields["height"] = obstacle.height_m
     if isinstance(obstacle, Box):
-        return {**fields, "shape": "box", "size": [obstacle.size_x_m, obstacle.size_y_m],
-                "yaw": obstacle.yaw_rad}
+        return {
+            **fields,
+            "shape": "box",
+            "size": [obstacle.size_x_m, obstacle.size_y_m],
+            "yaw": obstacle.yaw_rad,
+        }
     return {**fields, "shape": "cylinder", "radius": obstacle.radius_m}

@@ -23,6 +23,7 @@ and ``starts``, see ``free_starts``. The world or map by itself is the scene tha
 nothing else. A file is refused as a whole: every fault is listed at once in one
 ``InputError``.
 """
+
 from __future__ import annotations
 
 import os
@@ -31,26 +32,30 @@ from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Union
 
 from quad_nav.errors import InputError
+from quad_nav.files.document import Checker, kind, read_yaml
+from quad_nav.files.user_files import named_in
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.document import Checker, kind, read_yaml
 from quad_nav.sim.free_starts import with_free_starts
-from quad_nav.sim.scene import (
-    BODY_RADIUS_M,
-    Box,
-    Cylinder,
-    Obstacle,
-    Scene,
-    Sphere,
-    Walls,
-)
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Sphere, Walls
 from quad_nav.sim.surroundings import Surroundings, from_map, from_world
-from quad_nav.user_files import named_in
 
-_KEYS = ["name", "size", "origin", "altitude", "walls", "obstacles", "starts", "world", "map",
-         "unknown"]
-_SHAPE_KEYS = {"box": ["name", "shape", "centre", "size", "height", "yaw", "bottom"],
-               "cylinder": ["name", "shape", "centre", "radius", "height", "bottom"],
-               "sphere": ["name", "shape", "centre", "radius", "bottom"]}
+_KEYS = [
+    "name",
+    "size",
+    "origin",
+    "altitude",
+    "walls",
+    "obstacles",
+    "starts",
+    "world",
+    "map",
+    "unknown",
+]
+_SHAPE_KEYS = {
+    "box": ["name", "shape", "centre", "size", "height", "yaw", "bottom"],
+    "cylinder": ["name", "shape", "centre", "radius", "height", "bottom"],
+    "sphere": ["name", "shape", "centre", "radius", "bottom"],
+}
 _WORLD_SUFFIXES = (".world", ".sdf")
 MAX_SIZE_M = 1e5
 MAX_STARTS = 1000
@@ -73,8 +78,9 @@ def load_scene(path: Union[str, Path]) -> Scene:
     return scene_from_document(document, str(path), path.stem, place.parent)
 
 
-def scene_from_document(document: Any, source: str, default_name: str = "scene",
-                        folder: Path = Path()) -> Scene:
+def scene_from_document(
+    document: Any, source: str, default_name: str = "scene", folder: Path = Path()
+) -> Scene:
     """Check a parsed document; ``source`` names it in messages, ``folder`` is where the files
     that it refers to are. Raises ``InputError``."""
     check = Checker(source)
@@ -84,8 +90,7 @@ def scene_from_document(document: Any, source: str, default_name: str = "scene",
     return scene
 
 
-def _read_scene(check: Checker, document: Any, default_name: str, folder: Path
-                ) -> Optional[Scene]:
+def _read_scene(check: Checker, document: Any, default_name: str, folder: Path) -> Optional[Scene]:
     fields = check.mapping(document, "", _KEYS)
     if fields is None:
         return None
@@ -95,14 +100,23 @@ def _read_scene(check: Checker, document: Any, default_name: str, folder: Path
     around = _read_surroundings(check, fields, folder, walls.height_m)
     arena = _read_arena(check, fields, around)
     arena_is_sound = len(check.problems) == faults_before
-    obstacles = [_read_obstacle(check, entry, k)
-                 for k, entry in enumerate(check.sequence(fields, "obstacles", []))]
+    obstacles = [
+        _read_obstacle(check, entry, k)
+        for k, entry in enumerate(check.sequence(fields, "obstacles", []))
+    ]
     starts = _read_starts(check, fields, around)
-    scene = Scene(check.text(fields, "name", "", default_name), arena[2], arena[3], altitude,
-                  walls, (*(around.obstacles if around else ()),
-                          *(o for o in obstacles if o is not None)),
-                  tuple(s for s in starts if s is not None), arena[0], arena[1],
-                  around.remarks if around else ())
+    scene = Scene(
+        check.text(fields, "name", "", default_name),
+        arena[2],
+        arena[3],
+        altitude,
+        walls,
+        (*(around.obstacles if around else ()), *(o for o in obstacles if o is not None)),
+        tuple(s for s in starts if s is not None),
+        arena[0],
+        arena[1],
+        around.remarks if around else (),
+    )
     _check_names(check, scene)
     if arena_is_sound and around and "starts" not in fields:
         return _with_chosen_starts(check, scene, around)
@@ -113,12 +127,15 @@ def _read_scene(check: Checker, document: Any, default_name: str, folder: Path
 
 def _read_walls(check: Checker, fields: Dict[str, Any]) -> Walls:
     walls = check.mapping(fields.get("walls", {}), "walls", ["height", "thickness"]) or {}
-    return Walls(check.number(walls, "height", "walls", 2.0, positive=True),
-                 check.number(walls, "thickness", "walls", 0.1, positive=True))
+    return Walls(
+        check.number(walls, "height", "walls", 2.0, positive=True),
+        check.number(walls, "thickness", "walls", 0.1, positive=True),
+    )
 
 
-def _read_surroundings(check: Checker, fields: Dict[str, Any], folder: Path, height_m: float
-                       ) -> Optional[Surroundings]:
+def _read_surroundings(
+    check: Checker, fields: Dict[str, Any], folder: Path, height_m: float
+) -> Optional[Surroundings]:
     """The world or map that the scene takes its place from, if it does."""
     unknown = fields.get("unknown", "free")
     if not isinstance(unknown, str) or unknown not in ("free", "occupied"):
@@ -130,11 +147,13 @@ def _read_surroundings(check: Checker, fields: Dict[str, Any], folder: Path, hei
         return None
     try:
         if "world" in fields:
-            return from_world(named_in(folder, check.text(fields, "world", "", ".")),
-                              model_path())
+            return from_world(named_in(folder, check.text(fields, "world", "", ".")), model_path())
         if "map" in fields:
-            return from_map(named_in(folder, check.text(fields, "map", "", ".")), height_m,
-                            unknown == "occupied")
+            return from_map(
+                named_in(folder, check.text(fields, "map", "", ".")),
+                height_m,
+                unknown == "occupied",
+            )
     except InputError as error:
         check.problems += error.problems
     return None
@@ -146,24 +165,29 @@ def model_path() -> List[Path]:
     return [Path(folder) for folder in folders if folder]
 
 
-def _read_arena(check: Checker, fields: Dict[str, Any], around: Optional[Surroundings]
-                ) -> Sequence[float]:
+def _read_arena(
+    check: Checker, fields: Dict[str, Any], around: Optional[Surroundings]
+) -> Sequence[float]:
     """Lower left x and y, and sizes along x and y."""
     is_elsewhere = "world" in fields or "map" in fields
     if is_elsewhere and "size" not in fields and "origin" not in fields:
         if around is None:
             return (0.0, 0.0, 1.0, 1.0)
         if around.extent is None:
-            check.fault("size", "missing, and nothing stands in the world that an arena could be "
-                        "drawn around; expected a scene with world, size and origin")
+            check.fault(
+                "size",
+                "missing, and nothing stands in the world that an arena could be "
+                "drawn around; expected a scene with world, size and origin",
+            )
             return (0.0, 0.0, 1.0, 1.0)
         x, y, end_x, end_y = around.extent
         return (x, y, end_x - x, end_y - y)
     size = check.numbers(fields, "size", "", 2, positive=True)
     if max(size) > MAX_SIZE_M:
         check.fault("size", f"{max(size):g} m, expected {MAX_SIZE_M:g} m at most")
-    origin = (check.numbers(fields, "origin", "", 2) if "origin" in fields or is_elsewhere
-              else (0.0, 0.0))
+    origin = (
+        check.numbers(fields, "origin", "", 2) if "origin" in fields or is_elsewhere else (0.0, 0.0)
+    )
     return (*origin, *size)
 
 
@@ -188,8 +212,11 @@ def _read_obstacle(check: Checker, entry: Any, number: int) -> Optional[Obstacle
         radius = check.number(entry, "radius", place, positive=True)
         if bottom + 2 * radius <= 0.0:
             check.fault(f"{place}.bottom", f"{bottom:g} m puts all of it below the floor")
-        obstacle = (Cylinder(name, x, y, radius, height, bottom) if shape == "cylinder"
-                    else Sphere(name, x, y, bottom + radius, radius))
+        obstacle = (
+            Cylinder(name, x, y, radius, height, bottom)
+            if shape == "cylinder"
+            else Sphere(name, x, y, bottom + radius, radius)
+        )
     else:
         size_x, size_y = check.numbers(entry, "size", place, 2, positive=True)
         yaw = check.number(entry, "yaw", place, 0.0)
@@ -197,8 +224,9 @@ def _read_obstacle(check: Checker, entry: Any, number: int) -> Optional[Obstacle
     return obstacle if len(check.problems) == faults_before else None
 
 
-def _read_starts(check: Checker, fields: Dict[str, Any], around: Optional[Surroundings]
-                 ) -> List[Optional[Pose2D]]:
+def _read_starts(
+    check: Checker, fields: Dict[str, Any], around: Optional[Surroundings]
+) -> List[Optional[Pose2D]]:
     is_elsewhere = "world" in fields or "map" in fields
     starts = check.sequence(fields, "starts", [] if is_elsewhere else None)
     if len(starts) > MAX_STARTS:
@@ -212,8 +240,10 @@ def _read_starts(check: Checker, fields: Dict[str, Any], around: Optional[Surrou
 def _with_chosen_starts(check: Checker, scene: Scene, around: Surroundings) -> Scene:
     scene = with_free_starts(scene, around.may_start)
     if not scene.starts:
-        check.fault("starts", "missing, and no free place was found; "
-                    "expected a scene with world or map, and starts")
+        check.fault(
+            "starts",
+            "missing, and no free place was found; expected a scene with world or map, and starts",
+        )
     chosen = ", ".join(f"[{start.x_m:.2f}, {start.y_m:.2f}]" for start in scene.starts)
     remark = f"{check.source}: starts: none are given, quadcopters start at {chosen}"
     return replace(scene, remarks=(*scene.remarks, remark))
@@ -244,21 +274,28 @@ def _check_starts(check: Checker, scene: Scene, starts: Sequence[Optional[Pose2D
         problem = _start_problem(scene, start)
         if problem:
             check.fault(f"starts[{k}]", f"({start.x_m:g}, {start.y_m:g}) {problem}")
-        for other_k, other in readable[:readable.index((k, start))]:
+        for other_k, other in readable[: readable.index((k, start))]:
             distance_m = start.distance_to(other)
             if distance_m <= 2 * BODY_RADIUS_M:
-                check.fault(f"starts[{k}]", f"is {distance_m:.2f} m from starts[{other_k}], "
-                            f"expected more than two body radii, {2 * BODY_RADIUS_M:g} m")
+                check.fault(
+                    f"starts[{k}]",
+                    f"is {distance_m:.2f} m from starts[{other_k}], "
+                    f"expected more than two body radii, {2 * BODY_RADIUS_M:g} m",
+                )
 
 
 def _start_problem(scene: Scene, start: Pose2D) -> Optional[str]:
     if not scene.contains(start.x_m, start.y_m):
-        return (f"is outside the arena, expected {scene.origin_x_m:g} < x < {scene.end_x_m:g} "
-                f"and {scene.origin_y_m:g} < y < {scene.end_y_m:g}")
+        return (
+            f"is outside the arena, expected {scene.origin_x_m:g} < x < {scene.end_x_m:g} "
+            f"and {scene.origin_y_m:g} < y < {scene.end_y_m:g}"
+        )
     point = (start.x_m, start.y_m, scene.altitude_m)
     nearest = scene.nearest(*point)
     clearance_m = nearest.clearance_m(*point)
     if clearance_m <= BODY_RADIUS_M:
-        return (f"is {clearance_m:.2f} m from {nearest.name}, expected more than "
-                f"a quadcopter's radius, {BODY_RADIUS_M:g} m")
+        return (
+            f"is {clearance_m:.2f} m from {nearest.name}, expected more than "
+            f"a quadcopter's radius, {BODY_RADIUS_M:g} m"
+        )
     return None

@@ -1,4 +1,5 @@
 """Scenes as YAML, for ``scene_file`` to read."""
+
 from __future__ import annotations
 
 import math
@@ -13,11 +14,15 @@ from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
 def scene_document(scene: Scene) -> Dict[str, Any]:
     """The document that ``scene_from_document`` reads the same scene from, but for remarks."""
     walls = {"height": scene.walls.height_m, "thickness": scene.walls.thickness_m}
-    return {"name": scene.name, "size": [scene.size_x_m, scene.size_y_m],
-            "origin": [scene.origin_x_m, scene.origin_y_m],
-            "altitude": scene.altitude_m, "walls": walls,
-            "obstacles": [_obstacle_document(solid) for solid in scene.obstacles],
-            "starts": [[pose.x_m, pose.y_m, pose.yaw_rad] for pose in scene.starts]}
+    return {
+        "name": scene.name,
+        "size": [scene.size_x_m, scene.size_y_m],
+        "origin": [scene.origin_x_m, scene.origin_y_m],
+        "altitude": scene.altitude_m,
+        "walls": walls,
+        "obstacles": [_obstacle_document(solid) for solid in scene.obstacles],
+        "starts": [[pose.x_m, pose.y_m, pose.yaw_rad] for pose in scene.starts],
+    }
 
 
 def write_scene(scene: Scene, path: Path) -> None:
@@ -29,8 +34,10 @@ def write_scene(scene: Scene, path: Path) -> None:
     lines = [yaml.safe_dump(head, default_flow_style=None, sort_keys=False)]
     for key in ("obstacles", "starts"):
         lines.append(f"{key}:\n" if document[key] else f"{key}: []\n")
-        lines += ["  - " + yaml.safe_dump(item, default_flow_style=True, sort_keys=False,
-                                          width=math.inf) for item in document[key]]
+        lines += [
+            "  - " + yaml.safe_dump(item, default_flow_style=True, sort_keys=False, width=math.inf)
+            for item in document[key]
+        ]
     path.write_text("".join(lines), encoding="utf-8")
 
 
@@ -41,5 +48,7 @@ def _obstacle_document(solid: Obstacle) -> Dict[str, Any]:
         return {**start, "shape": "sphere", "radius": solid.radius_m, **bottom}
     shape: Dict[str, Any] = (
         {"shape": "box", "size": [solid.size_x_m, solid.size_y_m], "yaw": solid.yaw_rad}
-        if isinstance(solid, Box) else {"shape": "cylinder", "radius": solid.radius_m})
+        if isinstance(solid, Box)
+        else {"shape": "cylinder", "radius": solid.radius_m}
+    )
     return {**start, **shape, "height": solid.height_m, **bottom}

@@ -1,4 +1,5 @@
 """Shapes of SDF collisions as obstacles, if ours can stand where and as they do."""
+
 from __future__ import annotations
 
 import math
@@ -19,14 +20,20 @@ FLOOR_M = 1e-3
 """Planes and solids that end less than this above the floor are part of it."""
 
 
-def obstacle_of(reader: SdfReader, geometry: Element, name: str, map_from_shape: Pose3D
-                ) -> Optional[Obstacle]:
+def obstacle_of(
+    reader: SdfReader, geometry: Element, name: str, map_from_shape: Pose3D
+) -> Optional[Obstacle]:
     """The obstacle, or None where it is the floor or faulty. Raises ``NotRepresented``."""
     if not geometry.children:
         raise NotRepresented("geometry without a shape")
     shape = geometry.children[0]
-    make = {"box": _box, "cylinder": _cylinder, "sphere": _sphere, "plane": _plane,
-            "empty": _nothing}.get(shape.tag)
+    make = {
+        "box": _box,
+        "cylinder": _cylinder,
+        "sphere": _sphere,
+        "plane": _plane,
+        "empty": _nothing,
+    }.get(shape.tag)
     if make is None:
         raise NotRepresented(shape.tag)
     faults_before = len(reader.problems)
@@ -41,8 +48,9 @@ def obstacle_of(reader: SdfReader, geometry: Element, name: str, map_from_shape:
 def _above_floor(obstacle: Union[Box, Cylinder]) -> Obstacle:
     """The part of it that can be seen."""
     sunk_m = max(0.0, -obstacle.bottom_m)
-    return replace(obstacle, bottom_m=obstacle.bottom_m + sunk_m,
-                   height_m=obstacle.height_m - sunk_m)
+    return replace(
+        obstacle, bottom_m=obstacle.bottom_m + sunk_m, height_m=obstacle.height_m - sunk_m
+    )
 
 
 def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
@@ -54,8 +62,16 @@ def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle
         raise NotRepresented("tilted box")
     along, across = (up[0] + 1) % 3, (up[0] + 2) % 3
     yaw_rad = math.atan2(rotation[1, along], rotation[0, along])
-    return Box(name, pose.x_m, pose.y_m, sizes[along], sizes[across], sizes[up[0]], yaw_rad,
-               pose.z_m - sizes[up[0]] / 2)
+    return Box(
+        name,
+        pose.x_m,
+        pose.y_m,
+        sizes[along],
+        sizes[across],
+        sizes[up[0]],
+        yaw_rad,
+        pose.z_m - sizes[up[0]] / 2,
+    )
 
 
 def _cylinder(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:

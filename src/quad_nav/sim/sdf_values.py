@@ -1,4 +1,5 @@
 """Poses and numbers in SDF files, read with the line of what is wrong."""
+
 from __future__ import annotations
 
 import math

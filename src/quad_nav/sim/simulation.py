@@ -3,6 +3,7 @@
 Time is counted in whole steps of 1/240 s. Equal arguments and equal calls give
 equal results, bit for bit.
 """
+
 from __future__ import annotations
 
 import math
@@ -16,13 +17,7 @@ from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
 from quad_nav.sim.body import GoalSphere, World
 from quad_nav.sim.casters import WorldCaster
 from quad_nav.sim.contacts import Contact, ContactLog
-from quad_nav.sim.flight import (
-    Airframe,
-    BodyState,
-    FlightLaw,
-    FlightParams,
-    limit_command,
-)
+from quad_nav.sim.flight import Airframe, BodyState, FlightLaw, FlightParams, limit_command
 from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.lidars import Lidars, kernel_lidars
@@ -56,15 +51,17 @@ class SimulationParams:
     lidar_caster: str = "kernel"
 
     def __post_init__(self) -> None:
-        problems = [f"{name}: {value}, expected {unit}, 0 or more"
-                    for name, value, unit in [
-                        ("command_timeout", self.command_timeout_s, "seconds"),
-                        ("controller_period", self.controller_period_s, "seconds"),
-                        ("jitter", self.jitter_m, "metres")]
-                    if not 0.0 <= value < math.inf]
+        problems = [
+            f"{name}: {value}, expected {unit}, 0 or more"
+            for name, value, unit in [
+                ("command_timeout", self.command_timeout_s, "seconds"),
+                ("controller_period", self.controller_period_s, "seconds"),
+                ("jitter", self.jitter_m, "metres"),
+            ]
+            if not 0.0 <= value < math.inf
+        ]
         if self.lidar_caster not in LIDAR_CASTERS:
-            problems.append(f"lidar: {self.lidar_caster!r}, expected "
-                            f"{' or '.join(LIDAR_CASTERS)}")
+            problems.append(f"lidar: {self.lidar_caster!r}, expected {' or '.join(LIDAR_CASTERS)}")
         if problems:
             raise InputError(problems)
 
@@ -105,8 +102,9 @@ class RobotStates(Sequence[RobotState]):
 def _robot_state(row: np.ndarray) -> RobotState:
     x, y, z, qx, qy, qz, qw, *twist = row.tolist()
     quaternion, to_base = (qx, qy, qz, qw), (-qx, -qy, -qz, qw)
-    return RobotState(Pose3D(x, y, z, quaternion), rotate(to_base, twist[:3]),
-                      rotate(to_base, twist[3:]))
+    return RobotState(
+        Pose3D(x, y, z, quaternion), rotate(to_base, twist[:3]), rotate(to_base, twist[3:])
+    )
 
 
 class Simulation:
@@ -117,17 +115,24 @@ class Simulation:
     step that the clock starts at.
     """
 
-    def __init__(self, scene: Scene, n_robots: int, params: SimulationParams = SimulationParams(),
-                 seed: int = 0, gui: bool = False, start_step: int = 0):
+    def __init__(
+        self,
+        scene: Scene,
+        n_robots: int,
+        params: SimulationParams = SimulationParams(),
+        seed: int = 0,
+        gui: bool = False,
+        start_step: int = 0,
+    ):
         self.scene = scene
         self.params = params
         self.seed = seed
         self.step_count = start_step
         self._law = FlightLaw(params.airframe, params.flight)
         self._command_steps = math.floor(
-            (params.command_timeout_s + params.controller_period_s) * STEPS_PER_S + 1e-9)
-        self._starts = start_poses(scene, n_robots, params.jitter_m, seed,
-                                   params.airframe.radius_m)
+            (params.command_timeout_s + params.controller_period_s) * STEPS_PER_S + 1e-9
+        )
+        self._starts = start_poses(scene, n_robots, params.jitter_m, seed, params.airframe.radius_m)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
         # Who looks into the engine, by its window or its rays, has to find the bodies there.
         self._engine_is_seen = gui or params.lidar_caster == "bullet"
@@ -141,18 +146,21 @@ class Simulation:
         self._contact_log = ContactLog()
         self.lidars = self._new_lidars()
         self._state = self._world.state()
-        self._free_flight = FreeFlight(self.scene, n, self.params.airframe.radius_m, self._law,
-                                       STEP_S)
+        self._free_flight = FreeFlight(
+            self.scene, n, self.params.airframe.radius_m, self._law, STEP_S
+        )
         # The step up to which the engine moves a quadcopter.
         self._engine_until = np.full(n, math.inf if self._engine_is_seen else -math.inf)
 
     def _new_lidars(self) -> Lidars:
         params = self.params
         if params.lidar_caster == "kernel":
-            return kernel_lidars(params.lidar, self.scene, self.n_robots, self.seed,
-                                 params.airframe.radius_m)
-        return Lidars(params.lidar, WorldCaster(params.lidar, self._world), self.n_robots,
-                      self.seed)
+            return kernel_lidars(
+                params.lidar, self.scene, self.n_robots, self.seed, params.airframe.radius_m
+            )
+        return Lidars(
+            params.lidar, WorldCaster(params.lidar, self._world), self.n_robots, self.seed
+        )
 
     @property
     def n_robots(self) -> int:
@@ -212,8 +220,9 @@ class Simulation:
 
         With somebody in the engine that has to make the same step, time goes on there.
         """
-        state, done, near = self._free_flight.advance(self._state, self._commands, in_engine,
-                                                      end - self.step_count)
+        state, done, near = self._free_flight.advance(
+            self._state, self._commands, in_engine, end - self.step_count
+        )
         if done:
             self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
         self._engine_until[near] = self.step_count + done + _STEPS_NEAR
@@ -223,8 +232,9 @@ class Simulation:
         return not near
 
     def _step_with_engine(self, in_engine: np.ndarray) -> List[Contact]:
-        forces, torques = self._law.thrust_and_torque(self._state, self._commands,
-                                                      self.scene.altitude_m)
+        forces, torques = self._law.thrust_and_torque(
+            self._state, self._commands, self.scene.altitude_m
+        )
         self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
         self._state = self._world.step(self._state, forces, torques)
         self.step_count += 1
@@ -262,16 +272,23 @@ class Simulation:
         self._world.show_goals(spheres)
 
 
-def start_poses(scene: Scene, n_robots: int, jitter_m: float, seed: int,
-                body_radius_m: float = BODY_RADIUS_M) -> List[Pose2D]:
+def start_poses(
+    scene: Scene, n_robots: int, jitter_m: float, seed: int, body_radius_m: float = BODY_RADIUS_M
+) -> List[Pose2D]:
     """Start poses of the first robots, displaced within a disc of radius ``jitter_m``.
 
     Each stays clear of obstacles, walls and the robots before it. Raises
     ``InputError`` when the scene has too few starts or no free place is found.
     """
     if not 1 <= n_robots <= len(scene.starts):
-        raise InputError([(f"robots: {n_robots}, expected 1 to {len(scene.starts)}, "
-                           f"the start poses of scene {scene.name}")])
+        raise InputError(
+            [
+                (
+                    f"robots: {n_robots}, expected 1 to {len(scene.starts)}, "
+                    f"the start poses of scene {scene.name}"
+                )
+            ]
+        )
     random = np.random.default_rng([seed, 0])
     starts: List[Pose2D] = []
     for robot in range(n_robots):
@@ -279,20 +296,36 @@ def start_poses(scene: Scene, n_robots: int, jitter_m: float, seed: int,
     return starts
 
 
-def _displaced(scene: Scene, robot: int, others: Sequence[Pose2D], jitter_m: float,
-               random: np.random.Generator, body_radius_m: float) -> Pose2D:
+def _displaced(
+    scene: Scene,
+    robot: int,
+    others: Sequence[Pose2D],
+    jitter_m: float,
+    random: np.random.Generator,
+    body_radius_m: float,
+) -> Pose2D:
     start = scene.starts[robot]
     if jitter_m == 0.0:
         return start
     for _ in range(_START_TRIES):
         radius_m = jitter_m * math.sqrt(random.random())
         angle_rad = 2.0 * math.pi * random.random()
-        x_m, y_m = (start.x_m + radius_m * math.cos(angle_rad),
-                    start.y_m + radius_m * math.sin(angle_rad))
+        x_m, y_m = (
+            start.x_m + radius_m * math.cos(angle_rad),
+            start.y_m + radius_m * math.sin(angle_rad),
+        )
         pose = Pose2D(x_m, y_m, start.yaw_rad)
-        if (scene.contains(x_m, y_m)
-                and scene.clearance_m(x_m, y_m, scene.altitude_m) > body_radius_m + _START_GAP_M
-                and all(pose.distance_to(o) > 2 * body_radius_m + _START_GAP_M for o in others)):
+        if (
+            scene.contains(x_m, y_m)
+            and scene.clearance_m(x_m, y_m, scene.altitude_m) > body_radius_m + _START_GAP_M
+            and all(pose.distance_to(o) > 2 * body_radius_m + _START_GAP_M for o in others)
+        ):
             return pose
-    raise InputError([(f"jitter: {jitter_m:g} m leaves no free start for quadcopter {robot} around "
-                           f"({start.x_m:g}, {start.y_m:g}), expected a smaller one")])
+    raise InputError(
+        [
+            (
+                f"jitter: {jitter_m:g} m leaves no free start for quadcopter {robot} around "
+                f"({start.x_m:g}, {start.y_m:g}), expected a smaller one"
+            )
+        ]
+    )

@@ -1,4 +1,5 @@
 """A scene's obstacles and walls as the arrays that the LIDAR's kernel casts beams at."""
+
 from __future__ import annotations
 
 import math
@@ -32,8 +33,10 @@ def split_scene(scene: Scene) -> Tuple[Solids, SolidGrid]:
     area_m2 = float(np.prod((high.max(axis=0) - low.min(axis=0))[:2]))
     cell_m = max(_MIN_CELL_M, math.sqrt(area_m2 / count))
     covered = np.prod((high - low)[:, :2] / cell_m + 1.0, axis=1)
-    return (take(solids, np.flatnonzero(covered > _LARGE_CELLS)),
-            grid_of(take(solids, np.flatnonzero(covered <= _LARGE_CELLS)), cell_m))
+    return (
+        take(solids, np.flatnonzero(covered > _LARGE_CELLS)),
+        grid_of(take(solids, np.flatnonzero(covered <= _LARGE_CELLS)), cell_m),
+    )
 
 
 def solids_of(obstacles: Sequence[Obstacle]) -> Solids:
@@ -50,8 +53,12 @@ def solids_of(obstacles: Sequence[Obstacle]) -> Solids:
     rotations[:, 0, 1] = np.sin(yaws)
     rotations[:, 1, 0] = -rotations[:, 0, 1]
     rotations[:, 2, 2] = 1.0
-    return Solids(np.array(kinds, np.int64), np.array(centres, float).reshape(-1, 3), rotations,
-                  np.array(sizes, float).reshape(-1, 3))
+    return Solids(
+        np.array(kinds, np.int64),
+        np.array(centres, float).reshape(-1, 3),
+        rotations,
+        np.array(sizes, float).reshape(-1, 3),
+    )
 
 
 def _shape(solid: Obstacle) -> Tuple[int, float, Tuple[float, float, float]]:
@@ -84,8 +91,14 @@ def extents(solids: Solids) -> Tuple[np.ndarray, np.ndarray]:
 def grid_of(solids: Solids, cell_m: float) -> SolidGrid:
     """Solids that rest, sorted into the square columns that they reach into."""
     if len(solids.kinds) == 0:
-        return SolidGrid(solids, np.zeros(3), np.zeros(3), cell_m, np.zeros((1, 2), np.int32),
-                         np.zeros(0, np.int32))
+        return SolidGrid(
+            solids,
+            np.zeros(3),
+            np.zeros(3),
+            cell_m,
+            np.zeros((1, 2), np.int32),
+            np.zeros(0, np.int32),
+        )
     lows, highs = extents(solids)
     low, high = lows.min(axis=0), highs.max(axis=0)
     columns, rows = (np.floor((high - low)[:2] / cell_m).astype(int) + 1).tolist()
@@ -98,5 +111,11 @@ def grid_of(solids: Solids, cell_m: float) -> SolidGrid:
                 cells[y * columns + x].append(number)
     starts = np.concatenate([[0], np.cumsum([len(cell) for cell in cells])])
     rows_of_starts = starts[np.arange(rows)[:, None] * columns + np.arange(columns + 1)]
-    return SolidGrid(solids, low, high, float(cell_m), rows_of_starts.astype(np.int32),
-                     np.array([number for cell in cells for number in cell], np.int32))
+    return SolidGrid(
+        solids,
+        low,
+        high,
+        float(cell_m),
+        rows_of_starts.astype(np.int32),
+        np.array([number for cell in cells for number in cell], np.int32),
+    )

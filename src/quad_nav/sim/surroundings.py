@@ -1,4 +1,5 @@
 """What a scene takes from a Gazebo world or a ``map_server`` map."""
+
 from __future__ import annotations
 
 import math
@@ -6,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Callable, Iterable, List, Optional, Sequence, Set, Tuple
 
-from quad_nav.sim.document import read_yaml
+from quad_nav.files.document import read_yaml
 from quad_nav.sim.map_file import load_map
 from quad_nav.sim.scene import Box, Obstacle
 from quad_nav.sim.world_file import load_world
@@ -40,8 +41,9 @@ def from_map(path: Path, height_m: float, unknown_is_occupied: bool) -> Surround
     """
     occupancy = load_map(read_yaml(path), path)
     boxes = occupancy.boxes(height_m, unknown_is_occupied)
-    return Surroundings(tuple(boxes), _extent(occupancy.corners()), occupancy.is_free,
-                        occupancy.remarks)
+    return Surroundings(
+        tuple(boxes), _extent(occupancy.corners()), occupancy.is_free, occupancy.remarks
+    )
 
 
 def _with_names_of_their_own(obstacles: Sequence[Obstacle]) -> List[Obstacle]:
@@ -66,8 +68,10 @@ def _corners(obstacle: Obstacle) -> List[Tuple[float, float]]:
         reach_y = (sin * obstacle.size_x_m + cos * obstacle.size_y_m) / 2
     else:
         reach_x = reach_y = obstacle.radius_m
-    return [(obstacle.x_m - reach_x, obstacle.y_m - reach_y),
-            (obstacle.x_m + reach_x, obstacle.y_m + reach_y)]
+    return [
+        (obstacle.x_m - reach_x, obstacle.y_m - reach_y),
+        (obstacle.x_m + reach_x, obstacle.y_m + reach_y),
+    ]
 
 
 def _extent(corners: Iterable[Tuple[float, float]]) -> Optional[Extent]:

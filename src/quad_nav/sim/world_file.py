@@ -5,6 +5,7 @@ z = 0 is the floor. Everything else that could be touched is left out by name, w
 reason. Poses are composed along world, models in models, link and collision; a saved
 ``<state>`` has the last word on where models and links are, as in Gazebo.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -55,15 +56,23 @@ class _Findings:
             self.files[path] = read_xml(path)
             self.bytes_read += path.stat().st_size
             if self.bytes_read > MAX_BYTES:
-                raise InputError([f"{path}: makes it {self.bytes_read} bytes of included files, "
-                                  f"expected {MAX_BYTES} at most"])
+                raise InputError(
+                    [
+                        f"{path}: makes it {self.bytes_read} bytes of included files, "
+                        f"expected {MAX_BYTES} at most"
+                    ]
+                )
         return self.files[path]
 
     def count_part(self, path: Path) -> None:
         self.parts += 1
         if self.parts > MAX_PARTS:
-            raise InputError([f"{path}: more than {MAX_PARTS} models, links and collisions with "
-                              "what is included"])
+            raise InputError(
+                [
+                    f"{path}: more than {MAX_PARTS} models, links and collisions with "
+                    "what is included"
+                ]
+            )
 
     def leave_out(self, name: str, reason: str) -> None:
         self.left_out.setdefault(reason, []).append(name)
@@ -90,19 +99,23 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
         for element in world.all(tag):
             findings.leave_out(element.attributes.get("name", tag), tag)
     if len(findings.obstacles) > MAX_OBSTACLES:
-        findings.problems.append(f"{path}: {len(findings.obstacles)} shapes, expected "
-                                 f"{MAX_OBSTACLES} at most")
+        findings.problems.append(
+            f"{path}: {len(findings.obstacles)} shapes, expected {MAX_OBSTACLES} at most"
+        )
     if findings.problems:
         raise InputError(findings.problems)
     return GazeboWorld(tuple(findings.obstacles), tuple(_remarks(path, findings)))
 
 
 def _remarks(path: Path, findings: _Findings) -> List[str]:
-    remarks = [f"{path}: left out, {reason}: {', '.join(names)}"
-               for reason, names in findings.left_out.items()]
+    remarks = [
+        f"{path}: left out, {reason}: {', '.join(names)}"
+        for reason, names in findings.left_out.items()
+    ]
     if findings.not_static:
-        remarks.append(f"{path}: not static in Gazebo, stands fixed here: "
-                       f"{', '.join(findings.not_static)}")
+        remarks.append(
+            f"{path}: not static in Gazebo, stands fixed here: {', '.join(findings.not_static)}"
+        )
     return remarks
 
 
@@ -115,8 +128,9 @@ class _Walk:
     folders: Sequence[Path]
     depth: int = 0
 
-    def models(self, parent: Element, map_from_parent: Pose3D, prefix: str,
-               state: Optional[Element]) -> None:
+    def models(
+        self, parent: Element, map_from_parent: Pose3D, prefix: str, state: Optional[Element]
+    ) -> None:
         """Everything in a world or model that is a model itself."""
         for child in parent.children:
             if child.tag not in ("model", "include"):
@@ -131,8 +145,14 @@ class _Walk:
             except NotRepresented as reason:
                 self.findings.leave_out(name, str(reason))
 
-    def _model(self, model: Element, map_from_parent: Pose3D, prefix: str,
-               state: Optional[Element], included_as: Optional[Element] = None) -> None:
+    def _model(
+        self,
+        model: Element,
+        map_from_parent: Pose3D,
+        prefix: str,
+        state: Optional[Element],
+        included_as: Optional[Element] = None,
+    ) -> None:
         name = _name_of(included_as or model, _name_of(model))
         source = model
         if included_as is not None and included_as.first("pose") is not None:
@@ -152,8 +172,9 @@ class _Walk:
             self._link(link, map_from_model, f"{prefix}{name}/", saved)
         self.models(model, map_from_model, f"{prefix}{name}/", saved)
 
-    def _include(self, include: Element, map_from_parent: Pose3D, prefix: str,
-                 state: Optional[Element]) -> None:
+    def _include(
+        self, include: Element, map_from_parent: Pose3D, prefix: str, state: Optional[Element]
+    ) -> None:
         uri = include.text_of("uri")
         if uri == "model://sun":
             return
@@ -166,13 +187,15 @@ class _Walk:
                 return
             raise NotRepresented(f"<include> of {uri or 'nothing'}, not found")
         root = self.findings.read(path)
-        walk = _Walk(SdfReader(path, self.findings.problems), self.findings, self.folders,
-                     self.depth + 1)
+        walk = _Walk(
+            SdfReader(path, self.findings.problems), self.findings, self.folders, self.depth + 1
+        )
         for model in root.all("model"):
             walk._model(model, map_from_parent, prefix, state, include)
 
-    def _link(self, link: Element, map_from_model: Pose3D, prefix: str,
-              state: Optional[Element]) -> None:
+    def _link(
+        self, link: Element, map_from_model: Pose3D, prefix: str, state: Optional[Element]
+    ) -> None:
         name = prefix + _name_of(link)
         self.findings.count_part(self.reader.path)
         collisions = list(link.all("collision"))

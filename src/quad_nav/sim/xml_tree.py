@@ -3,6 +3,7 @@
 Entities and document type definitions are refused: they can make a small file fill
 the memory or read other files.
 """
+
 from __future__ import annotations
 
 import xml.sax
@@ -16,7 +17,7 @@ import defusedxml.sax
 from defusedxml.common import DefusedXmlException
 
 from quad_nav.errors import InputError
-from quad_nav.user_files import read_bytes
+from quad_nav.files.user_files import read_bytes
 
 MAX_BYTES = 32 * 1024 * 1024
 MAX_DEPTH = 100
@@ -53,11 +54,19 @@ def read_xml(path: Path) -> Element:
     try:
         defusedxml.sax.parseString(content, builder, forbid_dtd=True)
     except DefusedXmlException as error:
-        raise InputError([f"{path}: line {builder.line}: DOCTYPE and entities are refused, "
-                          "expected XML without them"]) from error
+        raise InputError(
+            [
+                f"{path}: line {builder.line}: DOCTYPE and entities are refused, "
+                "expected XML without them"
+            ]
+        ) from error
     except xml.sax.SAXParseException as error:
-        raise InputError([f"{path}: line {error.getLineNumber()}, column "
-                          f"{(error.getColumnNumber() or 0) + 1}: {error.getMessage()}"]) from error
+        raise InputError(
+            [
+                f"{path}: line {error.getLineNumber()}, column "
+                f"{(error.getColumnNumber() or 0) + 1}: {error.getMessage()}"
+            ]
+        ) from error
     return builder.root
 
 
@@ -83,8 +92,12 @@ class _Builder(ContentHandler):
         if self._elements > MAX_ELEMENTS:
             raise InputError([f"{self._path}: line {self.line}: more than {MAX_ELEMENTS} elements"])
         if len(self._open) >= MAX_DEPTH:
-            raise InputError([f"{self._path}: line {self.line}: more than {MAX_DEPTH} elements "
-                              "inside each other"])
+            raise InputError(
+                [
+                    f"{self._path}: line {self.line}: more than {MAX_DEPTH} elements "
+                    "inside each other"
+                ]
+            )
         if self._open:
             self._open[-1].children.append(element)
         else:

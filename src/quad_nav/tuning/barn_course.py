@@ -1,16 +1,17 @@
 """BARN's worlds as a course: searched on worlds that are not in the official sample."""
+
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, List, Sequence, Tuple
 
+from quad_nav.barn.figures import Figures, figures
+from quad_nav.barn.protocol import SAMPLE_STEP, TIME_LIMIT_S, Outcome, Run, metric
+from quad_nav.barn.setup import BarnOptions, Contestant, flight_setup, read_barn_setup
+from quad_nav.barn.worlds import BarnWorld
 from quad_nav.errors import InputError
-from quad_nav.offline.barn.figures import Figures, figures
-from quad_nav.offline.barn.protocol import SAMPLE_STEP, TIME_LIMIT_S, Outcome, Run, metric
-from quad_nav.offline.barn.setup import BarnOptions, Contestant, flight_setup, read_barn_setup
-from quad_nav.offline.barn.worlds import BarnWorld
-from quad_nav.offline.setup import FlightSetup, config_folder
+from quad_nav.scenario.flight_setup import FlightSetup, config_folder
 from quad_nav.tuning.courses import HELD_OUT_SEED, LIDAR, Case, files_digest
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.space import Assignments
@@ -36,9 +37,14 @@ class BarnCourse:
         self._contestants: Dict[Assignments, Contestant] = {(): setup.contestant}
         rest = [k for k, world in enumerate(self._worlds) if world.number % SAMPLE_STEP]
         sample = [k for k, world in enumerate(self._worlds) if not world.number % SAMPLE_STEP]
-        problems = [f"{options.worlds}: no world {what}; expected some"
-                    for what, found in (("outside of the official sample", rest),
-                                        ("of the official sample", sample)) if not found]
+        problems = [
+            f"{options.worlds}: no world {what}; expected some"
+            for what, found in (
+                ("outside of the official sample", rest),
+                ("of the official sample", sample),
+            )
+            if not found
+        ]
         if options.seed >= HELD_OUT_SEED:
             problems.append(f"seed: {options.seed}, expected less than {HELD_OUT_SEED}")
         if problems:
@@ -71,8 +77,11 @@ class BarnCourse:
         if of_world:
             raise InputError([f"{path}: the LIDAR is the benchmark's own" for path in of_world])
         if assignments not in self._contestants:
-            options = replace(self.options, only=(self._worlds[case.course].number,),
-                              parameters=(*self.options.parameters, *assignments))
+            options = replace(
+                self.options,
+                only=(self._worlds[case.course].number,),
+                parameters=(*self.options.parameters, *assignments),
+            )
             self._contestants[assignments] = read_barn_setup(options).contestant
         contestant = replace(self._contestants[assignments], seed=case.seed)
         return flight_setup(contestant, self._worlds[case.course], 0)
@@ -80,32 +89,50 @@ class BarnCourse:
     def identity(self) -> Dict[str, Any]:
         """What flights depend on besides candidate and case; plain JSON."""
         given = self.options
-        return {"config": {"name": given.params,
-                           "files": files_digest(config_folder(given.params))},
-                "parameters": dict(given.parameters),
-                "worlds": {"name": Path(given.worlds).name,
-                           "files": files_digest(Path(given.worlds))},
-                "body_radius_m": given.body_radius_m}
+        return {
+            "config": {"name": given.params, "files": files_digest(config_folder(given.params))},
+            "parameters": dict(given.parameters),
+            "worlds": {"name": Path(given.worlds).name, "files": files_digest(Path(given.worlds))},
+            "body_radius_m": given.body_radius_m,
+        }
 
     def figures(self, cases: Sequence[Case], flights: Sequence[FlightResult]) -> Figures:
         """The benchmark's own figures of flights."""
-        return figures([run_of(self._worlds[case.course], case, flight)
-                        for case, flight in zip(cases, flights)])
+        return figures(
+            [
+                run_of(self._worlds[case.course], case, flight)
+                for case, flight in zip(cases, flights)
+            ]
+        )
 
     def _cases(self, numbers: Sequence[int], seed: int, count: int) -> Tuple[Case, ...]:
-        return tuple(Case(number, f"BARN world {self._worlds[number].number}",
-                          seed + k // len(numbers))
-                     for k, number in ((k, numbers[k % len(numbers)]) for k in range(count)))
+        return tuple(
+            Case(number, f"BARN world {self._worlds[number].number}", seed + k // len(numbers))
+            for k, number in ((k, numbers[k % len(numbers)]) for k in range(count))
+        )
 
 
 def run_of(world: BarnWorld, case: Case, flight: FlightResult) -> Run:
     """A flight as the benchmark judges it: see ``offline.barn.runs.judge``."""
-    outcome = (Outcome.COLLISION if flight.contacts
-               else Outcome.SUCCESS if flight.completed else Outcome.TIME_OUT)
+    outcome = (
+        Outcome.COLLISION
+        if flight.contacts
+        else Outcome.SUCCESS
+        if flight.completed
+        else Outcome.TIME_OUT
+    )
     time_s = TIME_LIMIT_S if outcome is Outcome.TIME_OUT else flight.time_s
-    return Run(world.number, 0, case.seed, outcome, time_s,
-               metric(outcome, time_s, world.path_length_m), 0.0, flight.clearance_m or 0.0,
-               flight.recoveries)
+    return Run(
+        world.number,
+        0,
+        case.seed,
+        outcome,
+        time_s,
+        metric(outcome, time_s, world.path_length_m),
+        0.0,
+        flight.clearance_m or 0.0,
+        flight.recoveries,
+    )
 
 
 def _spread(numbers: Sequence[int]) -> List[int]:

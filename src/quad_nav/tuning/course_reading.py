@@ -1,10 +1,11 @@
 """Which course the options ask for, read and checked."""
+
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Sequence, Tuple, Union
 
-from quad_nav.offline.barn.setup import BarnOptions
+from quad_nav.barn.setup import BarnOptions
 from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.courses import MissionCourse, MissionOptions, check_missions
 from quad_nav.tuning.evaluation import Course

@@ -1,4 +1,5 @@
 """What candidates fly: missions in scenes, for the search and held out from it."""
+
 from __future__ import annotations
 
 import hashlib
@@ -10,7 +11,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.mission.goal_file import WatchedGoalFile
-from quad_nav.offline.setup import FlightOptions, FlightSetup, config_folder, read_setup
+from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, config_folder, read_setup
 from quad_nav.sim.simulation import SimulationParams
 from quad_nav.tuning.space import Assignments, costmap_paths
 
@@ -103,9 +104,17 @@ class MissionCourse:
         mission, given = self._missions[case.course], self.options
         world, parameters = _split(assignments)
         options = FlightOptions(
-            mission.scene, mission.goals, given.config, (*_single(given.parameters), *parameters),
-            given.robots, case.seed, given.size_m, given.time_limit_s, given.scans_per_s,
-            _simulation(given.simulation, world))
+            mission.scene,
+            mission.goals,
+            given.config,
+            (*_single(given.parameters), *parameters),
+            given.robots,
+            case.seed,
+            given.size_m,
+            given.time_limit_s,
+            given.scans_per_s,
+            _simulation(given.simulation, world),
+        )
         return _without_files(read_setup(options))
 
     def identity(self) -> Dict[str, Any]:
@@ -116,8 +125,12 @@ class MissionCourse:
             "parameters": dict(given.parameters),
             "missions": [_described(mission) for mission in given.missions],
             "held_out": [_described(mission) for mission in given.held_out],
-            "robots": given.robots, "size_m": given.size_m, "time_limit_s": given.time_limit_s,
-            "scans_per_s": given.scans_per_s, "simulation": asdict(given.simulation)}
+            "robots": given.robots,
+            "size_m": given.size_m,
+            "time_limit_s": given.time_limit_s,
+            "scans_per_s": given.scans_per_s,
+            "simulation": asdict(given.simulation),
+        }
 
 
 def check_missions(options: MissionOptions) -> List[str]:
@@ -130,13 +143,20 @@ def check_missions(options: MissionOptions) -> List[str]:
     problems: List[str] = []
     warnings: List[str] = []
     twice = set(options.missions) & set(options.held_out)
-    problems += [f"held out: {mission.name} is searched with too; expected another mission"
-                 for mission in twice if not mission.is_random]
+    problems += [
+        f"held out: {mission.name} is searched with too; expected another mission"
+        for mission in twice
+        if not mission.is_random
+    ]
     if options.seed >= HELD_OUT_SEED:
-        problems.append(f"seed: {options.seed}, expected less than {HELD_OUT_SEED}, where seeds "
-                        "that are held out begin")
-    cases = [*course.search_cases(len(options.missions)),
-             *course.held_out_cases(max(len(options.held_out), 1))]
+        problems.append(
+            f"seed: {options.seed}, expected less than {HELD_OUT_SEED}, where seeds "
+            "that are held out begin"
+        )
+    cases = [
+        *course.search_cases(len(options.missions)),
+        *course.held_out_cases(max(len(options.held_out), 1)),
+    ]
     for case in cases:
         try:
             warnings += course.setup(case, ()).warnings
@@ -151,18 +171,24 @@ def files_digest(*paths: Path) -> str:
     """A digest of files, or of the YAML and JSON files in folders, with their names."""
     digest = hashlib.sha256()
     for path in paths:
-        files = [path] if path.is_file() else sorted(
-            one for pattern in ("*.yaml", "*.json") for one in path.glob(pattern))
+        files = (
+            [path]
+            if path.is_file()
+            else sorted(one for pattern in ("*.yaml", "*.json") for one in path.glob(pattern))
+        )
         for file in files:
             digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
 
-def _cases(missions: Sequence[Mission], numbers: Sequence[int], seed: int, count: int
-           ) -> Tuple[Case, ...]:
+def _cases(
+    missions: Sequence[Mission], numbers: Sequence[int], seed: int, count: int
+) -> Tuple[Case, ...]:
     among = len(numbers)
-    return tuple(Case(numbers[k % among], missions[numbers[k % among]].name, seed + k // among)
-                 for k in range(count))
+    return tuple(
+        Case(numbers[k % among], missions[numbers[k % among]].name, seed + k // among)
+        for k in range(count)
+    )
 
 
 def _described(mission: Mission) -> Dict[str, str]:
@@ -172,8 +198,9 @@ def _described(mission: Mission) -> Dict[str, str]:
 
 def _split(assignments: Assignments) -> Tuple[Dict[str, Any], Assignments]:
     """Values of the LIDAR by name, and parameters of move_base."""
-    world = {path.split("/", 1)[1]: value for path, value in assignments
-             if path.startswith(f"{LIDAR}/")}
+    world = {
+        path.split("/", 1)[1]: value for path, value in assignments if path.startswith(f"{LIDAR}/")
+    }
     return world, tuple(pair for pair in assignments if not pair[0].startswith(f"{LIDAR}/"))
 
 
@@ -186,8 +213,12 @@ def _simulation(simulation: SimulationParams, world: Mapping[str, Any]) -> Simul
     lidar = simulation.lidar
     for name, value in world.items():
         if name not in (*_LIDAR_FIELDS, "scan_range", "beams"):
-            raise InputError([f"{LIDAR}/{name}: unknown; expected {LIDAR}/range, {LIDAR}/noise, "
-                              f"{LIDAR}/scan_range or {LIDAR}/beams"])
+            raise InputError(
+                [
+                    f"{LIDAR}/{name}: unknown; expected {LIDAR}/range, {LIDAR}/noise, "
+                    f"{LIDAR}/scan_range or {LIDAR}/beams"
+                ]
+            )
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise InputError([f"{LIDAR}/{name}: {value!r}, expected a number"])
         if not (value > 0 or name == "noise") or not math.isfinite(value):
@@ -196,14 +227,17 @@ def _simulation(simulation: SimulationParams, world: Mapping[str, Any]) -> Simul
             lidar = replace(lidar, **{_LIDAR_FIELDS[name]: float(value)})
     scan_range = float(world.get("scan_range", lidar.scan_range_rad))
     beams = round(world.get("beams", lidar.beam_count))
-    return replace(simulation, lidar=replace(
-        lidar, scan_range_rad=scan_range, step_size_rad=scan_range / beams))
+    return replace(
+        simulation,
+        lidar=replace(lidar, scan_range_rad=scan_range, step_size_rad=scan_range / beams),
+    )
 
 
 def _without_files(setup: FlightSetup) -> FlightSetup:
     """Goals that need no file any more: it may not be where they are flown."""
-    robots = tuple(replace(robot, file=WatchedGoalFile(Path(robot.file.path).name))
-                   for robot in setup.robots)
+    robots = tuple(
+        replace(robot, file=WatchedGoalFile(Path(robot.file.path).name)) for robot in setup.robots
+    )
     return replace(setup, robots=robots)
 
 

@@ -1,10 +1,11 @@
 """Candidates times flights: each flown once, whoever asks for it and however often."""
+
 from __future__ import annotations
 
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Protocol, Sequence, Set, Tuple
 
 from quad_nav.errors import InputError
-from quad_nav.offline.setup import FlightSetup
+from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.flight_result import FlightResult, FlightTask
 from quad_nav.tuning.journal import Journal, Key, key_text
@@ -70,8 +71,15 @@ class Evaluation:
     ``context``: what else tells flights apart in a journal of several studies.
     """
 
-    def __init__(self, course: Course, space: SearchSpace, workers: Workers, journal: Journal,
-                 watcher: Watcher, context: Optional[Mapping[str, Any]] = None):
+    def __init__(
+        self,
+        course: Course,
+        space: SearchSpace,
+        workers: Workers,
+        journal: Journal,
+        watcher: Watcher,
+        context: Optional[Mapping[str, Any]] = None,
+    ):
         self.course = course
         self.space = space
         self.watcher = watcher
@@ -95,8 +103,10 @@ class Evaluation:
                 self._counted.add(key)
                 self.watcher.flown(self._journal[key], True)
         keys = list(missing)
-        tasks = [(number, task_of(self.course, case, self.space.assignments(values)))
-                 for number, (values, case) in enumerate(missing.values())]
+        tasks = [
+            (number, task_of(self.course, case, self.space.assignments(values)))
+            for number, (values, case) in enumerate(missing.values())
+        ]
         for number, flight in fly_all(self._workers, tasks):
             self._journal.add(keys[number], flight)
             self._counted.add(keys[number])
@@ -106,8 +116,9 @@ class Evaluation:
         """Results of flights that were flown, in the cases' order."""
         return [self._journal[self._key(values, case)] for case in cases]
 
-    def flown(self, candidates: Sequence[Values], cases: Sequence[Case]
-              ) -> List[List[FlightResult]]:
+    def flown(
+        self, candidates: Sequence[Values], cases: Sequence[Case]
+    ) -> List[List[FlightResult]]:
         """Flies them and returns each candidate's results."""
         self.fly((values, case) for case in cases for values in candidates)
         return [self.flights(values, cases) for values in candidates]

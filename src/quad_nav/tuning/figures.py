@@ -1,4 +1,5 @@
 """What many flights of one set of parameters come to."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -34,13 +35,18 @@ def figures(flights: Sequence[FlightResult]) -> Figures:
         raise ValueError("no flights, no figures")
     gaps = [flight.gap_m for flight in flights if flight.gap_m is not None]
     return Figures(
-        len(flights), sum(flight.completed for flight in flights),
-        sum(flight.succeeded for flight in flights), sum(flight.contacts for flight in flights),
+        len(flights),
+        sum(flight.completed for flight in flights),
+        sum(flight.succeeded for flight in flights),
+        sum(flight.contacts for flight in flights),
         sum(flight.contacts > 0 for flight in flights),
         _mean([flight.time_s for flight in flights if flight.completed]),
-        min(gaps, default=None), _mean(gaps),
+        min(gaps, default=None),
+        _mean(gaps),
         sum(flight.roughness_mps2 for flight in flights) / len(flights),
-        sum(flight.recoveries for flight in flights), mean_cost(flights))
+        sum(flight.recoveries for flight in flights),
+        mean_cost(flights),
+    )
 
 
 def _mean(values: Sequence[float]) -> Optional[float]:

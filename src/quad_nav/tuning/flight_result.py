@@ -1,4 +1,5 @@
 """What one flight comes to, and flying it."""
+
 from __future__ import annotations
 
 import json
@@ -8,12 +9,12 @@ from typing import List, Optional
 
 from quad_nav.geometry import Twist2D
 from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.first_contact import FirstContact
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import fly
-from quad_nav.offline.setup import FlightSetup
-from quad_nav.tick import Located, Tick
+from quad_nav.scenario.flight_setup import FlightSetup
 
 _TURN_ARM_M = 0.3
 """A change of the turn rate counts as that of the speed so far from the middle: at the hull."""
@@ -81,8 +82,9 @@ def fly_task(task: FlightTask) -> FlightResult:
     if task.setup is None:
         return FlightResult(1, 0, 0, 0.0, 1.0, reason=task.refused)
     roughness, contacts = Roughness(), FirstContact()
-    summary = fly(task.setup, (roughness, contacts),
-                  contacts.has_come if task.ends_at_contact else None)
+    summary = fly(
+        task.setup, (roughness, contacts), contacts.has_come if task.ends_at_contact else None
+    )
     return result_of(summary, task.setup, roughness.mean_mps2)
 
 
@@ -90,14 +92,20 @@ def result_of(summary: MissionSummary, setup: FlightSetup, roughness_mps2: float
     """What counts of a flight's summary."""
     legs = [leg for robot in summary.robots for leg in robot.legs]
     return FlightResult(
-        goals=len(legs), reached=sum(leg.reached for leg in legs),
-        contacts=len(summary.contacts), time_s=max(map(_time_s, summary.robots)),
-        straight_m=max(_straight_m(robot, start.x_m, start.y_m)
-                       for robot, start in zip(summary.robots, setup.scene.starts)),
+        goals=len(legs),
+        reached=sum(leg.reached for leg in legs),
+        contacts=len(summary.contacts),
+        time_s=max(map(_time_s, summary.robots)),
+        straight_m=max(
+            _straight_m(robot, start.x_m, start.y_m)
+            for robot, start in zip(summary.robots, setup.scene.starts)
+        ),
         clearance_m=_least([robot.min_clearance_m for robot in summary.robots]),
         separation_m=_least([robot.min_separation_m for robot in summary.robots]),
         roughness_mps2=roughness_mps2,
-        recoveries=sum(robot.recoveries for robot in summary.robots), reason=summary.reason)
+        recoveries=sum(robot.recoveries for robot in summary.robots),
+        reason=summary.reason,
+    )
 
 
 class Roughness(FlightObserver):
@@ -115,7 +123,7 @@ class Roughness(FlightObserver):
     def began(self, flight: Flight) -> None:
         self._last = [None] * len(flight.robots)
 
-    def ticked(self, robot: int, tick: Tick, located: Located, wall_s: float) -> None:
+    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         new, old = tick.command, self._last[robot]
         if new is None:
             return

@@ -3,6 +3,7 @@
 Each is committed as soon as it is over: what is there survives Ctrl-C, a crash and kill -9.
 Only the process that hands out the flights writes.
 """
+
 from __future__ import annotations
 
 import json
@@ -16,8 +17,10 @@ from quad_nav.tuning.flight_result import FlightResult
 Key = Tuple[str, str, int]
 """Parameters as JSON with sorted keys, the mission's or world's name, the seed."""
 
-_TABLE = ("CREATE TABLE IF NOT EXISTS flights (parameters TEXT, mission TEXT, seed INTEGER, "
-          "result TEXT NOT NULL, PRIMARY KEY (parameters, mission, seed))")
+_TABLE = (
+    "CREATE TABLE IF NOT EXISTS flights (parameters TEXT, mission TEXT, seed INTEGER, "
+    "result TEXT NOT NULL, PRIMARY KEY (parameters, mission, seed))"
+)
 
 
 class Journal:
@@ -30,8 +33,10 @@ class Journal:
             with closing(sqlite3.connect(path)) as file, file:
                 file.execute(_TABLE)
                 rows = file.execute("SELECT parameters, mission, seed, result FROM flights")
-                self._flights = {(parameters, mission, seed): FlightResult.from_json(result)
-                                 for parameters, mission, seed, result in rows}
+                self._flights = {
+                    (parameters, mission, seed): FlightResult.from_json(result)
+                    for parameters, mission, seed, result in rows
+                }
         self.known_at_start = len(self._flights)
 
     def __contains__(self, key: Key) -> bool:

@@ -1,4 +1,5 @@
 """Whether parameters that are to be varied count at all."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -28,6 +29,9 @@ def parameter_faults(parameters: Sequence[Tuple[str, Any]], folder: Path, name: 
         remarks = config.load(tree).remarks
     except InputError as error:
         return list(error.problems)
-    return [f"{remark}; expected a parameter that counts in {folder}" for remark in remarks
-            if remark.kind in _NO_EFFECT and (remark.origin == name or any(
-                path.startswith(f"{remark.place}/") for path in paths))]
+    return [
+        f"{remark}; expected a parameter that counts in {folder}"
+        for remark in remarks
+        if remark.kind in _NO_EFFECT
+        and (remark.origin == name or any(path.startswith(f"{remark.place}/") for path in paths))
+    ]

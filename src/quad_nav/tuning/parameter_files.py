@@ -1,4 +1,5 @@
 """Tuned parameters as move_base's files: the base's own, with other values in some places."""
+
 from __future__ import annotations
 
 import re
@@ -31,8 +32,9 @@ class Change:
     remark: str
 
 
-def base_configuration(folder: Path, fixed: Sequence[Tuple[str, Any]], robot: int = 0
-                       ) -> config.Configuration:
+def base_configuration(
+    folder: Path, fixed: Sequence[Tuple[str, Any]], robot: int = 0
+) -> config.Configuration:
     """What flies with the base.
 
     Raises:
@@ -62,8 +64,11 @@ def write_parameters(base: Path, target: Path, changes: Sequence[Change]) -> Non
     Raises:
         FilesDiffer: they would not load as the base with these changes; nothing is written.
     """
-    files = {path.name: path.read_text(encoding="utf-8") for path in sorted(base.glob("*.yaml"))
-             if _FILE.fullmatch(path.name)}
+    files = {
+        path.name: path.read_text(encoding="utf-8")
+        for path in sorted(base.glob("*.yaml"))
+        if _FILE.fullmatch(path.name)
+    }
     for change in changes:
         _change(files, change)
     partial = target.with_name(f"{target.name}.partial")
@@ -120,15 +125,20 @@ def _stem(name: str) -> str:
 
 def _check(base: Path, written: Path, changes: Sequence[Change]) -> None:
     """Loads both, for every robot that has files of its own and for one without."""
-    numbers = {int(match.group(2)) for match in map(_FILE.fullmatch, (
-        path.name for path in base.glob("*.yaml"))) if match and match.group(2)}
+    numbers = {
+        int(match.group(2))
+        for match in map(_FILE.fullmatch, (path.name for path in base.glob("*.yaml")))
+        if match and match.group(2)
+    }
     assignments = [(change.path, change.value) for change in changes]
     for robot in sorted({0, 1, *numbers}):
         meant = config.load(_tree(base, assignments, robot)).to_tree()
         found = config.load(_tree(written, (), robot)).to_tree()
         if meant != found:
-            raise FilesDiffer(f"{base}: its files cannot be edited, robot {robot} would fly with "
-                              f"something else: {', '.join(_unlike(meant, found))}")
+            raise FilesDiffer(
+                f"{base}: its files cannot be edited, robot {robot} would fly with "
+                f"something else: {', '.join(_unlike(meant, found))}"
+            )
 
 
 def _tree(folder: Path, assignments: Sequence[Tuple[str, Any]], robot: int) -> Dict[str, Any]:

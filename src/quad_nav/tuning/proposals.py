@@ -5,6 +5,7 @@ generations of a fixed size. A generation depends on the seed, its number and th
 generations before it and on nothing else, so that neither the number of workers nor an
 interruption changes the study.
 """
+
 from __future__ import annotations
 
 import logging
@@ -36,14 +37,17 @@ def distributions(space: SearchSpace) -> Dict[str, BaseDistribution]:
     return {one.path: _distribution(one) for one in space.dimensions}
 
 
-def propose(space: SearchSpace, told: Sequence[FrozenTrial], generation: int, size: int, seed: int
-            ) -> List[Dict[str, Any]]:
+def propose(
+    space: SearchSpace, told: Sequence[FrozenTrial], generation: int, size: int, seed: int
+) -> List[Dict[str, Any]]:
     """The candidates of a generation; ``told`` are all trials of those before it."""
     study = _study(told, seed, generation)
     wanted = distributions(space)
     trials = [study.ask(wanted) for _ in range(size)]
-    return [{one.path: one.rounded(trial.params[one.path]) for one in space.dimensions}
-            for trial in trials]
+    return [
+        {one.path: one.rounded(trial.params[one.path]) for one in space.dimensions}
+        for trial in trials
+    ]
 
 
 def is_hopeless(told: Sequence[FrozenTrial], flights: int, running_mean: float) -> bool:
@@ -53,10 +57,12 @@ def is_hopeless(told: Sequence[FrozenTrial], flights: int, running_mean: float) 
     flight; all fly the same ones. Optuna's own pruner would take a candidate's best mean so far,
     its luck at the first flights, so it is shown the newest alone.
     """
-    pruner = optuna.pruners.MedianPruner(n_startup_trials=JUDGED_FROM_TRIALS,
-                                         n_min_trials=JUDGED_FROM_TRIALS)
-    trial = optuna.create_trial(state=TrialState.RUNNING,
-                                intermediate_values={flights: running_mean})
+    pruner = optuna.pruners.MedianPruner(
+        n_startup_trials=JUDGED_FROM_TRIALS, n_min_trials=JUDGED_FROM_TRIALS
+    )
+    trial = optuna.create_trial(
+        state=TrialState.RUNNING, intermediate_values={flights: running_mean}
+    )
     return pruner.prune(_study(told, 0, 0), trial)
 
 
@@ -66,7 +72,8 @@ def _study(told: Sequence[FrozenTrial], seed: int, generation: int) -> optuna.St
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
         sampler = optuna.samplers.TPESampler(
-            n_startup_trials=RANDOM_TRIALS, multivariate=True, constant_liar=True, seed=number)
+            n_startup_trials=RANDOM_TRIALS, multivariate=True, constant_liar=True, seed=number
+        )
     study = optuna.create_study(sampler=sampler)
     study.add_trials(told)
     return study

@@ -4,6 +4,7 @@ A candidate that was the best of many in few flights was lucky too. So the best 
 and so does the base. Then every change that does no good is taken back, and what each of the
 others gains is measured: flights without it beside flights with it.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -53,8 +54,13 @@ class Refined:
     gains: Tuple[Gain, ...]
 
 
-def refine(evaluation: Evaluation, finalists: Sequence[Values], base: Mapping[str, Any],
-           few: Sequence[Case], many: Sequence[Case]) -> Refined:
+def refine(
+    evaluation: Evaluation,
+    finalists: Sequence[Values],
+    base: Mapping[str, Any],
+    few: Sequence[Case],
+    many: Sequence[Case],
+) -> Refined:
     """The best of ``finalists`` and the base.
 
     Args:
@@ -82,13 +88,16 @@ def _without(values: Values, paths: Sequence[str]) -> Dict[str, Any]:
     return {path: value for path, value in values.items() if path not in paths}
 
 
-def _simplified(evaluation: Evaluation, best: Values, few: Sequence[Case], many: Sequence[Case]
-                ) -> Dict[str, Any]:
+def _simplified(
+    evaluation: Evaluation, best: Values, few: Sequence[Case], many: Sequence[Case]
+) -> Dict[str, Any]:
     """Without changes that do no good, if it is no worse without all of them."""
     evaluation.watcher.stage("taking back what does no good")
     evaluation.watcher.expect(len(best) * len(few))
-    savings = [(path, cost - mean_cost(evaluation.flights(best, few))) for path, cost in zip(
-        best, _costs_without(evaluation, best, few))]
+    savings = [
+        (path, cost - mean_cost(evaluation.flights(best, few)))
+        for path, cost in zip(best, _costs_without(evaluation, best, few))
+    ]
     idle = [path for path, saving in sorted(savings, key=lambda pair: pair[1]) if saving <= TRIFLE]
     limit = mean_cost(evaluation.flights(best, many)) + TRIFLE
     simplest = dict(best)
@@ -107,16 +116,20 @@ def _simplified(evaluation: Evaluation, best: Values, few: Sequence[Case], many:
 
 
 def _costs_without(evaluation: Evaluation, values: Values, cases: Sequence[Case]) -> List[float]:
-    return list(map(mean_cost, evaluation.flown(
-        [_without(values, [path]) for path in values], cases)))
+    return list(
+        map(mean_cost, evaluation.flown([_without(values, [path]) for path in values], cases))
+    )
 
 
-def _gains(evaluation: Evaluation, values: Values, base: Mapping[str, Any],
-           cases: Sequence[Case]) -> Tuple[Gain, ...]:
+def _gains(
+    evaluation: Evaluation, values: Values, base: Mapping[str, Any], cases: Sequence[Case]
+) -> Tuple[Gain, ...]:
     """Of every change, the largest first."""
     evaluation.watcher.expect(len(values) * len(cases))
     without = evaluation.flown([_without(values, [path]) for path in values], cases)
     with_it = figures(evaluation.flights(values, cases))
-    gains = [Gain(path, value, base.get(path), with_it, figures(flights))
-             for (path, value), flights in zip(values.items(), without)]
+    gains = [
+        Gain(path, value, base.get(path), with_it, figures(flights))
+        for (path, value), flights in zip(values.items(), without)
+    ]
     return tuple(sorted(gains, key=lambda gain: -gain.cost))

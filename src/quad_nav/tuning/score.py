@@ -4,6 +4,7 @@
 term outweighs all below it, and the second all below that: a goal that was not reached costs
 at least 5000, a contact 50 to 100, everything else less than 50 together.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -33,7 +34,7 @@ def _failure(flight: FlightResult) -> float:
 
 
 def _contact(flight: FlightResult) -> float:
-    return 1.0 - 0.5 ** flight.contacts
+    return 1.0 - 0.5**flight.contacts
 
 
 def _pace_s_per_m(flight: FlightResult) -> float:
@@ -51,15 +52,29 @@ def _roughness_mps2(flight: FlightResult) -> float:
 
 
 TERMS: Tuple[Term, ...] = (
-    Term("goals", 10000.0, "0 when every goal was reached, else from 0.5 (all but few) to 1 (none)",
-         _failure),
+    Term(
+        "goals",
+        10000.0,
+        "0 when every goal was reached, else from 0.5 (all but few) to 1 (none)",
+        _failure,
+    ),
     Term("contacts", 100.0, "0 for none, 0.5 for one, 0.75 for two, ... towards 1", _contact),
-    Term("time", 1.0, "seconds for each metre of the longest straight way, at most "
-         f"{SLOWEST_S_PER_M:g}", _pace_s_per_m),
-    Term("clearance", 1.0, f"0 when nothing came nearer than {COMFORTABLE_GAP_M:g} m, hull to "
-         "hull, up to 1 for a touch", _tightness),
-    Term("smoothness", 0.5, "change of commands, m/s^2, at most "
-         f"{ROUGHEST_MPS2:g}", _roughness_mps2),
+    Term(
+        "time",
+        1.0,
+        f"seconds for each metre of the longest straight way, at most {SLOWEST_S_PER_M:g}",
+        _pace_s_per_m,
+    ),
+    Term(
+        "clearance",
+        1.0,
+        f"0 when nothing came nearer than {COMFORTABLE_GAP_M:g} m, hull to "
+        "hull, up to 1 for a touch",
+        _tightness,
+    ),
+    Term(
+        "smoothness", 0.5, f"change of commands, m/s^2, at most {ROUGHEST_MPS2:g}", _roughness_mps2
+    ),
 )
 
 

@@ -1,4 +1,5 @@
 """The search: generations of candidates, each flown in rounds that the bad ones do not survive."""
+
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
@@ -50,28 +51,38 @@ def search(evaluation: Evaluation, study: TuneStudy, start: Values, options: Sea
         _fly_generation(evaluation, study, start, options, generation)
 
 
-def _fly_generation(evaluation: Evaluation, study: TuneStudy, start: Values,
-                    options: SearchOptions, generation: int) -> None:
+def _fly_generation(
+    evaluation: Evaluation, study: TuneStudy, start: Values, options: SearchOptions, generation: int
+) -> None:
     first = generation * options.generation
     told = study.trials
     candidates: List[Dict[str, Any]] = propose(
-        evaluation.space, told[:first], generation, options.generation, options.seed)
+        evaluation.space, told[:first], generation, options.generation, options.seed
+    )
     if generation == 0:
         candidates[0] = dict(start)
-    candidates = candidates[:options.candidates - first]
+    candidates = candidates[: options.candidates - first]
     cases = evaluation.course.search_cases(options.flights)
     means = _fly_rounds(evaluation, told[:first], candidates, cases)
     for number, (values, steps) in enumerate(zip(candidates, means), start=first):
         if number >= len(told):
             study.tell(_trial(evaluation, values, steps, cases))
-        done = study.trials[:number + 1]
-        evaluation.watcher.told(number + 1, min((trial.value for trial in done if trial.value
-                                                 is not None and is_complete(trial)),
-                                                default=float("inf")))
+        done = study.trials[: number + 1]
+        evaluation.watcher.told(
+            number + 1,
+            min(
+                (trial.value for trial in done if trial.value is not None and is_complete(trial)),
+                default=float("inf"),
+            ),
+        )
 
 
-def _fly_rounds(evaluation: Evaluation, told: Sequence[FrozenTrial], candidates: Sequence[Values],
-                cases: Sequence[Case]) -> List[Dict[int, float]]:
+def _fly_rounds(
+    evaluation: Evaluation,
+    told: Sequence[FrozenTrial],
+    candidates: Sequence[Values],
+    cases: Sequence[Case],
+) -> List[Dict[int, float]]:
     """For each candidate: flights -> mean cost of so many, as far as it came."""
     means: List[Dict[int, float]] = [{} for _ in candidates]
     flying = list(range(len(candidates)))
@@ -86,14 +97,19 @@ def _fly_rounds(evaluation: Evaluation, told: Sequence[FrozenTrial], candidates:
     return means
 
 
-def _trial(evaluation: Evaluation, values: Values, means: Mapping[int, float],
-           cases: Sequence[Case]) -> FrozenTrial:
+def _trial(
+    evaluation: Evaluation, values: Values, means: Mapping[int, float], cases: Sequence[Case]
+) -> FrozenTrial:
     flown = max(means)
     attributes = {FIGURES: asdict(figures(evaluation.flights(values, cases[:flown])))}
     return optuna.create_trial(
         state=TrialState.COMPLETE if flown == len(cases) else TrialState.PRUNED,
-        value=means[flown], params=dict(values), distributions=distributions(evaluation.space),
-        user_attrs=attributes, intermediate_values=dict(means))
+        value=means[flown],
+        params=dict(values),
+        distributions=distributions(evaluation.space),
+        user_attrs=attributes,
+        intermediate_values=dict(means),
+    )
 
 
 def is_complete(trial: FrozenTrial) -> bool:

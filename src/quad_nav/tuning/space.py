@@ -11,6 +11,7 @@ A space is a YAML file, one entry for each parameter's path:
       range: [0.5, 1.5]
       follow: {TrajectoryPlannerROS/min_vel_theta: -1}    # times that
 """
+
 from __future__ import annotations
 
 import math
@@ -20,9 +21,9 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import yaml
 
-from quad_nav import plain_yaml
 from quad_nav.errors import InputError
-from quad_nav.user_files import read_text
+from quad_nav.files import plain_yaml
+from quad_nav.files.user_files import read_text
 
 COSTMAPS = ("global_costmap", "local_costmap")
 BOTH = "*_costmap"
@@ -100,10 +101,14 @@ class SearchSpace:
 
     def corners(self) -> Tuple[Dict[str, Any], Dict[str, Any]]:
         """The lowest values of all, and the highest."""
-        low = {one.path: one.choices[0] if one.choices else one.rounded(one.low)
-               for one in self.dimensions}
-        high = {one.path: one.choices[-1] if one.choices else one.rounded(one.high)
-                for one in self.dimensions}
+        low = {
+            one.path: one.choices[0] if one.choices else one.rounded(one.low)
+            for one in self.dimensions
+        }
+        high = {
+            one.path: one.choices[-1] if one.choices else one.rounded(one.high)
+            for one in self.dimensions
+        }
         return low, high
 
 
@@ -125,8 +130,12 @@ def load_space(path: Path) -> SearchSpace:
     except yaml.YAMLError as error:
         raise InputError([f"{path}: cannot be read: {error}"]) from error
     if not isinstance(entries, dict) or not entries:
-        raise InputError([f"{path}: expected parameters with their ranges, as "
-                          "TrajectoryPlannerROS/max_vel_x: {range: [0.2, 0.6]}"])
+        raise InputError(
+            [
+                f"{path}: expected parameters with their ranges, as "
+                "TrajectoryPlannerROS/max_vel_x: {range: [0.2, 0.6]}"
+            ]
+        )
     problems: List[str] = []
     found = [_dimension(str(name), entry, path, problems) for name, entry in entries.items()]
     dimensions = [one for one in found if one is not None]
@@ -139,18 +148,24 @@ def load_space(path: Path) -> SearchSpace:
 def _dimension(name: str, entry: Any, path: Path, problems: List[str]) -> Optional[Dimension]:
     place = f"{path}: {name}"
     if not isinstance(entry, dict) or ("range" in entry) == ("choices" in entry):
-        problems.append(f"{place}: {entry!r}, expected {{range: [low, high]}} or "
-                        "{choices: [a, b]}")
+        problems.append(
+            f"{place}: {entry!r}, expected {{range: [low, high]}} or {{choices: [a, b]}}"
+        )
         return None
-    faults = [f"{place}: unknown key {key}; expected {', '.join(sorted(_KEYS))}"
-              for key in entry if key not in _KEYS]
-    faults += [f"{place}: {key}: {entry[key]!r}, expected true or false"
-               for key in ("log", "integer") if not isinstance(entry.get(key, False), bool)]
+    faults = [
+        f"{place}: unknown key {key}; expected {', '.join(sorted(_KEYS))}"
+        for key in entry
+        if key not in _KEYS
+    ]
+    faults += [
+        f"{place}: {key}: {entry[key]!r}, expected true or false"
+        for key in ("log", "integer")
+        if not isinstance(entry.get(key, False), bool)
+    ]
     follow = entry.get("follow", {})
     if not isinstance(follow, dict) or not all(_is_number(value) for value in follow.values()):
         faults.append(f"{place}: follow: {follow!r}, expected {{path: factor}}")
-    faults += (_range_faults(entry, place) if "range" in entry
-               else _choice_faults(entry, place))
+    faults += _range_faults(entry, place) if "range" in entry else _choice_faults(entry, place)
     if faults:
         problems += faults
         return None
@@ -158,14 +173,19 @@ def _dimension(name: str, entry: Any, path: Path, problems: List[str]) -> Option
     if "choices" in entry:
         return Dimension(name, choices=tuple(entry["choices"]), follow=pairs)
     low, high = map(float, entry["range"])
-    return Dimension(name, low, high, entry.get("log", False), entry.get("integer", False),
-                     follow=pairs)
+    return Dimension(
+        name, low, high, entry.get("log", False), entry.get("integer", False), follow=pairs
+    )
 
 
 def _range_faults(entry: Mapping[str, Any], place: str) -> List[str]:
     bounds = entry["range"]
-    if not (isinstance(bounds, list) and len(bounds) == 2 and all(map(_is_number, bounds))
-            and bounds[0] < bounds[1]):
+    if not (
+        isinstance(bounds, list)
+        and len(bounds) == 2
+        and all(map(_is_number, bounds))
+        and bounds[0] < bounds[1]
+    ):
         return [f"{place}: range: {bounds!r}, expected [low, high] with low < high"]
     faults = []
     if entry.get("log") is True and bounds[0] <= 0:
@@ -178,8 +198,11 @@ def _range_faults(entry: Mapping[str, Any], place: str) -> List[str]:
 def _choice_faults(entry: Mapping[str, Any], place: str) -> List[str]:
     choices = entry["choices"]
     faults = []
-    if not (isinstance(choices, list) and len(choices) > 1 and all(
-            isinstance(one, (bool, int, float, str)) for one in choices)):
+    if not (
+        isinstance(choices, list)
+        and len(choices) > 1
+        and all(isinstance(one, (bool, int, float, str)) for one in choices)
+    ):
         faults.append(f"{place}: choices: {choices!r}, expected two values or more")
     elif entry.get("follow") and not all(map(_is_number, choices)):
         faults.append(f"{place}: follow: expected choices that are numbers")
@@ -195,15 +218,16 @@ def _set_twice(dimensions: Sequence[Dimension], path: Path) -> List[str]:
         for name in (one.path, *(other for other, _ in one.follow)):
             for single in costmap_paths(name):
                 if single in places:
-                    problems.append(f"{path}: {one.path}: {single} is set by {places[single]} "
-                                    "too; expected one entry for it")
+                    problems.append(
+                        f"{path}: {one.path}: {single} is set by {places[single]} "
+                        "too; expected one entry for it"
+                    )
                 places.setdefault(single, one.path)
     return problems
 
 
 def _is_number(value: Any) -> bool:
-    return (isinstance(value, (int, float)) and not isinstance(value, bool)
-            and math.isfinite(value))
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _times(value: Any, factor: float) -> Any:

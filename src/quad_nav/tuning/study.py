@@ -4,6 +4,7 @@ A trial is written when its generation has been flown, finished, in one transact
 the air or half a generation is known from the flights alone, so that there is nothing to mend
 after kill -9.
 """
+
 from __future__ import annotations
 
 import fcntl
@@ -70,15 +71,20 @@ def _take(lock: int, folder: Path) -> None:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
-        raise InputError([f"{folder}: another quad tune works on this study; expected another "
-                          "folder with --output"]) from error
+        raise InputError(
+            [
+                f"{folder}: another quad tune works on this study; expected another "
+                "folder with --output"
+            ]
+        ) from error
 
 
 def _read(folder: Path, identity: Mapping[str, Any]) -> TuneStudy:
     path = folder / FILE
     try:
-        study = optuna.create_study(storage=f"sqlite:///{path}", study_name=_NAME,
-                                    load_if_exists=True)
+        study = optuna.create_study(
+            storage=f"sqlite:///{path}", study_name=_NAME, load_if_exists=True
+        )
         journal = Journal(path)
     except (sqlite3.Error, sqlalchemy.exc.SQLAlchemyError, RuntimeError) as error:
         raise InputError([f"{path}: cannot be read as a study: {error}"]) from error
@@ -88,20 +94,30 @@ def _read(folder: Path, identity: Mapping[str, Any]) -> TuneStudy:
     if found is None:
         study.set_user_attr(_IDENTITY, wanted)
     elif found != wanted:
-        raise InputError([f"{folder}: the study there is another one: {line}; expected the same, "
-                          "or another folder with --output"
-                          for line in unlike(found, wanted)])
+        raise InputError(
+            [
+                f"{folder}: the study there is another one: {line}; expected the same, "
+                "or another folder with --output"
+                for line in unlike(found, wanted)
+            ]
+        )
     return TuneStudy(study, journal)
 
 
 def unlike(there: Any, here: Any, place: str = "") -> Sequence[str]:
     """Where two JSON values differ: "seed was 0 and is 1"."""
     if isinstance(there, dict) and isinstance(here, dict):
-        return [line for key in sorted({*there, *here})
-                for line in unlike(there.get(key), here.get(key), f"{place}/{key}".lstrip("/"))]
+        return [
+            line
+            for key in sorted({*there, *here})
+            for line in unlike(there.get(key), here.get(key), f"{place}/{key}".lstrip("/"))
+        ]
     if isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
-        return [line for k, (one, other) in enumerate(zip(there, here))
-                for line in unlike(one, other, f"{place}[{k}]")]
+        return [
+            line
+            for k, (one, other) in enumerate(zip(there, here))
+            for line in unlike(one, other, f"{place}[{k}]")
+        ]
     return [] if there == here else [f"{place} was {_told(there)} and is {_told(here)}"]
 
 

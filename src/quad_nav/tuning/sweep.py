@@ -1,4 +1,5 @@
 """Tables instead of a search: every combination of a few values, or a list of them."""
+
 from __future__ import annotations
 
 import csv
@@ -11,9 +12,10 @@ from typing import Any, Dict, List, Sequence, Tuple
 
 import yaml
 
-from quad_nav import plain_yaml
 from quad_nav.errors import InputError
-from quad_nav.offline.setup import config_folder
+from quad_nav.files import plain_yaml
+from quad_nav.files.user_files import read_text
+from quad_nav.scenario.flight_setup import config_folder
 from quad_nav.tuning.course_reading import CourseOptions, read_course
 from quad_nav.tuning.courses import LIDAR, Case, identity_text
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher, task_of
@@ -23,7 +25,6 @@ from quad_nav.tuning.journal import Journal
 from quad_nav.tuning.parameter_check import parameter_faults
 from quad_nav.tuning.space import Dimension, SearchSpace
 from quad_nav.tuning.workers import Workers
-from quad_nav.user_files import read_text
 from quad_nav.versions import versions
 
 _BASE = "base"
@@ -82,8 +83,9 @@ class SweepRow:
 def grid(axes: Sequence[Tuple[str, Sequence[Any]]]) -> Tuple[Point, ...]:
     """Every combination, the last axis first."""
     names = [path for path, _ in axes]
-    return tuple(dict(zip(names, values))
-                 for values in itertools.product(*(values for _, values in axes)))
+    return tuple(
+        dict(zip(names, values)) for values in itertools.product(*(values for _, values in axes))
+    )
 
 
 def read_points(path: Path) -> Tuple[Point, ...]:
@@ -100,15 +102,19 @@ def read_points(path: Path) -> Tuple[Point, ...]:
     if len(lines) < 2:
         raise InputError([f"{path}: expected a line of parameters' paths, and one for each point"])
     paths, *rows = lines
-    problems = [f"{path}: row {number}: {len(row)} values, expected {len(paths)}"
-                for number, row in enumerate(rows, start=2) if len(row) != len(paths)]
+    problems = [
+        f"{path}: row {number}: {len(row)} values, expected {len(paths)}"
+        for number, row in enumerate(rows, start=2)
+        if len(row) != len(paths)
+    ]
     if len(set(paths)) < len(paths):
         problems.append(f"{path}: a path is there twice, expected each once")
     if problems:
         raise InputError(problems)
     try:
-        return tuple({name: plain_yaml.load(word) for name, word in zip(paths, row)}
-                     for row in rows)
+        return tuple(
+            {name: plain_yaml.load(word) for name, word in zip(paths, row)} for row in rows
+        )
     except yaml.YAMLError as error:
         raise InputError([f"{path}: a value is not YAML: {error}"]) from error
 
@@ -127,8 +133,13 @@ def read_sweep_setup(options: SweepOptions) -> SweepSetup:
     for point in options.points:
         assignments = space.assignments(point)
         refused = task_of(course, case, assignments).refused
-        problems += [f"{_words(point)}: {refused}"] if refused else parameter_faults(
-            [pair for pair in assignments if not pair[0].startswith(f"{LIDAR}/")], folder, _NAME)
+        problems += (
+            [f"{_words(point)}: {refused}"]
+            if refused
+            else parameter_faults(
+                [pair for pair in assignments if not pair[0].startswith(f"{LIDAR}/")], folder, _NAME
+            )
+        )
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
     return SweepSetup(course, options.points, options.flights, tuple(warnings))
@@ -139,11 +150,13 @@ def space_of(points: Sequence[Point]) -> SearchSpace:
     return SearchSpace(_NAME, tuple(Dimension(path) for path in points[0]))
 
 
-def run_sweep(setup: SweepSetup, workers: Workers, journal: Journal, watcher: Watcher
-              ) -> List[SweepRow]:
+def run_sweep(
+    setup: SweepSetup, workers: Workers, journal: Journal, watcher: Watcher
+) -> List[SweepRow]:
     """Flies all points, each flight of all before the next one of any."""
-    evaluation = Evaluation(setup.course, space_of(setup.points), workers, journal, watcher,
-                            {_BASE: setup.base})
+    evaluation = Evaluation(
+        setup.course, space_of(setup.points), workers, journal, watcher, {_BASE: setup.base}
+    )
     watcher.expect(len(setup.points) * setup.flights)
     watcher.stage("sweeping")
     flights = evaluation.flown(setup.points, setup.cases)

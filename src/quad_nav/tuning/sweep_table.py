@@ -1,4 +1,5 @@
 """A sweep's rows as a table, CSV and JSON."""
+
 from __future__ import annotations
 
 import csv
@@ -12,28 +13,51 @@ from quad_nav.tuning.record import value_words
 from quad_nav.tuning.sweep import SweepRow, SweepSetup
 from quad_nav.versions import versions
 
-_HEADER = ["flights", "complete\n%", "touched\n%", "mean\ntime, s", "least\ngap, m",
-           "roughness\nm/s2", "cost"]
+_HEADER = [
+    "flights",
+    "complete\n%",
+    "touched\n%",
+    "mean\ntime, s",
+    "least\ngap, m",
+    "roughness\nm/s2",
+    "cost",
+]
 
 
 def table(rows: Sequence[SweepRow]) -> str:
     """What the terminal shows, one line for each point."""
     paths = list(rows[0].point)
-    shown = [[*(value_words(row.point[path]) for path in paths), *_cells(row.figures)]
-             for row in rows]
+    shown = [
+        [*(value_words(row.point[path]) for path in paths), *_cells(row.figures)] for row in rows
+    ]
     header = [path.replace("/", "/\n") for path in paths]
-    return tabulate.tabulate(shown, [*header, *_HEADER], tablefmt="simple", disable_numparse=True,
-                             colalign=("right",) * (len(paths) + len(_HEADER)))
+    return tabulate.tabulate(
+        shown,
+        [*header, *_HEADER],
+        tablefmt="simple",
+        disable_numparse=True,
+        colalign=("right",) * (len(paths) + len(_HEADER)),
+    )
 
 
 def to_json(setup: SweepSetup, rows: Sequence[SweepRow]) -> Dict[str, Any]:
     """Points with figures and flights."""
     return {
-        "base": setup.course.config, "fixed": dict(setup.course.fixed), "versions": versions(),
-        "rows": [{"point": row.point, "figures": asdict(row.figures),
-                  "flights": [{"mission": case.name, "seed": case.seed, **asdict(flight)}
-                              for case, flight in zip(setup.cases, row.flights)]}
-                 for row in rows]}
+        "base": setup.course.config,
+        "fixed": dict(setup.course.fixed),
+        "versions": versions(),
+        "rows": [
+            {
+                "point": row.point,
+                "figures": asdict(row.figures),
+                "flights": [
+                    {"mission": case.name, "seed": case.seed, **asdict(flight)}
+                    for case, flight in zip(setup.cases, row.flights)
+                ],
+            }
+            for row in rows
+        ],
+    }
 
 
 def write_csv(rows: Sequence[SweepRow], file: TextIO) -> None:
@@ -47,9 +71,15 @@ def write_csv(rows: Sequence[SweepRow], file: TextIO) -> None:
 
 
 def _cells(one: Figures) -> List[str]:
-    return [str(one.flights), _percent(one.completed, one), _percent(one.touched, one),
-            _figure(one.mean_time_s, 1), _figure(one.least_gap_m, 2), f"{one.roughness_mps2:.2f}",
-            f"{one.cost:.2f}"]
+    return [
+        str(one.flights),
+        _percent(one.completed, one),
+        _percent(one.touched, one),
+        _figure(one.mean_time_s, 1),
+        _figure(one.least_gap_m, 2),
+        f"{one.roughness_mps2:.2f}",
+        f"{one.cost:.2f}",
+    ]
 
 
 def _percent(count: int, one: Figures) -> str:

@@ -1,4 +1,5 @@
 """Tuning from end to end: search, refinement, and flights that the search never saw."""
+
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
@@ -9,11 +10,11 @@ import optuna
 from optuna.trial import FrozenTrial
 
 from quad_nav import config
+from quad_nav.barn.setup import BarnOptions
+from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InputError
-from quad_nav.offline.barn.setup import BarnOptions
-from quad_nav.offline.setup import config_folder
-from quad_nav.plugins import plugin_name
-from quad_nav.shipped import shipped
+from quad_nav.files.shipped import shipped
+from quad_nav.scenario.flight_setup import config_folder
 from quad_nav.tuning.course_reading import CourseOptions, read_course, with_config
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
@@ -70,9 +71,14 @@ class TuneSetup:
     def identity(self) -> Dict[str, Any]:
         """What the study depends on; with the same one it can be taken up again."""
         search = self.options.search
-        return {**self.course.identity(), "space": asdict(self.space)["dimensions"],
-                "flights": search.flights, "generation": search.generation, "seed": search.seed,
-                "versions": all_versions()}
+        return {
+            **self.course.identity(),
+            "space": asdict(self.space)["dimensions"],
+            "flights": search.flights,
+            "generation": search.generation,
+            "seed": search.seed,
+            "versions": all_versions(),
+        }
 
 
 @dataclass(frozen=True)
@@ -115,17 +121,25 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
         InputError: every fault.
     """
     course, warnings = read_course(options.course)
-    against = tuple((name, read_course(with_config(options.course, name))[0])
-                    for name in options.against)
+    against = tuple(
+        (name, read_course(with_config(options.course, name))[0]) for name in options.against
+    )
     folder = config_folder(course.config)
     configuration = base_configuration(folder, course.fixed)
     space = load_space(options.space or _shipped_space(options.course, configuration)).without(
-        [path for path, _ in course.fixed])
-    problems = [line for values in space.corners() for line in parameter_faults(
-        (*course.fixed, *space.assignments(values)), folder, space.name)]
+        [path for path, _ in course.fixed]
+    )
+    problems = [
+        line
+        for values in space.corners()
+        for line in parameter_faults(
+            (*course.fixed, *space.assignments(values)), folder, space.name
+        )
+    ]
     if not space.dimensions:
-        problems.append(f"{space.name}: every parameter in it is fixed by --set; expected one that "
-                        "is not")
+        problems.append(
+            f"{space.name}: every parameter in it is fixed by --set; expected one that is not"
+        )
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
     tree = configuration.to_tree()
@@ -148,8 +162,9 @@ def run_tune(setup: TuneSetup, workers: Workers, watcher: Watcher) -> TuneResult
     with open_study(setup.options.output, setup.identity) as study:
         evaluation = Evaluation(setup.course, setup.space, workers, study.journal, watcher)
         result = _run(setup, evaluation, study)
-        others = tuple((name, _fly_other(name, course, result, evaluation))
-                       for name, course in setup.against)
+        others = tuple(
+            (name, _fly_other(name, course, result, evaluation)) for name, course in setup.against
+        )
         return replace(result, held_out=replace(result.held_out, others=others))
 
 
@@ -160,20 +175,26 @@ def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResu
     watcher.stage("flying the base")
     (reference,) = evaluation.flown([BASE], few)
     search(evaluation, study, start_values(setup.space, setup.base), options.search)
-    trials = study.trials[:options.search.candidates]
-    finalists = [trial.params for trial in best_first(trials)[:options.finalists]]
+    trials = study.trials[: options.search.candidates]
+    finalists = [trial.params for trial in best_first(trials)[: options.finalists]]
     many = course.search_cases(max(options.final_flights, len(few)))
     refined = refine(evaluation, finalists, setup.base, few, many)
     held_out = course.held_out_cases(options.held_out)
     watcher.expect(2 * len(held_out))
     watcher.stage("flying what was held out")
     base, tuned = evaluation.flown([BASE, refined.values], held_out)
-    return TuneResult(setup, tuple(trials), tuple(reference), refined,
-                      HeldOut(held_out, tuple(base), tuple(tuned)))
+    return TuneResult(
+        setup,
+        tuple(trials),
+        tuple(reference),
+        refined,
+        HeldOut(held_out, tuple(base), tuple(tuned)),
+    )
 
 
-def _fly_other(name: str, course: Course, result: TuneResult, evaluation: Evaluation
-               ) -> Tuple[FlightResult, ...]:
+def _fly_other(
+    name: str, course: Course, result: TuneResult, evaluation: Evaluation
+) -> Tuple[FlightResult, ...]:
     """The flights that were held out with other parameters."""
     evaluation.watcher.expect(len(result.held_out.cases))
     evaluation.watcher.stage(f"flying {name}")
@@ -185,8 +206,10 @@ def _fly_other(name: str, course: Course, result: TuneResult, evaluation: Evalua
 def start_values(space: SearchSpace, base: Mapping[str, Any]) -> Dict[str, Any]:
     """The base's own values, as far as the space has them: the first candidate."""
     low, _ = space.corners()
-    return {one.path: low[one.path] if base[one.path] is None else one.nearest(base[one.path])
-            for one in space.dimensions}
+    return {
+        one.path: low[one.path] if base[one.path] is None else one.nearest(base[one.path])
+        for one in space.dimensions
+    }
 
 
 def _shipped_space(course: CourseOptions, configuration: config.Configuration) -> Path:

@@ -3,6 +3,7 @@
 Both are backends of joblib. Results come as flights end, in any order; nothing of them depends
 on who flew. A worker that dies costs the flights that were in the air, and they are flown again.
 """
+
 from __future__ import annotations
 
 import signal
@@ -48,8 +49,9 @@ class LocalWorkers:
         if self.count == 1:
             yield from ((number, fly_task(task)) for number, task in tasks)
             return
-        parallel = joblib.Parallel(self.count, backend="loky", batch_size=1,
-                                   return_as="generator_unordered")
+        parallel = joblib.Parallel(
+            self.count, backend="loky", batch_size=1, return_as="generator_unordered"
+        )
         try:
             yield from parallel(joblib.delayed(_fly_in_worker)(*task) for task in tasks)
         except TerminatedWorkerError as error:
@@ -67,13 +69,18 @@ class RayWorkers:
         try:
             import ray
         except ImportError as error:
-            raise InputError(["--ray: Ray is not installed; expected it from "
-                              "pip install 'quad-nav[ray]'"]) from error
+            raise InputError(
+                ["--ray: Ray is not installed; expected it from pip install 'quad-nav[ray]'"]
+            ) from error
         try:
             ray.init(address=address, logging_level="ERROR", log_to_driver=False)
         except (ConnectionError, OSError, RuntimeError, ValueError) as error:
-            raise InputError([f"--ray {address}: {error}; expected the address of a running "
-                              "cluster, as 10.0.0.1:6379"]) from error
+            raise InputError(
+                [
+                    f"--ray {address}: {error}; expected the address of a running "
+                    "cluster, as 10.0.0.1:6379"
+                ]
+            ) from error
         self._died: Any = ray.exceptions.RayError
         self._register()
         self.count = count or int(ray.cluster_resources().get("CPU", 1))
@@ -92,8 +99,9 @@ class RayWorkers:
     def fly(self, tasks: Iterable[Numbered]) -> Iterator[NumberedResult]:
         try:
             with joblib.parallel_config(_RAY_BACKEND):
-                parallel = joblib.Parallel(self.count, batch_size=1,
-                                           return_as="generator_unordered")
+                parallel = joblib.Parallel(
+                    self.count, batch_size=1, return_as="generator_unordered"
+                )
                 yield from parallel(joblib.delayed(_fly_in_worker)(*task) for task in tasks)
         except self._died as error:
             raise _WorkerDied from error
@@ -118,11 +126,11 @@ def fly_all(workers: Workers, tasks: Sequence[Numbered]) -> Iterator[NumberedRes
             if deaths == MOST_DEATHS:
                 raise WorkersLost(
                     f"workers died {deaths} times without finishing any of {len(left)} flights: "
-                    "is there enough memory for so many at a time?") from error
+                    "is there enough memory for so many at a time?"
+                ) from error
 
 
 def _fly_in_worker(number: int, task: FlightTask) -> NumberedResult:
     # Ctrl-C reaches every process of the terminal; the first one ends the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     return number, fly_task(task)
-

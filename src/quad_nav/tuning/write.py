@@ -1,4 +1,5 @@
 """A study's outcome as files: parameters, record, figures and report."""
+
 from __future__ import annotations
 
 import json
@@ -7,7 +8,7 @@ from typing import Iterator
 
 from quad_nav.offline.first_contact import FirstContact
 from quad_nav.offline.run import fly
-from quad_nav.offline.trace import FlightTrace, TraceObserver
+from quad_nav.recording.trace import FlightTrace, TraceObserver
 from quad_nav.tuning.parameter_files import write_parameters
 from quad_nav.tuning.record import changes, markdown, to_json
 from quad_nav.tuning.space import Assignments
@@ -34,11 +35,14 @@ def write_result(result: TuneResult, command: str) -> Iterator[Path]:
 
 def _write_report(result: TuneResult, command: str) -> Path:
     """Imported here: a study can be run without waiting for what draws."""
-    from quad_nav.offline.report.write import write_page
+    from quad_nav.report.write import write_page
     from quad_nav.tuning.report.tune_page import tune_page
+
     path = result.setup.options.output / REPORT
-    before, after = (_traced(result, name, assignments)
-                     for name, assignments in (("base", ()), ("tuned", result.assignments)))
+    before, after = (
+        _traced(result, name, assignments)
+        for name, assignments in (("base", ()), ("tuned", result.assignments))
+    )
     write_page(tune_page(result, before, after, command), path)
     return path
 

@@ -3,6 +3,7 @@
 Comments and layout are for people, and a loader forgets them. So values are replaced where they
 stand, and the remark beside one that is replaced makes room for a new one.
 """
+
 from __future__ import annotations
 
 import re
@@ -21,12 +22,13 @@ def replaced(text: str, path: Sequence[str], value: Any, comment: str) -> Option
         return None
     first, last = node.start_mark, node.end_mark
     lines = text.split("\n")
-    before = lines[first.line][:first.column]
-    rest = lines[last.line][last.column:]
+    before = lines[first.line][: first.column]
+    rest = lines[last.line][last.column :]
     column = lines[last.line].find("#", last.column)
-    lines[first.line:last.line + 1] = [before + value_text(value) + rest]
-    return "\n".join(_remarked(lines, first.line, len(before) + len(value_text(value)), comment,
-                               column))
+    lines[first.line : last.line + 1] = [before + value_text(value) + rest]
+    return "\n".join(
+        _remarked(lines, first.line, len(before) + len(value_text(value)), comment, column)
+    )
 
 
 def inserted(text: str, path: Sequence[str], value: Any, comment: str) -> str:
@@ -39,8 +41,12 @@ def inserted(text: str, path: Sequence[str], value: Any, comment: str) -> str:
             break
         namespace, depth = below, depth + 1
     if not isinstance(namespace, yaml.MappingNode) or not namespace.value:
-        return text.rstrip("\n") + "\n" * bool(text) + "\n".join(
-            _new_lines(path[depth:], 0, value, comment)) + "\n"
+        return (
+            text.rstrip("\n")
+            + "\n" * bool(text)
+            + "\n".join(_new_lines(path[depth:], 0, value, comment))
+            + "\n"
+        )
     if namespace.flow_style:
         return _inserted_in_braces(text, namespace, path[depth:], value)
     lines = text.split("\n")
@@ -76,8 +82,9 @@ def _new_lines(path: Sequence[str], column: int, value: Any, comment: str) -> Li
     return lines
 
 
-def _inserted_in_braces(text: str, namespace: yaml.MappingNode, path: Sequence[str], value: Any
-                        ) -> str:
+def _inserted_in_braces(
+    text: str, namespace: yaml.MappingNode, path: Sequence[str], value: Any
+) -> str:
     at = namespace.value[0][0].start_mark.index
     words = value_text(value)
     for key in reversed(path[1:]):

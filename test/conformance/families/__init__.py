@@ -6,6 +6,7 @@ which is wanted. The tests and ``run.py`` both call it. For another family write
 ``<family>.py`` with a ``check`` in the way of ``inflation.py``, name it in
 ``FAMILIES``, and have ``test_<family>.py`` call it as ``test_inflation.py`` does.
 """
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -22,7 +23,7 @@ from families import (
     occupancy,
     trajectory_planner,
 )
-from families.case import Unusable, cases_in
+from families.case import InvalidValue, cases_in
 from families.comparison import Difference
 
 Check = Callable[[Path], List[Difference]]
@@ -40,14 +41,14 @@ FAMILIES: Dict[str, Check] = {
 }
 DATA = Path(__file__).resolve().parents[1] / "data"
 
-__all__ = ["DATA", "FAMILIES", "Check", "Difference", "Unusable", "cases"]
+__all__ = ["DATA", "FAMILIES", "Check", "Difference", "InvalidValue", "cases"]
 
 
 def cases(family: str, data: Path = DATA) -> List[Path]:
     """The files of a family's cases; none when ``data`` does not have the family.
 
     Raises:
-        Unusable: the family is there and can't be read.
+        InvalidValue: the family is there and can't be read.
     """
     if family == "defaults":
         file = data / "defaults.json"

@@ -1,4 +1,5 @@
 """The carrot planner."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -19,13 +20,15 @@ _METRES = _RADIANS = 1e-9
 def check(path: Path) -> List[Difference]:
     case, comparison = load_case(path), Comparison()
     recorded, meta = case.arrays, case.meta
-    configuration = load({"base_global_planner": "carrot_planner/CarrotPlanner",
-                          "CarrotPlanner": meta["params"]})
+    configuration = load(
+        {"base_global_planner": "carrot_planner/CarrotPlanner", "CarrotPlanner": meta["params"]}
+    )
     planner = Carrot(configuration.global_planner, recorded["footprint"])
     costs = recorded["costmap"].copy()
     try:
-        plan = planner.make_plan(spec_at(meta, meta["origin"]), costs, Pose2D(*meta["start"]),
-                                 Pose2D(*meta["goal"]))
+        plan = planner.make_plan(
+            spec_at(meta, meta["origin"]), costs, Pose2D(*meta["start"]), Pose2D(*meta["goal"])
+        )
     except PlanningError:
         plan = NO_PLAN
     comparison.exact("found", len(plan) > 0, meta["found"])

@@ -1,4 +1,5 @@
 """Reading recorded cases: an ``index.json`` and one ``.npz`` for each case it names."""
+
 from __future__ import annotations
 
 import json
@@ -10,7 +11,7 @@ from typing import Any, Dict, List
 import numpy as np
 
 
-class Unusable(Exception):
+class InvalidValue(Exception):
     """Recordings that are not in the format: says what is missing, and where."""
 
 
@@ -18,7 +19,7 @@ class Recorded(Dict[str, Any]):
     """A dictionary that complains about the recording when a key is not there."""
 
     def __missing__(self, key: str) -> Any:
-        raise Unusable(f"there is no {key!r}")
+        raise InvalidValue(f"there is no {key!r}")
 
 
 @dataclass(frozen=True)
@@ -33,30 +34,32 @@ def cases_in(folder: Path) -> List[Path]:
     """The files that a folder's index names, in its order.
 
     Raises:
-        Unusable: no index, one of another form, or a file that is not there.
+        InvalidValue: no index, one of another form, or a file that is not there.
     """
     path = folder / "index.json"
     try:
         names = [entry["case"] for entry in json.loads(path.read_text(encoding="utf-8"))]
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise Unusable(f"{path}: cannot be read: {error}") from error
+        raise InvalidValue(f"{path}: cannot be read: {error}") from error
     except (TypeError, KeyError) as error:
-        raise Unusable(f"{path}: expected a list of {{case: , note: }}") from error
+        raise InvalidValue(f"{path}: expected a list of {{case: , note: }}") from error
     files = [folder / f"{name}.npz" for name in names]
     missing = [file.name for file in files if not file.is_file()]
     if missing:
-        raise Unusable(f"{folder}: the index names files that are not there: {', '.join(missing)}")
+        raise InvalidValue(
+            f"{folder}: the index names files that are not there: {', '.join(missing)}"
+        )
     if not files:
-        raise Unusable(f"{path}: there is no case in it")
+        raise InvalidValue(f"{path}: there is no case in it")
     return files
 
 
 def load_case(path: Path) -> Case:
-    """Raises Unusable when the file is no recording."""
+    """Raises InvalidValue when the file is no recording."""
     try:
         with np.load(path) as file:
             arrays = Recorded(file)
         meta = json.loads(str(arrays.pop("meta")), object_hook=Recorded)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise Unusable(f"cannot be read: {error}") from error
+        raise InvalidValue(f"cannot be read: {error}") from error
     return Case(arrays, meta)

@@ -1,4 +1,5 @@
 """Comparing what was found with what was recorded."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -47,8 +48,11 @@ class Comparison:
         apart[np.isnan(apart)] = np.inf
         if apart.size and apart.max() > tolerance:
             where, values = _place(apart.argmax(), found, recorded)
-            self._add(field, f"{apart.max():.3g} apart{' ' + where if where else ': '}{values},"
-                             f" allowed are {tolerance:g}")
+            self._add(
+                field,
+                f"{apart.max():.3g} apart{' ' + where if where else ': '}{values},"
+                f" allowed are {tolerance:g}",
+            )
 
     def _same_shape(self, field: str, found: np.ndarray, recorded: np.ndarray) -> bool:
         if found.shape != recorded.shape:

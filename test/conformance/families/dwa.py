@@ -1,4 +1,5 @@
 """The dynamic window planner: closed loops call by call."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -19,8 +20,9 @@ _TOLERANCE = 1e-6
 def check(path: Path) -> List[Difference]:
     case, comparison = load_case(path), Comparison()
     recorded, meta = case.arrays, case.meta
-    configuration = load({"base_local_planner": "dwa_local_planner/DWAPlannerROS",
-                          "DWAPlannerROS": meta["params"]})
+    configuration = load(
+        {"base_local_planner": "dwa_local_planner/DWAPlannerROS", "DWAPlannerROS": meta["params"]}
+    )
     params = configuration.local_planner
     effective = {**values(configuration, "DWAPlannerROS"), "cheat_factor": params.cheat_factor}
     del effective["restore_defaults"]  # a button, not recorded
@@ -32,16 +34,25 @@ def check(path: Path) -> List[Difference]:
     return comparison.differences
 
 
-def _check_call(planner: DwaPlanner, control: Optional[Control], recorded: Recorded,
-                meta: Recorded, k: int, comparison: Comparison) -> None:
+def _check_call(
+    planner: DwaPlanner,
+    control: Optional[Control],
+    recorded: Recorded,
+    meta: Recorded,
+    k: int,
+    comparison: Comparison,
+) -> None:
     exact, near = comparison.exact, comparison.near
     command = control.command if control else Twist2D()
     exact(f"ok[{k}]", control is not None, bool(recorded["ok"][k]))
-    near(f"cmd[{k}]", [command.vx_mps, command.vy_mps, command.vyaw_radps], recorded["cmd"][k],
-         _TOLERANCE)
+    near(
+        f"cmd[{k}]",
+        [command.vx_mps, command.vy_mps, command.vyaw_radps],
+        recorded["cmd"][k],
+        _TOLERANCE,
+    )
     exact(f"goal_reached[{k}]", planner.is_goal_reached(), bool(recorded["goal_reached"][k]))
-    exact(f"state_flags[{k}]", _state(planner, meta["flag_names"]),
-          recorded["state_flags"][k] != 0)
+    exact(f"state_flags[{k}]", _state(planner, meta["flag_names"]), recorded["state_flags"][k] != 0)
     exact(f"plan_lengths[{k}] (global)", len(planner.plan), recorded["plan_lengths"][k, 0])
     best, goal_mode = planner.best, bool(recorded["goal_mode"][k])
     exact(f"goal_mode[{k}]", best is None, goal_mode)
@@ -58,11 +69,16 @@ def _check_call(planner: DwaPlanner, control: Optional[Control], recorded: Recor
 
 
 def _state(planner: DwaPlanner, names: List[str]) -> List[bool]:
-    state = {"xy_tolerance_latch": planner.xy_tolerance_latch,
-             "rotating_to_goal": planner.rotating_to_goal}
-    for axis, verb, short in zip(planner.oscillation.axes, ("forward", "strafing", "rotating"),
-                                 ("forward", "strafe", "rot")):
+    state = {
+        "xy_tolerance_latch": planner.xy_tolerance_latch,
+        "rotating_to_goal": planner.rotating_to_goal,
+    }
+    for axis, verb, short in zip(
+        planner.oscillation.axes, ("forward", "strafing", "rotating"), ("forward", "strafe", "rot")
+    ):
         state[f"{verb}_pos"], state[f"{verb}_neg"] = axis.going_positive, axis.going_negative
-        state[f"{short}_pos_only"], state[f"{short}_neg_only"] = (axis.positive_only,
-                                                                  axis.negative_only)
+        state[f"{short}_pos_only"], state[f"{short}_neg_only"] = (
+            axis.positive_only,
+            axis.negative_only,
+        )
     return [state[name] for name in names]

@@ -1,4 +1,5 @@
 """The planner of ``global_planner``: wave or A*, descent or grid path, orientations."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -21,13 +22,15 @@ _RADIANS = 2e-3
 def check(path: Path) -> List[Difference]:
     case, comparison = load_case(path), Comparison()
     recorded, meta = case.arrays, case.meta
-    configuration = load({"base_global_planner": "global_planner/GlobalPlanner",
-                          "GlobalPlanner": meta["params"]})
+    configuration = load(
+        {"base_global_planner": "global_planner/GlobalPlanner", "GlobalPlanner": meta["params"]}
+    )
     planner = SearchPlanner(configuration.global_planner)
     costs = recorded["grid_in"].copy()
     try:
-        plan = planner.make_plan(spec_at(meta, meta["origin"]), costs, Pose2D(*meta["start"]),
-                                 Pose2D(*meta["goal"]))
+        plan = planner.make_plan(
+            spec_at(meta, meta["origin"]), costs, Pose2D(*meta["start"]), Pose2D(*meta["goal"])
+        )
     except PlanningError:
         plan = NO_PLAN
     comparison.exact("found", len(plan) > 0, meta["found"])

@@ -1,4 +1,5 @@
 """The inflation layer, cost for cost."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -35,17 +36,28 @@ def check(path: Path) -> List[Difference]:
 
     for k, (before, after) in enumerate(zip(arrays["bounds_in"].tolist(), arrays["bounds_out"])):
         bounds = layer.update_bounds(Pose2D(0.0, 0.0), 0.0, Bounds(*before))
-        comparison.exact(f"bounds_out[{k}]", [
-            bounds.min_x_m, bounds.min_y_m, bounds.max_x_m, bounds.max_y_m], after)
+        comparison.exact(
+            f"bounds_out[{k}]",
+            [bounds.min_x_m, bounds.min_y_m, bounds.max_x_m, bounds.max_y_m],
+            after,
+        )
     return comparison.differences
 
 
 def _layer_params(params: Mapping[str, Any]) -> InflationLayerParams:
     """The layer's among the recorded parameters, which are the costmap's and the layer's."""
-    given = {name: params[name] for name in ("inflation_radius", "cost_scaling_factor",
-                                             "inflate_unknown") if name in params}
-    (layer,) = load({"local_costmap": {"plugins": [
-        {"name": "inflation", "type": "costmap_2d::InflationLayer"}], "inflation": given},
-    }).local_costmap.layers
+    given = {
+        name: params[name]
+        for name in ("inflation_radius", "cost_scaling_factor", "inflate_unknown")
+        if name in params
+    }
+    (layer,) = load(
+        {
+            "local_costmap": {
+                "plugins": [{"name": "inflation", "type": "costmap_2d::InflationLayer"}],
+                "inflation": given,
+            },
+        }
+    ).local_costmap.layers
     assert isinstance(layer[1], InflationLayerParams)
     return layer[1]

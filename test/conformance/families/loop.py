@@ -1,4 +1,5 @@
 """Closed loops of a local planner, driven with the recorded poses and velocities."""
+
 from __future__ import annotations
 
 import math
@@ -36,11 +37,18 @@ def replayed(planner: LocalPlanner, case: Case) -> Iterator[Tuple[int, Optional[
             planner.set_plan(plan_of(plans[k]))
         ox, oy = recorded["window_offset"][k]
         world = recorded["world"][recorded["world_index"][k]]
-        costs = world[oy:oy + meta["size_y"], ox:ox + meta["size_x"]]
+        costs = world[oy : oy + meta["size_y"], ox : ox + meta["size_x"]]
         try:
-            yield k, planner.compute_velocity(
-                spec_at(meta, recorded["origin"][k]), costs, Pose2D(*recorded["pose"][k]),
-                Twist2D(*recorded["velocity"][k]), local_from_plan)
+            yield (
+                k,
+                planner.compute_velocity(
+                    spec_at(meta, recorded["origin"][k]),
+                    costs,
+                    Pose2D(*recorded["pose"][k]),
+                    Twist2D(*recorded["velocity"][k]),
+                    local_from_plan,
+                ),
+            )
         except ControlError:
             yield k, None
 
@@ -58,7 +66,8 @@ def _local_from_plan(meta: Recorded) -> Pose2D:
     qx, qy, qz, qw = frame["quaternion_xyzw"]
     inverse = (-qx, -qy, -qz, qw)
     translation = multiply_quaternions(
-        multiply_quaternions(inverse, (-frame["x"], -frame["y"], 0.0, 0.0)), (qx, qy, qz, qw))
+        multiply_quaternions(inverse, (-frame["x"], -frame["y"], 0.0, 0.0)), (qx, qy, qz, qw)
+    )
     rotation = rotation_from_quaternion(inverse)
     root = math.sqrt(np.trace(rotation) + 1.0)
     yaw = 2.0 * math.atan2((rotation[1, 0] - rotation[0, 1]) * (0.5 / root), root * 0.5)

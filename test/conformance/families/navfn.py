@@ -1,4 +1,5 @@
 """NavFn: whole plans, and the wave and its descent on their own."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -44,14 +45,18 @@ def _check_plans(case: Case, comparison: Comparison) -> None:
         comparison.exact("grid_after" + suffix, costs, recorded["grid_after" + suffix])
         potential = np.zeros((0, 0)) if planner.potential is None else planner.potential
         comparison.exact("potential" + suffix, potential, recorded["potential" + suffix])
-        compare_plans(comparison, "plan" + suffix, plan, recorded["plan" + suffix], _METRES,
-                      _METRES)
+        compare_plans(
+            comparison, "plan" + suffix, plan, recorded["plan" + suffix], _METRES, _METRES
+        )
         if call["found"] and len(plan):
             cells = (plan[:-1, :2] - meta["origin"])[::-1] / spec.resolution_m
             comparison.near("path_cells" + suffix, cells, recorded["path_cells" + suffix], _CELLS)
         if k == 0 and potential.size:
-            comparison.exact("navcost", navigation_costs(costs, planner.params.allow_unknown),
-                             recorded["navcost"])
+            comparison.exact(
+                "navcost",
+                navigation_costs(costs, planner.params.allow_unknown),
+                recorded["navcost"],
+            )
 
 
 def _check_core(case: Case, comparison: Comparison) -> None:
@@ -60,15 +65,21 @@ def _check_core(case: Case, comparison: Comparison) -> None:
     heuristic = "Astar" in method
     start, goal = tuple(meta["start_cell"]), tuple(meta["goal_cell"])
     nav_costs = navigation_costs(recorded["grid_in"], meta["params"].get("allow_unknown", True))
-    potential = potential_from(nav_costs, source=goal, target=start,
-                               stop_at_target=heuristic or "(true)" in method,
-                               heuristic=heuristic)
+    potential = potential_from(
+        nav_costs,
+        source=goal,
+        target=start,
+        stop_at_target=heuristic or "(true)" in method,
+        heuristic=heuristic,
+    )
     comparison.exact("navcost", nav_costs, recorded["navcost"])
     comparison.exact("potential", potential, recorded["potential"])
     if "last_path_cost" in meta:
-        comparison.exact("last_path_cost", potential[start[1], start[0]],
-                         np.float32(meta["last_path_cost"]))
+        comparison.exact(
+            "last_path_cost", potential[start[1], start[0]], np.float32(meta["last_path_cost"])
+        )
     path, arrived = path_from(potential, start, goal)
     comparison.exact("found", arrived, meta["found"])
-    comparison.near("path_cells", path if arrived else np.zeros((0, 2)), recorded["path_cells"],
-                    _CELLS)
+    comparison.near(
+        "path_cells", path if arrived else np.zeros((0, 2)), recorded["path_cells"], _CELLS
+    )

@@ -1,4 +1,5 @@
 """Published occupancies, and the geometry of footprints."""
+
 from __future__ import annotations
 
 import json
@@ -31,8 +32,11 @@ def _check_footprint(case: Case, comparison: Comparison) -> None:
     arrays, meta = case.arrays, case.meta
     params = meta["params"]
     # The original reads the numbers of a footprint as float32.
-    unpadded = (np.array(json.loads(params["footprint"]), dtype=np.float32) if "footprint" in params
-                else footprints.circle(params["robot_radius"]))
+    unpadded = (
+        np.array(json.loads(params["footprint"]), dtype=np.float32)
+        if "footprint" in params
+        else footprints.circle(params["robot_radius"])
+    )
     padded = footprints.pad(unpadded, params["footprint_padding"])
     oriented = footprints.oriented(padded, Pose2D(*meta["pose"]))
     for name, found in (("unpadded", unpadded), ("padded", padded), ("oriented", oriented)):
@@ -42,7 +46,9 @@ def _check_footprint(case: Case, comparison: Comparison) -> None:
         for name, radius_m in zip(("inscribed_radius", "circumscribed_radius"), radii_m):
             comparison.near(name + suffix, radius_m, meta[name + suffix], _TOLERANCE)
     place = meta["grid"]
-    grid = CostGrid(GridSpec(place["size_x"], place["size_y"], place["resolution"],
-                             *place["origin"]), place["background"])
+    grid = CostGrid(
+        GridSpec(place["size_x"], place["size_y"], place["resolution"], *place["origin"]),
+        place["background"],
+    )
     grid.fill_polygon(oriented, 0)
     comparison.exact("filled", grid.costs, arrays["filled"])

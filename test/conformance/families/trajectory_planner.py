@@ -1,4 +1,5 @@
 """The trajectory planner: single searches, and closed loops call by call."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -7,7 +8,7 @@ from typing import Dict, List, Optional
 
 import numpy as np
 
-from families.case import Case, Recorded, Unusable, load_case
+from families.case import Case, InvalidValue, Recorded, load_case
 from families.comparison import Comparison, Difference
 from families.loop import period_s, plan_of, replayed, spec_at
 from quad_nav.config import load
@@ -28,7 +29,7 @@ def check(path: Path) -> List[Difference]:
     elif case.meta["mode"] == "loop":
         _check_loop(case, comparison)
     else:
-        raise Unusable(f"{case.meta['mode']!r} is no mode; expected single or loop")
+        raise InvalidValue(f"{case.meta['mode']!r} is no mode; expected single or loop")
     return comparison.differences
 
 
@@ -53,9 +54,15 @@ def _check_single(case: Case, comparison: Comparison) -> None:
     recorded, meta = case.arrays, case.meta
     params, oscillation = _params(meta), Oscillation()
     spec = spec_at(meta, meta["origin"])
-    rollout = Rollout(params, spec, recorded["costmap"], recorded["footprint"],
-                      plan_of(recorded["plan"]), Pose2D(*recorded["pose"]),
-                      Twist2D(*recorded["velocity"]))
+    rollout = Rollout(
+        params,
+        spec,
+        recorded["costmap"],
+        recorded["footprint"],
+        plan_of(recorded["plan"]),
+        Pose2D(*recorded["pose"]),
+        Twist2D(*recorded["velocity"]),
+    )
     comparison.exact("within_robot", rollout.grids.within_robot, recorded["within_robot"] != 0)
     comparison.exact("path_dist", rollout.grids.path, recorded["path_dist"])
     comparison.exact("goal_dist", rollout.grids.goal, recorded["goal_dist"])
@@ -65,13 +72,16 @@ def _check_single(case: Case, comparison: Comparison) -> None:
     comparison.near("best_points", best.points, recorded["best_points"], _TOLERANCE)
     command = best.sample if best.cost >= 0.0 else (0.0, 0.0, 0.0)
     comparison.near("cmd", command, recorded["cmd"], _TOLERANCE)
-    comparison.exact("state_flags", _flags(oscillation, meta["flag_names"], {}),
-                     recorded["state_flags"] != 0)
+    comparison.exact(
+        "state_flags", _flags(oscillation, meta["flag_names"], {}), recorded["state_flags"] != 0
+    )
     comparison.near("state_nums", _numbers(oscillation), recorded["state_nums"], _TOLERANCE)
 
     _check_samples(rollout, recorded, comparison)
-    costs = [footprint_cost(spec, recorded["costmap"], recorded["footprint"], Pose2D(*pose))
-             for pose in recorded["footprint_poses"]]
+    costs = [
+        footprint_cost(spec, recorded["costmap"], recorded["footprint"], Pose2D(*pose))
+        for pose in recorded["footprint_poses"]
+    ]
     comparison.exact("footprint_costs", costs, recorded["footprint_costs"])
 
 
@@ -94,19 +104,34 @@ def _check_loop(case: Case, comparison: Comparison) -> None:
         _check_call(planner, control, case.arrays, meta, k, comparison)
 
 
-def _check_call(planner: TrajectoryPlanner, control: Optional[Control], recorded: Recorded,
-                meta: Recorded, k: int, comparison: Comparison) -> None:
+def _check_call(
+    planner: TrajectoryPlanner,
+    control: Optional[Control],
+    recorded: Recorded,
+    meta: Recorded,
+    k: int,
+    comparison: Comparison,
+) -> None:
     exact, near = comparison.exact, comparison.near
     command = control.command if control else Twist2D()
     exact(f"ok[{k}]", control is not None, bool(recorded["ok"][k]))
-    near(f"cmd[{k}]", [command.vx_mps, command.vy_mps, command.vyaw_radps], recorded["cmd"][k],
-         _TOLERANCE)
+    near(
+        f"cmd[{k}]",
+        [command.vx_mps, command.vy_mps, command.vyaw_radps],
+        recorded["cmd"][k],
+        _TOLERANCE,
+    )
     exact(f"goal_reached[{k}]", planner.is_goal_reached(), bool(recorded["goal_reached"][k]))
-    state = {"rotating_to_goal": planner.rotating_to_goal,
-             "xy_tolerance_latch": planner.xy_tolerance_latch,
-             "reached_goal": planner.is_goal_reached()}
-    exact(f"state_flags[{k}]", _flags(planner.oscillation, meta["flag_names"], state),
-          recorded["state_flags"][k] != 0)
+    state = {
+        "rotating_to_goal": planner.rotating_to_goal,
+        "xy_tolerance_latch": planner.xy_tolerance_latch,
+        "reached_goal": planner.is_goal_reached(),
+    }
+    exact(
+        f"state_flags[{k}]",
+        _flags(planner.oscillation, meta["flag_names"], state),
+        recorded["state_flags"][k] != 0,
+    )
     near(f"state_nums[{k}]", _numbers(planner.oscillation), recorded["state_nums"][k], _TOLERANCE)
     exact(f"plan_lengths[{k}] (global)", len(planner.plan), recorded["plan_lengths"][k, 0])
     if control is not None:
@@ -114,8 +139,12 @@ def _check_call(planner: TrajectoryPlanner, control: Optional[Control], recorded
     if recorded["goal_mode"][k]:
         return
     best = planner.best
-    near(f"best_cost[{k}]", np.nan if best is None else best.cost, recorded["best_cost"][k],
-         _TOLERANCE)
+    near(
+        f"best_cost[{k}]",
+        np.nan if best is None else best.cost,
+        recorded["best_cost"][k],
+        _TOLERANCE,
+    )
     if control is not None and best is not None:
         exact(f"best_n_points[{k}]", len(control.local_plan), recorded["best_n_points"][k])
         near(f"best_vel[{k}]", best.sample, recorded["best_vel"][k], _TOLERANCE)

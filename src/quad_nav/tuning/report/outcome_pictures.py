@@ -1,4 +1,5 @@
 """What came of a search: time against clearance, and flights before and after."""
+
 from __future__ import annotations
 
 from typing import Any, List, Optional, Sequence, Tuple
@@ -8,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from quad_nav.offline.report.style import ALARM, QUIET, colour, new_figure, robot_legend
+from quad_nav.report.style import ALARM, QUIET, colour, new_figure, robot_legend
 from quad_nav.tuning.figures import Figures
 from quad_nav.tuning.flight_result import FlightResult
 
@@ -36,8 +37,11 @@ def pareto_picture(candidates: Sequence[Figures], base: Figures, tuned: Figures)
     """Candidates that reached every goal and touched nothing; others are left out."""
     figure = new_figure(3.8)
     axes = figure.subplots()
-    clean = [found for found in (place(one) for one in candidates
-                                 if one.succeeded == one.flights) if found is not None]
+    clean = [
+        found
+        for found in (place(one) for one in candidates if one.succeeded == one.flights)
+        if found is not None
+    ]
     if clean:
         times_s, gaps_m = zip(*clean)
         axes.scatter(times_s, gaps_m, s=22, color=colour(0), zorder=3)
@@ -47,12 +51,20 @@ def pareto_picture(candidates: Sequence[Figures], base: Figures, tuned: Figures)
     for one, marker, ink in ((base, "s", "black"), (tuned, "*", ALARM)):
         found = place(one)
         if found is not None:
-            axes.plot(*found, marker, color=ink, ms=8 if marker == "s" else 14, mec="white",
-                      zorder=6)
+            axes.plot(
+                *found, marker, color=ink, ms=8 if marker == "s" else 14, mec="white", zorder=6
+            )
     axes.set(xlabel="mean mission time, s", ylabel="smallest gap, m")
-    robot_legend(figure, (), [
-        _symbol("o", "candidate", colour(0)), _symbol("o", "front", "white", QUIET),
-        _symbol("s", "base", "black"), _symbol("*", "tuned", ALARM, size=13)])
+    robot_legend(
+        figure,
+        (),
+        [
+            _symbol("o", "candidate", colour(0)),
+            _symbol("o", "front", "white", QUIET),
+            _symbol("s", "base", "black"),
+            _symbol("*", "tuned", ALARM, size=13),
+        ],
+    )
     return figure
 
 
@@ -60,29 +72,58 @@ def held_out_picture(base: Sequence[FlightResult], tuned: Sequence[FlightResult]
     """Each flight of the base beside the tuned one of the same mission and seed."""
     figure = new_figure(3.4)
     left, right = figure.subplots(1, 2)
-    _draw_pairs(left, [(one.time_s, other.time_s) for one, other in zip(base, tuned)],
-                "Mission time, s", base, tuned)
+    _draw_pairs(
+        left,
+        [(one.time_s, other.time_s) for one, other in zip(base, tuned)],
+        "Mission time, s",
+        base,
+        tuned,
+    )
     gaps = [(one.gap_m, other.gap_m) for one, other in zip(base, tuned)]
-    _draw_pairs(right, [(np.nan if a is None else a, np.nan if b is None else b) for a, b in gaps],
-                "Smallest gap, m", base, tuned)
-    robot_legend(figure, (), [_symbol("o", "successful flight", colour(0)),
-                              _symbol("X", "failed flight", ALARM, size=8)])
+    _draw_pairs(
+        right,
+        [(np.nan if a is None else a, np.nan if b is None else b) for a, b in gaps],
+        "Smallest gap, m",
+        base,
+        tuned,
+    )
+    robot_legend(
+        figure,
+        (),
+        [
+            _symbol("o", "successful flight", colour(0)),
+            _symbol("X", "failed flight", ALARM, size=8),
+        ],
+    )
     return figure
 
 
-def _draw_pairs(axes: Axes, pairs: Sequence[Tuple[float, float]], title: str,
-                base: Sequence[FlightResult], tuned: Sequence[FlightResult]) -> None:
+def _draw_pairs(
+    axes: Axes,
+    pairs: Sequence[Tuple[float, float]],
+    title: str,
+    base: Sequence[FlightResult],
+    tuned: Sequence[FlightResult],
+) -> None:
     axes.set_title(title)
     for flights, column in ((base, 0), (tuned, 1)):
         shift = np.linspace(-0.16, 0.16, len(pairs)) if len(pairs) > 1 else np.zeros(1)
         for k, flight in enumerate(flights):
-            axes.plot(column + shift[k], pairs[k][column], "o" if flight.succeeded else "X",
-                      color=colour(0) if flight.succeeded else ALARM, mec="white", mew=0.5,
-                      ms=5 if flight.succeeded else 8, zorder=4)
+            axes.plot(
+                column + shift[k],
+                pairs[k][column],
+                "o" if flight.succeeded else "X",
+                color=colour(0) if flight.succeeded else ALARM,
+                mec="white",
+                mew=0.5,
+                ms=5 if flight.succeeded else 8,
+                zorder=4,
+            )
         values = np.array([pair[column] for pair in pairs])
         if np.isfinite(values).any():
-            axes.hlines(np.nanmean(values), column - 0.28, column + 0.28, color="black", lw=1.6,
-                        zorder=5)
+            axes.hlines(
+                np.nanmean(values), column - 0.28, column + 0.28, color="black", lw=1.6, zorder=5
+            )
     for k, pair in enumerate(pairs):
         shift_k = -0.16 + 0.32 * k / max(len(pairs) - 1, 1)
         axes.plot([shift_k, 1 + shift_k], pair, color=QUIET, lw=0.5, alpha=0.5, zorder=2)

@@ -1,4 +1,5 @@
 """How a search went: costs of candidates in order, which parameters counted, and their values."""
+
 from __future__ import annotations
 
 import math
@@ -13,14 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 from optuna.trial import FrozenTrial
 
-from quad_nav.offline.report.style import (
-    ALARM,
-    QUIET,
-    colour,
-    label_log,
-    new_figure,
-    robot_legend,
-)
+from quad_nav.report.style import ALARM, QUIET, colour, label_log, new_figure, robot_legend
 from quad_nav.tuning.search import is_complete
 from quad_nav.tuning.space import Dimension, SearchSpace
 
@@ -36,8 +30,14 @@ def history_picture(trials: Sequence[FrozenTrial], reference: float) -> Figure:
     top = _top(trials, reference)
     _draw_costs(axes, [trial.number for trial in trials], trials, top)
     costs = [_value(trial) if is_complete(trial) else math.inf for trial in trials]
-    axes.step([trial.number for trial in trials], np.minimum.accumulate(costs), where="post",
-              color=colour(0), lw=1.6, label="best so far")
+    axes.step(
+        [trial.number for trial in trials],
+        np.minimum.accumulate(costs),
+        where="post",
+        color=colour(0),
+        lw=1.6,
+        label="best so far",
+    )
     axes.axhline(reference, color="black", ls="--", lw=1.0, label="base")
     axes.set(xlabel="candidate", ylabel="mean cost", ylim=(_bottom(trials, reference), top))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -58,8 +58,9 @@ def importances(trials: Sequence[FrozenTrial], space: SearchSpace) -> Dict[str, 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
         evaluator = optuna.importance.PedAnovaImportanceEvaluator()
-    found = optuna.importance.get_param_importances(study, evaluator=evaluator,
-                                                    params=list(space.paths))
+    found = optuna.importance.get_param_importances(
+        study, evaluator=evaluator, params=list(space.paths)
+    )
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 
@@ -75,8 +76,14 @@ def importance_picture(found: Dict[str, float]) -> Figure:
     return figure
 
 
-def slice_picture(trials: Sequence[FrozenTrial], space: SearchSpace, order: Sequence[str],
-                  chosen: Dict[str, Any], base: Dict[str, Any], reference: float) -> Figure:
+def slice_picture(
+    trials: Sequence[FrozenTrial],
+    space: SearchSpace,
+    order: Sequence[str],
+    chosen: Dict[str, Any],
+    base: Dict[str, Any],
+    reference: float,
+) -> Figure:
     """For each parameter: its value and the cost, each candidate a dot; those first that count."""
     rows = -(-len(order) // _COLUMNS)
     figure = new_figure(0.6 + 1.75 * rows)
@@ -92,30 +99,47 @@ def slice_picture(trials: Sequence[FrozenTrial], space: SearchSpace, order: Sequ
         axes.set_title("\n".join(_two_lines(path)), fontsize=7.5)
         axes.set_ylim(bottom, top)
         _scale(axes, one)
-    for axes in panels[len(order):]:
+    for axes in panels[len(order) :]:
         axes.axis("off")
-    robot_legend(figure, (), [*_dots(), *(
-        _line(style, name) for style, name in (("--", "base"), ("-", "tuned")))])
+    robot_legend(
+        figure,
+        (),
+        [*_dots(), *(_line(style, name) for style, name in (("--", "base"), ("-", "tuned")))],
+    )
     return figure
 
 
-def _draw_costs(axes: Axes, places: Sequence[float], trials: Sequence[FrozenTrial], top: float
-                ) -> None:
+def _draw_costs(
+    axes: Axes, places: Sequence[float], trials: Sequence[FrozenTrial], top: float
+) -> None:
     """What costs more than the axis shows lies on its upper end."""
     for is_through, marker, face in ((True, "o", colour(0)), (False, "x", QUIET)):
-        points = [(place, min(_value(trial), top)) for place, trial in zip(places, trials)
-                  if is_complete(trial) is is_through]
+        points = [
+            (place, min(_value(trial), top))
+            for place, trial in zip(places, trials)
+            if is_complete(trial) is is_through
+        ]
         if points:
             above = [cost >= top for _, cost in points]
             x, y = zip(*points)
-            axes.scatter(x, y, s=20, marker=marker, zorder=3, clip_on=False, linewidths=1.0,
-                         color=[ALARM if one else face for one in above])
+            axes.scatter(
+                x,
+                y,
+                s=20,
+                marker=marker,
+                zorder=3,
+                clip_on=False,
+                linewidths=1.0,
+                color=[ALARM if one else face for one in above],
+            )
 
 
 def _dots() -> List[Any]:
-    return [_line("", "flew everything", marker="o", color=colour(0)),
-            _line("", "dropped", marker="x", color=QUIET),
-            _line("", "off the scale", marker="o", color=ALARM)]
+    return [
+        _line("", "flew everything", marker="o", color=colour(0)),
+        _line("", "dropped", marker="x", color=QUIET),
+        _line("", "off the scale", marker="o", color=ALARM),
+    ]
 
 
 def _line(style: str, name: str, **more: Any) -> Any:

@@ -1,12 +1,13 @@
 """The page of a sweep."""
+
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Iterator, Optional, Sequence
 
-from quad_nav.offline.report import style
-from quad_nav.offline.report.page import Page, Section, picture, render
-from quad_nav.offline.report.write import write_page
+from quad_nav.report import style
+from quad_nav.report.page import Page, Section, picture, render
+from quad_nav.report.write import write_page
 from quad_nav.tuning.record import value_words
 from quad_nav.tuning.report.sweep_pictures import sweep_picture
 from quad_nav.tuning.sweep import SweepRow, SweepSetup
@@ -19,15 +20,26 @@ def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
     """Pictures and the table."""
     with style.styled():
         section = Section(
-            "sweep", "Side by side", f"{setup.flights} flights at each point, the same for all. "
+            "sweep",
+            "Side by side",
+            f"{setup.flights} flights at each point, the same for all. "
             "Gaps are between hulls; times are of missions that reached every goal.",
-            (picture("sweep", "Figures over the values", sweep_picture(rows)),))
-    return render("sweep.html.jinja", [section], _FOLDER, setup=setup, rows=rows,
-                  words=value_words, versions=versions())
+            (picture("sweep", "Figures over the values", sweep_picture(rows)),),
+        )
+    return render(
+        "sweep.html.jinja",
+        [section],
+        _FOLDER,
+        setup=setup,
+        rows=rows,
+        words=value_words,
+        versions=versions(),
+    )
 
 
-def write_sweep_report(setup: SweepSetup, rows: Sequence[SweepRow], path: Optional[Path],
-                       pictures: Optional[Path]) -> Iterator[Path]:
+def write_sweep_report(
+    setup: SweepSetup, rows: Sequence[SweepRow], path: Optional[Path], pictures: Optional[Path]
+) -> Iterator[Path]:
     """Writes the page, its pictures, or both; yields what is there now."""
     page = sweep_page(setup, rows)
     if path is not None:

@@ -1,4 +1,5 @@
 """Figures over the values of one parameter, of two, or over a list of points."""
+
 from __future__ import annotations
 
 from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
@@ -7,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from quad_nav.offline.report.style import ALARM, QUIET, colour, new_figure
+from quad_nav.report.style import ALARM, QUIET, colour, new_figure
 from quad_nav.tuning.figures import Figures
 from quad_nav.tuning.record import value_words
 from quad_nav.tuning.sweep import SweepRow
@@ -72,8 +73,13 @@ def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measur
         axes.set_ylim(-5, 105)
 
 
-def _draw_map(figure: Figure, axes: Axes, rows: Sequence[SweepRow], values: Sequence[List[Any]],
-              measure: Measure) -> None:
+def _draw_map(
+    figure: Figure,
+    axes: Axes,
+    rows: Sequence[SweepRow],
+    values: Sequence[List[Any]],
+    measure: Measure,
+) -> None:
     cells = np.full((len(values[0]), len(values[1])), np.nan)
     first, second = list(rows[0].point)
     for row in rows:
@@ -81,12 +87,26 @@ def _draw_map(figure: Figure, axes: Axes, rows: Sequence[SweepRow], values: Sequ
         place = (values[0].index(row.point[first]), values[1].index(row.point[second]))
         cells[place] = np.nan if found is None else found
     limits = (0.0, 100.0) if measure.title.endswith("%") else (None, None)
-    image = axes.imshow(cells, aspect="auto", origin="lower", vmin=limits[0], vmax=limits[1],
-                        cmap="RdYlGn" if measure.more_is_better else "RdYlGn_r", alpha=0.85)
+    image = axes.imshow(
+        cells,
+        aspect="auto",
+        origin="lower",
+        vmin=limits[0],
+        vmax=limits[1],
+        cmap="RdYlGn" if measure.more_is_better else "RdYlGn_r",
+        alpha=0.85,
+    )
     if cells.size <= _MOST_NUMBERS:
         for (i, j), number in np.ndenumerate(cells):
-            axes.text(j, i, "–" if np.isnan(number) else f"{number:.{measure.decimals}f}",
-                      color=_ink(image.to_rgba(number)), ha="center", va="center", fontsize=8)
+            axes.text(
+                j,
+                i,
+                "–" if np.isnan(number) else f"{number:.{measure.decimals}f}",
+                color=_ink(image.to_rgba(number)),
+                ha="center",
+                va="center",
+                fontsize=8,
+            )
     else:
         figure.colorbar(image, ax=axes)
     axes.set_title(measure.title)
@@ -105,8 +125,12 @@ def _ink(rgba: np.ndarray) -> str:
 def _draw_list(axes: Axes, rows: Sequence[SweepRow], measure: Measure) -> None:
     found = [measure.value(row.figures) for row in rows]
     is_alarming = measure.title.startswith("Flights with")
-    axes.barh(range(len(rows)), [0.0 if one is None else one for one in found], height=0.65,
-              color=ALARM if is_alarming else colour(0))
+    axes.barh(
+        range(len(rows)),
+        [0.0 if one is None else one for one in found],
+        height=0.65,
+        color=ALARM if is_alarming else colour(0),
+    )
     axes.set_title(measure.title, fontsize=8)
     axes.set(ylim=(len(rows) - 0.4, -0.6), yticks=range(len(rows)))
     labels = [", ".join(map(value_words, row.point.values()))[:_MOST_LETTERS] for row in rows]

@@ -1,17 +1,18 @@
 """The page of a study: how the search went, what came of it, a flight before and after."""
+
 from __future__ import annotations
 
 from pathlib import Path
 from typing import List
 
-from quad_nav.offline.report import style
-from quad_nav.offline.report.encounters import encounters
-from quad_nav.offline.report.figures import figures
-from quad_nav.offline.report.measures import tracks
-from quad_nav.offline.report.page import MOST_STRIPS, Page, Section, picture, render
-from quad_nav.offline.report.paths_picture import paths_picture
-from quad_nav.offline.report.timeline_picture import timeline_picture
-from quad_nav.offline.trace import FlightTrace
+from quad_nav.recording.trace import FlightTrace
+from quad_nav.report import style
+from quad_nav.report.encounters import encounters
+from quad_nav.report.figures import figures
+from quad_nav.report.measures import tracks
+from quad_nav.report.page import MOST_STRIPS, Page, Section, picture, render
+from quad_nav.report.paths_picture import paths_picture
+from quad_nav.report.timeline_picture import timeline_picture
 from quad_nav.tuning import record
 from quad_nav.tuning.figures import Figures
 from quad_nav.tuning.figures import figures as figures_of
@@ -34,21 +35,43 @@ def tune_page(result: TuneResult, before: FlightTrace, after: FlightTrace, comma
     with style.styled():
         sections = [_held_out(result), _flights(before, after), *_search(result)]
     return render(
-        "tune.html.jinja", sections, _FOLDER, result=result, command=command,
-        rows=record.held_out_rows(result), barn=record.barn_rows(result), terms=TERMS,
-        gains=[(gain, record.value_words(gain.base), record.value_words(gain.value),
-                record.gain_words(gain)) for gain in result.refined.gains],
+        "tune.html.jinja",
+        sections,
+        _FOLDER,
+        result=result,
+        command=command,
+        rows=record.held_out_rows(result),
+        barn=record.barn_rows(result),
+        terms=TERMS,
+        gains=[
+            (
+                gain,
+                record.value_words(gain.base),
+                record.value_words(gain.value),
+                record.gain_words(gain),
+            )
+            for gain in result.refined.gains
+        ],
         flights=[("base", figures(before)), ("tuned", figures(after))],
-        versions=all_versions())
+        versions=all_versions(),
+    )
 
 
 def _held_out(result: TuneResult) -> Section:
     held_out = result.held_out
     return Section(
-        "held-out", "Flights that the search never saw", f"{len(held_out.cases)} flights with each "
+        "held-out",
+        "Flights that the search never saw",
+        f"{len(held_out.cases)} flights with each "
         "set of parameters; a line joins those of the same mission and seed, thick bars are means.",
-        (picture("held_out", "Times and gaps of the base and the tuned parameters",
-                 held_out_picture(held_out.base, held_out.tuned)),))
+        (
+            picture(
+                "held_out",
+                "Times and gaps of the base and the tuned parameters",
+                held_out_picture(held_out.base, held_out.tuned),
+            ),
+        ),
+    )
 
 
 def _flights(before: FlightTrace, after: FlightTrace) -> Section:
@@ -59,11 +82,18 @@ def _flights(before: FlightTrace, after: FlightTrace) -> Section:
         found = figures(trace, among)
         words = f"{name.capitalize()}: {found.mission_s:.1f} s"
         notes += [words, ""]
-        pictures += [picture(f"paths_{name}", f"Paths {name}", paths_picture(trace, among, shown)),
-                     picture(f"timeline_{name}", f"Goals {name}", timeline_picture(trace))]
-    return Section("flights", "One of these flights, before and after", "The same mission and seed "
-                   "with the base and with the tuned parameters. Letters are close encounters.",
-                   tuple(pictures), tuple(notes))
+        pictures += [
+            picture(f"paths_{name}", f"Paths {name}", paths_picture(trace, among, shown)),
+            picture(f"timeline_{name}", f"Goals {name}", timeline_picture(trace)),
+        ]
+    return Section(
+        "flights",
+        "One of these flights, before and after",
+        "The same mission and seed "
+        "with the base and with the tuned parameters. Letters are close encounters.",
+        tuple(pictures),
+        tuple(notes),
+    )
 
 
 def _search(result: TuneResult) -> List[Section]:
@@ -71,23 +101,55 @@ def _search(result: TuneResult) -> List[Section]:
     reference = figures_of(result.reference)
     found = importances(trials, space)
     sections = [
-        Section("history", "The search", "Mean cost of each candidate, lower is better. Those that "
-                "were dropped did not fly everything.",
-                (picture("history", "Cost of each candidate",
-                         history_picture(trials, reference.cost)),)),
-        _pareto(result, reference)]
+        Section(
+            "history",
+            "The search",
+            "Mean cost of each candidate, lower is better. Those that "
+            "were dropped did not fly everything.",
+            (
+                picture(
+                    "history", "Cost of each candidate", history_picture(trials, reference.cost)
+                ),
+            ),
+        ),
+        _pareto(result, reference),
+    ]
     if found:
-        sections.append(Section(
-            "importances", "What counted", "How much each parameter tells the better candidates "
-            "from the others (PED-ANOVA).",
-            (picture("importances", "Importance of each parameter", importance_picture(found)),)))
+        sections.append(
+            Section(
+                "importances",
+                "What counted",
+                "How much each parameter tells the better candidates from the others (PED-ANOVA).",
+                (
+                    picture(
+                        "importances", "Importance of each parameter", importance_picture(found)
+                    ),
+                ),
+            )
+        )
     order = list(found) or list(space.paths)
-    sections.append(Section(
-        "slices", "Values", "Each candidate's value and cost, for every parameter that was "
-        "searched; the tuned value has no line where the base's was kept.",
-        (picture("slices", "Cost over the values of each parameter", slice_picture(
-            trials, space, order, result.refined.values, dict(result.setup.base),
-            reference.cost)),)))
+    sections.append(
+        Section(
+            "slices",
+            "Values",
+            "Each candidate's value and cost, for every parameter that was "
+            "searched; the tuned value has no line where the base's was kept.",
+            (
+                picture(
+                    "slices",
+                    "Cost over the values of each parameter",
+                    slice_picture(
+                        trials,
+                        space,
+                        order,
+                        result.refined.values,
+                        dict(result.setup.base),
+                        reference.cost,
+                    ),
+                ),
+            ),
+        )
+    )
     return sections
 
 
@@ -97,8 +159,16 @@ def _pareto(result: TuneResult, reference: Figures) -> Section:
     gains = result.refined.gains
     tuned = gains[0].with_it if gains else reference
     return Section(
-        "pareto", "Time against clearance", f"{len(candidates)} candidates flew everything; those "
+        "pareto",
+        "Time against clearance",
+        f"{len(candidates)} candidates flew everything; those "
         "that reached every goal and touched nothing are shown. No other one beats those of the "
         "front in both. The tuned one has flown more than the others.",
-        (picture("pareto", "Mean time and smallest gap of candidates",
-                 pareto_picture(candidates, reference, tuned)),))
+        (
+            picture(
+                "pareto",
+                "Mean time and smallest gap of candidates",
+                pareto_picture(candidates, reference, tuned),
+            ),
+        ),
+    )

@@ -1,0 +1,161 @@
+"""Check that a change of the code leaves every flight as it was, bit for bit.
+
+    python bench/same_flights.py record before.json --source ../before --barn worlds.npz
+    python bench/same_flights.py compare before.json --barn worlds.npz
+
+``record`` flies a fixed list of flights with the sources of a checkout and writes their summaries;
+``compare`` flies them again and prints every value that differs. The flights are the tutorial's
+mission with both configurations, each encounter, twelve robots with random goals, and five BARN
+worlds if ``--barn`` names the file of worlds. Wall times and versions are not compared. A renamed
+key of a summary is listed in ``RENAMED``.
+
+Exit status: 0 if all flights are the same, 1 if one differs, 2 if one could not be flown.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
+
+import click
+import joblib
+
+ROOT = Path(__file__).resolve().parents[1]
+JITTER_M = 0.3
+TIME_LIMIT_S = 600
+BARN_WORLDS = "0,60,120,180,240"
+NOT_COMPARED = {"wall_time_s", "real_time_factor", "versions", "per_minute", "flights_per_minute"}
+RENAMED: Dict[str, str] = {}  # key of a recorded summary -> key of today's
+
+Summary = Dict[str, Any]
+
+
+def flights(barn: Optional[Path]) -> Dict[str, List[str]]:
+    """Return the arguments of ``quad`` for each flight, by the flight's name."""
+    usual = ["--jitter", str(JITTER_M), "--time-limit", str(TIME_LIMIT_S)]
+    listed = {
+        f"mission {config} seed {seed}": ["fly", "--config", config, "--seed", str(seed), *usual]
+        for config in ("default", "tutorial")
+        for seed in range(1, 6)
+    }
+    for folder in sorted((ROOT / "goals" / "encounters").iterdir()):
+        scene = ROOT / "scenes" / "encounters" / f"{folder.name}.yaml"
+        if scene.exists():
+            for seed in (1, 2):
+                listed[f"{folder.name} seed {seed}"] = [
+                    "fly",
+                    "--scene",
+                    str(scene),
+                    "--goals",
+                    str(folder),
+                    "--seed",
+                    str(seed),
+                    *usual,
+                ]
+    listed["12 robots seed 5"] = ["fly", "--robots", "12", "--seed", "5"]
+    if barn is not None:
+        listed["barn"] = ["barn", "--worlds", str(barn), "--only", BARN_WORLDS, "--workers", "1"]
+    return listed
+
+
+def fly(name: str, arguments: Sequence[str], source: Path) -> Tuple[str, Optional[Summary], str]:
+    """Fly one flight with the sources of a checkout.
+
+    Returns:
+        The flight's name, its summary or None, and what ``quad`` wrote on standard error.
+    """
+    run = subprocess.run(
+        [sys.executable, "-m", "quad_nav.cli", *arguments, "--json", "-", "--quiet"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(source / "src")},
+        check=False,
+    )
+    return name, json.loads(run.stdout) if run.stdout.startswith("{") else None, run.stderr
+
+
+def differences(before: Any, after: Any, place: str = "") -> Iterator[str]:
+    """Yield a line for each value that is not the same in two summaries."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        before = {RENAMED.get(key, key): value for key, value in before.items()}
+        for key in [*before, *(key for key in after if key not in before)]:
+            if key not in NOT_COMPARED:
+                yield from differences(
+                    before.get(key, "absent"), after.get(key, "absent"), f"{place}/{key}"
+                )
+    elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
+        for index, (one, other) in enumerate(zip(before, after)):
+            yield from differences(one, other, f"{place}[{index}]")
+    elif before != after:
+        yield f"{place}: {before} before, {after} now"
+
+
+def fly_all(barn: Optional[Path], source: Path, jobs: int) -> Dict[str, Summary]:
+    """Fly the whole list; exit with status 2 if one of them could not be flown."""
+    tasks = flights(barn)
+    summaries: Dict[str, Summary] = {}
+    parallel = joblib.Parallel(jobs, return_as="generator_unordered")
+    for name, summary, errors in parallel(
+        joblib.delayed(fly)(name, arguments, source.resolve()) for name, arguments in tasks.items()
+    ):
+        if summary is None:
+            print(f"{name}: not flown\n{errors}", file=sys.stderr)
+            sys.exit(2)
+        summaries[name] = summary
+    return {name: summaries[name] for name in tasks}
+
+
+@click.group()
+def main() -> None:
+    """Record a list of flights, or compare today's with recorded ones."""
+
+
+_FILE = click.Path(dir_okay=False, path_type=Path)
+_OPTIONS = (
+    click.argument("file", type=_FILE),
+    click.option(
+        "--source",
+        type=click.Path(file_okay=False, path_type=Path),
+        default=ROOT,
+        help="The checkout whose sources fly.  [default: this one]",
+    ),
+    click.option("--barn", type=_FILE, help="The file of the BARN worlds."),
+    click.option("--jobs", type=int, default=joblib.cpu_count(), help="Flights at the same time."),
+)
+
+
+def _with_options(command: Any) -> Any:
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+@main.command()
+@_with_options
+def record(file: Path, source: Path, barn: Optional[Path], jobs: int) -> None:
+    """Fly and write the summaries to FILE."""
+    summaries = fly_all(barn, source, jobs)
+    file.write_text(json.dumps(summaries, indent=1), encoding="utf-8")
+    print(f"{len(summaries)} flights recorded")
+
+
+@main.command()
+@_with_options
+def compare(file: Path, source: Path, barn: Optional[Path], jobs: int) -> None:
+    """Fly and compare with the summaries in FILE."""
+    recorded = json.loads(file.read_text(encoding="utf-8"))
+    flown = fly_all(barn, source, jobs)
+    lines = [
+        f"{name}{line}" for name in flown for line in differences(recorded.get(name), flown[name])
+    ]
+    print("\n".join([*lines, f"{len(flown)} flights, {len(lines)} values differ"]))
+    sys.exit(bool(lines))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,223 @@
+"""What flies through BARN's worlds: parameters, body and LIDAR, all checked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, List, Tuple
+
+from quad_nav import config
+from quad_nav.barn.protocol import GOAL_M, GOAL_TOLERANCE_M, SAMPLE_STEP, START, TIME_LIMIT_S
+from quad_nav.barn.worlds import BarnWorld, load_worlds
+from quad_nav.config import Configuration
+from quad_nav.config.files import set_value
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.errors import InputError
+from quad_nav.mission.goal_file import WatchedGoalFile
+from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
+from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.scenario.flight_setup import FlightSetup, config_folder, goals_off_the_costmap
+from quad_nav.sim.flight import Airframe, FlightParams
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.simulation import STEPS_PER_S, SimulationParams
+
+LIDAR = LidarParams(
+    math.radians(270.0),
+    math.radians(270.0) / 720,
+    range_min_m=0.1,
+    range_max_m=30.0,
+    noise_std_m=0.001,
+)
+"""The Hokuyo UST-10 of the challenge's robot."""
+SCANS_PER_S = 40
+
+
+@dataclass(frozen=True)
+class BarnOptions:
+    """What a person asks for.
+
+    ``params``: the name of a shipped folder of parameters, or a folder's path;
+    ``parameters``: (path, value) on top of it. ``only``: numbers of worlds, all when empty;
+    ``sample``: those of the official sample. ``runs``: flights through each.
+    """
+
+    worlds: Path
+    params: str = "barn"
+    parameters: Tuple[Tuple[str, Any], ...] = ()
+    only: Tuple[int, ...] = ()
+    sample: bool = False
+    runs: int = 1
+    seed: int = 0
+    body_radius_m: float = 0.20
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """What is the same in all flights. ``name`` is that of the parameters.
+
+    ``frames`` are the parameters' own names for our map, body and LIDAR.
+    """
+
+    name: str
+    configuration: Configuration
+    simulation: SimulationParams
+    seed: int
+    frames: Tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class BarnSetup:
+    """All flights that are wanted."""
+
+    contestant: Contestant
+    worlds: Tuple[BarnWorld, ...]
+    runs: int
+
+    @property
+    def wanted(self) -> int:
+        """How many flights there are."""
+        return self.runs * len(self.worlds)
+
+    @property
+    def warnings(self) -> Tuple[str, ...]:
+        return self.contestant.configuration.warnings
+
+
+def read_barn_setup(options: BarnOptions) -> BarnSetup:
+    """Reads worlds and parameters.
+
+    Raises:
+        InputError: every fault in them.
+    """
+    problems: List[str] = []
+    worlds: Tuple[BarnWorld, ...] = ()
+    try:
+        worlds = load_worlds(options.worlds, options.only)
+    except InputError as error:
+        problems += error.problems
+    if options.sample:
+        worlds = tuple(world for world in worlds if world.number % SAMPLE_STEP == 0)
+        if not worlds and not problems:
+            problems.append(f"{options.worlds}: none of the worlds is in the official sample")
+    problems += _blocked_starts(worlds, options.body_radius_m, options.worlds)
+    try:
+        contestant = _contestant(options)
+    except InputError as error:
+        raise InputError(problems + error.problems) from error
+    if problems:
+        raise InputError(problems)
+    return BarnSetup(contestant, worlds, options.runs)
+
+
+def flight_setup(contestant: Contestant, world: BarnWorld, run: int) -> FlightSetup:
+    """One flight; run 0 has the contestant's seed, run 1 the next one, in every world."""
+    goals = RobotGoals("quad0", WatchedGoalFile("barn"), _GOALS)
+    return FlightSetup(
+        world.scene(),
+        (goals,),
+        (contestant.configuration,),
+        contestant.name,
+        contestant.simulation,
+        STEPS_PER_S // SCANS_PER_S,
+        contestant.seed + run,
+    )
+
+
+_GOALS = GoalSequence((Goal(*GOAL_M),), SequenceSettings(GOAL_TOLERANCE_M, TIME_LIMIT_S, retries=0))
+
+
+def _contestant(options: BarnOptions) -> Contestant:
+    folder = config_folder(options.params)
+    tree = config.load_files(folder, {"i": "0"})
+    for path, value in options.parameters:
+        set_value(tree, path, value, "the command line")
+    configuration = config.load(tree)
+    goals = RobotGoals("quad0", WatchedGoalFile(folder), _GOALS)
+    problems = [
+        *_unusable_inputs(configuration, folder),
+        *goals_off_the_costmap([goals], [configuration]),
+    ]
+    if problems:
+        raise InputError(problems)
+    simulation = SimulationParams(
+        LIDAR,
+        _limits(configuration.local_planner),
+        Airframe(radius_m=options.body_radius_m),
+        controller_period_s=1.0 / configuration.navigator.controller_frequency_hz,
+    )
+    return Contestant(
+        options.params, configuration, simulation, options.seed, _frames(configuration)
+    )
+
+
+def _limits(local_planner: Any) -> FlightParams:
+    """No command gets the quadcopter beyond the velocities that its parameters give.
+
+    A planner of the user's says nothing about them: then they are the quadcopter's own.
+    """
+    if isinstance(local_planner, TrajectoryPlannerParams):
+        speed_mps = max(local_planner.max_vel_x_mps, -local_planner.escape_vel_mps)
+    elif isinstance(local_planner, DwaParams):
+        speed_mps = (
+            local_planner.max_vel_trans_mps
+            if local_planner.max_vel_trans_mps >= 0.0
+            else math.hypot(local_planner.max_vel_x_mps, local_planner.max_vel_y_mps)
+        )
+    else:
+        return FlightParams()
+    yaw_rate_radps = local_planner.max_vel_theta_radps
+    return replace(FlightParams(), max_speed_mps=speed_mps, max_yaw_rate_radps=yaw_rate_radps)
+
+
+def _unusable_inputs(configuration: Configuration, folder: Path) -> List[str]:
+    """Sensors that are not there, and maps: nobody knows these worlds beforehand."""
+    problems = []
+    for costmap in (configuration.global_costmap, configuration.local_costmap):
+        for name, layer in costmap.layers:
+            if isinstance(layer, StaticLayerParams):
+                problems.append(
+                    f"{folder}: {name}: there is no map of these worlds; expected "
+                    "static_map: false, or plugins without a static layer"
+                )
+            for source in layer.sources if isinstance(layer, ObstacleLayerParams) else ():
+                if source.data_type != "LaserScan":
+                    problems.append(
+                        f"{folder}: {name}/{source.name}: data_type {source.data_type}, expected "
+                        "LaserScan, the only sensor here"
+                    )
+    return list(dict.fromkeys(problems))
+
+
+def _frames(configuration: Configuration) -> Tuple[str, ...]:
+    """Names of frames, in order: global ones, the body's, the sensors'.
+
+    Offline there are no frames to look up: odometry is exact, so that every global frame is
+    ``map``; the body's is ``base_link0``, and every LaserScan is the LIDAR's.
+    """
+    costmaps = (configuration.global_costmap, configuration.local_costmap)
+    names = [costmap.global_frame for costmap in costmaps]
+    names += [costmap.robot_base_frame for costmap in costmaps]
+    names += [
+        source.sensor_frame
+        for costmap in costmaps
+        for _, layer in costmap.layers
+        if isinstance(layer, ObstacleLayerParams)
+        for source in layer.sources
+    ]
+    return tuple(dict.fromkeys(name for name in names if name))
+
+
+def _blocked_starts(worlds: Tuple[BarnWorld, ...], radius_m: float, path: Path) -> List[str]:
+    problems = []
+    for world in worlds:
+        clearance_m = world.scene().flight_clearance_m(START.x_m, START.y_m)
+        if clearance_m <= radius_m:
+            problems.append(
+                f"{path}: world {world.number}: a cylinder is {clearance_m:.2f} m from "
+                f"the start, expected more than the body's radius, {radius_m:g} m"
+            )
+    return problems

@@ -1,0 +1,208 @@
+"""Planners, costmap layers and recoveries of one's own.
+
+Where move_base expects a plugin's name, a dotted Python name loads a class,
+``my_package.my_module.MyPlanner``. What the class has to offer is an
+``Interface``; ``docs/plugins.md`` shows a working example of each.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import traceback
+from dataclasses import dataclass, field
+from typing import Any, Dict, Iterator, Mapping, Tuple
+
+from quad_nav.control.controller import LocalPlanner
+from quad_nav.costmap.layer import Layer, LayerParams
+from quad_nav.errors import InputError
+from quad_nav.grid import GridSpec
+from quad_nav.plan.planner import GlobalPlanner
+from quad_nav.recovery import Recovery
+
+
+@dataclass(frozen=True)
+class Interface:
+    """What a plugin's class must have.
+
+    ``methods_of``: the class whose public methods and annotated attributes are
+    needed. ``arguments``: what the constructor is called with. ``derived``: whether
+    the plugin has to be derived from ``methods_of``.
+    """
+
+    kind: str
+    methods_of: type
+    arguments: Tuple[str, ...]
+    derived: bool = False
+
+
+GLOBAL_PLANNER = Interface("a global planner", GlobalPlanner, ("params", "footprint"))
+LOCAL_PLANNER = Interface(
+    "a local planner", LocalPlanner, ("params", "footprint", "control_period_s")
+)
+LAYER = Interface(
+    "a costmap layer", Layer, ("params", "spec", "rolling_window", "default_cost"), derived=True
+)
+RECOVERY = Interface("a recovery behaviour", Recovery, ("params",))
+
+
+class Parameters(Dict[str, Any]):
+    """The parameters below a plugin's name, as they were written.
+
+    ``parameters["radius"]`` that nobody wrote is an InputError with its place;
+    ``get`` has a default instead.
+    """
+
+    def __init__(self, written: Mapping[str, Any], place: str):
+        super().__init__(written)
+        self.place = place
+
+    def __missing__(self, name: str) -> Any:
+        raise InputError([f"{self.place}/{name}: missing; expected a value"])
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """A class of the user's and its parameters."""
+
+    plugin_class: Any
+    parameters: Parameters
+
+    def make(self, *arguments: Any) -> Any:
+        """An object of the class; ``arguments`` follow the parameters."""
+        return self.plugin_class(self.parameters, *arguments)
+
+
+@dataclass(frozen=True)
+class PluginLayerParams(LayerParams):
+    """The parameters of a user's layer, which gets them like ``Parameters``."""
+
+    plugin_class: Any = Layer
+    parameters: Parameters = field(default_factory=lambda: Parameters({}, ""))
+
+    def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> Layer:
+        return self.plugin_class(self, spec, rolling_window, default_cost)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.parameters[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.parameters
+
+    def get(self, name: str, default: Any = None) -> Any:
+        return self.parameters.get(name, default)
+
+
+def is_dotted(name: str) -> bool:
+    """Whether a plugin's name is a Python class's rather than one of pluginlib's."""
+    return "." in name and "/" not in name and ":" not in name
+
+
+def plugin_name(plugin: str) -> str:
+    """The namespace of a plugin's parameters and topics.
+
+    ``NavfnROS`` for ``navfn/NavfnROS``, ``MyPlanner`` for ``my_package.MyPlanner``.
+    """
+    return plugin.replace("::", "/").replace(".", "/").split("/")[-1]
+
+
+def load_class(name: str, interface: Interface) -> Any:
+    """The class of a dotted name.
+
+    Raises:
+        InputError: no such module or class, or one line for everything that it
+            lacks of the interface.
+    """
+    module_name, _, class_name = name.rpartition(".")
+    module = _imported(module_name)
+    found = getattr(module, class_name, None)
+    if not isinstance(found, type):
+        has = f"has no class {class_name}" if found is None else f"has {class_name}, not a class"
+        raise InputError(
+            [
+                f"{module_name} ({getattr(module, '__file__', 'built in')}) {has};"
+                f" expected {interface.kind} as package.module.Class"
+            ]
+        )
+    problems = list(_misfits(found, interface))
+    if problems:
+        raise InputError([f"{name} is not {interface.kind}: {problem}" for problem in problems])
+    return found
+
+
+def _imported(module_name: str) -> Any:
+    try:
+        return importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        missing = error.name or module_name
+        if module_name == missing or module_name.startswith(missing + "."):
+            raise InputError(
+                [
+                    f"there is no module {missing}; expected package.module.Class with"
+                    " the package's folder in PYTHONPATH"
+                ]
+            ) from error
+        raise InputError([_failure(module_name, error)]) from error
+    except Exception as error:  # whatever a user's module does wrong while it is imported
+        raise InputError([_failure(module_name, error)]) from error
+
+
+def _failure(module_name: str, error: Exception) -> str:
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    return (
+        f"{module_name} cannot be imported: {type(error).__name__}: {error}"
+        f" ({last.filename}:{last.lineno}); expected a module that can"
+    )
+
+
+def _misfits(plugin_class: Any, interface: Interface) -> Iterator[str]:
+    """Everything that the class lacks."""
+    wanted = interface.methods_of
+    if interface.derived and not issubclass(plugin_class, wanted):
+        yield (
+            f"it is not derived from {wanted.__name__}; expected class"
+            f" {plugin_class.__name__}({wanted.__module__}.{wanted.__name__})"
+        )
+        return
+    if not _takes(plugin_class, interface.arguments):
+        yield _expectation("__init__", plugin_class.__init__, interface.arguments)
+    for name in getattr(wanted, "__annotations__", {}):
+        if not hasattr(plugin_class, name):
+            yield f"it has no {name}; expected a class attribute or a property of that name"
+    for name, function in vars(wanted).items():
+        if name.startswith("_") or not inspect.isfunction(function):
+            continue
+        arguments = tuple(inspect.signature(function).parameters)[1:]
+        own = getattr(plugin_class, name, None)
+        if own is None or (own is function and not interface.derived):
+            yield f"it has no method {name}; expected {_call(name, arguments)}"
+        elif not _takes(own, arguments if _is_bound(plugin_class, name) else ("self", *arguments)):
+            yield _expectation(name, own, arguments)
+
+
+def _takes(function: Any, arguments: Tuple[str, ...]) -> bool:
+    try:
+        inspect.signature(function).bind(*arguments)
+    except TypeError:
+        return False
+    except ValueError:  # compiled functions may not tell their signature
+        return True
+    return True
+
+
+def _is_bound(plugin_class: Any, name: str) -> bool:
+    return isinstance(inspect.getattr_static(plugin_class, name), (staticmethod, classmethod))
+
+
+def _expectation(name: str, own: Any, arguments: Tuple[str, ...]) -> str:
+    return f"{name}{_signature(own)} cannot take its arguments; expected {_call(name, arguments)}"
+
+
+def _signature(function: Any) -> str:
+    """The names of the parameters, as they are written."""
+    parameters = inspect.signature(function).parameters.values()
+    return f"({', '.join(str(parameter).split(':')[0] for parameter in parameters)})"
+
+
+def _call(name: str, arguments: Tuple[str, ...]) -> str:
+    return f"{name}({', '.join(('self', *arguments))})"

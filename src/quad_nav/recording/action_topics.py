@@ -1,0 +1,155 @@
+"""The topics of a navigator's action ``move_base``, as actionlib's server has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, List, Optional
+
+from quad_nav.geometry import Pose2D
+from quad_nav.navigator.tick import Outcome
+from quad_nav.recording.messages import constant, header, message, planar_pose, pose_stamped, time
+from quad_nav.recording.topic_writer import Topics, stamp_at
+
+STATUS_PERIOD_S = 0.2
+ENDED_GOALS_STAY_S = 5.0
+
+_STATUS = "actionlib_msgs/GoalStatus"
+_ACTIVE, _PREEMPTED, _SUCCEEDED, _ABORTED = (
+    constant(_STATUS, name) for name in ("ACTIVE", "PREEMPTED", "SUCCEEDED", "ABORTED")
+)
+_ACCEPTED_TEXT = "This goal has been accepted by the simple action server"
+_REPLACED_TEXT = (
+    "This goal was canceled because another goal was recieved by the simple action server"
+)
+
+
+@dataclass
+class _Goal:
+    pose: Pose2D
+    sent: int  # nanoseconds
+    name: str
+    status: int
+    text: str
+    ended_s: Optional[float] = None
+
+    def message(self) -> Any:
+        goal_id = message("actionlib_msgs/GoalID", time(self.sent), self.name)
+        return message(_STATUS, goal_id, self.status, self.text)
+
+
+class ActionTopics:
+    """Goals in, status, feedback and results out, for robot ``robot``."""
+
+    def __init__(self, robot: int, topics: Topics):
+        self._topics = topics
+        self._robot = robot
+        self._node = f"/move_base{robot}"
+        self._goals: List[_Goal] = []
+        self._waiting: Optional[_Goal] = None
+        self._active: Optional[_Goal] = None
+        self._count = 0
+        self._next_status_s = 0.0
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a goal was sent that the navigator has not taken yet."""
+        return self._waiting is not None
+
+    def send(self, now_s: float, pose: Pose2D) -> None:
+        """The sequencer sends a goal."""
+        stamp = stamp_at(now_s)
+        self._count += 1
+        name = f"{self._node}-{self._count}-{stamp / 1e9:.3f}"
+        self._waiting = _Goal(pose, stamp, name, _ACTIVE, _ACCEPTED_TEXT)
+        goal = pose_stamped(planar_pose(pose), "map", stamp)
+        self._topics.write(f"/move_base_simple/goal{self._robot}", stamp, goal, "/sequencer")
+        # As our node forwards it: the server gives it a name when it comes.
+        unnamed = message("actionlib_msgs/GoalID", time(0), "")
+        self._write(
+            "goal",
+            stamp,
+            message(
+                "move_base_msgs/MoveBaseActionGoal",
+                header("", stamp),
+                unnamed,
+                message("move_base_msgs/MoveBaseGoal", goal),
+            ),
+        )
+
+    def accept(self, now_s: float) -> None:
+        """The navigator takes the goal that waits; one that it flew to is replaced."""
+        assert self._waiting is not None
+        if self._active is not None:
+            self._end(now_s, _PREEMPTED, _REPLACED_TEXT)
+        goal, self._waiting = self._waiting, None
+        self._active = goal
+        self._goals.append(goal)
+        self._write(
+            "current_goal", stamp_at(now_s), pose_stamped(planar_pose(goal.pose), "map", goal.sent)
+        )
+        self._write_status(now_s)
+
+    def feedback(self, now_s: float, pose: Pose2D) -> None:
+        """A control cycle ran at ``pose`` in ``map``."""
+        if self._active is None:
+            return
+        stamp = stamp_at(now_s)
+        self._write(
+            "feedback",
+            stamp,
+            message(
+                "move_base_msgs/MoveBaseActionFeedback",
+                header("", stamp),
+                self._active.message(),
+                message(
+                    "move_base_msgs/MoveBaseFeedback", pose_stamped(planar_pose(pose), "map", stamp)
+                ),
+            ),
+        )
+
+    def finish(self, now_s: float, outcome: Outcome) -> None:
+        if self._active is not None:
+            self._end(now_s, _SUCCEEDED if outcome.succeeded else _ABORTED, outcome.text)
+
+    def tell_status(self, now_s: float) -> None:
+        """The status at its own rate."""
+        if now_s >= self._next_status_s - 1e-9:
+            self._write_status(now_s)
+
+    def _end(self, now_s: float, status: int, text: str) -> None:
+        goal, self._active = self._active, None
+        assert goal is not None
+        goal.status, goal.text, goal.ended_s = status, text, now_s
+        stamp = stamp_at(now_s)
+        self._write(
+            "result",
+            stamp,
+            message(
+                "move_base_msgs/MoveBaseActionResult",
+                header("", stamp),
+                goal.message(),
+                message("move_base_msgs/MoveBaseResult"),
+            ),
+        )
+        self._write_status(now_s)
+
+    def _write_status(self, now_s: float) -> None:
+        self._next_status_s = now_s + STATUS_PERIOD_S
+        self._goals = [
+            goal
+            for goal in self._goals
+            if goal.ended_s is None or now_s < goal.ended_s + ENDED_GOALS_STAY_S
+        ]
+        stamp = stamp_at(now_s)
+        self._write(
+            "status",
+            stamp,
+            message(
+                "actionlib_msgs/GoalStatusArray",
+                header("", stamp),
+                [goal.message() for goal in self._goals],
+            ),
+        )
+
+    def _write(self, name: str, stamp: int, content: Any) -> None:
+        self._topics.write(f"{self._node}/{name}", stamp, content, self._node)

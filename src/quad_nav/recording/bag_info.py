@@ -1,0 +1,160 @@
+"""What ``/quad/flight`` and ``/quad/events`` of a recording say, checked.
+
+Anybody can have written a recording, so nothing in it is believed to be of the type that
+our own nodes write. Every function raises ValueError with the key and what was expected.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Dict, Mapping, Optional
+
+from quad_nav.config.differences import differences
+from quad_nav.geometry import Pose3D
+
+LARGEST_M = 1e6
+LONGEST_S = 1e10
+"""More than any stamp, which has 32 bits for the seconds."""
+LARGEST_HZ = 1e6
+MOST_ROBOTS = 100
+_UNIT_WITHIN = 1e-2
+_MOST_LEVELS = 50
+_LONGEST_TEXT = 10_000
+
+
+def checked_flight(info: Mapping[str, Any]) -> Dict[str, Any]:
+    """An object of ``/quad/flight``; keys that nobody reads are left out, the scene is not
+    checked yet."""
+    given = {key: info[key] for key in ("scene",) if key in info}
+    for key in ("title", "config", "reason"):
+        if key in info:
+            given[key] = _text(info, key)
+    if "start_s" in info:
+        given["start_s"] = _number(info, "start_s", LONGEST_S)
+    if "robot_radius_m" in info:
+        given["robot_radius_m"] = _number(info, "robot_radius_m", LARGEST_M)
+    if info.get("seed") is not None:
+        given["seed"] = _whole(info, "seed")
+    if "versions" in info:
+        given["versions"] = {
+            str(key): str(value) for key, value in _mapping(info["versions"], "versions").items()
+        }
+    if "robots" in info:
+        given["robots"] = [_robot(one) for one in _list(info, "robots", MOST_ROBOTS)]
+    return given
+
+
+def checked_event(event: Mapping[str, Any]) -> Dict[str, Any]:
+    """An object of ``/quad/events``; of a kind that nobody reads it is only its kind."""
+    robot = _whole(event, "robot")
+    if not 0 <= robot < MOST_ROBOTS:
+        raise ValueError(f"robot: {robot}, expected 0 to {MOST_ROBOTS - 1}")
+    kind = event.get("event")
+    if kind not in ("sent", "ended"):
+        return {"robot": robot, "event": None}
+    checked: Dict[str, Any] = {
+        "robot": robot,
+        "event": kind,
+        "time_s": _number(event, "time_s", LONGEST_S),
+    }
+    if kind == "ended":
+        return {
+            **checked,
+            "reached": event.get("reached") is True,
+            "reason": _text(event, "reason"),
+            "attempts": _whole(event, "attempts"),
+        }
+    places = {key: _number(event, key, LARGEST_M) for key in ("x_m", "y_m", "yaw_rad")}
+    return {
+        **checked,
+        **places,
+        "goal": _whole(event, "goal"),
+        "lap": _whole(event, "lap"),
+        "why": _text(event, "why"),
+    }
+
+
+def finite(values: Any, largest: float = LARGEST_M) -> None:
+    """Raises ValueError unless all numbers are finite and no larger than that."""
+    for value in values:
+        if not abs(value) <= largest:
+            raise ValueError(f"{value}, expected a finite number up to {largest:g}")
+
+
+def checked_pose(pose: Pose3D) -> Pose3D:
+    """A pose with finite numbers and a rotation. Raises ValueError for another one."""
+    finite((pose.x_m, pose.y_m, pose.z_m))
+    length = math.sqrt(sum(part * part for part in pose.quaternion))
+    if not abs(length - 1.0) < _UNIT_WITHIN:
+        raise ValueError(f"a rotation of length {length:g}, expected a unit quaternion")
+    return pose
+
+
+def _robot(value: Any) -> Dict[str, Any]:
+    fields = _mapping(value, "robots")
+    parameters = _mapping(fields.get("parameters", {}), "parameters")
+    _check_levels(parameters, _MOST_LEVELS)
+    if (
+        "controller_frequency" in parameters
+        and not _number(parameters, "controller_frequency", LARGEST_HZ) > 0
+    ):
+        raise ValueError("controller_frequency: expected a number above 0")
+    try:
+        differences(parameters)
+    except (LookupError, TypeError, AttributeError, ValueError) as error:
+        raise ValueError(f"parameters: {error!r}, expected move_base's tree") from error
+    given: Dict[str, Any] = {"parameters": parameters}
+    if "name" in fields:
+        given["name"] = _text(fields, "name")
+    return given
+
+
+def _check_levels(value: Any, left: int) -> None:
+    if left == 0:
+        raise ValueError(f"parameters: more than {_MOST_LEVELS} levels inside each other")
+    below = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    for one in below:
+        _check_levels(one, left - 1)
+
+
+def _mapping(value: Any, key: str) -> Dict[str, Any]:
+    if not isinstance(value, dict):
+        raise ValueError(f"{key}: {_short(value)}, expected an object")
+    return value
+
+
+def _list(fields: Mapping[str, Any], key: str, most: int) -> Any:
+    value = fields[key]
+    if not isinstance(value, list) or len(value) > most:
+        raise ValueError(f"{key}: {_short(value)}, expected a list of {most} at most")
+    return value
+
+
+def _text(fields: Mapping[str, Any], key: str) -> str:
+    """What cannot be printed is left out; it would not stand in a page of text."""
+    value: Optional[Any] = fields.get(key)
+    if not isinstance(value, str):
+        raise ValueError(f"{key}: {_short(value)}, expected a text")
+    return "".join(c for c in value[:_LONGEST_TEXT] if c.isprintable() or c == "\n")
+
+
+def _number(fields: Mapping[str, Any], key: str, largest: float) -> float:
+    value = fields.get(key)
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, float))
+        or (not math.isfinite(value) or abs(value) > largest)
+    ):
+        raise ValueError(f"{key}: {_short(value)}, expected a number up to {largest:g}")
+    return value
+
+
+def _whole(fields: Mapping[str, Any], key: str) -> int:
+    value = fields.get(key)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ValueError(f"{key}: {_short(value)}, expected a whole number")
+    return value
+
+
+def _short(value: Any) -> str:
+    return repr(value)[:60]

@@ -1,0 +1,265 @@
+"""ROS 1 messages as bytes, and back, without ROS.
+
+``rosbags`` knows the common messages; the navigation's are added here. A message is one
+of its dataclasses, ``message("geometry_msgs/Point", x, y, z)``, with the fields in the order
+of the definition.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Dict, List, Mapping, Sequence, Tuple
+
+import numpy as np
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from quad_nav.costmap.occupancy import occupancy
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, quaternion_from_yaw
+from quad_nav.grid import GridSpec
+from quad_nav.topics.markers import Marker
+
+_DEFINITIONS = {
+    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
+    "map_msgs/msg/OccupancyGridUpdate": "std_msgs/Header header\nint32 x\nint32 y\nuint32 width\nuint32 height\nint8[] data",
+    "move_base_msgs/msg/RecoveryStatus": "geometry_msgs/PoseStamped pose_stamped\nuint16 current_recovery_number\n"
+    "uint16 total_number_of_recoveries\nstring recovery_behavior_name",
+    "move_base_msgs/msg/MoveBaseGoal": "geometry_msgs/PoseStamped target_pose",
+    "move_base_msgs/msg/MoveBaseFeedback": "geometry_msgs/PoseStamped base_position",
+    "move_base_msgs/msg/MoveBaseResult": "",
+    "move_base_msgs/msg/MoveBaseActionGoal": "std_msgs/Header header\nactionlib_msgs/GoalID goal_id\nMoveBaseGoal goal",
+    "move_base_msgs/msg/MoveBaseActionFeedback": "std_msgs/Header header\nactionlib_msgs/GoalStatus status\nMoveBaseFeedback feedback",
+    "move_base_msgs/msg/MoveBaseActionResult": "std_msgs/Header header\nactionlib_msgs/GoalStatus status\nMoveBaseResult result",
+}
+
+_NS = 10**9
+_ZEROS_36 = np.zeros(36)
+
+
+def _store() -> Any:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types: Dict[str, Any] = {}
+    for name, text in _DEFINITIONS.items():
+        types.update(get_types_from_msg(text, name))
+    store.register(types)
+    return store
+
+
+_STORE = _store()
+
+
+def long_name(kind: str) -> str:
+    """``nav_msgs/Path`` as rosbags calls it."""
+    package, name = kind.split("/")
+    return f"{package}/msg/{name}"
+
+
+def definition(kind: str) -> Tuple[str, str]:
+    """Full text and MD5 sum of a type's definition."""
+    text, digest = _STORE.generate_msgdef(long_name(kind))
+    return text, digest
+
+
+def message(kind: str, *fields: Any) -> Any:
+    return _message_class(kind)(*fields)
+
+
+@functools.lru_cache(maxsize=None)
+def _message_class(kind: str) -> Any:
+    return _STORE.types[long_name(kind)]
+
+
+def encode(content: Any) -> bytes:
+    return bytes(_STORE.serialize_ros1(content, content.__msgtype__))
+
+
+def decode(data: bytes, kind: str) -> Any:
+    """Raises what struct and numpy raise for bytes that are no such message."""
+    return _STORE.deserialize_ros1(data, long_name(kind))
+
+
+def constant(kind: str, name: str) -> int:
+    """A constant of a type, as ``ACTIVE`` of ``actionlib_msgs/GoalStatus``."""
+    return int(getattr(_STORE.types[long_name(kind)], name))
+
+
+def time(stamp_ns: int) -> Any:
+    return message("builtin_interfaces/Time", stamp_ns // _NS, stamp_ns % _NS)
+
+
+def stamp_ns(stamp: Any) -> int:
+    return int(stamp.sec) * _NS + int(stamp.nanosec)
+
+
+def header(frame: str, stamp: int) -> Any:
+    return message("std_msgs/Header", 0, time(stamp), frame)
+
+
+def point(x: float, y: float, z: float) -> Any:
+    return message("geometry_msgs/Point", x, y, z)
+
+
+def vector(x: float, y: float, z: float) -> Any:
+    return message("geometry_msgs/Vector3", x, y, z)
+
+
+def quaternion(x: float, y: float, z: float, w: float) -> Any:
+    return message("geometry_msgs/Quaternion", x, y, z, w)
+
+
+def pose(at: Pose3D) -> Any:
+    return message("geometry_msgs/Pose", point(at.x_m, at.y_m, at.z_m), quaternion(*at.quaternion))
+
+
+def pose_stamped(at: Pose3D, frame: str, stamp: int) -> Any:
+    return message("geometry_msgs/PoseStamped", header(frame, stamp), pose(at))
+
+
+def planar_pose(at: Pose2D, z_m: float = 0.0) -> Pose3D:
+    return Pose3D(at.x_m, at.y_m, z_m, quaternion_from_yaw(at.yaw_rad))
+
+
+def text(content: str) -> Any:
+    return message("std_msgs/String", content)
+
+
+def clock(stamp: int) -> Any:
+    return message("rosgraph_msgs/Clock", time(stamp))
+
+
+def transform(parent_from_child: Pose3D, parent: str, child: str, stamp: int) -> Any:
+    at = parent_from_child
+    return message(
+        "geometry_msgs/TransformStamped",
+        header(parent, stamp),
+        child,
+        message(
+            "geometry_msgs/Transform", vector(at.x_m, at.y_m, at.z_m), quaternion(*at.quaternion)
+        ),
+    )
+
+
+def twist(linear: Sequence[float], angular: Sequence[float]) -> Any:
+    return message("geometry_msgs/Twist", vector(*linear), vector(*angular))
+
+
+def command(velocity: Twist2D) -> Any:
+    return twist((velocity.vx_mps, velocity.vy_mps, 0.0), (0.0, 0.0, velocity.vyaw_radps))
+
+
+def odometry(
+    odom_from_base: Pose3D,
+    linear_mps: Sequence[float],
+    angular_radps: Sequence[float],
+    frames: Tuple[str, str],
+    stamp: int,
+) -> Any:
+    """``frames`` are the odometry frame and the body's, which the velocities are in."""
+    return message(
+        "nav_msgs/Odometry",
+        header(frames[0], stamp),
+        frames[1],
+        message("geometry_msgs/PoseWithCovariance", pose(odom_from_base), _ZEROS_36),
+        message("geometry_msgs/TwistWithCovariance", twist(linear_mps, angular_radps), _ZEROS_36),
+    )
+
+
+def laser_scan(scan: Scan, frame: str, stamp: int) -> Any:
+    angle_max = scan.angle_min_rad + (len(scan.ranges_m) - 1) * scan.angle_increment_rad
+    return message(
+        "sensor_msgs/LaserScan",
+        header(frame, stamp),
+        scan.angle_min_rad,
+        angle_max,
+        scan.angle_increment_rad,
+        0.0,
+        0.0,
+        scan.range_min_m,
+        scan.range_max_m,
+        scan.ranges_m,
+        np.zeros(0, dtype=np.float32),
+    )
+
+
+def polygon(points: np.ndarray, frame: str, stamp: int) -> Any:
+    """A footprint float64[n, 2] already in ``frame``."""
+    corners = [message("geometry_msgs/Point32", x, y, 0.0) for x, y in points.tolist()]
+    return message(
+        "geometry_msgs/PolygonStamped",
+        header(frame, stamp),
+        message("geometry_msgs/Polygon", corners),
+    )
+
+
+def occupancy_grid(spec: GridSpec, costs: np.ndarray, frame: str, stamp: int) -> Any:
+    """A costmap's master grid uint8[H, W] in occupancies."""
+    origin = pose(Pose3D(spec.origin_x_m, spec.origin_y_m, 0.0))
+    info = message(
+        "nav_msgs/MapMetaData", time(0), spec.resolution_m, spec.size_x, spec.size_y, origin
+    )
+    return message("nav_msgs/OccupancyGrid", header(frame, stamp), info, occupancy(costs).ravel())
+
+
+def grid_update(costs: np.ndarray, x0: int, y0: int, frame: str, stamp: int) -> Any:
+    """A window uint8[h, w] of a costmap whose lower left cell is (x0, y0)."""
+    height, width = costs.shape
+    return message(
+        "map_msgs/OccupancyGridUpdate",
+        header(frame, stamp),
+        x0,
+        y0,
+        width,
+        height,
+        occupancy(costs).ravel(),
+    )
+
+
+def diagnostic(
+    level: int, name: str, content: str, hardware_id: str, values: Mapping[str, str]
+) -> Any:
+    pairs = [message("diagnostic_msgs/KeyValue", key, value) for key, value in values.items()]
+    return message("diagnostic_msgs/DiagnosticStatus", level, name, content, hardware_id, pairs)
+
+
+def marker_array(shown: Sequence[Marker], replaces_all: bool = False) -> Any:
+    """With ``replaces_all`` they take the place of all that the topic has shown before."""
+    markers = [_marker(one) for one in shown]
+    if replaces_all:
+        clear = _marker(
+            Marker("map", "", 0, 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+        )
+        clear.action = constant("visualization_msgs/Marker", "DELETEALL")
+        markers.insert(0, clear)
+    return message("visualization_msgs/MarkerArray", markers)
+
+
+def _marker(one: Marker) -> Any:
+    place = Pose3D(*one.place_m, quaternion_from_yaw(one.yaw_rad))
+    colours: List[Any] = []
+    return message(
+        "visualization_msgs/Marker",
+        header(one.frame, 0),
+        one.namespace,
+        one.number,
+        one.kind,
+        constant("visualization_msgs/Marker", "ADD"),
+        pose(place),
+        vector(*one.size_m),
+        message("std_msgs/ColorRGBA", *one.rgba),
+        message("builtin_interfaces/Duration", 0, 0),
+        one.frame_locked,
+        [point(*at) for at in one.points_m],
+        colours,
+        one.text,
+        "",
+        False,
+    )
+
+
+def pose_from(position: Any, orientation: Any) -> Pose3D:
+    """A pose from a message's point or vector and its quaternion."""
+    return Pose3D(
+        position.x,
+        position.y,
+        position.z,
+        (orientation.x, orientation.y, orientation.z, orientation.w),
+    )

@@ -1,0 +1,137 @@
+"""The topics of one quadcopter's ``move_base{i}``."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, Optional, Tuple
+
+import numpy as np
+
+from quad_nav.config.plugins import plugin_name
+from quad_nav.control.controller import Control
+from quad_nav.costmap.cost_grid import Window
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.footprint import oriented
+from quad_nav.geometry import Pose2D
+from quad_nav.navigator.navigator import Navigator
+from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick
+from quad_nav.recording import messages
+from quad_nav.recording.action_topics import ActionTopics
+from quad_nav.recording.path_messages import plan_bytes
+from quad_nav.recording.topic_writer import Topics, stamp_at
+from quad_nav.topics.costmap_updates import CostmapNews
+
+_NO_PLAN = np.zeros((0, 3))
+
+
+class NavigatorTopics:
+    """Writes what ticks say, as the node ``move_base`` publishes it."""
+
+    def __init__(self, robot: int, navigator: Navigator, topics: Topics):
+        self.action = ActionTopics(robot, topics)
+        self._topics = topics
+        self._navigator = navigator
+        self._node = f"/move_base{robot}"
+        self._command_topic = f"/cmd_vel{robot}"
+        self._planner = plugin_name(navigator.params.base_global_planner)
+        self._controller = plugin_name(navigator.params.base_local_planner)
+        self._state: Optional[State] = None
+        self._costmaps: Dict[str, Tuple[LayeredCostmap, CostmapNews]] = {
+            name: (costmap, CostmapNews(costmap))
+            for name, costmap in (
+                ("global", navigator.global_costmap),
+                ("local", navigator.local_costmap),
+            )
+        }
+        self._shown: Dict[str, bool] = {}
+
+    def write(self, tick: Tick, located: RobotPoses) -> None:
+        stamp = stamp_at(tick.now_s)
+        assert located.in_global is not None and located.in_local is not None
+        if tick.state is not self._state:
+            self._state = tick.state
+            self._write("state", stamp, messages.text(tick.state.value), latched=True)
+        if tick.command is not None:
+            self._topics.write(
+                self._command_topic, stamp, messages.command(tick.command), self._node
+            )
+        self._write_plans(tick, stamp)
+        if tick.recovery is not None:
+            self._write_recovery(tick.recovery, located.in_global, stamp)
+        if tick.cycle:
+            self.action.feedback(tick.now_s, located.in_global)
+        poses = {"global": located.in_global, "local": located.in_local}
+        for name, window in tick.windows.items():
+            self._write_costmap(name, window, poses[name], tick.now_s)
+        if tick.outcome is not None:
+            self.action.finish(tick.now_s, tick.outcome)
+
+    def _write_plans(self, tick: Tick, stamp: int) -> None:
+        """A failed search takes the old plan off the display."""
+        plan = tick.plan if tick.plan is not None else _NO_PLAN if tick.planning_failed else None
+        if plan is not None:
+            frame = self._navigator.global_costmap.params.global_frame
+            self._write_path(f"{self._planner}/plan", plan, frame, stamp, stamp)
+        if tick.control is not None:
+            self._write_control(tick.control, stamp)
+
+    def _write_control(self, control: Control, stamp: int) -> None:
+        frame = self._navigator.local_costmap.params.global_frame
+        # As in the original, the plan that is followed carries no time.
+        for name, plan, own_stamp in (
+            ("global_plan", control.global_plan, 0),
+            ("local_plan", control.local_plan, stamp),
+        ):
+            if len(plan):
+                self._write_path(f"{self._controller}/{name}", plan, frame, stamp, own_stamp)
+
+    def _write_path(self, name: str, plan: np.ndarray, frame: str, stamp: int, own: int) -> None:
+        self._topics.write_bytes(
+            f"{self._node}/{name}", "nav_msgs/Path", stamp, plan_bytes(plan, frame, own), self._node
+        )
+
+    def _write_recovery(self, start: RecoveryStart, pose: Pose2D, stamp: int) -> None:
+        frame = self._navigator.global_costmap.params.global_frame
+        at = messages.pose_stamped(messages.planar_pose(pose), frame, stamp)
+        self._write(
+            "recovery_status",
+            stamp,
+            messages.message(
+                "move_base_msgs/RecoveryStatus", at, start.index, start.total, start.name
+            ),
+        )
+
+    def _write_costmap(self, name: str, window: Window, pose: Pose2D, now_s: float) -> None:
+        """The grid is latched, so that whoever comes late has it, as new listeners do on ROS.
+
+        One full grid is told at the first update, as to a new listener.
+        """
+        costmap, news = self._costmaps[name]
+        frame, stamp = costmap.params.global_frame, stamp_at(now_s)
+        self._write(
+            f"{name}_costmap/footprint",
+            stamp,
+            messages.polygon(oriented(costmap.footprint, pose), frame, stamp),
+        )
+        is_due, is_first = news.note(now_s, window), name not in self._shown
+        if not is_due and not is_first:
+            return
+        self._shown[name] = True
+        changed = news.take()
+        if news.wants_full_grid():
+            self._write(
+                f"{name}_costmap/costmap",
+                stamp,
+                messages.occupancy_grid(costmap.spec, costmap.costs, frame, stamp),
+                latched=True,
+            )
+        elif not changed.is_empty:
+            self._write(
+                f"{name}_costmap/costmap_updates",
+                stamp,
+                messages.grid_update(
+                    costmap.costs[changed.slices], changed.x0, changed.y0, frame, stamp
+                ),
+            )
+
+    def _write(self, name: str, stamp: int, content: Any, latched: bool = False) -> None:
+        self._topics.write(f"{self._node}/{name}", stamp, content, self._node, latched)

@@ -1,0 +1,154 @@
+"""Files of ROS messages: ROS 1 bags, and MCAP with the same bytes in it.
+
+A file is written as ``<name>.active``, as ``rosbag record`` does, and takes its name when it
+is complete, so an older recording of that name is there until then.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import Any, Dict, Optional, Protocol
+
+import lz4.frame
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer
+
+from quad_nav.errors import InputError
+from quad_nav.recording.messages import definition, long_name
+
+SUFFIXES = (".bag", ".mcap")
+
+
+class RecordFile(Protocol):
+    """Takes messages in the order of their stamps. Its methods raise ``OSError``."""
+
+    def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
+        """A handle for ``write``; ``kind`` is as ``nav_msgs/Path``."""
+
+    def write(self, handle: Any, stamp_ns: int, data: bytes) -> None: ...
+
+    def close(self) -> None:
+        """Completes the file. It raises when a part was lost; the rest is readable then."""
+
+
+def create(path: Path) -> RecordFile:
+    """A new file, by the name's ending.
+
+    Raises:
+        InputError: another ending, or a file that cannot be made there.
+    """
+    if path.suffix not in SUFFIXES:
+        raise InputError(
+            [
+                f"{path}: cannot be recorded to; expected a name that ends with "
+                f"{' or '.join(SUFFIXES)}"
+            ]
+        )
+    active = path.with_name(path.name + ".active")
+    try:
+        if path.is_dir():
+            raise IsADirectoryError(None, "is a folder")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            active.unlink()
+        return BagFile(path, active) if path.suffix == ".bag" else McapFile(path, active)
+    except OSError as error:
+        raise InputError(
+            [
+                f"{path}: cannot be recorded to: {error.strerror}; expected a file "
+                "that can be written"
+            ]
+        ) from error
+
+
+class BagFile:
+    """A ROS 1 bag, in LZ4 chunks of 1 MiB."""
+
+    def __init__(self, path: Path, active: Path):
+        self._path, self._active = path, active
+        self._writer = Writer(active)
+        self._writer.set_compression(Writer.CompressionFormat.LZ4)
+        self._writer.compressor = _compressed
+        self._error: Optional[OSError] = None
+        self._writer.open()
+
+    def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
+        text, digest = definition(kind)
+        return self._writer.add_connection(
+            topic, long_name(kind), msgdef=text, md5sum=digest, callerid=node, latching=int(latched)
+        )
+
+    def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
+        try:
+            self._writer.write(handle, stamp_ns, data)
+        except OSError as error:
+            self._error = error
+            raise
+
+    def close(self) -> None:
+        try:
+            if self._error is None:
+                self._writer.close()
+        except OSError as error:
+            self._error = error
+        if self._error is not None:
+            self._close_shortened()
+        os.replace(self._active, self._path)
+        if self._error is not None:
+            raise self._error
+
+    def _close_shortened(self) -> None:
+        """On a full disk: give up the newest chunks until there is room for the index."""
+        writer = self._writer
+        while True:
+            chunks = [chunk for chunk in writer.chunks if chunk.pos != -1]
+            lost = chunks.pop() if chunks else None
+            if writer.bio is not None:
+                with contextlib.suppress(OSError):
+                    writer.bio.close()  # what waits in its buffer finds no room
+            if lost is None:
+                raise OSError(None, "no room for a single chunk")
+            writer.bio = self._active.open("r+b")
+            writer.bio.truncate(lost.pos)
+            writer.bio.seek(lost.pos)
+            writer.chunks[:] = chunks
+            with contextlib.suppress(OSError):
+                writer.close()
+                return
+
+
+def _compressed(data: bytes) -> bytes:
+    """The only kind of LZ4 that ROS reads; rosbags' own is refused by ``rosbag play``."""
+    packed: bytes = lz4.frame.compress(
+        data, block_linked=False, content_checksum=True, store_size=False
+    )
+    return packed
+
+
+class McapFile:
+    """MCAP with ROS 1 messages; the format has no place for what is latched."""
+
+    def __init__(self, path: Path, active: Path):
+        self._path, self._active = path, active
+        self._file = active.open("wb")
+        self._writer = McapWriter(self._file, compression=CompressionType.LZ4)
+        self._writer.start("ros1")
+        self._schemas: Dict[str, int] = {}
+
+    def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
+        if kind not in self._schemas:
+            text, _ = definition(kind)
+            self._schemas[kind] = self._writer.register_schema(kind, "ros1msg", text.encode())
+        metadata = {"callerid": node, "latching": str(int(latched))}
+        return self._writer.register_channel(topic, "ros1", self._schemas[kind], metadata)
+
+    def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
+        self._writer.add_message(handle, stamp_ns, data, stamp_ns)
+
+    def close(self) -> None:
+        self._writer.finish()
+        self._file.close()
+        os.replace(self._active, self._path)

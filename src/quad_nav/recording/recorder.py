@@ -1,0 +1,217 @@
+"""Records a flight as the topics of the ROS face, for ``rosbag play`` and RViz.
+
+The recording's clock is the simulator's: 1 s at the flight's start, for nodes take a time
+of 0 for a clock that stands.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Dict, List
+
+from quad_nav.geometry import Pose3D, Scan
+from quad_nav.mission.sequencer import Action, SendGoal
+from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.offline.flight import Flight
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.recording import messages
+from quad_nav.recording.navigator_topics import NavigatorTopics
+from quad_nav.recording.path_messages import path_bytes, pose_bytes
+from quad_nav.recording.record_file import create
+from quad_nav.recording.topic_writer import START_NS, Topics, stamp_at
+from quad_nav.sim.contacts import Contact
+from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.topics import flight_info
+from quad_nav.topics.contacts import NAME, contact_values
+from quad_nav.topics.flown_path import FlownPath
+from quad_nav.topics.goal_markers import goal_markers
+from quad_nav.topics.markers import quadcopter_markers, scene_markers
+
+_IDENTITY = Pose3D(0.0, 0.0, 0.0)
+_SIMULATOR, _SEQUENCER = "/simulator", "/sequencer"
+
+
+class Recorder(FlightObserver):
+    """Writes a flight to a ``.bag`` or ``.mcap``.
+
+    When the file takes no more, the flight is asked to end; what was recorded until then
+    stays readable.
+
+    Raises:
+        InputError: the file cannot be made.
+    """
+
+    looks_inside = True
+
+    def __init__(self, path: Path, title: str = "flight"):
+        self._topics = Topics(create(path))
+        self._title = title
+        self._navigators: List[NavigatorTopics] = []
+        self._paths: List[FlownPath[bytes]] = []
+
+    @property
+    def stop_reason(self) -> str:
+        return self._topics.problem
+
+    def began(self, flight: Flight) -> None:
+        self._flight = flight
+        self._navigators = [
+            NavigatorTopics(index, flight.pilots[index].navigator, self._topics)
+            for index in range(len(flight.robots))
+        ]
+        self._paths = [FlownPath(_path_pose) for _ in flight.robots]
+        self._tell_flight()
+        self._write(
+            "/simulation/scene",
+            START_NS,
+            messages.marker_array(scene_markers(flight.setup.scene)),
+            _SIMULATOR,
+            latched=True,
+        )
+        self._write(
+            "/simulation/quadcopters",
+            START_NS,
+            messages.marker_array(quadcopter_markers(len(flight.robots))),
+            _SIMULATOR,
+            latched=True,
+        )
+        self._tell_goals(0.0)
+        self.moved(flight)
+
+    def touched(self, contact: Contact) -> None:
+        stamp = stamp_at(contact.time_s)
+        level = messages.constant("diagnostic_msgs/DiagnosticStatus", "WARN")
+        self._write(
+            "/simulation/contacts",
+            stamp,
+            messages.diagnostic(
+                level,
+                NAME,
+                str(contact),
+                f"quad{contact.robot}",
+                contact_values(contact, contact.time_s + flight_info.START_S),
+            ),
+            _SIMULATOR,
+        )
+
+    def scanned(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
+        stamp = stamp_at(scan.stamp_s)
+        self._write(
+            f"/scan{robot}", stamp, messages.laser_scan(scan, f"Lidar{robot}", stamp), _SIMULATOR
+        )
+
+    def moved(self, flight: Flight) -> None:
+        now_s, stamp = flight.now_s, stamp_at(flight.now_s)
+        self._write("/clock", stamp, messages.clock(stamp), _SIMULATOR, latched=True)
+        self._write(
+            "/tf",
+            stamp,
+            messages.message(
+                "tf2_msgs/TFMessage",
+                [
+                    transform
+                    for robot, state in enumerate(flight.states)
+                    for transform in _transforms(robot, state.map_from_base, stamp)
+                ],
+            ),
+            _SIMULATOR,
+            latched=True,
+        )
+        for robot, state in enumerate(flight.states):
+            self._write(
+                f"/odom{robot}",
+                stamp,
+                messages.odometry(
+                    state.map_from_base,
+                    state.linear_mps,
+                    state.angular_radps,
+                    (f"odom{robot}", f"base_link{robot}"),
+                    stamp,
+                ),
+                _SIMULATOR,
+            )
+            path = self._paths[robot]
+            if path.add(now_s, state.map_from_base):
+                self._topics.write_bytes(
+                    f"/path{robot}",
+                    "nav_msgs/Path",
+                    stamp,
+                    path_bytes(path.poses, "map", stamp),
+                    _SEQUENCER,
+                    True,
+                )
+            self._navigators[robot].action.tell_status(now_s)
+
+    def acted(self, robot: int, now_s: float, action: Action) -> None:
+        info = flight_info.event(robot, now_s + flight_info.START_S, action)
+        self._write(
+            flight_info.EVENTS_TOPIC,
+            stamp_at(now_s),
+            messages.text(flight_info.to_text(info)),
+            _SEQUENCER,
+        )
+        if isinstance(action, SendGoal):
+            self._navigators[robot].action.send(now_s, action.pose)
+        self._tell_goals(now_s)
+
+    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+        navigator = self._navigators[robot]
+        if navigator.action.is_waiting and not self._flight.robots[robot].goal_waits:
+            navigator.action.accept(tick.now_s)
+        navigator.write(tick, located)
+
+    def ended(self, flight: Flight) -> None:
+        self._tell_flight()
+        self._topics.close()
+
+    def _tell_flight(self) -> None:
+        flight = self._flight
+        setup = flight.setup
+        info: Dict[str, Any] = {
+            "title": self._title,
+            "config": setup.config_name,
+            "reason": flight.reason,
+            **flight_info.simulation_info(setup.scene, setup.seed),
+            **flight_info.mission_info(
+                {robot.name: robot.sequencer.sequence for robot in flight.robots},
+                [robot.configuration.to_tree() for robot in flight.robots],
+                setup.robot_radius_m,
+            ),
+        }
+        self._write(
+            flight_info.FLIGHT_TOPIC,
+            stamp_at(flight.now_s),
+            messages.text(flight_info.to_text(info)),
+            _SIMULATOR,
+            latched=True,
+        )
+
+    def _tell_goals(self, now_s: float) -> None:
+        sequencers = [robot.sequencer for robot in self._flight.robots]
+        markers = goal_markers(sequencers, self._flight.setup.scene.altitude_m)
+        self._write(
+            "/goals",
+            stamp_at(now_s),
+            messages.marker_array(markers, replaces_all=True),
+            _SEQUENCER,
+            latched=True,
+        )
+
+    def _write(
+        self, topic: str, stamp: int, content: Any, node: str, latched: bool = False
+    ) -> None:
+        self._topics.write(topic, stamp, content, node, latched)
+
+
+def _transforms(robot: int, map_from_base: Pose3D, stamp: int) -> List[Any]:
+    odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"
+    return [
+        messages.transform(_IDENTITY, "map", odom, stamp),
+        messages.transform(map_from_base, odom, base, stamp),
+        messages.transform(base_from_lidar, base, lidar, stamp),
+    ]
+
+
+def _path_pose(stamp_s: float, pose: Pose3D) -> bytes:
+    upright = messages.planar_pose(pose.to_2d(), pose.z_m)
+    return pose_bytes(upright, "map", stamp_at(stamp_s))

@@ -1,0 +1,275 @@
+"""A flight in three dimensions, in rerun's viewer: live, or saved to be looked at later.
+
+rerun is an optional extra, ``pip install 'quad-nav[view]'``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any, List, Optional, Tuple
+
+import numpy as np
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose3D, Scan
+from quad_nav.mission.sequencer import Action
+from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.offline.flight import Flight
+from quad_nav.offline.observer import FlightObserver
+from quad_nav.recording.viewer_solids import colour_of, solid
+from quad_nav.sim.colours import ROBOT_COLOURS
+from quad_nav.sim.contacts import Contact
+from quad_nav.topics.flown_path import FlownPath
+from quad_nav.topics.goal_markers import goal_markers
+from quad_nav.topics.markers import SPHERE, quadcopter_markers, scene_markers
+
+SUFFIX = ".rrd"
+_TIMELINE = "flight"
+_LOOPBACK, _PORT = "127.0.0.1", 9876
+_STARTS_WITHIN_S = 30.0
+_BACKGROUND_RGB = (250, 250, 250)
+
+
+class View(FlightObserver):
+    """Shows scene, quadcopters, scans, plans, goals, trails and contacts.
+
+    ``path``: the file to save to; None opens the viewer and shows the flight as it is flown.
+
+    Raises:
+        InputError: rerun is not installed, or the file cannot be made.
+    """
+
+    looks_inside = True
+
+    def __init__(self, path: Optional[Path] = None):
+        self._rr = _rerun()
+        if path is not None:
+            _check(path)
+        self._rr.init("quad")
+        if path is None:
+            _spawn(self._rr)
+        else:
+            self._rr.save(path)
+        layout = importlib.import_module("rerun.blueprint")
+        self._rr.send_blueprint(
+            layout.Blueprint(
+                layout.Spatial3DView(origin="map", name="flight", background=_BACKGROUND_RGB),
+                collapse_panels=True,
+            )
+        )
+
+    def began(self, flight: Flight) -> None:
+        self._flight = flight
+        self._altitude_m = flight.setup.scene.altitude_m
+        self._trails: List[FlownPath[Tuple[float, float, float]]] = [
+            FlownPath(_place) for _ in flight.robots
+        ]
+        self._rr.log("map", self._rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for marker in scene_markers(flight.setup.scene):
+            self._rr.log(
+                f"map/{marker.namespace}/{marker.number}", solid(self._rr, marker), static=True
+            )
+        for marker in quadcopter_markers(len(flight.robots)):
+            self._rr.log(
+                f"map/{marker.namespace}/body/{marker.number}", solid(self._rr, marker), static=True
+            )
+        self._show_goals(0.0)
+        self.moved(flight)
+
+    def touched(self, contact: Contact) -> None:
+        self._at(contact.time_s)
+        self._rr.log(
+            "map/contacts",
+            self._rr.Points3D(
+                [contact.position_m], colors=[(220, 0, 0)], radii=[0.12], labels=[str(contact)]
+            ),
+        )
+        self._rr.log("contacts", self._rr.TextLog(str(contact), level="WARN"))
+
+    def scanned(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
+        self._at(scan.stamp_s)
+        self._rr.log(
+            f"map/quad{robot}/scan",
+            self._rr.Points3D(
+                scan_points(scan, map_from_lidar), colors=[_colour(robot)], radii=[0.025]
+            ),
+        )
+
+    def moved(self, flight: Flight) -> None:
+        self._at(flight.now_s)
+        for robot, state in enumerate(flight.states):
+            pose = state.map_from_base
+            self._rr.log(
+                f"map/quad{robot}/body",
+                self._rr.Transform3D(
+                    translation=(pose.x_m, pose.y_m, pose.z_m),
+                    quaternion=self._rr.Quaternion(xyzw=pose.quaternion),
+                ),
+            )
+            if self._trails[robot].add(flight.now_s, pose):
+                self._line(
+                    f"map/quad{robot}/trail",
+                    np.array(self._trails[robot].poses),
+                    _colour(robot),
+                    0.02,
+                )
+
+    def acted(self, robot: int, now_s: float, action: Action) -> None:
+        self._show_goals(now_s)
+
+    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+        self._at(tick.now_s)
+        if tick.plan is not None:
+            self._line(f"map/quad{robot}/plan", self._lifted(tick.plan), _colour(robot), 0.01)
+        if tick.control is not None and len(tick.control.local_plan):
+            self._line(
+                f"map/quad{robot}/local_plan",
+                self._lifted(tick.control.local_plan),
+                (40, 200, 40),
+                0.02,
+            )
+
+    def ended(self, flight: Flight) -> None:
+        self._rr.disconnect()
+
+    def _at(self, time_s: float) -> None:
+        self._rr.set_time_seconds(_TIMELINE, time_s)
+
+    def _line(
+        self, entity: str, points: np.ndarray, colour: Tuple[int, int, int], radius_m: float
+    ) -> None:
+        self._rr.log(entity, self._rr.LineStrips3D([points], colors=[colour], radii=[radius_m]))
+
+    def _lifted(self, plan: np.ndarray) -> np.ndarray:
+        """A plan's places at the flying altitude."""
+        return np.column_stack((plan[:, :2], np.full(len(plan), self._altitude_m)))
+
+    def _show_goals(self, now_s: float) -> None:
+        self._at(now_s)
+        markers = goal_markers([robot.sequencer for robot in self._flight.robots], self._altitude_m)
+        spheres = [marker for marker in markers if marker.kind == SPHERE]
+        self._rr.log(
+            "map/goals",
+            self._rr.Points3D(
+                [marker.place_m for marker in spheres],
+                colors=[colour_of(one) for one in spheres],
+                # A flown goal is a dot: translucent spheres are not drawn.
+                radii=[one.size_m[0] / 2 if one.rgba[3] > 0.5 else 0.05 for one in spheres],
+                labels=[str(one.number + 1) for one in spheres],
+            ),
+        )
+
+
+def scan_points(scan: Scan, map_from_lidar: Pose3D) -> np.ndarray:
+    """Where the beams hit, float64[n, 3] in ``map``; beams that hit nothing are left out."""
+    hits = np.isfinite(scan.ranges_m)
+    ranges_m = scan.ranges_m[hits].astype(np.float64)
+    angles = scan.angle_min_rad + np.nonzero(hits)[0] * scan.angle_increment_rad
+    points = np.column_stack(
+        (ranges_m * np.cos(angles), ranges_m * np.sin(angles), np.zeros(len(angles)))
+    )
+    placed: np.ndarray = points @ map_from_lidar.rotation.T + map_from_lidar.translation
+    return placed
+
+
+def _rerun() -> Any:
+    try:
+        return importlib.import_module("rerun")
+    except ImportError as error:
+        raise InputError(
+            [
+                f"--view: needs rerun ({error}); install it with "
+                "pip install 'quad-nav[view]', in a checkout with "
+                ".venv/bin/pip install '.[view]'"
+            ]
+        ) from error
+
+
+def _spawn(rr: Any) -> None:
+    """Opens the viewer, or shows the flight in one that is open.
+
+    rerun's own ``spawn`` has it listen to the whole network.
+    """
+    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
+        raise InputError(
+            [
+                "--view: there is no display for the viewer; expected one, or "
+                "--view FILE.rrd to look at later"
+            ]
+        )
+    if not _is_listening():
+        # pip puts it beside Python, where an unactivated environment's PATH does not look.
+        places = os.pathsep.join(
+            (str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath))
+        )
+        program = shutil.which("rerun", path=places) or "rerun"
+        try:
+            viewer = subprocess.Popen(
+                [
+                    program,
+                    f"--bind={_LOOPBACK}",
+                    f"--port={_PORT}",
+                    "--memory-limit=75%",
+                    "--expect-data-soon",
+                ],
+                start_new_session=True,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+        except OSError as error:
+            raise InputError([_no_viewer(error.strerror)]) from error
+        _wait_for(viewer)
+    rr.connect_tcp(f"{_LOOPBACK}:{_PORT}")
+
+
+def _wait_for(viewer: subprocess.Popen) -> None:
+    end_s = time.monotonic() + _STARTS_WITHIN_S
+    while not _is_listening():
+        if viewer.poll() is not None:
+            raise InputError([_no_viewer(f"rerun ended with {viewer.returncode}")])
+        if time.monotonic() > end_s:
+            raise InputError([_no_viewer(f"rerun is not there after {_STARTS_WITHIN_S:g} s")])
+        time.sleep(0.05)
+
+
+def _is_listening() -> bool:
+    try:
+        socket.create_connection((_LOOPBACK, _PORT), timeout=1.0).close()
+    except OSError:
+        return False
+    return True
+
+
+def _no_viewer(why: Optional[str]) -> str:
+    return (
+        f"--view: the viewer does not start: {why}; expected a display, or --view FILE.rrd "
+        "to look at later"
+    )
+
+
+def _check(path: Path) -> None:
+    if path.suffix != SUFFIX:
+        raise InputError([f"{path}: cannot be saved to; expected a name that ends with {SUFFIX}"])
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.open("wb").close()
+    except OSError as error:
+        raise InputError(
+            [f"{path}: cannot be saved to: {error.strerror}; expected a file that can be written"]
+        ) from error
+
+
+def _colour(robot: int) -> Tuple[int, int, int]:
+    return ROBOT_COLOURS[robot % len(ROBOT_COLOURS)]
+
+
+def _place(_stamp_s: float, pose: Pose3D) -> Tuple[float, float, float]:
+    return pose.x_m, pose.y_m, pose.z_m

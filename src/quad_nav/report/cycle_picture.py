@@ -1,0 +1,87 @@
+"""How long control cycles took and how regularly they came."""
+
+from __future__ import annotations
+
+from typing import List, Sequence, Tuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from quad_nav.recording.trace import FlightTrace, RobotTrace
+from quad_nav.report.style import QUIET, colour, label_log, new_figure, robot_legend, time_axis
+
+_TAIL = 0.001  # smallest part of the cycles that the distribution shows
+
+
+def cycle_picture(trace: FlightTrace) -> Figure:
+    """Wall times where they were measured; otherwise the time from one cycle to the next."""
+    measured = has_walls(trace)
+    figure = new_figure(3.3)
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2), sharey=True)
+    for k, robot in enumerate(trace.robots):
+        times_s, values_ms = _values(robot, measured)
+        left.plot(times_s, values_ms, ".", ms=2.2, color=colour(k), alpha=0.6)
+        _draw_distribution(right, k, values_ms)
+    periods_ms = _periods_ms(trace)
+    for period_ms in periods_ms:
+        for axes in (left, right):
+            axes.axhline(period_ms, color=QUIET, lw=0.9, ls="--")
+    if periods_ms:
+        right.annotate(
+            "control period",
+            (1.0, min(periods_ms)),
+            (-2, 3),
+            ha="right",
+            textcoords="offset points",
+            fontsize=8,
+            color=QUIET,
+            xycoords=("axes fraction", "data"),
+        )
+    left.set(
+        title="Wall time of each control cycle"
+        if measured
+        else "Time from one control cycle to the next",
+        ylabel="ms",
+    )
+    if measured:
+        left.set_yscale("log")
+        label_log(left.yaxis)
+    else:
+        left.set_ylim(0.0, 1.1 * left.get_ylim()[1])
+    right.set(
+        title="Share of cycles that take longer",
+        xscale="log",
+        xlim=(_TAIL, 1.0),
+        xticks=[0.001, 0.01, 0.1, 1.0],
+        xticklabels=["0.1 %", "1 %", "10 %", "100 %"],
+    )
+    time_axis(left)
+    robot_legend(figure, [robot.name for robot in trace.robots])
+    return figure
+
+
+def has_walls(trace: FlightTrace) -> bool:
+    """Whether wall times of cycles are known."""
+    return any(len(robot.cycle_walls_s) for robot in trace.robots)
+
+
+def _values(robot: RobotTrace, measured: bool) -> Tuple[np.ndarray, np.ndarray]:
+    if measured:
+        return robot.cycle_times_s[: len(robot.cycle_walls_s)], 1e3 * robot.cycle_walls_s
+    return robot.cycle_times_s[1:], 1e3 * np.diff(robot.cycle_times_s)
+
+
+def _draw_distribution(axes: Axes, number: int, values_ms: np.ndarray) -> None:
+    if len(values_ms):
+        above = 1.0 - np.arange(len(values_ms)) / len(values_ms)
+        axes.step(above, np.sort(values_ms), color=colour(number), where="pre")
+
+
+def _periods_ms(trace: FlightTrace) -> List[float]:
+    rates: Sequence[float] = [
+        robot.parameters["controller_frequency"]
+        for robot in trace.robots
+        if robot.parameters.get("controller_frequency", 0) > 0
+    ]
+    return sorted({1e3 / rate for rate in rates})

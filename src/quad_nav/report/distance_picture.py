@@ -1,0 +1,87 @@
+"""Gaps to the nearest other quadcopter and to the nearest obstacle over time."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from quad_nav.recording.trace import FlightTrace
+from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter
+from quad_nav.report.measures import Tracks, clearances_m, separations_m
+from quad_nav.report.style import ALARM, QUIET, colour, new_figure, robot_legend, time_axis
+
+_SHOWN_M = 3.0  # beyond this nobody asks how far it was
+_FEW = 4  # so many lines can be followed one by one
+
+
+def distance_picture(trace: FlightTrace, among: Tracks, marked: Sequence[Encounter] = ()) -> Figure:
+    """Panels for what could be measured; marked encounters keep their letters."""
+    panels = []
+    if len(trace.robots) > 1:
+        panels.append(
+            ("Gap to the nearest other quadcopter", separations_m(among, trace.robot_radius_m))
+        )
+    if trace.scene is not None:
+        panels.append(
+            (
+                "Gap to the nearest obstacle or wall",
+                clearances_m(among, trace.scene, trace.robot_radius_m),
+            )
+        )
+    figure = new_figure(0.6 + 2.1 * max(len(panels), 1))
+    column = figure.subplots(max(len(panels), 1), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (title, gaps_m) in zip(column, panels):
+        _draw_gaps(axes, title, among.times_s, gaps_m)
+        for contact in trace.contacts:
+            axes.axvline(contact.time_s, color=ALARM, lw=0.9, ls="--")
+    if len(trace.robots) > 1:
+        _draw_letters(column[0], marked)
+    time_axis(column[-1])
+    robot_legend(figure, [robot.name for robot in trace.robots])
+    return figure
+
+
+def _draw_gaps(axes: Axes, title: str, times_s: np.ndarray, gaps_m: np.ndarray) -> None:
+    many = len(gaps_m) > _FEW
+    same = len(gaps_m) == 2 and np.array_equal(gaps_m[0], gaps_m[1], equal_nan=True)
+    for k, gap_m in enumerate(gaps_m):
+        axes.plot(
+            times_s,
+            gap_m,
+            color="black" if same else colour(k),
+            lw=0.8 if many else 1.4,
+            alpha=0.55 if many else 1.0,
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # times at which nobody was heard of
+        least_m = np.nanmin(gaps_m, axis=0) if gaps_m.size else np.empty(0)
+    if many:
+        axes.plot(times_s, least_m, color="black", lw=1.3)
+    touching = np.where(least_m <= 0.0, 0.0, np.nan)
+    axes.plot(times_s[: len(touching)], touching, color=ALARM, lw=4, solid_capstyle="butt")
+    axes.axhspan(-1.0, 0.0, color=ALARM, alpha=0.10, lw=0)
+    bottom = min(-0.1, float(np.nanmin(least_m)) - 0.05) if np.isfinite(least_m).any() else -0.1
+    axes.set(
+        title=title + (", the least of all in black" if many else ""),
+        ylabel="m",
+        ylim=(bottom, _SHOWN_M),
+    )
+
+
+def _draw_letters(axes: Axes, marked: Sequence[Encounter]) -> None:
+    for letter, one in zip(LETTERS, marked):
+        if one.other is not None:
+            axes.plot(one.time_s, one.gap_m, "o", ms=5, color="none", mec="black", zorder=8)
+            axes.annotate(
+                letter,
+                (one.time_s, one.gap_m),
+                (5, 8),
+                textcoords="offset points",
+                fontsize=9,
+                fontweight="bold",
+            )
+    axes.axhline(CLOSE_M, color=QUIET, lw=0.8, ls=":")

@@ -1,0 +1,128 @@
+"""The scene from above, and quadcopters to scale in it."""
+
+from __future__ import annotations
+
+import math
+from typing import List, Optional, Tuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.patches import Circle, Patch, Rectangle
+
+from quad_nav.report.measures import Tracks
+from quad_nav.report.style import colour
+from quad_nav.sim.scene import Box, Obstacle, Scene
+
+Extent = Tuple[float, float, float, float]
+_SOLID, _EDGE = "#b9bfc6", "#7c858e"
+
+
+def draw_scene(axes: Axes, scene: Optional[Scene], near: Optional[Extent] = None) -> None:
+    """Obstacles and walls; those that quadcopters fly over or under are only outlined.
+
+    ``near``: what the picture shows, where that is a small part of the scene.
+    """
+    axes.set_aspect("equal")
+    if scene is None:
+        return
+    z_m = scene.altitude_m
+    solids: List[Patch] = []
+    passed: List[Patch] = []
+    for solid in (*scene.wall_boxes(), *scene.obstacles):
+        if near is not None and not _reaches(solid, near):
+            continue
+        meets = solid.bottom_m <= z_m <= solid.bottom_m + solid.height_m
+        (solids if meets else passed).append(_outline(solid))
+    axes.add_collection(
+        PatchCollection(solids, facecolor=_SOLID, edgecolor=_EDGE, lw=0.8, zorder=1)
+    )
+    axes.add_collection(
+        PatchCollection(passed, facecolor="none", edgecolor=_EDGE, lw=0.8, linestyle=":", zorder=1)
+    )
+
+
+def _reaches(solid: Obstacle, near: Extent) -> bool:
+    x0, x1, y0, y1 = near
+    reach_m = (
+        solid.radius_m
+        if not isinstance(solid, Box)
+        else math.hypot(solid.size_x_m, solid.size_y_m) / 2
+    )
+    return x0 - reach_m <= solid.x_m <= x1 + reach_m and y0 - reach_m <= solid.y_m <= y1 + reach_m
+
+
+def _outline(solid: Obstacle) -> Patch:
+    if not isinstance(solid, Box):
+        return Circle((solid.x_m, solid.y_m), solid.radius_m)
+    lower_left = (solid.x_m - solid.size_x_m / 2, solid.y_m - solid.size_y_m / 2)
+    return Rectangle(
+        lower_left,
+        solid.size_x_m,
+        solid.size_y_m,
+        angle=np.degrees(solid.yaw_rad),
+        rotation_point="center",
+    )
+
+
+def extent(scene: Optional[Scene], among: Tracks) -> Extent:
+    """x from, x to, y from, y to in ``map``: the scene with its walls, or what was flown over."""
+    if scene is not None:
+        west, east, south, north = scene.wall_boxes()
+        return (
+            west.x_m - west.size_x_m / 2,
+            east.x_m + east.size_x_m / 2,
+            south.y_m - south.size_y_m / 2,
+            north.y_m + north.size_y_m / 2,
+        )
+    flown = among.positions_m.reshape(-1, 2)
+    flown = flown[np.isfinite(flown).all(axis=1)]
+    if len(flown) == 0:
+        return (0.0, 1.0, 0.0, 1.0)
+    (x0, y0), (x1, y1) = flown.min(axis=0) - 1.0, flown.max(axis=0) + 1.0
+    return (float(x0), float(x1), float(y0), float(y1))
+
+
+def draw_hull(
+    axes: Axes,
+    robot: int,
+    position_m: np.ndarray,
+    yaw_rad: float,
+    radius_m: float,
+    numbered: bool = False,
+) -> None:
+    """A disc to scale with a line that shows where the nose is."""
+    if not np.isfinite(position_m).all():
+        return
+    axes.add_patch(
+        Circle(
+            tuple(position_m),
+            radius_m,
+            facecolor=(*colour(robot), 0.35),
+            edgecolor=colour(robot),
+            lw=1.2,
+            zorder=6,
+        )
+    )
+    ahead = radius_m * np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+    axes.plot(
+        *np.transpose([position_m, position_m + ahead]),
+        color=colour(robot),
+        lw=1.6,
+        zorder=7,
+        solid_capstyle="round",
+    )
+    if numbered:
+        x_m, y_m = position_m - 0.5 * ahead
+        axes.text(
+            x_m,
+            y_m,
+            str(robot),
+            fontsize=6.5,
+            fontweight="bold",
+            color=colour(robot),
+            ha="center",
+            va="center_baseline",
+            zorder=9,
+            clip_on=True,
+        )

@@ -1,0 +1,112 @@
+"""What all pictures have in common: sizes, fonts, colours, and PNG."""
+
+from __future__ import annotations
+
+import io
+import math
+from typing import Any, Dict, Sequence, Tuple
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from quad_nav.sim.colours import robot_rgba
+
+WIDTH_IN = 8.0
+_DPI = 140
+ALARM = "#c01020"  # contacts, failures, limits
+QUIET = "#667080"  # labels and lines that only help
+MOST_ROWS = 16
+"""Pictures with a row for each quadcopter have no more rows than this."""
+_MOST_IN_LEGEND = 24
+
+RC: Dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.edgecolor": "#a0a8b0",
+    "axes.labelcolor": "#303840",
+    "axes.grid": True,
+    "grid.color": "#e4e8ec",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.color": "#505860",
+    "ytick.color": "#505860",
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "hatch.linewidth": 0.6,
+    "figure.facecolor": "white",
+    "text.parse_math": False,  # names of quadcopters may hold any character
+}
+
+
+def new_figure(height_in: float) -> Figure:
+    """A figure on Agg, without pyplot's global state; its layout keeps things apart."""
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as a PNG file."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def styled() -> Any:
+    """The context in which figures are made and drawn."""
+    return matplotlib.rc_context(RC)
+
+
+def label_log(axis: Axis) -> None:
+    """Plain numbers on a logarithmic axis of which the limits are known.
+
+    matplotlib's own labels there are mathematics, which is switched off.
+    """
+    low, high = axis.get_view_interval()
+    decades = math.log10(high / low)
+    steps = (1.0,) if decades > 4.0 else (1.0, 3.0) if decades > 1.2 else (1.0, 2.0, 3.0, 5.0, 7.0)
+    axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def colour(robot: int) -> Tuple[float, float, float]:
+    return robot_rgba(robot)[:3]
+
+
+def robot_legend(figure: Figure, names: Sequence[str], more: Sequence[Any] = ()) -> None:
+    """Below the axes, where it covers nothing; ``more`` are artists with labels.
+
+    Names of more quadcopters than one can tell apart are left out: then labels must do.
+    """
+    handles = []
+    if 1 < len(names) <= _MOST_IN_LEGEND:
+        handles = [
+            matplotlib.lines.Line2D([], [], color=colour(k), lw=3, label=name)
+            for k, name in enumerate(names)
+        ]
+    handles += more
+    if handles:
+        figure.legend(
+            handles=handles,
+            loc="outside lower center",
+            ncols=min(len(handles), 6),
+            fontsize=8.5,
+            columnspacing=1.4,
+            handlelength=1.6,
+        )
+
+
+def time_axis(axes: Axes, label: bool = True) -> None:
+    axes.margins(x=0.01)
+    if label:
+        axes.set_xlabel("time, s")

@@ -1,0 +1,124 @@
+"""Messages and our dataclasses, in pairs: ``x_message`` and ``x_from_message``."""
+
+from __future__ import annotations
+
+from typing import Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from nav_msgs.msg import Odometry
+from rospy.numpy_msg import numpy_msg
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Header
+
+from quad_nav.geometry import Pose3D, Scan, Twist2D
+
+_NO_COVARIANCE = [0.0] * 36
+_NO_INTENSITIES = np.empty(0, dtype=np.float32)
+
+
+def time_message(seconds: float) -> rospy.Time:
+    """The nearest nanosecond."""
+    whole = int(seconds)
+    return rospy.Time(whole, round((seconds - whole) * 1e9))
+
+
+def twist_message(twist: Twist2D) -> Twist:
+    return Twist(Vector3(twist.vx_mps, twist.vy_mps, 0.0), Vector3(0.0, 0.0, twist.vyaw_radps))
+
+
+def twist_from_message(message: Twist) -> Twist2D:
+    """The horizontal part; it may hold NaN or infinity, see ``Twist2D.is_finite``."""
+    return Twist2D(message.linear.x, message.linear.y, message.angular.z)
+
+
+def pose_message(pose: Pose3D) -> Pose:
+    return Pose(Point(pose.x_m, pose.y_m, pose.z_m), Quaternion(*pose.quaternion))
+
+
+def pose_from_message(message: Pose) -> Pose3D:
+    """As it is: neither finite numbers nor a unit quaternion are checked."""
+    p, q = message.position, message.orientation
+    return Pose3D(p.x, p.y, p.z, (q.x, q.y, q.z, q.w))
+
+
+def transform_message(
+    parent_from_child: Pose3D, parent: str, child: str, stamp: rospy.Time
+) -> TransformStamped:
+    return TransformStamped(Header(0, stamp, parent), child, transform(parent_from_child))
+
+
+def transform(parent_from_child: Pose3D) -> Transform:
+    return Transform(
+        Vector3(parent_from_child.x_m, parent_from_child.y_m, parent_from_child.z_m),
+        Quaternion(*parent_from_child.quaternion),
+    )
+
+
+def pose_from_transform(message: TransformStamped) -> Pose3D:
+    """``parent_from_child``."""
+    t, q = message.transform.translation, message.transform.rotation
+    return Pose3D(t.x, t.y, t.z, (q.x, q.y, q.z, q.w))
+
+
+def odometry_message(
+    odom_from_base: Pose3D,
+    linear_mps: Tuple[float, float, float],
+    angular_radps: Tuple[float, float, float],
+    frames: Tuple[str, str],
+    stamp: rospy.Time,
+) -> Odometry:
+    """``frames`` are the odometry frame and the body's, which the velocities are in."""
+    twist = Twist(Vector3(*linear_mps), Vector3(*angular_radps))
+    return Odometry(
+        Header(0, stamp, frames[0]),
+        frames[1],
+        PoseWithCovariance(pose_message(odom_from_base), _NO_COVARIANCE),
+        TwistWithCovariance(twist, _NO_COVARIANCE),
+    )
+
+
+def odometry_from_message(message: Odometry) -> Tuple[Pose3D, Twist2D]:
+    """The body's pose in the odometry frame and its velocity in its own."""
+    return pose_from_message(message.pose.pose), twist_from_message(message.twist.twist)
+
+
+ScanMessage = numpy_msg(LaserScan)
+"""A LaserScan whose ranges are an array, which goes over the wire as it is."""
+
+
+def scan_message(scan: Scan, frame: str) -> LaserScan:
+    """All beams are of one instant: ``time_increment`` and ``scan_time`` are 0."""
+    message = ScanMessage(
+        angle_min=scan.angle_min_rad,
+        angle_max=scan.angle_min_rad + (len(scan.ranges_m) - 1) * scan.angle_increment_rad,
+        angle_increment=scan.angle_increment_rad,
+        range_min=scan.range_min_m,
+        range_max=scan.range_max_m,
+        ranges=scan.ranges_m.astype(np.float32, copy=False),
+        intensities=_NO_INTENSITIES,
+    )
+    message.header.frame_id, message.header.stamp = frame, time_message(scan.stamp_s)
+    return message
+
+
+def scan_from_message(message: LaserScan) -> Scan:
+    return Scan(
+        message.header.stamp.to_sec(),
+        message.angle_min,
+        message.angle_increment,
+        message.range_min,
+        message.range_max,
+        np.array(message.ranges, dtype=np.float32),
+    )

@@ -1,0 +1,28 @@
+"""The node ``fleet_rviz``: RViz with a file made for its number of quadcopters."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import rospkg
+import yaml
+
+from quad_nav.errors import InputError
+from quad_nav.scenario.fleet_setup import scene_of
+from quad_nav.topics.rviz_file import EXIT_BAD_INPUT, arguments, document
+
+
+def main() -> int:
+    """Replaces this process by RViz; its file is among ROS's logs."""
+    given, others = arguments(sys.argv[1:])
+    try:
+        content = document(given.robots, scene_of(vars(given)))
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return EXIT_BAD_INPUT
+    path = Path(rospkg.get_log_dir()) / "quad" / f"fleet-{os.getpid()}.rviz"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    os.execvp("rviz", ["rviz", "-d", str(path), *others])

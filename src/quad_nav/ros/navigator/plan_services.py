@@ -1,0 +1,91 @@
+"""The services of a navigator: plans that nobody flies, and costmaps made empty."""
+
+from __future__ import annotations
+
+import threading
+from typing import Callable, Tuple
+
+import rospy
+from nav_msgs.srv import GetPlan, GetPlanResponse
+from std_srvs.srv import Empty, EmptyResponse
+
+from quad_nav.config.plugins import plugin_name
+from quad_nav.errors import InvalidGoal, PlanningError
+from quad_nav.geometry import Pose2D
+from quad_nav.navigator.navigator import Navigator
+from quad_nav.navigator.tick import RobotPoses, State
+from quad_nav.ros.common.names import Names
+from quad_nav.ros.common.nav_messages import goal_from_message, path_message
+from quad_nav.ros.navigator.plan_topics import PlanTopics
+
+
+class PlanServices:
+    """``~make_plan``, ``~<planner>/make_plan`` and ``~clear_costmaps``.
+
+    ``lock`` guards the navigator; ``locate`` says what time it is and where the robot is.
+    """
+
+    def __init__(
+        self,
+        navigator: Navigator,
+        topics: PlanTopics,
+        lock: threading.RLock,
+        locate: Callable[[], Tuple[float, RobotPoses]],
+        clearing_radius_m: Callable[[], float],
+        names: Names,
+    ):
+        self._navigator, self._topics, self._lock = navigator, topics, lock
+        self._locate, self._clearing_radius_m = locate, clearing_radius_m
+        planner = plugin_name(navigator.params.base_global_planner)
+        self._services = [
+            rospy.Service(names("~make_plan"), GetPlan, self._make_plan),
+            rospy.Service(names(f"~{planner}/make_plan"), GetPlan, self._make_planner_plan),
+            rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps),
+        ]
+
+    def _make_plan(self, request) -> GetPlanResponse:
+        with self._lock:
+            if self._navigator.state is not State.IDLE:
+                raise rospy.ServiceException(
+                    "move_base must be in an inactive state to make a plan for an external user"
+                )
+            if self._navigator.params.make_plan_clear_costmap:
+                self._navigator.free_surroundings(self._locate()[1], self._clearing_radius_m())
+            return self._plan_response(request)
+
+    def _make_planner_plan(self, request) -> GetPlanResponse:
+        with self._lock:
+            return self._plan_response(request)
+
+    def _plan_response(self, request) -> GetPlanResponse:
+        frame = self._navigator.global_costmap.params.global_frame
+        if request.goal.header.frame_id.lstrip("/") != frame:
+            raise rospy.ServiceException(
+                f"the goal is in frame '{request.goal.header.frame_id}', expected '{frame}'"
+            )
+        try:
+            goal = goal_from_message(request.goal.pose).to_2d()
+            plan = self._navigator.make_plan(self._start(request), goal, request.tolerance)
+        except InvalidGoal as error:
+            raise rospy.ServiceException(str(error)) from error
+        except PlanningError as error:
+            rospy.logwarn("make_plan: %s", error)
+            return GetPlanResponse()
+        now = rospy.Time.now()
+        self._topics.plan(plan, now)
+        response = GetPlanResponse()
+        response.plan.poses = path_message(plan, frame, now).poses
+        return response
+
+    def _start(self, request) -> Pose2D:
+        if request.start.header.frame_id:
+            return goal_from_message(request.start.pose).to_2d()
+        here = self._locate()[1].in_global
+        if here is None:
+            raise rospy.ServiceException("the robot's pose is unknown")
+        return here
+
+    def _clear_costmaps(self, _) -> EmptyResponse:
+        with self._lock:
+            self._navigator.clear_costmaps(rospy.get_time())
+        return EmptyResponse()

@@ -1,0 +1,138 @@
+"""What a tick planned and commanded, as the original's topics."""
+
+from __future__ import annotations
+
+from typing import Optional
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Twist
+from move_base_msgs.msg import RecoveryStatus
+from nav_msgs.msg import OccupancyGrid, Path
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
+
+from quad_nav.config.plugins import plugin_name
+from quad_nav.geometry import Pose3D
+from quad_nav.navigator.navigator import Navigator
+from quad_nav.navigator.tick import State, Tick
+from quad_nav.plan.global_planner import SearchPlanner
+from quad_nav.plan.navfn import Navfn
+from quad_nav.ros.common.convert import twist_message
+from quad_nav.ros.common.names import Names, own_node
+from quad_nav.ros.common.nav_messages import (
+    cost_cloud_message,
+    path_message,
+    pose_stamped,
+    potential_message,
+)
+
+
+class PlanTopics:
+    """Publishers of command, plans, scores and recoveries."""
+
+    def __init__(self, navigator: Navigator, names: Names = own_node):
+        self._navigator = navigator
+        planner = plugin_name(navigator.params.base_global_planner)
+        controller = plugin_name(navigator.params.base_local_planner)
+        self._command = rospy.Publisher(names("cmd_vel"), Twist, queue_size=1)
+        self._plan = rospy.Publisher(names(f"~{planner}/plan"), Path, queue_size=2)
+        if isinstance(navigator.planner, SearchPlanner):
+            self._potential = rospy.Publisher(
+                names(f"~{planner}/potential"), OccupancyGrid, queue_size=1
+            )
+        of_controller = names(f"~{controller}")
+        self._global_plan = rospy.Publisher(f"{of_controller}/global_plan", Path, queue_size=1)
+        self._local_plan = rospy.Publisher(f"{of_controller}/local_plan", Path, queue_size=1)
+        self._cost_cloud = rospy.Publisher(f"{of_controller}/cost_cloud", PointCloud2, queue_size=1)
+        self._state = rospy.Publisher(names("~state"), String, queue_size=10, latch=True)
+        self._told_state: Optional[State] = None
+        self._recovery = rospy.Publisher(
+            names("move_base/recovery_status"), RecoveryStatus, queue_size=1
+        )
+
+    @property
+    def _global_frame(self) -> str:
+        return self._navigator.global_costmap.params.global_frame
+
+    @property
+    def _local_frame(self) -> str:
+        return self._navigator.local_costmap.params.global_frame
+
+    def publish(self, tick: Tick, pose: Pose3D) -> None:
+        now = rospy.Time.from_sec(tick.now_s)
+        if tick.state is not self._told_state:
+            self._told_state = tick.state
+            self._state.publish(tick.state.value)
+        if tick.command is not None:
+            self._command.publish(twist_message(tick.command))
+        if tick.plan is not None:
+            self.plan(tick.plan, now)
+        if tick.planning_failed:
+            self._no_plan(now)
+        if tick.plan is not None or tick.planning_failed:
+            self._publish_potential(now)
+        if tick.recovery is not None:
+            self._recovery.publish(
+                RecoveryStatus(
+                    pose_stamped(pose, self._global_frame, now),
+                    tick.recovery.index,
+                    tick.recovery.total,
+                    tick.recovery.name,
+                )
+            )
+        if tick.control is not None:
+            self._control(tick.control, now)
+
+    def plan(self, plan, now: rospy.Time) -> None:
+        """NavFn's twice, as the original: what the search found, then with the goal itself."""
+        if self._plan.get_num_connections() == 0:
+            return
+        message = path_message(plan, self._global_frame, now)
+        if isinstance(self._navigator.planner, Navfn):
+            self._plan.publish(Path(message.header, message.poses[:-1]))
+        self._plan.publish(message)
+
+    def _no_plan(self, now: rospy.Time) -> None:
+        """A failed search takes the old plan off the display."""
+        if self._plan.get_num_connections() > 0:
+            self._plan.publish(path_message(np.zeros((0, 3)), self._global_frame, now))
+
+    def _publish_potential(self, now: rospy.Time) -> None:
+        planner = self._navigator.planner
+        if (
+            isinstance(planner, SearchPlanner)
+            and planner.params.publish_potential
+            and planner.potential is not None
+            and self._potential.get_num_connections() > 0
+        ):
+            self._potential.publish(
+                potential_message(
+                    self._navigator.global_costmap.spec,
+                    planner.potential,
+                    planner.params.publish_scale,
+                    self._global_frame,
+                    now,
+                )
+            )
+
+    def _control(self, control, now: rospy.Time) -> None:
+        if len(control.global_plan) and self._global_plan.get_num_connections() > 0:
+            self._global_plan.publish(
+                path_message(control.global_plan, self._local_frame, rospy.Time(0))
+            )
+        if len(control.local_plan) and self._local_plan.get_num_connections() > 0:
+            self._local_plan.publish(path_message(control.local_plan, self._local_frame, now))
+        if self._cost_cloud.get_num_connections() > 0:
+            self._publish_cost_cloud(now)
+
+    def _publish_cost_cloud(self, now: rospy.Time) -> None:
+        points = self._navigator.controller.cost_cloud()
+        if len(points):
+            spec = self._navigator.local_costmap.spec
+            self._cost_cloud.publish(
+                cost_cloud_message(points, spec.size_x * spec.size_y, self._local_frame, now)
+            )
+
+    def stop(self) -> None:
+        self._command.publish(Twist())

@@ -1,0 +1,76 @@
+"""Map topics into the costmaps' static layers."""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+import numpy as np
+import rospy
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.grid import GridSpec
+from quad_nav.ros.common.names import Names, own_node
+from quad_nav.topics.incoming import grid_problem
+
+
+class MapListener:
+    """One static layer's map topic. ``lock`` guards the costmap."""
+
+    def __init__(
+        self, costmap: LayeredCostmap, name: str, layer: StaticLayer, lock, names: Names = own_node
+    ):
+        self._costmap = costmap
+        self._name = name
+        self._layer = layer
+        self._lock = lock
+        topic = names(layer.params.map_topic)
+        self._grid = rospy.Subscriber(topic, OccupancyGrid, self._on_map, queue_size=1)
+        if layer.params.subscribe_to_updates:
+            self._updates = rospy.Subscriber(
+                topic + "_updates", OccupancyGridUpdate, self._on_update, queue_size=10
+            )
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        info = message.info
+        problem = grid_problem(info.width, info.height, info.resolution, len(message.data))
+        if problem:
+            rospy.logwarn("%s: the map is dropped: %s", self._grid.resolved_name, problem)
+            return
+        spec = GridSpec(
+            info.width, info.height, info.resolution, info.origin.position.x, info.origin.position.y
+        )
+        frame, wanted = message.header.frame_id, self._costmap.params.global_frame
+        if frame != wanted and not self._costmap.params.rolling_window:
+            rospy.logwarn(
+                "map on %s is in frame '%s', the costmap in '%s': used as if it were the same",
+                self._grid.resolved_name,
+                frame,
+                wanted,
+            )
+        occupancy = np.array(message.data, dtype=np.int8).reshape(spec.shape)
+        with self._lock:
+            self._costmap.set_map(StaticMap(occupancy, spec), self._name)
+        if self._layer.params.first_map_only:
+            self._grid.unregister()
+
+    def _on_update(self, message: OccupancyGridUpdate) -> None:
+        problem = grid_problem(message.width, message.height, 1.0, len(message.data))
+        if problem:
+            rospy.logwarn_throttle(5.0, f"{self._updates.resolved_name}: dropped: {problem}")
+            return
+        part = np.array(message.data, dtype=np.int8).reshape(message.height, message.width)
+        with self._lock:
+            self._layer.update_map(part, message.x, message.y)
+
+
+def connect(costmaps: Sequence[LayeredCostmap], lock, names: Names = own_node) -> list:
+    """Subscribes to the map topic of every static layer."""
+    return [
+        MapListener(costmap, name, layer, lock, names)
+        for costmap in costmaps
+        for name, layer in costmap.layers.items()
+        if isinstance(layer, StaticLayer)
+    ]

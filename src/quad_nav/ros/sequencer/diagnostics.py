@@ -1,0 +1,64 @@
+"""The mission's progress as ``diagnostic_msgs``."""
+
+from __future__ import annotations
+
+from typing import Sequence
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from quad_nav.mission.flight_log import Contact, FlightLog
+from quad_nav.ros.sequencer.robot import MissionRobot
+from quad_nav.topics.contacts import contact_from_values
+
+
+def progress(robots: Sequence[MissionRobot], log: FlightLog) -> DiagnosticArray:
+    array = DiagnosticArray(status=[_robot_status(robot, log) for robot in robots])
+    array.header.stamp = rospy.Time.now()
+    return array
+
+
+def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
+    sequencer, flown = robot.sequencer, log.robots[robot.name]
+    count = len(sequencer.sequence.goals)
+    skipped = sum(not leg.reached for leg in flown.legs)
+    contacts = log.contacts_of(robot.name)
+    flight, pose = sequencer.flight, robot.pose
+    attempts = [leg.attempts for leg in flown.legs] + ([flight.attempt] if flight else [])
+    distance_m = None
+    if flight is not None and pose is not None:
+        distance_m = pose.to_2d().distance_to(flight.pose)
+    level, message = DiagnosticStatus.OK, "done" if sequencer.done else "starting"
+    if distance_m is not None:
+        message = f"flying to goal {sequencer.index + 1} of {count}, {distance_m:.2f} m away"
+    if skipped or contacts or (flight is not None and flight.attempt > 1):
+        level = DiagnosticStatus.WARN
+    if robot.is_silent:
+        level, message = DiagnosticStatus.ERROR, "no odometry"
+    values = {
+        "goal": min(sequencer.index + 1, count),
+        "goals": count,
+        "lap": sequencer.lap,
+        "distance_m": "" if distance_m is None else f"{distance_m:.2f}",
+        "attempt": flight.attempt if flight else 0,
+        "retries": sum(attempts) - len(attempts),
+        "reached": len(flown.legs) - skipped,
+        "skipped": skipped,
+        "contacts": contacts,
+        "last reason": next((leg.reason for leg in reversed(flown.legs) if leg.reason), ""),
+        "odometry silent s": f"{robot.silent_s:.2f}",
+        "recoveries": flown.recoveries,
+        "path_length_m": f"{flown.path_length_m:.2f}",
+    }
+    return DiagnosticStatus(
+        level=level,
+        name=f"mission: {robot.name}",
+        message=message,
+        hardware_id=robot.name,
+        values=[KeyValue(key, str(value)) for key, value in values.items()],
+    )
+
+
+def contact_from_message(status: DiagnosticStatus) -> Contact:
+    """A contact as the simulator reports it. Raises ValueError for what cannot be read."""
+    return contact_from_values(status.hardware_id, {pair.key: pair.value for pair in status.values})

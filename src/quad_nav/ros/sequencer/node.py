@@ -1,0 +1,126 @@
+"""The node ``sequencer``: hands N quadcopters their goals and says how well they flew.
+
+Check everything, wait for everything, start the simulation, fly, sum up. Timers run on
+simulated time, so they stand still with a paused simulation.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import List, Optional
+
+import rospy
+
+from quad_nav.errors import InputError
+from quad_nav.mission.flight_log import unflown
+from quad_nav.mission.summary import (
+    EXIT_BAD_INPUT,
+    EXIT_FAILURE,
+    MissionSummary,
+    RobotSummary,
+    table,
+    write_json,
+)
+from quad_nav.ros.common import readiness
+from quad_nav.ros.common.respawn import AGAIN
+from quad_nav.ros.common.signals import init_node
+from quad_nav.ros.sequencer.mission import START_SERVICE, Mission
+from quad_nav.ros.sequencer.setup import MissionSetup, read_setup, result_path
+
+DIAGNOSTICS_PERIOD_S = 1.0  # wall time, so that a paused simulation shows its state
+
+
+def watch(mission: Mission, exit_when_done: bool, result: Path) -> int:
+    """Until the end: progress once a second, and the summary whenever all goals are flown."""
+    status: Optional[int] = None
+    next_s = 0.0
+    while not rospy.is_shutdown():
+        mission.advance()
+        if time.monotonic() >= next_s:
+            next_s = time.monotonic() + DIAGNOSTICS_PERIOD_S
+            mission.publish_progress()
+        if not mission.is_done:
+            status = None
+        elif status is None:
+            status = report(mission.summary(), result)
+            if exit_when_done:
+                return status
+    if status is None:
+        status = report(mission.summary(mission.why_stopped()), result)
+    return status
+
+
+def report(summary: MissionSummary, result: Path) -> int:
+    """The table on the terminal and the JSON where it belongs; the exit status."""
+    print(f"\n{table(summary)}", flush=True)
+    if not _write(summary, result):
+        return summary.exit_status or EXIT_FAILURE
+    print(f"Written to {result}\n", flush=True)
+    return summary.exit_status
+
+
+def _write(summary: MissionSummary, result: Path) -> bool:
+    try:
+        write_json(summary, result)
+    except OSError as error:
+        rospy.logerr("%s: cannot be written: %s", result, error.strerror)
+        return False
+    return True
+
+
+def fly(mission: Mission, setup: MissionSetup, result: Path) -> int:
+    """A mission from waiting for its parts to its summary."""
+    missing = readiness.wait_for(mission.needs(), setup.ready_timeout_s)
+    if missing:
+        reason = "stopped while waiting for" if rospy.is_shutdown() else "not ready"
+        return _not_flown(setup, result, reason, missing)
+    try:
+        mission.start()
+    except (rospy.ServiceException, rospy.ROSException) as error:
+        return _not_flown(
+            setup, result, "the simulation did not start", [f"{START_SERVICE}: {error}"]
+        )
+    try:
+        return watch(mission, setup.exit_when_done, result)
+    except Exception as error:  # what was flown is not lost with a fault of ours
+        report(mission.summary(f"internal error: {error!r}"), result)
+        raise
+    finally:
+        rospy.signal_shutdown("the sequencer is through")
+
+
+def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:
+    rospy.logfatal("nothing is flown, %s:\n  %s", reason, "\n  ".join(lines))
+    robots = tuple(
+        RobotSummary(robot.name, tuple(unflown(robot.sequence))) for robot in setup.robots
+    )
+    _write(
+        MissionSummary(
+            robots,
+            robot_radius_m=setup.robot_radius_m,
+            reason=f"{reason}: {'; '.join(lines)}",
+            contacts_reported=False,
+        ),
+        result,
+    )
+    return EXIT_FAILURE
+
+
+def main() -> int:
+    """Exit status: 0 all goals reached and nothing touched, 1 otherwise, 2 for bad input."""
+    init_node("sequencer")
+    name = rospy.get_name()
+    parameters = rospy.get_param("~", {})
+    result = result_path(parameters)
+    try:
+        setup = read_setup(parameters, name, result, rospy.get_param("/", {}))
+        mission = Mission(setup, AGAIN in sys.argv)
+    except InputError as error:
+        rospy.logfatal("nothing is flown:\n  %s", "\n  ".join(error.problems))
+        _write(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)
+        return EXIT_BAD_INPUT
+    for warning in setup.warnings:
+        rospy.logwarn("%s", warning)
+    return fly(mission, setup, result)

@@ -1,0 +1,248 @@
+"""One quadcopter of a mission: its sequencer between its topics, its log and the terminal."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from typing import Callable, Optional, Sequence
+
+import rospy
+from nav_msgs.msg import Odometry
+from std_msgs.msg import String
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose3D
+from quad_nav.mission.flight_log import FlightLog, Leg
+from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.mission.sequencer import (
+    BEGINNING,
+    Action,
+    SendGoal,
+    SequenceDone,
+    Sequencer,
+    Stage,
+    Verdict,
+)
+from quad_nav.ros.common.convert import pose_from_message
+from quad_nav.ros.common.path_publisher import PathPublisher
+from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.ros.sequencer.robot_link import Inbox, RobotLink
+from quad_nav.topics.flight_info import EVENTS_TOPIC, event, to_text
+
+FILE_POLL_S = 0.5  # wall time: a person edits while the simulation is paused, too
+ODOMETRY_SILENT_S = 3.0
+WARN_AGAIN_S = 5.0
+# How far odometry may be ahead of our clock; what is further is from before the clock went back.
+AHEAD_S = 1.0
+# A step of odometry that no flight makes: a simulation's reset.
+JUMP_M, JUMP_MPS = 1.0, 5.0
+# A smaller one is a fault of the odometry, which may be over soon.
+STEP_M, SETTLE_S = 0.25, 1.0
+
+
+# Takes a robot and the leg that has ended, if one has, before anything else is done.
+Keep = Callable[["MissionRobot", Optional[Leg]], None]
+
+
+class MissionRobot:
+    """Flies one quadcopter's goals; ``news`` is set when its odometry comes."""
+
+    def __init__(
+        self, index: int, goals: RobotGoals, transforms: Transforms, news: threading.Event
+    ):
+        self.name = goals.name
+        self.sequencer = Sequencer(goals.sequence)
+        self.link = RobotLink(index, news)
+        self.pose: Optional[Pose3D] = None
+        self.is_silent, self.silent_s = False, 0.0
+        self._odometry: Optional[Odometry] = None
+        self._begun_s = 0.0
+        self._heard_s = self._settled_s = 0.0
+        self._file = goals.file
+        self._next_poll_s = 0.0
+        self._transforms = transforms
+        self._index = index
+        self._events = rospy.Publisher(EVENTS_TOPIC, String, queue_size=100)
+        self._path = PathPublisher(f"/path{index}")
+
+    def begin(self, now_s: float, stage: Stage = BEGINNING) -> None:
+        """From the first goal: at the start, and after the simulation was reset.
+
+        With a ``stage``, from where another sequencer left off.
+        """
+        self.sequencer = Sequencer(self.sequencer.sequence, stage)
+        self.pose, self.is_silent, self._begun_s, self._heard_s = None, False, now_s, now_s
+        self._odometry, self._settled_s = None, 0.0
+        self.link.forget()
+        self._path.clear()
+
+    def was_reset(self, inbox: Inbox) -> bool:
+        """Whether the odometry that has come says that the quadcopter was put somewhere else."""
+        usable = [o for o in inbox.odometry if o.header.stamp.to_sec() >= self._begun_s]
+        before = [self._odometry, *usable] if self._odometry is not None else usable
+        return any(_is_jump(a, b) for a, b in zip(before, before[1:]))
+
+    def step(self, inbox: Inbox, now_s: float, log: FlightLog, keep: Keep) -> bool:
+        """Take what has come and act on it; whether the goals or their states changed."""
+        changed = self._poll_file()
+        self._move(inbox.odometry, now_s, log)
+        for recovery in inbox.recoveries:
+            log.robots[self.name].recoveries += 1
+            rospy.logwarn(
+                "%s: recovery %d of %d: %s",
+                self.name,
+                recovery.current_recovery_number + 1,
+                recovery.total_number_of_recoveries,
+                recovery.recovery_behavior_name,
+            )
+        log.robots[self.name].aborts += sum(
+            report.verdict is Verdict.ABORTED for report in inbox.reports
+        )
+        for newcomer in inbox.newcomers:
+            if self.link.send_to(newcomer):
+                rospy.loginfo(
+                    "%s: %s sent to a node that began to listen",
+                    self.name,
+                    self._goal(self.sequencer.index, self.sequencer.lap),
+                )
+        self._watch_silence(now_s)
+        if self.pose is None or self._settled_s > now_s:
+            return changed
+        actions = self.sequencer.tick(
+            now_s, self.pose.to_2d(), inbox.reports, self.link.navigator_is_idle(now_s)
+        )
+        legs = [log.robots[self.name].act(action) for action in actions]
+        if actions:
+            keep(self, next((leg for leg in legs if leg is not None), None))
+        for action, leg in zip(actions, legs):
+            self._do(action, leg, now_s)
+        return changed or bool(actions)
+
+    def map_from(self, frame: str) -> Pose3D:
+        """Raises TransformUnavailable."""
+        return self._transforms.lookup("map", frame) if frame != "map" else Pose3D(0.0, 0.0, 0.0)
+
+    def _move(self, messages: Sequence[Odometry], now_s: float, log: FlightLog) -> None:
+        usable = [
+            one for one in messages if self._begun_s <= one.header.stamp.to_sec() <= now_s + AHEAD_S
+        ]
+        if not usable:
+            return
+        before, self._odometry = self._odometry, usable[-1]
+        try:
+            map_from_odom = self.map_from(usable[-1].header.frame_id)
+        except TransformUnavailable as error:
+            rospy.logwarn_throttle(
+                WARN_AGAIN_S, f"{self.name}: its place in map is unknown: {error}"
+            )
+            return
+        self._heard_s = now_s
+        if any(_is_jump(a, b, STEP_M) for a, b in zip([before, *usable], usable) if a is not None):
+            rospy.logwarn(
+                "%s: its odometry has jumped: nothing counts as reached for %g s",
+                self.name,
+                SETTLE_S,
+            )
+            self._settled_s = now_s + SETTLE_S
+        for odometry in usable:
+            stamp_s = odometry.header.stamp.to_sec()
+            self.pose = map_from_odom.compose(pose_from_message(odometry.pose.pose))
+            log.move(self.name, stamp_s, self.pose.to_2d())
+            self._path.add(stamp_s, self.pose)
+
+    def _watch_silence(self, now_s: float) -> None:
+        self.silent_s = now_s - self._heard_s
+        was_silent, self.is_silent = self.is_silent, self.silent_s > ODOMETRY_SILENT_S
+        if self.is_silent and not was_silent:
+            rospy.logwarn(
+                "%s: nothing has come on %s for %.0f s",
+                self.name,
+                self.link.odometry.resolved_name,
+                ODOMETRY_SILENT_S,
+            )
+
+    def _poll_file(self) -> bool:
+        if time.monotonic() < self._next_poll_s:
+            return False
+        self._next_poll_s = time.monotonic() + FILE_POLL_S
+        try:
+            sequence = self._file.poll()
+        except InputError as error:
+            rospy.logerr(
+                "%s: its edited goal file cannot be used, the goals stay as they were:\n  %s",
+                self.name,
+                "\n  ".join(error.problems),
+            )
+            return False
+        if sequence is None:
+            return False
+        self.sequencer.replace_sequence(sequence)
+        rospy.loginfo(
+            "%s: goal file edited: %d goals, %d of them flown",
+            self.name,
+            len(sequence.goals),
+            min(self.sequencer.index, len(sequence.goals)),
+        )
+        return True
+
+    def _do(self, action: Action, leg: Optional[Leg], now_s: float) -> None:
+        self._events.publish(to_text(event(self._index, now_s, action)))
+        if isinstance(action, SendGoal):
+            self.link.send(action.pose)
+            self._tell_sent(action)
+        elif isinstance(action, SequenceDone):
+            self.link.forget()
+            rospy.loginfo("%s: no more goals", self.name)
+        elif leg is not None:
+            self._tell_ended(leg)
+
+    def _tell_sent(self, action: SendGoal) -> None:
+        goal = self._goal(action.index, action.lap)
+        if not action.why:
+            away_m = self.pose.to_2d().distance_to(action.pose) if self.pose else 0.0
+            rospy.loginfo(
+                "%s: %s (%.2f, %.2f) sent, %.2f m away",
+                self.name,
+                goal,
+                action.pose.x_m,
+                action.pose.y_m,
+                away_m,
+            )
+            return
+        rospy.logwarn(
+            "%s: %s sent again, attempt %d of %d: %s",
+            self.name,
+            goal,
+            action.attempt,
+            self.sequencer.sequence.settings.retries + 1,
+            action.why,
+        )
+
+    def _tell_ended(self, leg: Leg) -> None:
+        goal = self._goal(leg.index, leg.lap)
+        if leg.reached:
+            rospy.loginfo(
+                "%s: %s reached in %.1f s, path %.2f m (straight %.2f m)",
+                self.name,
+                goal,
+                leg.time_s,
+                leg.path_length_m,
+                leg.straight_length_m,
+            )
+        else:
+            rospy.logwarn(
+                "%s: %s SKIPPED after %.1f s: %s", self.name, goal, leg.time_s, leg.reason
+            )
+
+    def _goal(self, index: int, lap: int) -> str:
+        sequence = self.sequencer.sequence
+        round_ = f"lap {lap}, " if sequence.settings.loop else ""
+        return f"{round_}goal {index + 1} of {len(sequence.goals)}"
+
+
+def _is_jump(before: Odometry, after: Odometry, least_m: float = JUMP_M) -> bool:
+    a, b = before.pose.pose.position, after.pose.pose.position
+    distance_m = math.hypot(b.x - a.x, b.y - a.y)
+    time_s = (after.header.stamp - before.header.stamp).to_sec()
+    return distance_m > max(least_m, JUMP_MPS * time_s)

@@ -1,0 +1,280 @@
+"""The simulator as a node: it owns the bodies and the clock.
+
+Callbacks only store; one loop advances the simulation and publishes. Simulated
+time starts at 1 s, because nodes take a time of 0 for a clock that has not
+started; it only ever grows, also over a reset.
+"""
+
+from __future__ import annotations
+
+import collections
+import functools
+import signal
+import sys
+import time
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from typing import Callable, Deque, Tuple
+
+import rospy
+from geometry_msgs.msg import Twist
+from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
+from visualization_msgs.msg import MarkerArray
+
+from quad_nav.errors import InputError
+from quad_nav.ros.common.convert import twist_from_message
+from quad_nav.ros.common.marker_messages import goal_spheres
+from quad_nav.ros.simulator.topics import SimulatorTopics
+from quad_nav.scenario.simulator_setup import (
+    DEFAULTS,
+    SimulatorSetup,
+    longest_controller_period_s,
+    read_setup,
+)
+from quad_nav.sim.pacing import Pacer, RateMeter
+from quad_nav.sim.simulation import STEP_S, STEPS_PER_S, Simulation
+from quad_nav.topics.command_lease import CommandLease
+from quad_nav.topics.incoming import twist_problem
+
+_STEPS_PER_ODOMETRY = STEPS_PER_S // 40
+_STEPS_PER_CLOCK = STEPS_PER_S // 120
+_START_STEP = STEPS_PER_S
+_COMMANDS_PER_ROBOT = 20
+_HEALTH_PERIOD_S = 1.0  # wall time, as the next two
+_PAUSED_PERIOD_S = 0.5
+_PAUSED_SLEEP_S = 0.02
+_ANSWER_WITHIN_S = 10.0
+
+
+class SimulatorNode:
+    """Topics and services around one simulation."""
+
+    def __init__(self, setup: SimulatorSetup):
+        self._setup = setup
+        self._simulation = Simulation(
+            setup.scene, setup.robots, setup.params, setup.seed, setup.gui, _START_STEP
+        )
+        self._topics = SimulatorTopics(self._simulation)
+        self._pacer = Pacer(setup.rate, STEP_S)
+        self._meter = RateMeter()
+        # Faster than real time, the clock comes with the odometry: nobody needs it more often.
+        self._steps_per_clock = _STEPS_PER_CLOCK if setup.rate <= 1.0 else _STEPS_PER_ODOMETRY
+        self._paused, self._stopping = True, False
+        self._next_health_s = self._next_republish_s = 0.0
+        # A node that floods a topic costs no more than this.
+        self._commands: Deque[Tuple[int, Twist]] = collections.deque(
+            maxlen=_COMMANDS_PER_ROBOT * setup.robots
+        )
+        self._lease = CommandLease(
+            setup.params.command_timeout_s + setup.params.controller_period_s
+        )
+        self._requests: Deque[Tuple[Callable[[], str], Future]] = collections.deque()
+        self._goals, self._goals_are_shown = MarkerArray(), True
+        self._subscribe()
+        self._offer_services()
+
+    def run(self) -> None:
+        """Until ``stop``, ROS shuts down or the window is closed."""
+        self._publish_all()
+        if not self._setup.start_paused:
+            self._start()
+        while not (self._stopping or rospy.is_shutdown()) and self._simulation.is_open:
+            self._answer_requests()
+            self._show_goals()
+            self._report()
+            if self._paused:
+                self._stand()
+            else:
+                self._advance()
+        self._simulation.close()
+
+    def stop(self) -> None:
+        """End ``run`` soon."""
+        self._stopping = True
+
+    def _subscribe(self) -> None:
+        for i in range(self._setup.robots):
+            rospy.Subscriber(
+                f"/cmd_vel{i}",
+                Twist,
+                functools.partial(self._store_command, i),
+                queue_size=10,
+                tcp_nodelay=True,
+            )
+        if self._setup.gui:
+            rospy.Subscriber("/goals", MarkerArray, self._store_goals, queue_size=1)
+
+    def _offer_services(self) -> None:
+        for name, action in (
+            ("start", self._start),
+            ("pause", self._pause),
+            ("reset", self._reset),
+        ):
+            rospy.Service(f"/simulation/{name}", Trigger, self._trigger_handler(action))
+        for i in range(self._setup.robots):
+            rospy.Service(
+                f"/simulation/lidar{i}/enable", SetBool, functools.partial(self._enable_lidar, i)
+            )
+
+    # Callbacks, in threads of their own.
+
+    def _store_command(self, robot: int, message: Twist) -> None:
+        self._commands.append((robot, message))
+
+    def _store_goals(self, message: MarkerArray) -> None:
+        self._goals, self._goals_are_shown = message, False
+
+    def _trigger_handler(self, action: Callable[[], str]) -> Callable:
+        """A service that answers when the loop has done what it asks for."""
+
+        def handle(_) -> TriggerResponse:
+            done: Future = Future()
+            self._requests.append((action, done))
+            try:
+                return TriggerResponse(True, done.result(_ANSWER_WITHIN_S))
+            except FutureTimeoutError:
+                return TriggerResponse(False, f"not done within {_ANSWER_WITHIN_S:g} s")
+
+        return handle
+
+    def _enable_lidar(self, robot: int, request) -> SetBoolResponse:
+        self._topics.lidar_enabled[robot] = request.data
+        return SetBoolResponse(True, f"LIDAR {robot} is {'on' if request.data else 'off'}")
+
+    # The loop.
+
+    def _answer_requests(self) -> None:
+        while self._requests:
+            action, done = self._requests.popleft()
+            done.set_result(action())
+
+    def _start(self) -> str:
+        if self._paused:
+            self._paused = False
+            self._pacer.start(time.monotonic())
+            self._meter.start(time.monotonic(), self._simulation.now_s)
+            self._next_health_s = time.monotonic() + _HEALTH_PERIOD_S
+            rospy.loginfo("simulation runs")
+        return "the simulation runs"
+
+    def _pause(self) -> str:
+        if not self._paused:
+            self._paused = True
+            self._topics.publish_clock()
+            rospy.loginfo("simulation paused at %.2f s", self._simulation.now_s)
+        return "the simulation is paused"
+
+    def _reset(self) -> str:
+        """Poses change at once and time does not, so one step separates their stamps."""
+        self._simulation.reset()
+        self._simulation.step()
+        self._commands.clear()
+        self._lease.clear()
+        self._goals_are_shown = False
+        self._publish_all()
+        rospy.loginfo("simulation reset")
+        return "the quadcopters are back at their starts; the clock goes on"
+
+    def _advance(self) -> None:
+        """Do the steps that are due, then sleep until the clock's next tick."""
+        for _ in range(self._pacer.take_due(time.monotonic())):
+            self._step()
+        steps = self._steps_per_clock - self._simulation.step_count % self._steps_per_clock
+        time.sleep(self._pacer.wait_s(time.monotonic(), steps))
+
+    def _step(self) -> None:
+        self._take_commands()
+        for contact in self._simulation.step():
+            self._topics.publish_contact(contact)
+        count = self._simulation.step_count
+        if count % self._steps_per_clock == 0:
+            self._topics.publish_clock()
+        if count % _STEPS_PER_ODOMETRY == 0:
+            self._topics.publish_poses()
+        if count % self._setup.steps_per_scan == 0:
+            self._topics.publish_scans()
+
+    def _take_commands(self) -> None:
+        while self._commands:
+            robot, message = self._commands.popleft()
+            twist = twist_from_message(message)
+            if twist_problem(twist):
+                rospy.logwarn_throttle(
+                    5.0, "/cmd_vel%d: dropped, expected finite numbers: %s", robot, twist
+                )
+                continue
+            node = message._connection_header["callerid"]
+            holder = self._lease.holder(robot, node, self._simulation.now_s)
+            if holder == node:
+                self._simulation.set_command(robot, twist)
+            else:
+                rospy.logwarn_throttle(
+                    5.0,
+                    "/cmd_vel%d: %s steers this quadcopter; what %s sends "
+                    "is dropped, expected one node at a time",
+                    robot,
+                    holder,
+                    node,
+                )
+
+    def _stand(self) -> None:
+        """Paused: tell late comers what is, but tf, which is latched."""
+        if time.monotonic() >= self._next_republish_s:
+            self._next_republish_s = time.monotonic() + _PAUSED_PERIOD_S
+            self._topics.publish_clock()
+            self._topics.publish_poses(with_transforms=False)
+            self._topics.publish_scans()
+        time.sleep(_PAUSED_SLEEP_S)
+
+    def _publish_all(self) -> None:
+        self._topics.publish_clock()
+        self._topics.publish_poses()
+        self._topics.publish_scans()
+
+    def _report(self) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._next_health_s:
+            self._next_health_s = now_s + _HEALTH_PERIOD_S
+            factor = self._meter.read(now_s, self._simulation.now_s)
+            self._topics.publish_health(self._paused, self._setup.rate, factor)
+
+    def _show_goals(self) -> None:
+        if not self._goals_are_shown:
+            self._goals_are_shown = True
+            self._simulation.show_goals(goal_spheres(self._goals))
+
+
+def main() -> int:
+    """0 after a shutdown, 2 when the parameters or the scene cannot be used.
+
+    rospy's own signal handler would close the publishers in the middle of a
+    publish of this thread, and wait for ever for a lock that it holds itself.
+    """
+    rospy.init_node("simulator", disable_signals=True)
+    name = rospy.get_name().lstrip("/")
+    try:
+        parameters = rospy.get_param("~", {})
+        if not parameters.get("config"):
+            parameters.setdefault(
+                "controller_period",
+                longest_controller_period_s(
+                    rospy.get_param("/", {}), parameters.get("robots", DEFAULTS["robots"])
+                ),
+            )
+        setup = read_setup(parameters, name)
+        node = SimulatorNode(setup)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
+    for remark in setup.scene.remarks:
+        rospy.logwarn("%s", remark)
+    if not rospy.get_param("/use_sim_time", False):
+        rospy.logwarn(
+            "/use_sim_time is not set: other nodes will not follow the simulation's "
+            "clock, expected true before they start"
+        )
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: node.stop())
+    node.run()
+    rospy.signal_shutdown("the simulation has ended")
+    return 0

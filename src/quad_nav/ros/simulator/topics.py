@@ -1,0 +1,184 @@
+"""What the simulator tells: clock, transforms, odometry, scans, contacts, health."""
+
+from __future__ import annotations
+
+from typing import List, Mapping, Sequence
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header, String
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
+
+from quad_nav.geometry import Pose3D
+from quad_nav.ros.common.convert import (
+    ScanMessage,
+    odometry_message,
+    scan_message,
+    time_message,
+    transform,
+    transform_message,
+)
+from quad_nav.ros.common.diagnostics import DiagnosticsTopic
+from quad_nav.ros.common.marker_messages import marker_array
+from quad_nav.sim.contacts import Contact
+from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.simulation import RobotState, Simulation
+from quad_nav.topics.contacts import NAME, contact_values, text_values
+from quad_nav.topics.flight_info import FLIGHT_TOPIC, simulation_info, to_text
+from quad_nav.topics.markers import quadcopter_markers, scene_markers
+
+_STAYS, _MOUNT = transform(Pose3D(0.0, 0.0, 0.0)), transform(base_from_lidar)
+_LAGS_BELOW = 0.9
+"""Part of the asked-for rate below which the simulation is said to lag."""
+_LAGGING_REPORTS = 3
+"""Reports in a row that lag before it counts; nodes that start up take their time."""
+
+
+class SimulatorTopics:
+    """The publishers, one method for each thing that is told together.
+
+    Odometry and scans are made only while somebody listens. ``/clock`` and
+    ``/tf`` are latched: a node that comes while the simulation is paused gets
+    them, and tf is not sent twice with one stamp, which tf2 would complain about.
+    """
+
+    def __init__(self, simulation: Simulation):
+        self._simulation = simulation
+        robots = range(simulation.n_robots)
+        self.lidar_enabled = [True for _ in robots]
+        self._lagging_reports = 0
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
+        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, latch=True)
+        self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
+        self._scans = [rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=10) for i in robots]
+        self._contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=100)
+        self._diagnostics = DiagnosticsTopic()
+        self._scene = rospy.Publisher("/simulation/scene", MarkerArray, queue_size=1, latch=True)
+        self._quadcopters = rospy.Publisher(
+            "/simulation/quadcopters", MarkerArray, queue_size=1, latch=True
+        )
+        self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
+        self._flight.publish(to_text(simulation_info(simulation.scene, simulation.seed)))
+        self._scene.publish(marker_array(scene_markers(simulation.scene)))
+        self._quadcopters.publish(marker_array(quadcopter_markers(simulation.n_robots)))
+
+    def publish_clock(self) -> None:
+        self._clock.publish(Clock(time_message(self._simulation.now_s)))
+
+    def publish_poses(self, with_transforms: bool = True) -> None:
+        """Transforms, in one message for all, and odometry, as far as somebody listens."""
+        states = [self._simulation.state(i) for i in range(self._simulation.n_robots)]
+        stamp = time_message(self._simulation.now_s)
+        if with_transforms:
+            self._publish_transforms(states, stamp)
+        self._publish_odometry(states, stamp)
+
+    def _publish_transforms(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
+        """``map -> odom{i} -> base_link{i} -> Lidar{i}`` of all quadcopters."""
+        header = Header(0, stamp, "map")
+        transforms = []
+        for i, state in enumerate(states):
+            odom, base, lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
+            transforms += [
+                TransformStamped(header, odom, _STAYS),
+                transform_message(state.map_from_base, odom, base, stamp),
+                TransformStamped(Header(0, stamp, base), lidar, _MOUNT),
+            ]
+        self._tf.publish(TFMessage(transforms))
+
+    def _publish_odometry(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
+        for i, (publisher, state) in enumerate(zip(self._odometry, states)):
+            if publisher.get_num_connections():
+                publisher.publish(
+                    odometry_message(
+                        state.map_from_base,
+                        state.linear_mps,
+                        state.angular_radps,
+                        (f"odom{i}", f"base_link{i}"),
+                        stamp,
+                    )
+                )
+
+    def publish_scans(self) -> None:
+        robots = [
+            i
+            for i, publisher in enumerate(self._scans)
+            if self.lidar_enabled[i] and publisher.get_num_connections()
+        ]
+        for i, scan in zip(robots, self._simulation.scans(robots)):
+            self._scans[i].publish(scan_message(scan, f"Lidar{i}"))
+
+    def publish_contact(self, contact: Contact) -> None:
+        x, y, _ = contact.position_m
+        rospy.logwarn("%s at (%.2f, %.2f) m, time %.2f s", contact, x, y, contact.time_s)
+        self._contacts.publish(
+            DiagnosticStatus(
+                level=DiagnosticStatus.WARN,
+                name=NAME,
+                hardware_id=f"quad{contact.robot}",
+                message=str(contact),
+                values=_pairs(contact_values(contact, contact.time_s)),
+            )
+        )
+
+    def publish_health(self, paused: bool, rate: float, factor: float) -> None:
+        """``factor`` is the real-time factor reached of the ``rate`` asked for."""
+        array = DiagnosticArray(
+            status=[self._clock_health(paused, rate, factor), *self._robots_health()]
+        )
+        array.header.stamp = time_message(self._simulation.now_s)
+        self._diagnostics.publish(array)
+
+    def _clock_health(self, paused: bool, rate: float, factor: float) -> DiagnosticStatus:
+        lags = not paused and factor < _LAGS_BELOW * rate
+        self._lagging_reports = self._lagging_reports + 1 if lags else 0
+        if self._lagging_reports >= _LAGGING_REPORTS:
+            rospy.logwarn_throttle(
+                10.0 * rate,
+                "simulated time lags: %.2f of %g seconds per second are reached",
+                factor,
+                rate,
+            )
+        message = "paused" if paused else f"{'lags: ' if lags else ''}{factor:.2f} x real time"
+        return DiagnosticStatus(
+            level=(
+                DiagnosticStatus.WARN
+                if self._lagging_reports >= _LAGGING_REPORTS
+                else DiagnosticStatus.OK
+            ),
+            name="simulator: clock",
+            hardware_id="simulator",
+            message=message,
+            values=_pairs(
+                text_values(
+                    real_time_factor=factor, rate=rate, contacts=len(self._simulation.contacts)
+                )
+            ),
+        )
+
+    def _robots_health(self) -> List[DiagnosticStatus]:
+        simulation = self._simulation
+        return [
+            DiagnosticStatus(
+                level=DiagnosticStatus.OK if self.lidar_enabled[i] else DiagnosticStatus.WARN,
+                name=f"simulator: quadcopter {i}",
+                hardware_id=f"quad{i}",
+                message=("hovering, no commands" if hovering else "flying")
+                + ("" if self.lidar_enabled[i] else ", LIDAR switched off"),
+                values=_pairs(
+                    text_values(
+                        contacts=sum(c.involves(i) for c in simulation.contacts),
+                        lidar=self.lidar_enabled[i],
+                    )
+                ),
+            )
+            for i, hovering in enumerate(simulation.is_hovering)
+        ]
+
+
+def _pairs(values: Mapping[str, str]) -> List[KeyValue]:
+    return [KeyValue(key, value) for key, value in values.items()]

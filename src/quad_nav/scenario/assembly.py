@@ -1,0 +1,188 @@
+"""A navigator made from a configuration, and changed by another one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Callable, Dict, Optional
+
+import numpy as np
+
+from quad_nav.config import Configuration
+from quad_nav.config.plugins import Plugin
+from quad_nav.config.recoveries import RecoveryParams
+from quad_nav.control.controller import LocalPlanner
+from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
+from quad_nav.control.rollout import footprint_cost
+from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
+from quad_nav.costmap.inflation import InflationLayerParams
+from quad_nav.costmap.layer import LayerParams
+from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.peer_layer import PeerLayerParams
+from quad_nav.geometry import Pose2D
+from quad_nav.navigator.fixes import Fixes
+from quad_nav.navigator.navigator import Navigator
+from quad_nav.navigator.recovery_sequence import NamedRecovery
+from quad_nav.plan.carrot import Carrot, CarrotParams
+from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
+from quad_nav.plan.navfn import Navfn, NavfnParams
+from quad_nav.plan.planner import GlobalPlanner
+from quad_nav.recovery import (
+    ORIGINAL_LAYER_NAMES,
+    ClearCostmap,
+    ClearCostmapParams,
+    MoveSlowAndClear,
+    MoveSlowAndClearParams,
+    Recovery,
+    Rotate,
+    RotateParams,
+)
+
+# The planner that each dataclass of parameters is for.
+GLOBAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray], GlobalPlanner]] = {
+    NavfnParams: lambda params, footprint: Navfn(params),
+    SearchPlannerParams: lambda params, footprint: SearchPlanner(params),
+    CarrotParams: Carrot,
+}
+LOCAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray, float], LocalPlanner]] = {
+    TrajectoryPlannerParams: TrajectoryPlanner,
+    DwaParams: DwaPlanner,
+}
+
+
+_PEERS = ("peer_layer", PeerLayerParams())
+
+
+def build_navigator(configuration: Configuration, number: Optional[int] = None) -> Navigator:
+    """The navigator that a configuration describes, standing idle.
+
+    ``number`` is the robot's among its peers if it is not the configuration's ``robot``.
+    """
+    global_costmap = LayeredCostmap(_global_costmap(configuration))
+    local_costmap = LayeredCostmap(_local_costmap(configuration))
+    planner = _global_planner(configuration.global_planner, global_costmap.footprint)
+    controller = _local_planner(
+        _mended(configuration.local_planner, configuration.fixes),
+        local_costmap.footprint,
+        configuration.local_planner_period_s,
+    )
+    recoveries = [
+        NamedRecovery(name, _recovery(_mended(params, configuration.fixes)))
+        for name, params in configuration.recoveries
+    ]
+    return Navigator(
+        configuration.navigator,
+        global_costmap,
+        local_costmap,
+        planner,
+        controller,
+        recoveries,
+        configuration.fixes,
+        configuration.robot if number is None else number,
+    )
+
+
+def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
+    """Takes over every parameter that may change in flight; plan and goal stay."""
+    footprint = navigator.global_costmap.footprint
+    navigator.params = configuration.navigator
+    navigator.fixes = configuration.fixes
+    navigator.global_costmap.reconfigure(_global_costmap(configuration))
+    navigator.local_costmap.reconfigure(_local_costmap(configuration))
+    new_footprint = navigator.global_costmap.footprint
+    # A user's planner has no parameters that change, and may have learnt something.
+    if not isinstance(configuration.global_planner, Plugin) or not np.array_equal(
+        footprint, new_footprint
+    ):
+        navigator.planner = _global_planner(configuration.global_planner, new_footprint)
+    if not isinstance(configuration.local_planner, Plugin):
+        navigator.set_controller_params(_mended(configuration.local_planner, configuration.fixes))
+    navigator.controller.set_footprint(navigator.local_costmap.footprint)
+
+
+def _global_planner(params: Any, footprint: np.ndarray) -> GlobalPlanner:
+    if isinstance(params, Plugin):
+        return params.make(footprint)
+    return GLOBAL_PLANNERS[type(params)](params, footprint)
+
+
+def _local_planner(params: Any, footprint: np.ndarray, control_period_s: float) -> LocalPlanner:
+    if isinstance(params, Plugin):
+        return params.make(footprint, control_period_s)
+    return LOCAL_PLANNERS[type(params)](params, footprint, control_period_s)
+
+
+def _mended(params: Any, fixes: Fixes) -> Any:
+    """A local planner's or a recovery's parameters with the switches that concern it."""
+    if isinstance(params, TrajectoryPlannerParams):
+        return replace(
+            params,
+            reject_colliding_escape=fixes.reject_colliding_escape,
+            predict_goal_turn=fixes.predict_goal_turn,
+            meter_scoring=params.meter_scoring or not fixes.respect_meter_scoring,
+        )
+    if isinstance(params, DwaParams):
+        return replace(params, predict_goal_turn=fixes.predict_goal_turn)
+    if isinstance(params, RotateParams):
+        return replace(params, stop_afterwards=fixes.stop_after_rotation)
+    if (
+        isinstance(params, ClearCostmapParams)
+        and params.layer_names is None
+        and not fixes.clear_any_obstacle_layer
+    ):
+        return replace(params, layer_names=ORIGINAL_LAYER_NAMES)
+    return params
+
+
+def _global_costmap(configuration: Configuration) -> CostmapParams:
+    """Peers are no obstacles there, so their layer comes after the one that inflates."""
+    costmap = _watched(configuration, configuration.global_costmap)
+    return replace(costmap, layers=(*costmap.layers, _PEERS))
+
+
+def _local_costmap(configuration: Configuration) -> CostmapParams:
+    """Peers are obstacles there, so their layer comes before the first that inflates."""
+    costmap = _watched(configuration, configuration.local_costmap)
+    kinds = [isinstance(layer, InflationLayerParams) for _, layer in costmap.layers]
+    place = kinds.index(True) if any(kinds) else len(kinds)
+    return replace(costmap, layers=(*costmap.layers[:place], _PEERS, *costmap.layers[place:]))
+
+
+def _watched(configuration: Configuration, costmap: CostmapParams) -> CostmapParams:
+    """The costmap with no sensor trusted for longer than ``sensor_timeout_s``.
+
+    ``expected_update_rate`` is a period in seconds, and people write 21.0 into it
+    for a LIDAR of 20 Hz; the robot would fly blind for 21 s.
+    """
+    limit_s = configuration.fixes.sensor_timeout_s
+    if limit_s <= 0.0:
+        return costmap
+    layers = tuple((name, _watched_layer(layer, limit_s)) for name, layer in costmap.layers)
+    return replace(costmap, layers=layers)
+
+
+def _watched_layer(layer: LayerParams, limit_s: float) -> LayerParams:
+    if not isinstance(layer, ObstacleLayerParams):
+        return layer
+    sources = tuple(
+        replace(
+            source,
+            expected_update_period_s=min(source.expected_update_period_s or limit_s, limit_s),
+        )
+        for source in layer.sources
+    )
+    return replace(layer, sources=sources)
+
+
+def _recovery(params: RecoveryParams) -> Recovery:
+    if isinstance(params, Plugin):
+        return params.make()
+    if isinstance(params, ClearCostmapParams):
+        return ClearCostmap(params)
+    if isinstance(params, MoveSlowAndClearParams):
+        return MoveSlowAndClear(params)
+    return Rotate(params, _footprint_cost)
+
+
+def _footprint_cost(costmap: LayeredCostmap, pose: Pose2D) -> float:
+    return footprint_cost(costmap.spec, costmap.costs, costmap.footprint, pose)

@@ -1,0 +1,56 @@
+"""The map that a static layer gets offline: the scene, cut at the flying altitude."""
+
+from __future__ import annotations
+
+import math
+from typing import Dict
+
+import numpy as np
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.grid import GridSpec
+from quad_nav.sim.scene import Scene
+
+_ROWS = 64  # of cells that are looked at in one go
+
+
+class SceneMaps:
+    """The maps of a scene, each resolution made once and only if it is wanted."""
+
+    def __init__(self, scene: Scene):
+        self._scene = scene
+        self._maps: Dict[float, StaticMap] = {}
+
+    def give_to(self, costmap: LayeredCostmap) -> None:
+        """Gives a costmap's static layers, if it has any, their map."""
+        if not any(isinstance(layer, StaticLayer) for layer in costmap.layers.values()):
+            return
+        resolution_m = costmap.params.resolution_m
+        if resolution_m not in self._maps:
+            self._maps[resolution_m] = scene_map(self._scene, resolution_m)
+        costmap.set_map(self._maps[resolution_m])
+
+
+def scene_map(scene: Scene, resolution_m: float) -> StaticMap:
+    """Occupied are the cells whose centres are in a wall or an obstacle, free all others.
+
+    The map reaches to the outer faces of the walls.
+    """
+    margin_m = scene.walls.thickness_m
+    low_x, low_y = scene.origin_x_m - margin_m, scene.origin_y_m - margin_m
+    spec = GridSpec(
+        math.ceil((scene.size_x_m + 2 * margin_m) / resolution_m),
+        math.ceil((scene.size_y_m + 2 * margin_m) / resolution_m),
+        resolution_m,
+        low_x,
+        low_y,
+    )
+    x_m = low_x + (np.arange(spec.size_x) + 0.5) * resolution_m
+    y_m = low_y + (np.arange(spec.size_y) + 0.5) * resolution_m
+    occupancy = np.zeros(spec.shape, dtype=np.int8)
+    for row in range(0, spec.size_y, _ROWS):
+        rows = slice(row, row + _ROWS)
+        centres = np.stack(np.meshgrid(x_m, y_m[rows]), axis=-1)
+        occupancy[rows][scene.flight_clearances_m(centres) <= 0.0] = 100
+    return StaticMap(occupancy, spec)

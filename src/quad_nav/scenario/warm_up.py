@@ -1,0 +1,121 @@
+"""Compiles the kernels before anything flies.
+
+numba compiles a kernel at its first call, which takes seconds, and keeps the
+result beside the source (or in the user's cache where that cannot be written).
+``python -m quad_nav.scenario.warm_up`` fills that cache at set-up; a node warms up its own
+configuration before it takes goals, which is quick when the cache is there.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Dict, Tuple
+
+import numpy as np
+
+from quad_nav import config
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.navigator.navigator import Navigator
+from quad_nav.navigator.tick import RobotPoses
+from quad_nav.peers.peer import Intention, Peer
+from quad_nav.scenario.assembly import build_navigator
+
+_AHEAD_M = 1.0
+_LIDAR: Dict[str, Any] = {
+    "data_type": "LaserScan",
+    "marking": True,
+    "clearing": True,
+    "inf_is_valid": True,
+    "max_obstacle_height": 2.0,
+}
+_COSTMAP: Dict[str, Any] = {"observation_sources": "scan", "scan": _LIDAR}
+_VOXELS: Dict[str, Any] = {**_COSTMAP, "map_type": "voxel"}
+# Together they call every planner, both kinds of search and path, and both obstacle layers.
+_MISSIONS: Tuple[Tuple[Dict[str, Any], Dict[str, Any]], ...] = (  # costmap, the node's own
+    (_COSTMAP, {}),
+    (
+        _COSTMAP,
+        {
+            "base_local_planner": "dwa_local_planner/DWAPlannerROS",
+            "base_global_planner": "global_planner/GlobalPlanner",
+        },
+    ),
+    (
+        _VOXELS,
+        {
+            "base_global_planner": "global_planner/GlobalPlanner",
+            "GlobalPlanner": {"use_dijkstra": False, "use_grid_path": True},
+        },
+    ),
+    (_COSTMAP, {"base_global_planner": "carrot_planner/CarrotPlanner"}),
+)
+
+
+def warm_up(configuration: config.Configuration) -> None:
+    """Flies a second of a little mission with a navigator of its own."""
+    navigator = build_navigator(configuration)
+    spec = navigator.global_costmap.spec
+    here = Pose2D(
+        spec.origin_x_m + 0.5 * spec.size_x * spec.resolution_m,
+        spec.origin_y_m + 0.5 * spec.size_y * spec.resolution_m,
+    )
+    _look_around(navigator, here)
+    navigator.set_goal(Pose2D(here.x_m + _AHEAD_M, here.y_m), 0.0)
+    for now_s in (0.0, 0.5):
+        navigator.tick(now_s, RobotPoses(here, here), Twist2D(vx_mps=0.1))
+    navigator.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), [_coming(here, 1.0)])
+    _look_around(navigator, here)  # again, with a peer whose points are left out
+
+
+def _coming(here: Pose2D, now_s: float) -> Peer:
+    """A peer that goes first and for which the robot has to make room."""
+    way = np.array([[here.x_m + 2.0, here.y_m], [here.x_m, here.y_m]])
+    return Peer("peer", here.x_m + 2.0, here.y_m, 0.0, 0.0, now_s, Intention(-1.0, way))
+
+
+def _look_around(navigator: Navigator, here: Pose2D) -> None:
+    """A scan with something 2 m behind the robot for every obstacle layer."""
+    angles = np.linspace(-math.pi, math.pi, 64, endpoint=False)
+    ranges = np.where(np.abs(angles) > 3.0, 2.0, np.inf).astype(np.float32)
+    scan = Scan(0.0, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
+    lidar = Pose3D(here.x_m, here.y_m, 1.0)
+    for costmap in (navigator.global_costmap, navigator.local_costmap):
+        for layer in costmap.layers.values():
+            if isinstance(layer, ObstacleLayer):
+                for source in layer.params.sources:
+                    layer.add_scan(source.name, scan, lidar, 0.0)
+
+
+def simulate() -> None:
+    """A step and a scan of the simulator, which a navigator itself does not need."""
+    from quad_nav.sim.scene import Scene, Walls
+    from quad_nav.sim.simulation import Simulation
+
+    simulation = Simulation(Scene("warm-up", 10.0, 10.0, 1.0, Walls(), (), (Pose2D(5.0, 5.0),)), 1)
+    simulation.step()
+    simulation.scan(0)
+    simulation.close()
+
+
+def main() -> None:
+    simulate()
+    for costmap, node in _MISSIONS:
+        warm_up(
+            config.load(
+                {
+                    **node,
+                    "global_costmap": dict(costmap),
+                    "local_costmap": {
+                        **costmap,
+                        "rolling_window": True,
+                        "width": 3.0,
+                        "height": 3.0,
+                    },
+                }
+            )
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""Schedules of periodic work and timers of stalled robots. The caller passes the time."""
+
+from __future__ import annotations
+
+import math
+from typing import Optional
+
+from quad_nav.geometry import Pose2D
+
+
+class Schedule:
+    """The due times of a periodic task.
+
+    Attributes:
+        period_s: Seconds between two due times, +inf for a frequency of 0.
+        due_s: The next due time, +inf if the task never runs.
+    """
+
+    def __init__(self, frequency_hz: float) -> None:
+        """Create a schedule that has not started; a frequency of 0 means never."""
+        self.due_s = math.inf
+        self._set_frequency(frequency_hz)
+
+    def _set_frequency(self, frequency_hz: float) -> None:
+        self._frequency_hz = frequency_hz
+        self.period_s = 1.0 / frequency_hz if frequency_hz > 0.0 else math.inf
+
+    def set_frequency(self, frequency_hz: float, now_s: float) -> None:
+        """Restart the schedule if the frequency differs from the current one."""
+        if frequency_hz != self._frequency_hz:
+            self._set_frequency(frequency_hz)
+            self.start(now_s)
+
+    def start(self, now_s: float) -> None:
+        """Make the task due now, and periodically from now on."""
+        self.due_s = now_s if math.isfinite(self.period_s) else math.inf
+
+    def pop(self, now_s: float) -> bool:
+        """Return whether the task is due, and if so advance to the next due time.
+
+        Due times that have passed meanwhile are dropped.
+        """
+        if now_s < self.due_s - 1e-9:
+            return False
+        missed = math.floor((now_s - self.due_s + 1e-9) / self.period_s)
+        self.due_s += (missed + 1) * self.period_s
+        return True
+
+
+class StallTimer:
+    """Measures how long a robot has stayed near one place."""
+
+    def __init__(self) -> None:
+        """Create a timer without a reference pose; it does not run yet."""
+        self._reference: Optional[Pose2D] = None
+        self._since_s = math.inf
+
+    def restart(self, now_s: float) -> None:
+        """Set the elapsed time to zero and keep the reference pose."""
+        self._since_s = now_s
+
+    def has_moved(self, now_s: float, pose: Pose2D, distance_m: float) -> bool:
+        """Return whether the robot has left the circle around the reference pose.
+
+        If it has, or if there is no reference yet, ``pose`` becomes the reference and the
+        timer restarts.
+        """
+        if self._reference is not None and pose.distance_to(self._reference) < distance_m:
+            return False
+        self._reference = pose
+        self._since_s = now_s
+        return True
+
+    def exceeds(self, now_s: float, timeout_s: float) -> bool:
+        """Return whether the robot has stalled for longer than the timeout; 0 is no timeout."""
+        return timeout_s > 0.0 and now_s > self._since_s + timeout_s

@@ -1,0 +1,160 @@
+"""RViz for any number of quadcopters, made from the file for two.
+
+    python -m quad_nav.topics.rviz_file --robots 8 > fleet.rviz
+
+The group of quadcopter 0 is the template of all. Of many quadcopters only what shows the
+whole is switched on at first: plans and trails. The rest is a click away, and costs nothing
+until then, because a display that is off does not subscribe.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import math
+import sys
+from typing import Any, Dict, List, Sequence, Tuple
+
+import yaml
+
+from quad_nav.errors import InputError
+from quad_nav.files.shipped import shipped
+from quad_nav.scenario.fleet_setup import RANDOM, scene_of
+from quad_nav.sim.colours import robot_rgba
+from quad_nav.sim.scene import Scene
+
+FEW = 4
+_OF_MANY = ("Global plan", "Trail")
+_GOAL_TOOL = "rviz/SetGoal"
+_NUMBERED_TOOLS = (_GOAL_TOOL, "rviz/SetInitialPose", "rviz/PublishPoint")
+_WINDOW_PX = 750.0  # the shorter side of the view in an ordinary window
+EXIT_BAD_INPUT = 2
+
+
+def document(robots: int, scene: Scene) -> Dict[str, Any]:
+    """The content of a .rviz file for quadcopters 0 .. ``robots`` - 1 in a scene."""
+    template = yaml.safe_load(shipped("rviz", "quad_multi.rviz").read_text(encoding="utf-8"))
+    manager = template["Visualization Manager"]
+    displays = manager["Displays"]
+    group = next(one for one in displays if one["Name"] == "Quadcopter 0")
+    general = [one for one in displays if not one["Name"].startswith("Quadcopter ")]
+    for display in general:
+        _fit_general(display, robots, scene)
+    manager["Displays"] = general + [_of_robot(group, number, robots) for number in range(robots)]
+    manager["Tools"] = _tools(manager["Tools"], robots)
+    for view in (manager["Views"]["Current"], *manager["Views"].get("Saved", ())):
+        _centre(view, scene)
+    _fold(template, robots)
+    return template
+
+
+def _fit_general(display: Dict[str, Any], robots: int, scene: Scene) -> None:
+    if display["Class"] == "rviz/Grid":
+        cells = math.ceil(max(scene.size_x_m, scene.size_y_m))
+        display["Plane Cell Count"] = cells
+        display["Offset"] = {
+            "X": scene.origin_x_m + 0.5 * cells,
+            "Y": scene.origin_y_m + 0.5 * cells,
+            "Z": 0,
+        }
+    elif display["Class"] == "rviz/TF" and robots > FEW:
+        display["Enabled"] = display["Value"] = False
+
+
+def _of_robot(group: Dict[str, Any], number: int, robots: int) -> Dict[str, Any]:
+    """The template with another quadcopter's number and colours."""
+    own = _renumbered(group, number)
+    for display in own["Displays"]:
+        colour = _rgb(number)
+        if display.get("Color") == _rgb(0):
+            display["Color"] = colour
+        if robots > FEW:
+            display["Enabled"] = display["Value"] = display["Name"] in _OF_MANY
+    return own
+
+
+def _renumbered(value: Any, number: int) -> Any:
+    """Names and topics of quadcopter 0 as those of another."""
+    if isinstance(value, dict):
+        return {key: _renumbered(one, number) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_renumbered(one, number) for one in value]
+    if isinstance(value, str):
+        if value == "Quadcopter 0":
+            return f"Quadcopter {number}"
+        if value.startswith("/"):
+            return (
+                value.replace("/move_base0/", f"/move_base{number}/", 1)
+                if "/move_base0/" in value
+                else _with_number(value, number)
+            )
+    return copy.copy(value)
+
+
+def _with_number(topic: str, number: int) -> str:
+    return topic[:-1] + str(number) if topic.endswith("0") else topic
+
+
+def _tools(tools: Sequence[Dict[str, Any]], robots: int) -> List[Dict[str, Any]]:
+    """Buttons for goals of the first few quadcopters, and for poses and points if they are all.
+
+    They all look alike: more would be of no use.
+    """
+    made: List[Dict[str, Any]] = []
+    for tool in tools:
+        if tool["Class"] not in _NUMBERED_TOOLS:
+            made.append(tool)
+        elif tool["Topic"].endswith("0") and (robots <= FEW or tool["Class"] == _GOAL_TOOL):
+            made += [
+                {**tool, "Topic": _with_number(tool["Topic"], number)}
+                for number in range(min(robots, FEW))
+            ]
+    return made
+
+
+def _centre(view: Dict[str, Any], scene: Scene) -> None:
+    """The whole arena in sight."""
+    middle_x_m = scene.origin_x_m + 0.5 * scene.size_x_m
+    middle_y_m = scene.origin_y_m + 0.5 * scene.size_y_m
+    longest_m = max(scene.size_x_m, scene.size_y_m)
+    if view["Class"] == "rviz/TopDownOrtho":
+        view["X"], view["Y"] = middle_x_m, middle_y_m
+        view["Scale"] = _WINDOW_PX / longest_m
+    elif "Focal Point" in view:
+        view["Focal Point"] = {"X": middle_x_m, "Y": middle_y_m, "Z": 0}
+        view["Distance"] = 1.5 * longest_m
+
+
+def _fold(template: Dict[str, Any], robots: int) -> None:
+    for panel in template["Panels"]:
+        if panel["Class"] == "rviz/Displays" and robots > FEW:
+            panel["Property Tree Widget"]["Expanded"] = []
+
+
+def _rgb(number: int) -> str:
+    return "; ".join(str(round(255 * part)) for part in robot_rgba(number)[:3])
+
+
+def arguments(words: Sequence[str]) -> Tuple[argparse.Namespace, List[str]]:
+    """The command line's, and the words among them that are not ours."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
+    parser.add_argument("--robots", type=int, required=True)
+    parser.add_argument("--scene", default=RANDOM)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--size", type=float, default=0.0)
+    return parser.parse_known_args(words)
+
+
+def main() -> int:
+    """Prints the file."""
+    given, _ = arguments(sys.argv[1:])
+    try:
+        yaml.safe_dump(document(given.robots, scene_of(vars(given))), sys.stdout, sort_keys=False)
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return EXIT_BAD_INPUT
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,134 @@
+"""Each fault of the original: mended by default, and to be had back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from quad_nav.config import load, updated
+from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.grid import LETHAL
+from quad_nav.navigator.fixes import ORIGINAL, Fixes
+from quad_nav.navigator.tick import RobotPoses
+from quad_nav.recovery import RecoveryContext
+from quad_nav.scenario.assembly import apply_configuration, build_navigator
+
+LIDAR = {
+    "data_type": "LaserScan",
+    "marking": True,
+    "clearing": False,
+    "max_obstacle_height": 2.0,
+    "expected_update_rate": 21.0,
+}
+TREE = {
+    name: {"observation_sources": "scan", "scan": LIDAR, "obstacle_range": 5.0}
+    for name in ("global_costmap", "local_costmap")
+}
+OFF = {
+    "progress_timeout": 0.0,
+    "stuck_cost_factor": 1.0,
+    "sensor_timeout": 0.0,
+    "clear_any_obstacle_layer": False,
+    "reject_colliding_escape": False,
+    "escape_collision": False,
+    "predict_goal_turn": False,
+    "stop_after_rotation": False,
+    "avoid_peers": False,
+    "yield_when_idle": False,
+    "reject_implausible_scans": False,
+}
+HERE = Pose2D(5.0, 5.0)
+
+
+def navigator_with(fixes):
+    return build_navigator(load({**TREE, "fixes": fixes}))
+
+
+def see_a_wall_three_metres_ahead(navigator, now_s=0.0):
+    scan = Scan(now_s, 0.0, 0.01, 0.02, 60.0, np.full(2, 3.0, dtype=np.float32))
+    for costmap in (navigator.global_costmap, navigator.local_costmap):
+        costmap.layers["obstacle_layer"].add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), now_s)
+        costmap.update(now_s, HERE)
+
+
+def test_all_are_on_by_default_and_all_can_be_switched_off():
+    assert load({}).fixes == Fixes()
+    assert load({"fixes": OFF}).fixes == ORIGINAL
+
+
+@pytest.mark.parametrize(
+    "fixes, is_left", [({}, False), ({"clear_any_obstacle_layer": False}, True)]
+)
+def test_the_default_recovery_clears_the_layer_that_there_is(fixes, is_left):
+    navigator = navigator_with(fixes)
+    see_a_wall_three_metres_ahead(navigator)
+    grid = navigator.global_costmap.layers["obstacle_layer"].grid.costs
+    assert (grid == LETHAL).any()
+    clear = navigator.recoveries[0].behaviour  # beyond 3 m / 2
+    clear.step(RecoveryContext(0.0, navigator.global_costmap, navigator.local_costmap, HERE, HERE))
+    assert (grid == LETHAL).any() == is_left
+
+
+@pytest.mark.parametrize(
+    "fixes, stale_after_s",
+    [({}, 1.0), ({"sensor_timeout": 0.0}, 21.0), ({"sensor_timeout": 3.0}, 3.0)],
+)
+def test_a_silent_sensor_is_missed_after_a_time_that_is_a_time(fixes, stale_after_s):
+    navigator = navigator_with(fixes)
+    see_a_wall_three_metres_ahead(navigator, 10.0)
+    assert navigator.local_costmap.is_current(10.0 + stale_after_s)
+    assert not navigator.local_costmap.is_current(10.1 + stale_after_s)
+
+
+@pytest.mark.parametrize("fixes", [{}, OFF])
+def test_switches_reach_planner_and_recoveries(fixes):
+    navigator = navigator_with(fixes)
+    on = not fixes
+    assert navigator.controller.params.reject_colliding_escape is on
+    assert navigator.controller.params.predict_goal_turn is on
+    assert navigator.recoveries[1].behaviour.params.stop_afterwards is on
+    dwa = build_navigator(
+        load({"fixes": fixes, "base_local_planner": "dwa_local_planner/DWAPlannerROS"})
+    )
+    assert dwa.controller.params.predict_goal_turn is on
+
+
+def test_switches_can_be_thrown_in_flight():
+    configuration = load(TREE)
+    navigator = build_navigator(configuration)
+    configuration = updated(
+        configuration, "fixes", {"progress_timeout": 3.0, "predict_goal_turn": False}
+    )
+    apply_configuration(navigator, configuration)
+    assert navigator.fixes.progress_timeout_s == 3.0
+    assert not navigator.controller.params.predict_goal_turn
+
+
+@pytest.mark.parametrize("fixes, leaves", [({}, True), ({"escape_collision": False}, False)])
+def test_one_that_touches_a_wall_leaves_it(fixes, leaves):
+    """Its back is 0.36 m behind it, in the cell of the wall at 0.38 m."""
+    away = Pose2D(5.0, 5.0, 3.14)
+    node = {
+        "robot_radius": 0.35,
+        "plugins": [
+            {"name": "obstacle_layer", "type": "costmap_2d::ObstacleLayer"},
+            {"name": "inflation_layer", "type": "costmap_2d::InflationLayer"},
+        ],
+        "obstacle_layer": {**TREE["local_costmap"], "footprint_clearing_enabled": False},
+    }
+    navigator = build_navigator(
+        load(
+            {
+                "global_costmap": node,
+                "local_costmap": {**node, "rolling_window": True, "width": 4.0, "height": 4.0},
+                "fixes": fixes,
+            }
+        )
+    )
+    scan = Scan(0.0, -0.05, 0.05, 0.02, 60.0, np.full(3, 0.38, dtype=np.float32))
+    for costmap in (navigator.global_costmap, navigator.local_costmap):
+        costmap.layers["obstacle_layer"].add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), 0.0)
+    navigator.set_goal(Pose2D(2.0, 5.0, 3.14), 0.0)
+    tick = navigator.tick(0.0, RobotPoses(away, away), Twist2D())
+    assert any("every trajectory hits something" in warning for warning in tick.warnings)
+    assert tick.command == (Twist2D(0.1) if leaves else Twist2D())

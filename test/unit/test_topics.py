@@ -1,0 +1,244 @@
+"""What the ROS face says, before it becomes messages."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from quad_nav.costmap.cost_grid import NO_CELLS, Window
+from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
+from quad_nav.files.shipped import shipped
+from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.mission.flight_log import Contact as LoggedContact
+from quad_nav.mission.goal_sequence import Goal, GoalSequence
+from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
+from quad_nav.sim.contacts import Contact
+from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
+from quad_nav.sim.scene_document import scene_document
+from quad_nav.sim.scene_file import load_scene, scene_from_document
+from quad_nav.topics.contacts import contact_from_values, contact_values
+from quad_nav.topics.costmap_updates import CostmapNews
+from quad_nav.topics.flight_info import event, from_text, mission_info, simulation_info, to_text
+from quad_nav.topics.flown_path import FlownPath
+from quad_nav.topics.goal_markers import goal_markers
+from quad_nav.topics.markers import (
+    CUBE,
+    CUBE_LIST,
+    CYLINDER,
+    SPHERE,
+    quadcopter_markers,
+    scene_markers,
+)
+
+SCENE = Scene(
+    "yard",
+    10.0,
+    8.0,
+    1.25,
+    Walls(1.5, 0.2),
+    (
+        Box("crate", 4.0, 2.0, 0.5, 0.7, 0.9, 0.4, 0.125),
+        Cylinder("pole", 3.0, 3.0, 0.25, 2.0),
+        Sphere("ball", 1.0, -1.0, 0.75, 0.5),
+    ),
+    (Pose2D(-3.0, -2.0, 0.5),),
+    -5.0,
+    -4.0,
+)
+
+
+# Scenes.
+
+
+@pytest.mark.parametrize(
+    "scene", [SCENE, load_scene(shipped("scenes", "arena.yaml"))], ids=lambda scene: scene.name
+)
+def test_a_scene_s_document_makes_the_same_scene(scene):
+    document = json.loads(json.dumps(scene_document(scene)))
+    assert scene_from_document(document, "it") == scene
+
+
+def test_solids_are_markers_of_their_shape_and_size():
+    walls, solids = scene_markers(SCENE)[:4], scene_markers(SCENE)[4:]
+    assert {marker.namespace for marker in walls} == {"walls"}
+    crate, pole, ball = solids
+    assert (crate.kind, crate.size_m, crate.yaw_rad) == (CUBE, (0.5, 0.7, 0.9), 0.4)
+    assert crate.place_m == pytest.approx((4.0, 2.0, 0.125 + 0.45))
+    assert (pole.kind, pole.place_m, pole.size_m) == (CYLINDER, (3.0, 3.0, 1.0), (0.5, 0.5, 2.0))
+    assert (ball.kind, ball.place_m, ball.size_m) == (SPHERE, (1.0, -1.0, 0.75), (1.0, 1.0, 1.0))
+
+
+def test_thousands_of_boxes_are_one_list():
+    quarter = math.pi / 2
+    boxes = [Box(f"b{k}", float(k), 5.0, 0.1, 0.1, 2.0, quarter) for k in range(1000)]
+    shown = scene_markers(Scene("map", 9.0, 9.0, 1.0, Walls(), tuple(boxes), ()))
+    assert [marker.kind for marker in shown] == [CUBE] * 4 + [CUBE_LIST]
+    # In axes turned by a quarter to the left, what lies at (x, y) has coordinates (y, -x).
+    assert shown[-1].points_m[3] == pytest.approx((5.0, -3.0, 1.0))
+
+
+def test_quadcopters_move_with_their_frames():
+    parts = quadcopter_markers(2)
+    assert {part.frame for part in parts} == {"base_link0", "base_link1"}
+    assert all(part.frame_locked for part in parts)
+    assert len({(part.namespace, part.number) for part in parts}) == len(parts)
+
+
+def test_the_goal_in_flight_is_large_and_the_flown_one_dim():
+    sequencer = Sequencer(GoalSequence((Goal(1.0, 0.0), Goal(2.0, 0.0), Goal(3.0, 0.0))))
+    sequencer.tick(0.0, Pose2D(0.0, 0.0))
+    sequencer.tick(1.0, Pose2D(1.0, 0.0))  # the first is reached, the second sent
+    spheres = [m for m in goal_markers([sequencer], 1.0) if m.kind == SPHERE]
+    assert [m.size_m[0] for m in spheres] == [0.30, 0.45, 0.30]
+    assert [m.rgba[3] for m in spheres] == [0.2, 1.0, 0.75]
+
+
+# Paths and costmaps.
+
+
+def test_a_path_has_poses_5_cm_apart_and_is_told_twice_a_second():
+    path = FlownPath(lambda stamp_s, pose: pose.x_m)
+    told = [k for k in range(41) if path.add(k / 40, Pose3D(k * 0.0126, 0.0, 1.0))]
+    assert list(path.poses) == pytest.approx([0.0504 * k for k in range(11)])
+    assert told == [0, 20, 40]
+
+
+def test_a_path_that_does_not_grow_is_not_told():
+    path = FlownPath(lambda stamp_s, pose: pose)
+    assert [path.add(stamp_s, Pose3D(0.0, 0.0, 1.0)) for stamp_s in (0.0, 1.0, 2.0)] == [
+        True,
+        False,
+        False,
+    ]
+
+
+def test_a_cleared_path_begins_anew():
+    path = FlownPath(lambda stamp_s, pose: stamp_s)
+    path.add(7.0, Pose3D(0.0, 0.0, 1.0))
+    path.clear()
+    assert path.add(1.0, Pose3D(0.0, 0.0, 1.0))
+    assert list(path.poses) == [1.0]
+
+
+def costmap(**params):
+    return LayeredCostmap(
+        CostmapParams(width_m=2.0, height_m=1.0, resolution_m=0.1, layers=(), **params)
+    )
+
+
+def test_windows_add_up_between_two_publications():
+    news = CostmapNews(costmap(publish_frequency_hz=1.0))
+    assert not news.note(0.4, Window(0, 2, 0, 2))
+    assert not news.note(0.8, NO_CELLS)
+    assert news.note(1.0, Window(4, 5, 1, 3))
+    assert news.take() == Window(0, 5, 0, 3)
+    assert news.take() == NO_CELLS
+    assert not news.note(1.8, NO_CELLS)
+    assert news.note(2.0, NO_CELLS)
+
+
+def test_a_late_update_does_not_delay_what_is_told_after_it():
+    news = CostmapNews(costmap(publish_frequency_hz=1.0))
+    assert news.note(1.2, NO_CELLS)
+    assert not news.note(1.9, NO_CELLS)
+    assert news.note(2.0, NO_CELLS)
+
+
+def test_news_come_again_one_period_after_the_clock_has_gone_back():
+    news = CostmapNews(costmap(publish_frequency_hz=1.0))
+    assert news.note(100.0, NO_CELLS)
+    news.restart(50.5)
+    assert not news.note(51.0, NO_CELLS)
+    assert news.note(51.5, NO_CELLS)
+
+
+def test_without_a_frequency_nothing_is_published():
+    assert not CostmapNews(costmap(publish_frequency_hz=0.0)).note(100.0, Window(0, 2, 0, 2))
+
+
+def test_a_grid_that_moved_is_wanted_in_full():
+    moving = costmap(publish_frequency_hz=1.0, rolling_window=True)
+    news = CostmapNews(moving)
+    assert [news.wants_full_grid(), news.wants_full_grid()] == [True, False]
+    moving.update(1.0, Pose2D(3.0, 3.0))
+    assert [news.wants_full_grid(), news.wants_full_grid()] == [True, False]
+
+
+def test_a_costmap_can_always_be_wanted_in_full():
+    news = CostmapNews(costmap(publish_frequency_hz=1.0, always_send_full_costmap=True))
+    assert [news.wants_full_grid(), news.wants_full_grid()] == [True, True]
+
+
+# Texts.
+
+
+def test_a_contact_comes_back_from_its_values():
+    contact = Contact(12.3456, 0, "quadcopter 1", 1, (1.23456, 7.0, 1.0))
+    values = contact_values(contact, 13.3456)
+    assert contact_from_values("quad0", values) == LoggedContact(
+        13.3456, "quad0", "quad1", 1.23456, 7.0
+    )
+
+
+def test_a_contact_without_a_place_is_refused():
+    with pytest.raises(ValueError, match="without a readable 'y_m'"):
+        contact_from_values("quad0", {"with": "wall", "time_s": "1", "x_m": "2"})
+
+
+def test_events_say_what_the_sequencer_did():
+    goal = Goal(1.0, 2.0)
+    sent = event(1, 4.5, SendGoal(2, 1, Pose2D(1.0, 2.0, 0.5), 2, "aborted"))
+    assert sent == {
+        "event": "sent",
+        "robot": 1,
+        "time_s": 4.5,
+        "goal": 2,
+        "lap": 1,
+        "x_m": 1.0,
+        "y_m": 2.0,
+        "yaw_rad": 0.5,
+        "attempt": 2,
+        "why": "aborted",
+    }
+    ended = event(0, 9.0, GoalEnded(2, 1, goal, False, 4.5, 2, "aborted"))
+    assert ended == {
+        "event": "ended",
+        "robot": 0,
+        "time_s": 9.0,
+        "goal": 2,
+        "lap": 1,
+        "reached": False,
+        "attempts": 2,
+        "reason": "aborted",
+    }
+    assert event(0, 9.0, SequenceDone())["event"] == "done"
+
+
+def test_what_is_known_of_a_flight_is_json():
+    info = {
+        **simulation_info(SCENE, 7),
+        **mission_info(
+            {"quad0": GoalSequence((Goal(1.0, 2.0), Goal(1.0, 2.0, 0.5)))},
+            [{"controller_frequency": 10.0}],
+            0.3,
+        ),
+    }
+    read = from_text(to_text(info))
+    assert read == info
+    assert (read["seed"], read["start_s"], read["robot_radius_m"]) == (7, 1.0, 0.3)
+    assert read["robots"] == [
+        {
+            "name": "quad0",
+            "goals": [[1.0, 2.0], [1.0, 2.0, 0.5]],
+            "parameters": {"controller_frequency": 10.0},
+        }
+    ]
+    assert read["versions"]["numpy"] == np.__version__
+
+
+@pytest.mark.parametrize("text", ["", "no JSON", "[1, 2]", '"text"'])
+def test_a_text_that_is_no_object_tells_nothing(text):
+    assert from_text(text) is None
