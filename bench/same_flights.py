@@ -70,8 +70,7 @@ def fly(name: str, arguments: Sequence[str], source: Path) -> Tuple[str, Optiona
     """
     run = subprocess.run(
         [sys.executable, "-m", "quad_nav.cli", *arguments, "--json", "-", "--quiet"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        capture_output=True,
         text=True,
         env={**os.environ, "PYTHONPATH": str(source / "src")},
         check=False,
@@ -95,9 +94,9 @@ def differences(before: Any, after: Any, place: str = "") -> Iterator[str]:
         yield f"{place}: {before} before, {after} now"
 
 
-def fly_all(barn: Optional[Path], source: Path, jobs: int) -> Dict[str, Summary]:
+def fly_all(barn: Optional[Path], source: Path, jobs: int, only: str = "") -> Dict[str, Summary]:
     """Fly the whole list; exit with status 2 if one of them could not be flown."""
-    tasks = flights(barn)
+    tasks = {name: arguments for name, arguments in flights(barn).items() if only in name}
     summaries: Dict[str, Summary] = {}
     parallel = joblib.Parallel(jobs, return_as="generator_unordered")
     for name, summary, errors in parallel(
@@ -146,10 +145,11 @@ def record(file: Path, source: Path, barn: Optional[Path], jobs: int) -> None:
 
 @main.command()
 @_with_options
-def compare(file: Path, source: Path, barn: Optional[Path], jobs: int) -> None:
+@click.option("--only", default="", metavar="TEXT", help="Flights with this text in their name.")
+def compare(file: Path, source: Path, barn: Optional[Path], jobs: int, only: str) -> None:
     """Fly and compare with the summaries in FILE."""
     recorded = json.loads(file.read_text(encoding="utf-8"))
-    flown = fly_all(barn, source, jobs)
+    flown = fly_all(barn, source, jobs, only)
     lines = [
         f"{name}{line}" for name in flown for line in differences(recorded.get(name), flown[name])
     ]
