@@ -84,7 +84,7 @@ def _sections() -> Iterable[Tuple[str, str, Table]]:
     )
     yield (
         "fixes",
-        "Not in the original: its faults, mended; see [faults](faults.md).",
+        "Not in the original: its faults, mended; see [faults](upstream_bugs.md).",
         tables.MENDS,
     )
     yield "Costmaps", "Below `global_costmap` and `local_costmap`.", costmap_tables.COSTMAP

@@ -179,7 +179,7 @@ NAVIGATOR = Table(
     ),
 )
 
-# Not in the original: its faults, mended. See docs/faults.md.
+# Not in the original: its faults, mended. See docs/upstream_bugs.md.
 MENDS = Table(
     reconfigurable=(
         double(

@@ -1,6 +1,6 @@
 """The original's faults, mended: one switch each.
 
-What each fault is, and what is done about it, is in ``docs/faults.md``.
+What each fault is, and what is done about it, is in ``docs/upstream_bugs.md``.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ The states and their transitions are those of ROS's move_base: PLANNING until
 there is a plan, CONTROLLING along it, CLEARING (one recovery behaviour after
 the other) when planning or control has failed for its patience or the robot
 oscillates, and then PLANNING again. What differs, and why, is in
-``docs/faults.md``.
+``docs/upstream_bugs.md``.
 """
 
 from __future__ import annotations
