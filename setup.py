@@ -1,32 +1,39 @@
-"""The Python package for catkin and pip; the metadata is in pyproject.toml.
+"""Build the Python package for catkin and for pip.
 
-catkin reads the arguments of this call, so what it needs stands here and not in pyproject.toml. The
-version is package.xml's.
+catkin executes this file and reads the arguments of ``setup``, so everything that catkin needs is
+here; the rest of the metadata is in ``pyproject.toml``. The version is the one of ``package.xml``.
 """
 
 from itertools import groupby
 from pathlib import Path
 from xml.etree import ElementTree
 
-from setuptools import find_packages, setup
+import setuptools
 
 ROOT = Path(__file__).parent
-# What the package is asked for by name (quad_nav/files/shipped.py); catkin installs it by CMake.
+# Files that `quad_nav.files.shipped` finds by name. CMakeLists.txt installs them for catkin.
 SHIPPED = sorted(
     path.relative_to(ROOT)
     for folder in ("config", "goals", "scenes", "spaces")
     for path in (ROOT / folder).rglob("*.*")
     if path.is_file()
 )
+# setuptools 77 is the first with SPDX expressions. Noetic has 45, Debian 12 has 66.
+LICENSE = "license_expression" if int(setuptools.__version__.split(".")[0]) >= 77 else "license"
 
-setup(
+setuptools.setup(
     name="quad-nav",
     version=ElementTree.parse(ROOT / "package.xml").findtext("version"),
-    packages=find_packages("src"),
+    packages=setuptools.find_packages("src"),
     package_dir={"": "src"},
-    package_data={"quad_nav.report": ["*.jinja"], "quad_nav.tuning.report": ["*.jinja"]},
+    package_data={
+        "quad_nav": ["py.typed"],
+        "quad_nav.report": ["*.jinja"],
+        "quad_nav.tuning.report": ["*.jinja"],
+    },
     data_files=[
         (f"share/quad/{folder}", list(map(str, paths)))
         for folder, paths in groupby(SHIPPED, lambda path: path.parent)
     ],
+    **{LICENSE: "BSD-3-Clause"},
 )
