@@ -7,9 +7,9 @@ from typing import Any, Sequence, Tuple
 import numpy as np
 
 from quad_nav.geometry import Pose2D, quaternion_from_euler
-from quad_nav.mission.flight_log import Contact
 from quad_nav.navigator.tick import State
 from quad_nav.recording.trace import FlightTrace, GoalTrace, RobotTrace
+from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Box, Cylinder, Scene, Walls
 
 RADIUS_M = 0.3

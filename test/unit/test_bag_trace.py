@@ -12,7 +12,6 @@ from recorded_flight import flown, setup
 from quad_nav.control.controller import Control
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Twist2D, quaternion_from_yaw
-from quad_nav.mission import flight_log
 from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick, Trigger
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.recording import messages
@@ -24,7 +23,7 @@ from quad_nav.sim.contacts import Contact
 # Stamps are whole nanoseconds; contacts are told with six digits; a quaternion gives a yaw.
 TIME_S, SIX_DIGITS, YAW_RAD = 1e-9, 1e-5, 1e-12
 
-TOUCH = Contact(0.125, 1, "quadcopter 0", 0, (9.876543, 2.0, 1.0))
+TOUCH = Contact(0.125, "quad1", "quad0", 9.876543, 2.0)
 HERE = Pose2D(1.5, 1.5)
 
 
@@ -61,7 +60,7 @@ def traces(request, tmp_path_factory):
     path = folder / request.param
     trace, recorder = TraceObserver("short"), Recorder(path, "short")
     summary = fly(setup(folder, seed=3), [trace, Troubles(trace, recorder), recorder])
-    contact = flight_log.Contact(summary.sim_time_s, "quad1", "quad0", 9.87654, 2.0)
+    contact = Contact(summary.sim_time_s, "quad1", "quad0", 9.87654, 2.0)
     return trace.trace((contact,), summary.reason), read_trace(path)
 
 

@@ -21,9 +21,10 @@ from quad_nav.barn.setup import BarnOptions, read_barn_setup
 from quad_nav.barn.worlds import BarnWorld, load_worlds
 from quad_nav.cli.barn import barn
 from quad_nav.errors import InputError
-from quad_nav.mission.flight_log import Contact, Leg
+from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.goal_sequence import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Cylinder
 
 ROOT = Path(__file__).resolve().parents[2]

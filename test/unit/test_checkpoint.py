@@ -10,9 +10,10 @@ import pytest
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.checkpoint import contact_record, head, on_clock, robot_record, standing
-from quad_nav.mission.flight_log import Contact, FlightLog
+from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
 from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
+from quad_nav.sim.contacts import Contact
 
 A, B, C = Goal(3.0, 0.0), Goal(3.0, 4.0), Goal(0.0, 4.0, 1.5)
 START = Pose2D(0.0, 0.0)

@@ -149,7 +149,7 @@ def test_the_engine_takes_over_where_the_free_flight_was():
         simulation.close()
     (free,), (engine,) = contacts
     assert (free.other, free.time_s) == (engine.other, engine.time_s)
-    np.testing.assert_allclose(free.position_m, engine.position_m, atol=1e-6)
+    assert (free.x_m, free.y_m) == pytest.approx((engine.x_m, engine.y_m), abs=1e-6)
 
 
 def test_only_who_is_near_is_in_the_engine():
@@ -182,5 +182,5 @@ def test_who_has_left_the_engine_is_not_in_the_way_there():
             simulation.set_command(1, Twist2D(0.4 if step > 960 else 0.0, 0.0, 0.0))
         simulation.step()
     (contact,) = simulation.contacts
-    assert (contact.robot, contact.other) == (1, "post")
+    assert (contact.robot, contact.other) == ("quad1", "post")
     simulation.close()

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hand_made_traces import TIMES_S, flight, robot
 
-from quad_nav.mission.flight_log import Contact
 from quad_nav.report.encounter_picture import encounter_picture, frame_times
 from quad_nav.report.encounters import encounters, gap_text
 from quad_nav.report.measures import tracks
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.style import styled
+from quad_nav.sim.contacts import Contact
 
 
 def found_in(trace, **options):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hand_made_traces import RADIUS_M, SCENE, TIMES_S, flight, goal, robot
 
-from quad_nav.mission.flight_log import Contact
 from quad_nav.report.figures import figures
 from quad_nav.report.measures import (
     clearances_m,
@@ -21,6 +20,7 @@ from quad_nav.report.measures import (
     tilt_rad,
     tracks,
 )
+from quad_nav.sim.contacts import Contact
 
 
 def test_gap_between_two_that_meet_head_on():

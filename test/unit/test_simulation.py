@@ -10,7 +10,7 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.sim.contacts import SEPARATION_S, ContactLog, Touch
+from quad_nav.sim.contacts import CONTACT_GAP_S, ContactLog, Touch
 from quad_nav.sim.flight import Airframe
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
@@ -145,8 +145,8 @@ def test_one_contact_for_a_push_against_a_pillar(make):
     fly(simulation, 6.0, Twist2D(0.5, 0.0, 0.0))
     assert len(simulation.contacts) == 1
     contact = simulation.contacts[0]
-    assert str(contact) == "quadcopter 0 touches pillar"
-    assert contact.position_m[:2] == pytest.approx((11.5, 10.0), abs=0.02)
+    assert str(contact) == "quad0 touches pillar"
+    assert (contact.x_m, contact.y_m) == pytest.approx((11.5, 10.0), abs=0.02)
     # 1.2 m to go at 0.5 m/s, and 0.32 s that the velocity loop lags behind
     assert contact.time_s == pytest.approx(1.2 / 0.5 + 0.32, abs=0.05)
     assert simulation.state(0).map_from_base.z_m == pytest.approx(1.0, abs=0.02)
@@ -157,10 +157,10 @@ def test_one_contact_for_a_push_against_a_pillar(make):
 def test_two_quadcopters_make_one_contact_that_involves_both(make):
     simulation = make(room(Pose2D(9.0, 10.0, 0.0), Pose2D(11.0, 10.0, math.pi)), 2)
     fly(simulation, 3.0, Twist2D(0.5, 0.0, 0.0), Twist2D(0.5, 0.0, 0.0))
-    assert [str(c) for c in simulation.contacts] == ["quadcopter 0 touches quadcopter 1"]
+    assert [str(c) for c in simulation.contacts] == ["quad0 touches quad1"]
     contact = simulation.contacts[0]
-    assert contact.involves(0) and contact.involves(1)
-    assert contact.position_m[:2] == pytest.approx((10.0, 10.0), abs=0.02)
+    assert contact.involves("quad0") and contact.involves("quad1")
+    assert (contact.x_m, contact.y_m) == pytest.approx((10.0, 10.0), abs=0.02)
 
 
 def test_a_low_crate_is_flown_over(make):
@@ -179,11 +179,11 @@ def test_walls_touch(make):
 
 def test_contact_log_needs_separation_before_a_new_contact():
     log = ContactLog()
-    touch = Touch(0, "pillar", None, (1.0, 2.0, 3.0))
-    other = Touch(1, "pillar", None, (1.0, 2.0, 3.0))
+    touch = Touch(0, "pillar", (1.0, 2.0, 3.0))
+    other = Touch(1, "pillar", (1.0, 2.0, 3.0))
     assert [c.time_s for c in log.update(1.0, [touch])] == [1.0]
-    assert log.update(1.0 + SEPARATION_S, [touch]) == []
-    assert [c.robot for c in log.update(1.1 + SEPARATION_S, [touch, other])] == [1]
+    assert log.update(1.0 + CONTACT_GAP_S, [touch]) == []
+    assert [c.robot for c in log.update(1.1 + CONTACT_GAP_S, [touch, other])] == ["quad1"]
     assert log.update(3.0, []) == []
     assert [c.time_s for c in log.update(3.0, [touch])] == [3.0]
     assert len(log.contacts) == 3
@@ -275,7 +275,7 @@ def test_same_seed_same_bits(make):
         assert np.array_equal(flown, flown_again)
         assert np.array_equal(ranges, ranges_again)
         assert len(contacts) > 0
-        assert [c.position_m for c in contacts] == [c.position_m for c in contacts_again]
+        assert [(c.x_m, c.y_m) for c in contacts] == [(c.x_m, c.y_m) for c in contacts_again]
     assert not np.array_equal(flown, flight(make(scene, 2, params, seed=6))[0])
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.flight_log import Contact, FlightLog, Leg, unflown
+from quad_nav.mission.flight_log import FlightLog, Leg, unflown
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.mission.summary import (
@@ -16,6 +16,8 @@ from quad_nav.mission.summary import (
     to_json,
     write_json,
 )
+from quad_nav.sim.contacts import Contact, ContactLog, Touch
+from quad_nav.topics.contacts import contact_from_values, contact_values
 
 # From (0, 0) over (3, 0) to the goal: 7 m where the straight line has 5 m.
 DETOUR = [(0.0, Pose2D(0, 0)), (10.0, Pose2D(3, 0)), (20.0, Pose2D(3, 4))]
@@ -72,14 +74,34 @@ def test_the_path_is_from_the_first_goal_to_the_last_and_by_newer_poses_only():
     assert log.robots["quad0"].path_length_m == 5.0
 
 
-def test_one_touch_is_one_contact_from_both_sides_and_while_it_lasts():
+def test_a_contact_that_is_reported_again_or_by_both_robots_counts_once():
     log = FlightLog(["quad0", "quad1"], 0.3)
-    assert log.touch(Contact(5.0, "quad0", "quad1", 1.0, 2.0))
-    assert not log.touch(Contact(5.0, "quad1", "quad0", 1.0, 2.0))
-    assert not log.touch(Contact(6.0, "quad0", "quad1", 1.0, 2.0))
-    assert log.touch(Contact(6.0, "quad0", "pillar", 1.0, 2.0))
-    assert log.touch(Contact(7.5, "quad1", "quad0", 1.0, 2.0))
+    assert log.add_contact(Contact(5.0, "quad0", "quad1", 1.0, 2.0))
+    assert not log.add_contact(Contact(5.01, "quad1", "quad0", 1.0, 2.0))
+    assert log.add_contact(Contact(5.6, "quad0", "quad1", 1.0, 2.0))
+    assert not log.add_contact(Contact(5.0, "quad0", "quad1", 1.0, 2.0))
+    assert log.add_contact(Contact(5.6, "quad0", "pillar", 1.0, 2.0))
     assert log.contacts_of("quad0") == 3 and log.contacts_of("quad1") == 2
+
+
+@pytest.mark.parametrize(
+    "period_s, contacts",
+    [(0.7, 5), (0.4, 1)],
+    ids=["apart", "lasting"],
+)
+def test_both_shells_count_the_same_contacts(period_s, contacts):
+    """Offline the flight log gets the simulation's contacts, under ROS their messages."""
+    simulation = ContactLog()
+    offline, ros = FlightLog(["quad0"], 0.3), FlightLog(["quad0"], 0.3)
+    for count in range(5):
+        for contact in simulation.update(
+            1.0 + count * period_s, [Touch(0, "pillar", (1.0, 2.0, 1.0))]
+        ):
+            offline.add_contact(contact)
+            message = contact_values(contact, contact.time_s + 4321.0)
+            ros.add_contact(contact_from_values(contact.robot, message))
+            ros.add_contact(contact_from_values(contact.robot, message))  # sent twice
+    assert len(offline.contacts) == len(ros.contacts) == contacts
 
 
 CONTACT = Contact(5.0, "quad0", "pillar", 1.0, 2.0)

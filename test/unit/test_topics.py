@@ -12,7 +12,6 @@ from quad_nav.costmap.cost_grid import NO_CELLS, Window
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D
-from quad_nav.mission.flight_log import Contact as LoggedContact
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import Contact
@@ -176,11 +175,9 @@ def test_a_costmap_can_always_be_wanted_in_full():
 
 
 def test_a_contact_comes_back_from_its_values():
-    contact = Contact(12.3456, 0, "quadcopter 1", 1, (1.23456, 7.0, 1.0))
+    contact = Contact(12.3456, "quad0", "quad1", 1.23456, 7.0)
     values = contact_values(contact, 13.3456)
-    assert contact_from_values("quad0", values) == LoggedContact(
-        13.3456, "quad0", "quad1", 1.23456, 7.0
-    )
+    assert contact_from_values("quad0", values) == Contact(13.3456, "quad0", "quad1", 1.23456, 7.0)
 
 
 def test_a_contact_without_a_place_is_refused():

@@ -12,9 +12,10 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, TypeV
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.flight_log import Contact, FlightLog, Flown, Leg
+from quad_nav.mission.flight_log import FlightLog, Flown, Leg
 from quad_nav.mission.goal_sequence import Goal
 from quad_nav.mission.sequencer import BEGINNING, Flight, Sequencer, Stage
+from quad_nav.sim.contacts import Contact
 
 T = TypeVar("T")
 

@@ -14,8 +14,11 @@ from quad_nav.geometry import Pose2D, angle_difference
 from quad_nav.mission.gap_log import Clearances, GapLog
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
+from quad_nav.sim.contacts import CONTACT_GAP_S, Contact
 
-SAME_CONTACT_S = 1.0
+# Contacts of a pair begin more than CONTACT_GAP_S apart, so reports of a begin that differ by less
+# than this, in rounding or because both robots report it, are of the same contact.
+_SAME_BEGIN_S = CONTACT_GAP_S / 2
 # A quadcopter that is slower than this and turns faster than this spins.
 SPIN_BELOW_MPS, SPIN_ABOVE_RADPS = 0.05, 0.2
 
@@ -37,17 +40,6 @@ class Leg:
     time_s: Optional[float] = None
     path_length_m: float = 0.0
     straight_length_m: float = 0.0
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Two things touched; ``other`` is a quadcopter's name or an obstacle's."""
-
-    time_s: float
-    robot: str
-    other: str
-    x_m: float
-    y_m: float
 
 
 @dataclass(frozen=True)
@@ -196,19 +188,19 @@ class FlightLog:
         self.robot_radius_m = robot_radius_m
         self.contacts: List[Contact] = []
         self.gaps = GapLog(names, robot_radius_m, clearances_m)
-        self._last_contact_s: Dict[frozenset, float] = {}
 
     def move(self, name: str, stamp_s: float, pose: Pose2D) -> None:
         """Take a quadcopter's pose in ``map``."""
         if self.robots[name].move(stamp_s, pose):
             self.gaps.add(name, stamp_s, pose.x_m, pose.y_m)
 
-    def touch(self, contact: Contact) -> bool:
-        """Take a contact; False when it is the last one going on, or seen from the other side."""
-        pair = frozenset((contact.robot, contact.other))
-        last_s = self._last_contact_s.get(pair)
-        self._last_contact_s[pair] = contact.time_s
-        if last_s is not None and contact.time_s - last_s <= SAME_CONTACT_S:
+    def add_contact(self, contact: Contact) -> bool:
+        """Add a contact that begins; return False if it is in the log already.
+
+        ``sim.contacts`` defines what a contact is. This method only ignores a contact that is
+        reported again, or by both robots of the pair.
+        """
+        if any(_is_same(contact, known) for known in self.contacts):
             return False
         self.contacts.append(contact)
         return True
@@ -221,7 +213,15 @@ class FlightLog:
         self.gaps.know(name, clearance_m, separation_m)
 
     def contacts_of(self, name: str) -> int:
-        return sum(name in (contact.robot, contact.other) for contact in self.contacts)
+        return sum(contact.involves(name) for contact in self.contacts)
+
+
+def _is_same(one: Contact, other: Contact) -> bool:
+    return (
+        abs(one.time_s - other.time_s) < _SAME_BEGIN_S
+        and one.involves(other.robot)
+        and one.involves(other.other)
+    )
 
 
 def unflown(sequence: GoalSequence) -> List[Leg]:

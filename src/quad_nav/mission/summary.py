@@ -13,7 +13,8 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import tabulate
 
-from quad_nav.mission.flight_log import INTERRUPTED, Contact, FlightLog, Leg
+from quad_nav.mission.flight_log import INTERRUPTED, FlightLog, Leg
+from quad_nav.sim.contacts import Contact
 
 EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT = 0, 1, 2
 

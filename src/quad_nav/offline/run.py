@@ -5,13 +5,11 @@ from __future__ import annotations
 import time
 from typing import Callable, Optional, Sequence
 
-from quad_nav.mission import flight_log
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.gaps import Gaps
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.scenario.flight_setup import FlightSetup
-from quad_nav.sim.contacts import Contact
 from quad_nav.versions import versions
 
 INTERRUPTED = "interrupted"
@@ -57,20 +55,10 @@ def _advance_to_end(flight: Flight, is_stopped: Optional[Callable[[], bool]]) ->
 
 def _summary(flight: Flight, gaps: Gaps, wall_time_s: float, reason: str) -> MissionSummary:
     setup = flight.setup
-    contacts = tuple(
-        flight_log.Contact(
-            contact.time_s,
-            f"quad{contact.robot}",
-            _name(contact),
-            contact.position_m[0],
-            contact.position_m[1],
-        )
-        for contact in flight.contacts
-    )
     robots = tuple(_robot_summary(flight, gaps, index) for index in range(len(flight.robots)))
     return MissionSummary(
         robots,
-        contacts,
+        tuple(flight.contacts),
         setup.robot_radius_m,
         flight.now_s,
         wall_time_s,
@@ -78,10 +66,6 @@ def _summary(flight: Flight, gaps: Gaps, wall_time_s: float, reason: str) -> Mis
         seed=setup.seed,
         versions=versions(),
     )
-
-
-def _name(contact: Contact) -> str:
-    return contact.other if contact.other_robot is None else f"quad{contact.other_robot}"
 
 
 def _robot_summary(flight: Flight, gaps: Gaps, index: int) -> RobotSummary:
@@ -93,7 +77,7 @@ def _robot_summary(flight: Flight, gaps: Gaps, index: int) -> RobotSummary:
         float(gaps.clearances_m[index]),
         float(gaps.separations_m[index]) if len(flight.robots) > 1 else None,
         log.recoveries,
-        sum(contact.involves(index) for contact in flight.contacts),
+        sum(contact.involves(robot.name) for contact in flight.contacts),
         log.aborts,
         log.spin_s,
     )

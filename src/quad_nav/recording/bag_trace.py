@@ -12,7 +12,6 @@ from typing import Any, Callable, Dict, List, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.memory_limit import at_most_more
-from quad_nav.mission.flight_log import Contact
 from quad_nav.recording.bag_file import Message, read_messages
 from quad_nav.recording.bag_info import (
     LONGEST_S,
@@ -25,6 +24,7 @@ from quad_nav.recording.bag_info import (
 from quad_nav.recording.bag_robot import BagRobot
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import FlightTrace
+from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import scene_from_document
 from quad_nav.topics.contacts import NAME, contact_from_values

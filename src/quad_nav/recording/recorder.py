@@ -88,7 +88,7 @@ class Recorder(FlightObserver):
                 level,
                 NAME,
                 str(contact),
-                f"quad{contact.robot}",
+                contact.robot,
                 contact_values(contact, contact.time_s + flight_info.START_S),
             ),
             _SIMULATOR,

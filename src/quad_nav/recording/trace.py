@@ -11,11 +11,11 @@ from typing import Any, List, Mapping, Optional, Tuple
 import numpy as np
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.flight_log import Contact
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.observer import FlightObserver
+from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
 from quad_nav.versions import versions
 

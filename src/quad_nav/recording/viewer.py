@@ -88,7 +88,10 @@ class View(FlightObserver):
         self._rr.log(
             "map/contacts",
             self._rr.Points3D(
-                [contact.position_m], colors=[(220, 0, 0)], radii=[0.12], labels=[str(contact)]
+                [(contact.x_m, contact.y_m, self._altitude_m)],
+                colors=[(220, 0, 0)],
+                radii=[0.12],
+                labels=[str(contact)],
             ),
         )
         self._rr.log("contacts", self._rr.TextLog(str(contact), level="WARN"))

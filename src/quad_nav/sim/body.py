@@ -207,11 +207,11 @@ class World:
         )
         other: Optional[int] = numbers[1] if len(numbers) == 2 else None
         name = (
-            f"quadcopter {other}"
+            f"quad{other}"
             if other is not None
             else self._names[body_a if body_a in self._names else body_b]
         )
-        return Touch(numbers[0], name or self._scene.nearest(*position).name, other, position)
+        return Touch(numbers[0], name or self._scene.nearest(*position).name, position)
 
     def _add_obstacle(self, solid: Obstacle) -> int:
         client, height = self._client, solid.height_m

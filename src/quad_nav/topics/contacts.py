@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from typing import Dict, Mapping
 
-from quad_nav.mission import flight_log
 from quad_nav.sim.contacts import Contact
 
 NAME = "contact"
@@ -20,20 +18,29 @@ def text_values(**entries: object) -> Dict[str, str]:
 
 
 def contact_values(contact: Contact, clock_s: float) -> Dict[str, str]:
-    """``clock_s`` is what ``/clock`` says at the contact."""
-    x_m, y_m, _ = contact.position_m
+    """Return the values of a contact's message; ``clock_s`` is the time of ``/clock``."""
     return text_values(
-        time_s=clock_s, robot=contact.robot, **{"with": contact.other}, x_m=x_m, y_m=y_m
+        time_s=clock_s,
+        robot=contact.robot,
+        **{"with": contact.other},
+        x_m=contact.x_m,
+        y_m=contact.y_m,
     )
 
 
-def contact_from_values(robot: str, values: Mapping[str, str]) -> flight_log.Contact:
-    """The contact of the quadcopter ``robot``. Raises ValueError for what cannot be read."""
+def contact_from_values(robot: str, values: Mapping[str, str]) -> Contact:
+    """Return the contact of the robot of this name.
+
+    Raises:
+        ValueError: A value is missing or is not a number.
+    """
     try:
-        # The simulator writes "quadcopter 1"; robots[].robot in our summary is "quad1".
-        other = re.sub(r"^quadcopter (\d+)$", r"quad\1", values["with"])
-        return flight_log.Contact(
-            float(values["time_s"]), robot, other, float(values["x_m"]), float(values["y_m"])
+        return Contact(
+            float(values["time_s"]),
+            robot,
+            values["with"],
+            float(values["x_m"]),
+            float(values["y_m"]),
         )
     except (KeyError, ValueError) as error:
         raise ValueError(

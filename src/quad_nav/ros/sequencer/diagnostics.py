@@ -7,8 +7,9 @@ from typing import Sequence
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from quad_nav.mission.flight_log import Contact, FlightLog
+from quad_nav.mission.flight_log import FlightLog
 from quad_nav.ros.sequencer.robot import MissionRobot
+from quad_nav.sim.contacts import Contact
 from quad_nav.topics.contacts import contact_from_values
 
 

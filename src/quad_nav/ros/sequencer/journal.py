@@ -15,9 +15,10 @@ from quad_nav.mission.checkpoint import (
     robot_record,
     standing,
 )
-from quad_nav.mission.flight_log import Contact, FlightLog, Leg
+from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.journal import Journal
 from quad_nav.mission.sequencer import Sequencer
+from quad_nav.sim.contacts import Contact
 
 
 class MissionJournal:

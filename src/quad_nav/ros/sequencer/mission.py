@@ -226,7 +226,7 @@ class Mission:
                 stands.stage.lap,
             )
         for contact in before.contacts:
-            self._log.touch(replace(contact, time_s=contact.time_s + start_s))
+            self._log.add_contact(replace(contact, time_s=contact.time_s + start_s))
 
     def _keep(self, robot: MissionRobot, leg: Optional[Leg]) -> None:
         self._journal.keep_robot(robot.name, robot.sequencer, self._log, leg, self._now_s)
@@ -256,7 +256,7 @@ class Mission:
             rospy.logwarn("%s: %s", self._contacts.resolved_name, error)
             return
         with self._lock:
-            is_new = self._log.touch(contact)
+            is_new = self._log.add_contact(contact)
             if is_new:
                 self._journal.keep_contact(contact, self._now_s)
         if is_new:

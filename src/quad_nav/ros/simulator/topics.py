@@ -113,13 +113,14 @@ class SimulatorTopics:
             self._scans[i].publish(scan_message(scan, f"Lidar{i}"))
 
     def publish_contact(self, contact: Contact) -> None:
-        x, y, _ = contact.position_m
-        rospy.logwarn("%s at (%.2f, %.2f) m, time %.2f s", contact, x, y, contact.time_s)
+        rospy.logwarn(
+            "%s at (%.2f, %.2f) m, time %.2f s", contact, contact.x_m, contact.y_m, contact.time_s
+        )
         self._contacts.publish(
             DiagnosticStatus(
                 level=DiagnosticStatus.WARN,
                 name=NAME,
-                hardware_id=f"quad{contact.robot}",
+                hardware_id=contact.robot,
                 message=str(contact),
                 values=_pairs(contact_values(contact, contact.time_s)),
             )
@@ -171,7 +172,7 @@ class SimulatorTopics:
                 + ("" if self.lidar_enabled[i] else ", LIDAR switched off"),
                 values=_pairs(
                     text_values(
-                        contacts=sum(c.involves(i) for c in simulation.contacts),
+                        contacts=sum(c.involves(f"quad{i}") for c in simulation.contacts),
                         lidar=self.lidar_enabled[i],
                     )
                 ),
