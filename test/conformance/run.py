@@ -18,7 +18,8 @@ from typing import List, Tuple
 
 import tabulate
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "src"))
+_TEST = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(_TEST.parent / "src"), str(_TEST)]
 
 from families import DATA, FAMILIES, Difference, InvalidValue, cases  # noqa: E402
 

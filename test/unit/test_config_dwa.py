@@ -10,7 +10,7 @@ from quad_nav.config.dwa_table import DWA_PLANNER, DWA_TABLE, dwa_params, settle
 from quad_nav.config.notes import CAUTION, CLAMPED, IGNORED, UNKNOWN, Notes
 from quad_nav.control.dwa_planner import DwaParams
 
-MENDS = {"predict_goal_turn"}  # set by the group of that name, not by the planner's own
+FIXES = {"predict_goal_turn"}  # set by the group of that name, not by the planner's own
 
 
 def settled(namespace, **node_level):
@@ -24,7 +24,7 @@ def test_every_field_has_a_spelling_and_the_same_default():
         parameter.field: parameter.in_force for parameter in DWA_TABLE.parameters if parameter.field
     }
     assert of_table == {
-        field.name: field.default for field in fields(DwaParams) if field.name not in MENDS
+        field.name: field.default for field in fields(DwaParams) if field.name not in FIXES
     }
 
 

@@ -56,8 +56,7 @@ def test_chosen_planner_is_built_with_its_parameters(name, namespace, planner, p
     "key, name", [(key, name) for key, slot in planners.SLOTS.items() for name in slot.types]
 )
 def test_every_planner_that_can_be_chosen_can_be_built(key, name):
-    off = {"reject_colliding_escape": False, "predict_goal_turn": False}
-    configuration = load({key: name, "fixes": off})
+    configuration = load({key: name})
     navigator = build_navigator(configuration)
     made = {"base_global_planner": navigator.planner, "base_local_planner": navigator.controller}
     chosen = {

@@ -20,7 +20,7 @@ from quad_nav.kernels.dwa import obstacle_cost, travel
 REST = Twist2D()
 ORIGIN = Pose2D(0.0, 0.0)
 PERIOD_S = 0.2
-PARAMS = DwaParams(max_vel_y_mps=0.0, min_vel_y_mps=0.0)
+PARAMS = DwaParams(max_vel_y_mps=0.0, min_vel_y_mps=0.0, predict_goal_turn=False)
 SQUARE = np.array([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
 # 3 m x 3 m of 5 cm cells around (0, 0)
 WINDOW = GridSpec(60, 60, 0.05, -1.5, -1.5)

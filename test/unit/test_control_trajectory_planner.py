@@ -22,7 +22,9 @@ from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
 
 REST = Twist2D()
 ORIGIN = Pose2D(0.0, 0.0)
-PARAMS = TrajectoryPlannerParams(holonomic_robot=False)
+PARAMS = TrajectoryPlannerParams(
+    holonomic_robot=False, reject_colliding_escape=False, predict_goal_turn=False
+)
 SQUARE = np.array([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]])
 # 3 m x 3 m of 5 cm cells around (0, 0)
 WINDOW = GridSpec(60, 60, 0.05, -1.5, -1.5)
@@ -183,7 +185,13 @@ def test_cost_is_the_weighted_sum_at_the_last_pose():
 
 
 def test_without_meter_scoring_distances_count_in_cells():
-    params = replace(PARAMS, meter_scoring=False, path_distance_bias=1.0, goal_distance_bias=10.0)
+    params = replace(
+        PARAMS,
+        meter_scoring=False,
+        respect_meter_scoring=True,
+        path_distance_bias=1.0,
+        goal_distance_bias=10.0,
+    )
     plan = line(0.01, 0.11, 1.01, 0.11)
 
     cost = rollout(pose=Pose2D(0.01, 0.01), params=params, plan=plan).trajectory((0.0,) * 3).cost
@@ -440,7 +448,7 @@ def test_new_parameters_keep_the_plan_and_the_state():
     assert planner.oscillation.rotating_left
 
 
-# Mended faults
+# Fixed upstream bugs
 
 
 def test_an_escape_must_lead_out_of_the_collision():
@@ -452,12 +460,12 @@ def test_an_escape_must_lead_out_of_the_collision():
     assert control.command == Twist2D(-0.1, 0.0, 0.0)
 
     costs[:, 24] = LETHAL  # 0.1 m back, the outline touches this one at x = -0.30
-    original = planner_at(plan, replace(params, reject_colliding_escape=False))
-    assert original.compute_velocity(WINDOW, costs, ORIGIN, REST).command.vx_mps == -0.1
-    mended = planner_at(plan, params)
+    upstream = planner_at(plan, replace(params, reject_colliding_escape=False))
+    assert upstream.compute_velocity(WINDOW, costs, ORIGIN, REST).command.vx_mps == -0.1
+    fixed = planner_at(plan, params)
     with pytest.raises(NoValidTrajectory, match="hits something"):
-        mended.compute_velocity(WINDOW, costs, ORIGIN, REST)
-    assert not mended.oscillation.escaping
+        fixed.compute_velocity(WINDOW, costs, ORIGIN, REST)
+    assert not fixed.oscillation.escaping
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,17 @@
-"""Each fault of the original: mended by default, and to be had back."""
+"""Upstream bugs: fixed by default, and each can be restored."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from upstream import UPSTREAM
 
 from quad_nav.config import load, updated
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import LETHAL
-from quad_nav.navigator.fixes import ORIGINAL, Fixes
+from quad_nav.navigator.progress_checker import ProgressParams
 from quad_nav.navigator.tick import RobotPoses
+from quad_nav.peers.params import PeerParams
 from quad_nav.recovery import RecoveryContext
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
@@ -23,19 +25,6 @@ LIDAR = {
 TREE = {
     name: {"observation_sources": "scan", "scan": LIDAR, "obstacle_range": 5.0}
     for name in ("global_costmap", "local_costmap")
-}
-OFF = {
-    "progress_timeout": 0.0,
-    "stuck_cost_factor": 1.0,
-    "sensor_timeout": 0.0,
-    "clear_any_obstacle_layer": False,
-    "reject_colliding_escape": False,
-    "escape_collision": False,
-    "predict_goal_turn": False,
-    "stop_after_rotation": False,
-    "avoid_peers": False,
-    "yield_when_idle": False,
-    "reject_implausible_scans": False,
 }
 HERE = Pose2D(5.0, 5.0)
 
@@ -51,9 +40,16 @@ def see_a_wall_three_metres_ahead(navigator, now_s=0.0):
         costmap.update(now_s, HERE)
 
 
-def test_all_are_on_by_default_and_all_can_be_switched_off():
-    assert load({}).fixes == Fixes()
-    assert load({"fixes": OFF}).fixes == ORIGINAL
+def test_fixes_are_on_by_default_and_each_can_be_switched_off():
+    defaults, upstream = load({}), load({"fixes": UPSTREAM})
+    assert defaults.navigator.progress == ProgressParams(10.0, 0.1, 0.1)
+    assert upstream.navigator.progress == ProgressParams(0.0, 0.1, 1.0)
+    assert defaults.navigator.escape_collision and defaults.navigator.sensor_timeout_s == 1.0
+    assert not upstream.navigator.escape_collision and upstream.navigator.sensor_timeout_s == 0.0
+    assert defaults.peers == PeerParams(True, 0.05, 0.5, True)
+    assert upstream.peers == PeerParams(False, 0.05, 0.5, False)
+    assert defaults.scan_validator.reject_implausible_scans
+    assert not upstream.scan_validator.reject_implausible_scans
 
 
 @pytest.mark.parametrize(
@@ -80,13 +76,13 @@ def test_a_silent_sensor_is_missed_after_a_time_that_is_a_time(fixes, stale_afte
     assert not navigator.local_costmap.is_current(10.1 + stale_after_s)
 
 
-@pytest.mark.parametrize("fixes", [{}, OFF])
+@pytest.mark.parametrize("fixes", [{}, UPSTREAM])
 def test_switches_reach_planner_and_recoveries(fixes):
     navigator = navigator_with(fixes)
     on = not fixes
     assert navigator.controller.params.reject_colliding_escape is on
     assert navigator.controller.params.predict_goal_turn is on
-    assert navigator.recoveries[1].behaviour.params.stop_afterwards is on
+    assert navigator.recoveries[1].behaviour.params.stop_after_rotation is on
     dwa = build_navigator(
         load({"fixes": fixes, "base_local_planner": "dwa_local_planner/DWAPlannerROS"})
     )
@@ -100,7 +96,7 @@ def test_switches_can_be_thrown_in_flight():
         configuration, "fixes", {"progress_timeout": 3.0, "predict_goal_turn": False}
     )
     apply_configuration(navigator, configuration)
-    assert navigator.fixes.progress_timeout_s == 3.0
+    assert navigator.params.progress.timeout_s == 3.0
     assert not navigator.controller.params.predict_goal_turn
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from upstream import UPSTREAM
 
+from quad_nav.config import load
 from quad_nav.errors import NoPath, NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.navigator.fixes import ORIGINAL, Fixes
-from quad_nav.navigator.navigator import Navigator, NavigatorParams
+from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import RobotPoses, State, Trigger, local_from_global
 from quad_nav.plan.near import ring_offsets
@@ -105,21 +106,25 @@ class FakeRecovery:
 
 
 class Flight:
-    """A navigator, its fakes, and a clock that stops wherever something is due."""
+    """A navigator, its fakes, and a clock that stops wherever something is due.
 
-    def __init__(self, recoveries=(), fixes=ORIGINAL, **params):
+    It behaves as upstream, or with the group ``fixes`` that is given.
+    """
+
+    def __init__(self, recoveries=(), fixes=None, **params):
         params.setdefault("controller_frequency_hz", 10.0)
+        configuration = load({"fixes": UPSTREAM if fixes is None else fixes})
         self.global_costmap = FakeCostmap(5.0)
         self.local_costmap = FakeCostmap(4.0)
         self.planner, self.controller = FakePlanner(), FakeController()
         self.navigator = Navigator(
-            NavigatorParams(**params),
+            replace(configuration.navigator, **params),
             self.global_costmap,
             self.local_costmap,
             self.planner,
             self.controller,
             recoveries,
-            fixes,
+            configuration.peers,
         )
         self.now_s = 0.0
         self.pose = HERE
@@ -228,7 +233,7 @@ def test_oscillation_timeout_aborts_when_the_robot_stays_within_its_distance():
 
 
 def test_standing_still_is_replanned_then_recovered_then_aborted():
-    flight = Flight([NamedRecovery("r", FakeRecovery())], Fixes(progress_timeout_s=2.0))
+    flight = Flight([NamedRecovery("r", FakeRecovery())], {"progress_timeout": 2.0})
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(12.0)
     warnings = [warning for tick in ticks for warning in tick.warnings]
@@ -238,7 +243,7 @@ def test_standing_still_is_replanned_then_recovered_then_aborted():
 
 
 def test_obstacle_costs_weigh_less_from_the_new_plan_on_until_the_robot_gets_away():
-    flight = Flight(fixes=Fixes(progress_timeout_s=2.0))
+    flight = Flight(fixes={"progress_timeout": 2.0})
     weights = flight.controller
     weights.params = Weights(occdist_scale=0.01)
     flight.navigator.set_goal(GOAL, 0.0)
@@ -255,7 +260,7 @@ def test_obstacle_costs_weigh_less_from_the_new_plan_on_until_the_robot_gets_awa
 
 
 def test_with_the_originals_progress_timeout_it_spins_for_ever():
-    flight = Flight(fixes=ORIGINAL)
+    flight = Flight()
     flight.controller.command = Twist2D(vyaw_radps=1.0)
     flight.navigator.set_goal(GOAL, 0.0)
     assert outcomes(flight.until(60.0)) == []
@@ -304,7 +309,7 @@ def test_silent_sensor_stops_the_robot_and_says_which():
     assert FORWARD in {tick.command for tick in flight.until(2.0)}
 
 
-@pytest.mark.parametrize("fixes, turns", [(Fixes(avoid_peers=False), False), (ORIGINAL, True)])
+@pytest.mark.parametrize("fixes, turns", [({"avoid_peers": False}, False), (UPSTREAM, True)])
 def test_a_rotation_waits_while_the_robot_is_blind(fixes, turns):
     recovery = FakeRecovery(steps=200)
     flight = Flight([NamedRecovery("rotate", recovery)], fixes, planner_patience_s=0.5)
@@ -319,7 +324,7 @@ def test_a_rotation_waits_while_the_robot_is_blind(fixes, turns):
 
 
 def test_standing_blind_is_no_lack_of_progress():
-    flight = Flight(fixes=Fixes(progress_timeout_s=1.0, avoid_peers=False))
+    flight = Flight(fixes={"progress_timeout": 1.0, "avoid_peers": False})
     flight.navigator.set_goal(GOAL, 0.0)
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
     flight.until(5.0)

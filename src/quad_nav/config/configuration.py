@@ -8,6 +8,7 @@ from typing import Any, Dict, Iterable, Mapping, Optional, Tuple
 
 from quad_nav.config import tables
 from quad_nav.config.costmaps import costmap_params, remark_on_blindness, settle_costmap
+from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
 from quad_nav.config.notes import CAUTION, Notes, Remark, join
 from quad_nav.config.planners import (
     local_planner_frequency,
@@ -29,11 +30,12 @@ from quad_nav.config.recoveries import (
 )
 from quad_nav.config.workload import workload_problems
 from quad_nav.costmap.layered import CostmapParams
+from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError
-from quad_nav.navigator.fixes import Fixes
-from quad_nav.navigator.navigator import NavigatorParams
+from quad_nav.navigator.params import NavigatorParams
+from quad_nav.navigator.progress_checker import ProgressParams
+from quad_nav.peers.params import PeerParams
 
-MENDS = "fixes"
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards, so they may stand at the node's level.
 _INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
@@ -53,7 +55,8 @@ class Configuration:
     """
 
     navigator: NavigatorParams
-    fixes: Fixes
+    peers: PeerParams
+    scan_validator: ScanValidatorParams
     global_costmap: CostmapParams
     local_costmap: CostmapParams
     global_planner: Any
@@ -107,7 +110,8 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
     pruned = _without_empty(settled)
     configuration = Configuration(
         navigator=navigator_params(settled, listed, given=tree),
-        fixes=fixes_of(settled),
+        peers=with_fixes(PeerParams(), settled),
+        scan_validator=with_fixes(ScanValidatorParams(), settled),
         global_costmap=costmaps[0],
         local_costmap=costmaps[1],
         global_planner=planner_params(settled, "base_global_planner"),
@@ -131,14 +135,12 @@ def navigator_params(
     tree: Mapping[str, Any], listed: Optional[NamedTypes], given: Iterable[str]
 ) -> NavigatorParams:
     """The dataclass of a settled tree; ``given`` are the keys that somebody set."""
-    return NavigatorParams(
-        recovery_behaviors=listed, **fields(tree, tables.NAVIGATOR.parameters, given)
+    params = NavigatorParams(
+        recovery_behaviors=listed,
+        progress=with_fixes(ProgressParams(), tree),
+        **fields(tree, tables.NAVIGATOR.parameters, given),
     )
-
-
-def fixes_of(tree: Mapping[str, Any]) -> Fixes:
-    """The switches of a settled tree."""
-    return Fixes(**fields(tree[MENDS], tables.MENDS.parameters))
+    return with_fixes(params, tree)
 
 
 def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
@@ -146,7 +148,7 @@ def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     settle_planner_names(tree, notes)
     known = [
         *COSTMAPS,
-        MENDS,
+        FIXES,
         *planner_keys(tree),
         *_INHERITED,
         "recovery_behaviors",
@@ -154,7 +156,7 @@ def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     ]
     settle(tree, "", tables.NAVIGATOR, notes, also_known=known)
     settle_planners(tree, notes)
-    settle(subtree(tree, MENDS, "", notes), MENDS, tables.MENDS, notes)
+    settle(subtree(tree, FIXES, "", notes), FIXES, FIXES_TABLE, notes)
     for name in COSTMAPS:
         settle_costmap(tree, name, notes)
     return settle_recoveries(tree, notes)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Dict, Iterator, Mapping, Tuple
 
 from quad_nav.config import costmap_tables, tables
-from quad_nav.config.configuration import COSTMAPS, MENDS
+from quad_nav.config.configuration import COSTMAPS
+from quad_nav.config.fixes import FIXES, FIXES_TABLE
 from quad_nav.config.layers import LAYERS
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_type
@@ -63,7 +64,7 @@ def _namespaces(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[s
         table = RECOVERY_TABLES.get(full_type(entry["type"]))
         if table is not None:
             yield entry["name"], table, _below(tree, entry["name"])
-    yield MENDS, tables.MENDS, _below(tree, MENDS)
+    yield FIXES, FIXES_TABLE, _below(tree, FIXES)
 
 
 def _layers(

@@ -11,6 +11,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
 from quad_nav.config import global_planner_tables, tables
 from quad_nav.config.dwa_table import DWA_TABLE, LATCH, dwa_params, settle_dwa
+from quad_nav.config.fixes import with_fixes
 from quad_nav.config.notes import RENAMED, UNSUPPORTED, UNUSED, Notes
 from quad_nav.config.plugins import (
     GLOBAL_PLANNER,
@@ -154,7 +155,7 @@ def planner_params(tree: Mapping[str, Any], key: str) -> Any:
     """The dataclass of the planner that a settled tree names, or the user's ``Plugin``."""
     own = planner_type(tree, key)
     if own is not None:
-        return own.params(tree)
+        return with_fixes(own.params(tree), tree)
     name = plugin_name(tree[key])
     return Plugin(load_class(tree[key], SLOTS[key].interface), Parameters(tree.get(name, {}), name))
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config import costmap_tables, tables
-from quad_nav.config.configuration import COSTMAPS, MENDS, Configuration, fixes_of, navigator_params
+from quad_nav.config.configuration import COSTMAPS, Configuration, navigator_params
 from quad_nav.config.costmaps import costmap_params
+from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
 from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
@@ -30,7 +31,7 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
         namespaces[costmap] = costmap_tables.COSTMAP
         for layer, table in layer_tables(configuration.tree[costmap]["plugins"]).items():
             namespaces[join(costmap, layer)] = table
-    namespaces[MENDS] = tables.MENDS
+    namespaces[FIXES] = FIXES_TABLE
     return {name: table.reconfigurable for name, table in namespaces.items()}
 
 
@@ -112,8 +113,8 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
     if namespace == "":
         listed = configuration.navigator.recovery_behaviors
         return replace(configuration, navigator=navigator_params(tree, listed, given=tree))
-    if namespace == MENDS:
-        return replace(configuration, fixes=fixes_of(tree))
+    if namespace == FIXES:
+        return _with_other_fixes(configuration)
     if namespace in reconfigurable_planners(tree):
         return replace(
             configuration,
@@ -125,6 +126,20 @@ def _remade(configuration: Configuration, namespace: str) -> Configuration:
     if costmap == "global_costmap":
         return replace(configuration, global_costmap=params)
     return replace(configuration, local_costmap=params)
+
+
+def _with_other_fixes(configuration: Configuration) -> Configuration:
+    """Set the switches anew in every part that may change in flight: recoveries may not."""
+    tree, navigator = configuration.tree, configuration.navigator
+    return replace(
+        configuration,
+        navigator=replace(
+            with_fixes(navigator, tree), progress=with_fixes(navigator.progress, tree)
+        ),
+        peers=with_fixes(configuration.peers, tree),
+        scan_validator=with_fixes(configuration.scan_validator, tree),
+        local_planner=with_fixes(configuration.local_planner, tree),
+    )
 
 
 def _below(tree: Mapping[str, Any], namespace: str) -> Any:

@@ -6,6 +6,7 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from quad_nav.config import tables
 from quad_nav.config.costmap_tables import COSTMAP
+from quad_nav.config.fixes import with_fixes
 from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
 from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
@@ -59,7 +60,7 @@ def recoveries(
 ) -> Tuple[Tuple[str, RecoveryParams], ...]:
     """(name, parameters) in the order in which they are tried, of a settled tree."""
     sequence = _default_sequence(tree) if listed is None else listed
-    return tuple((name, _params(name, kind, tree)) for name, kind in sequence)
+    return tuple((name, with_fixes(_params(name, kind, tree), tree)) for name, kind in sequence)
 
 
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:

@@ -9,6 +9,7 @@ from typing import Iterable, List, Tuple
 
 from quad_nav.config import costmap_tables, global_planner_tables, tables
 from quad_nav.config.dwa_table import DWA_TABLE
+from quad_nav.config.fixes import FIXES_TABLE
 from quad_nav.config.spec import Parameter, Table
 
 _HEAD = """# Parameters
@@ -84,8 +85,8 @@ def _sections() -> Iterable[Tuple[str, str, Table]]:
     )
     yield (
         "fixes",
-        "Not in the original: its faults, mended; see [faults](upstream_bugs.md).",
-        tables.MENDS,
+        "[Upstream bugs](upstream_bugs.md) that are fixed by default, and how to restore each.",
+        FIXES_TABLE,
     )
     yield "Costmaps", "Below `global_costmap` and `local_costmap`.", costmap_tables.COSTMAP
     yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", costmap_tables.OBSTACLE_LAYER)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Dict, Mapping
 
 from quad_nav.config import tables
+from quad_nav.config.fixes import FIXES
 from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, Notes, join
 from quad_nav.config.reader import Namespace, fields, settle, subtree
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
@@ -25,7 +26,7 @@ def settle_trajectory_planner(tree: Namespace, notes: Notes) -> None:
         if old in planner:
             _take_old_name(planner, old, new, notes)
     settle(planner, TRAJECTORY_PLANNER, tables.TRAJECTORY_PLANNER, notes, also_known=_RENAMED)
-    if planner.get("meter_scoring") is False and not _is_heeded(tree):
+    if planner.get("meter_scoring") is False and not _is_respected(tree):
         notes.remark(
             join(TRAJECTORY_PLANNER, "meter_scoring"),
             IGNORED,
@@ -39,8 +40,8 @@ def settle_trajectory_planner(tree: Namespace, notes: Notes) -> None:
         )
 
 
-def _is_heeded(tree: Namespace) -> bool:
-    fixes = tree.get("fixes")
+def _is_respected(tree: Namespace) -> bool:
+    fixes = tree.get(FIXES)
     return isinstance(fixes, dict) and fixes.get("respect_meter_scoring") is True
 
 

@@ -62,8 +62,8 @@ class DwaParams:
     # Global plan
     prune_plan: bool = False
 
-    # Mended fault; False is the original's behaviour
-    predict_goal_turn: bool = False  # turn no farther in one control period than is left
+    # Fixed upstream bug; False restores upstream behaviour
+    predict_goal_turn: bool = True  # turn no farther in one control period than is left
 
     # The turn at the goal has the limits of every turn; ``goal`` has names of its own for them.
     @property

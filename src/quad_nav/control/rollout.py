@@ -194,7 +194,7 @@ def highest_near(window: collision.Window, reach_m: float) -> np.ndarray:
 
 def _rules(params: TrajectoryPlannerParams, resolution_m: float) -> kernel.Rules:
     # Biases are per metre with meter scoring, distances are in cells.
-    per_cell = resolution_m if params.meter_scoring else 1.0
+    per_cell = resolution_m if params.scores_in_metres else 1.0
     return kernel.Rules(
         sim_time_s=float(params.sim_time_s),
         sim_granularity_m=float(params.sim_granularity_m),

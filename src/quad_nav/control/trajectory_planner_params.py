@@ -46,6 +46,7 @@ class TrajectoryPlannerParams:
 
     # Scoring
     meter_scoring: bool = True
+    respect_meter_scoring: bool = False  # False: distances are always scored in metres
     path_distance_bias: float = 0.6
     goal_distance_bias: float = 0.8
     occdist_scale: float = 0.01
@@ -64,6 +65,11 @@ class TrajectoryPlannerParams:
     # Global plan
     prune_plan: bool = True
 
-    # Mended faults; False is the original's behaviour
-    reject_colliding_escape: bool = False  # escape backwards only where nothing is hit
-    predict_goal_turn: bool = False  # turn no farther in one control period than is left
+    # Fixed upstream bugs; False restores upstream behaviour
+    reject_colliding_escape: bool = True  # escape backwards only where nothing is hit
+    predict_goal_turn: bool = True  # turn no farther in one control period than is left
+
+    @property
+    def scores_in_metres(self) -> bool:
+        """Whether distances are scored in metres, otherwise in cells."""
+        return self.meter_scoring or not self.respect_meter_scoring

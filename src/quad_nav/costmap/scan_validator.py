@@ -14,6 +14,7 @@ robot. What is not believed is what cannot be:
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Iterable, Optional, Tuple
 
 import numpy as np
@@ -28,6 +29,13 @@ _CORRECTION_M, _CORRECTION_RAD = 0.25, 0.3
 _LOST_SHARE = 0.25
 _HARDLY_MOVED_M = 2.0
 _ALL_AROUND_RAD = 2.0 * math.pi * 0.98
+
+
+@dataclass(frozen=True)
+class ScanValidatorParams:
+    """Parameters of the scan validation."""
+
+    reject_implausible_scans: bool = True
 
 
 class ScanValidator:

@@ -24,7 +24,6 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import ControlError, PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator.costmap_updates import CostmapUpdates
-from quad_nav.navigator.fixes import Fixes
 from quad_nav.navigator.parameter_limiter import ParameterLimiter
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.navigator.progress_checker import (
@@ -35,6 +34,7 @@ from quad_nav.navigator.progress_checker import (
 from quad_nav.navigator.recovery_sequence import NamedRecovery, RecoverySequence
 from quad_nav.navigator.tick import Outcome, RobotPoses, State, Tick, Trigger, local_from_global
 from quad_nav.peers.coordinator import Yielding
+from quad_nav.peers.params import PeerParams
 from quad_nav.peers.peer import Intention, Peer
 from quad_nav.peers.traffic import CRUISING_MPS, Traffic
 from quad_nav.plan.near import plan_near
@@ -62,11 +62,11 @@ class Navigator:
         planner: GlobalPlanner,
         controller: LocalPlanner,
         recoveries: Sequence[NamedRecovery],
-        fixes: Fixes,
+        peers: PeerParams,
         number: int = 0,
     ):
         self.params = params
-        self.fixes = fixes
+        self.peer_params = peers
         self.global_costmap = global_costmap
         self.local_costmap = local_costmap
         self.planner = planner
@@ -132,7 +132,7 @@ class Navigator:
             due += [self._cycle.due_s, self._recovering.due_s]
         if self.state is State.CONTROLLING:
             due.append(self._replan.due_s)
-        elif self.state is State.IDLE and self.fixes.avoid_peers:
+        elif self.state is State.IDLE and self.peer_params.avoid_peers:
             due.append(self._watch.due_s)
         return min(due)
 
@@ -318,7 +318,7 @@ class Navigator:
     @property
     def _minds_blindness(self) -> bool:
         """The original goes on recovering while it is blind, and is impatient afterwards."""
-        return self.fixes.sensor_timeout_s > 0.0
+        return self.params.sensor_timeout_s > 0.0
 
     def _follow(self, tick: Tick, located: RobotPoses, velocity: Twist2D) -> None:
         assert located.in_local is not None and located.in_global is not None
@@ -354,18 +354,18 @@ class Navigator:
             self._enter_clearing(tick, Trigger.CONTROLLING)
             return
         tick.command = Twist2D()
-        if self.fixes.escape_collision:
+        if self.params.escape_collision:
             local = self.local_costmap
             tick.command = escape(local.spec, local.costs, local.footprint, pose) or Twist2D()
         self._begin_planning(tick.now_s)
 
     def _is_progressing(self, tick: Tick, pose: Pose2D) -> bool:
         """Whether the robot has moved lately; if not, a new plan, then recoveries."""
-        remedy = self._progress.look(tick.now_s, pose, self.fixes)
+        remedy = self._progress.look(tick.now_s, pose, self.params.progress)
         if remedy is StuckAction.NONE:
             return True
         where = (
-            f"no progress for {self.fixes.progress_timeout_s:g} s at "
+            f"no progress for {self.params.progress.timeout_s:g} s at "
             f"({pose.x_m:.2f}, {pose.y_m:.2f})"
         )
         if remedy is StuckAction.RECOVERIES:
@@ -374,7 +374,9 @@ class Navigator:
             return False
         tick.warnings.append(where + ": planning anew")
         limit = relaxed_obstacle_weight(
-            self._limiter.usual, self.fixes, self.params.oscillation_distance_m
+            self._limiter.usual,
+            self.params.progress.stuck_cost_factor,
+            self.params.oscillation_distance_m,
         )
         if limit is not None:
             self._limiter.impose(limit, pose)
@@ -401,7 +403,7 @@ class Navigator:
     def _see_peers(self, tick: Tick, located: RobotPoses, peers: Sequence[Peer]) -> None:
         traffic, had_some = self._yielding.traffic, bool(self._yielding.traffic.peers)
         traffic.cruising_mps = getattr(self._limiter.usual, "max_vel_x_mps", CRUISING_MPS)
-        tick.notes += traffic.see(tick.now_s, located.in_global, peers, self.fixes)
+        tick.notes += traffic.see(tick.now_s, located.in_global, peers, self.peer_params)
         if (traffic.peers or had_some) and located.in_global and located.in_local:
             traffic.tell_costmaps(
                 tick.now_s, located.in_global, local_from_global(located), self._yielding.rank_s
@@ -449,7 +451,9 @@ class Navigator:
 
     def _run_errand(self, tick: Tick, here: Optional[Pose2D]) -> None:
         """Without a goal: out of a peer's way, or back again."""
-        home = self._yielding.errand(tick.now_s, here, self.fixes) if here is not None else None
+        home = (
+            self._yielding.errand(tick.now_s, here, self.peer_params) if here is not None else None
+        )
         if home is not None:
             self._set_goal(home, tick.now_s)
             tick.notes.append(str(self._yielding.now or "returns to its place"))

@@ -5,10 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
+from quad_nav.navigator.progress_checker import ProgressParams
+
 
 @dataclass(frozen=True)
 class NavigatorParams:
-    """move_base's own parameters, and the limits that mend its faults."""
+    """move_base's own parameters.
+
+    The last three are ours. ``sensor_timeout_s``: the robot stops when a sensor has sent
+    nothing for so long; 0 leaves it to the sensor's own period. ``escape_collision``: a round
+    robot without a legal trajectory moves to where costs are lower.
+    """
 
     base_global_planner: str = "navfn/NavfnROS"
     base_local_planner: str = "base_local_planner/TrajectoryPlannerROS"
@@ -26,3 +33,6 @@ class NavigatorParams:
     shutdown_costmaps: bool = False
     make_plan_clear_costmap: bool = True
     make_plan_add_unreachable_goal: bool = True
+    sensor_timeout_s: float = 1.0
+    escape_collision: bool = True
+    progress: ProgressParams = ProgressParams()

@@ -21,6 +21,7 @@ class OfflineRobot:
         self.navigator = build_navigator(configuration, number)
         self.waiting_goal: Optional[Pose2D] = None
         self._sinks = self._sorted_sinks()
+        self._rejects_scans = configuration.scan_validator.reject_implausible_scans
         self._trust = ScanValidator(
             layer.buffers[source].params
             for sinks in self._sinks.values()
@@ -40,9 +41,7 @@ class OfflineRobot:
 
     def see(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> None:
         """Takes a scan that comes now, if it can be true."""
-        if self.navigator.fixes.reject_implausible_scans and self._trust.why_not(
-            scan, map_from_lidar, now_s
-        ):
+        if self._rejects_scans and self._trust.why_not(scan, map_from_lidar, now_s):
             return
         for sinks in self._sinks.values():
             layer, source = sinks[0]

@@ -12,7 +12,7 @@ from typing import List, Optional
 import numpy as np
 
 from quad_nav.geometry import Pose2D
-from quad_nav.navigator.fixes import Fixes
+from quad_nav.peers.params import PeerParams
 from quad_nav.peers.peer import IDLE_RANK_S, NO_WAY_POINTS, Intention, rank_of, thinned
 from quad_nav.peers.right_of_way import Manner, YieldDecision
 from quad_nav.peers.traffic import Traffic
@@ -112,9 +112,9 @@ class Yielding:
         if self.now is not None:
             self.now = YieldDecision(self.now.to, Manner.WAIT)
 
-    def errand(self, now_s: float, here: Pose2D, fixes: Fixes) -> Optional[Pose2D]:
+    def errand(self, now_s: float, here: Pose2D, params: PeerParams) -> Optional[Pose2D]:
         """For a robot without a goal: the home of an errand that it sets out on, if any."""
-        if not fixes.yield_when_idle or not self.traffic.peers:
+        if not params.yield_when_idle or not self.traffic.peers:
             return None
         now = self.traffic.give_way(now_s, here, NO_WAY_POINTS, NO_WAY_POINTS, self.rank_s, None)
         home = self.home

@@ -17,8 +17,8 @@ from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
-from quad_nav.navigator.fixes import Fixes
 from quad_nav.peers.holding_point import can_be_reached, find_holding_point
+from quad_nav.peers.params import PeerParams
 from quad_nav.peers.peer import Peer
 from quad_nav.peers.right_of_way import (
     EARLIER_LATER_S,
@@ -71,17 +71,17 @@ class Traffic:
     # -- what is seen ----------------------------------------------------------------
 
     def see(
-        self, now_s: float, here: Optional[Pose2D], peers: Sequence[Peer], fixes: Fixes
+        self, now_s: float, here: Optional[Pose2D], peers: Sequence[Peer], params: PeerParams
     ) -> List[str]:
         """Takes what is known of the peers; returns what is to be said about it."""
         if not peers and not self.peers and not self._lost:
             return []
-        if not fixes.avoid_peers or here is None:
+        if not params.avoid_peers or here is None:
             peers = ()
-        fresh = [p for p in peers if abs(now_s - p.stamp_s) <= fixes.peer_timeout_s]
-        lost = [p.name for p in peers if abs(now_s - p.stamp_s) > fixes.peer_timeout_s]
+        fresh = [p for p in peers if abs(now_s - p.stamp_s) <= params.timeout_s]
+        lost = [p.name for p in peers if abs(now_s - p.stamp_s) > params.timeout_s]
         news = [
-            f"nothing from {name} for {fixes.peer_timeout_s:g} s: only the LIDAR sees it"
+            f"nothing from {name} for {params.timeout_s:g} s: only the LIDAR sees it"
             for name in lost
             if name not in self._lost
         ]
@@ -89,7 +89,7 @@ class Traffic:
             f"{name} is heard of again" for name in self._lost if any(p.name == name for p in fresh)
         ]
         self._lost = lost
-        self._margin_m = fixes.peer_margin_m
+        self._margin_m = params.margin_m
         reach_m = self.reach_m
         self.peers = [
             peer.moved_to(now_s)

@@ -6,13 +6,12 @@ is done; it never blocks, so a goal can be cancelled in the middle of a turn.
 
 from __future__ import annotations
 
-from quad_nav.recovery.clear_costmap import ORIGINAL_LAYER_NAMES, ClearCostmap, ClearCostmapParams
+from quad_nav.recovery.clear_costmap import ClearCostmap, ClearCostmapParams
 from quad_nav.recovery.move_slow import MoveSlowAndClear, MoveSlowAndClearParams
 from quad_nav.recovery.recovery import ParameterLimit, Recovery, RecoveryContext, Step
 from quad_nav.recovery.rotate import FootprintCost, Rotate, RotateParams
 
 __all__ = [
-    "ORIGINAL_LAYER_NAMES",
     "ClearCostmap",
     "ClearCostmapParams",
     "FootprintCost",

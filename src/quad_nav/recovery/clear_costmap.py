@@ -9,16 +9,19 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.recovery.recovery import RecoveryContext, Step
 
-# What the original clears by default, a name that its own loader never gives: it
-# calls the layer "obstacle_layer".
-ORIGINAL_LAYER_NAMES = ("obstacles",)
+# The layers that upstream clears by default. No layer has this name there either: the
+# default obstacle layer is called "obstacle_layer".
+UPSTREAM_LAYER_NAMES = ("obstacles",)
 
 
 @dataclass(frozen=True)
 class ClearCostmapParams:
     """Parameters of ``clear_costmap_recovery/ClearCostmapRecovery``.
 
-    ``layer_names`` None means every obstacle layer.
+    Attributes:
+        layer_names: The layers to clear, None for the default.
+        clear_any_obstacle_layer: By default clear every obstacle layer; False restores
+            upstream behaviour, which clears layers called "obstacles" only.
     """
 
     reset_distance_m: float = 3.0
@@ -26,6 +29,7 @@ class ClearCostmapParams:
     invert_area_to_clear: bool = False
     force_updating: bool = False
     affected_maps: str = "both"  # "global", "local" or "both"
+    clear_any_obstacle_layer: bool = True
 
 
 class ClearCostmap:
@@ -69,4 +73,6 @@ class ClearCostmap:
     def _names(self, costmap: LayeredCostmap) -> Iterable[str]:
         if self.params.layer_names is not None:
             return self.params.layer_names
+        if not self.params.clear_any_obstacle_layer:
+            return UPSTREAM_LAYER_NAMES
         return [name for name, layer in costmap.layers.items() if isinstance(layer, ObstacleLayer)]

@@ -23,7 +23,7 @@ class RotateParams:
     acc_lim_theta_radps2: float = 3.2
     max_vel_theta_radps: float = 1.0
     min_in_place_vel_theta_radps: float = 0.4
-    stop_afterwards: bool = False  # a mended fault
+    stop_after_rotation: bool = True  # False restores upstream behaviour
 
 
 FootprintCost = Callable[[LayeredCostmap, Pose2D], float]
@@ -55,7 +55,7 @@ class Rotate:
             self._start_yaw_rad = pose.yaw_rad
         left_rad = self._angle_left(pose.yaw_rad)
         if left_rad is None:
-            return self._end("", stop=self.params.stop_afterwards)
+            return self._end("", stop=self.params.stop_after_rotation)
         if not self._is_free(context.local_costmap, pose, left_rad):
             return self._end("rotation ended: the footprint would touch an obstacle", stop=True)
         return Step(command=Twist2D(vyaw_radps=self._speed(left_rad)))

@@ -20,7 +20,6 @@ from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.peer_layer import PeerLayerParams
 from quad_nav.geometry import Pose2D
-from quad_nav.navigator.fixes import Fixes
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.plan.carrot import Carrot, CarrotParams
@@ -28,14 +27,12 @@ from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
 from quad_nav.plan.navfn import Navfn, NavfnParams
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.recovery import (
-    ORIGINAL_LAYER_NAMES,
     ClearCostmap,
     ClearCostmapParams,
     MoveSlowAndClear,
     MoveSlowAndClearParams,
     Recovery,
     Rotate,
-    RotateParams,
 )
 
 # The planner that each dataclass of parameters is for.
@@ -62,13 +59,12 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
     local_costmap = LayeredCostmap(_local_costmap(configuration))
     planner = _global_planner(configuration.global_planner, global_costmap.footprint)
     controller = _local_planner(
-        _mended(configuration.local_planner, configuration.fixes),
+        configuration.local_planner,
         local_costmap.footprint,
         configuration.local_planner_period_s,
     )
     recoveries = [
-        NamedRecovery(name, _recovery(_mended(params, configuration.fixes)))
-        for name, params in configuration.recoveries
+        NamedRecovery(name, _recovery(params)) for name, params in configuration.recoveries
     ]
     return Navigator(
         configuration.navigator,
@@ -77,7 +73,7 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
         planner,
         controller,
         recoveries,
-        configuration.fixes,
+        configuration.peers,
         configuration.robot if number is None else number,
     )
 
@@ -86,7 +82,7 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
     """Takes over every parameter that may change in flight; plan and goal stay."""
     footprint = navigator.global_costmap.footprint
     navigator.params = configuration.navigator
-    navigator.fixes = configuration.fixes
+    navigator.peer_params = configuration.peers
     navigator.global_costmap.reconfigure(_global_costmap(configuration))
     navigator.local_costmap.reconfigure(_local_costmap(configuration))
     new_footprint = navigator.global_costmap.footprint
@@ -96,7 +92,7 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
     ):
         navigator.planner = _global_planner(configuration.global_planner, new_footprint)
     if not isinstance(configuration.local_planner, Plugin):
-        navigator.set_controller_params(_mended(configuration.local_planner, configuration.fixes))
+        navigator.set_controller_params(configuration.local_planner)
     navigator.controller.set_footprint(navigator.local_costmap.footprint)
 
 
@@ -110,28 +106,6 @@ def _local_planner(params: Any, footprint: np.ndarray, control_period_s: float) 
     if isinstance(params, Plugin):
         return params.make(footprint, control_period_s)
     return LOCAL_PLANNERS[type(params)](params, footprint, control_period_s)
-
-
-def _mended(params: Any, fixes: Fixes) -> Any:
-    """A local planner's or a recovery's parameters with the switches that concern it."""
-    if isinstance(params, TrajectoryPlannerParams):
-        return replace(
-            params,
-            reject_colliding_escape=fixes.reject_colliding_escape,
-            predict_goal_turn=fixes.predict_goal_turn,
-            meter_scoring=params.meter_scoring or not fixes.respect_meter_scoring,
-        )
-    if isinstance(params, DwaParams):
-        return replace(params, predict_goal_turn=fixes.predict_goal_turn)
-    if isinstance(params, RotateParams):
-        return replace(params, stop_afterwards=fixes.stop_after_rotation)
-    if (
-        isinstance(params, ClearCostmapParams)
-        and params.layer_names is None
-        and not fixes.clear_any_obstacle_layer
-    ):
-        return replace(params, layer_names=ORIGINAL_LAYER_NAMES)
-    return params
 
 
 def _global_costmap(configuration: Configuration) -> CostmapParams:
@@ -154,7 +128,7 @@ def _watched(configuration: Configuration, costmap: CostmapParams) -> CostmapPar
     ``expected_update_rate`` is a period in seconds, and people write 21.0 into it
     for a LIDAR of 20 Hz; the robot would fly blind for 21 s.
     """
-    limit_s = configuration.fixes.sensor_timeout_s
+    limit_s = configuration.navigator.sensor_timeout_s
     if limit_s <= 0.0:
         return costmap
     layers = tuple((name, _watched_layer(layer, limit_s)) for name, layer in costmap.layers)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import List, Optional
 
+from upstream import UPSTREAM
+
 from families.case import Recorded, load_case
 from families.comparison import Comparison, Difference
 from families.loop import period_s, replayed
@@ -21,7 +23,11 @@ def check(path: Path) -> List[Difference]:
     case, comparison = load_case(path), Comparison()
     recorded, meta = case.arrays, case.meta
     configuration = load(
-        {"base_local_planner": "dwa_local_planner/DWAPlannerROS", "DWAPlannerROS": meta["params"]}
+        {
+            "base_local_planner": "dwa_local_planner/DWAPlannerROS",
+            "DWAPlannerROS": meta["params"],
+            "fixes": UPSTREAM,
+        }
     )
     params = configuration.local_planner
     effective = {**values(configuration, "DWAPlannerROS"), "cheat_factor": params.cheat_factor}

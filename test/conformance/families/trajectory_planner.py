@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Dict, List, Optional
 
 import numpy as np
+from upstream import UPSTREAM
 
 from families.case import Case, InvalidValue, Recorded, load_case
 from families.comparison import Comparison, Difference
@@ -34,7 +35,8 @@ def check(path: Path) -> List[Difference]:
 
 
 def _params(meta: Recorded) -> TrajectoryPlannerParams:
-    params = load({"TrajectoryPlannerROS": meta["params"]}).local_planner
+    fixes = {**UPSTREAM, "respect_meter_scoring": True}
+    params = load({"TrajectoryPlannerROS": meta["params"], "fixes": fixes}).local_planner
     return replace(params, meter_scoring=meta["meter_scoring_effective"])
 
 

@@ -141,7 +141,9 @@ class RobotNavigator:
     def _step(self, now_s: float) -> None:
         navigator = self._navigator
         for sensor in self._sensors:
-            sensor.deliver(self._transforms, navigator.fixes.reject_implausible_scans)
+            sensor.deliver(
+                self._transforms, self._configuration.scan_validator.reject_implausible_scans
+            )
         self._goals.poll(navigator, now_s)
         self._peers.tell(self.number, navigator.intention, now_s)
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
@@ -175,7 +177,7 @@ class RobotNavigator:
 
     def _odometry_silence(self, now_s: float) -> str:
         """Said when there was odometry and is none any more."""
-        limit_s, heard_s = self._navigator.fixes.sensor_timeout_s, self._heard_s
+        limit_s, heard_s = self._navigator.params.sensor_timeout_s, self._heard_s
         if limit_s <= 0.0 or heard_s is None or now_s - heard_s <= limit_s:
             return ""
         return f"nothing from {self._odometry.resolved_name} for {now_s - heard_s:.1f} s"

@@ -1,0 +1,213 @@
+"""The parameter group ``fixes``: upstream bugs fixed by default, and how to restore each.
+
+In YAML and dynamic_reconfigure the switches are one group. In the code each switch belongs to
+the dataclass of the part that it changes; ``_SWITCHES`` maps the group to these owners. The
+defaults of the table and of the dataclasses are the same; a test compares them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Mapping, Tuple, TypeVar, cast
+
+from quad_nav.config.reader import fields
+from quad_nav.config.spec import Parameter, Table, double, flag
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.scan_validator import ScanValidatorParams
+from quad_nav.navigator.params import NavigatorParams
+from quad_nav.navigator.progress_checker import ProgressParams
+from quad_nav.peers.params import PeerParams
+from quad_nav.recovery import ClearCostmapParams, RotateParams
+
+FIXES = "fixes"  # the name of the group below the node's own namespace
+
+_Params = TypeVar("_Params")
+
+# The switches in the order of dynamic_reconfigure, each with the dataclasses that own it.
+_SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
+    (
+        double(
+            "progress_timeout",
+            10.0,
+            "timeout_s",
+            "seconds",
+            "A robot that has not moved by progress_distance for so long plans anew, and after the"
+            " same time again runs the recoveries; 0 disables the check.",
+            low=0,
+            high=100,
+        ),
+        (ProgressParams,),
+    ),
+    (
+        double(
+            "progress_distance",
+            0.1,
+            "distance_m",
+            "metres",
+            "A robot that has moved so far makes progress.",
+            low=0,
+            high=10,
+        ),
+        (ProgressParams,),
+    ),
+    (
+        double(
+            "stuck_cost_factor",
+            0.1,
+            "stuck_cost_factor",
+            "",
+            "Without progress, occdist_scale is multiplied by this until the robot has moved"
+            " oscillation_distance.",
+            low=0,
+            high=1,
+        ),
+        (ProgressParams,),
+    ),
+    (
+        double(
+            "sensor_timeout",
+            1.0,
+            "sensor_timeout_s",
+            "seconds",
+            "The robot stops when a sensor has sent nothing for so long; 0 leaves the limit to"
+            " expected_update_rate.",
+            low=0,
+            high=100,
+        ),
+        (NavigatorParams,),
+    ),
+    (
+        flag(
+            "reject_implausible_scans",
+            True,
+            "reject_implausible_scans",
+            "Reject scans that cannot be true, as of a LIDAR that is frozen, late or half blind.",
+        ),
+        (ScanValidatorParams,),
+    ),
+    (
+        flag(
+            "clear_any_obstacle_layer",
+            True,
+            "clear_any_obstacle_layer",
+            "Clearing recoveries without layer_names clear every obstacle layer, not only one"
+            " called obstacles.",
+        ),
+        (ClearCostmapParams,),
+    ),
+    (
+        flag(
+            "reject_colliding_escape",
+            True,
+            "reject_colliding_escape",
+            "Escape backwards only out of a collision, not into one.",
+        ),
+        (TrajectoryPlannerParams,),
+    ),
+    (
+        flag(
+            "escape_collision",
+            True,
+            "escape_collision",
+            "A round robot without a legal trajectory moves to where costs are lower.",
+        ),
+        (NavigatorParams,),
+    ),
+    (
+        flag(
+            "predict_goal_turn",
+            True,
+            "predict_goal_turn",
+            "Turn no farther in one control period than is left to the goal's heading.",
+        ),
+        (TrajectoryPlannerParams, DwaParams),
+    ),
+    (
+        flag(
+            "respect_meter_scoring",
+            False,
+            "respect_meter_scoring",
+            "Respect meter_scoring. Upstream scores in metres whatever is set.",
+        ),
+        (TrajectoryPlannerParams,),
+    ),
+    (
+        flag(
+            "stop_after_rotation",
+            True,
+            "stop_after_rotation",
+            "Publish a stop after a rotation recovery.",
+        ),
+        (RotateParams,),
+    ),
+    (
+        flag(
+            "avoid_peers",
+            True,
+            "avoid_peers",
+            "Avoid the other robots whose poses are known, and yield by priority.",
+        ),
+        (PeerParams,),
+    ),
+    (
+        double(
+            "peer_margin",
+            0.05,
+            "margin_m",
+            "metres",
+            "Distance that each of two robots keeps its footprint from the bisector between them.",
+            low=0,
+            high=2,
+        ),
+        (PeerParams,),
+    ),
+    (
+        double(
+            "peer_timeout",
+            0.5,
+            "timeout_s",
+            "seconds",
+            "A peer whose state is older than this is left to the LIDAR.",
+            low=0,
+            high=60,
+        ),
+        (PeerParams,),
+    ),
+    (
+        flag(
+            "yield_when_idle",
+            True,
+            "yield_when_idle",
+            "A robot without a goal leaves the path of a peer, and comes back.",
+        ),
+        (PeerParams,),
+    ),
+)
+
+FIXES_TABLE = Table(
+    reconfigurable=(
+        *(parameter for parameter, _ in _SWITCHES),
+        flag("restore_defaults", False, "", "Restore to the original configuration."),
+    )
+)
+
+
+def switches_of(owner: type) -> Tuple[Parameter, ...]:
+    """The switches of the group that a dataclass of parameters owns."""
+    return tuple(parameter for parameter, owners in _SWITCHES if owner in owners)
+
+
+def with_fixes(params: _Params, tree: Mapping[str, Any]) -> _Params:
+    """Set the switches that a dataclass of parameters owns to those of a normalised tree.
+
+    Args:
+        params: The parameters of one part; what owns no switch is returned unchanged.
+        tree: The parameter tree, at the node's level.
+    """
+    switches = switches_of(type(params))
+    if not switches:
+        return params
+    # mypy cannot know that the type variable stands for a dataclass.
+    changed: _Params = replace(cast(Any, params), **fields(tree.get(FIXES, {}), switches))
+    return changed

@@ -1,0 +1,17 @@
+"""Upstream behaviour: the switches of the group ``fixes`` that are off where tests want it."""
+
+from __future__ import annotations
+
+UPSTREAM = {
+    "progress_timeout": 0.0,
+    "stuck_cost_factor": 1.0,
+    "sensor_timeout": 0.0,
+    "reject_implausible_scans": False,
+    "clear_any_obstacle_layer": False,
+    "reject_colliding_escape": False,
+    "escape_collision": False,
+    "predict_goal_turn": False,
+    "stop_after_rotation": False,
+    "avoid_peers": False,
+    "yield_when_idle": False,
+}
