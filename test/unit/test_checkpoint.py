@@ -99,12 +99,15 @@ def test_the_figures_add_up():
     assert later.log.robots["quad0"].path_length_m == pytest.approx(6.8)
 
 
-def test_smallest_gaps_last():
+def test_smallest_distances_last():
     mission = a_mission_on_its_second_goal()
     mission.records[-1].update(clearance_m=0.25, separation_m=1.5)
     log = mission.taken_over().log
-    assert log.gaps.clearance_m("quad0") == 0.25 and log.gaps.separation_m("quad0") == 1.5
-    assert log.gaps.clearance_m("quad1") is None
+    assert (
+        log.distances.min_clearance_m("quad0") == 0.25
+        and log.distances.min_separation_m("quad0") == 1.5
+    )
+    assert log.distances.min_clearance_m("quad1") is None
 
 
 def test_a_mission_that_was_flown_is_not_flown_again():

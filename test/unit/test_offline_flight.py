@@ -8,23 +8,19 @@ import multiprocessing
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from quad_nav.errors import InputError
-from quad_nav.geometry import Pose2D
 from quad_nav.mission.summary import to_json
 from quad_nav.offline.flight import Flight
-from quad_nav.offline.gaps import Gaps
 from quad_nav.offline.navigator_group import NavigatorGroup
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.offline.worker_process import PROCESS_NAME, WorkerProcessError
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.scene import Cylinder, Scene, Walls
 from quad_nav.sim.simulation import SimulationParams
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -237,27 +233,6 @@ def test_without_files_a_mission_is_made_for_so_many_and_the_costmaps_hold_it():
 def test_frames_that_nobody_publishes_are_refused():
     with pytest.raises(InputError, match="global_frame of robot 0: world, expected map or odom0"):
         read_setup(options(parameters=(("local_costmap/global_frame", "world"),)))
-
-
-def test_gaps_are_between_hulls():
-    """A pillar of 0.5 m radius in the middle; two fly past it and each other."""
-    scene = Scene(
-        "pillar",
-        20.0,
-        20.0,
-        1.0,
-        Walls(),
-        (Cylinder("pillar", 10.0, 10.0, 0.5, 2.0),),
-        (Pose2D(1.0, 1.0),),
-    )
-    gaps = Gaps(scene, 2, 0.3)
-    for positions in ([[10.0, 12.0, 1.0], [10.0, 17.0, 1.0]], [[13.0, 10.0, 1.0], [17.0, 13.0, 1]]):
-        state = SimpleNamespace(positions_m=np.array(positions))
-        gaps.moved(SimpleNamespace(simulation=SimpleNamespace(body_state=state)))
-    gaps.ended(SimpleNamespace())
-    # To the pillar 2 - 0.5 - 0.3; the second is nearest to the walls, 3 - 0.3 away.
-    assert gaps.clearances_m == pytest.approx([1.2, 2.7])
-    assert gaps.separations_m == pytest.approx([5.0 - 0.6, 5.0 - 0.6])
 
 
 def test_the_kernel_and_the_engine_see_the_same_flight():

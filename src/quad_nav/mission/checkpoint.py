@@ -36,7 +36,8 @@ class RobotCheckpoint:
 @dataclass(frozen=True)
 class MissionCheckpoint:
     """All quadcopters', by name; ``epoch_s`` is Unix time and ``clock_s`` the clock's at the
-    beginning, ``mission_s`` and ``wall_s`` what has passed since."""
+    beginning, ``mission_s`` and ``wall_s`` what has passed since.
+    """
 
     clock_s: float
     epoch_s: float
@@ -58,7 +59,7 @@ def robot_record(
     flight = sequencer.flight
     figures = dataclasses.asdict(dataclasses.replace(log.robots[name].flown, legs=()))
     del figures["legs"]  # each has its line
-    clearance_m, separation_m = log.gaps.so_far_m(name)
+    clearance_m, separation_m = log.distances.minima_of_blocks_m(name)
     return {
         "robot": name,
         "index": sequencer.index,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D, angle_difference
-from quad_nav.mission.gap_log import Clearances, GapLog
+from quad_nav.mission.distances import DistanceLog, SurfaceDistance
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import CONTACT_GAP_S, Contact
@@ -182,17 +182,20 @@ class FlightLog:
     """What all quadcopters of a mission have flown."""
 
     def __init__(
-        self, names: Sequence[str], robot_radius_m: float, clearances_m: Optional[Clearances] = None
+        self,
+        names: Sequence[str],
+        robot_radius_m: float,
+        surface_distance: Optional[SurfaceDistance] = None,
     ):
         self.robots: Dict[str, RobotLog] = {name: RobotLog(name) for name in names}
         self.robot_radius_m = robot_radius_m
         self.contacts: List[Contact] = []
-        self.gaps = GapLog(names, robot_radius_m, clearances_m)
+        self.distances = DistanceLog(names, robot_radius_m, surface_distance)
 
     def move(self, name: str, stamp_s: float, pose: Pose2D) -> None:
         """Take a quadcopter's pose in ``map``."""
         if self.robots[name].move(stamp_s, pose):
-            self.gaps.add(name, stamp_s, pose.x_m, pose.y_m)
+            self.distances.add(name, stamp_s, pose.x_m, pose.y_m)
 
     def add_contact(self, contact: Contact) -> bool:
         """Add a contact that begins; return False if it is in the log already.
@@ -210,7 +213,7 @@ class FlightLog:
     ) -> None:
         """Take over what a quadcopter has flown, and its smallest gaps, from another log."""
         self.robots[name] = RobotLog(name, before)
-        self.gaps.know(name, clearance_m, separation_m)
+        self.distances.restore(name, clearance_m, separation_m)
 
     def contacts_of(self, name: str) -> int:
         return sum(contact.involves(name) for contact in self.contacts)

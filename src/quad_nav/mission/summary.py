@@ -14,7 +14,9 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 import tabulate
 
 from quad_nav.mission.flight_log import INTERRUPTED, FlightLog, Leg
+from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.contacts import Contact
+from quad_nav.versions import versions
 
 EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT = 0, 1, 2
 
@@ -90,14 +92,55 @@ class MissionSummary:
         return self.sim_time_s / self.wall_time_s if self.wall_time_s > 0 else None
 
 
+def summarize(
+    log: FlightLog,
+    sequencers: Mapping[str, Sequencer],
+    clock_s: float,
+    *,
+    sim_time_s: float,
+    wall_time_s: float,
+    reason: str = "",
+    seed: Optional[int] = None,
+    contacts_reported: bool = True,
+) -> MissionSummary:
+    """Sum up a mission, ended or not, from its log.
+
+    Args:
+        log: Flight log of all robots.
+        sequencers: Each robot's sequencer, by the robot's name.
+        clock_s: Present time on the clock of the log and the sequencers.
+        sim_time_s: Duration of the mission.
+        wall_time_s: Wall time that it took.
+        reason: Reason why the mission ended before its goals did, "" if it did not.
+        seed: Seed of the simulation.
+        contacts_reported: False if nothing reports contacts, as on real quadcopters.
+    """
+    robots = (
+        summarize_robot(log, name, log.robots[name].all_legs(sequencer, clock_s))
+        for name, sequencer in sequencers.items()
+    )
+    return MissionSummary(
+        tuple(robots),
+        tuple(log.contacts),
+        log.robot_radius_m,
+        sim_time_s,
+        wall_time_s,
+        reason,
+        contacts_reported=contacts_reported,
+        seed=seed,
+        versions=versions(),
+    )
+
+
 def summarize_robot(log: FlightLog, name: str, legs: Sequence[Leg]) -> RobotSummary:
+    """Sum up one robot's part; ``legs`` are all of its goals, flown or not."""
     robot = log.robots[name]
     return RobotSummary(
         name,
         tuple(legs),
         robot.path_length_m,
-        log.gaps.clearance_m(name),
-        log.gaps.separation_m(name),
+        log.distances.min_clearance_m(name),
+        log.distances.min_separation_m(name),
         robot.recoveries,
         log.contacts_of(name),
         robot.aborts,

@@ -13,7 +13,7 @@ from typing import Dict, List, Mapping, Sequence
 
 from quad_nav.config import Configuration
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.flight_log import RobotLog
+from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import Action, NavigatorReport, SendGoal, Sequencer, Verdict
 from quad_nav.navigator.tick import State, Tick
@@ -35,24 +35,24 @@ class FlightRobot:
     ``goal_waits`` while the navigator has not taken the last goal that was sent.
     """
 
-    def __init__(self, goals: RobotGoals, configuration: Configuration):
+    def __init__(self, goals: RobotGoals, configuration: Configuration, log: FlightLog):
         self.name = goals.name
         self.configuration = configuration
         self.sequencer = Sequencer(goals.sequence)
-        self.log = RobotLog(goals.name)
+        self._log = log
         self.goal_waits = False
         self._is_idle = True
         self._reports: List[NavigatorReport] = []
 
     def sequence(self, now_s: float, pose: Pose2D) -> List[Action]:
         """Lets the sequencer look at the odometry; its actions."""
-        self.log.move(now_s, pose)
+        self._log.move(self.name, now_s, pose)
         actions = self.sequencer.tick(
             now_s, pose, self._reports, self._is_idle and not self.goal_waits
         )
         self._reports = []
         for action in actions:
-            self.log.act(action)
+            self._log.robots[self.name].act(action)
             self.goal_waits = self.goal_waits or isinstance(action, SendGoal)
         return actions
 
@@ -60,10 +60,10 @@ class FlightRobot:
         """What the navigator has done."""
         self.goal_waits, self._is_idle = goal_waits, tick.state is State.IDLE
         if tick.recovery is not None:
-            self.log.recoveries += 1
+            self._log.robots[self.name].recoveries += 1
         if tick.outcome is None:
             return
-        self.log.aborts += not tick.outcome.succeeded
+        self._log.robots[self.name].aborts += not tick.outcome.succeeded
         # A goal that waits has replaced the one that ended here.
         if not goal_waits:
             verdict = Verdict.SUCCEEDED if tick.outcome.succeeded else Verdict.ABORTED
@@ -87,8 +87,13 @@ class Flight:
             or setup.simulation.lidar_caster != "kernel"
         ):
             processes = 1
+        self.log = FlightLog(
+            [goals.name for goals in setup.robots],
+            setup.robot_radius_m,
+            setup.scene.flight_clearances_m,
+        )
         self.robots = [
-            FlightRobot(goals, configuration)
+            FlightRobot(goals, configuration, self.log)
             for goals, configuration in zip(setup.robots, setup.configurations)
         ]
         shares = [
@@ -119,7 +124,7 @@ class Flight:
     @property
     def contacts(self) -> List[Contact]:
         """Oldest first."""
-        return self.simulation.contacts
+        return self.log.contacts
 
     @property
     def is_done(self) -> bool:
@@ -155,6 +160,7 @@ class Flight:
         count, per_scan = self.simulation.step_count, self.setup.steps_per_scan
         next_scan = (count // per_scan + 1) * per_scan
         for contact in self.simulation.advance(min(end, next_scan) - count):
+            self.log.add_contact(contact)
             for observer in self._observers:
                 observer.touched(contact)
         if self.simulation.step_count == next_scan:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import time
 from typing import Callable, Optional, Sequence
 
-from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.offline.flight import Flight
-from quad_nav.offline.gaps import Gaps
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.scenario.flight_setup import FlightSetup
-from quad_nav.versions import versions
 
 INTERRUPTED = "interrupted"
 
@@ -25,8 +23,7 @@ def fly(
 
     The navigators share so many ``processes``.
     """
-    gaps = Gaps(setup.scene, len(setup.robots), setup.robot_radius_m)
-    flight = Flight(setup, (gaps, *observers), processes)
+    flight = Flight(setup, observers, processes)
     start_wall_s = time.perf_counter()
     try:
         reason = _advance_to_end(flight, is_stopped)
@@ -36,7 +33,15 @@ def fly(
     wall_time_s = time.perf_counter() - start_wall_s
     flight.end(reason)
     reasons = dict.fromkeys(why for why in (reason, flight.stop_reason) if why)
-    return _summary(flight, gaps, wall_time_s, "; ".join(reasons))
+    return summarize(
+        flight.log,
+        {robot.name: robot.sequencer for robot in flight.robots},
+        flight.now_s,
+        sim_time_s=flight.now_s,
+        wall_time_s=wall_time_s,
+        reason="; ".join(reasons),
+        seed=setup.seed,
+    )
 
 
 def _advance_to_end(flight: Flight, is_stopped: Optional[Callable[[], bool]]) -> str:
@@ -51,33 +56,3 @@ def _advance_to_end(flight: Flight, is_stopped: Optional[Callable[[], bool]]) ->
         elif is_stopped is not None and is_stopped():
             reason = reason or INTERRUPTED
     return reason
-
-
-def _summary(flight: Flight, gaps: Gaps, wall_time_s: float, reason: str) -> MissionSummary:
-    setup = flight.setup
-    robots = tuple(_robot_summary(flight, gaps, index) for index in range(len(flight.robots)))
-    return MissionSummary(
-        robots,
-        tuple(flight.contacts),
-        setup.robot_radius_m,
-        flight.now_s,
-        wall_time_s,
-        reason,
-        seed=setup.seed,
-        versions=versions(),
-    )
-
-
-def _robot_summary(flight: Flight, gaps: Gaps, index: int) -> RobotSummary:
-    robot, log = flight.robots[index], flight.robots[index].log
-    return RobotSummary(
-        robot.name,
-        tuple(log.all_legs(robot.sequencer, flight.now_s)),
-        log.path_length_m,
-        float(gaps.clearances_m[index]),
-        float(gaps.separations_m[index]) if len(flight.robots) > 1 else None,
-        log.recoveries,
-        sum(contact.involves(robot.name) for contact in flight.contacts),
-        log.aborts,
-        log.spin_s,
-    )

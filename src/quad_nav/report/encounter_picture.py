@@ -9,7 +9,7 @@ from matplotlib.patches import FancyArrowPatch
 
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.encounters import Encounter, gap_text
-from quad_nav.report.measures import Tracks, pair_gap_m
+from quad_nav.report.measures import Tracks, pair_separations_m
 from quad_nav.report.scene_drawing import draw_hull, draw_scene
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure
 
@@ -83,7 +83,7 @@ def _gap(trace: FlightTrace, among: Tracks, one: Encounter, now: int, nearest: b
         return ""
     if nearest:
         return gap_text(one.gap_m)
-    return gap_text(pair_gap_m(among, one.robot, one.other, trace.robot_radius_m)[now])
+    return gap_text(pair_separations_m(among, one.robot, one.other, trace.robot_radius_m)[now])
 
 
 def _draw_robot(axes: Axes, among: Tracks, robot: int, now: int, radius_m: float) -> None:

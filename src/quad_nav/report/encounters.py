@@ -9,7 +9,7 @@ from typing import Dict, List, Optional, Tuple
 import numpy as np
 
 from quad_nav.recording.trace import FlightTrace
-from quad_nav.report.measures import Tracks, pair_gap_m, runs
+from quad_nav.report.measures import Tracks, pair_separations_m, runs
 
 CLOSE_M = 0.5
 """Two hulls that are less than this apart have a close encounter."""
@@ -56,7 +56,7 @@ def gap_text(gap_m: float) -> str:
 
 
 def _of_pair(trace: FlightTrace, among: Tracks, a: int, b: int, below_m: float) -> List[Encounter]:
-    gap_m = pair_gap_m(among, a, b, trace.robot_radius_m)
+    gap_m = pair_separations_m(among, a, b, trace.robot_radius_m)
     close = gap_m < below_m
     if not close.any():
         return []

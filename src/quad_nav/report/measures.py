@@ -11,6 +11,7 @@ from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
+from quad_nav.mission import distances
 from quad_nav.mission.flight_log import SPIN_ABOVE_RADPS, SPIN_BELOW_MPS
 from quad_nav.recording.trace import FlightTrace, GoalTrace, RobotTrace
 from quad_nav.sim.scene import Scene
@@ -70,28 +71,21 @@ def speed_mps(robot: RobotTrace) -> np.ndarray:
     return np.hypot(robot.velocities[:, 0], robot.velocities[:, 1])
 
 
-def pair_gap_m(among: Tracks, a: int, b: int, radius_m: float) -> np.ndarray:
-    """Gap float64[t] between the hulls of two quadcopters."""
-    apart = among.positions_m[a] - among.positions_m[b]
-    return np.hypot(apart[:, 0], apart[:, 1]) - 2.0 * radius_m
+def pair_separations_m(among: Tracks, a: int, b: int, radius_m: float) -> np.ndarray:
+    """Return the distance float64[t] between the hulls of two robots."""
+    return distances.separations_m(among.positions_m[a], among.positions_m[b], radius_m)
 
 
 def separations_m(among: Tracks, radius_m: float) -> np.ndarray:
-    """Gap float64[n, t] to the nearest other quadcopter; NaN when there is none."""
-    nearest = np.full(among.yaws_rad.shape, np.nan)
-    for a in range(len(nearest)):
-        for b in range(a + 1, len(nearest)):
-            gap_m = pair_gap_m(among, a, b, radius_m)
-            nearest[a] = np.fmin(nearest[a], gap_m)
-            nearest[b] = np.fmin(nearest[b], gap_m)
-    return nearest
+    """Return each robot's separation float64[n, t] from the nearest other; NaN if there is none."""
+    return distances.nearest_separations_m(among.positions_m, radius_m)
 
 
 def clearances_m(among: Tracks, scene: Optional[Scene], radius_m: float) -> np.ndarray:
-    """Gap float64[n, t] to the nearest obstacle or wall; NaN without a scene."""
+    """Return each robot's clearance float64[n, t]; NaN without a scene."""
     if scene is None or among.positions_m.size == 0:
         return np.full(among.yaws_rad.shape, np.nan)
-    return scene.flight_clearances_m(among.positions_m) - radius_m
+    return distances.clearances_m(among.positions_m, scene.flight_clearances_m, radius_m)
 
 
 def span_s(trace: FlightTrace) -> Span:

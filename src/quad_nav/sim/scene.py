@@ -127,17 +127,17 @@ class Scene:
 
     @property
     def end_x_m(self) -> float:
-        """x of the arena's upper right corner."""
+        """X of the arena's upper right corner."""
         return self.origin_x_m + self.size_x_m
 
     @property
     def end_y_m(self) -> float:
-        """y of the arena's upper right corner."""
+        """Y of the arena's upper right corner."""
         return self.origin_y_m + self.size_y_m
 
     @property
     def centre(self) -> Tuple[float, float]:
-        """x and y of the arena's centre."""
+        """X and y of the arena's centre."""
         return (self.origin_x_m + self.size_x_m / 2, self.origin_y_m + self.size_y_m / 2)
 
     def contains(self, x_m: float, y_m: float) -> bool:

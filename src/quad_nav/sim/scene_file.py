@@ -82,7 +82,8 @@ def scene_from_document(
     document: Any, source: str, default_name: str = "scene", folder: Path = Path()
 ) -> Scene:
     """Check a parsed document; ``source`` names it in messages, ``folder`` is where the files
-    that it refers to are. Raises ``InputError``."""
+    that it refers to are. Raises ``InputError``.
+    """
     check = Checker(source)
     scene = _read_scene(check, document, default_name, folder)
     if scene is None or check.problems:

@@ -20,7 +20,7 @@ from visualization_msgs.msg import MarkerArray
 
 from quad_nav.mission.checkpoint import MissionCheckpoint, RobotCheckpoint, on_clock
 from quad_nav.mission.flight_log import FlightLog, Leg
-from quad_nav.mission.summary import MissionSummary, summarize_robot
+from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
 from quad_nav.ros.common.marker_messages import only_markers
@@ -32,7 +32,6 @@ from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.ros.sequencer.setup import MissionSetup
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, mission_info, to_text
 from quad_nav.topics.goal_markers import goal_markers
-from quad_nav.versions import versions
 
 START_SERVICE = "/simulation/start"
 WAIT_S = 0.2  # wall time, as the next: how soon it is seen that the node shall end
@@ -153,24 +152,15 @@ class Mission:
 
     def summary(self, reason: str = "") -> MissionSummary:
         with self._lock:
-            robots = [
-                summarize_robot(
-                    self._log,
-                    robot.name,
-                    self._log.robots[robot.name].all_legs(robot.sequencer, self._now_s),
-                )
-                for robot in self.robots
-            ]
-            return MissionSummary(
-                tuple(robots),
-                tuple(self._log.contacts),
-                self._setup.robot_radius_m,
-                self._now_s - self._journal.start_s,
-                self._journal.wall_time_s,
-                reason,
-                contacts_reported=self._setup.simulation,
+            return summarize(
+                self._log,
+                {robot.name: robot.sequencer for robot in self.robots},
+                self._now_s,
+                sim_time_s=self._now_s - self._journal.start_s,
+                wall_time_s=self._journal.wall_time_s,
+                reason=reason,
                 seed=self._seed,
-                versions=versions(),
+                contacts_reported=self._setup.simulation,
             )
 
     def _begin(self, now_s: float) -> None:
@@ -194,7 +184,7 @@ class Mission:
             robot.name: RobotCheckpoint(
                 on_clock(robot.sequencer.stage, -start_s),
                 self._log.robots[robot.name].flown,
-                *self._log.gaps.so_far_m(robot.name),
+                *self._log.distances.minima_of_blocks_m(robot.name),
             )
             for robot in self.robots
         }
@@ -235,7 +225,7 @@ class Mission:
         return FlightLog(
             [robot.name for robot in self._setup.robots],
             self._setup.robot_radius_m,
-            self._setup.clearances_m,
+            self._setup.surface_distance,
         )
 
     def _show_goals(self) -> None:

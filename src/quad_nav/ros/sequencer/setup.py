@@ -20,7 +20,7 @@ import rospkg
 
 from quad_nav import config
 from quad_nav.errors import InputError
-from quad_nav.mission.gap_log import Clearances
+from quad_nav.mission.distances import SurfaceDistance
 from quad_nav.mission.goal_file import SETTINGS, PlaceCheck, read_settings
 from quad_nav.mission.goal_sequence import SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
@@ -59,7 +59,7 @@ class MissionSetup:
     robots: Tuple[RobotGoals, ...]
     robot_radius_m: float
     altitude_m: Optional[float]
-    clearances_m: Optional[Clearances]
+    surface_distance: Optional[SurfaceDistance]
     simulation: bool
     ready_timeout_s: float
     exit_when_done: bool
