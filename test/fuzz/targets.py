@@ -25,7 +25,7 @@ from quad_nav.mission.goal_file import parse_goals
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import Message
 from quad_nav.recording.bag_trace import _is_wanted, _Reading, read_trace
-from quad_nav.report.figures import figures
+from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.page import flight_page
 from quad_nav.scenario.scene_check import scene_check
 from quad_nav.sim.scene_file import load_scene
@@ -85,11 +85,11 @@ def command_line(data: bytes) -> None:
 
 
 def bag(data: bytes) -> None:
-    figures(read_trace(_written("flight.bag", data)))
+    flight_metrics(read_trace(_written("flight.bag", data)))
 
 
 def mcap(data: bytes) -> None:
-    figures(read_trace(_written("flight.mcap", data)))
+    flight_metrics(read_trace(_written("flight.mcap", data)))
 
 
 def flight_info(data: bytes) -> None:
@@ -103,7 +103,7 @@ def flight_info(data: bytes) -> None:
             reading.take(Message(EVENTS_TOPIC, "std_msgs/String", 0, text("std_msgs/String", line)))
     except ValueError:
         return  # read_trace makes an InputError of it
-    figures(reading.trace(Path("flight.bag")))
+    flight_metrics(reading.trace(Path("flight.bag")))
 
 
 def page(data: bytes) -> None:
@@ -141,7 +141,7 @@ def robot_messages(data: bytes) -> None:
         reading.take(Message(topic, kind, 0, content))
     except ValueError:
         return
-    figures(reading.trace(Path("flight.bag")))
+    flight_metrics(reading.trace(Path("flight.bag")))
 
 
 TARGETS: Dict[str, Callable[[bytes], None]] = {

@@ -13,11 +13,11 @@ import pytest
 from click.testing import CliRunner
 
 from quad_nav import config
-from quad_nav.barn.figures import figures, wilson_interval
 from quad_nav.barn.protocol import Outcome, Run, metric
 from quad_nav.barn.results import Results, differences
 from quad_nav.barn.runs import fly_all, fly_world, judge
 from quad_nav.barn.setup import BarnOptions, read_barn_setup
+from quad_nav.barn.statistics import barn_statistics, wilson_interval
 from quad_nav.barn.worlds import BarnWorld, load_worlds
 from quad_nav.cli.barn import barn
 from quad_nav.errors import InputError
@@ -101,7 +101,7 @@ def test_figures_are_means_over_worlds_of_the_successful_runs_times():
             RUN, world=2, outcome=Outcome.TIME_OUT, time_s=100.0, metric=0.0, gave_up="aborted"
         ),
     ]
-    row = figures(runs)
+    row = barn_statistics(runs)
     assert (row.worlds, row.runs, row.successes, row.collisions, row.time_outs, row.gave_up) == (
         3,
         5,
@@ -112,7 +112,7 @@ def test_figures_are_means_over_worlds_of_the_successful_runs_times():
     )
     assert row.mean_time_s == pytest.approx(30.0)  # of 25 s in world 0 and 35 s in world 1
     assert row.metric == pytest.approx(0.12)
-    assert figures(runs[3:]).mean_time_s is None
+    assert barn_statistics(runs[3:]).mean_time_s is None
 
 
 def test_a_world_has_cylinders_where_its_cells_say_and_the_path_counts_from_start_to_goal(tmp_path):
@@ -368,4 +368,4 @@ def test_without_a_flight_there_are_no_figures(tmp_path):
     setup = setup_of(write_worlds(tmp_path / "w.npz", w6=free()))
     assert Results(setup.contestant, (), 1, 0.0).rows == []
     with pytest.raises(ValueError, match="no runs"):
-        figures([])
+        barn_statistics([])

@@ -74,7 +74,7 @@ def test_every_fault_is_told_and_nothing_written(report, tmp_path):
     assert result.exit_code == 2
     lines = result.output.splitlines()
     assert lines[:3] == [
-        "no report:",
+        "no report written:",
         "  animation: 3 flights, expected one",
         "  animation: one.avi, expected a name that ends in .gif or .mp4",
     ]

@@ -24,7 +24,7 @@ from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import INTERRUPTED, fly
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import read_messages
-from quad_nav.recording.path_messages import path_bytes, plan_bytes, pose_bytes
+from quad_nav.recording.messages import path_bytes, plan_bytes, pose_bytes
 from quad_nav.recording.record_file import create
 from quad_nav.recording.recorder import Recorder
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup

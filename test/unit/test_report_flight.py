@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from quad_nav.cli import main
 from quad_nav.offline.run import fly
 from quad_nav.recording.trace import TraceObserver
-from quad_nav.report.figures import figures
+from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import SimulationParams
@@ -34,7 +34,7 @@ def test_figures_are_those_of_the_summary():
         ),
         [observer],
     )
-    found = figures(observer.trace(summary.contacts, summary.reason))
+    found = flight_metrics(observer.trace(summary.contacts, summary.reason))
     assert found.mission_s == pytest.approx(summary.sim_time_s, abs=1 / 40 + 1e-9)
     assert found.least_separation_m == pytest.approx(summary.min_separation_m, abs=1e-3)
     assert found.faults == ("it ended early (time limit of 6 s)", "2 of 2 goals not reached")

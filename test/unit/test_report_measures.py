@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hand_made_traces import RADIUS_M, SCENE, TIMES_S, flight, goal, robot
 
-from quad_nav.report.figures import figures
+from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.measures import (
     clearances_m,
     runs,
@@ -105,7 +105,7 @@ def test_figures_of_a_flight():
         recoveries=((3.0, "rotate_recovery"),),
         goals=(goal(0, (3.0, 2.0), 1.0, 4.0), goal(1, (5.0, 2.0), 4.0, 9.0)),
     )
-    found = figures(flight(done, robot(1, (1.0, 4.0))))
+    found = flight_metrics(flight(done, robot(1, (1.0, 4.0))))
     assert (found.sent, found.reached, found.contacts, found.recoveries) == (2, 2, 0, 1)
     assert found.mission_s == pytest.approx(8.0)
     assert found.path_ratio == pytest.approx(1.0)
@@ -119,7 +119,7 @@ def test_figures_of_a_flight():
 
 def test_faults_say_why_a_flight_failed():
     failed = robot(0, (1.0, 2.0), goals=(goal(0, (3.0, 2.0), 1.0, 4.0, reached=False),))
-    found = figures(
+    found = flight_metrics(
         flight(failed, contacts=[Contact(2.0, "quad0", "pillar", 1.0, 2.0)], reason="interrupted")
     )
     assert not found.success
@@ -128,5 +128,5 @@ def test_faults_say_why_a_flight_failed():
 
 
 def test_a_flight_without_goals_is_no_success():
-    assert figures(flight(robot(0, (1.0, 1.0)))).faults == ("no goal was sent",)
-    assert figures(flight()).faults == ("no goal was sent",)
+    assert flight_metrics(flight(robot(0, (1.0, 1.0)))).faults == ("no goal was sent",)
+    assert flight_metrics(flight()).faults == ("no goal was sent",)

@@ -13,9 +13,15 @@ from hand_made_traces import TIMES_S, fleet, flight, goal, robot
 from PIL import Image
 
 from quad_nav.report.animation import animate_flight, animation_faults
-from quad_nav.report.figures import figures
-from quad_nav.report.page import MOST_STRIPS, Page, comparison_page, flight_page
-from quad_nav.report.write import write_comparison, write_report
+from quad_nav.report.flight_metrics import flight_metrics
+from quad_nav.report.page import (
+    MOST_STRIPS,
+    Page,
+    comparison_page,
+    flight_page,
+    write_comparison,
+    write_report,
+)
 
 SECTIONS = [
     "paths",
@@ -137,8 +143,8 @@ def test_text_is_escaped():
 
 def test_comparison_of_flights():
     flights = [
-        figures(fleet(2)),
-        figures(
+        flight_metrics(fleet(2)),
+        flight_metrics(
             flight(
                 robot(0, (1.0, 1.0), (0.3, 0.0), goals=(goal(0, (4.0, 1.0), 0.0, 10.0),)),
                 config_name="mine",
@@ -158,7 +164,7 @@ def test_files_of_one_and_of_several(tmp_path):
     assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == sorted(
         f"{name}.png" for name in [*PICTURES, "encounter_A", "encounter_B"]
     )
-    write_comparison([figures(fleet(2))] * 2, tmp_path / "two.html", tmp_path / "compared")
+    write_comparison([flight_metrics(fleet(2))] * 2, tmp_path / "two.html", tmp_path / "compared")
     assert [path.name for path in (tmp_path / "compared").iterdir()] == ["comparison.png"]
 
 

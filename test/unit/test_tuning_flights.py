@@ -166,10 +166,10 @@ def test_a_flight_through_barn_counts_as_the_benchmark_counts_it(tmp_path):
     setup = read_barn_setup(BarnOptions(path, only=(0,)))
     run = fly_world(setup.contestant, setup.worlds[0], 0)
     assert run.outcome is Outcome.SUCCESS
-    found = course.figures(cases, [flight])
+    found = course.statistics(cases, [flight])
     assert (found.successes, found.mean_time_s, found.metric) == (1, run.time_s, run.metric)
-    touched = course.figures(cases, [replace(flight, contacts=1)])
-    late = course.figures(cases, [replace(flight, reached=0)])
+    touched = course.statistics(cases, [replace(flight, contacts=1)])
+    late = course.statistics(cases, [replace(flight, reached=0)])
     assert (touched.collisions, late.time_outs, touched.metric, late.metric) == (1, 1, 0.0, 0.0)
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 from study_flights import FLOWN
 
-from quad_nav.tuning.figures import figures
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.score import TERMS, cost, mean_cost
+from quad_nav.tuning.statistics import flight_statistics
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_figures_of_three_flights():
         replace(FLOWN, time_s=50.0, clearance_m=0.1, recoveries=2),
         replace(FLOWN, reached=1, time_s=300.0, contacts=2),
     ]
-    found = figures(flights)
+    found = flight_statistics(flights)
     assert (found.flights, found.completed, found.succeeded) == (3, 2, 2)
     assert (found.contacts, found.touched, found.recoveries) == (2, 1, 2)
     assert (found.mean_time_s, found.least_gap_m) == (45.0, 0.1)
@@ -56,7 +56,7 @@ def test_figures_of_three_flights():
 
 
 def test_figures_without_a_mission_that_was_completed():
-    found = figures([replace(FLOWN, reached=0, clearance_m=None)])
+    found = flight_statistics([replace(FLOWN, reached=0, clearance_m=None)])
     assert (found.mean_time_s, found.least_gap_m) == (None, None)
 
 

@@ -17,8 +17,8 @@ from study_flights import PAPER_BASE, PAPER_SPACE, PaperCourse, PaperWorkers, to
 
 from quad_nav.errors import InputError
 from quad_nav.tuning.evaluation import Evaluation, Watcher
+from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.flight_result import FlightResult
-from quad_nav.tuning.journal import Journal
 from quad_nav.tuning.proposals import is_hopeless, propose
 from quad_nav.tuning.refinement import refine
 from quad_nav.tuning.report.search_pictures import importances
@@ -118,7 +118,7 @@ t.run(Path(sys.argv[1]), watcher=Dies())
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(HERE)])}
     died = subprocess.run([sys.executable, "-c", code, str(tmp_path / "parts")], env=environment)
     assert died.returncode == -signal.SIGKILL
-    before = Journal(tmp_path / "parts" / "study.db").known_at_start
+    before = FlightCache(tmp_path / "parts" / "study.db").known_at_start
     resumed, after = run(tmp_path / "parts")
     assert before == 23
     assert resumed == whole
@@ -159,7 +159,7 @@ def test_a_candidate_is_dropped_above_the_median_of_those_that_flew_everything()
 
 def test_refining_keeps_what_helps_and_takes_back_what_does_not():
     workers, course = PaperWorkers(), PaperCourse()
-    evaluation = Evaluation(course, PAPER_SPACE, workers, Journal(), Watcher())
+    evaluation = Evaluation(course, PAPER_SPACE, workers, FlightCache(), Watcher())
     refined = refine(
         evaluation,
         [{"speed": 0.5, "idle": 0.9, "bad": 0.0}, {"speed": 0.6, "idle": 0.2, "bad": 0.0}],
@@ -177,7 +177,7 @@ def test_refining_keeps_what_helps_and_takes_back_what_does_not():
 
 def test_nothing_is_changed_when_nothing_beats_the_base():
     course = PaperCourse()
-    evaluation = Evaluation(course, PAPER_SPACE, PaperWorkers(), Journal(), Watcher())
+    evaluation = Evaluation(course, PAPER_SPACE, PaperWorkers(), FlightCache(), Watcher())
     refined = refine(
         evaluation,
         [{"speed": 0.99, "idle": 0.5, "bad": 0.0}, {"speed": 0.5, "idle": 0.5, "bad": 9.0}],
@@ -201,7 +201,9 @@ def test_a_flight_is_known_by_parameters_mission_and_seed(tmp_path):
     course = PaperCourse()
     workers = PaperWorkers()
     for _ in range(2):
-        evaluation = Evaluation(course, PAPER_SPACE, workers, Journal(tmp_path / "f.db"), Watcher())
+        evaluation = Evaluation(
+            course, PAPER_SPACE, workers, FlightCache(tmp_path / "f.db"), Watcher()
+        )
         evaluation.flown([{"speed": 0.5}, {"speed": 0.5}, {"speed": 0.25}], course.search_cases(2))
     assert [json.loads(flown) for flown in workers.flown] == [
         [{"speed": 0.5}, 0],

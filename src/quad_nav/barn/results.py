@@ -10,9 +10,9 @@ from typing import Any, Dict, List, Optional, Sequence, TextIO, Tuple
 
 import tabulate
 
-from quad_nav.barn.figures import Figures, figures
 from quad_nav.barn.protocol import Run
 from quad_nav.barn.setup import SCANS_PER_S, Contestant
+from quad_nav.barn.statistics import BarnStatistics, barn_statistics
 from quad_nav.barn.worlds import ALTITUDE_M, MARGIN_M
 from quad_nav.sim.simulation import STEPS_PER_S
 from quad_nav.versions import versions
@@ -56,21 +56,21 @@ class Results:
     wall_time_s: float
 
     @property
-    def rows(self) -> List[Tuple[str, Figures]]:
+    def rows(self) -> List[Tuple[str, BarnStatistics]]:
         """The figures by what they are of; none without a run."""
         sample = [run for run in self.runs if run.in_sample]
-        rows = [("official sample", figures(sample))] if sample else []
+        rows = [("official sample", barn_statistics(sample))] if sample else []
         if len(sample) < len(self.runs):
-            rows.append(("all worlds", figures(self.runs)))
+            rows.append(("all worlds", barn_statistics(self.runs)))
         return rows
 
     @property
-    def world_rows(self) -> List[Tuple[str, Figures]]:
+    def world_rows(self) -> List[Tuple[str, BarnStatistics]]:
         """The figures of each world."""
         worlds: Dict[int, List[Run]] = {}
         for run in self.runs:
             worlds.setdefault(run.world, []).append(run)
-        return [(f"world {number}", figures(runs)) for number, runs in worlds.items()]
+        return [(f"world {number}", barn_statistics(runs)) for number, runs in worlds.items()]
 
 
 def text(results: Results, per_world: bool = False) -> str:
@@ -144,7 +144,7 @@ def write_csv(results: Results, file: TextIO) -> None:
     writer.writerows(_run_row(run) for run in results.runs)
 
 
-def _table(rows: Sequence[Tuple[str, Figures]]) -> str:
+def _table(rows: Sequence[Tuple[str, BarnStatistics]]) -> str:
     return tabulate.tabulate(
         [_row(name, row) for name, row in rows],
         _HEADER,
@@ -154,7 +154,7 @@ def _table(rows: Sequence[Tuple[str, Figures]]) -> str:
     )
 
 
-def _row(name: str, row: Figures) -> List[str]:
+def _row(name: str, row: BarnStatistics) -> List[str]:
     low, high = row.success_interval
     time = "-" if row.mean_time_s is None else f"{row.mean_time_s:.1f}"
     return [
@@ -187,7 +187,7 @@ def _collisions(runs: Sequence[Run]) -> List[str]:
     return lines
 
 
-def _figures_json(row: Figures) -> Dict[str, Any]:
+def _figures_json(row: BarnStatistics) -> Dict[str, Any]:
     low, high = row.success_interval
     return {
         **asdict(row),

@@ -42,7 +42,7 @@ class FlightPictures:
             return
         trace = self._observer.trace(summary.contacts, summary.reason)
         if self._report is not None:
-            from quad_nav.report.write import write_report
+            from quad_nav.report.page import write_report
 
             write_report(trace, self._report, wall_time_s=summary.wall_time_s)
             yield f"report: {self._report}"

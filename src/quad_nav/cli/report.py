@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Callable, List, Optional, Sequence, Tuple, TypeVar
+from typing import Callable, List, Optional, Sequence, Tuple, TypeVar
 
 import click
 from rich.console import Console
@@ -13,9 +13,11 @@ from rich.progress import track
 
 from quad_nav.cli import EXIT_BAD_INPUT
 from quad_nav.errors import InputError
-
-if TYPE_CHECKING:
-    from quad_nav.recording.trace import FlightTrace
+from quad_nav.recording.bag_trace import read_trace
+from quad_nav.recording.trace import FlightTrace
+from quad_nav.report.animation import animate_flight, animation_faults
+from quad_nav.report.flight_metrics import flight_metrics
+from quad_nav.report.page import write_comparison, write_report
 
 T = TypeVar("T")
 
@@ -31,43 +33,39 @@ T = TypeVar("T")
     metavar="FILE",
     default=Path("report.html"),
     show_default=True,
-    help="The page.",
+    help="Write the report to this file.",
 )
 @click.option(
     "--png",
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help="Write every picture there as well.",
+    help="Also write every picture to this folder as a PNG file.",
 )
 @click.option(
     "--animate",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Write an animation of the one FLIGHT: .gif, or .mp4 where there is ffmpeg.",
+    help="Write an animation: .gif, or .mp4 (requires ffmpeg). Takes exactly one FLIGHT.",
 )
 def report(
     flights: Tuple[Path, ...], output: Path, png: Optional[Path], animate: Optional[Path]
 ) -> None:
-    """Make a page with pictures of a recorded flight, or compare several.
+    """Write a report of a recorded flight, or compare several flights.
 
-    A FLIGHT is a bag or MCAP of quad fly --record, or a bag of rosbag record during roslaunch. The
-    page is one HTML file that needs no network.
+    A FLIGHT is a bag or an MCAP file from quad fly --record, or a bag from rosbag record. The
+    report is a single HTML file that needs no network.
 
-    Exit status: 0, or 2 for input that cannot be used.
+    Exit status: 0, or 2 for invalid input.
     """
-    from quad_nav.report.animation import animate_flight, animation_faults
-    from quad_nav.report.figures import figures
-    from quad_nav.report.write import write_comparison, write_report
-
     try:
         faults = animation_faults(animate, len(flights)) if animate is not None else []
         if len(flights) == 1:
             (trace,) = _read(flights, lambda trace: trace, faults)
             write_report(trace, output, png)
         else:
-            write_comparison(_read(flights, figures, faults), output, png)
+            write_comparison(_read(flights, flight_metrics, faults), output, png)
     except InputError as error:
-        click.echo("no report:\n  " + "\n  ".join(error.problems), err=True)
+        click.echo("no report written:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
     click.echo(f"report: {output}")
     if animate is not None:
@@ -78,24 +76,26 @@ def report(
 def _read(
     flights: Sequence[Path], reduce: Callable[[FlightTrace], T], faults: Sequence[str]
 ) -> List[T]:
-    """What ``reduce`` makes of each flight's trace; traces of many would fill the memory.
+    """Read each flight and reduce its trace at once: many whole traces do not fit in memory.
+
+    Args:
+        flights: Recordings.
+        reduce: Function of a trace whose results are returned.
+        faults: Faults found before; they are reported together with those of the flights.
 
     Raises:
-        InputError: the ``faults`` that were known before, and a line for every flight that cannot
-            be read.
+        InputError: Lists ``faults`` and every flight that cannot be read.
     """
-    from quad_nav.recording.bag_trace import read_trace
-
     console = Console(stderr=True)
-    found: List[T] = []
+    reduced: List[T] = []
     problems = list(faults)
     for path in track(
         flights, "reading", console=console, transient=True, disable=not console.is_terminal
     ):
         try:
-            found.append(reduce(replace(read_trace(path), title=path.name)))
+            reduced.append(reduce(replace(read_trace(path), title=path.name)))
         except InputError as error:
             problems += error.problems
     if problems:
         raise InputError(problems)
-    return found
+    return reduced

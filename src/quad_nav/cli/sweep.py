@@ -26,7 +26,7 @@ from quad_nav.cli.study_options import (
 )
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
-from quad_nav.tuning.journal import Journal
+from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.sweep import (
     Point,
     SweepOptions,
@@ -120,7 +120,7 @@ def sweep(
                 "at a time",
                 err=True,
             )
-        rows = _run(setup, crew, Journal(journal), quiet)
+        rows = _run(setup, crew, FlightCache(journal), quiet)
     if not quiet:
         to_terminal = any(
             file is not None and file.name == "<stdout>" for file in (json_file, csv_file)
@@ -134,7 +134,7 @@ def sweep(
     sys.exit(EXIT_SUCCESS)
 
 
-def _run(setup: SweepSetup, workers: Workers, journal: Journal, quiet: bool) -> List[SweepRow]:
+def _run(setup: SweepSetup, workers: Workers, journal: FlightCache, quiet: bool) -> List[SweepRow]:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     with FlightsBar(quiet) as bar:

@@ -24,11 +24,11 @@ from quad_nav.cli.study_options import (
     worker_options,
     workers_of,
 )
-from quad_nav.tuning.record import text
 from quad_nav.tuning.search import SearchOptions
+from quad_nav.tuning.study_files import write_result
+from quad_nav.tuning.study_text import text
 from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_setup, run_tune
 from quad_nav.tuning.workers import Workers
-from quad_nav.tuning.write import write_result
 
 
 @click.command()

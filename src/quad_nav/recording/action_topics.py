@@ -8,7 +8,7 @@ from typing import Any, List, Optional
 from quad_nav.geometry import Pose2D
 from quad_nav.navigator.tick import Outcome
 from quad_nav.recording.messages import constant, header, message, planar_pose, pose_stamped, time
-from quad_nav.recording.topic_writer import Topics, stamp_at
+from quad_nav.recording.record_file import TopicWriter, stamp_at
 
 STATUS_PERIOD_S = 0.2
 ENDED_GOALS_STAY_S = 5.0
@@ -40,7 +40,7 @@ class _Goal:
 class ActionTopics:
     """Goals in, status, feedback and results out, for robot ``robot``."""
 
-    def __init__(self, robot: int, topics: Topics):
+    def __init__(self, robot: int, topics: TopicWriter):
         self._topics = topics
         self._robot = robot
         self._node = f"/move_base{robot}"

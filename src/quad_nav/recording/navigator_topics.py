@@ -16,8 +16,8 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick
 from quad_nav.recording import messages
 from quad_nav.recording.action_topics import ActionTopics
-from quad_nav.recording.path_messages import plan_bytes
-from quad_nav.recording.topic_writer import Topics, stamp_at
+from quad_nav.recording.messages import plan_bytes
+from quad_nav.recording.record_file import TopicWriter, stamp_at
 from quad_nav.topics.costmap_updates import CostmapNews
 
 _NO_PLAN = np.zeros((0, 3))
@@ -26,7 +26,7 @@ _NO_PLAN = np.zeros((0, 3))
 class NavigatorTopics:
     """Writes what ticks say, as the node ``move_base`` publishes it."""
 
-    def __init__(self, robot: int, navigator: Navigator, topics: Topics):
+    def __init__(self, robot: int, navigator: Navigator, topics: TopicWriter):
         self.action = ActionTopics(robot, topics)
         self._topics = topics
         self._navigator = navigator

@@ -13,11 +13,12 @@ from typing import Any, Dict, Optional, Protocol
 
 import lz4.frame
 from mcap.writer import CompressionType
-from mcap.writer import Writer as McapWriter
-from rosbags.rosbag1 import Writer
+from mcap.writer import Writer as McapLibraryWriter
+from rosbags.rosbag1 import Writer as BagLibraryWriter
 
 from quad_nav.errors import InputError
-from quad_nav.recording.messages import definition, long_name
+from quad_nav.recording.messages import definition, encode, long_name
+from quad_nav.topics.flight_info import START_S
 
 SUFFIXES = (".bag", ".mcap")
 
@@ -54,7 +55,7 @@ def create(path: Path) -> RecordFile:
         path.parent.mkdir(parents=True, exist_ok=True)
         with contextlib.suppress(FileNotFoundError):
             active.unlink()
-        return BagFile(path, active) if path.suffix == ".bag" else McapFile(path, active)
+        return BagWriter(path, active) if path.suffix == ".bag" else McapWriter(path, active)
     except OSError as error:
         raise InputError(
             [
@@ -64,13 +65,13 @@ def create(path: Path) -> RecordFile:
         ) from error
 
 
-class BagFile:
+class BagWriter:
     """A ROS 1 bag, in LZ4 chunks of 1 MiB."""
 
     def __init__(self, path: Path, active: Path):
         self._path, self._active = path, active
-        self._writer = Writer(active)
-        self._writer.set_compression(Writer.CompressionFormat.LZ4)
+        self._writer = BagLibraryWriter(active)
+        self._writer.set_compression(BagLibraryWriter.CompressionFormat.LZ4)
         self._writer.compressor = _compressed
         self._error: Optional[OSError] = None
         self._writer.open()
@@ -128,13 +129,13 @@ def _compressed(data: bytes) -> bytes:
     return packed
 
 
-class McapFile:
+class McapWriter:
     """MCAP with ROS 1 messages; the format has no place for what is latched."""
 
     def __init__(self, path: Path, active: Path):
         self._path, self._active = path, active
         self._file = active.open("wb")
-        self._writer = McapWriter(self._file, compression=CompressionType.LZ4)
+        self._writer = McapLibraryWriter(self._file, compression=CompressionType.LZ4)
         self._writer.start("ros1")
         self._schemas: Dict[str, int] = {}
 
@@ -152,3 +153,48 @@ class McapFile:
         self._writer.finish()
         self._file.close()
         os.replace(self._active, self._path)
+
+
+START_NS = round(START_S * 1e9)
+
+
+def stamp_at(time_s: float) -> int:
+    """Nanoseconds on the recording's clock at a time of the flight."""
+    return round(time_s * 1e9) + START_NS
+
+
+class TopicWriter:
+    """Writes messages until the file takes no more; ``problem`` then says why."""
+
+    def __init__(self, file: RecordFile):
+        self._file = file
+        self._handles: Dict[str, Any] = {}
+        self.problem = ""
+
+    def write(self, topic: str, stamp: int, content: Any, node: str, latched: bool = False) -> None:
+        """``content`` is a message of ``record_messages``."""
+        self.write_bytes(
+            topic, content.__msgtype__.replace("/msg/", "/"), stamp, encode(content), node, latched
+        )
+
+    def write_bytes(
+        self, topic: str, kind: str, stamp: int, data: bytes, node: str, latched: bool = False
+    ) -> None:
+        if self.problem:
+            return
+        try:
+            if topic not in self._handles:
+                self._handles[topic] = self._file.add_topic(topic, kind, latched, node)
+            self._file.write(self._handles[topic], stamp, data)
+        except OSError as error:
+            self.problem = _said(error)
+
+    def close(self) -> None:
+        try:
+            self._file.close()
+        except OSError as error:
+            self.problem = self.problem or _said(error)
+
+
+def _said(error: OSError) -> str:
+    return f"the recording cannot be written: {error.strerror or error}"

@@ -15,10 +15,9 @@ from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight import Flight
 from quad_nav.offline.observer import FlightObserver
 from quad_nav.recording import messages
+from quad_nav.recording.messages import path_bytes, pose_bytes
 from quad_nav.recording.navigator_topics import NavigatorTopics
-from quad_nav.recording.path_messages import path_bytes, pose_bytes
-from quad_nav.recording.record_file import create
-from quad_nav.recording.topic_writer import START_NS, Topics, stamp_at
+from quad_nav.recording.record_file import START_NS, TopicWriter, create, stamp_at
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.topics import flight_info
@@ -44,7 +43,7 @@ class Recorder(FlightObserver):
     looks_inside = True
 
     def __init__(self, path: Path, title: str = "flight"):
-        self._topics = Topics(create(path))
+        self._topics = TopicWriter(create(path))
         self._title = title
         self._navigators: List[NavigatorTopics] = []
         self._paths: List[FlownPath[bytes]] = []

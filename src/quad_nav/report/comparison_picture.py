@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from quad_nav.report.figures import FlightFigures
+from quad_nav.report.flight_metrics import FlightMetrics
 from quad_nav.report.style import ALARM, colour, new_figure, robot_legend
 
-Panel = Tuple[str, Callable[[FlightFigures], Optional[float]]]
+Panel = Tuple[str, Callable[[FlightMetrics], Optional[float]]]
 PANELS: Tuple[Panel, ...] = (
     ("Mission time, s", lambda one: one.mission_s),
     ("Path / straight", lambda one: one.path_ratio),
@@ -25,15 +25,15 @@ _BOX_FROM = 5  # flights; of fewer a box says less than the dots
 _COUNTS = ("Recoveries", "Contacts")
 
 
-def grouped(flights: Sequence[FlightFigures]) -> Dict[str, List[FlightFigures]]:
+def grouped(flights: Sequence[FlightMetrics]) -> Dict[str, List[FlightMetrics]]:
     """Flights by the name of their configuration, in the order in which these come first."""
-    groups: Dict[str, List[FlightFigures]] = {}
+    groups: Dict[str, List[FlightMetrics]] = {}
     for one in flights:
         groups.setdefault(one.config_name or "unknown", []).append(one)
     return groups
 
 
-def comparison_picture(flights: Sequence[FlightFigures]) -> Figure:
+def comparison_picture(flights: Sequence[FlightMetrics]) -> Figure:
     """Each flight is a dot, those that failed a red cross."""
     groups = grouped(flights)
     figure = new_figure(5.2)
@@ -65,7 +65,7 @@ def comparison_picture(flights: Sequence[FlightFigures]) -> Figure:
 
 
 def _draw_group(
-    axes: Axes, column: int, values: Sequence[Tuple[FlightFigures, Optional[float]]]
+    axes: Axes, column: int, values: Sequence[Tuple[FlightMetrics, Optional[float]]]
 ) -> None:
     known = [(one, value) for one, value in values if value is not None]
     if len(known) >= _BOX_FROM:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, List, Optional, Sequence, Tuple
@@ -17,7 +18,7 @@ from quad_nav.report.cycle_picture import cycle_picture, has_walls
 from quad_nav.report.distance_picture import distance_picture
 from quad_nav.report.encounter_picture import encounter_picture
 from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, gap_text
-from quad_nav.report.figures import FlightFigures, figures
+from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
 from quad_nav.report.measures import Tracks, tracks
 from quad_nav.report.motion_picture import motion_picture
 from quad_nav.report.parameter_table import parameter_rows
@@ -64,7 +65,7 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
     """The report of one flight; ``wall_time_s`` is how long it took, where that is known."""
     with style.styled():
         among = tracks(trace)
-        flight = figures(trace, among)
+        flight = flight_metrics(trace, among)
         met = encounters(trace, among)
         shown = met[:MOST_STRIPS]
         sections = [
@@ -85,7 +86,7 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
     )
 
 
-def comparison_page(flights: Sequence[FlightFigures]) -> Page:
+def comparison_page(flights: Sequence[FlightMetrics]) -> Page:
     """The report of several flights."""
     with style.styled():
         compared = picture("comparison", "Figures of each flight", comparison_picture(flights))
@@ -146,7 +147,7 @@ def _note(one: Encounter) -> str:
 
 
 def _curves(
-    trace: FlightTrace, among: Tracks, flight: FlightFigures, shown: Sequence[Encounter]
+    trace: FlightTrace, among: Tracks, flight: FlightMetrics, shown: Sequence[Encounter]
 ) -> List[Section]:
     rows = _most_endangered(flight)
     left_out = len(trace.robots) - len(rows)
@@ -199,7 +200,7 @@ def _curves(
     ]
 
 
-def _most_endangered(flight: FlightFigures) -> List[int]:
+def _most_endangered(flight: FlightMetrics) -> List[int]:
     """Numbers of the quadcopters that get a row each, in order."""
 
     def least_gap_m(number: int) -> float:
@@ -237,3 +238,35 @@ def _figure_filter() -> Callable[[Optional[float], int], str]:
         return "–" if value is None else f"{round(value, decimals) + 0.0:.{decimals}f}"
 
     return figure
+
+
+def write_report(
+    trace: FlightTrace,
+    path: Path,
+    pictures: Optional[Path] = None,
+    wall_time_s: Optional[float] = None,
+) -> None:
+    """The report of one flight, with its folders.
+
+    ``pictures``: the folder that gets every picture as a PNG file, None for none.
+    """
+    write_page(flight_page(trace, wall_time_s), path, pictures)
+
+
+def write_comparison(
+    flights: Sequence[FlightMetrics], path: Path, pictures: Optional[Path] = None
+) -> None:
+    """The report of several flights, written as ``write_report`` does."""
+    write_page(comparison_page(flights), path, pictures)
+
+
+def write_page(page: Page, path: Path, pictures: Optional[Path] = None) -> None:
+    """The HTML, and its pictures as PNG files for a folder; nobody sees half of the HTML."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    partial.write_text(page.html, encoding="utf-8")
+    partial.replace(path)
+    if pictures is not None:
+        pictures.mkdir(parents=True, exist_ok=True)
+        for picture in page.pictures:
+            (pictures / f"{picture.name}.png").write_bytes(picture.png)

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, List, Sequence, Tuple
 
-from quad_nav.barn.figures import Figures, figures
 from quad_nav.barn.protocol import SAMPLE_STEP, TIME_LIMIT_S, Outcome, Run, metric
 from quad_nav.barn.setup import BarnOptions, Contestant, flight_setup, read_barn_setup
+from quad_nav.barn.statistics import BarnStatistics, barn_statistics
 from quad_nav.barn.worlds import BarnWorld
 from quad_nav.errors import InputError
 from quad_nav.scenario.flight_setup import FlightSetup, config_folder
@@ -96,9 +96,9 @@ class BarnCourse:
             "body_radius_m": given.body_radius_m,
         }
 
-    def figures(self, cases: Sequence[Case], flights: Sequence[FlightResult]) -> Figures:
+    def statistics(self, cases: Sequence[Case], flights: Sequence[FlightResult]) -> BarnStatistics:
         """The benchmark's own figures of flights."""
-        return figures(
+        return barn_statistics(
             [
                 run_of(self._worlds[case.course], case, flight)
                 for case, flight in zip(cases, flights)

@@ -7,8 +7,8 @@ from typing import Any, Dict, Iterable, List, Mapping, Optional, Protocol, Seque
 from quad_nav.errors import InputError
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import Case
+from quad_nav.tuning.flight_cache import FlightCache, Key, key_text
 from quad_nav.tuning.flight_result import FlightResult, FlightTask
-from quad_nav.tuning.journal import Journal, Key, key_text
 from quad_nav.tuning.space import Assignments, SearchSpace, Values
 from quad_nav.tuning.workers import Workers, fly_all
 
@@ -76,7 +76,7 @@ class Evaluation:
         course: Course,
         space: SearchSpace,
         workers: Workers,
-        journal: Journal,
+        journal: FlightCache,
         watcher: Watcher,
         context: Optional[Mapping[str, Any]] = None,
     ):
@@ -84,37 +84,37 @@ class Evaluation:
         self.space = space
         self.watcher = watcher
         self._workers = workers
-        self._journal = journal
+        self._cache = journal
         self._context = {} if context is None else dict(context)
         self._counted: Set[Key] = set()
 
     def of(self, course: Course, context: Mapping[str, Any]) -> Evaluation:
         """The same workers and journal for another course."""
-        return Evaluation(course, self.space, self._workers, self._journal, self.watcher, context)
+        return Evaluation(course, self.space, self._workers, self._cache, self.watcher, context)
 
     def fly(self, wanted: Iterable[Tuple[Values, Case]]) -> None:
         """Afterwards all of them are in the journal."""
         missing: Dict[Key, Tuple[Values, Case]] = {}
         for values, case in wanted:
             key = self._key(values, case)
-            if key not in self._journal:
+            if key not in self._cache:
                 missing[key] = (values, case)
             elif key not in self._counted:
                 self._counted.add(key)
-                self.watcher.flown(self._journal[key], True)
+                self.watcher.flown(self._cache[key], True)
         keys = list(missing)
         tasks = [
             (number, task_of(self.course, case, self.space.assignments(values)))
             for number, (values, case) in enumerate(missing.values())
         ]
         for number, flight in fly_all(self._workers, tasks):
-            self._journal.add(keys[number], flight)
+            self._cache.add(keys[number], flight)
             self._counted.add(keys[number])
             self.watcher.flown(flight, False)
 
     def flights(self, values: Values, cases: Sequence[Case]) -> List[FlightResult]:
         """Results of flights that were flown, in the cases' order."""
-        return [self._journal[self._key(values, case)] for case in cases]
+        return [self._cache[self._key(values, case)] for case in cases]
 
     def flown(
         self, candidates: Sequence[Values], cases: Sequence[Case]

@@ -12,9 +12,9 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Evaluation
-from quad_nav.tuning.figures import Figures, figures
 from quad_nav.tuning.score import mean_cost
 from quad_nav.tuning.space import Values
+from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
 
 BASE: Values = {}
 TRIFLE = 0.02
@@ -31,8 +31,8 @@ class Gain:
     path: str
     value: Any
     base: Any
-    with_it: Figures
-    without_it: Figures
+    with_it: FlightStatistics
+    without_it: FlightStatistics
 
     @property
     def cost(self) -> float:
@@ -127,9 +127,9 @@ def _gains(
     """Of every change, the largest first."""
     evaluation.watcher.expect(len(values) * len(cases))
     without = evaluation.flown([_without(values, [path]) for path in values], cases)
-    with_it = figures(evaluation.flights(values, cases))
+    with_it = flight_statistics(evaluation.flights(values, cases))
     gains = [
-        Gain(path, value, base.get(path), with_it, figures(flights))
+        Gain(path, value, base.get(path), with_it, flight_statistics(flights))
         for (path, value), flights in zip(values.items(), without)
     ]
     return tuple(sorted(gains, key=lambda gain: -gain.cost))

@@ -10,10 +10,10 @@ from optuna.trial import FrozenTrial, TrialState
 
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Evaluation
-from quad_nav.tuning.figures import figures
 from quad_nav.tuning.proposals import distributions, is_hopeless, propose
 from quad_nav.tuning.score import mean_cost
 from quad_nav.tuning.space import Values
+from quad_nav.tuning.statistics import flight_statistics
 from quad_nav.tuning.study import TuneStudy
 
 FIRST_ROUND = 2
@@ -101,7 +101,7 @@ def _trial(
     evaluation: Evaluation, values: Values, means: Mapping[int, float], cases: Sequence[Case]
 ) -> FrozenTrial:
     flown = max(means)
-    attributes = {FIGURES: asdict(figures(evaluation.flights(values, cases[:flown])))}
+    attributes = {FIGURES: asdict(flight_statistics(evaluation.flights(values, cases[:flown])))}
     return optuna.create_trial(
         state=TrialState.COMPLETE if flown == len(cases) else TrialState.PRUNED,
         value=means[flown],

@@ -21,7 +21,7 @@ from optuna.trial import FrozenTrial
 
 from quad_nav.errors import InputError
 from quad_nav.tuning.courses import identity_text
-from quad_nav.tuning.journal import Journal
+from quad_nav.tuning.flight_cache import FlightCache
 
 FILE = "study.db"
 _LOCK = ".lock"
@@ -32,7 +32,7 @@ _IDENTITY = "identity"
 class TuneStudy:
     """Trials and flights. Open it with ``open_study``."""
 
-    def __init__(self, study: optuna.Study, journal: Journal):
+    def __init__(self, study: optuna.Study, journal: FlightCache):
         self._study = study
         self.journal = journal
 
@@ -85,7 +85,7 @@ def _read(folder: Path, identity: Mapping[str, Any]) -> TuneStudy:
         study = optuna.create_study(
             storage=f"sqlite:///{path}", study_name=_NAME, load_if_exists=True
         )
-        journal = Journal(path)
+        journal = FlightCache(path)
     except (sqlite3.Error, sqlalchemy.exc.SQLAlchemyError, RuntimeError) as error:
         raise InputError([f"{path}: cannot be read as a study: {error}"]) from error
     # The identity as it comes back from JSON: tuples are lists there.

@@ -16,14 +16,13 @@ from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
 from quad_nav.files.user_files import read_text
 from quad_nav.scenario.flight_setup import config_folder
-from quad_nav.tuning.course_reading import CourseOptions, read_course
 from quad_nav.tuning.courses import LIDAR, Case, identity_text
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher, task_of
-from quad_nav.tuning.figures import Figures, figures
+from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.flight_result import FlightResult
-from quad_nav.tuning.journal import Journal
-from quad_nav.tuning.parameter_check import parameter_faults
 from quad_nav.tuning.space import Dimension, SearchSpace
+from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
+from quad_nav.tuning.study_input import CourseOptions, parameter_faults, read_course
 from quad_nav.tuning.workers import Workers
 from quad_nav.versions import versions
 
@@ -76,8 +75,8 @@ class SweepRow:
     flights: Tuple[FlightResult, ...]
 
     @property
-    def figures(self) -> Figures:
-        return figures(self.flights)
+    def statistics(self) -> FlightStatistics:
+        return flight_statistics(self.flights)
 
 
 def grid(axes: Sequence[Tuple[str, Sequence[Any]]]) -> Tuple[Point, ...]:
@@ -151,7 +150,7 @@ def space_of(points: Sequence[Point]) -> SearchSpace:
 
 
 def run_sweep(
-    setup: SweepSetup, workers: Workers, journal: Journal, watcher: Watcher
+    setup: SweepSetup, workers: Workers, journal: FlightCache, watcher: Watcher
 ) -> List[SweepRow]:
     """Flies all points, each flight of all before the next one of any."""
     evaluation = Evaluation(

@@ -8,8 +8,8 @@ from typing import Any, Dict, List, Optional, Sequence, TextIO
 
 import tabulate
 
-from quad_nav.tuning.figures import Figures
-from quad_nav.tuning.record import value_words
+from quad_nav.tuning.statistics import FlightStatistics
+from quad_nav.tuning.study_text import value_words
 from quad_nav.tuning.sweep import SweepRow, SweepSetup
 from quad_nav.versions import versions
 
@@ -28,7 +28,7 @@ def table(rows: Sequence[SweepRow]) -> str:
     """What the terminal shows, one line for each point."""
     paths = list(rows[0].point)
     shown = [
-        [*(value_words(row.point[path]) for path in paths), *_cells(row.figures)] for row in rows
+        [*(value_words(row.point[path]) for path in paths), *_cells(row.statistics)] for row in rows
     ]
     header = [path.replace("/", "/\n") for path in paths]
     return tabulate.tabulate(
@@ -49,7 +49,7 @@ def to_json(setup: SweepSetup, rows: Sequence[SweepRow]) -> Dict[str, Any]:
         "rows": [
             {
                 "point": row.point,
-                "figures": asdict(row.figures),
+                "figures": asdict(row.statistics),
                 "flights": [
                     {"mission": case.name, "seed": case.seed, **asdict(flight)}
                     for case, flight in zip(setup.cases, row.flights)
@@ -62,15 +62,15 @@ def to_json(setup: SweepSetup, rows: Sequence[SweepRow]) -> Dict[str, Any]:
 
 def write_csv(rows: Sequence[SweepRow], file: TextIO) -> None:
     """A line for each point."""
-    names = [field.name for field in fields(Figures)]
+    names = [field.name for field in fields(FlightStatistics)]
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow([*rows[0].point, *names])
     for row in rows:
-        figures = asdict(row.figures)
+        figures = asdict(row.statistics)
         writer.writerow([*map(value_words, row.point.values()), *(figures[name] for name in names)])
 
 
-def _cells(one: Figures) -> List[str]:
+def _cells(one: FlightStatistics) -> List[str]:
     return [
         str(one.flights),
         _percent(one.completed, one),
@@ -82,7 +82,7 @@ def _cells(one: Figures) -> List[str]:
     ]
 
 
-def _percent(count: int, one: Figures) -> str:
+def _percent(count: int, one: FlightStatistics) -> str:
     return f"{100 * count / one.flights:.0f}"
 
 

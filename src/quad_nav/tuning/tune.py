@@ -15,16 +15,15 @@ from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.scenario.flight_setup import config_folder
-from quad_nav.tuning.course_reading import CourseOptions, read_course, with_config
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
 from quad_nav.tuning.flight_result import FlightResult
-from quad_nav.tuning.parameter_check import parameter_faults
 from quad_nav.tuning.parameter_files import base_configuration, base_value
 from quad_nav.tuning.refinement import BASE, Refined, refine
 from quad_nav.tuning.search import SearchOptions, best_first, search
 from quad_nav.tuning.space import Assignments, SearchSpace, load_space
 from quad_nav.tuning.study import TuneStudy, open_study
+from quad_nav.tuning.study_input import CourseOptions, parameter_faults, read_course, with_config
 from quad_nav.tuning.workers import Workers
 from quad_nav.versions import versions
 

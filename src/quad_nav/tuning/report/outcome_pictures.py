@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure, robot_legend
-from quad_nav.tuning.figures import Figures
 from quad_nav.tuning.flight_result import FlightResult
+from quad_nav.tuning.statistics import FlightStatistics
 
 Place = Tuple[float, float]
 """Mean time in seconds, smallest gap in metres."""
 
 
-def place(one: Figures) -> Optional[Place]:
+def place(one: FlightStatistics) -> Optional[Place]:
     """None where nothing was flown to its end, or nothing was near."""
     if one.mean_time_s is None or one.least_gap_m is None:
         return None
@@ -33,7 +33,9 @@ def front(places: Sequence[Place]) -> List[Place]:
     return kept
 
 
-def pareto_picture(candidates: Sequence[Figures], base: Figures, tuned: Figures) -> Figure:
+def pareto_picture(
+    candidates: Sequence[FlightStatistics], base: FlightStatistics, tuned: FlightStatistics
+) -> Figure:
     """Candidates that reached every goal and touched nothing; others are left out."""
     figure = new_figure(3.8)
     axes = figure.subplots()

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Iterator, Optional, Sequence
 
 from quad_nav.report import style
-from quad_nav.report.page import Page, Section, picture, render
-from quad_nav.report.write import write_page
-from quad_nav.tuning.record import value_words
+from quad_nav.report.page import Page, Section, picture, render, write_page
 from quad_nav.tuning.report.sweep_pictures import sweep_picture
+from quad_nav.tuning.study_text import value_words
 from quad_nav.tuning.sweep import SweepRow, SweepSetup
 from quad_nav.versions import versions
 
@@ -24,7 +23,7 @@ def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
             "Side by side",
             f"{setup.flights} flights at each point, the same for all. "
             "Gaps are between hulls; times are of missions that reached every goal.",
-            (picture("sweep", "Figures over the values", sweep_picture(rows)),),
+            (picture("sweep", "Statistics over the values", sweep_picture(rows)),),
         )
     return render(
         "sweep.html.jinja",

@@ -1,4 +1,4 @@
-"""Figures over the values of one parameter, of two, or over a list of points."""
+"""Statistics over the values of one parameter, of two, or over a list of points."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure
-from quad_nav.tuning.figures import Figures
-from quad_nav.tuning.record import value_words
+from quad_nav.tuning.statistics import FlightStatistics
+from quad_nav.tuning.study_text import value_words
 from quad_nav.tuning.sweep import SweepRow
 
 
@@ -20,7 +20,7 @@ class Measure(NamedTuple):
     title: str
     more_is_better: bool
     decimals: int
-    value: Callable[[Figures], Optional[float]]
+    value: Callable[[FlightStatistics], Optional[float]]
 
 
 MEASURES: Tuple[Measure, ...] = (
@@ -58,7 +58,7 @@ def sweep_picture(rows: Sequence[SweepRow]) -> Figure:
 
 def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measure) -> None:
     places, labels = _places([row.point[path] for row in rows])
-    found = [measure.value(row.figures) for row in rows]
+    found = [measure.value(row.statistics) for row in rows]
     axes.plot(places, [np.nan if one is None else one for one in found], "o-", color=colour(0))
     if measure.title.startswith("Mean"):  # and each flight
         for place, row in zip(places, rows):
@@ -83,7 +83,7 @@ def _draw_map(
     cells = np.full((len(values[0]), len(values[1])), np.nan)
     first, second = list(rows[0].point)
     for row in rows:
-        found = measure.value(row.figures)
+        found = measure.value(row.statistics)
         place = (values[0].index(row.point[first]), values[1].index(row.point[second]))
         cells[place] = np.nan if found is None else found
     limits = (0.0, 100.0) if measure.title.endswith("%") else (None, None)
@@ -123,7 +123,7 @@ def _ink(rgba: np.ndarray) -> str:
 
 
 def _draw_list(axes: Axes, rows: Sequence[SweepRow], measure: Measure) -> None:
-    found = [measure.value(row.figures) for row in rows]
+    found = [measure.value(row.statistics) for row in rows]
     is_alarming = measure.title.startswith("Flights with")
     axes.barh(
         range(len(rows)),

@@ -8,14 +8,12 @@ from typing import List
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.encounters import encounters
-from quad_nav.report.figures import figures
+from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.measures import tracks
 from quad_nav.report.page import MOST_STRIPS, Page, Section, picture, render
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.timeline_picture import timeline_picture
-from quad_nav.tuning import record
-from quad_nav.tuning.figures import Figures
-from quad_nav.tuning.figures import figures as figures_of
+from quad_nav.tuning import study_text
 from quad_nav.tuning.report.outcome_pictures import held_out_picture, pareto_picture
 from quad_nav.tuning.report.search_pictures import (
     history_picture,
@@ -25,6 +23,7 @@ from quad_nav.tuning.report.search_pictures import (
 )
 from quad_nav.tuning.score import TERMS
 from quad_nav.tuning.search import FIGURES, is_complete
+from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
 from quad_nav.tuning.tune import TuneResult, all_versions
 
 _FOLDER = Path(__file__).parent
@@ -40,19 +39,19 @@ def tune_page(result: TuneResult, before: FlightTrace, after: FlightTrace, comma
         _FOLDER,
         result=result,
         command=command,
-        rows=record.held_out_rows(result),
-        barn=record.barn_rows(result),
+        rows=study_text.held_out_rows(result),
+        barn=study_text.barn_rows(result),
         terms=TERMS,
         gains=[
             (
                 gain,
-                record.value_words(gain.base),
-                record.value_words(gain.value),
-                record.gain_words(gain),
+                study_text.value_words(gain.base),
+                study_text.value_words(gain.value),
+                study_text.gain_words(gain),
             )
             for gain in result.refined.gains
         ],
-        flights=[("base", figures(before)), ("tuned", figures(after))],
+        flights=[("base", flight_metrics(before)), ("tuned", flight_metrics(after))],
         versions=all_versions(),
     )
 
@@ -79,7 +78,7 @@ def _flights(before: FlightTrace, after: FlightTrace) -> Section:
     for name, trace in (("before", before), ("after", after)):
         among = tracks(trace)
         shown = encounters(trace, among)[:MOST_STRIPS]
-        found = figures(trace, among)
+        found = flight_metrics(trace, among)
         words = f"{name.capitalize()}: {found.mission_s:.1f} s"
         notes += [words, ""]
         pictures += [
@@ -98,7 +97,7 @@ def _flights(before: FlightTrace, after: FlightTrace) -> Section:
 
 def _search(result: TuneResult) -> List[Section]:
     trials, space = result.trials, result.setup.space
-    reference = figures_of(result.reference)
+    reference = flight_statistics(result.reference)
     found = importances(trials, space)
     sections = [
         Section(
@@ -153,9 +152,9 @@ def _search(result: TuneResult) -> List[Section]:
     return sections
 
 
-def _pareto(result: TuneResult, reference: Figures) -> Section:
+def _pareto(result: TuneResult, reference: FlightStatistics) -> Section:
     complete = [trial for trial in result.trials if is_complete(trial)]
-    candidates = [Figures(**trial.user_attrs[FIGURES]) for trial in complete]
+    candidates = [FlightStatistics(**trial.user_attrs[FIGURES]) for trial in complete]
     gains = result.refined.gains
     tuned = gains[0].with_it if gains else reference
     return Section(

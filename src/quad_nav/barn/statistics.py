@@ -14,7 +14,7 @@ _Z = 1.959963984540054
 
 
 @dataclass(frozen=True)
-class Figures:
+class BarnStatistics:
     """Counts of outcomes, and means. ``gave_up`` of the time-outs ended before their time.
 
     ``mean_time_s``: of the successful runs of each world, and of that over the worlds, as the
@@ -36,7 +36,7 @@ class Figures:
         return wilson_interval(self.successes, self.runs)
 
 
-def figures(runs: Sequence[Run]) -> Figures:
+def barn_statistics(runs: Sequence[Run]) -> BarnStatistics:
     """Raises ValueError without any run."""
     if not runs:
         raise ValueError("no runs, no figures")
@@ -46,7 +46,7 @@ def figures(runs: Sequence[Run]) -> Figures:
         if run.outcome is Outcome.SUCCESS:
             times_s[run.world].append(run.time_s)
     means_s = [sum(times) / len(times) for _, times in sorted(times_s.items())]
-    return Figures(
+    return BarnStatistics(
         len({run.world for run in runs}),
         len(runs),
         counts[Outcome.SUCCESS],

@@ -10,8 +10,8 @@ from quad_nav.offline.first_contact import FirstContact
 from quad_nav.offline.run import fly
 from quad_nav.recording.trace import FlightTrace, TraceObserver
 from quad_nav.tuning.parameter_files import write_parameters
-from quad_nav.tuning.record import changes, markdown, to_json
 from quad_nav.tuning.space import Assignments
+from quad_nav.tuning.study_text import changes, markdown, to_json
 from quad_nav.tuning.tune import TuneResult
 
 PARAMETERS = "config"
@@ -35,7 +35,7 @@ def write_result(result: TuneResult, command: str) -> Iterator[Path]:
 
 def _write_report(result: TuneResult, command: str) -> Path:
     """Imported here: a study can be run without waiting for what draws."""
-    from quad_nav.report.write import write_page
+    from quad_nav.report.page import write_page
     from quad_nav.tuning.report.tune_page import tune_page
 
     path = result.setup.options.output / REPORT

@@ -23,7 +23,7 @@ _TABLE = (
 )
 
 
-class Journal:
+class FlightCache:
     """``path`` None keeps flights for as long as the object lives."""
 
     def __init__(self, path: Optional[Path] = None):

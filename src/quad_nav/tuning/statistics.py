@@ -10,7 +10,7 @@ from quad_nav.tuning.score import mean_cost
 
 
 @dataclass(frozen=True)
-class Figures:
+class FlightStatistics:
     """``mean_time_s`` is of the flights that reached every goal, None without any.
 
     ``touched``: flights with a contact; ``least_gap_m``: the smallest of all, between hulls.
@@ -29,12 +29,12 @@ class Figures:
     cost: float
 
 
-def figures(flights: Sequence[FlightResult]) -> Figures:
+def flight_statistics(flights: Sequence[FlightResult]) -> FlightStatistics:
     """Raises ValueError without any flight."""
     if not flights:
         raise ValueError("no flights, no figures")
     gaps = [flight.gap_m for flight in flights if flight.gap_m is not None]
-    return Figures(
+    return FlightStatistics(
         len(flights),
         sum(flight.completed for flight in flights),
         sum(flight.succeeded for flight in flights),

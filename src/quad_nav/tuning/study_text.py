@@ -7,13 +7,13 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import tabulate
 
-from quad_nav.barn.figures import Figures as BarnFigures
+from quad_nav.barn.statistics import BarnStatistics
 from quad_nav.tuning.barn_course import BarnCourse
-from quad_nav.tuning.figures import Figures, figures
 from quad_nav.tuning.parameter_files import Change, base_configuration, base_value
 from quad_nav.tuning.refinement import Gain
 from quad_nav.tuning.score import TERMS
 from quad_nav.tuning.space import costmap_paths
+from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
 from quad_nav.tuning.tune import TuneResult, all_versions
 
 _HEADER = [
@@ -49,7 +49,7 @@ def text(result: TuneResult) -> str:
 
 
 def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
-    """Figures of flights that the search never saw."""
+    """Return the statistics of flights that the search never saw."""
     tables = [
         tabulate.tabulate(
             [figure_row(name, one) for name, one in held_out_rows(result)],
@@ -74,26 +74,26 @@ def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
     return "\n\n".join(tables)
 
 
-def held_out_rows(result: TuneResult) -> Tuple[Tuple[str, Figures], ...]:
-    """Figures of the base, of what it is compared with, and of the best."""
+def held_out_rows(result: TuneResult) -> Tuple[Tuple[str, FlightStatistics], ...]:
+    """Return the statistics of the base, of what it is compared with, and of the best."""
     return tuple(
-        (name, figures(flights))
+        (name, flight_statistics(flights))
         for name, flights in result.held_out.sets(result.setup.course.config)
     )
 
 
-def barn_rows(result: TuneResult) -> Tuple[Tuple[str, BarnFigures], ...]:
+def barn_rows(result: TuneResult) -> Tuple[Tuple[str, BarnStatistics], ...]:
     """The same flights as the benchmark counts them; none of other courses."""
     course, held_out = result.setup.course, result.held_out
     if not isinstance(course, BarnCourse):
         return ()
     return tuple(
-        (name, course.figures(held_out.cases, flights))
+        (name, course.statistics(held_out.cases, flights))
         for name, flights in held_out.sets(course.config)
     )
 
 
-def barn_row(name: str, one: BarnFigures) -> List[str]:
+def barn_row(name: str, one: BarnStatistics) -> List[str]:
     """Cells of the benchmark's table."""
     low, high = one.success_interval
     rates = [
@@ -110,7 +110,7 @@ def barn_row(name: str, one: BarnFigures) -> List[str]:
     ]
 
 
-def figure_row(name: str, one: Figures) -> List[str]:
+def figure_row(name: str, one: FlightStatistics) -> List[str]:
     """Cells of the table of figures."""
     return [
         name,
@@ -197,7 +197,7 @@ def value_words(value: Any) -> str:
 
 
 def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
-    """Figures, parameters and what they depend on."""
+    """Statistics, parameters and what they depend on."""
     setup, held_out = result.setup, result.held_out
     found = {
         "command": command,

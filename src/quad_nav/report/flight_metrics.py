@@ -25,7 +25,7 @@ from quad_nav.report.measures import (
 
 
 @dataclass(frozen=True)
-class RobotFigures:
+class RobotMetrics:
     """One quadcopter's; lengths and gaps are None where they could not be measured."""
 
     name: str
@@ -43,13 +43,13 @@ class RobotFigures:
 
 
 @dataclass(frozen=True)
-class FlightFigures:
+class FlightMetrics:
     """A whole flight's. ``mission_s`` runs from the first goal's sending to the last one's end."""
 
     title: str
     config_name: str
     seed: Optional[int]
-    robots: Tuple[RobotFigures, ...]
+    robots: Tuple[RobotMetrics, ...]
     mission_s: float
     contacts: int
     reason: str
@@ -98,7 +98,7 @@ class FlightFigures:
         return sum(robot.recoveries for robot in self.robots)
 
 
-def figures(trace: FlightTrace, among: Optional[Tracks] = None) -> FlightFigures:
+def flight_metrics(trace: FlightTrace, among: Optional[Tracks] = None) -> FlightMetrics:
     """The figures of a flight; ``among`` are its tracks where they are there already."""
     among = tracks(trace) if among is None else among
     clearances = clearances_m(among, trace.scene, trace.robot_radius_m)
@@ -109,7 +109,7 @@ def figures(trace: FlightTrace, among: Optional[Tracks] = None) -> FlightFigures
     )
     sent = [goal.sent_s for robot in trace.robots for goal in robot.goals]
     ended = [end_s(goal, robot) for robot in trace.robots for goal in robot.goals]
-    return FlightFigures(
+    return FlightMetrics(
         trace.title,
         trace.config_name,
         trace.seed,
@@ -125,9 +125,9 @@ def _robot(
     trace: FlightTrace,
     clearance_m: Optional[float],
     separation_m: Optional[float],
-) -> RobotFigures:
+) -> RobotMetrics:
     span = flying_span(robot)
-    return RobotFigures(
+    return RobotMetrics(
         robot.name,
         len(robot.goals),
         sum(goal.reached for goal in robot.goals),

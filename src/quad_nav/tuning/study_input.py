@@ -1,17 +1,43 @@
-"""Whether parameters that are to be varied count at all."""
+"""Which course the options ask for, read and checked."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, List, Sequence, Tuple
+from typing import Any, List, Sequence, Tuple, Union
 
 from quad_nav import config
+from quad_nav.barn.setup import BarnOptions
 from quad_nav.config.files import set_value
 from quad_nav.config.notes import CLAMPED, IGNORED, UNKNOWN, UNSUPPORTED, UNUSED
 from quad_nav.errors import InputError
+from quad_nav.tuning.barn_course import BarnCourse
+from quad_nav.tuning.courses import MissionCourse, MissionOptions, check_missions
+from quad_nav.tuning.evaluation import Course
 from quad_nav.tuning.space import costmap_paths
 
 _NO_EFFECT = (UNKNOWN, UNSUPPORTED, IGNORED, UNUSED, CLAMPED)
+
+CourseOptions = Union[MissionOptions, BarnOptions]
+
+
+def read_course(given: CourseOptions) -> Tuple[Course, Sequence[str]]:
+    """What is flown, and the warnings about it.
+
+    Raises:
+        InputError: every fault.
+    """
+    if isinstance(given, BarnOptions):
+        barn = BarnCourse(given)
+        return barn, barn.warnings
+    return MissionCourse(given), check_missions(given)
+
+
+def with_config(given: CourseOptions, name: str) -> CourseOptions:
+    """The same flights with another folder of parameters as it is."""
+    if isinstance(given, BarnOptions):
+        return replace(given, params=name, parameters=())
+    return replace(given, config=name, parameters=())
 
 
 def parameter_faults(parameters: Sequence[Tuple[str, Any]], folder: Path, name: str) -> List[str]:
