@@ -49,9 +49,7 @@ def radii(footprint: Footprint) -> Tuple[float, float]:
 
 def oriented(footprint: Footprint, pose: Pose2D) -> np.ndarray:
     """The footprint of a robot at ``pose``, in the frame of the pose."""
-    x, y = _points(footprint).T
-    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-    return np.column_stack((pose.x_m + (x * cos - y * sin), pose.y_m + (x * sin + y * cos)))
+    return pose.transform_points(_points(footprint))
 
 
 def _points(footprint: Footprint) -> np.ndarray:

@@ -141,7 +141,7 @@ class Critics:
         front_xy = plan_xy.copy()
         ahead_rad = math.atan2(self.goal.y_m - self.pose.y_m, self.goal.x_m - self.pose.x_m)
         forward_m = self.params.forward_point_distance_m
-        front_xy[-1] += forward_m * math.cos(ahead_rad), forward_m * math.sin(ahead_rad)
+        front_xy[-1] += Pose2D(0.0, 0.0, ahead_rad).rotate(forward_m, 0.0)
         nowhere = np.zeros(self.window.costs.shape, dtype=np.bool_)
         cells = cells_on_plan(self.window, plan_xy)
         front_cells = cells_on_plan(self.window, front_xy)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from quad_nav.geometry import Pose2D
@@ -22,7 +20,7 @@ def plan_in_window(
     the plan, float64[n, 3], is near.
     """
     radius_m = max(spec.size_x * spec.resolution_m / 2.0, spec.size_y * spec.resolution_m / 2.0)
-    robot = _inverse_transform(local_from_plan, pose)
+    robot = pose.relative_to(local_from_plan)
     near = _distance2(plan, robot) <= radius_m * radius_m
     if not near.any():
         return np.zeros((0, 3))
@@ -49,20 +47,6 @@ def _distance2(plan: np.ndarray, pose: Pose2D) -> np.ndarray:
 
 
 def _transform(a_from_b: Pose2D, poses: np.ndarray) -> np.ndarray:
-    cos_yaw, sin_yaw = math.cos(a_from_b.yaw_rad), math.sin(a_from_b.yaw_rad)
-    x, y, yaw = poses.T
     return np.column_stack(
-        (
-            cos_yaw * x - sin_yaw * y + a_from_b.x_m,
-            sin_yaw * x + cos_yaw * y + a_from_b.y_m,
-            yaw + a_from_b.yaw_rad,
-        )
-    )
-
-
-def _inverse_transform(a_from_b: Pose2D, pose: Pose2D) -> Pose2D:
-    cos_yaw, sin_yaw = math.cos(a_from_b.yaw_rad), math.sin(a_from_b.yaw_rad)
-    dx, dy = pose.x_m - a_from_b.x_m, pose.y_m - a_from_b.y_m
-    return Pose2D(
-        cos_yaw * dx + sin_yaw * dy, cos_yaw * dy - sin_yaw * dx, pose.yaw_rad - a_from_b.yaw_rad
+        (a_from_b.transform_points(poses[:, :2]), poses[:, 2] + a_from_b.yaw_rad)
     )

@@ -184,11 +184,8 @@ def _distance_ahead(
     rollout: Rollout, params: TrajectoryPlannerParams, end: np.ndarray
 ) -> Optional[int]:
     """Goal distance of the cell that a pose faces, None off the map."""
-    x, y, theta = (float(value) for value in end)
-    return rollout.goal_distance_at(
-        x + params.heading_lookahead_m * math.cos(theta),
-        y + params.heading_lookahead_m * math.sin(theta),
-    )
+    pose = Pose2D(*(float(value) for value in end))
+    return rollout.goal_distance_at(*pose.transform(params.heading_lookahead_m, 0.0))
 
 
 def _escape(
@@ -211,9 +208,8 @@ def _escape(
 
 def _leads_out(rollout: Rollout, params: TrajectoryPlannerParams) -> bool:
     """Whether the robot is free where the escape ends. It may begin in contact."""
-    x, y, yaw = rollout.pose.x_m, rollout.pose.y_m, rollout.pose.yaw_rad
     back_m = math.copysign(params.escape_reset_dist_m, params.escape_vel_mps)
-    return rollout.is_free(Pose2D(x + back_m * math.cos(yaw), y + back_m * math.sin(yaw), yaw))
+    return rollout.is_free(rollout.pose.compose(Pose2D(back_m, 0.0)))
 
 
 def _settle(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
@@ -135,7 +134,7 @@ class StaticLayer(GridLayer):
         corners = np.array(
             [spec.centre_of(x, y) for x in (area.x0, area.xn) for y in (area.y0, area.yn)]
         )
-        return bounds.including(self._global_points(corners))
+        return bounds.including(self.map_from_global.inverse_transform_points(corners))
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
         if self._map is None:
@@ -150,20 +149,14 @@ class StaticLayer(GridLayer):
     def _copy_by_position(self, master: CostGrid, window: Window) -> None:
         """Each master cell takes the map cell under its centre."""
         x, y = _centres(master.spec, window)
-        pose, spec = self.map_from_global, self.grid.spec
-        cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-        column = (x * cos - y * sin + pose.x_m - spec.origin_x_m) / spec.resolution_m
-        row = (x * sin + y * cos + pose.y_m - spec.origin_y_m) / spec.resolution_m
+        spec = self.grid.spec
+        x, y = self.map_from_global.transform(x, y)
+        column = (x - spec.origin_x_m) / spec.resolution_m
+        row = (y - spec.origin_y_m) / spec.resolution_m
         inside = (column >= 0) & (column < spec.size_x) & (row >= 0) & (row < spec.size_y)
         found = self.grid.costs[row[inside].astype(np.intp), column[inside].astype(np.intp)]
         below = master.costs[window.slices]
         below[inside] = np.maximum(found, below[inside]) if self.params.use_maximum else found
-
-    def _global_points(self, points: np.ndarray) -> np.ndarray:
-        pose = self.map_from_global
-        cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
-        x, y = points[:, 0] - pose.x_m, points[:, 1] - pose.y_m
-        return np.column_stack((x * cos + y * sin, y * cos - x * sin))
 
     def _everything(self) -> Window:
         return Window(0, self.grid.spec.size_x, 0, self.grid.spec.size_y)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import math
 from dataclasses import dataclass, field
 from typing import Dict, List, Optional
 
@@ -83,6 +82,6 @@ def local_from_global(located: RobotPoses) -> Pose2D:
         return Pose2D(0.0, 0.0, 0.0)
     assert located.in_local is not None and located.in_global is not None
     a, b = located.in_local, located.in_global
-    yaw = a.yaw_rad - b.yaw_rad
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return Pose2D(a.x_m - (cos * b.x_m - sin * b.y_m), a.y_m - (sin * b.x_m + cos * b.y_m), yaw)
+    turn = Pose2D(0.0, 0.0, a.yaw_rad - b.yaw_rad)
+    x_m, y_m = turn.rotate(b.x_m, b.y_m)
+    return Pose2D(a.x_m - x_m, a.y_m - y_m, turn.yaw_rad)

@@ -86,13 +86,13 @@ def peer_at(
     name: str, pose: Pose2D, velocity: Twist2D, stamp_s: float, intention: Intention = Intention()
 ) -> Peer:
     """A peer from its pose in ``map`` and its odometry's velocity, in its own frame."""
-    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    vx_mps, vy_mps = pose.rotate(velocity.vx_mps, velocity.vy_mps)
     return Peer(
         name,
         pose.x_m,
         pose.y_m,
-        cos * velocity.vx_mps - sin * velocity.vy_mps,
-        sin * velocity.vx_mps + cos * velocity.vy_mps,
+        vx_mps,
+        vy_mps,
         stamp_s,
         intention,
     )

@@ -152,7 +152,7 @@ class Traffic:
             (self._global, positions, areas),
             (
                 self._local,
-                _moved(positions, local_from_global),
+                local_from_global.transform_points(positions),
                 self._solid(now_s, here, local_from_global),
             ),
         ):
@@ -194,7 +194,9 @@ class Traffic:
             radius_m = min(2.0 * self.safety_radius_m, away_m - _OUTSIDE_M) - self._radius_m
             if self.is_parked(peer, now_s) and radius_m > 0.0:
                 solid.append(
-                    PeerArea(_moved(peer.position[None, :], local_from_global), radius_m, LETHAL)
+                    PeerArea(
+                        local_from_global.transform_points(peer.position[None, :]), radius_m, LETHAL
+                    )
                 )
         return solid
 
@@ -318,11 +320,3 @@ class Traffic:
 def _ahead(peer: Peer) -> np.ndarray:
     """Where a peer is and what of its plan is still before it, float64[k, 2]."""
     return track(peer, 1.0, np.arange(0.0, _BEHIND_M, 0.1))
-
-
-def _moved(points: np.ndarray, local_from_global: Pose2D) -> np.ndarray:
-    cos, sin = np.cos(local_from_global.yaw_rad), np.sin(local_from_global.yaw_rad)
-    x, y = points[:, 0], points[:, 1]
-    return np.column_stack(
-        (cos * x - sin * y + local_from_global.x_m, sin * x + cos * y + local_from_global.y_m)
-    )

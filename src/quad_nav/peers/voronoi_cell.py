@@ -60,8 +60,8 @@ def limit_to_cell(
     """
     if not peers or (command.vx_mps == 0.0 and command.vy_mps == 0.0):
         return LimitedCommand(command)
-    coasting = COASTING_S * _turned(np.array([[velocity.vx_mps, velocity.vy_mps]]), pose.yaw_rad)[0]
-    arc = _turned(_arc(command, hold_s), pose.yaw_rad)
+    coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
+    arc = np.column_stack(pose.rotate(*_arc(command, hold_s).T))
     fraction, nearest = 1.0, None
     for peer in peers:
         allowed = _allowed_fraction(
@@ -125,11 +125,4 @@ def _arc(command: Twist2D, hold_s: float) -> np.ndarray:
             command.vx_mps * ahead - command.vy_mps * aside,
             command.vx_mps * aside + command.vy_mps * ahead,
         )
-    )
-
-
-def _turned(vectors: np.ndarray, yaw_rad: float) -> np.ndarray:
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    return np.column_stack(
-        (cos * vectors[:, 0] - sin * vectors[:, 1], sin * vectors[:, 0] + cos * vectors[:, 1])
     )

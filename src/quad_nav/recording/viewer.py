@@ -178,8 +178,7 @@ def scan_points(scan: Scan, map_from_lidar: Pose3D) -> np.ndarray:
     points = np.column_stack(
         (ranges_m * np.cos(angles), ranges_m * np.sin(angles), np.zeros(len(angles)))
     )
-    placed: np.ndarray = points @ map_from_lidar.rotation.T + map_from_lidar.translation
-    return placed
+    return map_from_lidar.transform_points(points)
 
 
 def _rerun() -> Any:

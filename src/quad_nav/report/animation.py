@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from PIL import Image
 
+from quad_nav.geometry import Pose2D
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks, tracks
 from quad_nav.report.scene_drawing import draw_scene, extent
@@ -170,8 +171,8 @@ class _MovingRobot:
         self._goal.set_data(*(([], []) if goal is None else ([goal[0]], [goal[1]])))
 
     def _show_body(self, among: Tracks, now: int, here: np.ndarray) -> None:
-        yaw_rad = among.yaws_rad[self._number, now]
-        ahead = np.array([np.cos(yaw_rad), np.sin(yaw_rad)]) * self._radius_m
+        yaw_rad = float(among.yaws_rad[self._number, now])
+        ahead = np.array(Pose2D(0.0, 0.0, yaw_rad).rotate(self._radius_m, 0.0))
         self._hull.set(center=tuple(here))
         self._nose.set_data(*np.transpose([here + 0.5 * ahead, here + ahead]))
         self._label.set_position(tuple(here - 0.15 * ahead))

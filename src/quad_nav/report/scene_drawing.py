@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.patches import Circle, Patch, Rectangle
 
+from quad_nav.geometry import Pose2D
 from quad_nav.report.measures import Tracks
 from quad_nav.report.style import colour
 from quad_nav.sim.scene import Box, Obstacle, Scene
@@ -104,7 +105,7 @@ def draw_hull(
             zorder=6,
         )
     )
-    ahead = radius_m * np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+    ahead = np.array(Pose2D(0.0, 0.0, yaw_rad).rotate(radius_m, 0.0))
     axes.plot(
         *np.transpose([position_m, position_m + ahead]),
         color=colour(robot),

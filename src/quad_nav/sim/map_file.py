@@ -72,10 +72,9 @@ class OccupancyMap:
     def is_free(self, x_m: float, y_m: float) -> bool:
         """Whether the cell under a point in ``map`` is known to be free."""
         origin, height_width = self.fields.origin, self.occupancy.shape
-        cos, sin = math.cos(origin.yaw_rad), math.sin(origin.yaw_rad)
-        dx, dy = x_m - origin.x_m, y_m - origin.y_m
-        column = math.floor((cos * dx + sin * dy) / self.fields.resolution_m)
-        row = math.floor((cos * dy - sin * dx) / self.fields.resolution_m)
+        right_m, up_m = origin.inverse_transform(x_m, y_m)
+        column = math.floor(right_m / self.fields.resolution_m)
+        row = math.floor(up_m / self.fields.resolution_m)
         inside = 0 <= row < height_width[0] and 0 <= column < height_width[1]
         return inside and 0 <= self.occupancy[row, column] < OCCUPIED
 
@@ -85,10 +84,8 @@ class OccupancyMap:
         return [self._in_map(x, y) for x in (0.0, width) for y in (0.0, height)]
 
     def _in_map(self, column: float, row: float) -> Tuple[float, float]:
-        origin, resolution_m = self.fields.origin, self.fields.resolution_m
-        cos, sin = math.cos(origin.yaw_rad), math.sin(origin.yaw_rad)
-        x, y = column * resolution_m, row * resolution_m
-        return (origin.x_m + cos * x - sin * y, origin.y_m + sin * x + cos * y)
+        resolution_m = self.fields.resolution_m
+        return self.fields.origin.transform(column * resolution_m, row * resolution_m)
 
     def boxes(self, height_m: float, unknown_too: bool) -> List[Box]:
         """The occupied cells as few boxes: every one is in exactly one, and no other cell is.

@@ -16,7 +16,7 @@ from typing import Any, List, Sequence, Tuple, Union
 
 import numpy as np
 
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, rotate_vectors
 
 Lengths = Union[float, np.ndarray]
 
@@ -41,11 +41,10 @@ class Box:
 
     def clearance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
         """Distance from a point, or from each of many, to the surface; negative inside."""
-        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        dx, dy = x_m - self.x_m, y_m - self.y_m
+        x, y = Pose2D(self.x_m, self.y_m, self.yaw_rad).inverse_transform(x_m, y_m)
         outside = (
-            np.abs(cos * dx + sin * dy) - self.size_x_m / 2.0,
-            np.abs(-sin * dx + cos * dy) - self.size_y_m / 2.0,
+            np.abs(x) - self.size_x_m / 2.0,
+            np.abs(y) - self.size_y_m / 2.0,
             _outside_slab(z_m, self.bottom_m, self.height_m),
         )
         return _signed_distance(outside)
@@ -229,7 +228,7 @@ class _Boxes:
     def _clearances_m(self, x_m: float, y_m: float, z_m: float) -> np.ndarray:
         """Of each box, float64[n]; see ``Box.clearance_m``."""
         dx, dy, dz = ((x_m, y_m, z_m) - self._centres).T
-        local = (self._cos * dx + self._sin * dy, self._cos * dy - self._sin * dx, dz)
+        local = (*rotate_vectors(self._cos, -self._sin, dx, dy), dz)
         outside = np.abs(local).T - self._halves
         return _signed_distance((outside[:, 0], outside[:, 1], outside[:, 2]))
 

@@ -7,6 +7,7 @@ from typing import List, Sequence, Tuple
 
 import numpy as np
 
+from quad_nav.geometry import yaw_rotations
 from quad_nav.kernels.lidar import SolidGrid, Solids
 from quad_nav.kernels.rays import BOX, CYLINDER, SPHERE
 from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
@@ -48,15 +49,10 @@ def solids_of(obstacles: Sequence[Obstacle]) -> Solids:
         centres.append((solid.x_m, solid.y_m, solid.bottom_m + solid.height_m / 2))
         yaws.append(yaw_rad)
         sizes.append(size)
-    rotations = np.zeros((len(kinds), 3, 3))
-    rotations[:, 0, 0] = rotations[:, 1, 1] = np.cos(yaws)
-    rotations[:, 0, 1] = np.sin(yaws)
-    rotations[:, 1, 0] = -rotations[:, 0, 1]
-    rotations[:, 2, 2] = 1.0
     return Solids(
         np.array(kinds, np.int64),
         np.array(centres, float).reshape(-1, 3),
-        rotations,
+        np.ascontiguousarray(np.swapaxes(yaw_rotations(np.array(yaws, float)), 1, 2)),
         np.array(sizes, float).reshape(-1, 3),
     )
 

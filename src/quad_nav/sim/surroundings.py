@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Callable, Iterable, List, Optional, Sequence, Set, Tuple
 
 from quad_nav.files.document import read_yaml
+from quad_nav.geometry import Pose2D
 from quad_nav.sim.map_file import load_map
 from quad_nav.sim.scene import Box, Obstacle
 from quad_nav.sim.world_file import load_world
@@ -61,16 +61,15 @@ def _with_names_of_their_own(obstacles: Sequence[Obstacle]) -> List[Obstacle]:
 
 
 def _corners(obstacle: Obstacle) -> List[Tuple[float, float]]:
-    """Corners of the upright rectangle along x and y that holds an obstacle."""
+    """Points that span the extent of an obstacle along x and y."""
     if isinstance(obstacle, Box):
-        cos, sin = abs(math.cos(obstacle.yaw_rad)), abs(math.sin(obstacle.yaw_rad))
-        reach_x = (cos * obstacle.size_x_m + sin * obstacle.size_y_m) / 2
-        reach_y = (sin * obstacle.size_x_m + cos * obstacle.size_y_m) / 2
-    else:
-        reach_x = reach_y = obstacle.radius_m
+        pose = Pose2D(obstacle.x_m, obstacle.y_m, obstacle.yaw_rad)
+        x, y = obstacle.size_x_m / 2, obstacle.size_y_m / 2
+        return [pose.transform(*corner) for corner in ((-x, -y), (-x, y), (x, -y), (x, y))]
+    reach = obstacle.radius_m
     return [
-        (obstacle.x_m - reach_x, obstacle.y_m - reach_y),
-        (obstacle.x_m + reach_x, obstacle.y_m + reach_y),
+        (obstacle.x_m - reach, obstacle.y_m - reach),
+        (obstacle.x_m + reach, obstacle.y_m + reach),
     ]
 
 

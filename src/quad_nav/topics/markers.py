@@ -7,6 +7,7 @@ from collections import defaultdict
 from dataclasses import dataclass, replace
 from typing import Dict, List, Sequence, Tuple
 
+from quad_nav.geometry import Pose2D
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene, Sphere
@@ -101,7 +102,7 @@ def _quadcopter(robot: int) -> List[Marker]:
         )
     for k in range(4):
         angle = math.pi / 4 + k * math.pi / 2
-        place = (_ARM_M * math.cos(angle), _ARM_M * math.sin(angle), 0.03)
+        place = (*Pose2D(0.0, 0.0, angle).rotate(_ARM_M, 0.0), 0.03)
         colour = robot_rgba(robot, 0.8) if k in (0, 3) else (0.3, 0.3, 0.32, 0.7)
         parts.append(
             Marker(
@@ -137,10 +138,9 @@ def _box_lists(boxes: Sequence[Box]) -> List[Marker]:
         alike[(box.size_x_m, box.size_y_m, box.height_m), box.yaw_rad].append(box)
     markers = []
     for number, ((size, yaw_rad), group) in enumerate(alike.items()):
-        cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+        turned = Pose2D(0.0, 0.0, yaw_rad)
         points = tuple(
-            (cos * b.x_m + sin * b.y_m, cos * b.y_m - sin * b.x_m, b.bottom_m + b.height_m / 2)
-            for b in group
+            (*turned.inverse_transform(b.x_m, b.y_m), b.bottom_m + b.height_m / 2) for b in group
         )
         markers.append(
             Marker(
