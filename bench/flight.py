@@ -30,11 +30,11 @@ HALL_M = 60.0
 PARTS: Dict[str, Tuple[str, ...]] = {
     "bodies": ("simulation.py:step",),
     "LIDAR": ("lidars.py:scan",),
-    "scans to points": ("pilot.py:see",),
+    "scans to points": ("offline_robot.py:see",),
     "costmaps": ("layered.py:update",),
     "global plans": ("navigator.py:_plan",),
     "control": ("navigator.py:_control_cycle",),
-    "goals": ("flight.py:sequence",),
+    "goals": ("flight.py:tick_sequencer",),
 }
 
 

@@ -21,8 +21,7 @@ import numpy as np
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import Action, GoalEnded
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.contacts import Contact
@@ -39,19 +38,19 @@ class Stretches(FlightObserver):
         self.memories_mb: List[float] = []
         self._begin()
 
-    def touched(self, contact: Contact) -> None:
+    def on_contact(self, contact: Contact) -> None:
         self._contacts += 1
 
-    def acted(self, robot: int, now_s: float, action: Action) -> None:
+    def on_action(self, robot: int, now_s: float, action: Action) -> None:
         if isinstance(action, GoalEnded):
             self._reached += action.reached
             self._skipped += not action.reached
 
-    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+    def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         if tick.cycle:
             self._cycles_ms.append(1000 * wall_s)
 
-    def moved(self, flight: Flight) -> None:
+    def on_move(self, flight: Flight) -> None:
         if flight.now_s < self._length_s * (len(self.memories_mb) + 1):
             return
         self.memories_mb.append(memory_mb())

@@ -15,7 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "unit"))
 from study_flights import mortal_tasks, searched, tune_setup  # noqa: E402
 
 from quad_nav.errors import InputError  # noqa: E402
-from quad_nav.tuning.workers import LocalWorkers, RayWorkers, fly_all  # noqa: E402
+from quad_nav.offline.workers import LocalWorkers, RayWorkers, fly_all  # noqa: E402
+from quad_nav.tuning.flight_result import fly_task  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +41,7 @@ def test_the_study_is_the_one_of_a_single_process(workers, tmp_path):
 
 
 def test_flights_of_a_worker_that_dies_are_flown_again(workers, tmp_path):
-    flown = dict(fly_all(workers, mortal_tasks(tmp_path / "deaths", 1)))
+    flown = dict(fly_all(workers, fly_task, mortal_tasks(tmp_path / "deaths", 1)))
     assert {number: flight.reason for number, flight in flown.items()} == dict.fromkeys(
         range(6), "flown"
     )

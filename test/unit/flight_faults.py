@@ -10,8 +10,7 @@ import numpy as np
 
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.navigator.tick import RobotPoses
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.offline_robot import OfflineRobot
 
 Seen = Tuple[Scan, Pose3D]
@@ -36,8 +35,8 @@ class SenseFault(FlightObserver):
         self.away_s: Optional[float] = None
         self._pilot: Optional[OfflineRobot] = None
 
-    def began(self, flight: Flight) -> None:
-        self._pilot, self._configuration = flight.pilots[0], flight.robots[0].configuration
+    def on_start(self, flight: Flight) -> None:
+        self._pilot, self._configuration = flight.offline_robots[0], flight.robots[0].configuration
         self._see, self._navigate = self._pilot.see, self._pilot.navigate
         self._pilot.see, self._pilot.navigate = self.see, self.navigate
 
@@ -68,7 +67,7 @@ class SenseFault(FlightObserver):
     def located_as(self, now_s, state, peers):
         return self._navigate(now_s, state, peers)
 
-    def ticked(self, robot, tick, located, wall_s):
+    def on_tick(self, robot, tick, located, wall_s):
         if robot != 0 or tick.command is None or tick.command.is_zero:
             return
         if self.is_on(tick.now_s):

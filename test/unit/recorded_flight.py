@@ -8,7 +8,7 @@ from typing import NamedTuple, Sequence
 
 from quad_nav.files.shipped import shipped
 from quad_nav.mission.summary import MissionSummary
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.recording.trace import FlightTrace, TraceObserver
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup

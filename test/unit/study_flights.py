@@ -6,18 +6,18 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Dict, Iterable, Iterator, List, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Sequence, Tuple
 
 from quad_nav.errors import InputError
+from quad_nav.offline.workers import Workers
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionOptions
 from quad_nav.tuning.evaluation import Evaluation, Watcher
-from quad_nav.tuning.flight_result import FlightResult
+from quad_nav.tuning.flight_result import FlightResult, FlightTask
 from quad_nav.tuning.search import SearchOptions, search
 from quad_nav.tuning.space import Assignments, Dimension, SearchSpace
 from quad_nav.tuning.study import open_study
 from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup, start_values
-from quad_nav.tuning.workers import Numbered, NumberedResult, Workers
 
 SCENE = """\
 name: small
@@ -161,7 +161,11 @@ class PaperWorkers:
     def __init__(self) -> None:
         self.flown: List[str] = []
 
-    def fly(self, tasks: Iterable[Numbered]) -> Iterator[NumberedResult]:
+    def run(
+        self,
+        function: Callable[[FlightTask], FlightResult],
+        tasks: Iterable[Tuple[int, FlightTask]],
+    ) -> Iterator[Tuple[int, FlightResult]]:
         for number, task in tasks:
             self.flown.append(task.refused)
             yield number, paper_flight(*json.loads(task.refused))

@@ -13,7 +13,7 @@ from quad_nav.control.controller import Control
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Twist2D, quaternion_from_yaw
 from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick, Trigger
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import FlightObserver
 from quad_nav.recording import messages
 from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.record_file import create
@@ -33,7 +33,7 @@ class Troubles(FlightObserver):
     def __init__(self, *others):
         self._others = others
 
-    def ended(self, flight):
+    def on_end(self, flight):
         now_s = flight.now_s
         start = RecoveryStart("conservative_reset", 0, 3, Trigger.CONTROLLING)
         plan = np.array([[1.0, 2.0, 3.0], [1.5, 2.5, -3.0]])
@@ -46,8 +46,8 @@ class Troubles(FlightObserver):
             recovery=start,
         )
         for other in self._others:
-            other.touched(dataclasses.replace(TOUCH, time_s=now_s))
-            other.ticked(0, tick, RobotPoses(HERE, HERE), 0.01)
+            other.on_contact(dataclasses.replace(TOUCH, time_s=now_s))
+            other.on_tick(0, tick, RobotPoses(HERE, HERE), 0.01)
 
 
 @pytest.fixture(scope="module", params=["flight.bag", "flight.mcap"])

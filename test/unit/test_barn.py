@@ -16,7 +16,7 @@ from quad_nav import config
 from quad_nav.barn.protocol import Outcome, Run, metric
 from quad_nav.barn.results import Results, differences
 from quad_nav.barn.runs import fly_all, fly_world, judge
-from quad_nav.barn.setup import BarnOptions, read_barn_setup
+from quad_nav.barn.setup import BarnOptions, flight_setup, read_barn_setup
 from quad_nav.barn.statistics import barn_statistics, wilson_interval
 from quad_nav.barn.worlds import BarnWorld, load_worlds
 from quad_nav.cli.barn import barn
@@ -24,6 +24,8 @@ from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.goal_sequence import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.offline.flight import StopAtContact
+from quad_nav.offline.run import fly
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Cylinder
 
@@ -287,6 +289,14 @@ def test_two_workers_give_what_one_gives_a_contact_is_a_collision_and_the_seed_c
         )
         # It touches when its hull gets there, 0.275 m before the cylinder's axis.
         assert 1.2 / 0.3 < run.time_s < 1.6 / 0.3 and run.min_clearance_m < 0.01
+
+
+def test_a_flight_that_ends_at_a_contact_says_so(tmp_path):
+    setup = setup_of(write_worlds(tmp_path / "w.npz", w1=one_ahead()), parameters=(*BLIND, *SLOW))
+    flight = flight_setup(setup.contestant, setup.worlds[0], 0)
+    summary = fly(flight, [StopAtContact()])
+    assert summary.reason == "contact" and len(summary.contacts) == 1
+    assert fly(replace(flight, time_limit_s=1.0), [StopAtContact()]).reason == "time limit of 1 s"
 
 
 def leg(reached: bool, time_s: float, reason: str = "") -> Leg:

@@ -51,8 +51,8 @@ WORLD_USERS = {
 PLACES = {
     "click": "cli/",
     "rich": "cli/",
-    "joblib": ("barn/runs.py", "tuning/workers.py"),
-    "ray": "tuning/workers.py",
+    "joblib": "offline/workers.py",
+    "ray": "offline/workers.py",
     "optuna": "tuning/",
     "sqlalchemy": "tuning/study.py",
     "numba": "kernels/",

@@ -14,9 +14,8 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import to_json
-from quad_nav.offline.flight import Flight
+from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.navigator_group import NavigatorGroup
-from quad_nav.offline.observer import FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.offline.worker_process import PROCESS_NAME, WorkerProcessError
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
@@ -57,11 +56,20 @@ def write_goals(folder: Path, *robots) -> Path:
     return folder
 
 
-def helpers() -> list:
-    """Processes of navigators that run."""
+def worker_processes() -> list:
+    """Worker processes that run."""
     return [
         process for process in multiprocessing.active_children() if process.name == PROCESS_NAME
     ]
+
+
+class Stop(FlightObserver):
+    """Stops the flight after its first period of odometry."""
+
+    stop_reason = ""
+
+    def on_move(self, flight):
+        self.stop_reason = "interrupted"
 
 
 class Track(FlightObserver):
@@ -70,7 +78,7 @@ class Track(FlightObserver):
     def __init__(self):
         self.rows = []
 
-    def moved(self, flight):
+    def on_move(self, flight):
         self.rows.append(flight.simulation.body_state.rows)
 
 
@@ -100,38 +108,38 @@ def test_navigators_in_several_processes_fly_the_same_bit_for_bit(processes):
     summary = fly(meeting, [alone])
     assert figures(fly(meeting, [shared], processes=processes)) == figures(summary)
     assert np.array_equal(alone.rows, shared.rows)
-    assert helpers() == []
+    assert worker_processes() == []
 
 
 def test_a_process_of_navigators_that_dies_ends_the_flight_with_the_reason():
     class Killer(FlightObserver):
-        def moved(self, flight):
+        def on_move(self, flight):
             if flight.now_s > 0.5:
-                helpers()[0].kill()
+                worker_processes()[0].kill()
 
-    with pytest.raises(WorkerProcessError, match="1 navigators has failed: it has ended"):
+    with pytest.raises(WorkerProcessError, match="1 navigators failed: it has ended"):
         fly(read_setup(options()), [Killer()], processes=2)
-    assert helpers() == []
+    assert worker_processes() == []
 
 
 def test_what_fails_in_a_process_of_navigators_is_told_with_its_place(monkeypatch):
     monkeypatch.setattr(NavigatorGroup, "navigate", lambda *_: 1 / 0)
     flight = Flight(read_setup(options()), processes=2)
-    flight._crew.navigate = lambda *_: []
+    flight._group.navigate = lambda *_: []
     with pytest.raises(WorkerProcessError, match="(?s)Traceback.*ZeroDivisionError"):
         flight.advance()
     flight.end()
 
 
-def test_an_observer_that_looks_inside_finds_all_navigators():
+def test_an_observer_that_needs_a_single_process_finds_all_navigators():
     class Inside(FlightObserver):
-        looks_inside = True
+        needs_single_process = True
         seen = set()
 
-        def began(self, flight):
-            assert list(flight.pilots) == [0, 1]
+        def on_start(self, flight):
+            assert list(flight.offline_robots) == [0, 1]
 
-        def scanned(self, robot, scan, map_from_lidar):
+        def on_scan(self, robot, scan, map_from_lidar):
             self.seen.add(robot)
 
     fly(read_setup(options(time_limit_s=0.1)), [Inside()], processes=2)
@@ -197,7 +205,7 @@ def test_two_that_stand_before_each_other_turn_round_and_go_on(seed):
 
 def test_a_flight_that_is_out_of_time_or_stopped_says_so():
     assert fly(read_setup(options(time_limit_s=0.5))).reason == "time limit of 0.5 s"
-    stopped = fly(read_setup(options()), is_stopped=lambda: True)
+    stopped = fly(read_setup(options()), [Stop()])
     assert stopped.reason == "interrupted" and stopped.sim_time_s == pytest.approx(0.025)
     assert [leg.reason for leg in stopped.robots[0].legs] == ["interrupted", "not sent", "not sent"]
 

@@ -19,9 +19,9 @@ from quad_nav.costmap.occupancy import occupancy
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.run import INTERRUPTED, fly
+from quad_nav.mission.flight_log import INTERRUPTED
+from quad_nav.offline.flight import Flight, FlightObserver
+from quad_nav.offline.run import fly
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import read_messages
 from quad_nav.recording.messages import path_bytes, plan_bytes, pose_bytes
@@ -38,19 +38,19 @@ class Notes(FlightObserver):
     def __init__(self):
         self.scans, self.states, self.windows = [], [], []
 
-    def began(self, flight):
+    def on_start(self, flight):
         self._flight = flight
-        self.moved(flight)
+        self.on_move(flight)
 
-    def scanned(self, robot, scan, map_from_lidar):
+    def on_scan(self, robot, scan, map_from_lidar):
         self.scans.append((robot, scan))
 
-    def moved(self, flight):
+    def on_move(self, flight):
         self.states.append((flight.now_s, list(flight.states)))
 
-    def ticked(self, robot, tick, located, wall_s):
+    def on_tick(self, robot, tick, located, wall_s):
         for name in tick.windows:
-            navigator = self._flight.pilots[robot].navigator
+            navigator = self._flight.offline_robots[robot].navigator
             costs = {"global": navigator.global_costmap, "local": navigator.local_costmap}[name]
             self.windows.append((robot, name, tick.now_s, occupancy(costs.costs)))
 
@@ -287,14 +287,21 @@ def test_an_older_recording_stays_until_the_new_one_is_complete(tmp_path):
 
 def test_an_interrupted_flight_leaves_a_recording(tmp_path):
     path = tmp_path / "flight.bag"
-    summary = fly(setup(tmp_path), [Recorder(path)], lambda: True)
+
+    class Stop(FlightObserver):
+        stop_reason = ""
+
+        def on_move(self, flight):
+            self.stop_reason = INTERRUPTED
+
+    summary = fly(setup(tmp_path), [Recorder(path), Stop()])
     assert summary.reason == INTERRUPTED
     assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == INTERRUPTED
 
 
 def test_a_flight_that_fails_leaves_a_recording(tmp_path):
     class Faulty(FlightObserver):
-        def moved(self, flight):
+        def on_move(self, flight):
             raise ZeroDivisionError
 
     path = tmp_path / "flight.bag"

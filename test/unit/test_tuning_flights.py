@@ -31,13 +31,13 @@ from quad_nav.barn.setup import BarnOptions, read_barn_setup
 from quad_nav.cli.sweep import sweep
 from quad_nav.cli.tune import tune
 from quad_nav.errors import InputError
+from quad_nav.offline.workers import MAX_DEATHS, LocalWorkers, WorkersLost, fly_all
 from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionCourse, check_missions
 from quad_nav.tuning.evaluation import task_of
 from quad_nav.tuning.flight_result import FlightTask, fly_task
 from quad_nav.tuning.report.outcome_pictures import front
 from quad_nav.tuning.sweep import read_points
-from quad_nav.tuning.workers import MOST_DEATHS, LocalWorkers, WorkersLost, fly_all
 
 ROOT = Path(__file__).resolve().parents[2]
 SETS = [word for path, value in FAST for word in ("--set", f"{path}={value}")]
@@ -52,7 +52,7 @@ def test_the_number_of_workers_does_not_change_the_study(tmp_path):
 
 
 def test_flights_of_a_worker_that_dies_are_flown_again(tmp_path):
-    flown = dict(fly_all(LocalWorkers(2), mortal_tasks(tmp_path / "deaths", 1)))
+    flown = dict(fly_all(LocalWorkers(2), fly_task, mortal_tasks(tmp_path / "deaths", 1)))
     assert {number: flight.reason for number, flight in flown.items()} == dict.fromkeys(
         range(6), "flown"
     )
@@ -61,8 +61,8 @@ def test_flights_of_a_worker_that_dies_are_flown_again(tmp_path):
 
 def test_workers_that_die_again_and_again_end_it(tmp_path):
     tasks = mortal_tasks(tmp_path / "deaths", 1000)[3:4]
-    with pytest.raises(WorkersLost, match=f"died {MOST_DEATHS} times .* of 1 flights"):
-        list(fly_all(LocalWorkers(2), tasks))
+    with pytest.raises(WorkersLost, match=f"died {MAX_DEATHS} times .* of 1 flights"):
+        list(fly_all(LocalWorkers(2), fly_task, tasks))
 
 
 def test_what_is_held_out_is_never_searched(tmp_path):

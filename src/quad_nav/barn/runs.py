@@ -1,52 +1,51 @@
-"""Flies through the worlds, several at once in processes of their own."""
+"""Fly through the worlds, several at the same time in worker processes."""
 
 from __future__ import annotations
 
-import signal
-from typing import Iterator, Sequence, Tuple
-
-import joblib
+from typing import Iterator, NamedTuple
 
 from quad_nav.barn.protocol import TIME_LIMIT_S, Outcome, Run, metric
 from quad_nav.barn.setup import BarnSetup, Contestant, flight_setup
 from quad_nav.barn.worlds import BarnWorld
 from quad_nav.mission.summary import MissionSummary
-from quad_nav.offline.first_contact import FirstContact
+from quad_nav.offline import workers
+from quad_nav.offline.flight import StopAtContact
 from quad_nav.offline.run import fly
 
-Task = Tuple[BarnWorld, int]
+
+class _Task(NamedTuple):
+    contestant: Contestant
+    world: BarnWorld
+    run: int
 
 
-def cores() -> int:
-    """As many flights are quickest at the same time."""
-    return int(joblib.cpu_count())
+def fly_all(setup: BarnSetup, count: int) -> Iterator[Run]:
+    """Yield every run of every world as soon as it is flown, in any order.
 
+    The runs do not depend on ``count``, the number of flights at the same time.
 
-def fly_all(setup: BarnSetup, workers: int) -> Iterator[Run]:
-    """Every run of every world as soon as it is flown, in an order that is not said.
-
-    Which runs come, and each bit of them, does not depend on ``workers``.
+    Raises:
+        WorkersLost: Workers died repeatedly.
     """
-    tasks: Sequence[Task] = [(world, run) for run in range(setup.runs) for world in setup.worlds]
-    if workers == 1:
-        return (fly_world(setup.contestant, world, run) for world, run in tasks)
-    parallel = joblib.Parallel(workers, backend="loky", return_as="generator_unordered")
-    runs: Iterator[Run] = parallel(
-        joblib.delayed(_fly_in_worker)(setup.contestant, world, run) for world, run in tasks
-    )
-    return runs
+    tasks = [
+        _Task(setup.contestant, world, run) for run in range(setup.runs) for world in setup.worlds
+    ]
+    flown = workers.fly_all(workers.LocalWorkers(count), _fly_task, list(enumerate(tasks)))
+    return (run for _, run in flown)
 
 
 def fly_world(contestant: Contestant, world: BarnWorld, run: int) -> Run:
-    """One flight, to the goal, the first contact or the end of its time."""
-    contact = FirstContact()
-    setup = flight_setup(contestant, world, run)
-    summary = fly(setup, (contact,), contact.has_come)
+    """Fly through a world until the goal, the first contact or the time limit."""
+    summary = fly(flight_setup(contestant, world, run), (StopAtContact(),))
     return judge(summary, world, run)
 
 
+def _fly_task(task: _Task) -> Run:
+    return fly_world(*task)
+
+
 def judge(summary: MissionSummary, world: BarnWorld, run: int) -> Run:
-    """What a flight counts for. A contact counts, also one at the goal."""
+    """Score a flight by the benchmark's protocol; a contact at the goal is a collision."""
     robot = summary.robots[0]
     leg = robot.legs[0]
     outcome = (
@@ -73,9 +72,3 @@ def judge(summary: MissionSummary, world: BarnWorld, run: int) -> Run:
         touched=touched.other if touched else "",
         touched_at_m=(touched.x_m, touched.y_m) if touched else None,
     )
-
-
-def _fly_in_worker(contestant: Contestant, world: BarnWorld, run: int) -> Run:
-    # Ctrl-C reaches every process of the terminal; the first one ends the others.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return fly_world(contestant, world, run)

@@ -15,11 +15,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from quad_nav.barn.protocol import Outcome, Run
 from quad_nav.barn.results import Results, text, to_json, write_csv
-from quad_nav.barn.runs import cores, fly_all
+from quad_nav.barn.runs import fly_all
 from quad_nav.barn.setup import BarnOptions, BarnSetup, read_barn_setup
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED, EXIT_SUCCESS
 from quad_nav.cli.parameters import parameter
 from quad_nav.errors import InputError
+from quad_nav.offline.workers import LocalWorkers
 from quad_nav.scenario.warm_up import simulate, warm_up
 
 _OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # refused now, not after an hour
@@ -75,7 +76,7 @@ _OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # refused now, not afte
 @click.option(
     "--workers",
     type=click.IntRange(min=1),
-    default=cores,
+    default=lambda: LocalWorkers().count,
     metavar="N",
     help="Flights at the same time.  [default: as many as there are cores]",
 )

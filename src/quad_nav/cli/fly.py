@@ -6,10 +6,9 @@ import json
 import math
 import signal
 import sys
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Callable, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import click
 
@@ -19,9 +18,9 @@ from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
+from quad_nav.mission.flight_log import INTERRUPTED
 from quad_nav.mission.summary import table, to_json, write_json
-from quad_nav.offline.observer import FlightObserver
-from quad_nav.offline.run import INTERRUPTED
+from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
 from quad_nav.offline.worker_process import processes_for
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
@@ -245,8 +244,8 @@ def _fly(
     observers = [*watchers, *pictures.observers]
     if not quiet:
         observers.append(ProgressBar())
-    with _stop_on_signal() as is_stopped:
-        summary = fly_setup(setup, observers, is_stopped, processes)
+    with _StopOnSignal() as stop:
+        summary = fly_setup(setup, [*observers, stop], processes)
     to_terminal = json_path == "-"
     if not quiet:
         click.echo(table(summary), err=to_terminal)
@@ -259,18 +258,26 @@ def _fly(
     return EXIT_INTERRUPTED if summary.reason == INTERRUPTED else summary.exit_status
 
 
-@contextmanager
-def _stop_on_signal() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C or a termination was asked for; a second one ends at once."""
-    received: List[int] = []
+class _StopOnSignal(FlightObserver):
+    """Stops the flight at SIGINT (Ctrl-C) or SIGTERM; a second signal ends the process."""
 
-    def receive(number: int, _frame: object) -> None:
-        received.append(number)
-        signal.signal(number, before[signal.Signals(number)])
+    def __init__(self) -> None:
+        self._received = False
+        self._handlers: Dict[int, Any] = {}
 
-    before = {number: signal.signal(number, receive) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield lambda: bool(received)
-    finally:
-        for number, handler in before.items():
+    @property
+    def stop_reason(self) -> str:
+        return INTERRUPTED if self._received else ""
+
+    def __enter__(self) -> _StopOnSignal:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._handlers[number] = signal.signal(number, self._receive)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._handlers.items():
             signal.signal(number, handler)
+
+    def _receive(self, number: int, _frame: object) -> None:
+        self._received = True
+        signal.signal(number, self._handlers[number])

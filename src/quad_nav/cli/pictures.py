@@ -7,7 +7,7 @@ from typing import Iterator, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import MissionSummary
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import FlightObserver
 from quad_nav.recording.trace import TraceObserver
 from quad_nav.scenario.flight_setup import FlightSetup
 

@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from quad_nav.mission.sequencer import Action, GoalEnded
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import Flight, FlightObserver
 
 _PERIOD_S = 0.1  # wall time between two looks at the clock
 
@@ -37,17 +36,17 @@ class ProgressBar(FlightObserver):
         self._ended = 0
         self._start_s = self._shown_s = 0.0
 
-    def began(self, flight: Flight) -> None:
+    def on_start(self, flight: Flight) -> None:
         self._start_s = time.monotonic()
         goals = sum(len(robot.sequencer.sequence.goals) for robot in flight.robots)
         self._task = self._progress.add_task("", total=goals, sim=_STARTING)
         self._progress.start()
         self._progress.refresh()
 
-    def acted(self, robot: int, now_s: float, action: Action) -> None:
+    def on_action(self, robot: int, now_s: float, action: Action) -> None:
         self._ended += isinstance(action, GoalEnded)
 
-    def moved(self, flight: Flight) -> None:
+    def on_move(self, flight: Flight) -> None:
         wall_s = time.monotonic()
         if wall_s - self._shown_s < _PERIOD_S:
             return
@@ -61,5 +60,5 @@ class ProgressBar(FlightObserver):
             sim=f"{flight.now_s:.1f} s simulated, {speed:.0f} x real time",
         )
 
-    def ended(self, flight: Flight) -> None:
+    def on_end(self, flight: Flight) -> None:
         self._progress.stop()

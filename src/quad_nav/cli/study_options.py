@@ -16,6 +16,7 @@ from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
 from quad_nav.cli.parameters import parameter
 from quad_nav.errors import InputError, QuadError
 from quad_nav.files.shipped import shipped
+from quad_nav.offline.workers import LocalWorkers, RayWorkers, Workers
 from quad_nav.scenario.flight_setup import config_folder
 from quad_nav.scenario.warm_up import simulate, warm_up
 from quad_nav.sim.lidar import LidarParams
@@ -23,7 +24,6 @@ from quad_nav.sim.simulation import SimulationParams
 from quad_nav.tuning.courses import Mission, MissionOptions
 from quad_nav.tuning.evaluation import Course
 from quad_nav.tuning.parameter_files import base_configuration
-from quad_nav.tuning.workers import LocalWorkers, RayWorkers, Workers
 
 F = TypeVar("F", bound=Callable[..., Any])
 

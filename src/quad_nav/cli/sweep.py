@@ -26,6 +26,7 @@ from quad_nav.cli.study_options import (
 )
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
+from quad_nav.offline.workers import Workers
 from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.sweep import (
     Point,
@@ -38,7 +39,6 @@ from quad_nav.tuning.sweep import (
     run_sweep,
 )
 from quad_nav.tuning.sweep_table import table, to_json, write_csv
-from quad_nav.tuning.workers import Workers
 
 _OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # refused now, not after an hour
 
@@ -111,16 +111,16 @@ def sweep(
     with faults_told():
         options = SweepOptions(course_of(**given), _points(over, points), flights)
         setup = read_sweep_setup(options)
-        crew = workers_of(workers, ray_address)
+        processes = workers_of(workers, ray_address)
         if not quiet:
             for warning in setup.warnings:
                 click.echo(warning, err=True)
             click.echo(
-                f"{len(setup.points)} points, {flights} flights each, {crew.count} flights "
+                f"{len(setup.points)} points, {flights} flights each, {processes.count} flights "
                 "at a time",
                 err=True,
             )
-        rows = _run(setup, crew, FlightCache(journal), quiet)
+        rows = _run(setup, processes, FlightCache(journal), quiet)
     if not quiet:
         to_terminal = any(
             file is not None and file.name == "<stdout>" for file in (json_file, csv_file)

@@ -24,11 +24,11 @@ from quad_nav.cli.study_options import (
     worker_options,
     workers_of,
 )
+from quad_nav.offline.workers import Workers
 from quad_nav.tuning.search import SearchOptions
 from quad_nav.tuning.study_files import write_result
 from quad_nav.tuning.study_text import text
 from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_setup, run_tune
-from quad_nav.tuning.workers import Workers
 
 
 @click.command()
@@ -126,10 +126,10 @@ def tune(
     """
     with faults_told():
         setup = read_tune_setup(_options(output, **given))
-        crew = workers_of(workers, ray_address)
+        processes = workers_of(workers, ray_address)
         if not quiet:
-            _announce(setup, crew)
-        result = _run(setup, crew, quiet)
+            _announce(setup, processes)
+        result = _run(setup, processes, quiet)
         for path in write_result(result, shlex.join(["quad", *sys.argv[1:]])):
             if not quiet:
                 click.echo(f"written: {path}", err=True)

@@ -1,7 +1,8 @@
-"""The LIDARs and navigators that share a process: what they see, and what is due to them.
+"""A navigator group: the LIDARs and navigators of the robots that share a process.
 
-Those of a flight are one crew, or several in as many processes: navigators know of
-each other what peers tell, and nothing that was told in the same instant.
+The robots of a flight are one group, or several in as many processes. A navigator knows of
+its peers what they publish, and nothing that they publish in the same instant, so that the
+division into groups does not change the flight.
 """
 
 from __future__ import annotations
@@ -22,12 +23,17 @@ from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.lidars import Lidars
 from quad_nav.sim.simulation import RobotStates
 
-Seen = Tuple[Scan, Pose3D]  # and where the LIDAR was, in ``map``
+LocatedScan = Tuple[Scan, Pose3D]
+"""A scan and ``map_from_lidar``, the LIDAR's pose at its stamp."""
 
 
 @dataclass(frozen=True)
-class Navigated:
-    """What a navigator has done; ``goal_waits`` when it has not taken the last goal yet."""
+class NavigatorResult:
+    """The result of one navigator's tick.
+
+    ``goal_waits`` while the navigator has not taken the last goal that was sent. ``wall_s`` is
+    the tick's wall time.
+    """
 
     robot: int
     tick: Tick
@@ -38,69 +44,84 @@ class Navigated:
 
 
 class NavigatorGroup:
-    """Those of some of a setup's quadcopters, by their numbers; ``lidars`` are everybody's."""
+    """The LIDARs and navigators of some of a set-up's robots.
+
+    Attributes:
+        robots: The group's robots, by number.
+    """
 
     def __init__(self, setup: FlightSetup, robots: Sequence[int], lidars: Lidars):
-        self.pilots = {robot: OfflineRobot(setup.configurations[robot], robot) for robot in robots}
+        """Build the navigators of ``robots``; ``lidars`` are those of all robots."""
+        self.robots = {robot: OfflineRobot(setup.configurations[robot], robot) for robot in robots}
         self._lidars = lidars
         self._names = [goals.name for goals in setup.robots]
         self._intentions = [Intention()] * len(setup.robots)
-        for robot, pilot in self.pilots.items():
-            self._intentions[robot] = pilot.navigator.intention
+        for number, robot in self.robots.items():
+            self._intentions[number] = robot.navigator.intention
         maps = SceneMaps(setup.scene)
-        for pilot in self.pilots.values():
-            maps.give_to(pilot.navigator.global_costmap)
-            maps.give_to(pilot.navigator.local_costmap)
+        for robot in self.robots.values():
+            maps.set_map_of(robot.navigator.global_costmap)
+            maps.set_map_of(robot.navigator.local_costmap)
 
-    def scan(self, now_s: float, states: RobotStates) -> Dict[int, Seen]:
-        """Lets the LIDARs turn once and the navigators see that."""
-        seen = {}
-        for robot, scan in zip(
-            self.pilots, self._lidars.scan(states.bodies, list(self.pilots), now_s)
-        ):
-            map_from_lidar = states[robot].map_from_base.compose(base_from_lidar)
-            self.pilots[robot].see(scan, map_from_lidar, now_s)
-            seen[robot] = (scan, map_from_lidar)
-        return seen
+    def scan(self, now_s: float, states: RobotStates) -> Dict[int, LocatedScan]:
+        """Take a scan with each LIDAR and pass it to the robot's navigator.
+
+        Returns:
+            The scans, by the robots' numbers.
+        """
+        scans = {}
+        numbers = list(self.robots)
+        for number, scan in zip(numbers, self._lidars.scan(states.bodies, numbers, now_s)):
+            map_from_lidar = states[number].map_from_base.compose(base_from_lidar)
+            self.robots[number].see(scan, map_from_lidar, now_s)
+            scans[number] = (scan, map_from_lidar)
+        return scans
 
     def navigate(
         self,
         now_s: float,
         states: RobotStates,
         goals: Mapping[int, Pose2D],
-        news: Mapping[int, Intention],
-    ) -> List[Navigated]:
-        """Does what is due, after new goals for own quadcopters and news of others."""
-        for robot, goal in goals.items():
-            self.pilots[robot].waiting_goal = goal
-        for robot, intention in news.items():
-            self._intentions[robot] = intention
-        due = [robot for robot, pilot in self.pilots.items() if pilot.is_due(now_s)]
-        peers = self._peers_near(due, now_s, states)
-        done = [self._navigate(robot, now_s, states, peers[robot]) for robot in due]
-        for navigated in done:
-            self._intentions[navigated.robot] = navigated.intention
-        return done
+        updates: Mapping[int, Intention],
+    ) -> List[NavigatorResult]:
+        """Tick the navigators that are due.
+
+        Args:
+            now_s: Simulated time.
+            states: States of all robots.
+            goals: New goals of robots of this group, by number.
+            updates: Intentions of all robots that have changed, by number.
+        """
+        for number, goal in goals.items():
+            self.robots[number].waiting_goal = goal
+        for number, intention in updates.items():
+            self._intentions[number] = intention
+        due = [number for number, robot in self.robots.items() if robot.is_due(now_s)]
+        peers = self._peers_in_reach(due, now_s, states)
+        results = [self._navigate(number, now_s, states, peers[number]) for number in due]
+        for result in results:
+            self._intentions[result.robot] = result.intention
+        return results
 
     def _navigate(
-        self, robot: int, now_s: float, states: RobotStates, peers: Sequence[Peer]
-    ) -> Navigated:
-        pilot = self.pilots[robot]
+        self, number: int, now_s: float, states: RobotStates, peers: Sequence[Peer]
+    ) -> NavigatorResult:
+        robot = self.robots[number]
         start_s = time.perf_counter()
-        tick, located = pilot.navigate(now_s, states[robot], peers)
-        return Navigated(
-            robot,
+        tick, located = robot.navigate(now_s, states[number], peers)
+        return NavigatorResult(
+            number,
             tick,
             located,
             time.perf_counter() - start_s,
-            pilot.waiting_goal is not None,
-            pilot.navigator.intention,
+            robot.waiting_goal is not None,
+            robot.navigator.intention,
         )
 
-    def _peers_near(
+    def _peers_in_reach(
         self, robots: Sequence[int], now_s: float, states: RobotStates
     ) -> Dict[int, List[Peer]]:
-        """For each of some quadcopters the others that it may have to do with."""
+        """The peers within each robot's ``peer_reach_m``, by the robots' numbers."""
         if len(self._names) == 1:
             return {robot: [] for robot in robots}
         positions = states.bodies.positions_m[:, :2]
@@ -109,7 +130,7 @@ class NavigatorGroup:
             distance_m = np.hypot(*(positions - positions[robot]).T)
             distance_m[robot] = np.inf
             near[robot] = np.flatnonzero(
-                distance_m < self.pilots[robot].navigator.peer_reach_m
+                distance_m < self.robots[robot].navigator.peer_reach_m
             ).tolist()
         peers = {
             robot: self._as_peer(robot, now_s, states) for robot in set().union(*near.values())

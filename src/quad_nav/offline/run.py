@@ -1,38 +1,44 @@
-"""Flies a setup to its end and sums it up."""
+"""Fly a set-up to its end and summarize the flight."""
 
 from __future__ import annotations
 
 import time
-from typing import Callable, Optional, Sequence
+from typing import List, Sequence
 
 from quad_nav.mission.summary import MissionSummary, summarize
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.scenario.flight_setup import FlightSetup
-
-INTERRUPTED = "interrupted"
 
 
 def fly(
     setup: FlightSetup,
     observers: Sequence[FlightObserver] = (),
-    is_stopped: Optional[Callable[[], bool]] = None,
     processes: int = 1,
 ) -> MissionSummary:
-    """Fly until every goal is through, time is up, or ``is_stopped`` says so.
+    """Fly a set-up until all goals have ended, time is up, or an observer stops the flight.
 
-    The navigators share so many ``processes``.
+    Args:
+        setup: The flight.
+        observers: Called as the flight goes on; the first ``stop_reason`` ends it.
+        processes: Number of processes that share the navigators.
+
+    Returns:
+        The summary; its ``reason`` says why the flight ended early, "" if it did not.
+
+    Raises:
+        WorkerProcessError: A worker process failed.
     """
     flight = Flight(setup, observers, processes)
     start_wall_s = time.perf_counter()
     try:
-        reason = _advance_to_end(flight, is_stopped)
-    except BaseException as error:  # what was flown is not lost with a fault of ours
+        reasons = _advance_to_end(flight)
+    except BaseException as error:  # recordings keep what was flown
         flight.end(f"ended by {type(error).__name__}")
         raise
     wall_time_s = time.perf_counter() - start_wall_s
-    flight.end(reason)
-    reasons = dict.fromkeys(why for why in (reason, flight.stop_reason) if why)
+    flight.end("; ".join(reasons))
+    # Observers may fail at the end, for example a recording that is closed on a full disk.
+    reasons = list(dict.fromkeys([*reasons, *flight.stop_reasons]))
     return summarize(
         flight.log,
         {robot.name: robot.sequencer for robot in flight.robots},
@@ -44,15 +50,13 @@ def fly(
     )
 
 
-def _advance_to_end(flight: Flight, is_stopped: Optional[Callable[[], bool]]) -> str:
-    """Why it ended early, "" when every goal is through."""
+def _advance_to_end(flight: Flight) -> List[str]:
+    """Fly and return the reasons to end early, [] after all goals have ended."""
     time_limit_s = flight.setup.time_limit_s
-    reason = flight.stop_reason
-    while not flight.is_done and not reason:
+    reasons = flight.stop_reasons
+    while not flight.is_done and not reasons:
         flight.advance()
-        reason = flight.stop_reason
-        if flight.now_s >= time_limit_s and not flight.is_done:
-            reason = reason or f"time limit of {time_limit_s:g} s"
-        elif is_stopped is not None and is_stopped():
-            reason = reason or INTERRUPTED
-    return reason
+        reasons = flight.stop_reasons
+        if flight.now_s >= time_limit_s and not flight.is_done and not reasons:
+            reasons = [f"time limit of {time_limit_s:g} s"]
+    return reasons

@@ -12,8 +12,7 @@ from typing import Any, Dict, List
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.mission.sequencer import Action, SendGoal
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.recording import messages
 from quad_nav.recording.messages import path_bytes, pose_bytes
 from quad_nav.recording.navigator_topics import NavigatorTopics
@@ -40,7 +39,7 @@ class Recorder(FlightObserver):
         InputError: the file cannot be made.
     """
 
-    looks_inside = True
+    needs_single_process = True
 
     def __init__(self, path: Path, title: str = "flight"):
         self._topics = TopicWriter(create(path))
@@ -52,10 +51,10 @@ class Recorder(FlightObserver):
     def stop_reason(self) -> str:
         return self._topics.problem
 
-    def began(self, flight: Flight) -> None:
+    def on_start(self, flight: Flight) -> None:
         self._flight = flight
         self._navigators = [
-            NavigatorTopics(index, flight.pilots[index].navigator, self._topics)
+            NavigatorTopics(index, flight.offline_robots[index].navigator, self._topics)
             for index in range(len(flight.robots))
         ]
         self._paths = [FlownPath(_path_pose) for _ in flight.robots]
@@ -75,9 +74,9 @@ class Recorder(FlightObserver):
             latched=True,
         )
         self._tell_goals(0.0)
-        self.moved(flight)
+        self.on_move(flight)
 
-    def touched(self, contact: Contact) -> None:
+    def on_contact(self, contact: Contact) -> None:
         stamp = stamp_at(contact.time_s)
         level = messages.constant("diagnostic_msgs/DiagnosticStatus", "WARN")
         self._write(
@@ -93,13 +92,13 @@ class Recorder(FlightObserver):
             _SIMULATOR,
         )
 
-    def scanned(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
+    def on_scan(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
         stamp = stamp_at(scan.stamp_s)
         self._write(
             f"/scan{robot}", stamp, messages.laser_scan(scan, f"Lidar{robot}", stamp), _SIMULATOR
         )
 
-    def moved(self, flight: Flight) -> None:
+    def on_move(self, flight: Flight) -> None:
         now_s, stamp = flight.now_s, stamp_at(flight.now_s)
         self._write("/clock", stamp, messages.clock(stamp), _SIMULATOR, latched=True)
         self._write(
@@ -141,7 +140,7 @@ class Recorder(FlightObserver):
                 )
             self._navigators[robot].action.tell_status(now_s)
 
-    def acted(self, robot: int, now_s: float, action: Action) -> None:
+    def on_action(self, robot: int, now_s: float, action: Action) -> None:
         info = flight_info.event(robot, now_s + flight_info.START_S, action)
         self._write(
             flight_info.EVENTS_TOPIC,
@@ -153,13 +152,13 @@ class Recorder(FlightObserver):
             self._navigators[robot].action.send(now_s, action.pose)
         self._tell_goals(now_s)
 
-    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+    def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         navigator = self._navigators[robot]
         if navigator.action.is_waiting and not self._flight.robots[robot].goal_waits:
             navigator.action.accept(tick.now_s)
         navigator.write(tick, located)
 
-    def ended(self, flight: Flight) -> None:
+    def on_end(self, flight: Flight) -> None:
         self._tell_flight()
         self._topics.close()
 

@@ -13,8 +13,7 @@ import numpy as np
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.navigator.tick import RobotPoses, State, Tick
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
 from quad_nav.versions import versions
@@ -102,12 +101,12 @@ class TraceObserver(FlightObserver):
         self._robots: List[_RobotRecord] = []
         self._flight: Optional[Flight] = None
 
-    def began(self, flight: Flight) -> None:
+    def on_start(self, flight: Flight) -> None:
         self._flight = flight
         self._robots = [_RobotRecord() for _ in flight.robots]
-        self.moved(flight)
+        self.on_move(flight)
 
-    def moved(self, flight: Flight) -> None:
+    def on_move(self, flight: Flight) -> None:
         bodies = flight.simulation.body_state
         self._times_s.append(flight.now_s)
         self._positions.append(bodies.positions_m)
@@ -116,7 +115,7 @@ class TraceObserver(FlightObserver):
             twist = state.twist
             record.velocities.append((twist.vx_mps, twist.vy_mps, twist.vyaw_radps))
 
-    def acted(self, robot: int, now_s: float, action: Action) -> None:
+    def on_action(self, robot: int, now_s: float, action: Action) -> None:
         goals = self._robots[robot].goals
         if isinstance(action, SendGoal) and not action.why:
             goals.append(GoalTrace(action.index, action.lap, action.pose, now_s))
@@ -133,7 +132,7 @@ class TraceObserver(FlightObserver):
                 action.attempts,
             )
 
-    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+    def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         record, now_s = self._robots[robot], tick.now_s
         if tick.cycle:
             record.cycles.append((now_s, wall_s))

@@ -21,8 +21,7 @@ from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.mission.sequencer import Action
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.recording.viewer_solids import colour_of, solid
 from quad_nav.sim.colours import ROBOT_COLOURS
 from quad_nav.sim.contacts import Contact
@@ -46,7 +45,7 @@ class View(FlightObserver):
         InputError: rerun is not installed, or the file cannot be made.
     """
 
-    looks_inside = True
+    needs_single_process = True
 
     def __init__(self, path: Optional[Path] = None):
         self._rr = _rerun()
@@ -65,7 +64,7 @@ class View(FlightObserver):
             )
         )
 
-    def began(self, flight: Flight) -> None:
+    def on_start(self, flight: Flight) -> None:
         self._flight = flight
         self._altitude_m = flight.setup.scene.altitude_m
         self._trails: List[FlownPath[Tuple[float, float, float]]] = [
@@ -81,9 +80,9 @@ class View(FlightObserver):
                 f"map/{marker.namespace}/body/{marker.number}", solid(self._rr, marker), static=True
             )
         self._show_goals(0.0)
-        self.moved(flight)
+        self.on_move(flight)
 
-    def touched(self, contact: Contact) -> None:
+    def on_contact(self, contact: Contact) -> None:
         self._at(contact.time_s)
         self._rr.log(
             "map/contacts",
@@ -96,7 +95,7 @@ class View(FlightObserver):
         )
         self._rr.log("contacts", self._rr.TextLog(str(contact), level="WARN"))
 
-    def scanned(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
+    def on_scan(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
         self._at(scan.stamp_s)
         self._rr.log(
             f"map/quad{robot}/scan",
@@ -105,7 +104,7 @@ class View(FlightObserver):
             ),
         )
 
-    def moved(self, flight: Flight) -> None:
+    def on_move(self, flight: Flight) -> None:
         self._at(flight.now_s)
         for robot, state in enumerate(flight.states):
             pose = state.map_from_base
@@ -124,10 +123,10 @@ class View(FlightObserver):
                     0.02,
                 )
 
-    def acted(self, robot: int, now_s: float, action: Action) -> None:
+    def on_action(self, robot: int, now_s: float, action: Action) -> None:
         self._show_goals(now_s)
 
-    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+    def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         self._at(tick.now_s)
         if tick.plan is not None:
             self._line(f"map/quad{robot}/plan", self._lifted(tick.plan), _colour(robot), 0.01)
@@ -139,7 +138,7 @@ class View(FlightObserver):
                 0.02,
             )
 
-    def ended(self, flight: Flight) -> None:
+    def on_end(self, flight: Flight) -> None:
         self._rr.disconnect()
 
     def _at(self, time_s: float) -> None:

@@ -22,8 +22,8 @@ class SceneMaps:
         self._scene = scene
         self._maps: Dict[float, StaticMap] = {}
 
-    def give_to(self, costmap: LayeredCostmap) -> None:
-        """Gives a costmap's static layers, if it has any, their map."""
+    def set_map_of(self, costmap: LayeredCostmap) -> None:
+        """Set the map of a costmap with static layers."""
         if not any(isinstance(layer, StaticLayer) for layer in costmap.layers.values()):
             return
         resolution_m = costmap.params.resolution_m

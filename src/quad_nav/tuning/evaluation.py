@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Protocol, Sequence, Set, Tuple
 
 from quad_nav.errors import InputError
+from quad_nav.offline.workers import Workers, fly_all
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.flight_cache import FlightCache, Key, key_text
-from quad_nav.tuning.flight_result import FlightResult, FlightTask
+from quad_nav.tuning.flight_result import FlightResult, FlightTask, fly_task
 from quad_nav.tuning.space import Assignments, SearchSpace, Values
-from quad_nav.tuning.workers import Workers, fly_all
 
 
 class Course(Protocol):
@@ -107,7 +107,7 @@ class Evaluation:
             (number, task_of(self.course, case, self.space.assignments(values)))
             for number, (values, case) in enumerate(missing.values())
         ]
-        for number, flight in fly_all(self._workers, tasks):
+        for number, flight in fly_all(self._workers, fly_task, tasks):
             self._cache.add(keys[number], flight)
             self._counted.add(keys[number])
             self.watcher.flown(flight, False)

@@ -10,9 +10,7 @@ from typing import List, Optional
 from quad_nav.geometry import Twist2D
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.offline.first_contact import FirstContact
-from quad_nav.offline.flight import Flight
-from quad_nav.offline.observer import FlightObserver
+from quad_nav.offline.flight import Flight, FlightObserver, StopAtContact
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightSetup
 
@@ -81,10 +79,9 @@ def fly_task(task: FlightTask) -> FlightResult:
     """Flies it; parameters that cannot be flown with reach no goal."""
     if task.setup is None:
         return FlightResult(1, 0, 0, 0.0, 1.0, reason=task.refused)
-    roughness, contacts = Roughness(), FirstContact()
-    summary = fly(
-        task.setup, (roughness, contacts), contacts.has_come if task.ends_at_contact else None
-    )
+    roughness = Roughness()
+    stops = (StopAtContact(),) if task.ends_at_contact else ()
+    summary = fly(task.setup, (roughness, *stops))
     return result_of(summary, task.setup, roughness.mean_mps2)
 
 
@@ -120,10 +117,10 @@ class Roughness(FlightObserver):
         self._total_mps = 0.0
         self._time_s = 0.0
 
-    def began(self, flight: Flight) -> None:
+    def on_start(self, flight: Flight) -> None:
         self._last = [None] * len(flight.robots)
 
-    def ticked(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+    def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         new, old = tick.command, self._last[robot]
         if new is None:
             return
@@ -132,7 +129,7 @@ class Roughness(FlightObserver):
             self._total_mps += _TURN_ARM_M * abs(new.vyaw_radps - old.vyaw_radps)
         self._last[robot] = new
 
-    def ended(self, flight: Flight) -> None:
+    def on_end(self, flight: Flight) -> None:
         self._time_s = flight.now_s
 
     @property

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Iterator
 
-from quad_nav.offline.first_contact import FirstContact
+from quad_nav.offline.flight import StopAtContact
 from quad_nav.offline.run import fly
 from quad_nav.recording.trace import FlightTrace, TraceObserver
 from quad_nav.tuning.parameter_files import write_parameters
@@ -51,7 +51,7 @@ def _traced(result: TuneResult, name: str, assignments: Assignments) -> FlightTr
     """The first of the flights that were held out once more, to be drawn."""
     course, case = result.setup.course, result.held_out.cases[0]
     setup = course.setup(case, assignments)
-    observer, contacts = TraceObserver(f"{case.name}, seed {case.seed}, {name}"), FirstContact()
-    is_stopped = contacts.has_come if course.ends_at_contact else None
-    summary = fly(setup, (observer, contacts), is_stopped)
+    observer = TraceObserver(f"{case.name}, seed {case.seed}, {name}")
+    stops = (StopAtContact(),) if course.ends_at_contact else ()
+    summary = fly(setup, (observer, *stops))
     return observer.trace(summary.contacts, summary.reason)

@@ -15,6 +15,7 @@ import yaml
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
 from quad_nav.files.user_files import read_text
+from quad_nav.offline.workers import Workers
 from quad_nav.scenario.flight_setup import config_folder
 from quad_nav.tuning.courses import LIDAR, Case, identity_text
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher, task_of
@@ -23,7 +24,6 @@ from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.space import Dimension, SearchSpace
 from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
 from quad_nav.tuning.study_input import CourseOptions, parameter_faults, read_course
-from quad_nav.tuning.workers import Workers
 from quad_nav.versions import versions
 
 _BASE = "base"

@@ -14,6 +14,7 @@ from quad_nav.barn.setup import BarnOptions
 from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
+from quad_nav.offline.workers import Workers
 from quad_nav.scenario.flight_setup import config_folder
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
@@ -24,7 +25,6 @@ from quad_nav.tuning.search import SearchOptions, best_first, search
 from quad_nav.tuning.space import Assignments, SearchSpace, load_space
 from quad_nav.tuning.study import TuneStudy, open_study
 from quad_nav.tuning.study_input import CourseOptions, parameter_faults, read_course, with_config
-from quad_nav.tuning.workers import Workers
 from quad_nav.versions import versions
 
 TUNED = "tuned"
