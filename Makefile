@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint rostest ray conformance fuzz bench bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 lint docs rostest ray conformance fuzz bench bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
@@ -18,7 +18,7 @@ help:  ## List the targets
 fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
 	@scripts/ros_env scripts/fly $(ARGS)
 
-test: unit unit38 lint rostest  ## Run every test and static check
+test: unit unit38 lint docs rostest  ## Run every test and static check
 	@echo "quad: all tests passed"
 
 unit: venv  ## The unit tests
@@ -28,10 +28,18 @@ unit: venv  ## The unit tests
 unit38: packages  ## The unit tests under Python 3.8, where there is one
 	@scripts/unit_tests_38
 
-lint: venv  ## ruff and mypy
-	@scripts/make_venv .venv requirements-lint.txt
+lint: venv  ## ruff, mypy and the structure of the sources
+	@scripts/make_venv .venv requirements-test.txt requirements-lint.txt
+	$(PYTHON) -m ruff format --check
 	$(PYTHON) -m ruff check
 	$(PYTHON) -m mypy
+	$(PYTHON) -m pytest -q test/unit/test_structure.py test/unit/test_imports.py
+
+# The PATH has ruff, which formats the signatures. The variable silences an advertisement.
+docs: venv  ## The documentation as a site, in site/; warnings are errors
+	@scripts/make_venv .venv requirements-lint.txt requirements-docs.txt
+	@PATH="$(CURDIR)/.venv/bin:$$PATH" NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --quiet --strict
+	@echo "quad: open site/index.html"
 
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 	@scripts/ros_env scripts/rostests $(TEST)
@@ -69,7 +77,7 @@ workspace: venv  ## Build the catkin workspace
 	@scripts/build_workspace
 
 clean:  ## Remove what was built, but not the virtual environments
-	rm -rf .ws build dist .pytest_cache .mypy_cache .ruff_cache src/*.egg-info
+	rm -rf .ws build dist site .pytest_cache .mypy_cache .ruff_cache src/*.egg-info
 	find src test nodes -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean  ## Remove the virtual environments too
