@@ -72,7 +72,9 @@ class RepositoryPages:
         source = ROOT / path
         if source.is_dir():
             names = sorted(entry.name + "/" * entry.is_dir() for entry in source.iterdir())
-            listing = "".join(f"* [{name}]({path}/{name})\n" for name in names if name[0] not in "._")
+            listing = "".join(
+                f"* [{name}]({path}/{name})\n" for name in names if name[0] not in "._"
+            )
             return self._linked(f"# {path}/\n\n{listing}", PurePosixPath(), uri)
         text = source.read_text(encoding="utf-8")
         if source.suffix == ".md":
