@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
-from quad_nav.ros.common.convert import ScanMessage
+from quad_nav.ros.common.conversions import ScanMessage
 
 ROBOTS = 2
 

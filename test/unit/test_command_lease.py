@@ -1,6 +1,6 @@
 """One node at a time steers a quadcopter."""
 
-from quad_nav.topics.command_lease import CommandLease
+from quad_nav.topics.validation import CommandLease
 
 NAVIGATOR, ROGUE = "/move_base0", "/rogue"
 

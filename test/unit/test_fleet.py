@@ -6,7 +6,7 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
-from quad_nav.ros.common.names import in_fleet, own_node
+from quad_nav.ros.common.node_tools import in_fleet, own_node
 from quad_nav.scenario.fleet_setup import configurations, read_setup, scene_of
 from quad_nav.scenario.random_mission import random_mission
 from quad_nav.sim.colours import ROBOT_COLOURS

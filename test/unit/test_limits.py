@@ -57,10 +57,10 @@ ROWS = {
         bag_trace.LONGEST_FLIGHT_S / 86400,
         bag_info.MOST_ROBOTS,
     ],
-    "scan": [incoming.MOST_BEAMS],
-    "point cloud": [incoming.MOST_POINTS],
+    "scan": [incoming.MAX_BEAMS],
+    "point cloud": [incoming.MAX_POINTS],
     "odometry, commands, goals": [incoming.LARGEST],
-    "intention of a peer": [incoming.MOST_POSES],
+    "intention of a peer": [incoming.MAX_POSES],
     "map on a topic": [incoming.MOST_CELLS],
 }
 

@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # Dies at first, tells how it was called the second time, and ends with 3.
 DIES_ONCE = """
 import os, signal, sys
-if sys.argv[-1] != "--again":
+if sys.argv[-1] != "--respawned":
     os.kill(os.getpid(), signal.SIGKILL)
 print(sys.argv[1:], flush=True)
 sys.exit(3)
@@ -24,7 +24,7 @@ def again(program: str, *arguments: str) -> subprocess.Popen:
         [
             sys.executable,
             "-m",
-            "quad_nav.ros.common.respawn",
+            "quad_nav.mission.respawn",
             sys.executable,
             "-c",
             program,
@@ -39,8 +39,8 @@ def again(program: str, *arguments: str) -> subprocess.Popen:
 
 def test_what_was_killed_comes_again_and_ends_by_itself():
     told, said = (process := again(DIES_ONCE, "_robots:=2")).communicate(timeout=60)
-    assert told == "['_robots:=2', '--again']\n"
-    assert "killed by SIGKILL, started again" in said
+    assert told == "['_robots:=2', '--respawned']\n"
+    assert "killed by SIGKILL, restarting" in said
     assert process.returncode == 3
 
 

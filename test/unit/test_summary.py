@@ -17,7 +17,7 @@ from quad_nav.mission.summary import (
     write_json,
 )
 from quad_nav.sim.contacts import Contact, ContactLog, Touch
-from quad_nav.topics.contacts import contact_from_values, contact_values
+from quad_nav.topics.flight_info import contact_from_values, contact_values
 
 # From (0, 0) over (3, 0) to the goal: 7 m where the straight line has 5 m.
 DETOUR = [(0.0, Pose2D(0, 0)), (10.0, Pose2D(3, 0)), (20.0, Pose2D(3, 4))]

@@ -18,11 +18,11 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
 from quad_nav.sim.scene_document import scene_document
 from quad_nav.sim.scene_file import load_scene, scene_from_document
-from quad_nav.topics.contacts import contact_from_values, contact_values
-from quad_nav.topics.costmap_updates import CostmapNews
+from quad_nav.topics.flight_info import contact_from_values, contact_values
+from quad_nav.topics.publishing import CostmapUpdates
 from quad_nav.topics.flight_info import event, from_text, mission_info, simulation_info, to_text
-from quad_nav.topics.flown_path import FlownPath
-from quad_nav.topics.goal_markers import goal_markers
+from quad_nav.topics.publishing import FlownPath
+from quad_nav.topics.markers import goal_markers
 from quad_nav.topics.markers import (
     CUBE,
     CUBE_LIST,
@@ -98,7 +98,7 @@ def test_the_goal_in_flight_is_large_and_the_flown_one_dim():
 # Paths and costmaps.
 
 
-def test_a_path_has_poses_5_cm_apart_and_is_told_twice_a_second():
+def test_a_path_has_poses_5_cm_apart_and_is_published_twice_a_second():
     path = FlownPath(lambda stamp_s, pose: pose.x_m)
     told = [k for k in range(41) if path.add(k / 40, Pose3D(k * 0.0126, 0.0, 1.0))]
     assert list(path.poses) == pytest.approx([0.0504 * k for k in range(11)])
@@ -129,46 +129,46 @@ def costmap(**params):
 
 
 def test_windows_add_up_between_two_publications():
-    news = CostmapNews(costmap(publish_frequency_hz=1.0))
-    assert not news.note(0.4, Window(0, 2, 0, 2))
-    assert not news.note(0.8, NO_CELLS)
-    assert news.note(1.0, Window(4, 5, 1, 3))
-    assert news.take() == Window(0, 5, 0, 3)
-    assert news.take() == NO_CELLS
-    assert not news.note(1.8, NO_CELLS)
-    assert news.note(2.0, NO_CELLS)
+    updates = CostmapUpdates(costmap(publish_frequency_hz=1.0))
+    assert not updates.add(0.4, Window(0, 2, 0, 2))
+    assert not updates.add(0.8, NO_CELLS)
+    assert updates.add(1.0, Window(4, 5, 1, 3))
+    assert updates.pop() == Window(0, 5, 0, 3)
+    assert updates.pop() == NO_CELLS
+    assert not updates.add(1.8, NO_CELLS)
+    assert updates.add(2.0, NO_CELLS)
 
 
-def test_a_late_update_does_not_delay_what_is_told_after_it():
-    news = CostmapNews(costmap(publish_frequency_hz=1.0))
-    assert news.note(1.2, NO_CELLS)
-    assert not news.note(1.9, NO_CELLS)
-    assert news.note(2.0, NO_CELLS)
+def test_a_late_update_does_not_delay_what_is_published_after_it():
+    updates = CostmapUpdates(costmap(publish_frequency_hz=1.0))
+    assert updates.add(1.2, NO_CELLS)
+    assert not updates.add(1.9, NO_CELLS)
+    assert updates.add(2.0, NO_CELLS)
 
 
 def test_news_come_again_one_period_after_the_clock_has_gone_back():
-    news = CostmapNews(costmap(publish_frequency_hz=1.0))
-    assert news.note(100.0, NO_CELLS)
-    news.restart(50.5)
-    assert not news.note(51.0, NO_CELLS)
-    assert news.note(51.5, NO_CELLS)
+    updates = CostmapUpdates(costmap(publish_frequency_hz=1.0))
+    assert updates.add(100.0, NO_CELLS)
+    updates.restart(50.5)
+    assert not updates.add(51.0, NO_CELLS)
+    assert updates.add(51.5, NO_CELLS)
 
 
 def test_without_a_frequency_nothing_is_published():
-    assert not CostmapNews(costmap(publish_frequency_hz=0.0)).note(100.0, Window(0, 2, 0, 2))
+    assert not CostmapUpdates(costmap(publish_frequency_hz=0.0)).add(100.0, Window(0, 2, 0, 2))
 
 
 def test_a_grid_that_moved_is_wanted_in_full():
     moving = costmap(publish_frequency_hz=1.0, rolling_window=True)
-    news = CostmapNews(moving)
-    assert [news.wants_full_grid(), news.wants_full_grid()] == [True, False]
+    updates = CostmapUpdates(moving)
+    assert [updates.pop_full_grid(), updates.pop_full_grid()] == [True, False]
     moving.update(1.0, Pose2D(3.0, 3.0))
-    assert [news.wants_full_grid(), news.wants_full_grid()] == [True, False]
+    assert [updates.pop_full_grid(), updates.pop_full_grid()] == [True, False]
 
 
 def test_a_costmap_can_always_be_wanted_in_full():
-    news = CostmapNews(costmap(publish_frequency_hz=1.0, always_send_full_costmap=True))
-    assert [news.wants_full_grid(), news.wants_full_grid()] == [True, True]
+    updates = CostmapUpdates(costmap(publish_frequency_hz=1.0, always_send_full_costmap=True))
+    assert [updates.pop_full_grid(), updates.pop_full_grid()] == [True, True]
 
 
 # Texts.
@@ -181,7 +181,7 @@ def test_a_contact_comes_back_from_its_values():
 
 
 def test_a_contact_without_a_place_is_refused():
-    with pytest.raises(ValueError, match="without a readable 'y_m'"):
+    with pytest.raises(ValueError, match="has no valid .y_m'"):
         contact_from_values("quad0", {"with": "wall", "time_s": "1", "x_m": "2"})
 
 

@@ -27,7 +27,7 @@ from quad_nav.recording.trace import FlightTrace
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import scene_from_document
-from quad_nav.topics.contacts import NAME, contact_from_values
+from quad_nav.topics.flight_info import CONTACT_STATUS, contact_from_values
 from quad_nav.topics.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC, from_text
 
 MOST_MEMORY_BYTES = 4 * 10**9
@@ -139,7 +139,7 @@ class _Reading:
 
     def take_contact(self, message: Message) -> None:
         status = message.content
-        if status.name == NAME:
+        if status.name == CONTACT_STATUS:
             contact = contact_from_values(
                 status.hardware_id, {pair.key: pair.value for pair in status.values}
             )

@@ -18,7 +18,7 @@ from quad_nav.recording import messages
 from quad_nav.recording.action_topics import ActionTopics
 from quad_nav.recording.messages import plan_bytes
 from quad_nav.recording.record_file import TopicWriter, stamp_at
-from quad_nav.topics.costmap_updates import CostmapNews
+from quad_nav.topics.publishing import CostmapUpdates
 
 _NO_PLAN = np.zeros((0, 3))
 
@@ -35,8 +35,8 @@ class NavigatorTopics:
         self._planner = plugin_name(navigator.params.base_global_planner)
         self._controller = plugin_name(navigator.params.base_local_planner)
         self._state: Optional[State] = None
-        self._costmaps: Dict[str, Tuple[LayeredCostmap, CostmapNews]] = {
-            name: (costmap, CostmapNews(costmap))
+        self._costmaps: Dict[str, Tuple[LayeredCostmap, CostmapUpdates]] = {
+            name: (costmap, CostmapUpdates(costmap))
             for name, costmap in (
                 ("global", navigator.global_costmap),
                 ("local", navigator.local_costmap),
@@ -105,19 +105,19 @@ class NavigatorTopics:
 
         One full grid is told at the first update, as to a new listener.
         """
-        costmap, news = self._costmaps[name]
+        costmap, updates = self._costmaps[name]
         frame, stamp = costmap.params.global_frame, stamp_at(now_s)
         self._write(
             f"{name}_costmap/footprint",
             stamp,
             messages.polygon(oriented(costmap.footprint, pose), frame, stamp),
         )
-        is_due, is_first = news.note(now_s, window), name not in self._shown
+        is_due, is_first = updates.add(now_s, window), name not in self._shown
         if not is_due and not is_first:
             return
         self._shown[name] = True
-        changed = news.take()
-        if news.wants_full_grid():
+        changed = updates.pop()
+        if updates.pop_full_grid():
             self._write(
                 f"{name}_costmap/costmap",
                 stamp,

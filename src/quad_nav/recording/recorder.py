@@ -20,9 +20,9 @@ from quad_nav.recording.record_file import START_NS, TopicWriter, create, stamp_
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.topics import flight_info
-from quad_nav.topics.contacts import NAME, contact_values
-from quad_nav.topics.flown_path import FlownPath
-from quad_nav.topics.goal_markers import goal_markers
+from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
+from quad_nav.topics.publishing import FlownPath
+from quad_nav.topics.markers import goal_markers
 from quad_nav.topics.markers import quadcopter_markers, scene_markers
 
 _IDENTITY = Pose3D(0.0, 0.0, 0.0)
@@ -84,7 +84,7 @@ class Recorder(FlightObserver):
             stamp,
             messages.diagnostic(
                 level,
-                NAME,
+                CONTACT_STATUS,
                 str(contact),
                 contact.robot,
                 contact_values(contact, contact.time_s + flight_info.START_S),

@@ -1,4 +1,8 @@
-"""What the ROS face says, without ROS: for the nodes and for what records a flight offline.
+"""Content of the topics, without ROS: used by the nodes and by the offline recorder.
 
-Each shell puts it into its own classes of messages.
+Each shell converts these plain objects into its own message classes.
+
+Reading order: `flight_info` (JSON texts and contacts), `markers` (scene, quadcopters and goals),
+`publishing` (what to publish of costmaps and paths, and when), `health` (diagnostics),
+`validation` (accept or reject incoming messages), `rviz_file` (the RViz configuration).
 """

@@ -1,8 +1,9 @@
-"""What a recording says about a flight besides its messages, as JSON.
+"""Facts about a flight that no standard message carries.
 
-``/quad/flight`` is latched, one object with what is known; several publishers' objects
-add up. ``/quad/events`` has one object for each thing that a sequencer does. Both are
-``std_msgs/String``; ``docs/recording.md`` lists the keys.
+`/quad/flight` is latched and holds one JSON object; the objects of several publishers are merged.
+`/quad/events` holds one JSON object for each action of a sequencer. Both are `std_msgs/String`;
+`docs/recording.md` lists the keys. `/simulation/contacts` holds one
+`diagnostic_msgs/DiagnosticStatus` for each contact; this module has its values.
 """
 
 from __future__ import annotations
@@ -12,19 +13,21 @@ from typing import Any, Dict, Mapping, Optional, Sequence
 
 from quad_nav.mission.goal_sequence import GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
+from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_document import scene_document
 from quad_nav.versions import versions
 
 FLIGHT_TOPIC, EVENTS_TOPIC = "/quad/flight", "/quad/events"
+CONTACT_STATUS = "contact"
 
-_MOST_DIGITS = 100
+_MAX_DIGITS = 100
 START_S = 1.0
-"""What ``/clock`` says at a simulation's start: nodes take 0 for a clock that stands."""
+"""Time on `/clock` when a simulation starts: rospy treats 0 as a clock without messages."""
 
 
 def simulation_info(scene: Scene, seed: int) -> Dict[str, Any]:
-    """What the simulation knows."""
+    """Return the facts that the simulator publishes: scene, seed, start time, versions."""
     return {
         "scene": scene_document(scene),
         "seed": seed,
@@ -38,7 +41,13 @@ def mission_info(
     parameters: Sequence[Mapping[str, Any]],
     robot_radius_m: float,
 ) -> Dict[str, Any]:
-    """What the mission knows; ``parameters`` are the quadcopters' trees for move_base."""
+    """Return the facts that the sequencer publishes: goals, parameters, robot radius.
+
+    Args:
+        sequences: Goals by the robot's name.
+        parameters: move_base's parameter tree of each robot, in the same order.
+        robot_radius_m: Radius of a robot's hull.
+    """
     robots = [
         {"name": name, "goals": [_goal(goal) for goal in sequence.goals], "parameters": tree}
         for (name, sequence), tree in zip(sequences.items(), parameters)
@@ -47,7 +56,7 @@ def mission_info(
 
 
 def event(robot: int, clock_s: float, action: Action) -> Dict[str, Any]:
-    """A sequencer's action."""
+    """Return the JSON object of a sequencer's action."""
     fields: Dict[str, Any] = {"robot": robot, "time_s": clock_s}
     if isinstance(action, SendGoal):
         pose = action.pose
@@ -76,11 +85,12 @@ def event(robot: int, clock_s: float, action: Action) -> Dict[str, Any]:
 
 
 def to_text(info: Mapping[str, Any]) -> str:
+    """Encode an object as JSON with sorted keys."""
     return json.dumps(info, sort_keys=True)
 
 
 def from_text(text: str) -> Optional[Dict[str, Any]]:
-    """None for what is no object in JSON."""
+    """Decode a JSON object; return None for any other text."""
     try:
         info = json.loads(text, parse_int=_whole_number)
     except (ValueError, RecursionError):
@@ -89,11 +99,59 @@ def from_text(text: str) -> Optional[Dict[str, Any]]:
 
 
 def _whole_number(digits: str) -> int:
-    if len(digits) > _MOST_DIGITS:
-        raise ValueError("a number with too many digits")
+    if len(digits) > _MAX_DIGITS:
+        raise ValueError(f"a number with more than {_MAX_DIGITS} digits")
     return int(digits)
 
 
 def _goal(goal: Any) -> Sequence[float]:
     at = [goal.x_m, goal.y_m]
     return at if goal.yaw_rad is None else [*at, goal.yaw_rad]
+
+
+def text_values(**entries: object) -> Dict[str, str]:
+    """Format entries as diagnostic values: floats with six significant digits."""
+    return {
+        key: f"{value:.6g}" if isinstance(value, float) else str(value)
+        for key, value in entries.items()
+    }
+
+
+def contact_values(contact: Contact, clock_s: float) -> Dict[str, str]:
+    """Return the diagnostic values of a contact.
+
+    Args:
+        contact: The contact as the simulation logs it.
+        clock_s: Time on `/clock` at the contact.
+    """
+    return text_values(
+        time_s=clock_s,
+        robot=contact.robot,
+        **{"with": contact.other},
+        x_m=contact.x_m,
+        y_m=contact.y_m,
+    )
+
+
+def contact_from_values(robot: str, values: Mapping[str, str]) -> Contact:
+    """Read a contact from its diagnostic values.
+
+    Args:
+        robot: Name of the robot that reports the contact.
+        values: Values by their keys.
+
+    Raises:
+        ValueError: If a value is missing or not a number.
+    """
+    try:
+        return Contact(
+            float(values["time_s"]),
+            robot,
+            values["with"],
+            float(values["x_m"]),
+            float(values["y_m"]),
+        )
+    except (KeyError, ValueError) as error:
+        raise ValueError(
+            f"contact has no valid {error}; expected the values time_s, with, x_m, y_m"
+        ) from error

@@ -1,7 +1,7 @@
-"""What nodes tell on ``/diagnostics``: levels and their meaning, as ``docs/diagnostics.md`` has it.
+"""Statuses that nodes publish on `/diagnostics`; `docs/diagnostics.md` lists them.
 
-OK: as it should be. WARN: it flies, not as it should. ERROR: it cannot do its work now.
-STALE: nothing is known, because nothing has come yet.
+OK: as expected. WARN: the robot flies, but not as expected. ERROR: the part cannot work now.
+STALE: no message has arrived yet, so the status is unknown.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from typing import Dict, Mapping, Optional, Sequence
 from quad_nav.navigator.tick import State
 
 SLOW_BELOW = 0.8
-"""Part of the wanted control rate below which a second is a slow one."""
+"""A second is slow if the control rate is below this part of the configured one."""
 SLOW_SECONDS = 3
-"""Slow seconds in a row before it counts: one alone is a busy machine's."""
+"""Consecutive slow seconds that give a warning; a single one happens on a busy machine."""
 LATE_S = 0.2
-STUCK_S = 5.0
+BLOCKED_S = 5.0
 
 
 class Level(enum.IntEnum):
-    """The numbers are ``diagnostic_msgs/DiagnosticStatus``'s."""
+    """Level of a status, numbered as in `diagnostic_msgs/DiagnosticStatus`."""
 
     OK = 0
     WARN = 1
@@ -31,7 +31,15 @@ class Level(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Health:
-    """One status; ``name`` is "node: part", ``hardware_id`` the quadcopter or the node."""
+    """One status.
+
+    Attributes:
+        name: The form is "node: part".
+        hardware_id: Name of the robot, or of a node that serves several.
+        level: Severity.
+        message: One line for people.
+        values: Figures by their keys.
+    """
 
     name: str
     hardware_id: str
@@ -42,84 +50,101 @@ class Health:
 
 @dataclass(frozen=True)
 class Input:
-    """A topic that a navigator needs.
+    """An input topic of a navigator.
 
-    ``rate_hz``: messages per second of wall time. ``silent_s``: simulated time since the
-    last one came, None when none ever did; ``late_s``: how old its stamp was then.
+    Attributes:
+        topic: Resolved name.
+        rate_hz: Messages per second of wall time.
+        silent_s: Simulated time since the last message; None if none has arrived.
+        late_s: Age of the last message's stamp when the message arrived.
+        timeout_s: Longest accepted `silent_s`.
     """
 
     topic: str
     rate_hz: float
     silent_s: Optional[float]
     late_s: float
-    allowed_s: float
+    timeout_s: float
 
 
 @dataclass(frozen=True)
 class Control:
-    """What a navigator has been doing for about a second.
+    """Activity of a navigator during about one second.
 
-    ``rate_hz`` and ``wanted_hz`` are control cycles per simulated second; ``slow_seconds``
-    how long it has been below ``SLOW_BELOW`` of what is wanted. ``trouble`` is what is wrong
-    now, ``reason`` the last thing that went wrong, ``reason_s`` when that was.
+    Attributes:
+        state: State of the state machine.
+        rate_hz: Control cycles per simulated second.
+        expected_hz: The configured rate.
+        slow_seconds: How long `rate_hz` has been below `SLOW_BELOW` of `expected_hz`.
+        fault: Present fault, or "".
+        reason: The last fault, present or past.
+        reason_s: Time of the last fault.
     """
 
     state: State
     rate_hz: float
-    wanted_hz: float
+    expected_hz: float
     slow_seconds: int
-    trouble: str
+    fault: str
     reason: str
     reason_s: float
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A process's loop: the greatest lateness in a second, and when it last came round."""
+    """Control loop of a process that serves one robot or many.
+
+    Attributes:
+        robots: Number of robots served.
+        late_s: Greatest delay of a cycle within the last second.
+        blocked_s: Wall time since the loop completed a cycle.
+        cpu: Processor time per wall time of the process.
+        memory_mb: Resident memory of the process.
+    """
 
     robots: int
     late_s: float
-    unseen_s: float
+    blocked_s: float
     cpu: float
     memory_mb: float
 
 
-def inputs_health(node: str, robot: str, inputs: Sequence[Input], is_located: bool) -> Health:
-    """Whether everything that a navigator needs is coming."""
+def inputs_health(node: str, robot: str, inputs: Sequence[Input], is_localized: bool) -> Health:
+    """Assess the input topics of a navigator and whether its pose is known."""
     missing = [one.topic for one in inputs if one.silent_s is None]
     silent = [
-        f"nothing on {one.topic} for {one.silent_s:.1f} s"
+        f"no message on {one.topic} for {one.silent_s:.1f} s"
         for one in inputs
-        if one.silent_s is not None and one.silent_s > one.allowed_s
+        if one.silent_s is not None and one.silent_s > one.timeout_s
     ]
-    values: Dict[str, str] = {"located": str(is_located)}
+    values: Dict[str, str] = {"located": str(is_localized)}
     for one in inputs:
         values[f"{one.topic} Hz"] = f"{one.rate_hz:.1f}"
         values[f"{one.topic} silent s"] = "" if one.silent_s is None else f"{one.silent_s:.2f}"
         values[f"{one.topic} late s"] = f"{one.late_s:.3f}"
-    level, message = Level.OK, "all are coming"
+    level, message = Level.OK, "all inputs arriving"
     if missing:
-        level, message = Level.STALE, "nothing yet on " + ", ".join(missing)
+        level, message = Level.STALE, "no message yet on " + ", ".join(missing)
     if silent:
         level, message = Level.ERROR, "; ".join(silent)
-    elif not missing and not is_located:
-        level, message = Level.ERROR, "its place is unknown, see /tf"
+    elif not missing and not is_localized:
+        level, message = Level.ERROR, "robot pose unknown, check /tf"
     return Health(f"{node}: inputs", robot, level, message, values)
 
 
 def control_health(node: str, robot: str, control: Control) -> Health:
-    """What the navigator does, and how well it keeps up."""
+    """Assess the control rate and the faults of a navigator."""
     level, message = Level.OK, control.state.value
     if control.state is not State.IDLE:
         message += f" at {control.rate_hz:.1f} Hz"
     if control.slow_seconds >= SLOW_SECONDS:
         level = Level.WARN
-        message += f", {control.wanted_hz:g} Hz are wanted"
+        message += f", expected {control.expected_hz:g} Hz"
     if control.state is State.CLEARING:
-        level, message = Level.WARN, f"{message}: a recovery behaviour runs"
-    if control.trouble:
-        level, message = Level.WARN, f"{control.state.value}: {control.trouble}"
-        if control.trouble.startswith("stopped"):
+        level, message = Level.WARN, f"{message}: recovery behaviour active"
+    if control.fault:
+        level, message = Level.WARN, f"{control.state.value}: {control.fault}"
+        if control.fault.startswith("stopped"):
             level = Level.ERROR
     return Health(
         f"{node}: control",
@@ -129,7 +154,7 @@ def control_health(node: str, robot: str, control: Control) -> Health:
         {
             "state": control.state.value,
             "cycles per s": f"{control.rate_hz:.1f}",
-            "controller_frequency": f"{control.wanted_hz:g}",
+            "controller_frequency": f"{control.expected_hz:g}",
             "last reason": control.reason,
             "last reason at s": f"{control.reason_s:.2f}",
         },
@@ -137,12 +162,12 @@ def control_health(node: str, robot: str, control: Control) -> Health:
 
 
 def loop_health(node: str, loop: Loop) -> Health:
-    """Whether a process serves its robots in time."""
-    level, message = Level.OK, f"{loop.robots} served"
+    """Assess whether a process serves its robots in time."""
+    level, message = Level.OK, f"serving {loop.robots} robot{'s' * (loop.robots != 1)}"
     if loop.late_s > LATE_S:
-        level, message = Level.WARN, f"up to {loop.late_s:.2f} s late: cycles are left out"
-    if loop.unseen_s > STUCK_S:
-        level, message = Level.ERROR, f"has not come round for {loop.unseen_s:.0f} s"
+        level, message = Level.WARN, f"up to {loop.late_s:.2f} s late, skipping control cycles"
+    if loop.blocked_s > BLOCKED_S:
+        level, message = Level.ERROR, f"control loop blocked for {loop.blocked_s:.0f} s"
     return Health(
         f"{node}: loop",
         node,

@@ -1,27 +1,34 @@
-"""Scene and quadcopters as markers, see ``visualization_msgs/Marker``."""
+"""Markers of the scene, the quadcopters and the goals.
+
+`Marker` has the fields of `visualization_msgs/Marker` that are in use.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Dict, List, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene, Sphere
 
-# The message's numbers for shapes.
+# Shapes, numbered as in visualization_msgs/Marker.
 CUBE, SPHERE, CYLINDER, CUBE_LIST, TEXT = 1, 2, 3, 6, 9
 
 _WALL_RGBA = (0.55, 0.60, 0.65, 0.35)
 _OBSTACLE_RGBA = (0.62, 0.50, 0.38, 1.0)
 _DARK_RGBA = (0.15, 0.15, 0.17, 1.0)
+_REAR_ROTOR_RGBA = (0.3, 0.3, 0.32, 0.7)
 _ARM_M = 0.19
 _ROTOR_DIAMETER_M = 0.20
 _MANY_BOXES = 256
 _SMALL_M = 1.0
+_GOAL_DIAMETER_M, _ACTIVE_GOAL_DIAMETER_M, _GOAL_TEXT_HEIGHT_M = 0.30, 0.45, 0.35
+_REACHED_ALPHA, _PENDING_ALPHA = 0.2, 0.75
 
 Triple = Tuple[float, float, float]
 Rgba = Tuple[float, float, float, float]
@@ -29,10 +36,20 @@ Rgba = Tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Marker:
-    """A solid or a text in ``frame``; ``namespace`` and ``number`` identify it.
+    """One solid, list of cubes, or text.
 
-    ``size_m`` is (x, y, z). With ``frame_locked`` it moves along with the frame.
-    ``points_m``: the centres of the cubes of a list, in the marker's own axes.
+    Attributes:
+        frame: Frame of `place_m` and `yaw_rad`.
+        namespace: Identifies the marker together with `number`.
+        number: Unique within the namespace.
+        kind: One of the shapes of this module.
+        place_m: Position of the centre (x, y, z).
+        size_m: Extent along the marker's own axes (x, y, z).
+        rgba: Colour, each part from 0 to 1.
+        yaw_rad: Rotation about z.
+        text: Content of a `TEXT` marker.
+        frame_locked: Whether the marker moves with its frame.
+        points_m: Centres of the cubes of a `CUBE_LIST`, in the marker's own axes.
     """
 
     frame: str
@@ -49,9 +66,9 @@ class Marker:
 
 
 def scene_markers(scene: Scene) -> List[Marker]:
-    """Walls and obstacles in ``map``. No floor: RViz would draw it over the costmaps."""
+    """Return walls and obstacles in `map`. No floor: RViz would draw it over the costmaps."""
     walls = [_solid(wall, "walls", k, _WALL_RGBA) for k, wall in enumerate(scene.wall_boxes())]
-    single, listed = _by_number(scene.obstacles)
+    single, listed = _split_small_boxes(scene.obstacles)
     obstacles = [
         _solid(obstacle, "obstacles", k, _OBSTACLE_RGBA) for k, obstacle in enumerate(single)
     ]
@@ -59,70 +76,115 @@ def scene_markers(scene: Scene) -> List[Marker]:
 
 
 def quadcopter_markers(n_robots: int) -> List[Marker]:
-    """A body, arms, rotors and the LIDAR for each quadcopter, moving with ``base_link{i}``."""
+    """Return body, arms, rotors and LIDAR of each quadcopter, locked to `base_link{i}`."""
     return [marker for robot in range(n_robots) for marker in _quadcopter(robot)]
 
 
 def _quadcopter(robot: int) -> List[Marker]:
-    """Rotors are at 45 degrees; the two in front are in the quadcopter's colour."""
-    frame, name, rgba = f"base_link{robot}", f"quad{robot}", robot_rgba(robot)
-    parts = [
-        Marker(frame, name, 0, CUBE, (0.0, 0.0, 0.0), (0.16, 0.10, 0.05), rgba),
-        Marker(
-            frame,
-            name,
-            1,
-            CYLINDER,
-            (0.0, 0.0, MOUNT_HEIGHT_M - 0.015),
-            (0.07, 0.07, 0.05),
-            _DARK_RGBA,
+    """Draw one quadcopter; the rotors are at 45 degrees, the front two in its colour."""
+    part = _RobotPart(f"base_link{robot}", f"quad{robot}")
+    arms = [math.pi / 4, -math.pi / 4]
+    rotors = [math.pi / 4 + k * math.pi / 2 for k in range(4)]
+    return [
+        part.marker(0, CUBE, (0.0, 0.0, 0.0), (0.16, 0.10, 0.05), robot_rgba(robot)),
+        part.marker(
+            1, CYLINDER, (0.0, 0.0, MOUNT_HEIGHT_M - 0.015), (0.07, 0.07, 0.05), _DARK_RGBA
         ),
-        Marker(
-            frame,
-            name,
+        part.marker(
             2,
             CYLINDER,
             (0.0, 0.0, MOUNT_HEIGHT_M),
             (2 * BODY_RADIUS_M, 2 * BODY_RADIUS_M, 0.01),
             robot_rgba(robot, 0.15),
         ),
-    ]
-    for k, angle in enumerate((math.pi / 4, -math.pi / 4)):
-        parts.append(
-            Marker(
-                frame,
-                name,
-                3 + k,
-                CUBE,
-                (0.0, 0.0, 0.0),
-                (2 * _ARM_M, 0.025, 0.02),
-                _DARK_RGBA,
-                angle,
+        *(
+            part.marker(
+                3 + k, CUBE, (0.0, 0.0, 0.0), (2 * _ARM_M, 0.025, 0.02), _DARK_RGBA, angle_rad
             )
-        )
-    for k in range(4):
-        angle = math.pi / 4 + k * math.pi / 2
-        place = (*Pose2D(0.0, 0.0, angle).rotate(_ARM_M, 0.0), 0.03)
-        colour = robot_rgba(robot, 0.8) if k in (0, 3) else (0.3, 0.3, 0.32, 0.7)
-        parts.append(
-            Marker(
-                frame,
-                name,
+            for k, angle_rad in enumerate(arms)
+        ),
+        *(
+            part.marker(
                 5 + k,
                 CYLINDER,
-                place,
+                (*Pose2D(0.0, 0.0, angle_rad).rotate(_ARM_M, 0.0), 0.03),
                 (_ROTOR_DIAMETER_M, _ROTOR_DIAMETER_M, 0.01),
-                colour,
+                robot_rgba(robot, 0.8) if k in (0, 3) else _REAR_ROTOR_RGBA,
             )
+            for k, angle_rad in enumerate(rotors)
+        ),
+    ]
+
+
+@dataclass(frozen=True)
+class _RobotPart:
+    """Make markers that move with a quadcopter's frame."""
+
+    frame: str
+    namespace: str
+
+    def marker(
+        self,
+        number: int,
+        kind: int,
+        place_m: Triple,
+        size_m: Triple,
+        rgba: Rgba,
+        yaw_rad: float = 0.0,
+    ) -> Marker:
+        return Marker(
+            self.frame, self.namespace, number, kind, place_m, size_m, rgba, yaw_rad, "", True
         )
-    return [replace(part, frame_locked=True) for part in parts]
 
 
-def _by_number(obstacles: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], Sequence[Box]]:
-    """Obstacles that get a marker each, and small boxes that go into lists.
+def goal_markers(sequencers: Sequence[Sequencer], altitude_m: float) -> List[Marker]:
+    """Return numbered spheres for the goals of all robots.
 
-    RViz cannot take a marker each from thousands on. It does not draw a list whose
-    centres are all out of view, so that large boxes would vanish at its edges.
+    Reached goals are dimmed, the active one is larger and opaque. The result replaces all goal
+    markers that were published before.
+    """
+    return [
+        marker
+        for robot, sequencer in enumerate(sequencers)
+        for index in range(len(sequencer.sequence.goals))
+        for marker in _goal_markers(robot, index, sequencer, altitude_m)
+    ]
+
+
+def _goal_markers(robot: int, index: int, sequencer: Sequencer, altitude_m: float) -> List[Marker]:
+    goal = sequencer.sequence.goals[index]
+    is_active = sequencer.flight is not None and index == sequencer.index
+    alpha = 1.0 if is_active else _REACHED_ALPHA if index < sequencer.index else _PENDING_ALPHA
+    diameter_m = _ACTIVE_GOAL_DIAMETER_M if is_active else _GOAL_DIAMETER_M
+    above_m = altitude_m + diameter_m / 2 + _GOAL_TEXT_HEIGHT_M / 2
+    return [
+        Marker(
+            "map",
+            f"goal{robot}",
+            index,
+            SPHERE,
+            (goal.x_m, goal.y_m, altitude_m),
+            (diameter_m, diameter_m, diameter_m),
+            robot_rgba(robot, alpha),
+        ),
+        Marker(
+            "map",
+            f"goal{robot}_number",
+            index,
+            TEXT,
+            (goal.x_m, goal.y_m, above_m),
+            (0.0, 0.0, _GOAL_TEXT_HEIGHT_M),
+            (0.1, 0.1, 0.1, max(alpha, 0.4)),
+            text=str(index + 1),
+        ),
+    ]
+
+
+def _split_small_boxes(obstacles: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], Sequence[Box]]:
+    """Split obstacles into those with a marker each and small boxes for lists.
+
+    RViz cannot draw thousands of single markers. It hides a list whose centres are all out of
+    view, so large boxes in lists would vanish at the edges.
     """
     small = [o for o in obstacles if isinstance(o, Box) and max(o.size_x_m, o.size_y_m) <= _SMALL_M]
     if len(small) < _MANY_BOXES:
@@ -132,7 +194,7 @@ def _by_number(obstacles: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], Seque
 
 
 def _box_lists(boxes: Sequence[Box]) -> List[Marker]:
-    """One marker for all boxes of a size and yaw."""
+    """Return one marker for all boxes of the same size and yaw."""
     alike: Dict[Tuple[Triple, float], List[Box]] = defaultdict(list)
     for box in boxes:
         alike[(box.size_x_m, box.size_y_m, box.height_m), box.yaw_rad].append(box)

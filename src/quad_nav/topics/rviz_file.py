@@ -1,10 +1,10 @@
-"""RViz for any number of quadcopters, made from the file for two.
+"""Make an RViz configuration for any number of quadcopters from the one for two.
 
     python -m quad_nav.topics.rviz_file --robots 8 > fleet.rviz
 
-The group of quadcopter 0 is the template of all. Of many quadcopters only what shows the
-whole is switched on at first: plans and trails. The rest is a click away, and costs nothing
-until then, because a display that is off does not subscribe.
+The group of quadcopter 0 is the template for all. With more than `FEW` quadcopters only plans and
+trails are enabled at first. The other displays stay disabled until the user enables them; a
+disabled display does not subscribe and costs nothing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.scene import Scene
 
 FEW = 4
-_OF_MANY = ("Global plan", "Trail")
+_ENABLED_FOR_MANY = ("Global plan", "Trail")
 _GOAL_TOOL = "rviz/SetGoal"
 _NUMBERED_TOOLS = (_GOAL_TOOL, "rviz/SetInitialPose", "rviz/PublishPoint")
 _WINDOW_PX = 750.0  # the shorter side of the view in an ordinary window
@@ -32,7 +32,12 @@ EXIT_BAD_INPUT = 2
 
 
 def document(robots: int, scene: Scene) -> Dict[str, Any]:
-    """The content of a .rviz file for quadcopters 0 .. ``robots`` - 1 in a scene."""
+    """Return the content of a .rviz file.
+
+    Args:
+        robots: Number of quadcopters, numbered from 0.
+        scene: Sets the grid and the view.
+    """
     template = yaml.safe_load(shipped("rviz", "quad_multi.rviz").read_text(encoding="utf-8"))
     manager = template["Visualization Manager"]
     displays = manager["Displays"]
@@ -62,19 +67,19 @@ def _fit_general(display: Dict[str, Any], robots: int, scene: Scene) -> None:
 
 
 def _of_robot(group: Dict[str, Any], number: int, robots: int) -> Dict[str, Any]:
-    """The template with another quadcopter's number and colours."""
+    """Copy the template with another quadcopter's number and colours."""
     own = _renumbered(group, number)
     for display in own["Displays"]:
         colour = _rgb(number)
         if display.get("Color") == _rgb(0):
             display["Color"] = colour
         if robots > FEW:
-            display["Enabled"] = display["Value"] = display["Name"] in _OF_MANY
+            display["Enabled"] = display["Value"] = display["Name"] in _ENABLED_FOR_MANY
     return own
 
 
 def _renumbered(value: Any, number: int) -> Any:
-    """Names and topics of quadcopter 0 as those of another."""
+    """Replace names and topics of quadcopter 0 by those of another."""
     if isinstance(value, dict):
         return {key: _renumbered(one, number) for key, one in value.items()}
     if isinstance(value, list):
@@ -96,9 +101,10 @@ def _with_number(topic: str, number: int) -> str:
 
 
 def _tools(tools: Sequence[Dict[str, Any]], robots: int) -> List[Dict[str, Any]]:
-    """Buttons for goals of the first few quadcopters, and for poses and points if they are all.
+    """Return goal buttons for the first `FEW` quadcopters.
 
-    They all look alike: more would be of no use.
+    Pose and point buttons are added only if these are all. RViz gives all buttons the same icon,
+    so more of them could not be told apart.
     """
     made: List[Dict[str, Any]] = []
     for tool in tools:
@@ -113,7 +119,7 @@ def _tools(tools: Sequence[Dict[str, Any]], robots: int) -> List[Dict[str, Any]]
 
 
 def _centre(view: Dict[str, Any], scene: Scene) -> None:
-    """The whole arena in sight."""
+    """Fit the view to the whole arena."""
     middle_x_m = scene.origin_x_m + 0.5 * scene.size_x_m
     middle_y_m = scene.origin_y_m + 0.5 * scene.size_y_m
     longest_m = max(scene.size_x_m, scene.size_y_m)
@@ -136,7 +142,7 @@ def _rgb(number: int) -> str:
 
 
 def arguments(words: Sequence[str]) -> Tuple[argparse.Namespace, List[str]]:
-    """The command line's, and the words among them that are not ours."""
+    """Parse the command line; the second value holds the unknown words, for RViz."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], allow_abbrev=False)
     parser.add_argument("--robots", type=int, required=True)
     parser.add_argument("--scene", default=RANDOM)
@@ -146,7 +152,7 @@ def arguments(words: Sequence[str]) -> Tuple[argparse.Namespace, List[str]]:
 
 
 def main() -> int:
-    """Prints the file."""
+    """Print the configuration; return 0, or 2 for arguments that are not valid."""
     given, _ = arguments(sys.argv[1:])
     try:
         yaml.safe_dump(document(given.robots, scene_of(vars(given))), sys.stdout, sort_keys=False)

@@ -1,7 +1,7 @@
-"""``/diagnostics``: publishes statuses and says in the log when one changes its level.
+"""Publish statuses on `/diagnostics` and log every change of a level.
 
-``diagnostic_updater`` would do most of it, on simulated time: it falls silent while the
-simulation is paused, and its rates divide by a time that stands still. Here it is wall time.
+`diagnostic_updater` uses simulated time: it publishes nothing while the simulation is paused, and
+its rates divide by an elapsed time of 0. This module uses wall time.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ _LOG = {
 
 
 class DiagnosticsTopic:
-    """A node's publisher on ``/diagnostics``."""
+    """A node's publisher on `/diagnostics`."""
 
     def __init__(self) -> None:
+        """Advertise the topic."""
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         self._levels: Dict[str, int] = {}
 
     def publish(self, array: DiagnosticArray) -> None:
-        """Every status is told each time; a change of its level is one line in the log."""
+        """Publish all statuses and log those whose level has changed."""
         for status in array.status:
             before = self._levels.get(status.name)
             self._levels[status.name] = status.level
@@ -45,7 +46,7 @@ class DiagnosticsTopic:
 
 
 def diagnostic_array(healths: Sequence[Health]) -> DiagnosticArray:
-    """A message of the time that it is."""
+    """Convert statuses to a message with the present time."""
     array = DiagnosticArray(
         status=[
             DiagnosticStatus(
@@ -62,10 +63,13 @@ def diagnostic_array(healths: Sequence[Health]) -> DiagnosticArray:
     return array
 
 
-def tell_every_second(report: Callable[[], Sequence[Health]]) -> None:
-    """Publishes what ``report`` returns, from a thread of its own, until ROS shuts down.
+def publish_health(report: Callable[[], Sequence[Health]]) -> None:
+    """Publish statuses once a second from a separate thread until ROS shuts down.
 
-    It goes on while simulated time stands, and while the node's own loop does.
+    Publishing continues while simulated time or the node's own loop is stopped.
+
+    Args:
+        report: Returns the present statuses.
     """
     topic = DiagnosticsTopic()
 
@@ -75,7 +79,7 @@ def tell_every_second(report: Callable[[], Sequence[Health]]) -> None:
             try:
                 topic.publish(diagnostic_array(report()))
             except rospy.ROSException:
-                if not rospy.core.is_shutdown_requested():  # then rospy closes the topics
+                if not rospy.core.is_shutdown_requested():  # at shutdown rospy closes the topics
                     raise
 
     threading.Thread(target=run, name="diagnostics", daemon=True).start()

@@ -1,4 +1,4 @@
-"""Markers as messages, and goal spheres from there for pybullet's window."""
+"""Convert markers to messages, and goal markers to spheres for pybullet's window."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from quad_nav.topics import markers
 
 
 def marker_array(shown: Sequence[markers.Marker]) -> MarkerArray:
+    """Convert markers."""
     return MarkerArray([_message(marker) for marker in shown])
 
 
-def only_markers(shown: Sequence[markers.Marker]) -> MarkerArray:
-    """They take the place of all that the topic has shown before."""
+def replacing_markers(shown: Sequence[markers.Marker]) -> MarkerArray:
+    """Convert markers, preceded by an order to delete all markers that were shown before."""
     clear = Marker(action=Marker.DELETEALL)
     clear.header.frame_id = "map"
     return MarkerArray([clear, *marker_array(shown).markers])
 
 
 def goal_spheres(message: MarkerArray) -> List[GoalSphere]:
-    """The spheres among markers in ``map``."""
+    """Return the spheres among markers in `map`: centre, radius and colour."""
     return [
         (
             (m.pose.position.x, m.pose.position.y, m.pose.position.z),

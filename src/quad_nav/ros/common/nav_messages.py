@@ -1,4 +1,4 @@
-"""The navigator's arrays as standard messages, and goals back from them."""
+"""Convert the navigator's arrays to standard messages, and goals from messages."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
 from quad_nav.plan.navfn import NOT_REACHED
-from quad_nav.ros.common.convert import pose_from_message, pose_message
+from quad_nav.ros.common.conversions import pose_from_message, pose_message
 
 INVALID_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
 
 
 def goal_from_message(message: Pose) -> Pose3D:
-    """A message's pose with its quaternion normalised.
+    """Return the pose of a goal with its quaternion normalised.
 
     Raises:
-        InvalidGoal: not finite, or not a turn about z: with the original's sentence
-            for quaternions, and ours for positions.
+        InvalidGoal: If the position is not finite, or the rotation is not about z. The text for
+            quaternions is that of C++ move_base.
     """
     pose = pose_from_message(message)
     if not np.isfinite(pose.translation).all():
@@ -42,17 +42,25 @@ def goal_from_message(message: Pose) -> Pose3D:
 
 
 def planar_pose(pose: Pose2D, z_m: float = 0.0) -> Pose3D:
+    """Return a planar pose at a height."""
     return Pose3D(pose.x_m, pose.y_m, z_m, quaternion_from_yaw(pose.yaw_rad))
 
 
 def pose_stamped(pose: Pose3D, frame: str, stamp: rospy.Time) -> PoseStamped:
+    """Convert a pose with its frame and stamp."""
     message = PoseStamped(pose=pose_message(pose))
     message.header.frame_id, message.header.stamp = frame, stamp
     return message
 
 
 def path_message(plan: np.ndarray, frame: str, stamp: rospy.Time) -> Path:
-    """A plan float64[n, 3] (x, y, yaw) as a path; every pose carries the stamp."""
+    """Convert a plan to a path; every pose has the same stamp.
+
+    Args:
+        plan: float64, shape (n, 3): x and y in m, yaw in rad, in `frame`.
+        frame: Frame of the plan.
+        stamp: Time of the plan.
+    """
     path = Path()
     path.header.frame_id, path.header.stamp = frame, stamp
     path.poses = [pose_stamped(planar_pose(Pose2D(*row)), frame, stamp) for row in plan.tolist()]
@@ -60,7 +68,13 @@ def path_message(plan: np.ndarray, frame: str, stamp: rospy.Time) -> Path:
 
 
 def polygon_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> PolygonStamped:
-    """A footprint float64[n, 2] already in ``frame``."""
+    """Convert a footprint to a polygon.
+
+    Args:
+        points: float64, shape (n, 2), x and y in m, in `frame`.
+        frame: Frame of the points.
+        stamp: Time of the robot's pose.
+    """
     message = PolygonStamped()
     message.header.frame_id, message.header.stamp = frame, stamp
     message.polygon.points = [Point32(x, y, 0.0) for x, y in points.tolist()]
@@ -68,14 +82,29 @@ def polygon_message(points: np.ndarray, frame: str, stamp: rospy.Time) -> Polygo
 
 
 def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Time) -> OccupancyGrid:
-    """A costmap's master grid uint8[H, W] in occupancies."""
+    """Convert the master grid of a costmap to occupancies from 0 to 100 and -1.
+
+    Args:
+        spec: Size and place of the grid.
+        costs: uint8, shape (height, width).
+        frame: Global frame of the costmap.
+        stamp: Time of the grid.
+    """
     return _occupancy_grid(spec, occupancy(costs), frame, stamp)
 
 
 def potential_message(
     spec: GridSpec, potential: np.ndarray, scale: int, frame: str, stamp: rospy.Time
 ) -> OccupancyGrid:
-    """A planner's potential float32[H, W], from 0 to ``scale``; -1 where it did not come."""
+    """Convert the potential of a global planner; cells that it did not reach become -1.
+
+    Args:
+        spec: Size and place of the grid.
+        potential: float32, shape (height, width).
+        scale: Value of the greatest potential in the message.
+        frame: Global frame of the costmap.
+        stamp: Time of the plan.
+    """
     reached = potential < NOT_REACHED
     highest = potential[reached].max(initial=0.0)
     values = np.full(potential.shape, -1, dtype=np.int8)
@@ -101,7 +130,15 @@ def _occupancy_grid(
 def update_message(
     costs: np.ndarray, x0: int, y0: int, frame: str, stamp: rospy.Time
 ) -> OccupancyGridUpdate:
-    """A window uint8[h, w] of a costmap whose lower left cell is (x0, y0)."""
+    """Convert a window of a costmap.
+
+    Args:
+        costs: uint8, shape (height, width) of the window.
+        x0: First column of the window in the costmap.
+        y0: First row of the window in the costmap.
+        frame: Global frame of the costmap.
+        stamp: Time of the costmap.
+    """
     message = OccupancyGridUpdate(x=x0, y=y0, width=costs.shape[1], height=costs.shape[0])
     message.header.frame_id, message.header.stamp = frame, stamp
     message.data = occupancy(costs).ravel().tolist()
@@ -114,10 +151,16 @@ CLOUD_FIELDS = ("x", "y", "z", "path_cost", "goal_cost", "occ_cost", "total_cost
 def cost_cloud_message(
     points: np.ndarray, cells: int, frame: str, stamp: rospy.Time
 ) -> PointCloud2:
-    """Scored cells float32[n, 7] in the order of ``CLOUD_FIELDS``.
+    """Convert the scored cells of a local planner.
 
-    As the original's, the cloud has one point for each of the window's ``cells``, the
-    scored ones first. The points without a score are nan, which viewers leave out.
+    As in C++ move_base, the cloud has one point for each cell of the window, the scored ones
+    first. Points without a score are NaN; viewers skip them.
+
+    Args:
+        points: float32, shape (n, 7), columns as in `CLOUD_FIELDS`.
+        cells: Number of cells of the window.
+        frame: Global frame of the local costmap.
+        stamp: Time of the control cycle.
     """
     data = np.full((cells, len(CLOUD_FIELDS)), np.nan, dtype=np.float32)
     data[: len(points)] = points

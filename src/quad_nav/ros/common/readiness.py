@@ -1,38 +1,48 @@
-"""Waits until everything that a node needs is there, and names what is not."""
+"""Wait for what a node needs, and name the topics and services that are missing."""
 
 from __future__ import annotations
 
 import socket
 import time
 from dataclasses import dataclass
-from typing import Callable, List, Optional, Sequence
+from typing import Callable, Dict, List, Sequence
 
 import rosgraph
 import rospy
 
-WARN_EVERY_S = 10.0
+WARN_EVERY_S = 10.0  # wall time, as all durations here
 POLL_S = 0.1
 ALIVE_WITHIN_S = 1.0
+SILENT_AFTER_S = 3.0
+REPEAT_S = 15.0
 
 
 @dataclass(frozen=True)
 class Need:
-    """Something to wait for; ``missing`` says what is there instead once it is looked for."""
+    """A condition to wait for.
 
-    is_there: Callable[[], bool]
+    Attributes:
+        is_met: Tests the condition.
+        missing: Says what is missing and what is there instead.
+    """
+
+    is_met: Callable[[], bool]
     missing: Callable[[], str]
 
 
 def wait_for(needs: Sequence[Need], timeout_s: float) -> List[str]:
-    """What is still missing after ``timeout_s`` of wall time, a sentence each.
+    """Wait until all needs are met, a timeout has passed or the node shuts down.
 
-    Names it in the log every ten seconds meanwhile. Wall time, because the
-    simulated clock may not have started. Ends early when the node shuts down.
+    Logs the missing ones every ten seconds. The timeout is wall time, because the simulated
+    clock may not have started.
+
+    Returns:
+        A sentence for each need that is not met.
     """
     start_s = time.monotonic()
     warn_s = start_s + WARN_EVERY_S
     while True:
-        absent = [need for need in needs if not need.is_there()]
+        absent = [need for need in needs if not need.is_met()]
         now_s = time.monotonic()
         if not absent:
             return []
@@ -41,23 +51,64 @@ def wait_for(needs: Sequence[Need], timeout_s: float) -> List[str]:
         if now_s >= warn_s:
             warn_s = now_s + WARN_EVERY_S
             rospy.logwarn(
-                "waiting for %.0f s:\n  %s",
+                "still waiting after %.0f s:\n  %s",
                 now_s - start_s,
                 "\n  ".join(need.missing() for need in absent),
             )
         time.sleep(POLL_S)
 
 
-def service_is_there(name: str) -> bool:
+class TopicWatch:
+    """Log subscribed topics on which no message has ever arrived.
+
+    The times are wall times, because a stopped simulation publishes nothing. `check_clock`
+    covers `/clock` itself.
+    """
+
+    def __init__(self, subscribers: Sequence[rospy.Subscriber]) -> None:
+        """Watch the topics of subscribers; the first check is due after `SILENT_AFTER_S`."""
+        self._silent: Dict[str, rospy.Subscriber] = {s.resolved_name: s for s in subscribers}
+        self._next_check_s = time.monotonic() + SILENT_AFTER_S
+        for subscriber in subscribers:
+            subscriber.impl.add_callback(self._on_message, subscriber.resolved_name)
+
+    def _on_message(self, _: rospy.Message, name: str) -> None:
+        subscriber = self._silent.pop(name, None)
+        if subscriber is not None:
+            subscriber.impl.remove_callback(self._on_message, name)
+
+    def check_clock(self) -> None:
+        """Log that `/clock` has not started."""
+        if self._is_due():
+            rospy.logwarn(
+                "no message on /clock yet and use_sim_time is set; waiting for the simulator"
+            )
+
+    def check(self) -> None:
+        """Log the topics without a message."""
+        if self._silent and self._is_due():
+            for name, subscriber in list(self._silent.items()):
+                rospy.logwarn("%s", missing_topic(name, subscriber.type))
+
+    def _is_due(self) -> bool:
+        now_s = time.monotonic()
+        if now_s < self._next_check_s:
+            return False
+        self._next_check_s = now_s + REPEAT_S
+        return True
+
+
+def service_exists(name: str) -> bool:
+    """Return whether a node provides a service."""
     return name in _providers(2)
 
 
-def why_gone(service: str, node: str) -> str:
-    """That the master or the node that served something has died; "" when both live."""
+def lost_service(service: str, node: str) -> str:
+    """Say that the ROS master or the node that provided a service has died; "" if both live."""
     try:
         address = rosgraph.Master(rospy.get_name()).lookupService(service)
     except rosgraph.MasterError:
-        return f"the {node} is gone"
+        return f"the {node} has shut down"
     except OSError:
         return "the ROS master has died"
     try:
@@ -68,42 +119,41 @@ def why_gone(service: str, node: str) -> str:
 
 
 def missing_service(name: str) -> str:
-    there = _near(name, _providers(2))
-    return f"{name}: no node serves it; {there or 'there is no service like it'}"
+    """Say that no node provides a service, and which ones exist in its namespace."""
+    alike = _beside(name, _providers(2))
+    return f"{name}: no node provides this service; similar services: {alike}"
 
 
 def missing_topic(name: str, message_type: str) -> str:
-    """Why nothing has come on a topic."""
-    kinds = dict(rospy.get_published_topics())
-    if name not in kinds:
-        alike = sorted(topic for topic, kind in kinds.items() if kind == message_type)
-        there = (
-            f"of this type there is {', '.join(alike)}"
-            if alike
-            else "no topic of this type is published"
+    """Say why no message has arrived on a topic."""
+    types = dict(rospy.get_published_topics())
+    if name not in types:
+        alike = sorted(topic for topic, kind in types.items() if kind == message_type)
+        return (
+            f"{name} [{message_type}]: no node publishes this topic; topics of this type:"
+            f" {', '.join(alike) or 'none'}"
         )
-        return f"{name} [{message_type}]: no node publishes it; {there}"
-    if kinds[name] != message_type:
-        return f"{name}: is published as {kinds[name]}; expected {message_type}"
-    return f"{name} [{message_type}]: is published, but nothing has come on it yet"
+    if types[name] != message_type:
+        return f"{name}: published as {types[name]}, expected {message_type}"
+    return f"{name} [{message_type}]: published, but no message has arrived yet"
 
 
 def missing_subscriber(name: str) -> str:
-    """Why nobody would hear what is published on a topic."""
-    listeners = _providers(1)
-    if name in listeners:
-        return f"{name}: a node listens to it, but has not connected yet"
-    there = _near(name, listeners)
-    return f"{name}: no navigator listens to it; {there or 'nor to any topic like it'}"
+    """Say why a message on a topic would reach no node."""
+    subscribed = _providers(1)
+    if name in subscribed:
+        return f"{name}: a node subscribes to this topic, but has not connected yet"
+    alike = _beside(name, subscribed)
+    return f"{name}: no navigator subscribes to this topic; similar topics: {alike}"
 
 
 def _providers(kind: int) -> List[str]:
-    """Names of the published (0) or subscribed (1) topics or of the services (2) of the system."""
+    """Return all published (0) or subscribed (1) topics or the services (2) of the system."""
     return [name for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[kind]]
 
 
-def _near(name: str, names: Sequence[str]) -> Optional[str]:
-    """The names beside one in its namespace."""
+def _beside(name: str, names: Sequence[str]) -> str:
+    """List the other names in the namespace of one."""
     folder = name.rsplit("/", 1)[0] + "/"
-    beside = sorted(other for other in names if other.startswith(folder) and other != name)
-    return f"there is {', '.join(beside)}" if beside and folder != "/" else None
+    others = sorted(other for other in names if other.startswith(folder) and other != name)
+    return ", ".join(others) if others and folder != "/" else "none"

@@ -1,4 +1,4 @@
-"""The node ``fleet_rviz``: RViz with a file made for its number of quadcopters."""
+"""Node `fleet_rviz`: RViz with a configuration for the number of quadcopters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from quad_nav.topics.rviz_file import EXIT_BAD_INPUT, arguments, document
 
 
 def main() -> int:
-    """Replaces this process by RViz; its file is among ROS's logs."""
+    """Write the configuration to the ROS log folder and replace this process by RViz.
+
+    Returns:
+        2 if the arguments are not valid; otherwise RViz's exit status is the process's own.
+    """
     given, others = arguments(sys.argv[1:])
     try:
         content = document(given.robots, scene_of(vars(given)))

@@ -1,4 +1,4 @@
-"""tf2 as the core wants it: ``Pose3D`` between frames, or a reason why not."""
+"""Look up transforms of tf2 as `Pose3D`, or raise with the reason."""
 
 from __future__ import annotations
 
@@ -9,36 +9,48 @@ import tf2_ros
 
 from quad_nav.errors import NavigationError
 from quad_nav.geometry import Pose3D
-from quad_nav.ros.common.convert import pose_from_transform
+from quad_nav.ros.common.conversions import pose_from_transform
 
 
 class TransformUnavailable(NavigationError):
-    """No transform between two frames at a time. ``later`` says that it may still come."""
+    """No transform between two frames at a time.
 
-    def __init__(self, message: str, later: bool = False):
+    Attributes:
+        later: Whether the transform may still arrive.
+    """
+
+    def __init__(self, message: str, later: bool = False) -> None:
+        """Store the reason."""
         super().__init__(message)
         self.later = later
 
 
 class Transforms:
-    """The transform tree heard so far."""
+    """Transform tree received so far."""
 
     def __init__(self) -> None:
+        """Subscribe to `/tf` and `/tf_static`."""
         self._buffer = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._buffer)
 
     def lookup(self, to_frame: str, from_frame: str, stamp_s: Optional[float] = None) -> Pose3D:
-        """``to_from_from`` at a time, or the latest.
+        """Return the pose of `from_frame` in `to_frame`.
+
+        Args:
+            to_frame: Target frame.
+            from_frame: Source frame.
+            stamp_s: Time of the transform; None for the latest.
 
         Raises:
-            TransformUnavailable: unknown frame, no connection, or outside the times heard.
+            TransformUnavailable: If a frame is unknown, the frames are not connected, or the time
+                is outside of the received ones.
         """
         return self._lookup(to_frame, from_frame, stamp_s)[0]
 
     def locate(
         self, to_frame: str, base_frame: str, now_s: float, tolerance_s: float
     ) -> Optional[Pose3D]:
-        """The robot's latest pose, None when unknown or older than the tolerance."""
+        """Return the robot's latest pose; None if unknown or older than the tolerance."""
         try:
             pose, stamp_s = self._lookup(to_frame, base_frame, None)
         except TransformUnavailable:
@@ -48,13 +60,17 @@ class Transforms:
     def locate_in(
         self, wanted: Sequence[Tuple[str, str, float]], now_s: float
     ) -> List[Optional[Pose3D]]:
-        """``locate`` for several (to_frame, base_frame, tolerance_s); the same ones once."""
+        """Call `locate` once for each distinct (to_frame, base_frame, tolerance_s)."""
         found = {one: self.locate(one[0], one[1], now_s, one[2]) for one in dict.fromkeys(wanted)}
         return [found[one] for one in wanted]
 
-    def _lookup(self, to_frame: str, from_frame: str, stamp_s: Optional[float]):
+    def _lookup(
+        self, to_frame: str, from_frame: str, stamp_s: Optional[float]
+    ) -> Tuple[Pose3D, float]:
         if not to_frame or not from_frame:
-            raise TransformUnavailable(f"empty frame id; expected one like '{to_frame or 'map'}'")
+            raise TransformUnavailable(
+                f"empty frame id, expected one such as '{to_frame or 'map'}'"
+            )
         stamp = rospy.Time(0) if stamp_s is None else rospy.Time.from_sec(stamp_s)
         to_frame, from_frame = to_frame.lstrip("/"), from_frame.lstrip("/")
         try:

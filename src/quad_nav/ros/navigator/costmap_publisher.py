@@ -1,41 +1,65 @@
-"""A costmap's topics: the full grid, its updates and the footprint.
+"""Publish a costmap: the full grid, its updates, the footprint and marked voxels.
 
-The rules are the original's: nothing is published without a listener; what ``CostmapNews``
-says; one full grid for every new listener; with a publish frequency of 0 that is all.
+The rules are those of costmap_2d: publish only for subscribers; follow the schedule of
+`CostmapUpdates`; send each new subscriber one full grid, also with a publish frequency of 0.
 """
 
 from __future__ import annotations
 
+import threading
+from typing import Any, Callable, List
+
 import rospy
-from geometry_msgs.msg import PolygonStamped
+from geometry_msgs.msg import Point, PolygonStamped, Vector3
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
 
 from quad_nav.costmap.cost_grid import Window
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.voxel import VoxelLayer
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
-from quad_nav.ros.common.names import Names, own_node
 from quad_nav.ros.common.nav_messages import grid_message, polygon_message, update_message
-from quad_nav.ros.navigator.voxel_publisher import voxel_publishers
-from quad_nav.topics.costmap_updates import CostmapNews
+from quad_nav.ros.common.node_tools import Names, own_node
+from quad_nav.topics.publishing import CostmapUpdates
+
+_VOXEL_COLOUR = ColorRGBA(0.8, 0.3, 0.1, 0.6)
+
+_Publish = Callable[[Any], None]
 
 
-class _NewListener(rospy.SubscribeListener):
-    def __init__(self, send):
+class _NewSubscriber(rospy.SubscribeListener):
+    """Call a function with the `publish` of each new subscriber."""
+
+    def __init__(self, send: Callable[[_Publish], None]) -> None:
+        super().__init__()
         self._send = send
 
-    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+    def peer_subscribe(
+        self, topic_name: str, topic_publish: _Publish, peer_publish: _Publish
+    ) -> None:
         self._send(peer_publish)
 
 
 class CostmapPublisher:
-    """Publishes one costmap below ``~<name>/``. ``lock`` guards the costmap."""
+    """Publish one costmap below `~<name>/`."""
 
-    def __init__(self, name: str, costmap: LayeredCostmap, lock, names: Names = own_node):
+    def __init__(
+        self, name: str, costmap: LayeredCostmap, lock: threading.RLock, names: Names = own_node
+    ) -> None:
+        """Advertise the topics.
+
+        Args:
+            name: Namespace of the costmap.
+            costmap: The costmap.
+            lock: Guards the costmap.
+            names: Names of the robot's topics.
+        """
         self._costmap = costmap
         self._lock = lock
-        self._news = CostmapNews(costmap)
+        self._schedule = CostmapUpdates(costmap)
         self._footprint = rospy.Publisher(names(f"~{name}/footprint"), PolygonStamped, queue_size=1)
         self._updates = rospy.Publisher(
             names(f"~{name}/costmap_updates"), OccupancyGridUpdate, queue_size=10
@@ -44,16 +68,22 @@ class CostmapPublisher:
             names(f"~{name}/costmap"),
             OccupancyGrid,
             queue_size=1,
-            subscriber_listener=_NewListener(self._send_full),
+            subscriber_listener=_NewSubscriber(self._send_full),
         )
         self._voxels = voxel_publishers(names(f"~{name}"), costmap)
 
     def restart(self, now_s: float) -> None:
-        """For a clock that has jumped back."""
-        self._news.restart(now_s)
+        """Restart the schedule after a clock jump."""
+        self._schedule.restart(now_s)
 
-    def updated(self, now_s: float, pose: Pose2D, window: Window) -> None:
-        """To be called after each update of the costmap, with the window it changed."""
+    def publish(self, now_s: float, pose: Pose2D, window: Window) -> None:
+        """Publish what is due after an update of the costmap.
+
+        Args:
+            now_s: Time of the update.
+            pose: Robot pose in the costmap's global frame.
+            window: Window that the update changed.
+        """
         params, stamp = self._costmap.params, rospy.Time.from_sec(now_s)
         if self._footprint.get_num_connections() > 0:
             self._footprint.publish(
@@ -61,14 +91,14 @@ class CostmapPublisher:
             )
         for voxels in self._voxels:
             voxels.publish(params.global_frame, stamp)
-        if self._news.note(now_s, window):
-            self._publish(stamp)
+        if self._schedule.add(now_s, window):
+            self._publish_grid(stamp)
 
-    def _publish(self, stamp: rospy.Time) -> None:
-        costmap, changed = self._costmap, self._news.take()
+    def _publish_grid(self, stamp: rospy.Time) -> None:
+        costmap, changed = self._costmap, self._schedule.pop()
         if self._grid.get_num_connections() == 0 and self._updates.get_num_connections() == 0:
             return
-        if self._news.wants_full_grid():
+        if self._schedule.pop_full_grid():
             self._grid.publish(self._full(stamp))
         elif not changed.is_empty:
             part = costmap.costs[changed.slices]
@@ -80,7 +110,49 @@ class CostmapPublisher:
         costmap = self._costmap
         return grid_message(costmap.spec, costmap.costs, costmap.params.global_frame, stamp)
 
-    def _send_full(self, send) -> None:
+    def _send_full(self, send: _Publish) -> None:
         with self._lock:
             message = self._full(rospy.Time.now())
         send(message)
+
+
+class VoxelPublisher:
+    """Publish the marked voxels of one layer as cubes for RViz.
+
+    C++ costmap_2d publishes a message type of its own, and has a node that converts it to cubes.
+    """
+
+    def __init__(self, topic: str, layer: VoxelLayer) -> None:
+        """Advertise the topic."""
+        self._layer = layer
+        self._publisher = rospy.Publisher(topic, Marker, queue_size=1)
+
+    def publish(self, frame: str, stamp: rospy.Time) -> None:
+        """Publish the voxels after an update of the costmap, if a node subscribes."""
+        if self._publisher.get_num_connections() > 0:
+            self._publisher.publish(voxel_marker(self._layer, frame, stamp))
+
+
+def voxel_publishers(namespace: str, costmap: LayeredCostmap) -> List[VoxelPublisher]:
+    """Advertise `<namespace>/<layer>/voxel_markers` of each layer with `publish_voxel_map`."""
+    return [
+        VoxelPublisher(f"{namespace}/{name}/voxel_markers", layer)
+        for name, layer in costmap.layers.items()
+        if isinstance(layer, VoxelLayer) and layer.params.publish_voxel_map
+    ]
+
+
+def voxel_marker(layer: VoxelLayer, frame: str, stamp: rospy.Time) -> Marker:
+    """Return the marked voxels as one list of cubes, which replaces the previous one."""
+    resolution_m = layer.grid.spec.resolution_m
+    marker = Marker(
+        type=Marker.CUBE_LIST,
+        action=Marker.ADD,
+        ns="voxels",
+        color=_VOXEL_COLOUR,
+        scale=Vector3(resolution_m, resolution_m, layer.params.z_resolution_m),
+    )
+    marker.header.frame_id, marker.header.stamp = frame, stamp
+    marker.pose.orientation.w = 1.0
+    marker.points = [Point(*centre) for centre in layer.marked_voxels().tolist()]
+    return marker

@@ -1,7 +1,7 @@
-"""Goals from actionlib and from ``move_base_simple/goal``, and what becomes of them.
+"""Receive goals through actionlib and `move_base_simple/goal`, and report their results.
 
-The action is called ``move_base`` in the node's namespace, as the original's;
-the launch files remap its five topics into the robot's own namespace.
+The action is named `move_base` in the node's namespace, as in C++ move_base. The launch files
+remap its five topics into the robot's own namespace.
 """
 
 from __future__ import annotations
@@ -18,16 +18,27 @@ from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import Outcome
-from quad_nav.ros.common.names import Names, own_node
 from quad_nav.ros.common.nav_messages import goal_from_message, pose_stamped
+from quad_nav.ros.common.node_tools import Names, own_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.timing import Schedule
 
 
 class GoalServer:
-    """Hands the newest goal to the navigator when it accepts one."""
+    """Pass the newest goal to the navigator when it accepts one."""
 
-    def __init__(self, transforms: Transforms, global_frame: str, names: Names = own_node):
+    def __init__(
+        self, robot: str, transforms: Transforms, global_frame: str, names: Names = own_node
+    ) -> None:
+        """Start the action server.
+
+        Args:
+            robot: Name of the robot, for the log.
+            transforms: Converts goals to the global frame.
+            global_frame: Frame of the navigator's goals.
+            names: Names of the robot's topics.
+        """
+        self._robot = robot
         self._transforms = transforms
         self._global_frame = global_frame
         self._current_goal = rospy.Publisher(names("~current_goal"), PoseStamped, queue_size=1)
@@ -40,16 +51,16 @@ class GoalServer:
         )
         self._server.start()
         self._simple_goals: Deque[PoseStamped] = deque(maxlen=1)
-        self._status = Schedule(self._take_over_status())
+        self._status = Schedule(self._stop_status_thread())
         self._status.start(0.0)
         self._simple = rospy.Subscriber(
             names("move_base_simple/goal"), PoseStamped, self._store, queue_size=1
         )
 
-    def _take_over_status(self) -> float:
-        """How often the status is told, in Hz, from now on by ``poll``.
+    def _stop_status_thread(self) -> float:
+        """Stop actionlib's status thread and return its frequency in Hz.
 
-        actionlib has a thread for it that wakes up with every message of ``/clock``.
+        The thread wakes up with every message of `/clock`. `poll` publishes the status instead.
         """
         server = self._server.action_server
         if server.status_timer is not None:
@@ -57,17 +68,14 @@ class GoalServer:
         return max(server.status_frequency, 0.0)
 
     def restart(self, now_s: float) -> None:
-        """For a clock that has jumped back."""
+        """Restart the status schedule after a clock jump."""
         self._status.start(now_s)
 
     def _store(self, message: PoseStamped) -> None:
         self._simple_goals.append(message)
 
     def _forward(self) -> None:
-        """A goal without an action client becomes an action goal, visibly.
-
-        The newest only, however many have come.
-        """
+        """Publish the newest simple goal as an action goal, as C++ move_base does."""
         if not self._simple_goals:
             return
         goal = MoveBaseActionGoal()
@@ -76,7 +84,7 @@ class GoalServer:
         self._action_goal.publish(goal)
 
     def poll(self, navigator: Navigator, now_s: float) -> None:
-        """Passes on a waiting goal or cancel, if this is a moment to take it."""
+        """Pass a waiting goal or cancel to the navigator, if it accepts one now."""
         self._forward()
         if self._status.pop(now_s):
             self._server.action_server.publish_status()
@@ -94,7 +102,7 @@ class GoalServer:
             pose = self._in_global_frame(message)
         except InvalidGoal as error:
             navigator.cancel()
-            rospy.logerr("%s", error)
+            rospy.logerr("%s: goal refused: %s", self._robot, error)
             self._server.set_aborted(MoveBaseResult(), str(error))
             return
         navigator.set_goal(pose.to_2d(), now_s)
@@ -109,17 +117,19 @@ class GoalServer:
             return self._transforms.lookup(self._global_frame, frame).compose(pose)
         except TransformUnavailable as error:
             raise InvalidGoal(
-                f"Aborting on goal because its frame '{frame}' can't be transformed to "
+                f"Aborting on goal because its frame '{frame}' cannot be transformed to "
                 f"'{self._global_frame}': {error}"
             ) from error
 
-    def feedback(self, pose: Pose3D, now: rospy.Time) -> None:
+    def publish_feedback(self, pose: Pose3D, now: rospy.Time) -> None:
+        """Publish the robot's pose in the global frame while a goal is active."""
         if self._server.is_active():
             self._server.publish_feedback(
                 MoveBaseFeedback(pose_stamped(pose, self._global_frame, now))
             )
 
     def finish(self, outcome: Optional[Outcome]) -> None:
+        """Report the result of the active goal, if there is one."""
         if outcome is None or not self._server.is_active():
             return
         if outcome.succeeded:

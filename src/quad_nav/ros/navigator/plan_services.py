@@ -1,4 +1,4 @@
-"""The services of a navigator: plans that nobody flies, and costmaps made empty."""
+"""Provide the services of a navigator: `make_plan` and `clear_costmaps`."""
 
 from __future__ import annotations
 
@@ -6,24 +6,21 @@ import threading
 from typing import Callable, Tuple
 
 import rospy
-from nav_msgs.srv import GetPlan, GetPlanResponse
-from std_srvs.srv import Empty, EmptyResponse
+from nav_msgs.srv import GetPlan, GetPlanRequest, GetPlanResponse
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InvalidGoal, PlanningError
 from quad_nav.geometry import Pose2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses, State
-from quad_nav.ros.common.names import Names
 from quad_nav.ros.common.nav_messages import goal_from_message, path_message
+from quad_nav.ros.common.node_tools import Names
 from quad_nav.ros.navigator.plan_topics import PlanTopics
 
 
 class PlanServices:
-    """``~make_plan``, ``~<planner>/make_plan`` and ``~clear_costmaps``.
-
-    ``lock`` guards the navigator; ``locate`` says what time it is and where the robot is.
-    """
+    """Serve `~make_plan`, `~<planner>/make_plan` and `~clear_costmaps`."""
 
     def __init__(
         self,
@@ -33,7 +30,17 @@ class PlanServices:
         locate: Callable[[], Tuple[float, RobotPoses]],
         clearing_radius_m: Callable[[], float],
         names: Names,
-    ):
+    ) -> None:
+        """Advertise the services.
+
+        Args:
+            navigator: Makes the plans.
+            topics: Publish the plans.
+            lock: Guards the navigator.
+            locate: Returns the time and the robot's poses.
+            clearing_radius_m: Returns the radius that is freed around the robot.
+            names: Names of the robot's services.
+        """
         self._navigator, self._topics, self._lock = navigator, topics, lock
         self._locate, self._clearing_radius_m = locate, clearing_radius_m
         planner = plugin_name(navigator.params.base_global_planner)
@@ -43,7 +50,7 @@ class PlanServices:
             rospy.Service(names("~clear_costmaps"), Empty, self._clear_costmaps),
         ]
 
-    def _make_plan(self, request) -> GetPlanResponse:
+    def _make_plan(self, request: GetPlanRequest) -> GetPlanResponse:
         with self._lock:
             if self._navigator.state is not State.IDLE:
                 raise rospy.ServiceException(
@@ -53,11 +60,11 @@ class PlanServices:
                 self._navigator.free_surroundings(self._locate()[1], self._clearing_radius_m())
             return self._plan_response(request)
 
-    def _make_planner_plan(self, request) -> GetPlanResponse:
+    def _make_planner_plan(self, request: GetPlanRequest) -> GetPlanResponse:
         with self._lock:
             return self._plan_response(request)
 
-    def _plan_response(self, request) -> GetPlanResponse:
+    def _plan_response(self, request: GetPlanRequest) -> GetPlanResponse:
         frame = self._navigator.global_costmap.params.global_frame
         if request.goal.header.frame_id.lstrip("/") != frame:
             raise rospy.ServiceException(
@@ -69,23 +76,23 @@ class PlanServices:
         except InvalidGoal as error:
             raise rospy.ServiceException(str(error)) from error
         except PlanningError as error:
-            rospy.logwarn("make_plan: %s", error)
+            rospy.logwarn("%s: no plan: %s", self._services[0].resolved_name, error)
             return GetPlanResponse()
         now = rospy.Time.now()
-        self._topics.plan(plan, now)
+        self._topics.publish_plan(plan, now)
         response = GetPlanResponse()
         response.plan.poses = path_message(plan, frame, now).poses
         return response
 
-    def _start(self, request) -> Pose2D:
+    def _start(self, request: GetPlanRequest) -> Pose2D:
         if request.start.header.frame_id:
             return goal_from_message(request.start.pose).to_2d()
         here = self._locate()[1].in_global
         if here is None:
-            raise rospy.ServiceException("the robot's pose is unknown")
+            raise rospy.ServiceException("the robot pose is unknown")
         return here
 
-    def _clear_costmaps(self, _) -> EmptyResponse:
+    def _clear_costmaps(self, _: EmptyRequest) -> EmptyResponse:
         with self._lock:
             self._navigator.clear_costmaps(rospy.get_time())
         return EmptyResponse()

@@ -1,4 +1,4 @@
-"""What a tick planned and commanded, as the original's topics."""
+"""Publish the command, the plans and the scores of a tick on the topics of move_base."""
 
 from __future__ import annotations
 
@@ -13,25 +13,27 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 
 from quad_nav.config.plugins import plugin_name
+from quad_nav.control.controller import Control
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import State, Tick
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
-from quad_nav.ros.common.convert import twist_message
-from quad_nav.ros.common.names import Names, own_node
+from quad_nav.ros.common.conversions import twist_message
 from quad_nav.ros.common.nav_messages import (
     cost_cloud_message,
     path_message,
     pose_stamped,
     potential_message,
 )
+from quad_nav.ros.common.node_tools import Names, own_node
 
 
 class PlanTopics:
-    """Publishers of command, plans, scores and recoveries."""
+    """Publish command, plans, scores and recoveries."""
 
-    def __init__(self, navigator: Navigator, names: Names = own_node):
+    def __init__(self, navigator: Navigator, names: Names = own_node) -> None:
+        """Advertise the topics of a navigator."""
         self._navigator = navigator
         planner = plugin_name(navigator.params.base_global_planner)
         controller = plugin_name(navigator.params.base_local_planner)
@@ -46,7 +48,7 @@ class PlanTopics:
         self._local_plan = rospy.Publisher(f"{of_controller}/local_plan", Path, queue_size=1)
         self._cost_cloud = rospy.Publisher(f"{of_controller}/cost_cloud", PointCloud2, queue_size=1)
         self._state = rospy.Publisher(names("~state"), String, queue_size=10, latch=True)
-        self._told_state: Optional[State] = None
+        self._published_state: Optional[State] = None
         self._recovery = rospy.Publisher(
             names("move_base/recovery_status"), RecoveryStatus, queue_size=1
         )
@@ -60,16 +62,17 @@ class PlanTopics:
         return self._navigator.local_costmap.params.global_frame
 
     def publish(self, tick: Tick, pose: Pose3D) -> None:
+        """Publish the results of a tick; `pose` is the robot's in the global frame."""
         now = rospy.Time.from_sec(tick.now_s)
-        if tick.state is not self._told_state:
-            self._told_state = tick.state
+        if tick.state is not self._published_state:
+            self._published_state = tick.state
             self._state.publish(tick.state.value)
         if tick.command is not None:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
-            self.plan(tick.plan, now)
+            self.publish_plan(tick.plan, now)
         if tick.planning_failed:
-            self._no_plan(now)
+            self._clear_plan(now)
         if tick.plan is not None or tick.planning_failed:
             self._publish_potential(now)
         if tick.recovery is not None:
@@ -82,10 +85,17 @@ class PlanTopics:
                 )
             )
         if tick.control is not None:
-            self._control(tick.control, now)
+            self._publish_control(tick.control, now)
 
-    def plan(self, plan, now: rospy.Time) -> None:
-        """NavFn's twice, as the original: what the search found, then with the goal itself."""
+    def publish_plan(self, plan: np.ndarray, now: rospy.Time) -> None:
+        """Publish a plan.
+
+        NavFn's plan is published twice, as in C++ move_base: without and with the goal pose.
+
+        Args:
+            plan: float64, shape (n, 3): x and y in m, yaw in rad, in the global frame.
+            now: Stamp of the message.
+        """
         if self._plan.get_num_connections() == 0:
             return
         message = path_message(plan, self._global_frame, now)
@@ -93,8 +103,8 @@ class PlanTopics:
             self._plan.publish(Path(message.header, message.poses[:-1]))
         self._plan.publish(message)
 
-    def _no_plan(self, now: rospy.Time) -> None:
-        """A failed search takes the old plan off the display."""
+    def _clear_plan(self, now: rospy.Time) -> None:
+        """Remove the previous plan from displays after a failed search."""
         if self._plan.get_num_connections() > 0:
             self._plan.publish(path_message(np.zeros((0, 3)), self._global_frame, now))
 
@@ -116,7 +126,7 @@ class PlanTopics:
                 )
             )
 
-    def _control(self, control, now: rospy.Time) -> None:
+    def _publish_control(self, control: Control, now: rospy.Time) -> None:
         if len(control.global_plan) and self._global_plan.get_num_connections() > 0:
             self._global_plan.publish(
                 path_message(control.global_plan, self._local_frame, rospy.Time(0))
@@ -135,4 +145,5 @@ class PlanTopics:
             )
 
     def stop(self) -> None:
+        """Publish a zero velocity."""
         self._command.publish(Twist())

@@ -1,7 +1,7 @@
-"""dynamic_reconfigure: the services and topics of move_base's namespaces.
+"""Provide the dynamic_reconfigure services and topics of move_base's namespaces.
 
-The generated ``...Config`` modules of the original come from ``.cfg`` files at
-build time. Here the same object is made from the tables of ``quad_nav.config``.
+C++ move_base generates its `...Config` modules from `.cfg` files at build time. This module makes
+the same objects from the tables of `quad_nav.config`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dynamic_reconfigure.server import Server
 
 from quad_nav import config
 from quad_nav.errors import InputError
-from quad_nav.ros.common.names import Names, own_node
+from quad_nav.ros.common.node_tools import Names, own_node
 
 OnReconfigure = Callable[[str, Dict[str, Any]], config.Configuration]
 
@@ -22,48 +22,45 @@ _CTYPES = {"double": "double", "int": "int", "bool": "bool", "str": "std::string
 _INT_MAX = 2**31 - 1
 
 
-def config_type(name: str, parameters: Sequence[config.Parameter]) -> Any:
-    """What ``dynamic_reconfigure.server.Server`` wants to know about a set of parameters.
+# Messages of dynamic_reconfigure carry the group beside the values.
+_GROUP_STATE = {"name": "Default", "state": True, "id": 0, "parent": 0, "groups": {}}
+_GROUP = {
+    "name": "Default",
+    "type": "",
+    "state": True,
+    "cstate": "true",
+    "id": 0,
+    "parent": 0,
+    "parentname": "",
+    "class": "DEFAULT",
+    "parentclass": "",
+    "field": "default",
+    "upper": "DEFAULT",
+    "lower": "groups",
+}
 
-    Has the attributes of a generated module: ``config_description``, ``min``,
-    ``max``, ``defaults``, ``level``, ``type`` and ``all_level``.
+
+def config_type(name: str, parameters: Sequence[config.Parameter]) -> types.SimpleNamespace:
+    """Describe parameters as `dynamic_reconfigure.server.Server` expects it.
+
+    Returns:
+        An object with the attributes of a generated module: `config_description`, `min`, `max`,
+        `defaults`, `level`, `type` and `all_level`.
     """
     descriptions = [_description(parameter) for parameter in parameters]
 
     def column(key: str) -> Dict[str, Any]:
-        values = {description["name"]: description[key] for description in descriptions}
-        if key in ("min", "max", "default"):  # messages of the original carry the group as well
-            values["groups"] = {
-                "name": "Default",
-                "state": True,
-                "id": 0,
-                "parent": 0,
-                "groups": {},
-            }
-        return values
+        return {description["name"]: description[key] for description in descriptions}
 
-    group = {
-        "name": "Default",
-        "type": "",
-        "state": True,
-        "cstate": "true",
-        "id": 0,
-        "parent": 0,
-        "parentname": "",
-        "class": "DEFAULT",
-        "parentclass": "",
-        "field": "default",
-        "upper": "DEFAULT",
-        "lower": "groups",
-        "groups": [],
-        "parameters": descriptions,
-    }
+    def column_with_group(key: str) -> Dict[str, Any]:
+        return {**column(key), "groups": {**_GROUP_STATE, "groups": {}}}
+
     return types.SimpleNamespace(
         __name__=name,
-        config_description=group,
-        min=column("min"),
-        max=column("max"),
-        defaults=column("default"),
+        config_description={**_GROUP, "groups": [], "parameters": descriptions},
+        min=column_with_group("min"),
+        max=column_with_group("max"),
+        defaults=column_with_group("default"),
         level=column("level"),
         type=column("type"),
         all_level=0,
@@ -71,20 +68,26 @@ def config_type(name: str, parameters: Sequence[config.Parameter]) -> Any:
 
 
 def serve_namespaces(
-    configuration: config.Configuration, on_reconfigure: OnReconfigure, names: Names = own_node
+    robot: str,
+    configuration: config.Configuration,
+    on_reconfigure: OnReconfigure,
+    names: Names = own_node,
 ) -> List[Server]:
-    """Puts the configuration on the parameter server and serves every namespace of it.
+    """Put a configuration on the parameter server and serve all its namespaces.
 
     Args:
-        on_reconfigure: called with (namespace, changed values) in rospy's service
-            threads; returns the configuration that is then in force. An
-            ``InputError`` leaves everything as it is, and is logged.
+        robot: Name of the robot, for the log.
+        configuration: The present configuration.
+        on_reconfigure: Called with a namespace and the changed values in rospy's service threads;
+            returns the configuration then in force. If it raises an `InputError`, nothing changes
+            and the error is logged.
+        names: Names of the robot's parameters and services.
     """
     rospy.set_param(names("~"), configuration.to_tree())
     servers = []
     for namespace, parameters in config.reconfigurable(configuration).items():
         name = (namespace or "move_base").replace("/", "_") + "_config"
-        callback = _Callback(namespace, configuration, on_reconfigure)
+        callback = _Callback(robot, namespace, configuration, on_reconfigure)
         servers.append(
             _Server(
                 config_type(name, parameters),
@@ -97,13 +100,13 @@ def serve_namespaces(
 
 
 class _Server(Server):
-    """The original's, which talks to the parameter server about every single parameter.
+    """dynamic_reconfigure's server without its calls for every single parameter.
 
-    What is there was put there just before, so only what changes is told: that is a
-    hundred calls fewer for each robot's start.
+    The parameters were stored just before, so only changed ones are stored again. This saves a
+    hundred calls to the parameter server at each robot's start.
     """
 
-    def __init__(self, type_: Any, callback: Any, namespace: str, values: Dict[str, Any]):
+    def __init__(self, type_: Any, callback: Any, namespace: str, values: Dict[str, Any]) -> None:
         self._stored = dict(values)
         super().__init__(type_, callback, "" if namespace == "~" else namespace)
 
@@ -118,11 +121,16 @@ class _Server(Server):
 
 
 class _Callback:
-    """Asks for the change and answers with the values in force."""
+    """Request a change and return the values in force."""
 
     def __init__(
-        self, namespace: str, configuration: config.Configuration, on_reconfigure: OnReconfigure
-    ):
+        self,
+        robot: str,
+        namespace: str,
+        configuration: config.Configuration,
+        on_reconfigure: OnReconfigure,
+    ) -> None:
+        self._robot = robot
         self._namespace = namespace
         self._values = config.values(configuration, namespace)
         self._on_reconfigure = on_reconfigure
@@ -133,19 +141,19 @@ class _Callback:
             for name, value in self._values.items()
             if requested[name] != value
         }
-        # The server's first call, at its start, brings what was just loaded: no change.
+        # The server's first call, at its start, brings the loaded values: no change.
         if changes:
             try:
                 configuration = self._on_reconfigure(self._namespace, changes)
                 self._values = config.values(configuration, self._namespace)
             except InputError as error:
-                rospy.logerr("reconfiguration refused:\n%s", error)
+                rospy.logerr("%s: reconfiguration refused:\n%s", self._robot, error)
         requested.update(self._values)
         return requested
 
 
 def _description(parameter: config.Parameter) -> Dict[str, Any]:
-    """One entry of ``config_description``. Where there is no bound, the type's own stands in."""
+    """Return one entry of `config_description`; the type's limits replace missing bounds."""
     least, greatest = {
         "double": (-float("inf"), float("inf")),
         "int": (-_INT_MAX - 1, _INT_MAX),
@@ -172,7 +180,7 @@ def _description(parameter: config.Parameter) -> Dict[str, Any]:
 
 
 def _edit_method(parameter: config.Parameter) -> str:
-    """An enumeration as rqt_reconfigure parses it; "" for none."""
+    """Return the choices as rqt_reconfigure parses them; "" for none."""
     if not parameter.choices:
         return ""
     ctype = _CTYPES[parameter.kind]

@@ -1,14 +1,14 @@
-"""One robot's navigator on ROS: its topics, services, action and parameters.
+"""Connect one robot's navigator to ROS: topics, services, action and parameters.
 
-Callbacks store; ``step`` takes a snapshot, ticks the navigator when it asks for it and
-publishes what the tick says. One lock guards the navigator against services and
-reconfiguration, which run in rospy's threads.
+Callbacks store messages. `step` takes a snapshot, ticks the navigator when a tick is due and
+publishes the results. One lock guards the navigator against services and reconfiguration, which
+run in rospy's threads.
 """
 
 from __future__ import annotations
 
 import threading
-from typing import List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -16,28 +16,30 @@ from nav_msgs.msg import Odometry
 from quad_nav import config
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.ros.common.convert import twist_from_message
-from quad_nav.ros.common.names import Names, own_node
-from quad_nav.ros.common.throttled_warnings import ThrottledWarnings
+from quad_nav.ros.common.conversions import twist_from_message
+from quad_nav.ros.common.node_tools import Names, ThrottledWarnings, own_node
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
 from quad_nav.ros.navigator.goal_server import GoalServer
-from quad_nav.ros.navigator.health import InputMeter, NavigatorHealth
+from quad_nav.ros.navigator.health_meters import InputMeter, NavigatorHealth
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.plan_services import PlanServices
 from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.ros.navigator.reconfigure import serve_namespaces
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
-from quad_nav.topics.incoming import twist_problem
+from quad_nav.topics.validation import twist_problem
 
-POLL_S = 0.05  # how soon a goal for an idle navigator is noticed
+POLL_S = 0.05  # delay after which an idle navigator notices a goal
 
 
 class RobotNavigator:
-    """Connects a navigator to its topics, services and action.
+    """A navigator with its topics, services and action.
 
-    ``due_s`` is when ``step`` is to be called next.
+    Attributes:
+        number: Number of the robot.
+        due_s: Time at which `step` is due.
+        health: Meters of the navigator.
     """
 
     def __init__(
@@ -46,16 +48,27 @@ class RobotNavigator:
         transforms: Transforms,
         peers: PeerTopics,
         names: Names = own_node,
-    ):
+    ) -> None:
+        """Build the navigator and connect it.
+
+        Args:
+            configuration: Parameters of the robot.
+            transforms: Transform tree, shared by the robots of the process.
+            peers: States of the peers, shared as well.
+            names: Names of the robot's topics, services and parameters.
+
+        Raises:
+            InputError: If a plugin refuses its parameters.
+        """
         self.number = configuration.robot
-        self._name = "" if names is own_node else f"quad{self.number}: "
+        self._name = f"quad{self.number}"
         self.due_s = 0.0
-        self._complaints = ThrottledWarnings()
+        self._warnings = ThrottledWarnings()
         self._configuration = configuration
         self._navigator = navigator = build_navigator(configuration)
         self._lock = threading.RLock()
         self._velocity = Twist2D()
-        self._heard_s: Optional[float] = None  # when the odometry came last
+        self._odometry_s: Optional[float] = None  # time of the last odometry message
         self._transforms, self._peers = transforms, peers
         costmaps = (navigator.global_costmap, navigator.local_costmap)
         self._publishers = {
@@ -66,7 +79,7 @@ class RobotNavigator:
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
         self._sensors = sensors.connect(costmaps, names)
         self._maps = static_maps.connect(costmaps, self._lock, names)
-        self._reconfigure = serve_namespaces(configuration, self._on_reconfigure, names)
+        self._reconfigure = serve_namespaces(self._name, configuration, self._on_reconfigure, names)
         self._services = PlanServices(
             navigator,
             self._topics,
@@ -75,19 +88,21 @@ class RobotNavigator:
             lambda: self._configuration.clearing_radius_m,
             names,
         )
-        self._goals = GoalServer(transforms, navigator.global_costmap.params.global_frame, names)
+        self._goals = GoalServer(
+            self._name, transforms, navigator.global_costmap.params.global_frame, names
+        )
         self.health = self._new_health(names)
 
     @property
     def subscribers(self) -> List[rospy.Subscriber]:
-        """Whose silence would be a fault."""
+        """Subscribers to the topics that the navigator needs."""
         return [self._odometry, *(sensor.subscriber for sensor in self._sensors)]
 
     def _new_health(self, names: Names) -> NavigatorHealth:
         node = rospy.get_name() if names is own_node else names("~")
         return NavigatorHealth(
             node.strip("/"),
-            f"quad{self.number}",
+            self._name,
             [
                 InputMeter(self._odometry),
                 *(
@@ -98,17 +113,17 @@ class RobotNavigator:
         )
 
     def step(self, now_s: float) -> None:
-        """Does what is due at a time."""
+        """Do the work that is due at a time."""
         with self._lock:
             self._step(now_s)
             self.due_s = max(min(self._navigator.next_due_s, now_s + POLL_S), now_s)
 
     def restart(self, now_s: float) -> None:
-        """For a clock that has jumped back."""
+        """Discard messages and restart all schedules after a clock jump."""
         with self._lock:
             for sensor in self._sensors:
                 sensor.forget()
-            self._heard_s = None
+            self._odometry_s = None
             self._navigator.restart(now_s)
             self._goals.restart(now_s)
             for publisher in self._publishers.values():
@@ -116,7 +131,7 @@ class RobotNavigator:
             self.due_s = now_s
 
     def stop(self) -> None:
-        """Sends a last command: hover."""
+        """Publish a zero velocity; the quadcopter hovers."""
         self._topics.stop()
 
     # -- callbacks -----------------------------------------------------------------
@@ -125,11 +140,11 @@ class RobotNavigator:
         velocity = twist_from_message(message.twist.twist)
         problem = twist_problem(velocity)
         if problem:
-            self._complaints.say(f"{self._name}odometry is dropped: {problem}")
+            self._warnings.warn(f"{self._name}: odometry dropped: {problem}")
         else:
-            self._velocity, self._heard_s = velocity, rospy.get_time()
+            self._velocity, self._odometry_s = velocity, rospy.get_time()
 
-    def _on_reconfigure(self, namespace: str, changes: dict) -> config.Configuration:
+    def _on_reconfigure(self, namespace: str, changes: Dict[str, Any]) -> config.Configuration:
         with self._lock:
             configuration = config.updated(self._configuration, namespace, changes)
             apply_configuration(self._navigator, configuration)
@@ -145,24 +160,24 @@ class RobotNavigator:
                 self._transforms, self._configuration.scan_validator.reject_implausible_scans
             )
         self._goals.poll(navigator, now_s)
-        self._peers.tell(self.number, navigator.intention, now_s)
+        self._peers.publish(self.number, navigator.intention, now_s)
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
             return
         in_global, located = self._locate(now_s)
         peers = self._peers.near(self.number, located.in_global, navigator.peer_reach_m)
         tick = navigator.tick(now_s, located, self._velocity, peers)
-        self.health.wanted_hz = navigator.params.controller_frequency_hz
-        self.health.ticked(tick, located)
+        self.health.expected_hz = navigator.params.controller_frequency_hz
+        self.health.update(tick, located)
         self._publish(tick, in_global, located)
 
     def _locate(self, now_s: float) -> Tuple[Optional[Pose3D], RobotPoses]:
-        """The robot's pose in the global costmap's frame, and in both.
+        """Return the robot's pose in the global costmap's frame, and in those of both costmaps.
 
-        Without odometry it is not known how it moves, so where it is counts for nothing.
+        Without odometry the velocity is unknown, so the poses count as unknown as well.
         """
-        silence = self._odometry_silence(now_s)
-        if silence:
-            return None, RobotPoses(None, None, silence)
+        timeout = self._odometry_timeout(now_s)
+        if timeout:
+            return None, RobotPoses(None, None, timeout)
         costmaps = (self._navigator.global_costmap.params, self._navigator.local_costmap.params)
         in_global, in_local = self._transforms.locate_in(
             [
@@ -175,12 +190,12 @@ class RobotNavigator:
             in_global.to_2d() if in_global else None, in_local.to_2d() if in_local else None
         )
 
-    def _odometry_silence(self, now_s: float) -> str:
-        """Said when there was odometry and is none any more."""
-        limit_s, heard_s = self._navigator.params.sensor_timeout_s, self._heard_s
-        if limit_s <= 0.0 or heard_s is None or now_s - heard_s <= limit_s:
+    def _odometry_timeout(self, now_s: float) -> str:
+        """Say that odometry has timed out; "" before the first message."""
+        limit_s, received_s = self._navigator.params.sensor_timeout_s, self._odometry_s
+        if limit_s <= 0.0 or received_s is None or now_s - received_s <= limit_s:
             return ""
-        return f"nothing from {self._odometry.resolved_name} for {now_s - heard_s:.1f} s"
+        return f"no message on {self._odometry.resolved_name} for {now_s - received_s:.1f} s"
 
     def _located_now(self) -> Tuple[float, RobotPoses]:
         now_s = rospy.get_time()
@@ -188,14 +203,14 @@ class RobotNavigator:
 
     def _publish(self, tick: Tick, in_global: Optional[Pose3D], located: RobotPoses) -> None:
         for warning in tick.warnings:
-            self._complaints.say(self._name + warning)
+            self._warnings.warn(f"{self._name}: {warning}")
         for note in tick.notes:
-            rospy.loginfo("%s%s", self._name, note)
+            rospy.loginfo("%s: %s", self._name, note)
         if tick.planning_failed:
-            self._complaints.say(f"{self._name}no plan: {tick.planning_failed}")
+            self._warnings.warn(f"{self._name}: no plan: {tick.planning_failed}")
         if tick.recovery is not None:
             rospy.logwarn(
-                "%srecovery %d of %d: %s",
+                "%s: recovery %d of %d: %s",
                 self._name,
                 tick.recovery.index + 1,
                 tick.recovery.total,
@@ -204,12 +219,12 @@ class RobotNavigator:
         if in_global is not None:
             self._topics.publish(tick, in_global)
             if tick.cycle:
-                self._goals.feedback(in_global, rospy.Time.from_sec(tick.now_s))
+                self._goals.publish_feedback(in_global, rospy.Time.from_sec(tick.now_s))
         elif tick.command is not None:
             self._topics.stop()
         poses = {"global": located.in_global, "local": located.in_local}
         for name, window in tick.windows.items():
             pose = poses[name]
             assert pose is not None  # a costmap is updated at a known pose only
-            self._publishers[name].updated(tick.now_s, pose, window)
+            self._publishers[name].publish(tick.now_s, pose, window)
         self._goals.finish(tick.outcome)

@@ -20,11 +20,10 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.scan_validator import ScanValidator
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.ros.common.convert import ScanMessage, scan_from_message
-from quad_nav.ros.common.names import Names, own_node
-from quad_nav.ros.common.throttled_warnings import ThrottledWarnings
+from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
+from quad_nav.ros.common.node_tools import Names, ThrottledWarnings, own_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.topics.incoming import MOST_POINTS, scan_problem
+from quad_nav.topics.validation import MAX_POINTS, scan_problem
 
 MESSAGE_TYPES = {"LaserScan": ScanMessage, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
 QUEUE_LENGTH = 50
@@ -34,7 +33,7 @@ UNUSABLE = (ValueError, TypeError, ArithmeticError, struct.error)  # what a bad 
 class Sensor:
     """One topic and the (costmap, layer, source) that take what it brings."""
 
-    def __init__(self, topic: str, data_type: str):
+    def __init__(self, topic: str, data_type: str) -> None:
         self.topic = topic
         self.data_type = data_type
         self.targets: List[Tuple[LayeredCostmap, ObstacleLayer, str, str]] = []
@@ -109,7 +108,7 @@ class Sensor:
             return False  # when it is handed over it is said why
         why_not = self._trust.why_not(scan, global_from_sensor, rospy.get_time())
         if why_not:
-            self._complaints.say(f"{self.topic}: a scan is not believed: {why_not}")
+            self._complaints.warn(f"{self.topic}: a scan is not believed: {why_not}")
         return bool(why_not)
 
     def _drop(self, message) -> None:
@@ -200,8 +199,8 @@ def _cloud_points(message) -> np.ndarray:
     count = (
         len(message.points) if isinstance(message, PointCloud) else message.width * message.height
     )
-    if count > MOST_POINTS:
-        raise ValueError(f"{count} points, expected {MOST_POINTS} at most")
+    if count > MAX_POINTS:
+        raise ValueError(f"{count} points, expected {MAX_POINTS} at most")
     if isinstance(message, PointCloud):
         points = [(p.x, p.y, p.z) for p in message.points]
     else:

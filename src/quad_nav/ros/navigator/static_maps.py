@@ -1,8 +1,9 @@
-"""Map topics into the costmaps' static layers."""
+"""Subscribe to map topics and update the static layers of costmaps."""
 
 from __future__ import annotations
 
-from typing import Sequence
+import threading
+from typing import List, Sequence
 
 import numpy as np
 import rospy
@@ -12,16 +13,30 @@ from nav_msgs.msg import OccupancyGrid
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.static import StaticLayer, StaticMap
 from quad_nav.grid import GridSpec
-from quad_nav.ros.common.names import Names, own_node
-from quad_nav.topics.incoming import grid_problem
+from quad_nav.ros.common.node_tools import Names, own_node
+from quad_nav.topics.validation import grid_problem
 
 
 class MapListener:
-    """One static layer's map topic. ``lock`` guards the costmap."""
+    """Map topic of one static layer."""
 
     def __init__(
-        self, costmap: LayeredCostmap, name: str, layer: StaticLayer, lock, names: Names = own_node
-    ):
+        self,
+        costmap: LayeredCostmap,
+        name: str,
+        layer: StaticLayer,
+        lock: threading.RLock,
+        names: Names = own_node,
+    ) -> None:
+        """Subscribe to the map.
+
+        Args:
+            costmap: Costmap of the layer.
+            name: Name of the layer.
+            layer: The static layer.
+            lock: Guards the costmap.
+            names: Names of the robot's topics.
+        """
         self._costmap = costmap
         self._name = name
         self._layer = layer
@@ -37,7 +52,7 @@ class MapListener:
         info = message.info
         problem = grid_problem(info.width, info.height, info.resolution, len(message.data))
         if problem:
-            rospy.logwarn("%s: the map is dropped: %s", self._grid.resolved_name, problem)
+            rospy.logwarn("%s: map dropped: %s", self._grid.resolved_name, problem)
             return
         spec = GridSpec(
             info.width, info.height, info.resolution, info.origin.position.x, info.origin.position.y
@@ -45,7 +60,7 @@ class MapListener:
         frame, wanted = message.header.frame_id, self._costmap.params.global_frame
         if frame != wanted and not self._costmap.params.rolling_window:
             rospy.logwarn(
-                "map on %s is in frame '%s', the costmap in '%s': used as if it were the same",
+                "%s: map is in frame '%s', expected '%s'; using it without a transform",
                 self._grid.resolved_name,
                 frame,
                 wanted,
@@ -59,15 +74,19 @@ class MapListener:
     def _on_update(self, message: OccupancyGridUpdate) -> None:
         problem = grid_problem(message.width, message.height, 1.0, len(message.data))
         if problem:
-            rospy.logwarn_throttle(5.0, f"{self._updates.resolved_name}: dropped: {problem}")
+            rospy.logwarn_throttle(
+                5.0, f"{self._updates.resolved_name}: map update dropped: {problem}"
+            )
             return
         part = np.array(message.data, dtype=np.int8).reshape(message.height, message.width)
         with self._lock:
             self._layer.update_map(part, message.x, message.y)
 
 
-def connect(costmaps: Sequence[LayeredCostmap], lock, names: Names = own_node) -> list:
-    """Subscribes to the map topic of every static layer."""
+def connect(
+    costmaps: Sequence[LayeredCostmap], lock: threading.RLock, names: Names = own_node
+) -> List[MapListener]:
+    """Subscribe to the map topic of every static layer."""
     return [
         MapListener(costmap, name, layer, lock, names)
         for costmap in costmaps

@@ -23,15 +23,15 @@ from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
-from quad_nav.ros.common.marker_messages import only_markers
+from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.ros.common.readiness import Need
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.ros.sequencer.diagnostics import contact_from_message, progress
-from quad_nav.ros.sequencer.journal import MissionJournal
+from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress
+from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.ros.sequencer.setup import MissionSetup
 from quad_nav.topics.flight_info import FLIGHT_TOPIC, mission_info, to_text
-from quad_nav.topics.goal_markers import goal_markers
+from quad_nav.topics.markers import goal_markers
 
 START_SERVICE = "/simulation/start"
 WAIT_S = 0.2  # wall time, as the next: how soon it is seen that the node shall end
@@ -45,7 +45,7 @@ class Mission:
     journal that cannot be used.
     """
 
-    def __init__(self, setup: MissionSetup, again: bool = False):
+    def __init__(self, setup: MissionSetup, again: bool = False) -> None:
         self._setup, self._again = setup, again
         self._journal = MissionJournal(setup.journal, [robot.name for robot in setup.robots])
         self._before = self._journal.read() if setup.resume or again else None
@@ -234,7 +234,7 @@ class Mission:
         if altitude_m is None:
             altitude_m = heights[0] if heights else 0.0
         self._goals.publish(
-            only_markers(goal_markers([robot.sequencer for robot in self.robots], altitude_m))
+            replacing_markers(goal_markers([robot.sequencer for robot in self.robots], altitude_m))
         )
 
     def _on_contact(self, message: DiagnosticStatus) -> None:

@@ -15,6 +15,7 @@ import rospy
 
 from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import unflown
+from quad_nav.mission.respawn import RESPAWNED
 from quad_nav.mission.summary import (
     EXIT_BAD_INPUT,
     EXIT_FAILURE,
@@ -24,8 +25,7 @@ from quad_nav.mission.summary import (
     write_json,
 )
 from quad_nav.ros.common import readiness
-from quad_nav.ros.common.respawn import AGAIN
-from quad_nav.ros.common.signals import init_node
+from quad_nav.ros.common.node_tools import init_node
 from quad_nav.ros.sequencer.mission import START_SERVICE, Mission
 from quad_nav.ros.sequencer.setup import MissionSetup, read_setup, result_path
 
@@ -116,7 +116,7 @@ def main() -> int:
     result = result_path(parameters)
     try:
         setup = read_setup(parameters, name, result, rospy.get_param("/", {}))
-        mission = Mission(setup, AGAIN in sys.argv)
+        mission = Mission(setup, RESPAWNED in sys.argv)
     except InputError as error:
         rospy.logfatal("nothing is flown:\n  %s", "\n  ".join(error.problems))
         _write(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)

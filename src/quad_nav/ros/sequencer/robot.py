@@ -24,10 +24,9 @@ from quad_nav.mission.sequencer import (
     Stage,
     Verdict,
 )
-from quad_nav.ros.common.convert import pose_from_message
-from quad_nav.ros.common.path_publisher import PathPublisher
+from quad_nav.ros.common.conversions import pose_from_message
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.ros.sequencer.robot_link import Inbox, RobotLink
+from quad_nav.ros.sequencer.robot_link import Inbox, PathPublisher, RobotLink
 from quad_nav.topics.flight_info import EVENTS_TOPIC, event, to_text
 
 FILE_POLL_S = 0.5  # wall time: a person edits while the simulation is paused, too
@@ -50,7 +49,7 @@ class MissionRobot:
 
     def __init__(
         self, index: int, goals: RobotGoals, transforms: Transforms, news: threading.Event
-    ):
+    ) -> None:
         self.name = goals.name
         self.sequencer = Sequencer(goals.sequence)
         self.link = RobotLink(index, news)

@@ -47,7 +47,7 @@ class RobotLink(rospy.SubscribeListener):
     ``news`` is set when odometry comes.
     """
 
-    def __init__(self, index: int, news: threading.Event):
+    def __init__(self, index: int, news: threading.Event) -> None:
         super().__init__()
         self._news = news
         self._lock = threading.Lock()

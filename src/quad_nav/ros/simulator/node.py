@@ -22,7 +22,7 @@ from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError
-from quad_nav.ros.common.convert import twist_from_message
+from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.ros.common.marker_messages import goal_spheres
 from quad_nav.ros.simulator.topics import SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
@@ -33,8 +33,7 @@ from quad_nav.scenario.simulator_setup import (
 )
 from quad_nav.sim.pacing import Pacer, RateMeter
 from quad_nav.sim.simulation import STEP_S, STEPS_PER_S, Simulation
-from quad_nav.topics.command_lease import CommandLease
-from quad_nav.topics.incoming import twist_problem
+from quad_nav.topics.validation import CommandLease, twist_problem
 
 _STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 _STEPS_PER_CLOCK = STEPS_PER_S // 120
@@ -49,7 +48,7 @@ _ANSWER_WITHIN_S = 10.0
 class SimulatorNode:
     """Topics and services around one simulation."""
 
-    def __init__(self, setup: SimulatorSetup):
+    def __init__(self, setup: SimulatorSetup) -> None:
         self._setup = setup
         self._simulation = Simulation(
             setup.scene, setup.robots, setup.params, setup.seed, setup.gui, _START_STEP

@@ -14,7 +14,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.geometry import Pose3D
-from quad_nav.ros.common.convert import (
+from quad_nav.ros.common.conversions import (
     ScanMessage,
     odometry_message,
     scan_message,
@@ -27,8 +27,14 @@ from quad_nav.ros.common.marker_messages import marker_array
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.simulation import RobotState, Simulation
-from quad_nav.topics.contacts import NAME, contact_values, text_values
-from quad_nav.topics.flight_info import FLIGHT_TOPIC, simulation_info, to_text
+from quad_nav.topics.flight_info import (
+    CONTACT_STATUS,
+    FLIGHT_TOPIC,
+    contact_values,
+    simulation_info,
+    text_values,
+    to_text,
+)
 from quad_nav.topics.markers import quadcopter_markers, scene_markers
 
 _STAYS, _MOUNT = transform(Pose3D(0.0, 0.0, 0.0)), transform(base_from_lidar)
@@ -46,7 +52,7 @@ class SimulatorTopics:
     them, and tf is not sent twice with one stamp, which tf2 would complain about.
     """
 
-    def __init__(self, simulation: Simulation):
+    def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         robots = range(simulation.n_robots)
         self.lidar_enabled = [True for _ in robots]
@@ -119,7 +125,7 @@ class SimulatorTopics:
         self._contacts.publish(
             DiagnosticStatus(
                 level=DiagnosticStatus.WARN,
-                name=NAME,
+                name=CONTACT_STATUS,
                 hardware_id=contact.robot,
                 message=str(contact),
                 values=_pairs(contact_values(contact, contact.time_s)),

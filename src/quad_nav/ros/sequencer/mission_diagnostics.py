@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.sim.contacts import Contact
-from quad_nav.topics.contacts import contact_from_values
+from quad_nav.topics.flight_info import contact_from_values
 
 
 def progress(robots: Sequence[MissionRobot], log: FlightLog) -> DiagnosticArray:

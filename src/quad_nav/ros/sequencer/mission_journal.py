@@ -27,7 +27,7 @@ class MissionJournal:
     While no sequencer was there, a mission that is taken over on another clock stood still.
     """
 
-    def __init__(self, path: Path, names: Sequence[str]):
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
         self._journal = Journal(path)
         self._names = list(names)
         self.start_s = 0.0

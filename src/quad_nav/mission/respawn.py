@@ -1,9 +1,11 @@
-"""``python3 -m quad_nav.ros.common.respawn COMMAND [ARGUMENT...]``: runs a node, and again when killed.
+"""Run a node and restart it when a signal kills it.
 
-roslaunch's ``respawn`` takes a node that has finished for one that has died, and forbids
-``required`` beside it. As a ``launch-prefix`` this knows the difference: a node that ends
-by itself has ended, and its exit status is ours. One that a signal killed is started again,
-with ``--again`` behind its arguments.
+    python3 -m quad_nav.mission.respawn COMMAND [ARGUMENT...]
+
+The launch files use this as the sequencer's `launch-prefix`. roslaunch's own `respawn` also
+restarts a node that has finished, and excludes `required`. Here, a node that exits ends this
+program with the same status. A node that a signal kills is restarted with `--respawned` as its
+last argument, so that it resumes its mission from the journal.
 """
 
 from __future__ import annotations
@@ -15,13 +17,17 @@ import sys
 import threading
 from typing import List
 
-AGAIN = "--again"
+RESPAWNED = "--respawned"
 DELAY_S = 1.0
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 def main() -> int:
-    """The command's exit status; 128 and the signal's number when we ended it by one."""
+    """Run the command of the command line and restart it when it is killed.
+
+    Returns:
+        The command's exit status, or 128 plus the number of the signal passed on to it.
+    """
     command, ended = sys.argv[1:], threading.Event()
     child = _start(command)
 
@@ -36,21 +42,21 @@ def main() -> int:
         if status >= 0 or ended.is_set():
             return status if status >= 0 else 128 - status
         print(
-            f"{command[0]}: killed by {signal.Signals(-status).name}, started again",
+            f"{command[0]}: killed by {signal.Signals(-status).name}, restarting",
             file=sys.stderr,
             flush=True,
         )
         if ended.wait(DELAY_S):
             return 128 - status
-        child = _start([*command, AGAIN])
+        child = _start([*command, RESPAWNED])
 
 
-def _start(command: List[str]) -> subprocess.Popen:
+def _start(command: List[str]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, preexec_fn=_end_with_parent)
 
 
 def _end_with_parent() -> None:
-    """Nobody would see to a node whose parent was killed."""
+    """Let the kernel end the node if this program is killed: nothing would supervise it."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 

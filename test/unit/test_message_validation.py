@@ -28,7 +28,7 @@ def scan(angle_min_rad=-3.0, increment_rad=0.01, low_m=0.02, high_m=60.0, ranges
         scan(increment_rad=math.inf),
         scan(low_m=-math.inf),
         scan(high_m=math.nan),
-        scan(ranges=np.ones(incoming.MOST_BEAMS + 1)),
+        scan(ranges=np.ones(incoming.MAX_BEAMS + 1)),
     ],
 )
 def test_scans_that_are_dropped(odd):
@@ -52,7 +52,7 @@ def test_usual_messages_are_taken():
     assert incoming.scan_problem(scan(high_m=math.inf)) == ""
     assert incoming.pose_problem(Pose3D(1.0, 2.0, 3.0)) == ""
     assert incoming.twist_problem(Twist2D(0.3, 0.0, -1.0)) == ""
-    assert incoming.way_problem(np.array([[1.0, 2.0]])) == ""
+    assert incoming.path_problem(np.array([[1.0, 2.0]])) == ""
     assert incoming.grid_problem(3, 2, 0.05, 6) == ""
 
 
@@ -76,8 +76,8 @@ def test_velocities_that_are_dropped(twist):
 
 
 def test_ways_that_are_dropped():
-    assert "not finite" in incoming.way_problem(np.array([[1.0, math.nan]]))
-    assert "at most" in incoming.way_problem(np.zeros((incoming.MOST_POSES + 1, 2)))
+    assert "not finite" in incoming.path_problem(np.array([[1.0, math.nan]]))
+    assert "at most" in incoming.path_problem(np.zeros((incoming.MAX_POSES + 1, 2)))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Messages and our dataclasses, in pairs: ``x_message`` and ``x_from_message``."""
+"""Convert dataclasses to messages and back, in pairs: `x_message` and `x_from_message`."""
 
 from __future__ import annotations
 
@@ -29,26 +29,34 @@ _NO_INTENSITIES = np.empty(0, dtype=np.float32)
 
 
 def time_message(seconds: float) -> rospy.Time:
-    """The nearest nanosecond."""
+    """Round seconds to the nearest nanosecond."""
     whole = int(seconds)
     return rospy.Time(whole, round((seconds - whole) * 1e9))
 
 
 def twist_message(twist: Twist2D) -> Twist:
+    """Convert a velocity in the body frame."""
     return Twist(Vector3(twist.vx_mps, twist.vy_mps, 0.0), Vector3(0.0, 0.0, twist.vyaw_radps))
 
 
 def twist_from_message(message: Twist) -> Twist2D:
-    """The horizontal part; it may hold NaN or infinity, see ``Twist2D.is_finite``."""
+    """Return the planar part of a velocity.
+
+    Nothing is checked: it may hold NaN or infinity, see `Twist2D.is_finite`.
+    """
     return Twist2D(message.linear.x, message.linear.y, message.angular.z)
 
 
 def pose_message(pose: Pose3D) -> Pose:
+    """Convert a pose."""
     return Pose(Point(pose.x_m, pose.y_m, pose.z_m), Quaternion(*pose.quaternion))
 
 
 def pose_from_message(message: Pose) -> Pose3D:
-    """As it is: neither finite numbers nor a unit quaternion are checked."""
+    """Convert a pose.
+
+    Nothing is checked: numbers may not be finite, the quaternion may not have unit length.
+    """
     p, q = message.position, message.orientation
     return Pose3D(p.x, p.y, p.z, (q.x, q.y, q.z, q.w))
 
@@ -56,10 +64,12 @@ def pose_from_message(message: Pose) -> Pose3D:
 def transform_message(
     parent_from_child: Pose3D, parent: str, child: str, stamp: rospy.Time
 ) -> TransformStamped:
+    """Convert a transform between two frames with its stamp."""
     return TransformStamped(Header(0, stamp, parent), child, transform(parent_from_child))
 
 
 def transform(parent_from_child: Pose3D) -> Transform:
+    """Convert a transform without stamp."""
     return Transform(
         Vector3(parent_from_child.x_m, parent_from_child.y_m, parent_from_child.z_m),
         Quaternion(*parent_from_child.quaternion),
@@ -67,7 +77,7 @@ def transform(parent_from_child: Pose3D) -> Transform:
 
 
 def pose_from_transform(message: TransformStamped) -> Pose3D:
-    """``parent_from_child``."""
+    """Return the pose `parent_from_child`."""
     t, q = message.transform.translation, message.transform.rotation
     return Pose3D(t.x, t.y, t.z, (q.x, q.y, q.z, q.w))
 
@@ -79,7 +89,15 @@ def odometry_message(
     frames: Tuple[str, str],
     stamp: rospy.Time,
 ) -> Odometry:
-    """``frames`` are the odometry frame and the body's, which the velocities are in."""
+    """Make an odometry message without covariances.
+
+    Args:
+        odom_from_base: Pose of the body in the odometry frame.
+        linear_mps: Linear velocity (x, y, z) in the body frame.
+        angular_radps: Angular velocity (x, y, z) in the body frame.
+        frames: Odometry frame and body frame.
+        stamp: Time of the pose.
+    """
     twist = Twist(Vector3(*linear_mps), Vector3(*angular_radps))
     return Odometry(
         Header(0, stamp, frames[0]),
@@ -90,16 +108,19 @@ def odometry_message(
 
 
 def odometry_from_message(message: Odometry) -> Tuple[Pose3D, Twist2D]:
-    """The body's pose in the odometry frame and its velocity in its own."""
+    """Return the body's pose in the odometry frame and its velocity in the body frame."""
     return pose_from_message(message.pose.pose), twist_from_message(message.twist.twist)
 
 
 ScanMessage = numpy_msg(LaserScan)
-"""A LaserScan whose ranges are an array, which goes over the wire as it is."""
+"""A LaserScan whose ranges are an array, which rospy serialises without conversion."""
 
 
 def scan_message(scan: Scan, frame: str) -> LaserScan:
-    """All beams are of one instant: ``time_increment`` and ``scan_time`` are 0."""
+    """Convert a scan.
+
+    All beams have the same time: `time_increment` and `scan_time` are 0.
+    """
     message = ScanMessage(
         angle_min=scan.angle_min_rad,
         angle_max=scan.angle_min_rad + (len(scan.ranges_m) - 1) * scan.angle_increment_rad,
@@ -114,6 +135,7 @@ def scan_message(scan: Scan, frame: str) -> LaserScan:
 
 
 def scan_from_message(message: LaserScan) -> Scan:
+    """Convert a scan; `validation.scan_problem` checks the result."""
     return Scan(
         message.header.stamp.to_sec(),
         message.angle_min,

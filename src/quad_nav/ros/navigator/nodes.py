@@ -1,0 +1,129 @@
+"""Start of the nodes `move_base` (one robot) and `fleet` (many robots in one process).
+
+The robots of a fleet share tf, the odometry of their peers, the compiled kernels and one loop;
+there is no thread for each robot. Topics, services and parameters are each robot's own, named as
+those of a `move_base` started by `launch/quad.launch`.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Callable, Dict, Iterable, List, Mapping, Tuple
+
+import rospy
+
+from quad_nav import config
+from quad_nav.config import Configuration
+from quad_nav.errors import InputError
+from quad_nav.ros.common.node_tools import Names, in_fleet, init_node, own_node
+from quad_nav.ros.common.transforms import Transforms
+from quad_nav.ros.navigator.loop import NavigatorLoop
+from quad_nav.ros.navigator.peer_topics import PeerTopics
+from quad_nav.ros.navigator.robot_navigator import RobotNavigator
+from quad_nav.scenario.fleet_setup import read_setup
+from quad_nav.scenario.warm_up import warm_up
+
+EXIT_BAD_INPUT = 2
+FLEET_PERIOD_S = 1.0 / 40.0  # as often as poses arrive
+
+
+class Fleet:
+    """The robots of one process, and their peers in each global frame."""
+
+    def __init__(
+        self, configurations: Mapping[int, Configuration], names: Callable[[int], Names]
+    ) -> None:
+        """Connect the robots to their topics.
+
+        Args:
+            configurations: Parameters by the robot's number.
+            names: Returns the names of a robot's topics.
+
+        Raises:
+            InputError: If a plugin refuses its parameters.
+        """
+        transforms = Transforms()
+        frames: Dict[str, List[Configuration]] = {}
+        for one in configurations.values():
+            frames.setdefault(one.global_costmap.global_frame, []).append(one)
+        self.robots: List[RobotNavigator] = []
+        self.peers: List[PeerTopics] = []
+        for frame, members in frames.items():
+            peers = PeerTopics(
+                {one.robot: names(one.robot) for one in members},
+                members[0].robots,
+                transforms,
+                frame,
+            )
+            self.peers.append(peers)
+            self.robots += [
+                RobotNavigator(one, transforms, peers, names(one.robot)) for one in members
+            ]
+
+
+def move_base() -> int:
+    """Run the node `move_base`: one robot.
+
+    Returns:
+        Exit status: 0 at shutdown, 2 for parameters that are not valid.
+    """
+    init_node("move_base")
+
+    def configurations() -> Dict[int, Configuration]:
+        one = config.load(rospy.get_param("~", {}), rospy.get_name())
+        return {one.robot: one}
+
+    return _run(configurations, lambda _: own_node)
+
+
+def fleet() -> int:
+    """Run the node `fleet`: the robots that its parameters assign to it.
+
+    Returns:
+        Exit status: 0 at shutdown, 2 for parameters that are not valid.
+    """
+    init_node("fleet")
+    name = rospy.get_name().lstrip("/")
+    return _run(
+        lambda: read_setup(rospy.get_param("~", {}), name).configurations,
+        in_fleet,
+        FLEET_PERIOD_S,
+    )
+
+
+def _run(
+    read: Callable[[], Mapping[int, Configuration]],
+    names: Callable[[int], Names],
+    period_s: float = 0.001,
+) -> int:
+    name = rospy.get_name().lstrip("/")
+    try:
+        configurations = read()
+        warnings = [line for one in configurations.values() for line in one.warnings]
+        for warning in dict.fromkeys(warnings):
+            rospy.logwarn("%s", warning)
+        for configuration in _distinct(configurations.values()):
+            warm_up(configuration)
+        group = Fleet(configurations, names)
+        rospy.loginfo("%s: navigators ready: %d", name, len(group.robots))
+        NavigatorLoop(group.robots, group.peers, period_s).run()
+    except InputError as error:
+        rospy.logfatal("%s: invalid parameters, shutting down:\n%s", name, error)
+        print(f"{name}: invalid parameters, shutting down:\n{error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    except rospy.ROSInterruptException:
+        return 0  # a shutdown interrupts the loop's sleep
+    return 0
+
+
+def _distinct(configurations: Iterable[Configuration]) -> List[Configuration]:
+    """Return one configuration for each choice of plugins: the others use the same kernels."""
+    kinds: Dict[Tuple[object, ...], Configuration] = {}
+    for one in configurations:
+        layers = tuple(
+            type(layer)
+            for costmap in (one.global_costmap, one.local_costmap)
+            for _, layer in costmap.layers
+        )
+        kinds.setdefault((type(one.global_planner), type(one.local_planner), layers), one)
+    return list(kinds.values())

@@ -1,0 +1,104 @@
+"""What to publish of a costmap and of a flown path, and when."""
+
+from __future__ import annotations
+
+import collections
+from typing import Callable, Deque, Generic, Optional, TypeVar
+
+from quad_nav.costmap.cost_grid import NO_CELLS, Window
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.grid import GridSpec
+from quad_nav.timing import Schedule
+
+CLOCK_GRAIN_S = 1e-6  # a clock of whole nanoseconds may be this early
+
+PATH_PERIOD_S = 0.5
+PATH_SPACING_M = 0.05
+PATH_POSES = 1000  # 50 m, about a megabyte of messages
+
+T = TypeVar("T")
+
+
+class CostmapUpdates:
+    """Collect the windows that updates of a costmap change until publishing is due.
+
+    The rules are those of costmap_2d: publish the full grid when the map has moved or changed its
+    size, else only the window that changed, at the publish frequency.
+    """
+
+    def __init__(self, costmap: LayeredCostmap) -> None:
+        """Start at time 0 with nothing changed and nothing published."""
+        self._costmap = costmap
+        self._changed = NO_CELLS
+        self._published: Optional[GridSpec] = None
+        self._schedule = Schedule(costmap.params.publish_frequency_hz)
+        self.restart(0.0)
+
+    def restart(self, now_s: float) -> None:
+        """Restart the schedule after a clock jump: publishing is due after one period."""
+        self._schedule.start(now_s)
+        self._schedule.pop(now_s)
+
+    def add(self, now_s: float, window: Window) -> bool:
+        """Add the window that an update changed.
+
+        A late update does not delay the following ones.
+
+        Returns:
+            True if publishing is due; never with a publish frequency of 0.
+        """
+        self._changed = self._changed.union(window)
+        self._schedule.set_frequency(self._costmap.params.publish_frequency_hz, now_s)
+        return self._schedule.pop(now_s + CLOCK_GRAIN_S)
+
+    def pop(self) -> Window:
+        """Return the window that has changed since the last call."""
+        changed, self._changed = self._changed, NO_CELLS
+        return changed
+
+    def pop_full_grid(self) -> bool:
+        """Return whether the full grid is due, and count it as published."""
+        costmap = self._costmap
+        is_due = costmap.params.always_send_full_costmap or costmap.spec != self._published
+        self._published = costmap.spec
+        return is_due
+
+
+class FlownPath(Generic[T]):
+    """Recent poses at a minimum spacing, due twice a second while the quadcopter moves.
+
+    Attributes:
+        poses: The newest poses, oldest first, as `make` returned them.
+    """
+
+    def __init__(self, make: Callable[[float, Pose3D], T]) -> None:
+        """Start an empty path.
+
+        Args:
+            make: Converts a stamp in seconds and a pose in `map` to an entry of `poses`.
+        """
+        self._make = make
+        self.poses: Deque[T] = collections.deque(maxlen=PATH_POSES)
+        self._last: Optional[Pose2D] = None
+        self._has_grown = False
+        self._next_s = 0.0
+
+    def clear(self) -> None:
+        """Remove all poses and restart the schedule."""
+        self.poses.clear()
+        self._last = None
+        self._next_s = 0.0
+
+    def add(self, stamp_s: float, pose: Pose3D) -> bool:
+        """Add a pose in `map` and return whether publishing the path is due."""
+        here = Pose2D(pose.x_m, pose.y_m)
+        if self._last is None or here.distance_to(self._last) >= PATH_SPACING_M:
+            self._last = here
+            self.poses.append(self._make(stamp_s, pose))
+            self._has_grown = True
+        if not self._has_grown or stamp_s < self._next_s:
+            return False
+        self._has_grown = False
+        self._next_s = stamp_s + PATH_PERIOD_S
+        return True
