@@ -1,11 +1,11 @@
-"""One node at a time steers a quadcopter."""
+"""One node at a time controls a quadcopter."""
 
 from quad_nav.topics.validation import CommandLease
 
 NAVIGATOR, ROGUE = "/move_base0", "/rogue"
 
 
-def test_the_first_keeps_the_quadcopter_while_its_commands_count():
+def test_the_first_node_holds_the_lease_while_its_commands_are_in_force():
     lease = CommandLease(0.6)
     assert lease.holder(0, NAVIGATOR, 1.0) == NAVIGATOR
     assert lease.holder(0, ROGUE, 1.5) == NAVIGATOR
@@ -15,13 +15,13 @@ def test_the_first_keeps_the_quadcopter_while_its_commands_count():
     assert lease.holder(0, NAVIGATOR, 2.2) == ROGUE
 
 
-def test_each_quadcopter_has_its_own():
+def test_each_quadcopter_has_its_own_lease():
     lease = CommandLease(0.6)
     lease.holder(0, NAVIGATOR, 1.0)
     assert lease.holder(1, ROGUE, 1.0) == ROGUE
 
 
-def test_after_a_reset_anybody_may_be_first():
+def test_clear_releases_all_leases():
     lease = CommandLease(0.6)
     lease.holder(0, NAVIGATOR, 1.0)
     lease.clear()

@@ -1,4 +1,4 @@
-"""What nodes tell of themselves, from what was measured."""
+"""Statuses of nodes from measured figures."""
 
 from __future__ import annotations
 
@@ -28,33 +28,33 @@ def changed(one, **fields):
 
 
 @pytest.mark.parametrize(
-    "inputs, is_located, level, message",
+    "inputs, is_localized, level, message",
     [
-        ([ODOM, SCAN], True, Level.OK, "all are coming"),
-        ([ODOM, changed(SCAN, silent_s=None)], True, Level.STALE, "nothing yet on /scan0"),
+        ([ODOM, SCAN], True, Level.OK, "all inputs arriving"),
+        ([ODOM, changed(SCAN, silent_s=None)], True, Level.STALE, "no message yet on /scan0"),
         (
             [changed(ODOM, silent_s=1.5), changed(SCAN, silent_s=1.5)],
             True,
             Level.ERROR,
-            "nothing on /scan0 for 1.5 s",
+            "no message on /scan0 for 1.5 s",
         ),
         (
             [changed(ODOM, silent_s=None), changed(SCAN, silent_s=1.04)],
             True,
             Level.ERROR,
-            "nothing on /scan0 for 1.0 s",
+            "no message on /scan0 for 1.0 s",
         ),
-        ([ODOM, changed(SCAN, silent_s=1.0)], True, Level.OK, "all are coming"),
-        ([ODOM, SCAN], False, Level.ERROR, "its place is unknown, see /tf"),
+        ([ODOM, changed(SCAN, silent_s=1.0)], True, Level.OK, "all inputs arriving"),
+        ([ODOM, SCAN], False, Level.ERROR, "robot pose unknown, check /tf"),
     ],
 )
-def test_inputs(inputs, is_located, level, message):
-    health = inputs_health("move_base0", "quad0", inputs, is_located)
+def test_inputs(inputs, is_localized, level, message):
+    health = inputs_health("move_base0", "quad0", inputs, is_localized)
     assert (health.name, health.hardware_id) == ("move_base0: inputs", "quad0")
     assert (health.level, health.message) == (level, message)
 
 
-def test_what_inputs_tell_beside_their_level():
+def test_values_of_inputs():
     values = inputs_health("move_base0", "quad0", [SCAN, changed(ODOM, silent_s=None)], True).values
     assert values == {
         "located": "True",
@@ -76,12 +76,12 @@ def test_what_inputs_tell_beside_their_level():
         (
             {"rate_hz": 4.0, "slow_seconds": 3},
             Level.WARN,
-            "controlling at 4.0 Hz, 10 Hz are wanted",
+            "controlling at 4.0 Hz, expected 10 Hz",
         ),
-        ({"state": State.CLEARING}, Level.WARN, "clearing at 9.6 Hz: a recovery behaviour runs"),
-        ({"trouble": "no plan: blocked"}, Level.WARN, "controlling: no plan: blocked"),
+        ({"state": State.CLEARING}, Level.WARN, "clearing at 9.6 Hz: recovery behaviour active"),
+        ({"fault": "no plan: blocked"}, Level.WARN, "controlling: no plan: blocked"),
         (
-            {"trouble": "stopped: nothing from scan"},
+            {"fault": "stopped: nothing from scan"},
             Level.ERROR,
             "controlling: stopped: nothing from scan",
         ),
@@ -97,9 +97,9 @@ def test_control(fields, level, message):
 @pytest.mark.parametrize(
     "fields, level, message",
     [
-        ({}, Level.OK, "8 served"),
-        ({"late_s": 0.5}, Level.WARN, "up to 0.50 s late: cycles are left out"),
-        ({"late_s": 0.5, "unseen_s": 7.0}, Level.ERROR, "has not come round for 7 s"),
+        ({}, Level.OK, "serving 8 robots"),
+        ({"late_s": 0.5}, Level.WARN, "up to 0.50 s late, skipping control cycles"),
+        ({"late_s": 0.5, "blocked_s": 7.0}, Level.ERROR, "control loop blocked for 7 s"),
     ],
 )
 def test_loop(fields, level, message):
@@ -109,5 +109,5 @@ def test_loop(fields, level, message):
     assert health.values["memory MB"] == "190"
 
 
-def test_the_levels_are_those_of_the_messages():
+def test_levels_are_numbered_as_in_the_messages():
     assert list(map(int, Level)) == [0, 1, 2, 3]

@@ -20,7 +20,7 @@ from quad_nav.sim import (
     world_file,
     xml_tree,
 )
-from quad_nav.topics import incoming
+from quad_nav.topics import validation
 
 TABLE = (Path(__file__).parents[2] / "docs" / "limits.md").read_text(encoding="utf-8")
 ROWS = {
@@ -57,11 +57,11 @@ ROWS = {
         bag_trace.LONGEST_FLIGHT_S / 86400,
         bag_info.MOST_ROBOTS,
     ],
-    "scan": [incoming.MAX_BEAMS],
-    "point cloud": [incoming.MAX_POINTS],
-    "odometry, commands, goals": [incoming.LARGEST],
-    "intention of a peer": [incoming.MAX_POSES],
-    "map on a topic": [incoming.MOST_CELLS],
+    "scan": [validation.MAX_BEAMS],
+    "point cloud": [validation.MAX_POINTS],
+    "odometry, commands, goals": [validation.LARGEST],
+    "intention of a peer": [validation.MAX_POSES],
+    "map on a topic": [validation.MOST_CELLS],
 }
 
 

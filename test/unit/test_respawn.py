@@ -1,4 +1,4 @@
-"""A node that was killed is started again; one that has ended has not."""
+"""A node that a signal kills is restarted; one that exits is not."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-# Dies at first, tells how it was called the second time, and ends with 3.
+# Dies at first, prints its arguments the second time, and exits with 3.
 DIES_ONCE = """
 import os, signal, sys
 if sys.argv[-1] != "--respawned":
@@ -19,7 +19,7 @@ sys.exit(3)
 WAITS = "import signal; print('here', flush=True); signal.pause()"
 
 
-def again(program: str, *arguments: str) -> subprocess.Popen:
+def respawned(program: str, *arguments: str) -> subprocess.Popen:
     return subprocess.Popen(
         [
             sys.executable,
@@ -37,28 +37,28 @@ def again(program: str, *arguments: str) -> subprocess.Popen:
     )
 
 
-def test_what_was_killed_comes_again_and_ends_by_itself():
-    told, said = (process := again(DIES_ONCE, "_robots:=2")).communicate(timeout=60)
-    assert told == "['_robots:=2', '--respawned']\n"
-    assert "killed by SIGKILL, restarting" in said
+def test_a_killed_node_is_restarted_until_it_exits():
+    stdout, stderr = (process := respawned(DIES_ONCE, "_robots:=2")).communicate(timeout=60)
+    assert stdout == "['_robots:=2', '--respawned']\n"
+    assert "killed by SIGKILL, restarting" in stderr
     assert process.returncode == 3
 
 
-def test_what_has_ended_is_not_started_again():
-    process = again("import sys; print('once'); sys.exit(2)")
+def test_a_node_that_exits_is_not_restarted():
+    process = respawned("import sys; print('once'); sys.exit(2)")
     assert process.communicate(timeout=60)[0] == "once\n" and process.returncode == 2
 
 
-def test_a_request_to_end_is_passed_on_and_heeded():
-    process = again(WAITS)
+def test_signals_are_passed_on():
+    process = respawned(WAITS)
     assert process.stdout.readline() == "here\n"
     process.send_signal(signal.SIGTERM)
     assert process.communicate(timeout=60)[0] == ""
     assert process.returncode == 128 + signal.SIGTERM
 
 
-def test_the_command_ends_with_its_keeper():
-    process = again("import os, signal; print(os.getpid(), flush=True); signal.pause()")
+def test_the_command_ends_with_its_supervisor():
+    process = respawned("import os, signal; print(os.getpid(), flush=True); signal.pause()")
     child = int(process.stdout.readline())
     process.kill()
     process.communicate(timeout=60)  # the child's end closes the pipe

@@ -1,4 +1,4 @@
-"""What the ROS face says, before it becomes messages."""
+"""Content of the topics, before it becomes messages."""
 
 from __future__ import annotations
 
@@ -18,19 +18,25 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
 from quad_nav.sim.scene_document import scene_document
 from quad_nav.sim.scene_file import load_scene, scene_from_document
-from quad_nav.topics.flight_info import contact_from_values, contact_values
-from quad_nav.topics.publishing import CostmapUpdates
-from quad_nav.topics.flight_info import event, from_text, mission_info, simulation_info, to_text
-from quad_nav.topics.publishing import FlownPath
-from quad_nav.topics.markers import goal_markers
+from quad_nav.topics.flight_info import (
+    contact_from_values,
+    contact_values,
+    event,
+    from_text,
+    mission_info,
+    simulation_info,
+    to_text,
+)
 from quad_nav.topics.markers import (
     CUBE,
     CUBE_LIST,
     CYLINDER,
     SPHERE,
+    goal_markers,
     quadcopter_markers,
     scene_markers,
 )
+from quad_nav.topics.publishing import CostmapSchedule, FlownPath
 
 SCENE = Scene(
     "yard",
@@ -86,7 +92,7 @@ def test_quadcopters_move_with_their_frames():
     assert len({(part.namespace, part.number) for part in parts}) == len(parts)
 
 
-def test_the_goal_in_flight_is_large_and_the_flown_one_dim():
+def test_the_active_goal_is_large_and_the_reached_one_dim():
     sequencer = Sequencer(GoalSequence((Goal(1.0, 0.0), Goal(2.0, 0.0), Goal(3.0, 0.0))))
     sequencer.tick(0.0, Pose2D(0.0, 0.0))
     sequencer.tick(1.0, Pose2D(1.0, 0.0))  # the first is reached, the second sent
@@ -100,12 +106,12 @@ def test_the_goal_in_flight_is_large_and_the_flown_one_dim():
 
 def test_a_path_has_poses_5_cm_apart_and_is_published_twice_a_second():
     path = FlownPath(lambda stamp_s, pose: pose.x_m)
-    told = [k for k in range(41) if path.add(k / 40, Pose3D(k * 0.0126, 0.0, 1.0))]
+    published = [k for k in range(41) if path.add(k / 40, Pose3D(k * 0.0126, 0.0, 1.0))]
     assert list(path.poses) == pytest.approx([0.0504 * k for k in range(11)])
-    assert told == [0, 20, 40]
+    assert published == [0, 20, 40]
 
 
-def test_a_path_that_does_not_grow_is_not_told():
+def test_a_path_that_does_not_grow_is_not_published():
     path = FlownPath(lambda stamp_s, pose: pose)
     assert [path.add(stamp_s, Pose3D(0.0, 0.0, 1.0)) for stamp_s in (0.0, 1.0, 2.0)] == [
         True,
@@ -114,7 +120,7 @@ def test_a_path_that_does_not_grow_is_not_told():
     ]
 
 
-def test_a_cleared_path_begins_anew():
+def test_a_cleared_path_starts_again():
     path = FlownPath(lambda stamp_s, pose: stamp_s)
     path.add(7.0, Pose3D(0.0, 0.0, 1.0))
     path.clear()
@@ -129,46 +135,46 @@ def costmap(**params):
 
 
 def test_windows_add_up_between_two_publications():
-    updates = CostmapUpdates(costmap(publish_frequency_hz=1.0))
-    assert not updates.add(0.4, Window(0, 2, 0, 2))
-    assert not updates.add(0.8, NO_CELLS)
-    assert updates.add(1.0, Window(4, 5, 1, 3))
-    assert updates.pop() == Window(0, 5, 0, 3)
-    assert updates.pop() == NO_CELLS
-    assert not updates.add(1.8, NO_CELLS)
-    assert updates.add(2.0, NO_CELLS)
+    schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0))
+    assert not schedule.add(0.4, Window(0, 2, 0, 2))
+    assert not schedule.add(0.8, NO_CELLS)
+    assert schedule.add(1.0, Window(4, 5, 1, 3))
+    assert schedule.pop() == Window(0, 5, 0, 3)
+    assert schedule.pop() == NO_CELLS
+    assert not schedule.add(1.8, NO_CELLS)
+    assert schedule.add(2.0, NO_CELLS)
 
 
 def test_a_late_update_does_not_delay_what_is_published_after_it():
-    updates = CostmapUpdates(costmap(publish_frequency_hz=1.0))
-    assert updates.add(1.2, NO_CELLS)
-    assert not updates.add(1.9, NO_CELLS)
-    assert updates.add(2.0, NO_CELLS)
+    schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0))
+    assert schedule.add(1.2, NO_CELLS)
+    assert not schedule.add(1.9, NO_CELLS)
+    assert schedule.add(2.0, NO_CELLS)
 
 
-def test_news_come_again_one_period_after_the_clock_has_gone_back():
-    updates = CostmapUpdates(costmap(publish_frequency_hz=1.0))
-    assert updates.add(100.0, NO_CELLS)
-    updates.restart(50.5)
-    assert not updates.add(51.0, NO_CELLS)
-    assert updates.add(51.5, NO_CELLS)
+def test_publishing_is_due_one_period_after_a_clock_jump():
+    schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0))
+    assert schedule.add(100.0, NO_CELLS)
+    schedule.restart(50.5)
+    assert not schedule.add(51.0, NO_CELLS)
+    assert schedule.add(51.5, NO_CELLS)
 
 
 def test_without_a_frequency_nothing_is_published():
-    assert not CostmapUpdates(costmap(publish_frequency_hz=0.0)).add(100.0, Window(0, 2, 0, 2))
+    assert not CostmapSchedule(costmap(publish_frequency_hz=0.0)).add(100.0, Window(0, 2, 0, 2))
 
 
-def test_a_grid_that_moved_is_wanted_in_full():
+def test_a_grid_that_moved_is_published_in_full():
     moving = costmap(publish_frequency_hz=1.0, rolling_window=True)
-    updates = CostmapUpdates(moving)
-    assert [updates.pop_full_grid(), updates.pop_full_grid()] == [True, False]
+    schedule = CostmapSchedule(moving)
+    assert [schedule.pop_full_grid(), schedule.pop_full_grid()] == [True, False]
     moving.update(1.0, Pose2D(3.0, 3.0))
-    assert [updates.pop_full_grid(), updates.pop_full_grid()] == [True, False]
+    assert [schedule.pop_full_grid(), schedule.pop_full_grid()] == [True, False]
 
 
-def test_a_costmap_can_always_be_wanted_in_full():
-    updates = CostmapUpdates(costmap(publish_frequency_hz=1.0, always_send_full_costmap=True))
-    assert [updates.pop_full_grid(), updates.pop_full_grid()] == [True, True]
+def test_always_send_full_costmap():
+    schedule = CostmapSchedule(costmap(publish_frequency_hz=1.0, always_send_full_costmap=True))
+    assert [schedule.pop_full_grid(), schedule.pop_full_grid()] == [True, True]
 
 
 # Texts.
@@ -180,12 +186,12 @@ def test_a_contact_comes_back_from_its_values():
     assert contact_from_values("quad0", values) == Contact(13.3456, "quad0", "quad1", 1.23456, 7.0)
 
 
-def test_a_contact_without_a_place_is_refused():
+def test_a_contact_without_a_position_is_refused():
     with pytest.raises(ValueError, match="has no valid .y_m'"):
         contact_from_values("quad0", {"with": "wall", "time_s": "1", "x_m": "2"})
 
 
-def test_events_say_what_the_sequencer_did():
+def test_events_of_the_sequencer():
     goal = Goal(1.0, 2.0)
     sent = event(1, 4.5, SendGoal(2, 1, Pose2D(1.0, 2.0, 0.5), 2, "aborted"))
     assert sent == {
@@ -214,7 +220,7 @@ def test_events_say_what_the_sequencer_did():
     assert event(0, 9.0, SequenceDone())["event"] == "done"
 
 
-def test_what_is_known_of_a_flight_is_json():
+def test_flight_info_is_json():
     info = {
         **simulation_info(SCENE, 7),
         **mission_info(
@@ -237,5 +243,5 @@ def test_what_is_known_of_a_flight_is_json():
 
 
 @pytest.mark.parametrize("text", ["", "no JSON", "[1, 2]", '"text"'])
-def test_a_text_that_is_no_object_tells_nothing(text):
+def test_a_text_without_a_json_object_is_ignored(text):
     assert from_text(text) is None

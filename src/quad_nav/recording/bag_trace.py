@@ -27,8 +27,13 @@ from quad_nav.recording.trace import FlightTrace
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import scene_from_document
-from quad_nav.topics.flight_info import CONTACT_STATUS, contact_from_values
-from quad_nav.topics.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC, from_text
+from quad_nav.topics.flight_info import (
+    CONTACT_STATUS,
+    EVENTS_TOPIC,
+    FLIGHT_TOPIC,
+    contact_from_values,
+    from_text,
+)
 
 MOST_MEMORY_BYTES = 4 * 10**9
 """For a recording that is read; what is packed in it may be a thousand times larger."""

@@ -18,7 +18,7 @@ from quad_nav.recording import messages
 from quad_nav.recording.action_topics import ActionTopics
 from quad_nav.recording.messages import plan_bytes
 from quad_nav.recording.record_file import TopicWriter, stamp_at
-from quad_nav.topics.publishing import CostmapUpdates
+from quad_nav.topics.publishing import CostmapSchedule
 
 _NO_PLAN = np.zeros((0, 3))
 
@@ -35,8 +35,8 @@ class NavigatorTopics:
         self._planner = plugin_name(navigator.params.base_global_planner)
         self._controller = plugin_name(navigator.params.base_local_planner)
         self._state: Optional[State] = None
-        self._costmaps: Dict[str, Tuple[LayeredCostmap, CostmapUpdates]] = {
-            name: (costmap, CostmapUpdates(costmap))
+        self._costmaps: Dict[str, Tuple[LayeredCostmap, CostmapSchedule]] = {
+            name: (costmap, CostmapSchedule(costmap))
             for name, costmap in (
                 ("global", navigator.global_costmap),
                 ("local", navigator.local_costmap),

@@ -21,9 +21,8 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.topics import flight_info
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
+from quad_nav.topics.markers import goal_markers, quadcopter_markers, scene_markers
 from quad_nav.topics.publishing import FlownPath
-from quad_nav.topics.markers import goal_markers
-from quad_nav.topics.markers import quadcopter_markers, scene_markers
 
 _IDENTITY = Pose3D(0.0, 0.0, 0.0)
 _SIMULATOR, _SEQUENCER = "/simulator", "/sequencer"

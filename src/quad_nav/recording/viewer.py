@@ -25,9 +25,8 @@ from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.recording.viewer_solids import colour_of, solid
 from quad_nav.sim.colours import ROBOT_COLOURS
 from quad_nav.sim.contacts import Contact
+from quad_nav.topics.markers import SPHERE, goal_markers, quadcopter_markers, scene_markers
 from quad_nav.topics.publishing import FlownPath
-from quad_nav.topics.markers import goal_markers
-from quad_nav.topics.markers import SPHERE, quadcopter_markers, scene_markers
 
 SUFFIX = ".rrd"
 _TIMELINE = "flight"

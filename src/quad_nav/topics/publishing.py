@@ -20,7 +20,7 @@ PATH_POSES = 1000  # 50 m, about a megabyte of messages
 T = TypeVar("T")
 
 
-class CostmapUpdates:
+class CostmapSchedule:
     """Collect the windows that updates of a costmap change until publishing is due.
 
     The rules are those of costmap_2d: publish the full grid when the map has moved or changed its

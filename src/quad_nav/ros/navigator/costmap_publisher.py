@@ -1,7 +1,7 @@
 """Publish a costmap: the full grid, its updates, the footprint and marked voxels.
 
 The rules are those of costmap_2d: publish only for subscribers; follow the schedule of
-`CostmapUpdates`; send each new subscriber one full grid, also with a publish frequency of 0.
+`CostmapSchedule`; send each new subscriber one full grid, also with a publish frequency of 0.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.nav_messages import grid_message, polygon_message, update_message
 from quad_nav.ros.common.node_tools import Names, own_node
-from quad_nav.topics.publishing import CostmapUpdates
+from quad_nav.topics.publishing import CostmapSchedule
 
 _VOXEL_COLOUR = ColorRGBA(0.8, 0.3, 0.1, 0.6)
 
@@ -59,7 +59,7 @@ class CostmapPublisher:
         """
         self._costmap = costmap
         self._lock = lock
-        self._schedule = CostmapUpdates(costmap)
+        self._schedule = CostmapSchedule(costmap)
         self._footprint = rospy.Publisher(names(f"~{name}/footprint"), PolygonStamped, queue_size=1)
         self._updates = rospy.Publisher(
             names(f"~{name}/costmap_updates"), OccupancyGridUpdate, queue_size=10
