@@ -59,9 +59,9 @@ ROWS = {
     ],
     "scan": [validation.MAX_BEAMS],
     "point cloud": [validation.MAX_POINTS],
-    "odometry, commands, goals": [validation.LARGEST],
+    "odometry, commands, goals": [validation.MAX_MAGNITUDE],
     "intention of a peer": [validation.MAX_POSES],
-    "map on a topic": [validation.MOST_CELLS],
+    "map on a topic": [validation.MAX_CELLS],
 }
 
 

@@ -87,7 +87,7 @@ class Mission:
         needs = (
             [
                 Need(
-                    lambda: readiness.service_is_there(START_SERVICE),
+                    lambda: readiness.service_exists(START_SERVICE),
                     lambda: readiness.missing_service(START_SERVICE),
                 )
             ]
@@ -147,7 +147,7 @@ class Mission:
 
     def why_stopped(self) -> str:
         """When the node is to end before its mission has."""
-        fault = readiness.why_gone(START_SERVICE, "simulator") if self._setup.simulation else ""
+        fault = readiness.lost_service(START_SERVICE, "simulator") if self._setup.simulation else ""
         return fault or "stopped before all goals were flown"
 
     def summary(self, reason: str = "") -> MissionSummary:
