@@ -107,7 +107,7 @@ class Mission:
             else:
                 self._go_on(self._before, rospy.get_time())
         for robot in self.robots:
-            robot.link.take()  # what came while waiting is no part of the flight
+            robot.link.pop()  # what came while waiting is no part of the flight
 
     def _start_simulation(self) -> None:
         if self._setup.simulation:
@@ -120,7 +120,7 @@ class Mission:
         self._news.wait(WAIT_S)
         self._news.clear()
         time.sleep(GATHER_S)
-        inboxes = [robot.link.take() for robot in self.robots]
+        inboxes = [robot.link.pop() for robot in self.robots]
         with self._lock, _topics_may_close():
             now_s = rospy.get_time()
             if any(robot.was_reset(inbox) for robot, inbox in zip(self.robots, inboxes)):

@@ -73,7 +73,7 @@ class MissionRobot:
         self.sequencer = Sequencer(self.sequencer.sequence, stage)
         self.pose, self.is_silent, self._begun_s, self._heard_s = None, False, now_s, now_s
         self._odometry, self._settled_s = None, 0.0
-        self.link.forget()
+        self.link.clear()
         self._path.clear()
 
     def was_reset(self, inbox: Inbox) -> bool:
@@ -98,8 +98,8 @@ class MissionRobot:
         log.robots[self.name].aborts += sum(
             report.verdict is Verdict.ABORTED for report in inbox.reports
         )
-        for newcomer in inbox.newcomers:
-            if self.link.send_to(newcomer):
+        for subscriber in inbox.subscribers:
+            if self.link.send_to(subscriber):
                 rospy.loginfo(
                     "%s: %s sent to a node that began to listen",
                     self.name,
@@ -191,7 +191,7 @@ class MissionRobot:
             self.link.send(action.pose)
             self._tell_sent(action)
         elif isinstance(action, SequenceDone):
-            self.link.forget()
+            self.link.clear()
             rospy.loginfo("%s: no more goals", self.name)
         elif leg is not None:
             self._tell_ended(leg)

@@ -1,4 +1,4 @@
-"""One quadcopter's topics, as the sequencer sees them: callbacks store, ``take`` hands over."""
+"""Topics of one quadcopter as the sequencer uses them; callbacks store, `pop` returns."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseActionResult, RecoveryStatus
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import Odometry, Path
 
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.sequencer import NavigatorReport, Verdict
 from quad_nav.ros.common.nav_messages import planar_pose, pose_stamped
+from quad_nav.topics.publishing import FlownPath
 
-# A goal's id is stamped when the navigator receives it, on a clock that may lag behind ours.
+# The navigator stamps a goal's id when it receives the goal; its clock may lag behind ours.
 CLOCK_LAG_S = 0.5
 STATUS_FRESH_S = 3.0
 
@@ -33,23 +34,26 @@ _VERDICTS = {
 
 @dataclass
 class Inbox:
-    """What has come since the last look."""
+    """Messages that have arrived since the last `pop`."""
 
     odometry: List[Odometry] = field(default_factory=list)
     reports: List[NavigatorReport] = field(default_factory=list)
     recoveries: List[RecoveryStatus] = field(default_factory=list)
-    newcomers: List[Callable[[PoseStamped], Any]] = field(default_factory=list)
+    subscribers: List[Callable[[PoseStamped], Any]] = field(default_factory=list)
 
 
 class RobotLink(rospy.SubscribeListener):
-    """Robot i's odometry and its navigator's results in; its goals out.
+    """Receive a robot's odometry and its navigator's results, and send its goals.
 
-    ``news`` is set when odometry comes.
+    Attributes:
+        goals: Publisher of the goals.
+        odometry: Subscriber to the odometry.
     """
 
-    def __init__(self, index: int, news: threading.Event) -> None:
+    def __init__(self, index: int, received: threading.Event) -> None:
+        """Connect to the topics of robot `index`; odometry sets the event."""
         super().__init__()
-        self._news = news
+        self._received = received
         self._lock = threading.Lock()
         self._inbox = Inbox()
         self._sent_s = 0.0
@@ -72,17 +76,17 @@ class RobotLink(rospy.SubscribeListener):
 
     @property
     def odometry_frame(self) -> Optional[str]:
-        """The frame that odometry is in; None while none has come."""
+        """Frame of the odometry; None before the first message."""
         return self._odometry_frame
 
-    def take(self) -> Inbox:
-        """What has come."""
+    def pop(self) -> Inbox:
+        """Return the messages that have arrived since the last call."""
         with self._lock:
             inbox, self._inbox = self._inbox, Inbox()
         return inbox
 
     def navigator_is_idle(self, now_s: float) -> bool:
-        """Whether the navigator says that it has no goal; False when it says nothing."""
+        """Return whether the navigator reports no goal; False without a recent status."""
         status_s = self._status_s
         return status_s is not None and now_s - status_s < STATUS_FRESH_S and not self._busy
 
@@ -93,15 +97,15 @@ class RobotLink(rospy.SubscribeListener):
         self._sent_s = now.to_sec()
         self.goals.publish(self._goal)
 
-    def send_to(self, newcomer: Callable[[PoseStamped], Any]) -> bool:
-        """Send the goal in flight to one new subscriber; False when there is none."""
+    def send_to(self, subscriber: Callable[[PoseStamped], Any]) -> bool:
+        """Send the active goal to one new subscriber; return False without an active goal."""
         if self._goal is None:
             return False
-        newcomer(self._goal)
+        subscriber(self._goal)
         return True
 
-    def forget(self) -> None:
-        """No goal is in flight any more."""
+    def clear(self) -> None:
+        """Clear the active goal."""
         self._goal = None
 
     def peer_subscribe(
@@ -110,24 +114,25 @@ class RobotLink(rospy.SubscribeListener):
         topic_publish: Callable[[PoseStamped], Any],
         peer_publish: Callable[[PoseStamped], Any],
     ) -> None:
-        """A new subscriber, as a navigator that was started again, is told the goal in flight.
+        """Store a new subscriber, such as a restarted navigator, which needs the active goal.
 
-        By the thread that publishes the goals: rospy's peer_publish is not safe beside publish.
+        The thread that publishes the goals serves it: rospy's peer_publish is not safe while
+        another thread publishes.
         """
         with self._lock:
-            self._inbox.newcomers.append(peer_publish)
+            self._inbox.subscribers.append(peer_publish)
 
     def _on_odometry(self, message: Odometry) -> None:
         self._odometry_frame = message.header.frame_id
         with self._lock:
             self._inbox.odometry.append(message)
-        self._news.set()
+        self._received.set()
 
     def _on_result(self, message: MoveBaseActionResult) -> None:
         status = message.status
         verdict = _VERDICTS.get(status.status)
         if verdict is None or status.goal_id.stamp.to_sec() < self._sent_s - CLOCK_LAG_S:
-            return  # about an earlier goal
+            return  # result of an earlier goal
         if verdict is Verdict.CANCELLED and "another goal" in status.text:
             verdict = Verdict.REPLACED
         with self._lock:
@@ -140,3 +145,27 @@ class RobotLink(rospy.SubscribeListener):
     def _on_recovery(self, message: RecoveryStatus) -> None:
         with self._lock:
             self._inbox.recoveries.append(message)
+
+
+class PathPublisher:
+    """Publish the path that a quadcopter has flown, twice a second while it moves."""
+
+    def __init__(self, topic: str) -> None:
+        """Advertise the topic."""
+        self._publisher = rospy.Publisher(topic, Path, queue_size=1, latch=True)
+        self._path: FlownPath[PoseStamped] = FlownPath(_stamped)
+
+    def clear(self) -> None:
+        """Start an empty path."""
+        self._path.clear()
+
+    def add(self, stamp_s: float, pose: Pose3D) -> None:
+        """Add a pose in `map`, and publish if it is due."""
+        if self._path.add(stamp_s, pose):
+            path = Path(poses=list(self._path.poses))
+            path.header.frame_id, path.header.stamp = "map", rospy.Time.from_sec(stamp_s)
+            self._publisher.publish(path)
+
+
+def _stamped(stamp_s: float, pose: Pose3D) -> PoseStamped:
+    return pose_stamped(planar_pose(pose.to_2d(), pose.z_m), "map", rospy.Time.from_sec(stamp_s))
