@@ -9,7 +9,13 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.checkpoint import contact_record, head, on_clock, robot_record, standing
+from quad_nav.mission.checkpoint import (
+    contact_record,
+    head_record,
+    read_checkpoint,
+    robot_record,
+    shift_to_clock,
+)
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
 from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
@@ -21,18 +27,18 @@ START_S = 100.0
 NAMES = ["quad0", "quad1"]
 
 
-class Mission:
+class JournaledRobot:
     """Quadcopter 0 of two, with a journal; every record goes through JSON text."""
 
     def __init__(self, *goals, **settings):
         self.log = FlightLog(NAMES, 0.3)
         self.sequencer = Sequencer(GoalSequence(goals or (A, B, C), SequenceSettings(**settings)))
-        self.records = [head(NAMES, START_S, 1e9)]
+        self.records = [head_record(NAMES, START_S, 1e9)]
 
     def fly(self, now_s, pose):
-        self.log.move("quad0", now_s, pose)
+        self.log.add_pose("quad0", now_s, pose)
         actions = self.sequencer.tick(now_s, pose)
-        legs = [leg for leg in map(self.log.robots["quad0"].act, actions) if leg is not None]
+        legs = [leg for leg in map(self.log.robots["quad0"].add_action, actions) if leg is not None]
         if actions:
             record = robot_record(
                 "quad0", self.sequencer, self.log, legs[0] if legs else None, START_S
@@ -40,22 +46,24 @@ class Mission:
             self.records.append({**record, "mission_s": now_s - START_S, "wall_s": 7.0})
         return actions
 
-    def stands(self):
-        return standing(json.loads(json.dumps(self.records)), NAMES, "journal")
+    def checkpoint(self):
+        return read_checkpoint(json.loads(json.dumps(self.records)), NAMES, "journal")
 
     def taken_over(self, start_s=START_S, *goals, **settings):
         """Another sequencer and log."""
-        stands = self.stands().robots["quad0"]
+        checkpoint = self.checkpoint().robots["quad0"]
         log = FlightLog(NAMES, 0.3)
-        log.go_on("quad0", stands.flown, stands.clearance_m, stands.separation_m)
-        other = Mission(*goals, **settings)
-        other.sequencer = Sequencer(other.sequencer.sequence, on_clock(stands.stage, start_s))
+        log.resume("quad0", checkpoint.log, checkpoint.clearance_m, checkpoint.separation_m)
+        other = JournaledRobot(*goals, **settings)
+        other.sequencer = Sequencer(
+            other.sequencer.sequence, shift_to_clock(checkpoint.progress, start_s)
+        )
         other.log = log
         return other
 
 
 def a_mission_on_its_second_goal():
-    mission = Mission()
+    mission = JournaledRobot()
     mission.fly(100.0, START)
     mission.fly(105.0, Pose2D(1.5, 0.0))
     mission.fly(110.0, Pose2D(2.8, 0.0))  # within 0.4 m of A
@@ -67,8 +75,12 @@ def test_the_goal_in_flight_is_sent_again_uncounted_and_none_that_was_reached():
     later = mission.taken_over()
     (sent,) = later.fly(120.0, Pose2D(2.9, 1.0))
     assert isinstance(sent, SendGoal)
-    assert (sent.index, sent.attempt, sent.why) == (1, 1, "the sequencer or its clock began anew")
-    assert sent.pose == mission.sequencer.flight.pose
+    assert (sent.index, sent.attempt, sent.resend_reason) == (
+        1,
+        1,
+        "the sequencer or the clock restarted",
+    )
+    assert sent.pose == mission.sequencer.active_goal.pose
     assert later.fly(121.0, Pose2D(2.9, 1.1)) == []
     ended, after = later.fly(125.0, Pose2D(3.0, 3.9))
     assert ended == GoalEnded(1, 1, B, True, 15.0, 1) and after.index == 2
@@ -78,7 +90,7 @@ def test_a_goal_that_was_reached_while_nobody_looked_is_not_flown_again():
     later = a_mission_on_its_second_goal().taken_over()
     ended, sent = later.fly(150.0, Pose2D(3.0, 4.1))
     assert ended == GoalEnded(1, 1, B, True, 40.0, 1)
-    assert (sent.index, sent.why) == (2, "")
+    assert (sent.index, sent.resend_reason) == (2, "")
 
 
 def test_a_new_clock_counts_on():
@@ -111,7 +123,7 @@ def test_smallest_distances_last():
 
 
 def test_a_mission_that_was_flown_is_not_flown_again():
-    mission = Mission(A)
+    mission = JournaledRobot(A)
     mission.fly(100.0, START)
     mission.fly(110.0, Pose2D(3.0, 0.0))
     later = mission.taken_over(START_S, A)
@@ -120,10 +132,10 @@ def test_a_mission_that_was_flown_is_not_flown_again():
 
 
 def test_laps_and_attempts_go_on():
-    mission = Mission(A, B, loop=True, goal_timeout_s=5.0)
+    mission = JournaledRobot(A, B, loop=True, goal_timeout_s=5.0)
     for now_s, pose in ((100.0, START), (101.0, A.pose), (102.0, B.pose), (108.0, B.pose)):
         mission.fly(now_s, pose)
-    assert mission.sequencer.flight.attempt == 2
+    assert mission.sequencer.active_goal.attempt == 2
     later = mission.taken_over(START_S, A, B, loop=True, goal_timeout_s=5.0)
     (sent,) = later.fly(109.0, B.pose)
     assert (sent.index, sent.lap, sent.attempt) == (0, 2, 2)
@@ -133,27 +145,27 @@ def test_a_goal_file_that_was_edited_meanwhile_counts_from_the_goal_in_flight_on
     edited = Goal(5.0, 5.0)
     later = a_mission_on_its_second_goal().taken_over(START_S, A, edited, C)
     (sent,) = later.fly(120.0, Pose2D(2.8, 0.0))
-    assert (sent.index, sent.why, sent.pose.x_m) == (1, "", 5.0)
+    assert (sent.index, sent.resend_reason, sent.pose.x_m) == (1, "", 5.0)
 
 
 def test_contacts_and_times_are_kept():
     mission = a_mission_on_its_second_goal()
     contact = Contact(103.5, "quad0", "box", 1.0, 2.0)
     mission.records.append({**contact_record(contact, START_S), "mission_s": 12.0, "wall_s": 8.0})
-    stands = mission.stands()
-    assert stands.contacts == (Contact(3.5, "quad0", "box", 1.0, 2.0),)
-    assert (stands.clock_s, stands.epoch_s, stands.mission_s, stands.wall_s) == (
+    checkpoint = mission.checkpoint()
+    assert checkpoint.contacts == (Contact(3.5, "quad0", "box", 1.0, 2.0),)
+    assert (checkpoint.clock_s, checkpoint.epoch_s, checkpoint.mission_s, checkpoint.wall_s) == (
         100.0,
         1e9,
         12.0,
         8.0,
     )
-    assert stands.robots["quad1"].stage.index == 0
+    assert checkpoint.robots["quad1"].progress.index == 0
 
 
 def test_nothing_has_begun_in_an_empty_journal_or_with_its_head_alone():
-    assert standing([], NAMES, "journal") is None
-    assert standing([head(NAMES, 0.0, 0.0)], NAMES, "journal") is None
+    assert read_checkpoint([], NAMES, "journal") is None
+    assert read_checkpoint([head_record(NAMES, 0.0, 0.0)], NAMES, "journal") is None
 
 
 def test_another_missions_journal_is_refused():
@@ -162,20 +174,20 @@ def test_another_missions_journal_is_refused():
         match=r"journal: is the journal of \['quad0', 'quad1'\]; "
         r"expected one of \['quad0'\]",
     ):
-        standing(a_mission_on_its_second_goal().records, ["quad0"], "journal")
+        read_checkpoint(a_mission_on_its_second_goal().records, ["quad0"], "journal")
 
 
 @pytest.mark.parametrize(
-    "change", [{"index": None}, {"flown": {}}, {"flight": {"goal": 3}}, {"robot": "quad7"}]
+    "change", [{"index": None}, {"log": {}}, {"active_goal": {"goal": 3}}, {"robot": "quad7"}]
 )
 def test_what_no_sequencer_writes_is_refused(change):
     mission = a_mission_on_its_second_goal()
     mission.records[-1].update(change)
-    with pytest.raises(InputError, match="journal: cannot be understood"):
-        mission.stands()
+    with pytest.raises(InputError, match="journal: cannot be read"):
+        mission.checkpoint()
 
 
 def test_journals_hold_plain_numbers():
     for record in a_mission_on_its_second_goal().records:
         json.dumps(record, allow_nan=False)
-    assert math.isfinite(a_mission_on_its_second_goal().stands().mission_s)
+    assert math.isfinite(a_mission_on_its_second_goal().checkpoint().mission_s)

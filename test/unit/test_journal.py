@@ -19,9 +19,9 @@ def lines(path):
 def journal(path, *records):
     """A journal with these records, as its writer leaves it when it is killed."""
     written = Journal(path)
-    written.begin({"head": 1})
+    written.start({"head": 1})
     for record in records:
-        assert written.keep(record) == ""
+        assert written.append(record) == ""
     written.close()
     return path
 
@@ -45,27 +45,27 @@ class FullDisk:
 def test_what_is_kept_is_in_the_file_at_once_and_read_again(tmp_path):
     path = tmp_path / "folder" / "journal.jsonl"
     kept = Journal(path)
-    assert kept.begin({"head": 1}) == "" and kept.keep({"goal": 2}) == ""
+    assert kept.start({"head": 1}) == "" and kept.append({"goal": 2}) == ""
     assert lines(path) == [b'{"head": 1}', b'{"goal": 2}']
-    assert Journal(path).go_on() == [{"head": 1}, {"goal": 2}]
+    assert Journal(path).resume() == [{"head": 1}, {"goal": 2}]
 
 
 def test_one_that_begins_forgets_what_was_there(tmp_path):
     path = journal(tmp_path / "j", {"goal": 1}, {"goal": 2})
-    Journal(path).begin({"head": 2})
+    Journal(path).start({"head": 2})
     assert lines(path) == [b'{"head": 2}']
 
 
 def test_one_that_goes_on_writes_behind_what_was_there(tmp_path):
     path = journal(tmp_path / "j", {"goal": 1})
     later = Journal(path)
-    later.go_on()
-    later.keep({"goal": 2})
+    later.resume()
+    later.append({"goal": 2})
     assert lines(path) == [b'{"head": 1}', b'{"goal": 1}', b'{"goal": 2}']
 
 
 def test_there_need_be_none(tmp_path):
-    assert Journal(tmp_path / "none").go_on() == []
+    assert Journal(tmp_path / "none").resume() == []
 
 
 @pytest.mark.parametrize("torn", [b'{"goal', b'{"goal": 2}', b"\x00\x00\x00"])
@@ -74,8 +74,8 @@ def test_a_line_that_was_never_finished_counts_for_nothing(tmp_path, torn):
     with path.open("ab") as file:
         file.write(torn)
     later = Journal(path)
-    assert later.go_on() == [{"head": 1}, {"goal": 1}]
-    later.keep({"goal": 3})
+    assert later.resume() == [{"head": 1}, {"goal": 1}]
+    later.append({"goal": 3})
     assert lines(path) == [b'{"head": 1}', b'{"goal": 1}', b'{"goal": 3}']
 
 
@@ -83,40 +83,44 @@ def test_a_line_that_was_never_finished_counts_for_nothing(tmp_path, torn):
 def test_a_line_that_is_none_is_named(tmp_path, line):
     path = tmp_path / "j"
     path.write_bytes(b'{"head": 1}\n' + line + b'\n{"goal": 1}\n')
-    with pytest.raises(InputError, match=r"j:2: is no line of a journal; expected a JSON object"):
-        Journal(path).go_on()
+    with pytest.raises(
+        InputError, match=r"j:2: is not a record of a journal; expected a JSON object"
+    ):
+        Journal(path).resume()
 
 
 def test_what_cannot_be_read_is_named(tmp_path):
     with pytest.raises(InputError, match="cannot be read: Is a directory"):
-        Journal(tmp_path).go_on()
+        Journal(tmp_path).resume()
 
 
 def test_a_full_disk_is_told_once_and_the_journal_catches_up(tmp_path, monkeypatch):
     path = journal(tmp_path / "j", {"goal": 1})
     later = Journal(path)
-    later.go_on()
+    later.resume()
     disk = FullDisk(monkeypatch, room=5)
-    news = later.keep({"goal": 2})
-    assert news.startswith(f"{path}: cannot be written: No space left on device; the flight goes")
-    assert later.keep({"goal": 3}) == "" and later.flush() == ""
+    news = later.append({"goal": 2})
+    assert news.startswith(
+        f"{path}: cannot be written: No space left on device; the flight continues"
+    )
+    assert later.append({"goal": 3}) == "" and later.flush() == ""
     assert lines(path) == [b'{"head": 1}', b'{"goal": 1}']  # and no half line
     disk.room = 1000
-    assert later.flush() == f"{path}: written again, nothing is missing"
+    assert later.flush() == f"{path}: can be written again, nothing is missing"
     assert lines(path)[2:] == [b'{"goal": 2}', b'{"goal": 3}']
-    assert later.flush() == "" and later.keep({"goal": 4}) == ""
+    assert later.flush() == "" and later.append({"goal": 4}) == ""
     disk.room = 0
-    assert "cannot be written" in later.keep({"goal": 5})  # the next time it is told again
+    assert "cannot be written" in later.append({"goal": 5})  # the next time it is told again
 
 
 def test_a_file_that_may_grow_no_more_keeps_whole_lines(tmp_path):
     """The operating system's own refusal, in the middle of a line."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     kept = Journal(tmp_path / "j")
-    kept.begin({"head": 1})
+    kept.start({"head": 1})
     resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
     try:
-        assert "cannot be written: File too large" in kept.keep({"goal": 2})
+        assert "cannot be written: File too large" in kept.append({"goal": 2})
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert lines(tmp_path / "j") == [b'{"head": 1}']
@@ -127,7 +131,7 @@ def test_a_file_that_may_grow_no_more_keeps_whole_lines(tmp_path):
 def test_a_folder_that_cannot_be_made_is_a_full_disk(tmp_path):
     (tmp_path / "file").write_text("")
     kept = Journal(tmp_path / "file" / "j")
-    assert "cannot be written: " in kept.begin({"head": 1})
+    assert "cannot be written: " in kept.start({"head": 1})
     (tmp_path / "file").unlink()
     assert kept.flush().endswith("nothing is missing")
     assert lines(tmp_path / "file" / "j") == [b'{"head": 1}']
@@ -135,8 +139,8 @@ def test_a_folder_that_cannot_be_made_is_a_full_disk(tmp_path):
 
 def test_two_missions_do_not_write_one_journal(tmp_path):
     first, second = Journal(tmp_path / "j"), Journal(tmp_path / "j")
-    first.begin({"head": 1})
-    assert "another mission that flies now writes it" in second.begin({"head": 2})
+    first.start({"head": 1})
+    assert "another running mission writes it" in second.start({"head": 2})
     first.close()
     assert second.flush().endswith("nothing is missing")
     assert lines(tmp_path / "j") == [b'{"head": 2}']

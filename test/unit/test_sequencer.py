@@ -46,7 +46,7 @@ def test_goals_are_sent_one_by_one_to_the_end():
     ]
     assert not s.done and s.index == 1
     assert s.tick(25.0, at(B)) == [GoalEnded(1, 1, B, True, 5.0, 1), SequenceDone()]
-    assert s.done and s.flight is None and s.index == 2
+    assert s.done and s.active_goal is None and s.index == 2
     assert s.tick(26.0, START) == []
 
 
@@ -63,7 +63,7 @@ def test_a_given_yaw_is_sent_and_without_way_the_robots_own():
 
 def test_an_aborted_goal_is_sent_again_then_skipped():
     s = flying(A, B, retries=1)
-    sent = s.flight.pose
+    sent = s.active_goal.pose
     assert s.tick(5.0, at(A, 2.0), [ABORTED]) == [SendGoal(0, 1, sent, 2, "aborted: no plan")]
     assert s.tick(6.0, at(A, 2.0)) == []
     ended, following = s.tick(9.0, at(A, 2.0), [ABORTED])
@@ -82,7 +82,7 @@ def test_without_retries_the_first_failure_skips():
 def test_each_attempt_has_the_whole_time():
     s = flying(A, goal_timeout_s=30.0, retries=1)
     assert s.tick(29.9, START) == []
-    assert s.tick(30.0, START) == [SendGoal(0, 1, s.flight.pose, 2, "not reached in 30 s")]
+    assert s.tick(30.0, START) == [SendGoal(0, 1, s.active_goal.pose, 2, "not reached in 30 s")]
     assert s.tick(59.9, START) == []
     assert s.tick(60.0, START)[0] == GoalEnded(0, 1, A, False, 60.0, 2, "not reached in 30 s")
 
@@ -94,10 +94,10 @@ def test_a_goal_that_is_reached_counts_whatever_the_navigator_says():
 
 def test_stopping_short_of_the_goal_is_a_failure():
     s = flying(A)
-    assert s.tick(5.0, at(A, 0.5), [SUCCEEDED])[0].why == (
+    assert s.tick(5.0, at(A, 0.5), [SUCCEEDED])[0].resend_reason == (
         "the navigator stopped 0.50 m from it (goal_tolerance 0.40 m)"
     )
-    assert s.flight.attempt == 2
+    assert s.active_goal.attempt == 2
 
 
 def test_a_cancelled_goal_is_given_up():
@@ -113,7 +113,7 @@ def test_somebody_elses_goal_is_waited_for_and_costs_no_attempt(outcome):
     assert s.tick(2.0, START, [NavigatorReport(Verdict.REPLACED)]) == []
     assert s.tick(20.0, START) == []
     assert s.tick(21.0, START, [outcome]) == [
-        SendGoal(0, 1, s.flight.pose, 1, "the navigator is through with another node's goal")
+        SendGoal(0, 1, s.active_goal.pose, 1, "the navigator has finished another node's goal")
     ]
     assert s.tick(22.0, START, [outcome])[0].attempt == 2
 
@@ -124,10 +124,10 @@ def test_a_navigator_that_lost_its_goal_gets_it_again_in_the_same_attempt():
     assert s.tick(10.0, START, navigator_idle=True) == []
     assert s.tick(12.9, START, navigator_idle=True) == []
     assert s.tick(13.0, START, navigator_idle=True) == [
-        SendGoal(0, 1, s.flight.pose, 1, "the navigator has had no goal for 5 s")
+        SendGoal(0, 1, s.active_goal.pose, 1, "the navigator has had no goal for 5 s")
     ]
     assert s.tick(17.9, START, navigator_idle=True) == []
-    assert s.tick(30.0, START)[0].why == "not reached in 30 s"
+    assert s.tick(30.0, START)[0].resend_reason == "not reached in 30 s"
 
 
 def test_looping_counts_laps():

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.flight_log import FlightLog, Leg, unflown
+from quad_nav.mission.flight_log import FlightLog, Leg, unflown_legs
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.mission.summary import (
@@ -26,9 +26,9 @@ GOALS = GoalSequence((Goal(3.0, 4.0), Goal(9.0, 4.0), Goal(9.0, 9.0)))
 
 def fly(log, name, sequencer, samples):
     for now_s, pose in samples:
-        log.move(name, now_s, pose)
+        log.add_pose(name, now_s, pose)
         for action in sequencer.tick(now_s, pose):
-            log.robots[name].act(action)
+            log.robots[name].add_action(action)
 
 
 def leg(reached=True, **fields):
@@ -66,9 +66,9 @@ def test_legs_measure_the_way_flown_and_the_straight_way():
 
 def test_the_path_is_from_the_first_goal_to_the_last_and_by_newer_poses_only():
     log, sequencer = FlightLog(["quad0"], 0.3), Sequencer(GoalSequence((Goal(3.0, 4.0),)))
-    log.move("quad0", 0.0, Pose2D(-9, 0))
+    log.add_pose("quad0", 0.0, Pose2D(-9, 0))
     fly(log, "quad0", sequencer, [(1.0, Pose2D(0, 0))])
-    log.move("quad0", 1.0, Pose2D(5, 0))
+    log.add_pose("quad0", 1.0, Pose2D(5, 0))
     fly(log, "quad0", sequencer, [(2.0, Pose2D(3, 4)), (3.0, Pose2D(3.3, 4))])
     assert sequencer.done
     assert log.robots["quad0"].path_length_m == 5.0
@@ -207,7 +207,7 @@ def test_the_json_has_the_documented_keys(tmp_path):
 
 
 def test_a_mission_that_never_began_lists_its_goals():
-    assert [(leg.index, leg.reached, leg.reason) for leg in unflown(GOALS)] == [
+    assert [(leg.index, leg.reached, leg.reason) for leg in unflown_legs(GOALS)] == [
         (0, False, "not sent"),
         (1, False, "not sent"),
         (2, False, "not sent"),

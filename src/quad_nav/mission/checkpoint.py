@@ -1,7 +1,7 @@
-"""How a mission stands: what a journal keeps of it, and what another sequencer makes of that.
+"""Checkpoints of a mission: records of a journal, and the state that a sequencer resumes from.
 
-Times in a journal are seconds since the mission began, so they outlast the clock that
-they were read on; ``start_s`` is what the present clock said then.
+Times in a journal are seconds since the start of the mission, so that they outlive the clock.
+``start_s`` is the time of the present clock at the start of the mission.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, TypeV
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.flight_log import FlightLog, Flown, Leg
+from quad_nav.mission.flight_log import FlightLog, Leg, RobotLogState
 from quad_nav.mission.goal_sequence import Goal
-from quad_nav.mission.sequencer import BEGINNING, Flight, Sequencer, Stage
+from quad_nav.mission.sequencer import START, ActiveGoal, SequenceProgress, Sequencer
 from quad_nav.sim.contacts import Contact
 
 T = TypeVar("T")
@@ -22,21 +22,25 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class RobotCheckpoint:
-    """Where in its goals a quadcopter is, and what it has flown.
+    """Progress, log and smallest distances of one robot; distances are None if unknown."""
 
-    ``clearance_m`` and ``separation_m`` are the smallest gaps so far, None when not known.
-    """
-
-    stage: Stage = BEGINNING
-    flown: Flown = field(default_factory=Flown)
+    progress: SequenceProgress = START
+    log: RobotLogState = field(default_factory=RobotLogState)
     clearance_m: Optional[float] = None
     separation_m: Optional[float] = None
 
 
 @dataclass(frozen=True)
 class MissionCheckpoint:
-    """All quadcopters', by name; ``epoch_s`` is Unix time and ``clock_s`` the clock's at the
-    beginning, ``mission_s`` and ``wall_s`` what has passed since.
+    """State of a mission.
+
+    Attributes:
+        clock_s: Time of the clock at the start of the mission.
+        epoch_s: Unix time at the start of the mission.
+        mission_s: Time of the clock that has passed since.
+        wall_s: Wall time that has passed since.
+        robots: Checkpoints by the robots' names.
+        contacts: All contacts so far.
     """
 
     clock_s: float
@@ -47,25 +51,25 @@ class MissionCheckpoint:
     contacts: Sequence[Contact] = ()
 
 
-def head(names: Sequence[str], clock_s: float, epoch_s: float) -> Dict[str, Any]:
-    """The first line of a journal, and of its part from the next sequencer on."""
+def head_record(names: Sequence[str], clock_s: float, epoch_s: float) -> Dict[str, Any]:
+    """Return the first record of a journal, and of each part that a resumed mission adds."""
     return {"robots": list(names), "clock_s": clock_s, "epoch_s": epoch_s}
 
 
 def robot_record(
     name: str, sequencer: Sequencer, log: FlightLog, leg: Optional[Leg], start_s: float
 ) -> Dict[str, Any]:
-    """How a quadcopter stands now; ``leg`` is the one that has just ended, if one has."""
-    flight = sequencer.flight
-    figures = dataclasses.asdict(dataclasses.replace(log.robots[name].flown, legs=()))
-    del figures["legs"]  # each has its line
+    """Return the record of a robot's state; ``leg`` is the leg that has just ended, if any."""
+    active = sequencer.active_goal
+    state = dataclasses.asdict(dataclasses.replace(log.robots[name].state, legs=()))
+    del state["legs"]  # each has a record of its own
     clearance_m, separation_m = log.distances.minima_of_blocks_m(name)
     return {
         "robot": name,
         "index": sequencer.index,
         "lap": sequencer.lap,
-        "flight": None if flight is None else dataclasses.asdict(_moved(flight, -start_s)),
-        "flown": figures,
+        "active_goal": None if active is None else dataclasses.asdict(_shifted(active, -start_s)),
+        "log": state,
         "leg": None if leg is None else dataclasses.asdict(leg),
         "clearance_m": clearance_m,
         "separation_m": separation_m,
@@ -73,56 +77,61 @@ def robot_record(
 
 
 def contact_record(contact: Contact, start_s: float) -> Dict[str, Any]:
+    """Return the record of a contact."""
     return {
         "contact": dataclasses.asdict(dataclasses.replace(contact, time_s=contact.time_s - start_s))
     }
 
 
-def standing(
-    records: Sequence[Mapping[str, Any]], names: Sequence[str], where: str
+def read_checkpoint(
+    records: Sequence[Mapping[str, Any]], names: Sequence[str], source: str
 ) -> Optional[MissionCheckpoint]:
-    """How the mission of a journal stands, None when nothing had begun.
+    """Return the state of a mission at the end of its journal, None if no robot has started.
+
+    Args:
+        records: The records of the journal.
+        names: Names of the robots of the mission.
+        source: Name of the journal, for messages.
 
     Raises:
-        InputError: the journal, called ``where``, is of other quadcopters, or has something
-            that no sequencer writes.
+        InputError: The journal is of other robots or of another version.
     """
     if not any("robot" in record for record in records):
         return None
     if records[0].get("robots") != list(names):
         raise InputError(
             [
-                f"{where}: is the journal of {records[0].get('robots')}; expected one "
-                f"of {list(names)}. Remove it to begin with the first goals"
+                f"{source}: is the journal of {records[0].get('robots')}; expected one "
+                f"of {list(names)}. Remove it to start with the first goals"
             ]
         )
     try:
-        return _standing(records, names)
+        return _read_mission(records, names)
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
             [
-                f"{where}: cannot be understood: {error!r}; expected a journal of this "
-                "version. Remove it to begin with the first goals"
+                f"{source}: cannot be read: {error!r}; expected a journal of this "
+                "version. Remove it to start with the first goals"
             ]
         ) from error
 
 
-def _standing(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> MissionCheckpoint:
+def _read_mission(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> MissionCheckpoint:
     robots = {name: RobotCheckpoint() for name in names}
     contacts: List[Contact] = []
-    latest: Mapping[str, Any] = {}
+    head: Mapping[str, Any] = {}
     for record in records:
         if "contact" in record:
             contacts.append(Contact(**record["contact"]))
         elif "robot" in record:
             name = record["robot"]
-            robots[name] = _after(robots[name], record)
+            robots[name] = _read_robot(robots[name], record)
         else:
-            latest = record
+            head = record
     last = records[-1]
     return MissionCheckpoint(
-        float(latest["clock_s"]),
-        float(latest["epoch_s"]),
+        float(head["clock_s"]),
+        float(head["epoch_s"]),
         float(last.get("mission_s", 0.0)),
         float(last.get("wall_s", 0.0)),
         robots,
@@ -130,38 +139,37 @@ def _standing(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> Mis
     )
 
 
-def _after(before: RobotCheckpoint, record: Mapping[str, Any]) -> RobotCheckpoint:
-    legs = before.flown.legs
+def _read_robot(before: RobotCheckpoint, record: Mapping[str, Any]) -> RobotCheckpoint:
+    legs = before.log.legs
     if record["leg"] is not None:
         legs = (*legs, Leg(**{**record["leg"], "goal": Goal(**record["leg"]["goal"])}))
-    figures = dict(record["flown"])
+    state = dict(record["log"])
     for key in ("leg_start", "pose"):
-        figures[key] = _made(figures[key], Pose2D)
-    flight = record["flight"]
-    if flight is not None:
-        flight = Flight(
-            **{**flight, "goal": Goal(**flight["goal"]), "pose": Pose2D(**flight["pose"])}
-        )
+        state[key] = _instance(state[key], Pose2D)
+    active = record["active_goal"]
+    if active is not None:
+        goal, pose = Goal(**active["goal"]), Pose2D(**active["pose"])
+        active = ActiveGoal(**{**active, "goal": goal, "pose": pose})
     return RobotCheckpoint(
-        Stage(int(record["index"]), int(record["lap"]), flight),
-        Flown(legs=legs, **figures),
+        SequenceProgress(int(record["index"]), int(record["lap"]), active),
+        RobotLogState(legs=legs, **state),
         record["clearance_m"],
         record["separation_m"],
     )
 
 
-def on_clock(stage: Stage, start_s: float) -> Stage:
-    """A stage of a journal in the time of a clock that said ``start_s`` when it began."""
-    if stage.flight is None:
-        return stage
-    return dataclasses.replace(stage, flight=_moved(stage.flight, start_s))
+def shift_to_clock(progress: SequenceProgress, start_s: float) -> SequenceProgress:
+    """Shift times since the start of the mission to a clock that was ``start_s`` then."""
+    if progress.active_goal is None:
+        return progress
+    return dataclasses.replace(progress, active_goal=_shifted(progress.active_goal, start_s))
 
 
-def _moved(flight: Flight, by_s: float) -> Flight:
+def _shifted(active: ActiveGoal, by_s: float) -> ActiveGoal:
     return dataclasses.replace(
-        flight, first_sent_s=flight.first_sent_s + by_s, sent_s=flight.sent_s + by_s
+        active, first_sent_s=active.first_sent_s + by_s, sent_s=active.sent_s + by_s
     )
 
 
-def _made(values: Optional[Mapping[str, Any]], kind: Callable[..., T]) -> Optional[T]:
+def _instance(values: Optional[Mapping[str, Any]], kind: Callable[..., T]) -> Optional[T]:
     return None if values is None else kind(**values)

@@ -1,8 +1,7 @@
-"""What was flown: path lengths, smallest gaps, contacts, and each goal's outcome.
+"""Flight log: path lengths, clearances, contacts and the outcome of each goal.
 
-Gaps are between hulls: a quadcopter is a disc of ``robot_radius_m``, so the
-gap to an obstacle is the centre's distance to its surface less one radius, and
-the gap between two quadcopters their centres' distance less both radii.
+``RobotLog`` has the figures of one robot, ``FlightLog`` those of all robots of a mission. Both
+shells fill them and sum them up with ``summary``.
 """
 
 from __future__ import annotations
@@ -16,20 +15,24 @@ from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import CONTACT_GAP_S, Contact
 
-# Contacts of a pair begin more than CONTACT_GAP_S apart, so reports of a begin that differ by less
-# than this, in rounding or because both robots report it, are of the same contact.
 _SAME_BEGIN_S = CONTACT_GAP_S / 2
-# A quadcopter that is slower than this and turns faster than this spins.
-SPIN_BELOW_MPS, SPIN_ABOVE_RADPS = 0.05, 0.2
+"""Two reports of one contact differ by less: contacts of a pair begin further apart."""
 
-# Reasons of legs that no fault of theirs kept from their end.
+SPIN_BELOW_MPS, SPIN_ABOVE_RADPS = 0.05, 0.2
+"""A robot turns on the spot if it is slower than this and turns faster than this."""
+
 INTERRUPTED = "interrupted"
 NOT_SENT = "not sent"
+"""Reasons of goals that did not fail: the mission ended while they were flown, or before."""
 
 
 @dataclass(frozen=True)
 class Leg:
-    """The flight to one goal; ``straight_length_m`` is from where it was sent to where it ended."""
+    """Flight to one goal.
+
+    ``straight_length_m`` is the distance from the position where the goal was sent to the one
+    where it ended. ``time_s`` is None if the goal was not sent.
+    """
 
     index: int
     lap: int
@@ -43,11 +46,18 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class Flown:
-    """The figures of one quadcopter up to a moment, for a log that goes on from there.
+class RobotLogState:
+    """Snapshot of a robot's log that another log can resume from.
 
-    ``leg_start`` is where the leg in flight began, ``leg_start_length_m`` how long the path
-    was by then; ``pose`` is where the quadcopter was last, None when it is somewhere else now.
+    Attributes:
+        legs: The legs that have ended.
+        path_length_m: Length of the path since the first goal was sent.
+        recoveries: Number of recoveries.
+        aborts: Number of goals that the navigator aborted.
+        spin_s: Time that the robot turned on the spot.
+        leg_start: Pose in ``map`` at which the present leg began.
+        leg_start_length_m: Length of the path at that time.
+        pose: Last pose in ``map``; None if the robot is somewhere else now.
     """
 
     legs: Tuple[Leg, ...] = ()
@@ -61,30 +71,29 @@ class Flown:
 
 
 class RobotLog:
-    """What one quadcopter has flown from its first goal to its last.
+    """Log of one robot, from its first goal to its last.
 
-    ``spin_s`` is how long it turned on the spot, ``aborts`` how many goals its navigator
-    gave up. ``before`` is what it had flown before this log begins; to the first pose it
-    flew straight.
+    ``previous`` is the state of an earlier log to resume from; the path from its last pose to the
+    first new pose counts as straight.
     """
 
-    def __init__(self, name: str, before: Flown = Flown()):
+    def __init__(self, name: str, previous: RobotLogState = RobotLogState()):
         self.name = name
-        self.legs: List[Leg] = list(before.legs)
-        self.path_length_m = before.path_length_m
-        self.recoveries = before.recoveries
-        self.aborts = before.aborts
-        self.spin_s = before.spin_s
-        self._pose = before.pose
+        self.legs: List[Leg] = list(previous.legs)
+        self.path_length_m = previous.path_length_m
+        self.recoveries = previous.recoveries
+        self.aborts = previous.aborts
+        self.spin_s = previous.spin_s
+        self._pose = previous.pose
         self._stamp_s = 0.0
-        self._is_flying = before.pose is not None
-        self._leg_start = before.leg_start
-        self._leg_start_length_m = before.leg_start_length_m
+        self._is_flying = previous.pose is not None
+        self._leg_start = previous.leg_start
+        self._leg_start_length_m = previous.leg_start_length_m
 
     @property
-    def flown(self) -> Flown:
-        """Up to now."""
-        return Flown(
+    def state(self) -> RobotLogState:
+        """Snapshot of the present state."""
+        return RobotLogState(
             tuple(self.legs),
             self.path_length_m,
             self.recoveries,
@@ -95,91 +104,73 @@ class RobotLog:
             self._pose,
         )
 
-    def move(self, stamp_s: float, pose: Pose2D) -> bool:
-        """Take a pose; False for one that is not newer than the last."""
+    def add_pose(self, stamp_s: float, pose: Pose2D) -> bool:
+        """Add a pose in ``map``; return False if it is not newer than the last one."""
         if self._pose is not None:
             if stamp_s <= self._stamp_s:
                 return False
             if self._is_flying:
-                self._fly(self._pose, pose, stamp_s - self._stamp_s)
+                self._add_step(self._pose, pose, stamp_s - self._stamp_s)
         self._pose, self._stamp_s = pose, stamp_s
         return True
 
-    def _fly(self, before: Pose2D, after: Pose2D, time_s: float) -> None:
+    def _add_step(self, before: Pose2D, after: Pose2D, time_s: float) -> None:
         length_m = before.distance_to(after)
         self.path_length_m += length_m
         turn_rad = abs(angle_difference(after.yaw_rad, before.yaw_rad))
         if length_m < SPIN_BELOW_MPS * time_s and turn_rad > SPIN_ABOVE_RADPS * time_s:
             self.spin_s += time_s
 
-    def act(self, action: Action) -> Optional[Leg]:
-        """Take the sequencer's action; the leg when it ended one."""
+    def add_action(self, action: Action) -> Optional[Leg]:
+        """Add an action of the sequencer; return the leg if the action ended one."""
         self._is_flying = not isinstance(action, SequenceDone)
-        if isinstance(action, SendGoal) and not action.why:
+        if isinstance(action, SendGoal) and not action.resend_reason:
             self._leg_start, self._leg_start_length_m = self._pose, self.path_length_m
         if not isinstance(action, GoalEnded):
             return None
-        leg = self._leg(
-            action.index,
-            action.lap,
-            action.goal,
-            action.reached,
-            action.reason,
-            action.attempts,
-            action.time_s,
-        )
+        leg = self._present_leg(action)
         self.legs.append(leg)
         return leg
 
     def all_legs(self, sequencer: Sequencer, now_s: float) -> List[Leg]:
-        """The legs flown, the one cut short and those that were never begun."""
-        flight, index, lap = sequencer.flight, sequencer.index, sequencer.lap
-        rest: List[Leg] = []
-        for number, goal in enumerate(sequencer.sequence.goals[index:], start=index):
-            if flight is not None and number == index:
-                rest.append(
-                    self._leg(
-                        number,
-                        lap,
-                        goal,
-                        False,
-                        INTERRUPTED,
-                        flight.attempt,
-                        now_s - flight.first_sent_s,
-                    )
+        """Return the legs flown, the one that is interrupted now and those that were not sent."""
+        active, first, lap = sequencer.active_goal, sequencer.index, sequencer.lap
+        rest = [
+            Leg(index, lap, goal, False, NOT_SENT, 0)
+            for index, goal in enumerate(sequencer.sequence.goals[first:], start=first)
+        ]
+        if active is not None and rest:
+            time_s = now_s - active.first_sent_s
+            rest[0] = self._present_leg(
+                GoalEnded(
+                    first, lap, rest[0].goal, False, time_s, active.attempt, reason=INTERRUPTED
                 )
-            else:
-                rest.append(Leg(number, lap, goal, False, NOT_SENT, 0))
+            )
         return self.legs + rest
 
-    def _leg(
-        self,
-        index: int,
-        lap: int,
-        goal: Goal,
-        reached: bool,
-        reason: str,
-        attempts: int,
-        time_s: float,
-    ) -> Leg:
+    def _present_leg(self, ended: GoalEnded) -> Leg:
         straight_m = 0.0
         if self._leg_start is not None and self._pose is not None:
             straight_m = self._leg_start.distance_to(self._pose)
         return Leg(
-            index,
-            lap,
-            goal,
-            reached,
-            reason,
-            attempts,
-            time_s,
+            ended.index,
+            ended.lap,
+            ended.goal,
+            ended.reached,
+            ended.reason,
+            ended.attempts,
+            ended.time_s,
             self.path_length_m - self._leg_start_length_m,
             straight_m,
         )
 
 
 class FlightLog:
-    """What all quadcopters of a mission have flown."""
+    """Log of all robots of a mission.
+
+    ``surface_distance`` returns the distance to the nearest obstacle or wall; without it there are
+    no clearances.
+    """
 
     def __init__(
         self,
@@ -192,9 +183,9 @@ class FlightLog:
         self.contacts: List[Contact] = []
         self.distances = DistanceLog(names, robot_radius_m, surface_distance)
 
-    def move(self, name: str, stamp_s: float, pose: Pose2D) -> None:
-        """Take a quadcopter's pose in ``map``."""
-        if self.robots[name].move(stamp_s, pose):
+    def add_pose(self, name: str, stamp_s: float, pose: Pose2D) -> None:
+        """Add a robot's pose in ``map``; ignore one that is not newer than its last."""
+        if self.robots[name].add_pose(stamp_s, pose):
             self.distances.add(name, stamp_s, pose.x_m, pose.y_m)
 
     def add_contact(self, contact: Contact) -> bool:
@@ -208,14 +199,19 @@ class FlightLog:
         self.contacts.append(contact)
         return True
 
-    def go_on(
-        self, name: str, before: Flown, clearance_m: Optional[float], separation_m: Optional[float]
+    def resume(
+        self,
+        name: str,
+        previous: RobotLogState,
+        clearance_m: Optional[float],
+        separation_m: Optional[float],
     ) -> None:
-        """Take over what a quadcopter has flown, and its smallest gaps, from another log."""
-        self.robots[name] = RobotLog(name, before)
+        """Take over a robot's state and smallest distances from an earlier log."""
+        self.robots[name] = RobotLog(name, previous)
         self.distances.restore(name, clearance_m, separation_m)
 
     def contacts_of(self, name: str) -> int:
+        """Return the number of contacts of a robot."""
         return sum(contact.involves(name) for contact in self.contacts)
 
 
@@ -227,6 +223,6 @@ def _is_same(one: Contact, other: Contact) -> bool:
     )
 
 
-def unflown(sequence: GoalSequence) -> List[Leg]:
-    """The legs of a mission that never began."""
+def unflown_legs(sequence: GoalSequence) -> List[Leg]:
+    """Return the legs of a mission that did not start."""
     return [Leg(index, 1, goal, False, NOT_SENT, 0) for index, goal in enumerate(sequence.goals)]

@@ -1,4 +1,4 @@
-"""The goals of one quadcopter and how they are flown."""
+"""Goals of one robot, in the order in which it flies them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from quad_nav.geometry import Pose2D
 
 @dataclass(frozen=True)
 class Goal:
-    """A place in ``map``; without a yaw the quadcopter may face along its way."""
+    """Position in ``map``; without a yaw the robot may face in the direction of its path."""
 
     x_m: float
     y_m: float
@@ -18,15 +18,19 @@ class Goal:
 
     @property
     def pose(self) -> Pose2D:
+        """Pose in ``map``, with yaw 0 if the goal has none."""
         return Pose2D(self.x_m, self.y_m, self.yaw_rad or 0.0)
 
 
 @dataclass(frozen=True)
 class SequenceSettings:
-    """How a sequence is flown; times are simulated time where there is a simulation.
+    """Tolerance, retries and repetition; times are simulated if there is a simulation.
 
-    ``goal_timeout_s`` is the time for one attempt; a goal gets ``retries`` more
-    attempts before it is skipped.
+    Attributes:
+        goal_tolerance_m: Distance from the goal within which it counts as reached.
+        goal_timeout_s: Time for one attempt.
+        retries: Further attempts before the goal is skipped.
+        loop: Start again with the first goal after the last one.
     """
 
     goal_tolerance_m: float = 0.4
@@ -40,7 +44,7 @@ DEFAULT_SETTINGS = SequenceSettings()
 
 @dataclass(frozen=True)
 class GoalSequence:
-    """What one goal file says."""
+    """Content of a goal file."""
 
     goals: Tuple[Goal, ...]
     settings: SequenceSettings = DEFAULT_SETTINGS

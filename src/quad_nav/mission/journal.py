@@ -1,8 +1,7 @@
-"""A mission's journal: a file that tells a new sequencer what the one before it has flown.
+"""Journal of a mission: the file that a restarted sequencer resumes from.
 
-Lines are JSON objects, appended and forced to the disk before the quadcopters are told
-of what is in them. So whoever is killed, nothing that was flown is flown again. The end
-of a line that was never finished counts for nothing.
+Each line is a JSON object. A line is forced to the disk before the robots receive what it says,
+so that no goal is flown twice after a crash. An unfinished last line is ignored.
 """
 
 from __future__ import annotations
@@ -17,29 +16,29 @@ from quad_nav.errors import InputError
 
 
 class Journal:
-    """The lines of one mission, and those that wait for room on the disk.
+    """Records of one mission, and those that wait for space on the disk.
 
-    A disk that is full stops nobody: ``keep`` and ``flush`` return a sentence when the file
-    can't be written any more and another when it can again, and "" otherwise.
+    A write error does not stop the flight: ``start``, ``append`` and ``flush`` return a message
+    when writing fails for the first time and when it succeeds again, and "" otherwise.
     """
 
     def __init__(self, path: Path):
         self.path = path
         self._file: Optional[int] = None
-        self._size = 0  # bytes, of whole lines
+        self._size = 0  # bytes of complete lines
         self._waiting: List[bytes] = []
         self._is_failing = False
 
-    def begin(self, head: Mapping[str, Any]) -> str:
-        """Forgets what the file had and begins anew."""
+    def start(self, head: Mapping[str, Any]) -> str:
+        """Discard the content of the file and write the first record."""
         self._size, self._waiting = 0, []
-        return self.keep(head)
+        return self.append(head)
 
-    def go_on(self) -> List[Dict[str, Any]]:
-        """What the file has, [] when there is none; further lines come after it.
+    def resume(self) -> List[Dict[str, Any]]:
+        """Return the records of the file, [] if there is no file; append after them.
 
         Raises:
-            InputError: it cannot be read, or is no journal.
+            InputError: The file cannot be read or is not a journal.
         """
         try:
             content = self.path.read_bytes()
@@ -55,44 +54,42 @@ class Journal:
         records, self._size = _records(content, self.path)
         return records
 
-    def keep(self, record: Mapping[str, Any]) -> str:
-        """Takes a line and writes all that wait."""
+    def append(self, record: Mapping[str, Any]) -> str:
+        """Add a record and write all records that wait."""
         self._waiting.append(json.dumps(record, allow_nan=False).encode() + b"\n")
         return self.flush()
 
     def flush(self) -> str:
-        """Writes the lines that wait."""
+        """Write the records that wait."""
         if not self._waiting:
             return ""
+        was_failing = self._is_failing
         try:
             self._write(b"".join(self._waiting))
         except OSError as error:
-            news = (
-                ""
-                if self._is_failing
-                else (
-                    f"{self.path}: cannot be written: {error.strerror or error}; the flight goes on, "
-                    "and so does the journal as soon as it can"
-                )
-            )
             self._is_failing = True
-            return news
-        news = f"{self.path}: written again, nothing is missing" if self._is_failing else ""
+            return "" if was_failing else self._failure(error)
         self._waiting, self._is_failing = [], False
-        return news
+        return f"{self.path}: can be written again, nothing is missing" if was_failing else ""
 
     def close(self) -> None:
-        """Lets others have the file."""
+        """Close the file and release its lock."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
 
+    def _failure(self, error: OSError) -> str:
+        return (
+            f"{self.path}: cannot be written: {error.strerror or error}; the flight continues, "
+            "and the journal is written as soon as possible"
+        )
+
     def _write(self, data: bytes) -> None:
-        """All of it or, as far as a reader can see, nothing."""
+        """Write everything or, as far as a reader can see, nothing."""
         if self._file is None:
             self._file = self._open()
         try:
-            os.ftruncate(self._file, self._size)  # of an attempt before, or a torn line
+            os.ftruncate(self._file, self._size)  # removes an unfinished line
             done = 0
             while done < len(data):
                 done += os.pwrite(self._file, data[done:], self._size + done)
@@ -103,20 +100,20 @@ class Journal:
         self._size += len(data)
 
     def _open(self) -> int:
-        """The file, locked: two missions in one journal would be none."""
+        """Open and lock the file: two missions must not share a journal."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             os.close(file)
-            raise OSError(error.errno, "another mission that flies now writes it") from error
+            raise OSError(error.errno, "another running mission writes it") from error
         return file
 
 
 def _records(content: bytes, path: Path) -> Tuple[List[Dict[str, Any]], int]:
-    """The objects in a journal, and how many bytes they take."""
-    *lines, _torn = content.split(b"\n")
+    """Return the records of a journal and the number of bytes that they take."""
+    *lines, _unfinished = content.split(b"\n")
     records = []
     for number, line in enumerate(lines, start=1):
         try:
@@ -126,8 +123,8 @@ def _records(content: bytes, path: Path) -> Tuple[List[Dict[str, Any]], int]:
         if not isinstance(record, dict):
             raise InputError(
                 [
-                    f"{path}:{number}: is no line of a journal; expected a JSON object. "
-                    "Remove the file to begin with the first goals"
+                    f"{path}:{number}: is not a record of a journal; expected a JSON object. "
+                    "Remove the file to start with the first goals"
                 ]
             )
         records.append(record)

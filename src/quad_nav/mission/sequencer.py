@@ -1,15 +1,15 @@
-"""One quadcopter's goals, one after the other: the state machine without ROS or clock.
+"""State machine that flies one robot's goals in order, without ROS and without a clock.
 
-A goal is reached when the quadcopter is within the tolerance of it, as its
-odometry says; the navigator's own opinion only tells when to try again.
+A goal is reached when the robot's odometry is within the tolerance of it. What the navigator
+reports only decides when to send the goal again.
 
     send -> flying -> reached ------------------> next goal, or done
               |
-              +-> aborted, out of time, reported reached elsewhere
-              |       -> send again while retries last -> skipped -> next
-              +-> cancelled by a person -> skipped -> next
-              +-> forgotten by the navigator (restarted) or finished with
-                  somebody else's goal -> send again, not counted
+              +-> aborted, timed out, reported as reached elsewhere
+              |       -> send again while retries remain -> skipped -> next
+              +-> cancelled by another node -> skipped -> next
+              +-> lost by the navigator (restart), or replaced by another node's goal
+                  that has ended -> send again, not counted as an attempt
 """
 
 from __future__ import annotations
@@ -23,39 +23,44 @@ from typing import List, Optional, Sequence, Union
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal_sequence import Goal, GoalSequence
 
-# A navigator without a goal for this long has lost ours: it was restarted, or was not ready yet.
-FORGOTTEN_AFTER_S = 5.0
+GOAL_LOST_AFTER_S = 5.0
+"""A navigator that is idle for so long has lost the goal: it restarted, or was not ready."""
 
 
 class Verdict(enum.Enum):
-    """What the navigator says about the goal that it had."""
+    """Result that the navigator reports for a goal."""
 
     SUCCEEDED = "succeeded"
     ABORTED = "aborted"
     CANCELLED = "cancelled"
-    REPLACED = "replaced by somebody else's goal"
+    REPLACED = "replaced by another node's goal"
 
 
 @dataclass(frozen=True)
 class NavigatorReport:
+    """The navigator's result for the goal that was sent last, with its text."""
+
     verdict: Verdict
     text: str = ""
 
 
 @dataclass(frozen=True)
 class SendGoal:
-    """Send ``pose`` to the navigator. ``why`` is empty the first time."""
+    """Action: send ``pose`` to the navigator.
+
+    ``resend_reason`` says why the goal is sent again; it is empty the first time.
+    """
 
     index: int
     lap: int
     pose: Pose2D
     attempt: int
-    why: str = ""
+    resend_reason: str = ""
 
 
 @dataclass(frozen=True)
 class GoalEnded:
-    """The goal is reached, or skipped for ``reason``; ``time_s`` since it was first sent."""
+    """Action: the goal is reached, or skipped for ``reason``, ``time_s`` after it was first sent."""
 
     index: int
     lap: int
@@ -68,94 +73,105 @@ class GoalEnded:
 
 @dataclass(frozen=True)
 class SequenceDone:
-    """There is no further goal."""
+    """Action: all goals have ended."""
 
 
 Action = Union[SendGoal, GoalEnded, SequenceDone]
 
 
 @dataclass(frozen=True)
-class Flight:
-    """The goal that is being flown."""
+class ActiveGoal:
+    """The goal that the robot flies to.
+
+    Attributes:
+        goal: The goal as in the goal file.
+        pose: The pose that was sent, with the yaw that was chosen.
+        first_sent_s: Time of the first attempt.
+        sent_s: Start of the present attempt.
+        attempt: 1 for the first one.
+        replaced: The navigator flies another node's goal instead.
+    """
 
     goal: Goal
-    pose: Pose2D  # as sent, with the yaw that was chosen
+    pose: Pose2D
     first_sent_s: float
-    sent_s: float  # at the start of this attempt
+    sent_s: float
     attempt: int = 1
-    replaced: bool = False  # the navigator flies somebody else's goal
+    replaced: bool = False
 
 
 @dataclass(frozen=True)
-class Stage:
-    """How far a sequence has been flown: the goal in flight or next, and in which round."""
+class SequenceProgress:
+    """Snapshot of a sequencer: index of the active or next goal, lap, and the active goal."""
 
     index: int = 0
     lap: int = 1
-    flight: Optional[Flight] = None
+    active_goal: Optional[ActiveGoal] = None
 
 
-BEGINNING = Stage()
+START = SequenceProgress()
 
 
 class Sequencer:
-    """Which goal next. ``tick`` takes the situation and returns what to do, in order.
+    """Decides which goal to send next, and when to send, retry or skip it.
 
-    ``stage`` is where another sequencer has left off. The goal that it had in flight is
-    sent again, not counted, unless it has been reached meanwhile.
+    ``progress`` is the snapshot of an earlier sequencer to resume from. Its active goal is sent
+    again without counting an attempt, unless the robot has reached it meanwhile.
     """
 
-    def __init__(self, sequence: GoalSequence, stage: Stage = BEGINNING):
+    def __init__(self, sequence: GoalSequence, progress: SequenceProgress = START):
         self._sequence = sequence
-        self._index, self._lap, self._flight = stage.index, stage.lap, stage.flight
-        self._is_taken_over = stage.flight is not None
-        self._busy_s = 0.0  # when the navigator was last not known to be idle
+        self._index, self._lap, self._active = progress.index, progress.lap, progress.active_goal
+        self._is_resumed = progress.active_goal is not None
+        self._busy_s = 0.0  # the last time at which the navigator was not known to be idle
         self._done = False
-        self._drop_other_flight()
+        self._drop_replaced_goal()
 
     @property
     def sequence(self) -> GoalSequence:
+        """The goals and their settings."""
         return self._sequence
 
     @property
     def index(self) -> int:
-        """Of the goal that is flown or is next; the number of goals when done."""
+        """Index of the active or next goal; the number of goals when done."""
         return self._index
 
     @property
     def lap(self) -> int:
-        """1 in the first round."""
+        """Round through the goals, 1 for the first."""
         return self._lap
 
     @property
-    def flight(self) -> Optional[Flight]:
-        return self._flight
+    def active_goal(self) -> Optional[ActiveGoal]:
+        """The goal that the robot flies to; None before the first and after the last."""
+        return self._active
 
     @property
-    def stage(self) -> Stage:
-        """For another sequencer, to go on from."""
-        return Stage(self._index, self._lap, self._flight)
+    def progress(self) -> SequenceProgress:
+        """Snapshot that another sequencer can resume from."""
+        return SequenceProgress(self._index, self._lap, self._active)
 
     @property
     def done(self) -> bool:
+        """True when all goals have ended."""
         return self._done
 
     def replace_sequence(self, sequence: GoalSequence) -> None:
         """Follow an edited goal file from the next tick on.
 
-        The goals at the places already flown in this lap stay as they are;
-        the rest follows the new list. The goal in flight goes on if the new
-        list has the same one in its place.
+        Goals before the present index stay ended. The active goal stays active if the new list
+        has the same goal at its index.
         """
         self._sequence = sequence
         self._done = False
-        self._drop_other_flight()
+        self._drop_replaced_goal()
 
-    def _drop_other_flight(self) -> None:
+    def _drop_replaced_goal(self) -> None:
         goals = self._sequence.goals
         current = goals[self._index] if self._index < len(goals) else None
-        if self._flight is not None and self._flight.goal != current:
-            self._flight = None
+        if self._active is not None and self._active.goal != current:
+            self._active = None
 
     def tick(
         self,
@@ -164,70 +180,74 @@ class Sequencer:
         reports: Sequence[NavigatorReport] = (),
         navigator_idle: bool = False,
     ) -> List[Action]:
-        """What to do now.
+        """Return the actions that are due now, in order.
 
-        ``pose`` is the quadcopter's in ``map``; ``reports`` came since the
-        last tick, about the goal that was sent last; ``navigator_idle`` says
-        that the navigator is up and has no goal.
+        Args:
+            now_s: Present time.
+            pose: The robot's pose in ``map``.
+            reports: What the navigator has reported on the last sent goal since the last tick.
+            navigator_idle: True if the navigator runs and has no goal.
         """
         if self._done:
             return []
-        if self._flight is None:
-            return self._next(now_s, pose)
-        settings = self._sequence.settings
+        if self._active is None:
+            return self._start_next(now_s, pose)
         if not navigator_idle:
             self._busy_s = now_s
         if any(report.verdict is Verdict.REPLACED for report in reports):
-            self._flight = dataclasses.replace(self._flight, replaced=True)
-        flight = self._flight
-        if pose.distance_to(flight.pose) <= settings.goal_tolerance_m:
-            return self._end(flight, now_s, pose, "")
-        if any(report.verdict is Verdict.CANCELLED for report in reports):
-            return self._end(flight, now_s, pose, "cancelled by another node")
-        lost = self._why_lost(flight, now_s, reports)
-        if lost:
-            # The time-out is for an attempt: one that is only repeated keeps its start.
-            return [self._send(now_s, dataclasses.replace(flight, replaced=False), lost)]
-        failure = self._why_failed(flight, now_s, pose, reports)
-        if failure and flight.attempt <= settings.retries:
-            return [
-                self._send(
-                    now_s,
-                    dataclasses.replace(flight, sent_s=now_s, attempt=flight.attempt + 1),
-                    failure,
-                )
-            ]
-        return self._end(flight, now_s, pose, failure) if failure else []
+            self._active = dataclasses.replace(self._active, replaced=True)
+        return self._check_active(self._active, now_s, pose, reports)
 
-    def _why_lost(self, flight: Flight, now_s: float, reports: Sequence[NavigatorReport]) -> str:
-        """Why the navigator is without our goal through no fault of the goal's."""
-        if self._is_taken_over:
-            return "the sequencer or its clock began anew"
+    def _check_active(
+        self, active: ActiveGoal, now_s: float, pose: Pose2D, reports: Sequence[NavigatorReport]
+    ) -> List[Action]:
+        settings = self._sequence.settings
+        if pose.distance_to(active.pose) <= settings.goal_tolerance_m:
+            return self._end(active, now_s, pose, "")
+        if any(report.verdict is Verdict.CANCELLED for report in reports):
+            return self._end(active, now_s, pose, "cancelled by another node")
+        lost = self._loss_reason(active, now_s, reports)
+        if lost:
+            # The attempt is repeated, so its time-out keeps running from its start.
+            return [self._send(now_s, dataclasses.replace(active, replaced=False), lost)]
+        failure = self._failure_reason(active, now_s, pose, reports)
+        if failure and active.attempt <= settings.retries:
+            retry = dataclasses.replace(active, sent_s=now_s, attempt=active.attempt + 1)
+            return [self._send(now_s, retry, failure)]
+        return self._end(active, now_s, pose, failure) if failure else []
+
+    def _loss_reason(
+        self, active: ActiveGoal, now_s: float, reports: Sequence[NavigatorReport]
+    ) -> str:
+        """Return why the navigator has not got the goal any more, "" if it has."""
+        if self._is_resumed:
+            return "the sequencer or the clock restarted"
         ended = any(report.verdict in (Verdict.SUCCEEDED, Verdict.ABORTED) for report in reports)
-        if flight.replaced and ended:
-            return "the navigator is through with another node's goal"
-        if now_s - self._busy_s >= FORGOTTEN_AFTER_S:
-            return f"the navigator has had no goal for {FORGOTTEN_AFTER_S:.0f} s"
+        if active.replaced and ended:
+            return "the navigator has finished another node's goal"
+        if now_s - self._busy_s >= GOAL_LOST_AFTER_S:
+            return f"the navigator has had no goal for {GOAL_LOST_AFTER_S:.0f} s"
         return ""
 
-    def _why_failed(
-        self, flight: Flight, now_s: float, pose: Pose2D, reports: Sequence[NavigatorReport]
+    def _failure_reason(
+        self, active: ActiveGoal, now_s: float, pose: Pose2D, reports: Sequence[NavigatorReport]
     ) -> str:
+        """Return why the attempt has failed, "" if it has not."""
         settings = self._sequence.settings
         for report in reports:
             if report.verdict is Verdict.ABORTED:
                 return f"aborted: {report.text}" if report.text else "aborted"
             if report.verdict is Verdict.SUCCEEDED:
                 return (
-                    f"the navigator stopped {pose.distance_to(flight.pose):.2f} m from it "
+                    f"the navigator stopped {pose.distance_to(active.pose):.2f} m from it "
                     f"(goal_tolerance {settings.goal_tolerance_m:.2f} m)"
                 )
-        if now_s - flight.sent_s >= settings.goal_timeout_s:
+        if now_s - active.sent_s >= settings.goal_timeout_s:
             return f"not reached in {settings.goal_timeout_s:g} s"
         return ""
 
-    def _next(self, now_s: float, pose: Pose2D) -> List[Action]:
-        """Fly the goal at the present index, or see that there is none."""
+    def _start_next(self, now_s: float, pose: Pose2D) -> List[Action]:
+        """Send the goal at the present index, or end the sequence or lap."""
         goals = self._sequence.goals
         if self._index >= len(goals):
             if not self._sequence.settings.loop:
@@ -235,32 +255,32 @@ class Sequencer:
                 return [SequenceDone()]
             self._index, self._lap = 0, self._lap + 1
         goal = goals[self._index]
-        return [self._send(now_s, Flight(goal, _with_yaw(goal, pose), now_s, now_s), "")]
+        return [self._send(now_s, ActiveGoal(goal, _with_yaw(goal, pose), now_s, now_s), "")]
 
-    def _send(self, now_s: float, flight: Flight, why: str) -> SendGoal:
-        self._flight, self._busy_s, self._is_taken_over = flight, now_s, False
-        return SendGoal(self._index, self._lap, flight.pose, flight.attempt, why)
+    def _send(self, now_s: float, active: ActiveGoal, resend_reason: str) -> SendGoal:
+        self._active, self._busy_s, self._is_resumed = active, now_s, False
+        return SendGoal(self._index, self._lap, active.pose, active.attempt, resend_reason)
 
-    def _end(self, flight: Flight, now_s: float, pose: Pose2D, reason: str) -> List[Action]:
-        """Reached without a reason, skipped with one; then the next goal."""
+    def _end(self, active: ActiveGoal, now_s: float, pose: Pose2D, reason: str) -> List[Action]:
+        """End the goal, reached without a reason or skipped with one, and start the next."""
         ended = GoalEnded(
             self._index,
             self._lap,
-            flight.goal,
+            active.goal,
             not reason,
-            now_s - flight.first_sent_s,
-            flight.attempt,
+            now_s - active.first_sent_s,
+            active.attempt,
             reason,
         )
-        self._flight = None
+        self._active = None
         self._index += 1
-        return [ended, *self._next(now_s, pose)]
+        return [ended, *self._start_next(now_s, pose)]
 
 
 def _with_yaw(goal: Goal, start: Pose2D) -> Pose2D:
-    """The goal's pose; without a yaw it looks along the straight way from ``start``.
+    """Return the goal's pose; without a yaw it faces along the straight line from ``start``.
 
-    That is about how the quadcopter comes in, so it need not turn on the spot.
+    The robot arrives at about this yaw, so it need not turn at the goal.
     """
     if goal.yaw_rad is not None:
         return goal.pose

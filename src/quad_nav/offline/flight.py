@@ -99,13 +99,13 @@ class FlightRobot:
 
     def tick_sequencer(self, now_s: float, pose: Pose2D) -> List[Action]:
         """Pass the odometry to the sequencer and return its actions."""
-        self._log.move(self.name, now_s, pose)
+        self._log.add_pose(self.name, now_s, pose)
         actions = self.sequencer.tick(
             now_s, pose, self._reports, self._is_idle and not self.goal_waits
         )
         self._reports = []
         for action in actions:
-            self._log.robots[self.name].act(action)
+            self._log.robots[self.name].add_action(action)
             self.goal_waits = self.goal_waits or isinstance(action, SendGoal)
         return actions
 

@@ -117,7 +117,7 @@ class TraceObserver(FlightObserver):
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
         goals = self._robots[robot].goals
-        if isinstance(action, SendGoal) and not action.why:
+        if isinstance(action, SendGoal) and not action.resend_reason:
             goals.append(GoalTrace(action.index, action.lap, action.pose, now_s))
         elif isinstance(action, GoalEnded):
             last = goals[-1]

@@ -69,7 +69,7 @@ def event(robot: int, clock_s: float, action: Action) -> Dict[str, Any]:
             "y_m": pose.y_m,
             "yaw_rad": pose.yaw_rad,
             "attempt": action.attempt,
-            "why": action.why,
+            "why": action.resend_reason,
         }
     if isinstance(action, GoalEnded):
         return {

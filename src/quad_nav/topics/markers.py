@@ -153,7 +153,7 @@ def goal_markers(sequencers: Sequence[Sequencer], altitude_m: float) -> List[Mar
 
 def _goal_markers(robot: int, index: int, sequencer: Sequencer, altitude_m: float) -> List[Marker]:
     goal = sequencer.sequence.goals[index]
-    is_active = sequencer.flight is not None and index == sequencer.index
+    is_active = sequencer.active_goal is not None and index == sequencer.index
     alpha = 1.0 if is_active else _REACHED_ALPHA if index < sequencer.index else _PENDING_ALPHA
     diameter_m = _ACTIVE_GOAL_DIAMETER_M if is_active else _GOAL_DIAMETER_M
     above_m = altitude_m + diameter_m / 2 + _GOAL_TEXT_HEIGHT_M / 2

@@ -18,7 +18,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from quad_nav.mission.checkpoint import MissionCheckpoint, RobotCheckpoint, on_clock
+from quad_nav.mission.checkpoint import MissionCheckpoint, RobotCheckpoint, shift_to_clock
 from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.ros.common import readiness
@@ -38,7 +38,7 @@ WAIT_S = 0.2  # wall time, as the next: how soon it is seen that the node shall 
 GATHER_S = 0.02  # odometry of one instant comes in as many messages as there are quadcopters
 
 
-class Mission:
+class MissionRunner:
     """All quadcopters' flights.
 
     ``again`` says that a sequencer of this very flight has died. Raises InputError for a
@@ -105,7 +105,7 @@ class Mission:
             if self._before is None:
                 self._begin(rospy.get_time())
             else:
-                self._go_on(self._before, rospy.get_time())
+                self._resume(self._before, rospy.get_time())
         for robot in self.robots:
             robot.link.pop()  # what came while waiting is no part of the flight
 
@@ -130,7 +130,7 @@ class Mission:
                 rospy.logwarn(
                     "the clock went back by %.2f s: the mission goes on", self._now_s - now_s
                 )
-                self._go_on(self._stands(), now_s)
+                self._resume(self._checkpoint(), now_s)
                 self._start_another_simulation()
             self._now_s = now_s
             changed = [
@@ -177,13 +177,13 @@ class Mission:
         except rospy.ServiceException as error:
             rospy.logwarn("%s: %s", START_SERVICE, error)
 
-    def _stands(self) -> MissionCheckpoint:
+    def _checkpoint(self) -> MissionCheckpoint:
         """For another sequencer, or another clock."""
         start_s = self._journal.start_s
         robots = {
             robot.name: RobotCheckpoint(
-                on_clock(robot.sequencer.stage, -start_s),
-                self._log.robots[robot.name].flown,
+                shift_to_clock(robot.sequencer.progress, -start_s),
+                self._log.robots[robot.name].state,
                 *self._log.distances.minima_of_blocks_m(robot.name),
             )
             for robot in self.robots
@@ -198,22 +198,22 @@ class Mission:
             contacts,
         )
 
-    def _go_on(self, before: MissionCheckpoint, now_s: float) -> None:
+    def _resume(self, before: MissionCheckpoint, now_s: float) -> None:
         """From where another sequencer left off."""
         self._now_s, self._log = now_s, self._new_log()
-        self._journal.go_on(before, now_s, same_clock=self._again)
+        self._journal.resume(before, now_s, same_clock=self._again)
         start_s = self._journal.start_s
         for robot in self.robots:
-            stands = before.robots[robot.name]
-            flown = stands.flown if self._again else replace(stands.flown, pose=None)
-            self._log.go_on(robot.name, flown, stands.clearance_m, stands.separation_m)
-            robot.begin(now_s, on_clock(stands.stage, start_s))
+            checkpoint = before.robots[robot.name]
+            state = checkpoint.log if self._again else replace(checkpoint.log, pose=None)
+            self._log.resume(robot.name, state, checkpoint.clearance_m, checkpoint.separation_m)
+            robot.begin(now_s, shift_to_clock(checkpoint.progress, start_s))
             rospy.loginfo(
                 "%s: goes on with goal %d of %d, lap %d",
                 robot.name,
-                stands.stage.index + 1,
+                checkpoint.progress.index + 1,
                 len(robot.sequencer.sequence.goals),
-                stands.stage.lap,
+                checkpoint.progress.lap,
             )
         for contact in before.contacts:
             self._log.add_contact(replace(contact, time_s=contact.time_s + start_s))

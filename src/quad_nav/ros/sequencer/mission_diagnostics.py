@@ -24,15 +24,15 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
     count = len(sequencer.sequence.goals)
     skipped = sum(not leg.reached for leg in flown.legs)
     contacts = log.contacts_of(robot.name)
-    flight, pose = sequencer.flight, robot.pose
-    attempts = [leg.attempts for leg in flown.legs] + ([flight.attempt] if flight else [])
+    active, pose = sequencer.active_goal, robot.pose
+    attempts = [leg.attempts for leg in flown.legs] + ([active.attempt] if active else [])
     distance_m = None
-    if flight is not None and pose is not None:
-        distance_m = pose.to_2d().distance_to(flight.pose)
+    if active is not None and pose is not None:
+        distance_m = pose.to_2d().distance_to(active.pose)
     level, message = DiagnosticStatus.OK, "done" if sequencer.done else "starting"
     if distance_m is not None:
         message = f"flying to goal {sequencer.index + 1} of {count}, {distance_m:.2f} m away"
-    if skipped or contacts or (flight is not None and flight.attempt > 1):
+    if skipped or contacts or (active is not None and active.attempt > 1):
         level = DiagnosticStatus.WARN
     if robot.is_silent:
         level, message = DiagnosticStatus.ERROR, "no odometry"
@@ -41,7 +41,7 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
         "goals": count,
         "lap": sequencer.lap,
         "distance_m": "" if distance_m is None else f"{distance_m:.2f}",
-        "attempt": flight.attempt if flight else 0,
+        "attempt": active.attempt if active else 0,
         "retries": sum(attempts) - len(attempts),
         "reached": len(flown.legs) - skipped,
         "skipped": skipped,

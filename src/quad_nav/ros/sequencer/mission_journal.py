@@ -11,9 +11,9 @@ import rospy
 from quad_nav.mission.checkpoint import (
     MissionCheckpoint,
     contact_record,
-    head,
+    head_record,
+    read_checkpoint,
     robot_record,
-    standing,
 )
 from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.journal import Journal
@@ -35,20 +35,20 @@ class MissionJournal:
 
     def read(self) -> Optional[MissionCheckpoint]:
         """How the mission stands, None when it has not begun. Raises InputError."""
-        records = self._journal.go_on()
+        records = self._journal.resume()
         if not records:
             rospy.loginfo(
                 "%s: there is no journal of this mission yet: it begins with the first goals",
                 self._journal.path,
             )
-        return standing(records, self._names, str(self._journal.path))
+        return read_checkpoint(records, self._names, str(self._journal.path))
 
     def begin(self, now_s: float) -> None:
         """The mission begins, again perhaps: what the journal had counts for nothing."""
         self.start_s, self.start_epoch_s = now_s, time.time()
-        self._say(self._journal.begin(self._head()))
+        self._say(self._journal.start(self._head()))
 
-    def go_on(self, before: MissionCheckpoint, now_s: float, same_clock: bool) -> None:
+    def resume(self, before: MissionCheckpoint, now_s: float, same_clock: bool) -> None:
         """The mission goes on; ``same_clock`` says that the clock has run on meanwhile."""
         if same_clock and now_s >= before.clock_s + before.mission_s:
             self.start_s, self.start_epoch_s = before.clock_s, before.epoch_s
@@ -75,11 +75,11 @@ class MissionJournal:
         return time.time() - self.start_epoch_s
 
     def _head(self) -> Dict[str, Any]:
-        return head(self._names, self.start_s, self.start_epoch_s)
+        return head_record(self._names, self.start_s, self.start_epoch_s)
 
     def _keep(self, record: Dict[str, Any], now_s: float) -> None:
         self._say(
-            self._journal.keep(
+            self._journal.append(
                 {**record, "mission_s": now_s - self.start_s, "wall_s": self.wall_time_s}
             )
         )

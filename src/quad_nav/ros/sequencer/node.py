@@ -14,7 +14,7 @@ from typing import List, Optional
 import rospy
 
 from quad_nav.errors import InputError
-from quad_nav.mission.flight_log import unflown
+from quad_nav.mission.flight_log import unflown_legs
 from quad_nav.mission.respawn import RESPAWNED
 from quad_nav.mission.summary import (
     EXIT_BAD_INPUT,
@@ -26,13 +26,13 @@ from quad_nav.mission.summary import (
 )
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.node_tools import init_node
-from quad_nav.ros.sequencer.mission import START_SERVICE, Mission
+from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
 from quad_nav.ros.sequencer.setup import MissionSetup, read_setup, result_path
 
 DIAGNOSTICS_PERIOD_S = 1.0  # wall time, so that a paused simulation shows its state
 
 
-def watch(mission: Mission, exit_when_done: bool, result: Path) -> int:
+def watch(mission: MissionRunner, exit_when_done: bool, result: Path) -> int:
     """Until the end: progress once a second, and the summary whenever all goals are flown."""
     status: Optional[int] = None
     next_s = 0.0
@@ -70,7 +70,7 @@ def _write(summary: MissionSummary, result: Path) -> bool:
     return True
 
 
-def fly(mission: Mission, setup: MissionSetup, result: Path) -> int:
+def fly(mission: MissionRunner, setup: MissionSetup, result: Path) -> int:
     """A mission from waiting for its parts to its summary."""
     missing = readiness.wait_for(mission.needs(), setup.ready_timeout_s)
     if missing:
@@ -94,7 +94,7 @@ def fly(mission: Mission, setup: MissionSetup, result: Path) -> int:
 def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:
     rospy.logfatal("nothing is flown, %s:\n  %s", reason, "\n  ".join(lines))
     robots = tuple(
-        RobotSummary(robot.name, tuple(unflown(robot.sequence))) for robot in setup.robots
+        RobotSummary(robot.name, tuple(unflown_legs(robot.sequence))) for robot in setup.robots
     )
     _write(
         MissionSummary(
@@ -116,7 +116,7 @@ def main() -> int:
     result = result_path(parameters)
     try:
         setup = read_setup(parameters, name, result, rospy.get_param("/", {}))
-        mission = Mission(setup, RESPAWNED in sys.argv)
+        mission = MissionRunner(setup, RESPAWNED in sys.argv)
     except InputError as error:
         rospy.logfatal("nothing is flown:\n  %s", "\n  ".join(error.problems))
         _write(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)

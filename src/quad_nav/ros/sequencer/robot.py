@@ -16,12 +16,12 @@ from quad_nav.geometry import Pose3D
 from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import (
-    BEGINNING,
+    START,
     Action,
     SendGoal,
     SequenceDone,
+    SequenceProgress,
     Sequencer,
-    Stage,
     Verdict,
 )
 from quad_nav.ros.common.conversions import pose_from_message
@@ -65,12 +65,12 @@ class MissionRobot:
         self._events = rospy.Publisher(EVENTS_TOPIC, String, queue_size=100)
         self._path = PathPublisher(f"/path{index}")
 
-    def begin(self, now_s: float, stage: Stage = BEGINNING) -> None:
+    def begin(self, now_s: float, progress: SequenceProgress = START) -> None:
         """From the first goal: at the start, and after the simulation was reset.
 
-        With a ``stage``, from where another sequencer left off.
+        With ``progress``, from where another sequencer left off.
         """
-        self.sequencer = Sequencer(self.sequencer.sequence, stage)
+        self.sequencer = Sequencer(self.sequencer.sequence, progress)
         self.pose, self.is_silent, self._begun_s, self._heard_s = None, False, now_s, now_s
         self._odometry, self._settled_s = None, 0.0
         self.link.clear()
@@ -111,7 +111,7 @@ class MissionRobot:
         actions = self.sequencer.tick(
             now_s, self.pose.to_2d(), inbox.reports, self.link.navigator_is_idle(now_s)
         )
-        legs = [log.robots[self.name].act(action) for action in actions]
+        legs = [log.robots[self.name].add_action(action) for action in actions]
         if actions:
             keep(self, next((leg for leg in legs if leg is not None), None))
         for action, leg in zip(actions, legs):
@@ -147,7 +147,7 @@ class MissionRobot:
         for odometry in usable:
             stamp_s = odometry.header.stamp.to_sec()
             self.pose = map_from_odom.compose(pose_from_message(odometry.pose.pose))
-            log.move(self.name, stamp_s, self.pose.to_2d())
+            log.add_pose(self.name, stamp_s, self.pose.to_2d())
             self._path.add(stamp_s, self.pose)
 
     def _watch_silence(self, now_s: float) -> None:
@@ -198,7 +198,7 @@ class MissionRobot:
 
     def _tell_sent(self, action: SendGoal) -> None:
         goal = self._goal(action.index, action.lap)
-        if not action.why:
+        if not action.resend_reason:
             away_m = self.pose.to_2d().distance_to(action.pose) if self.pose else 0.0
             rospy.loginfo(
                 "%s: %s (%.2f, %.2f) sent, %.2f m away",
@@ -215,7 +215,7 @@ class MissionRobot:
             goal,
             action.attempt,
             self.sequencer.sequence.settings.retries + 1,
-            action.why,
+            action.resend_reason,
         )
 
     def _tell_ended(self, leg: Leg) -> None:
