@@ -137,7 +137,7 @@ def test_example_planner_fails_and_example_recovery_backs_off(tree):
     ticks, pose = fly(navigator, HERE, Pose2D(7.0, 2.0), 10.0)
 
     assert any(
-        re.match(r"there is something at \(3\.\d\d, 2\.00\) m", tick.planning_failed)
+        re.match(r"there is an obstacle at \(3\.\d\d, 2\.00\) m", tick.planning_failed)
         for tick in ticks
     )
     assert [tick.recovery.name for tick in ticks if tick.recovery] == ["back_off"]
