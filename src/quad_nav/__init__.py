@@ -1,14 +1,26 @@
 """Fleets of LIDAR quadcopters on the ROS navigation stack.
 
-The project is one loop: scan -> costmap -> global plan -> velocity -> body -> scan. The loop is
-plain Python and takes the time as an argument. ``offline`` runs it in one process on a virtual
-clock. ``ros`` cuts it at the topics.
+The project is one loop. A quadcopter's LIDAR scan marks obstacles in its costmaps; the global
+planner plans a path over the costmap to the goal; the local planner computes a velocity that
+follows the path; the body moves; and the LIDAR scans again. The loop is plain Python without
+ROS and takes the time as an argument. ``offline`` runs it in one process on a virtual clock;
+``ros`` cuts it at the topics.
 
-Reading order: ``geometry`` and ``grid`` (poses, cells), ``costmap`` (scan to costs), ``plan``
-(costs to path), ``control`` (path to velocity), ``recovery`` and ``peers`` (stuck robots, other
-robots), ``navigator`` (move_base's state machine), ``sim`` (velocity to body to scan), ``mission``
-(goals and results), ``config`` (move_base's YAML), ``scenario`` (a checked set-up), ``offline``
-and ``ros`` (the two shells), ``cli`` (the command line). ``docs/architecture.md`` has a picture.
+Reading order:
+
+1. ``geometry``, ``grid``, ``footprint``: poses, cells, hulls.
+2. ``costmap``, ``plan``, ``control``: scan to costs, costs to path, path to velocity. Their loops
+   are in ``kernels``.
+3. ``recovery``, ``peers``: robots that are stuck, and robots that meet.
+4. ``navigator``: move_base's state machine, which calls all of these.
+5. ``sim``: velocity to motion, pose to scan.
+6. ``mission``: goal files, the sequencer, contacts, the summary.
+7. ``config``, ``scenario``: move_base's YAML to parameters; scene, goals and configuration to a
+   checked set-up. ``files`` reads what users give.
+8. ``offline``, ``topics``, ``ros``: the two shells, and the contents of the topics.
+9. ``recording``, ``report``, ``barn``, ``tuning``, ``cli``: what is built on flights.
+
+``docs/architecture.md`` has a picture of the loop and of the packages.
 """
 
 from __future__ import annotations
