@@ -24,7 +24,7 @@ from quad_nav.files.shipped import shipped
 from quad_nav.mission.goal_file import parse_goals
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import Message
-from quad_nav.recording.bag_trace import _is_wanted, _Reading, read_trace
+from quad_nav.recording.bag_trace import _is_wanted, TraceReader, read_trace
 from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.page import flight_page
 from quad_nav.scenario.scene_check import scene_check
@@ -98,9 +98,9 @@ def flight_info(data: bytes) -> None:
     reading = _reading_with_odometry()
     text = messages.message
     try:
-        reading.take(Message(FLIGHT_TOPIC, "std_msgs/String", 0, text("std_msgs/String", first)))
+        reading.add(Message(FLIGHT_TOPIC, "std_msgs/String", 0, text("std_msgs/String", first)))
         for line in events:
-            reading.take(Message(EVENTS_TOPIC, "std_msgs/String", 0, text("std_msgs/String", line)))
+            reading.add(Message(EVENTS_TOPIC, "std_msgs/String", 0, text("std_msgs/String", line)))
     except ValueError:
         return  # read_trace makes an InputError of it
     flight_metrics(reading.trace(Path("flight.bag")))
@@ -111,7 +111,7 @@ def page(data: bytes) -> None:
     reading = _reading_with_odometry()
     told = messages.message("std_msgs/String", data.decode("utf-8", "replace"))
     try:
-        reading.take(Message(FLIGHT_TOPIC, "std_msgs/String", 0, told))
+        reading.add(Message(FLIGHT_TOPIC, "std_msgs/String", 0, told))
     except ValueError:
         return
     flight_page(reading.trace(Path("flight.bag")))
@@ -138,7 +138,7 @@ def robot_messages(data: bytes) -> None:
         return
     reading = _reading_with_odometry()
     try:
-        reading.take(Message(topic, kind, 0, content))
+        reading.add(Message(topic, kind, 0, content))
     except ValueError:
         return
     flight_metrics(reading.trace(Path("flight.bag")))
@@ -189,10 +189,10 @@ def _written(name: str, data: bytes) -> Path:
     return path
 
 
-def _reading_with_odometry() -> _Reading:
-    reading = _Reading()
+def _reading_with_odometry() -> TraceReader:
+    reading = TraceReader()
     for second in (1, 2, 3):
-        reading.take(Message("/odom0", "nav_msgs/Odometry", 0, odometry(second, 1.0 + second)))
+        reading.add(Message("/odom0", "nav_msgs/Odometry", 0, odometry(second, 1.0 + second)))
     return reading
 
 

@@ -154,7 +154,7 @@ def test_costmaps_are_what_the_navigator_has(recorded, name):
             assert content.data.tobytes() == part.tobytes()
 
 
-def test_a_costmap_is_told_as_often_as_its_parameters_say(recorded):
+def test_a_costmap_is_published_at_its_configured_rate(recorded):
     path, _, flight, _ = recorded
     topic = "/move_base0/global_costmap/costmap"
     stamps = [message.stamp_ns for message in read(path, topic, f"{topic}_updates")]
@@ -162,7 +162,7 @@ def test_a_costmap_is_told_as_often_as_its_parameters_say(recorded):
     assert np.diff(stamps[1:]).min() == 10**9  # publish_frequency 1.0
 
 
-def test_goals_are_sent_taken_and_ended_as_by_the_action_server(recorded):
+def test_goals_are_sent_accepted_and_ended_as_by_the_action_server(recorded):
     path = recorded[0]
     sent = read(path, "/move_base_simple/goal0")
     taken = read(path, "/move_base0/current_goal")
@@ -262,7 +262,7 @@ def test_mcap_holds_the_same_messages(recorded, tmp_path):
     "name, problem",
     [
         ("flight.txt", "expected a name that ends with .bag or .mcap"),
-        ("file/flight.bag", "cannot be recorded to: "),
+        ("file/flight.bag", "cannot write the recording: "),
         ("folder.bag", "is a folder"),
     ],
 )
@@ -330,18 +330,18 @@ def test_a_full_disk_ends_the_flight_and_what_was_recorded_is_readable(tmp_path)
     long_flight = read_setup(FlightOptions(shipped("scenes", "arena.yaml"), shipped("goals")))
     with SizeLimit(500_000):
         summary = fly(long_flight, [Recorder(path)])
-    assert summary.reason == "the recording cannot be written: File too large"
+    assert summary.reason == "cannot write the recording: File too large"
     assert summary.exit_status == 1
     assert path.stat().st_size <= 500_000
     assert 40 < len(read(path, "/odom0")) < summary.sim_time_s * 40
 
 
-def test_a_disk_that_is_full_at_the_end_is_told_too(tmp_path):
+def test_a_disk_that_is_full_at_the_end_is_reported(tmp_path):
     path = tmp_path / "flight.bag"
     with SizeLimit(450_000):
         summary = fly(setup(tmp_path), [Recorder(path)])
     assert all(robot.reached == len(robot.legs) for robot in summary.robots)
-    assert summary.reason == "the recording cannot be written: File too large"
+    assert summary.reason == "cannot write the recording: File too large"
     assert len(read(path, "/odom0")) > 40
 
 
@@ -375,7 +375,7 @@ def test_without_room_for_anything_the_flight_says_so(tmp_path):
     with SizeLimit(5_000):
         summary = fly(setup(tmp_path, time_limit_s=0.1), [Recorder(path)])
     assert summary.reason == (
-        "time limit of 0.1 s; the recording cannot be written: no room for a single chunk"
+        "time limit of 0.1 s; cannot write the recording: no room for a single chunk"
     )
     assert not path.exists()
 
@@ -405,9 +405,12 @@ def test_a_stop_reason_of_an_observer_ends_the_flight(tmp_path):
     [
         (
             ["--record", "flight.txt"],
-            "flight.txt: cannot be recorded to; expected a name that ends",
+            "flight.txt: unknown recording format; expected a name that ends",
         ),
-        (["--view", "flight.bag"], "flight.bag: cannot be saved to; expected a name that ends"),
+        (
+            ["--view", "flight.bag"],
+            "flight.bag: unknown format of a view; expected a name that ends",
+        ),
     ],
 )
 def test_a_bad_file_ends_with_status_2_before_anything_flies(monkeypatch, option, problem):

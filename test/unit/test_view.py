@@ -166,11 +166,13 @@ def test_without_a_display_no_viewer_is_opened(rerun, monkeypatch):
         View()
 
 
-def test_a_viewer_that_does_not_start_is_told(rerun, monkeypatch):
+def test_a_viewer_that_does_not_start_is_reported(rerun, monkeypatch):
     monkeypatch.setattr(view, "_is_listening", lambda: False)
     monkeypatch.setattr(view.subprocess, "Popen", FakeViewer)
     monkeypatch.setattr(FakeViewer, "returncode", 3)
-    with pytest.raises(InputError, match="does not start: rerun ended with 3; expected a display"):
+    with pytest.raises(
+        InputError, match="does not start: rerun exited with status 3; expected a display"
+    ):
         View()
 
 
@@ -178,7 +180,7 @@ def test_a_viewer_that_does_not_start_is_told(rerun, monkeypatch):
     "name, problem",
     [
         ("flight.bag", "expected a name that ends with .rrd"),
-        ("folder.rrd", "cannot be saved to: "),
+        ("folder.rrd", "cannot write: "),
     ],
 )
 def test_a_file_that_cannot_be_made_is_refused(rerun, tmp_path, name, problem):
@@ -187,7 +189,9 @@ def test_a_file_that_cannot_be_made_is_refused(rerun, tmp_path, name, problem):
         View(tmp_path / name)
 
 
-def test_without_rerun_it_is_said_what_to_install(monkeypatch):
+def test_without_rerun_the_error_names_the_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(InputError, match=r"needs rerun .*pip install 'quad-nav\[view\]'"):
+    with pytest.raises(
+        InputError, match=r"rerun is not installed .*pip install 'quad-nav\[view\]'"
+    ):
         View()

@@ -171,7 +171,7 @@ class _Bar:
     something of their own.
     """
 
-    def __init__(self, wanted: int, quiet: bool):
+    def __init__(self, wanted: int, quiet: bool) -> None:
         console = Console(stderr=True)
         self._progress = Progress(
             TextColumn("flights"),

@@ -19,7 +19,9 @@ class FlightPictures:
         InputError: the animation could not be written.
     """
 
-    def __init__(self, setup: FlightSetup, report: Optional[Path], animation: Optional[Path]):
+    def __init__(
+        self, setup: FlightSetup, report: Optional[Path], animation: Optional[Path]
+    ) -> None:
         self._report, self._animation = report, animation
         count = len(setup.robots)
         self._observer = TraceObserver(

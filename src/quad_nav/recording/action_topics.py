@@ -1,4 +1,4 @@
-"""The topics of a navigator's action ``move_base``, as actionlib's server has them."""
+"""Topics of a navigator's action ``move_base``, as actionlib's server publishes them."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class _Goal:
 
 
 class ActionTopics:
-    """Goals in, status, feedback and results out, for robot ``robot``."""
+    """Goals, status, feedback and results of one robot's action server."""
 
-    def __init__(self, robot: int, topics: TopicWriter):
+    def __init__(self, robot: int, topics: TopicWriter) -> None:
         self._topics = topics
         self._robot = robot
         self._node = f"/move_base{robot}"
@@ -52,32 +52,32 @@ class ActionTopics:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether a goal was sent that the navigator has not taken yet."""
+        """True if a sent goal is not accepted yet."""
         return self._waiting is not None
 
     def send(self, now_s: float, pose: Pose2D) -> None:
-        """The sequencer sends a goal."""
+        """Write a goal that the sequencer sends."""
         stamp = stamp_at(now_s)
         self._count += 1
         name = f"{self._node}-{self._count}-{stamp / 1e9:.3f}"
         self._waiting = _Goal(pose, stamp, name, _ACTIVE, _ACCEPTED_TEXT)
         goal = pose_stamped(planar_pose(pose), "map", stamp)
         self._topics.write(f"/move_base_simple/goal{self._robot}", stamp, goal, "/sequencer")
-        # As our node forwards it: the server gives it a name when it comes.
-        unnamed = message("actionlib_msgs/GoalID", time(0), "")
+        # As quad's node forwards it: the action server assigns the id on arrival.
+        no_id = message("actionlib_msgs/GoalID", time(0), "")
         self._write(
             "goal",
             stamp,
             message(
                 "move_base_msgs/MoveBaseActionGoal",
                 header("", stamp),
-                unnamed,
+                no_id,
                 message("move_base_msgs/MoveBaseGoal", goal),
             ),
         )
 
     def accept(self, now_s: float) -> None:
-        """The navigator takes the goal that waits; one that it flew to is replaced."""
+        """Accept the waiting goal; the active goal, if any, is preempted."""
         assert self._waiting is not None
         if self._active is not None:
             self._end(now_s, _PREEMPTED, _REPLACED_TEXT)
@@ -90,7 +90,7 @@ class ActionTopics:
         self._write_status(now_s)
 
     def feedback(self, now_s: float, pose: Pose2D) -> None:
-        """A control cycle ran at ``pose`` in ``map``."""
+        """Write the feedback of a control cycle at ``pose`` in ``map``."""
         if self._active is None:
             return
         stamp = stamp_at(now_s)
@@ -108,11 +108,12 @@ class ActionTopics:
         )
 
     def finish(self, now_s: float, outcome: Outcome) -> None:
+        """Write the result of the active goal."""
         if self._active is not None:
             self._end(now_s, _SUCCEEDED if outcome.succeeded else _ABORTED, outcome.text)
 
-    def tell_status(self, now_s: float) -> None:
-        """The status at its own rate."""
+    def write_due_status(self, now_s: float) -> None:
+        """Write the goal status if its period is over."""
         if now_s >= self._next_status_s - 1e-9:
             self._write_status(now_s)
 

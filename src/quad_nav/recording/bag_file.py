@@ -1,4 +1,4 @@
-"""Reads recordings of ROS 1 messages: bags, and MCAP with the same bytes in it."""
+"""Read messages from recordings: ROS 1 bags, and MCAP with ROS 1 messages."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from quad_nav.errors import InputError
 from quad_nav.files.user_files import open_file
 from quad_nav.recording.messages import decode
 
-Wanted = Callable[[str, str], bool]
-"""Whether a topic of a type, as ``nav_msgs/Path``, is to be read."""
+TopicFilter = Callable[[str, str], bool]
+"""Returns true for topics to read, given the topic and its type, such as ``nav_msgs/Path``."""
 
 
 class Message(NamedTuple):
-    """``stamp_ns`` is when it was recorded."""
+    """One recorded message; ``stamp_ns`` is the time of recording, ``kind`` its type."""
 
     topic: str
     kind: str
@@ -26,39 +26,39 @@ class Message(NamedTuple):
     content: Any
 
 
-def read_messages(path: Path, wanted: Wanted) -> Iterator[Message]:
-    """The messages of the wanted topics by the time that they were recorded.
+def read_messages(path: Path, wanted: TopicFilter) -> Iterator[Message]:
+    """Yield the messages of the wanted topics in the order of recording.
 
-    One chunk is in memory at a time; what is not wanted is not decoded.
+    One chunk is in memory at a time. Unwanted messages are not decoded.
 
     Raises:
-        InputError: no recording, or one that is damaged or was not completed.
+        InputError: The file is not a recording, is damaged or was not completed.
     """
-    open_file(path).close()  # not a pipe, which the libraries would wait for
+    open_file(path).close()  # refuses pipes, on which the libraries would block
     read = _read_mcap if path.suffix == ".mcap" else _read_bag
     try:
         for topic, kind, stamp_ns, data in read(path, wanted):
             yield Message(topic, kind, stamp_ns, decode(data, kind))
     except OSError as error:
         raise InputError(
-            [f"{path}: cannot be read: {error.strerror or error}; expected a recorded flight"]
+            [f"{path}: cannot read: {error.strerror or error}; expected a recorded flight"]
         ) from error
     except (ReaderError, McapError) as error:
-        raise InputError([f"{path}: {_why(error)}"]) from error
+        raise InputError([f"{path}: {_problem_text(error)}"]) from error
     except MemoryError:
         raise
     except Exception as error:
-        # What the two libraries raise for damaged files is not their own errors alone:
-        # struct's, lz4's and AssertionError are among it.
+        # For damaged files the two libraries also raise errors of struct and lz4, AssertionError
+        # and others.
         raise InputError(
-            [f"{path}: is damaged ({type(error).__name__}: {error}); expected a recorded flight"]
+            [f"{path}: damaged file ({type(error).__name__}: {error}); expected a recorded flight"]
         ) from error
 
 
 _Raw = Tuple[str, str, int, bytes]
 
 
-def _read_bag(path: Path, wanted: Wanted) -> Iterator[_Raw]:
+def _read_bag(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
     with Reader(path) as reader:
         kinds: Dict[int, str] = {}
         for connection in reader.connections:
@@ -71,12 +71,12 @@ def _read_bag(path: Path, wanted: Wanted) -> Iterator[_Raw]:
                 yield connection.topic, kinds[connection.id], stamp_ns, data
 
 
-def _read_mcap(path: Path, wanted: Wanted) -> Iterator[_Raw]:
+def _read_mcap(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
     with path.open("rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
         if summary is None:
-            raise McapError("has no index, so it was not completed")
+            raise McapError("no index, the recording was not completed")
         topics = [
             channel.topic
             for channel in summary.channels.values()
@@ -89,10 +89,10 @@ def _read_mcap(path: Path, wanted: Wanted) -> Iterator[_Raw]:
                 yield channel.topic, schema.name, message.log_time, message.data
 
 
-def _why(error: Exception) -> str:
-    said = str(error).rstrip(".")
-    if "not indexed" in said:
-        return "has no index, so its recording was not completed; `rosbag reindex` fixes it"
-    if "damaged" in said or "Header" in said:
-        return f"is cut short or damaged ({said}); expected a complete bag, `rosbag reindex` helps"
-    return f"is no recording that can be read ({said}); expected a ROS 1 bag or MCAP"
+def _problem_text(error: Exception) -> str:
+    text = str(error).rstrip(".")
+    if "not indexed" in text:
+        return "no index, the recording was not completed; run `rosbag reindex`"
+    if "damaged" in text or "Header" in text:
+        return f"truncated or damaged ({text}); expected a complete bag, run `rosbag reindex`"
+    return f"cannot read as a recording ({text}); expected a ROS 1 bag or MCAP"

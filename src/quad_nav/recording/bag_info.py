@@ -1,7 +1,7 @@
-"""What ``/quad/flight`` and ``/quad/events`` of a recording say, checked.
+"""Validate the contents of ``/quad/flight`` and ``/quad/events`` of a recording.
 
-Anybody can have written a recording, so nothing in it is believed to be of the type that
-our own nodes write. Every function raises ValueError with the key and what was expected.
+A recording may come from anywhere, so no type is trusted. Every function raises ValueError
+with the key, the value and what was expected.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from quad_nav.geometry import Pose3D
 
 LARGEST_M = 1e6
 LONGEST_S = 1e10
-"""More than any stamp, which has 32 bits for the seconds."""
+"""Larger than any stamp: stamps hold 32 bits of seconds."""
 LARGEST_HZ = 1e6
 MOST_ROBOTS = 100
 _UNIT_WITHIN = 1e-2
@@ -23,8 +23,11 @@ _LONGEST_TEXT = 10_000
 
 
 def checked_flight(info: Mapping[str, Any]) -> Dict[str, Any]:
-    """An object of ``/quad/flight``; keys that nobody reads are left out, the scene is not
-    checked yet."""
+    """Return the known keys of a ``/quad/flight`` object; the scene is not validated yet.
+
+    Raises:
+        ValueError: A value has the wrong type or range.
+    """
     given = {key: info[key] for key in ("scene",) if key in info}
     for key in ("title", "config", "reason"):
         if key in info:
@@ -40,12 +43,16 @@ def checked_flight(info: Mapping[str, Any]) -> Dict[str, Any]:
             str(key): str(value) for key, value in _mapping(info["versions"], "versions").items()
         }
     if "robots" in info:
-        given["robots"] = [_robot(one) for one in _list(info, "robots", MOST_ROBOTS)]
+        given["robots"] = [_robot(robot) for robot in _list(info, "robots", MOST_ROBOTS)]
     return given
 
 
 def checked_event(event: Mapping[str, Any]) -> Dict[str, Any]:
-    """An object of ``/quad/events``; of a kind that nobody reads it is only its kind."""
+    """Return the known keys of a ``/quad/events`` object; ``event`` is None for unknown kinds.
+
+    Raises:
+        ValueError: A value has the wrong type or range.
+    """
     robot = _whole(event, "robot")
     if not 0 <= robot < MOST_ROBOTS:
         raise ValueError(f"robot: {robot}, expected 0 to {MOST_ROBOTS - 1}")
@@ -74,19 +81,27 @@ def checked_event(event: Mapping[str, Any]) -> Dict[str, Any]:
     }
 
 
-def finite(values: Any, largest: float = LARGEST_M) -> None:
-    """Raises ValueError unless all numbers are finite and no larger than that."""
+def require_finite(values: Any, largest: float = LARGEST_M) -> None:
+    """Check numbers.
+
+    Raises:
+        ValueError: A number is not finite or its magnitude exceeds ``largest``.
+    """
     for value in values:
         if not abs(value) <= largest:
             raise ValueError(f"{value}, expected a finite number up to {largest:g}")
 
 
 def checked_pose(pose: Pose3D) -> Pose3D:
-    """A pose with finite numbers and a rotation. Raises ValueError for another one."""
-    finite((pose.x_m, pose.y_m, pose.z_m))
+    """Return the pose if its numbers are finite and its quaternion has unit length.
+
+    Raises:
+        ValueError: Otherwise.
+    """
+    require_finite((pose.x_m, pose.y_m, pose.z_m))
     length = math.sqrt(sum(part * part for part in pose.quaternion))
     if not abs(length - 1.0) < _UNIT_WITHIN:
-        raise ValueError(f"a rotation of length {length:g}, expected a unit quaternion")
+        raise ValueError(f"rotation of length {length:g}, expected a unit quaternion")
     return pose
 
 
@@ -111,10 +126,10 @@ def _robot(value: Any) -> Dict[str, Any]:
 
 def _check_levels(value: Any, left: int) -> None:
     if left == 0:
-        raise ValueError(f"parameters: more than {_MOST_LEVELS} levels inside each other")
-    below = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
-    for one in below:
-        _check_levels(one, left - 1)
+        raise ValueError(f"parameters: nested more than {_MOST_LEVELS} levels deep, expected fewer")
+    nested = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    for entry in nested:
+        _check_levels(entry, left - 1)
 
 
 def _mapping(value: Any, key: str) -> Dict[str, Any]:
@@ -131,7 +146,7 @@ def _list(fields: Mapping[str, Any], key: str, most: int) -> Any:
 
 
 def _text(fields: Mapping[str, Any], key: str) -> str:
-    """What cannot be printed is left out; it would not stand in a page of text."""
+    """Return a text without unprintable characters, which would break text output."""
     value: Optional[Any] = fields.get(key)
     if not isinstance(value, str):
         raise ValueError(f"{key}: {_short(value)}, expected a text")

@@ -1,15 +1,16 @@
-"""One quadcopter's part of a recording."""
+"""Collect one robot's messages of a recording."""
 
 from __future__ import annotations
 
 from typing import Any, Dict, List, Mapping, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Pose3D, yaw_from_quaternion
 from quad_nav.navigator.tick import State
 from quad_nav.recording.bag_file import Message
-from quad_nav.recording.bag_info import checked_pose, finite
+from quad_nav.recording.bag_info import checked_pose, require_finite
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import GoalTrace, RobotTrace
 
@@ -17,43 +18,48 @@ _STATES = {state.value: state for state in State}
 
 
 class BagRobot:
-    """Takes messages and becomes a ``RobotTrace``; times are the recording's clock until then."""
+    """Collects messages and builds a ``RobotTrace``; times are the recording's until then."""
 
     def __init__(self) -> None:
         self.map_from_odom = Pose3D(0.0, 0.0, 0.0)
         self._moves: List[Tuple[float, ...]] = []
         self._commands: List[Tuple[float, float, float, float]] = []
         self._cycles: List[float] = []
-        self._plans: List[Tuple[float, np.ndarray]] = []
+        self._plans: List[Tuple[float, NDArray[np.float64]]] = []
         self._states: List[Tuple[float, State]] = []
         self._recoveries: List[Tuple[float, str]] = []
         self._goals: List[Dict[str, Any]] = []
 
     @property
-    def has_moved(self) -> bool:
-        """Whether there is any odometry."""
+    def has_odometry(self) -> bool:
+        """True if any odometry was added."""
         return bool(self._moves)
 
     @property
     def first_s(self) -> float:
-        """When the first odometry was."""
+        """Time of the first odometry."""
         return self._moves[0][0]
 
     @property
     def last_s(self) -> float:
-        """When the last odometry was."""
+        """Time of the last odometry."""
         return self._moves[-1][0]
 
-    def move(self, message: Message) -> None:
+    def add_odometry(self, message: Message) -> None:
+        """Add a ``nav_msgs/Odometry``.
+
+        Raises:
+            ValueError: The pose or the velocity is invalid.
+        """
         odometry = message.content
         time_s = _seconds(odometry.header)
         if self._moves and time_s <= self._moves[-1][0]:
-            return  # told again by a paused simulation
+            return  # a paused simulation repeats its odometry
         pose = self.map_from_odom.compose(
             checked_pose(pose_from(odometry.pose.pose.position, odometry.pose.pose.orientation))
         )
         twist = odometry.twist.twist
-        finite((twist.linear.x, twist.linear.y, twist.angular.z))
+        require_finite((twist.linear.x, twist.linear.y, twist.angular.z))
         self._moves.append(
             (
                 time_s,
@@ -67,39 +73,54 @@ class BagRobot:
             )
         )
 
-    def command(self, message: Message) -> None:
+    def add_command(self, message: Message) -> None:
+        """Add a velocity command.
+
+        Raises:
+            ValueError: The command is not finite.
+        """
         twist = message.content
-        finite((twist.linear.x, twist.linear.y, twist.angular.z))
+        require_finite((twist.linear.x, twist.linear.y, twist.angular.z))
         self._commands.append(
             (message.stamp_ns / 1e9, twist.linear.x, twist.linear.y, twist.angular.z)
         )
 
-    def plan(self, message: Message) -> None:
-        """The original tells NavFn's plan twice, then with the goal; an empty one is none."""
+    def add_plan(self, message: Message) -> None:
+        """Add a plan; an empty one removes an earlier plan with the same stamp.
+
+        C++ move_base publishes NavFn's plan twice; the second one includes the goal and
+        replaces the first.
+
+        Raises:
+            ValueError: The plan is not finite.
+        """
         time_s, poses = _seconds(message.content.header), message.content.poses
         if self._plans and self._plans[-1][0] == time_s:
             self._plans.pop()
         if poses:
-            plan = np.array([_planar(one.pose) for one in poses])
-            finite((float(np.abs(plan).max()),))
+            plan = np.array([_planar(pose.pose) for pose in poses])
+            require_finite((float(np.abs(plan).max()),))
             self._plans.append((time_s, plan))
 
-    def state(self, message: Message) -> None:
+    def add_state(self, message: Message) -> None:
+        """Add a navigator state; unknown states are skipped."""
         state = _STATES.get(message.content.data)
         if state is not None:
             self._states.append((message.stamp_ns / 1e9, state))
 
-    def cycle(self, message: Message) -> None:
+    def add_cycle(self, message: Message) -> None:
+        """Add a control cycle, from the action's feedback."""
         self._cycles.append(_seconds(message.content.feedback.base_position.header))
 
-    def recovery(self, message: Message) -> None:
+    def add_recovery(self, message: Message) -> None:
+        """Add the start of a recovery behaviour."""
         status = message.content
         self._recoveries.append(
             (_seconds(status.pose_stamped.header), status.recovery_behavior_name)
         )
 
-    def event(self, event: Dict[str, Any]) -> None:
-        """What the sequencer did, as ``checked_event`` has it."""
+    def add_event(self, event: Dict[str, Any]) -> None:
+        """Add an event of the sequencer, as ``checked_event`` returns it."""
         if event["event"] == "sent" and not event["why"]:
             self._goals.append(event)
         elif event["event"] == "ended" and self._goals:
@@ -111,12 +132,18 @@ class BagRobot:
                 "attempts": event["attempts"],
             }
 
-    def trace(self, number: int, start_s: float, told: Mapping[str, Any]) -> RobotTrace:
-        """``told`` is what ``/quad/flight`` says about it."""
+    def trace(self, number: int, start_s: float, info: Mapping[str, Any]) -> RobotTrace:
+        """Build the trace.
+
+        Args:
+            number: Number of the robot.
+            start_s: Start of the flight on the recording's clock.
+            info: The robot's entry of ``/quad/flight``.
+        """
         moves = np.array(self._moves)
         commands = np.array(self._commands).reshape(-1, 4)
         return RobotTrace(
-            told.get("name", f"quad{number}"),
+            info.get("name", f"quad{number}"),
             moves[:, 0] - start_s,
             moves[:, 1:4],
             moves[:, 4:8],
@@ -129,7 +156,7 @@ class BagRobot:
             tuple((time_s - start_s, state) for time_s, state in self._states),
             tuple((time_s - start_s, name) for time_s, name in self._recoveries),
             tuple(_goal(event, start_s) for event in self._goals),
-            told.get("parameters", {}),
+            info.get("parameters", {}),
         )
 
 

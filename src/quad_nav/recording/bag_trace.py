@@ -1,7 +1,7 @@
-"""The trace of a flight from a recording: of ours or of ``rosbag record``.
+"""Build the trace of a flight from a recording of ``quad fly`` or ``rosbag record``.
 
-Which topic tells what stands in ``docs/recording.md``. Parts of the trace whose topics
-are missing are empty. Times are seconds since the flight's start.
+``docs/recording.md`` lists the topics. Parts of the trace whose topics are missing are empty.
+Times are seconds since the flight's start.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from quad_nav.recording.bag_info import (
     checked_event,
     checked_flight,
     checked_pose,
-    finite,
+    require_finite,
 )
 from quad_nav.recording.bag_robot import BagRobot
 from quad_nav.recording.messages import pose_from, stamp_ns
@@ -36,28 +36,36 @@ from quad_nav.topics.flight_info import (
 )
 
 MOST_MEMORY_BYTES = 4 * 10**9
-"""For a recording that is read; what is packed in it may be a thousand times larger."""
+"""Limit for reading a recording: unpacked, it may be a thousand times larger."""
 LONGEST_FLIGHT_S = 30 * 24 * 3600.0
-"""Stamps of two clocks in one recording are decades apart."""
+"""Longer flights are refused: two clocks in one recording differ by decades."""
 _CONTACTS_TOPIC = "/simulation/contacts"
-# Topic, type, and what a quadcopter's record takes of it.
+# Topic, type, and the method of ``BagRobot`` that adds its messages.
 _ROBOT_TOPICS: Tuple[Tuple[str, str, Callable[[BagRobot, Message], None]], ...] = (
-    (r"/odom([0-9]{1,4})", "nav_msgs/Odometry", BagRobot.move),
-    (r"/cmd_vel([0-9]{1,4})", "geometry_msgs/Twist", BagRobot.command),
-    (r"/move_base([0-9]{1,4})/[^/]+/plan", "nav_msgs/Path", BagRobot.plan),
-    (r"/move_base([0-9]{1,4})/state", "std_msgs/String", BagRobot.state),
-    (r"/move_base([0-9]{1,4})/feedback", "move_base_msgs/MoveBaseActionFeedback", BagRobot.cycle),
-    (r"/move_base([0-9]{1,4})/recovery_status", "move_base_msgs/RecoveryStatus", BagRobot.recovery),
+    (r"/odom([0-9]{1,4})", "nav_msgs/Odometry", BagRobot.add_odometry),
+    (r"/cmd_vel([0-9]{1,4})", "geometry_msgs/Twist", BagRobot.add_command),
+    (r"/move_base([0-9]{1,4})/[^/]+/plan", "nav_msgs/Path", BagRobot.add_plan),
+    (r"/move_base([0-9]{1,4})/state", "std_msgs/String", BagRobot.add_state),
+    (
+        r"/move_base([0-9]{1,4})/feedback",
+        "move_base_msgs/MoveBaseActionFeedback",
+        BagRobot.add_cycle,
+    ),
+    (
+        r"/move_base([0-9]{1,4})/recovery_status",
+        "move_base_msgs/RecoveryStatus",
+        BagRobot.add_recovery,
+    ),
 )
 
 
 def read_trace(path: Path) -> FlightTrace:
-    """The trace of a recorded flight.
+    """Read the trace of a recorded flight.
 
-    ``cycle_walls_s`` is empty: the wall time of control cycles is not recorded.
+    ``cycle_walls_s`` is empty: recordings do not hold the wall time of control cycles.
 
     Raises:
-        InputError: no recording, a damaged one, or one without odometry.
+        InputError: The file is not a recording, is damaged or has no odometry.
     """
     try:
         with at_most_more(MOST_MEMORY_BYTES):
@@ -65,25 +73,25 @@ def read_trace(path: Path) -> FlightTrace:
     except MemoryError as error:
         raise InputError(
             [
-                f"{path}: needs more than {MOST_MEMORY_BYTES / 1e9:g} GB of memory, "
-                "expected less; `rosbag filter` makes a shorter recording"
+                f"{path}: reading needs more than {MOST_MEMORY_BYTES / 1e9:g} GB of memory, "
+                "expected less; shorten the recording with `rosbag filter`"
             ]
         ) from error
 
 
 def _read(path: Path) -> FlightTrace:
-    reading = _Reading()
+    reader = TraceReader()
     for message in read_messages(path, _is_wanted):
         try:
-            reading.take(message)
+            reader.add(message)
         except ValueError as error:
             raise InputError(
                 [
-                    f"{path}: {message.topic}: cannot be understood: "
-                    f"{error}; expected what docs/recording.md says"
+                    f"{path}: {message.topic}: invalid message: {error}; expected the format "
+                    "of docs/recording.md"
                 ]
             ) from error
-    return reading.trace(path)
+    return reader.trace(path)
 
 
 def _is_wanted(topic: str, kind: str) -> bool:
@@ -93,15 +101,15 @@ def _is_wanted(topic: str, kind: str) -> bool:
 def _robot_topic(
     topic: str, kind: str
 ) -> Optional[Tuple[int, Callable[[BagRobot, Message], None]]]:
-    for pattern, expected, take in _ROBOT_TOPICS:
+    for pattern, expected, add in _ROBOT_TOPICS:
         match = re.fullmatch(pattern, topic)
         if match and kind == expected:
-            return int(match.group(1)), take
+            return int(match.group(1)), add
     return None
 
 
-class _Reading:
-    """What the messages so far have told."""
+class TraceReader:
+    """Collects the messages of a recording and builds a ``FlightTrace``."""
 
     def __init__(self) -> None:
         self.robots: Dict[int, BagRobot] = {}
@@ -109,10 +117,14 @@ class _Reading:
         self.contacts: List[Contact] = []
         self._clock_ns: Optional[int] = None
 
-    def take(self, message: Message) -> None:
-        """What has no stamp of its own came at the time that ``/clock`` said before.
+    def add(self, message: Message) -> None:
+        """Add a message.
 
-        A recorder that was started before the simulation notes the wall time.
+        Messages without a stamp of their own get the last time of ``/clock``: a recorder that was
+        started before the simulation stores wall times.
+
+        Raises:
+            ValueError: The message is invalid.
         """
         if self._clock_ns is not None:
             message = message._replace(stamp_ns=self._clock_ns)
@@ -122,37 +134,42 @@ class _Reading:
             return
         found = _robot_topic(message.topic, message.kind)
         assert found is not None
-        robot, take = found
-        take(self._robot(robot), message)
+        robot, add = found
+        add(self._robot(robot), message)
 
     def _robot(self, robot: int) -> BagRobot:
         if robot >= MOST_ROBOTS:
             raise ValueError(f"quadcopter {robot}, expected 0 to {MOST_ROBOTS - 1}")
         return self.robots.setdefault(robot, BagRobot())
 
-    def take_flight(self, message: Message) -> None:
+    def add_flight(self, message: Message) -> None:
+        """Update the flight's information from ``/quad/flight``."""
         self.info.update(checked_flight(from_text(message.content.data) or {}))
 
-    def take_clock(self, message: Message) -> None:
+    def set_clock(self, message: Message) -> None:
+        """Update the recording's clock from ``/clock``."""
         self._clock_ns = stamp_ns(message.content.clock)
 
-    def take_event(self, message: Message) -> None:
+    def add_event(self, message: Message) -> None:
+        """Add an event of ``/quad/events``."""
         event = from_text(message.content.data)
         if event is not None:
             event = checked_event(event)
-            self._robot(event["robot"]).event(event)
+            self._robot(event["robot"]).add_event(event)
 
-    def take_contact(self, message: Message) -> None:
+    def add_contact(self, message: Message) -> None:
+        """Add a contact; diagnostics of other names are skipped."""
         status = message.content
         if status.name == CONTACT_STATUS:
             contact = contact_from_values(
                 status.hardware_id, {pair.key: pair.value for pair in status.values}
             )
-            finite((contact.x_m, contact.y_m))
-            finite((contact.time_s,), LONGEST_S)
+            require_finite((contact.x_m, contact.y_m))
+            require_finite((contact.time_s,), LONGEST_S)
             self.contacts.append(contact)
 
-    def take_transforms(self, message: Message) -> None:
+    def add_transforms(self, message: Message) -> None:
+        """Update the robots' odometry frames from ``/tf``."""
         for transform in message.content.transforms:
             match = re.fullmatch(r"/?odom([0-9]{1,4})", transform.child_frame_id)
             if match and transform.header.frame_id.lstrip("/") == "map":
@@ -161,15 +178,19 @@ class _Reading:
                 )
 
     def trace(self, path: Path) -> FlightTrace:
-        flown = {number: robot for number, robot in sorted(self.robots.items()) if robot.has_moved}
-        if not flown:
+        """Build the trace.
+
+        Raises:
+            InputError: The recording has no odometry, too long a flight or an invalid scene.
+        """
+        robots = {
+            number: robot for number, robot in sorted(self.robots.items()) if robot.has_odometry
+        }
+        if not robots:
             raise InputError(
-                [
-                    f"{path}: has no odometry; expected messages nav_msgs/Odometry on "
-                    "/odom0 and so on"
-                ]
+                [f"{path}: no odometry; expected messages nav_msgs/Odometry on /odom0, ..."]
             )
-        for number, robot in flown.items():
+        for number, robot in robots.items():
             if robot.last_s - robot.first_s > LONGEST_FLIGHT_S:
                 raise InputError(
                     [
@@ -179,18 +200,18 @@ class _Reading:
                 )
         start_s = self.info.get("start_s")
         if start_s is None:
-            start_s = min(robot.first_s for robot in flown.values())
-        told = self.info.get("robots", [])
-        robots = tuple(
-            robot.trace(number, start_s, told[number] if number < len(told) else {})
-            for number, robot in flown.items()
+            start_s = min(robot.first_s for robot in robots.values())
+        infos = self.info.get("robots", [])
+        traces = tuple(
+            robot.trace(number, start_s, infos[number] if number < len(infos) else {})
+            for number, robot in robots.items()
         )
         contacts = tuple(
             Contact(c.time_s - start_s, c.robot, c.other, c.x_m, c.y_m) for c in self.contacts
         )
         return FlightTrace(
             self.info.get("title", path.stem),
-            robots,
+            traces,
             contacts,
             self._scene(path),
             self.info.get("robot_radius_m", BODY_RADIUS_M),
@@ -207,18 +228,18 @@ class _Reading:
         if isinstance(document, dict) and {"world", "map"} & set(document):
             raise InputError(
                 [
-                    f"{path}: {FLIGHT_TOPIC}: scene: names another file, expected all "
-                    "of it in the recording"
+                    f"{path}: {FLIGHT_TOPIC}: scene: refers to another file, expected the "
+                    "complete scene in the recording"
                 ]
             )
         return scene_from_document(document, f"{path}: {FLIGHT_TOPIC}: scene")
 
 
-_COMMON_TOPICS: Dict[Tuple[str, str], Callable[[_Reading, Message], None]] = {
-    (FLIGHT_TOPIC, "std_msgs/String"): _Reading.take_flight,
-    ("/clock", "rosgraph_msgs/Clock"): _Reading.take_clock,
-    (EVENTS_TOPIC, "std_msgs/String"): _Reading.take_event,
-    (_CONTACTS_TOPIC, "diagnostic_msgs/DiagnosticStatus"): _Reading.take_contact,
-    ("/tf", "tf2_msgs/TFMessage"): _Reading.take_transforms,
-    ("/tf_static", "tf2_msgs/TFMessage"): _Reading.take_transforms,
+_COMMON_TOPICS: Dict[Tuple[str, str], Callable[[TraceReader, Message], None]] = {
+    (FLIGHT_TOPIC, "std_msgs/String"): TraceReader.add_flight,
+    ("/clock", "rosgraph_msgs/Clock"): TraceReader.set_clock,
+    (EVENTS_TOPIC, "std_msgs/String"): TraceReader.add_event,
+    (_CONTACTS_TOPIC, "diagnostic_msgs/DiagnosticStatus"): TraceReader.add_contact,
+    ("/tf", "tf2_msgs/TFMessage"): TraceReader.add_transforms,
+    ("/tf_static", "tf2_msgs/TFMessage"): TraceReader.add_transforms,
 }

@@ -1,8 +1,8 @@
-"""ROS 1 messages as bytes, and back, without ROS.
+"""Encode and decode ROS 1 messages without ROS.
 
-``rosbags`` knows the common messages; the navigation's are added here. A message is one
-of its dataclasses, ``message("geometry_msgs/Point", x, y, z)``, with the fields in the order
-of the definition.
+``rosbags`` knows the common message types; those of navigation are added here. A message is
+one of its dataclasses with the fields in the order of the definition, for example
+``message("geometry_msgs/Point", x, y, z)``. Stamps are in nanoseconds.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import functools
 from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from quad_nav.costmap.occupancy import occupancy
@@ -20,15 +21,25 @@ from quad_nav.topics.markers import Marker
 
 _DEFINITIONS = {
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
-    "map_msgs/msg/OccupancyGridUpdate": "std_msgs/Header header\nint32 x\nint32 y\nuint32 width\nuint32 height\nint8[] data",
-    "move_base_msgs/msg/RecoveryStatus": "geometry_msgs/PoseStamped pose_stamped\nuint16 current_recovery_number\n"
-    "uint16 total_number_of_recoveries\nstring recovery_behavior_name",
+    "map_msgs/msg/OccupancyGridUpdate": (
+        "std_msgs/Header header\nint32 x\nint32 y\nuint32 width\nuint32 height\nint8[] data"
+    ),
+    "move_base_msgs/msg/RecoveryStatus": (
+        "geometry_msgs/PoseStamped pose_stamped\nuint16 current_recovery_number\n"
+        "uint16 total_number_of_recoveries\nstring recovery_behavior_name"
+    ),
     "move_base_msgs/msg/MoveBaseGoal": "geometry_msgs/PoseStamped target_pose",
     "move_base_msgs/msg/MoveBaseFeedback": "geometry_msgs/PoseStamped base_position",
     "move_base_msgs/msg/MoveBaseResult": "",
-    "move_base_msgs/msg/MoveBaseActionGoal": "std_msgs/Header header\nactionlib_msgs/GoalID goal_id\nMoveBaseGoal goal",
-    "move_base_msgs/msg/MoveBaseActionFeedback": "std_msgs/Header header\nactionlib_msgs/GoalStatus status\nMoveBaseFeedback feedback",
-    "move_base_msgs/msg/MoveBaseActionResult": "std_msgs/Header header\nactionlib_msgs/GoalStatus status\nMoveBaseResult result",
+    "move_base_msgs/msg/MoveBaseActionGoal": (
+        "std_msgs/Header header\nactionlib_msgs/GoalID goal_id\nMoveBaseGoal goal"
+    ),
+    "move_base_msgs/msg/MoveBaseActionFeedback": (
+        "std_msgs/Header header\nactionlib_msgs/GoalStatus status\nMoveBaseFeedback feedback"
+    ),
+    "move_base_msgs/msg/MoveBaseActionResult": (
+        "std_msgs/Header header\nactionlib_msgs/GoalStatus status\nMoveBaseResult result"
+    ),
 }
 
 _NS = 10**9
@@ -48,18 +59,19 @@ _STORE = _store()
 
 
 def long_name(kind: str) -> str:
-    """``nav_msgs/Path`` as rosbags calls it."""
+    """Convert a type name such as ``nav_msgs/Path`` to the spelling of rosbags."""
     package, name = kind.split("/")
     return f"{package}/msg/{name}"
 
 
 def definition(kind: str) -> Tuple[str, str]:
-    """Full text and MD5 sum of a type's definition."""
+    """Return the full text and the MD5 sum of a type's definition."""
     text, digest = _STORE.generate_msgdef(long_name(kind))
     return text, digest
 
 
 def message(kind: str, *fields: Any) -> Any:
+    """Build a message of a type, for example ``nav_msgs/Path``, from its fields in order."""
     return _message_class(kind)(*fields)
 
 
@@ -69,64 +81,81 @@ def _message_class(kind: str) -> Any:
 
 
 def encode(content: Any) -> bytes:
+    """Serialize a message."""
     return bytes(_STORE.serialize_ros1(content, content.__msgtype__))
 
 
 def decode(data: bytes, kind: str) -> Any:
-    """Raises what struct and numpy raise for bytes that are no such message."""
+    """Deserialize a message of a type.
+
+    Raises:
+        Exception: The bytes are not such a message. rosbags raises errors of struct and numpy.
+    """
     return _STORE.deserialize_ros1(data, long_name(kind))
 
 
 def constant(kind: str, name: str) -> int:
-    """A constant of a type, as ``ACTIVE`` of ``actionlib_msgs/GoalStatus``."""
+    """Return a constant of a type, for example ``ACTIVE`` of ``actionlib_msgs/GoalStatus``."""
     return int(getattr(_STORE.types[long_name(kind)], name))
 
 
 def time(stamp_ns: int) -> Any:
+    """Build a ROS time from nanoseconds."""
     return message("builtin_interfaces/Time", stamp_ns // _NS, stamp_ns % _NS)
 
 
 def stamp_ns(stamp: Any) -> int:
+    """Convert a ROS time to nanoseconds."""
     return int(stamp.sec) * _NS + int(stamp.nanosec)
 
 
 def header(frame: str, stamp: int) -> Any:
+    """Build a ``std_msgs/Header``."""
     return message("std_msgs/Header", 0, time(stamp), frame)
 
 
 def point(x: float, y: float, z: float) -> Any:
+    """Build a ``geometry_msgs/Point``."""
     return message("geometry_msgs/Point", x, y, z)
 
 
 def vector(x: float, y: float, z: float) -> Any:
+    """Build a ``geometry_msgs/Vector3``."""
     return message("geometry_msgs/Vector3", x, y, z)
 
 
 def quaternion(x: float, y: float, z: float, w: float) -> Any:
+    """Build a ``geometry_msgs/Quaternion``."""
     return message("geometry_msgs/Quaternion", x, y, z, w)
 
 
 def pose(at: Pose3D) -> Any:
+    """Build a ``geometry_msgs/Pose``."""
     return message("geometry_msgs/Pose", point(at.x_m, at.y_m, at.z_m), quaternion(*at.quaternion))
 
 
 def pose_stamped(at: Pose3D, frame: str, stamp: int) -> Any:
+    """Build a ``geometry_msgs/PoseStamped``."""
     return message("geometry_msgs/PoseStamped", header(frame, stamp), pose(at))
 
 
 def planar_pose(at: Pose2D, z_m: float = 0.0) -> Pose3D:
+    """Convert a planar pose to an upright pose at height ``z_m``."""
     return Pose3D(at.x_m, at.y_m, z_m, quaternion_from_yaw(at.yaw_rad))
 
 
 def text(content: str) -> Any:
+    """Build a ``std_msgs/String``."""
     return message("std_msgs/String", content)
 
 
 def clock(stamp: int) -> Any:
+    """Build a ``rosgraph_msgs/Clock``."""
     return message("rosgraph_msgs/Clock", time(stamp))
 
 
 def transform(parent_from_child: Pose3D, parent: str, child: str, stamp: int) -> Any:
+    """Build a ``geometry_msgs/TransformStamped``."""
     at = parent_from_child
     return message(
         "geometry_msgs/TransformStamped",
@@ -139,10 +168,12 @@ def transform(parent_from_child: Pose3D, parent: str, child: str, stamp: int) ->
 
 
 def twist(linear: Sequence[float], angular: Sequence[float]) -> Any:
+    """Build a ``geometry_msgs/Twist`` from (x, y, z) in m/s and in rad/s."""
     return message("geometry_msgs/Twist", vector(*linear), vector(*angular))
 
 
 def command(velocity: Twist2D) -> Any:
+    """Build the ``geometry_msgs/Twist`` of a velocity command."""
     return twist((velocity.vx_mps, velocity.vy_mps, 0.0), (0.0, 0.0, velocity.vyaw_radps))
 
 
@@ -153,7 +184,15 @@ def odometry(
     frames: Tuple[str, str],
     stamp: int,
 ) -> Any:
-    """``frames`` are the odometry frame and the body's, which the velocities are in."""
+    """Build a ``nav_msgs/Odometry``.
+
+    Args:
+        odom_from_base: Pose of the body in the odometry frame.
+        linear_mps: Linear velocity in the body frame.
+        angular_radps: Angular velocity in the body frame.
+        frames: Names of the odometry frame and of the body frame.
+        stamp: Time in nanoseconds.
+    """
     return message(
         "nav_msgs/Odometry",
         header(frames[0], stamp),
@@ -164,6 +203,7 @@ def odometry(
 
 
 def laser_scan(scan: Scan, frame: str, stamp: int) -> Any:
+    """Build a ``sensor_msgs/LaserScan``."""
     angle_max = scan.angle_min_rad + (len(scan.ranges_m) - 1) * scan.angle_increment_rad
     return message(
         "sensor_msgs/LaserScan",
@@ -180,8 +220,14 @@ def laser_scan(scan: Scan, frame: str, stamp: int) -> Any:
     )
 
 
-def polygon(points: np.ndarray, frame: str, stamp: int) -> Any:
-    """A footprint float64[n, 2] already in ``frame``."""
+def polygon(points: NDArray[np.float64], frame: str, stamp: int) -> Any:
+    """Build a ``geometry_msgs/PolygonStamped``.
+
+    Args:
+        points: Corners, shape (n, 2), metres in ``frame``.
+        frame: Frame of the corners.
+        stamp: Time in nanoseconds.
+    """
     corners = [message("geometry_msgs/Point32", x, y, 0.0) for x, y in points.tolist()]
     return message(
         "geometry_msgs/PolygonStamped",
@@ -190,8 +236,8 @@ def polygon(points: np.ndarray, frame: str, stamp: int) -> Any:
     )
 
 
-def occupancy_grid(spec: GridSpec, costs: np.ndarray, frame: str, stamp: int) -> Any:
-    """A costmap's master grid uint8[H, W] in occupancies."""
+def occupancy_grid(spec: GridSpec, costs: NDArray[np.uint8], frame: str, stamp: int) -> Any:
+    """Build a ``nav_msgs/OccupancyGrid`` from costs, shape (size_y, size_x)."""
     origin = pose(Pose3D(spec.origin_x_m, spec.origin_y_m, 0.0))
     info = message(
         "nav_msgs/MapMetaData", time(0), spec.resolution_m, spec.size_x, spec.size_y, origin
@@ -199,8 +245,16 @@ def occupancy_grid(spec: GridSpec, costs: np.ndarray, frame: str, stamp: int) ->
     return message("nav_msgs/OccupancyGrid", header(frame, stamp), info, occupancy(costs).ravel())
 
 
-def grid_update(costs: np.ndarray, x0: int, y0: int, frame: str, stamp: int) -> Any:
-    """A window uint8[h, w] of a costmap whose lower left cell is (x0, y0)."""
+def grid_update(costs: NDArray[np.uint8], x0: int, y0: int, frame: str, stamp: int) -> Any:
+    """Build a ``map_msgs/OccupancyGridUpdate``.
+
+    Args:
+        costs: Costs of the window, shape (height, width).
+        x0: Column of the window's lower left cell in the costmap.
+        y0: Row of that cell.
+        frame: Frame of the costmap.
+        stamp: Time in nanoseconds.
+    """
     height, width = costs.shape
     return message(
         "map_msgs/OccupancyGridUpdate",
@@ -216,12 +270,18 @@ def grid_update(costs: np.ndarray, x0: int, y0: int, frame: str, stamp: int) -> 
 def diagnostic(
     level: int, name: str, content: str, hardware_id: str, values: Mapping[str, str]
 ) -> Any:
+    """Build a ``diagnostic_msgs/DiagnosticStatus``."""
     pairs = [message("diagnostic_msgs/KeyValue", key, value) for key, value in values.items()]
     return message("diagnostic_msgs/DiagnosticStatus", level, name, content, hardware_id, pairs)
 
 
 def marker_array(shown: Sequence[Marker], replaces_all: bool = False) -> Any:
-    """With ``replaces_all`` they take the place of all that the topic has shown before."""
+    """Build a ``visualization_msgs/MarkerArray``.
+
+    Args:
+        shown: Markers to add.
+        replaces_all: Delete all markers of the topic first.
+    """
     markers = [_marker(one) for one in shown]
     if replaces_all:
         clear = _marker(
@@ -256,7 +316,7 @@ def _marker(one: Marker) -> Any:
 
 
 def pose_from(position: Any, orientation: Any) -> Pose3D:
-    """A pose from a message's point or vector and its quaternion."""
+    """Convert a message's point or vector and its quaternion to a pose."""
     return Pose3D(
         position.x,
         position.y,
@@ -265,8 +325,17 @@ def pose_from(position: Any, orientation: Any) -> Pose3D:
     )
 
 
-def plan_bytes(plan: np.ndarray, frame: str, stamp: int) -> bytes:
-    """A plan float64[n, 3], rows (x, y, yaw); every pose carries the stamp."""
+def plan_bytes(plan: NDArray[np.float64], frame: str, stamp: int) -> bytes:
+    """Serialize a plan as ``nav_msgs/Path``.
+
+    All poses have records of one size, so numpy writes them at once: a plan has hundreds of
+    poses and is written 20 times a second.
+
+    Args:
+        plan: Poses (x, y, yaw), shape (n, 3), metres and radians in ``frame``.
+        frame: Frame of the plan.
+        stamp: Time of the path and of every pose, nanoseconds.
+    """
     records = np.zeros(len(plan), dtype=_record(len(frame.encode())))
     records["sec"], records["nsec"] = stamp // _NS, stamp % _NS
     records["length"], records["frame"] = len(frame.encode()), frame.encode()
@@ -278,11 +347,12 @@ def plan_bytes(plan: np.ndarray, frame: str, stamp: int) -> bytes:
 
 
 def pose_bytes(pose: Pose3D, frame: str, stamp: int) -> bytes:
-    """One pose of a path, for ``path_bytes``."""
+    """Serialize one pose for ``path_bytes``."""
     return encode(pose_stamped(pose, frame, stamp))
 
 
 def path_bytes(poses: Iterable[bytes], frame: str, stamp: int) -> bytes:
+    """Serialize poses from ``pose_bytes`` as ``nav_msgs/Path``."""
     parts = list(poses)
     return _path(frame, stamp, len(parts), b"".join(parts))
 
@@ -292,8 +362,8 @@ def _path(frame: str, stamp: int, count: int, poses: bytes) -> bytes:
 
 
 @functools.lru_cache(maxsize=None)
-def _record(frame_length: int) -> np.dtype:
-    """``geometry_msgs/PoseStamped`` with a frame's name of so many bytes."""
+def _record(frame_length: int) -> np.dtype[np.void]:
+    """Return the layout of ``geometry_msgs/PoseStamped`` for a frame name of this many bytes."""
     return np.dtype(
         [
             ("seq", "<u4"),

@@ -1,10 +1,11 @@
-"""The topics of one quadcopter's ``move_base{i}``."""
+"""Topics that one robot's ``move_base`` publishes."""
 
 from __future__ import annotations
 
 from typing import Any, Dict, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.config.plugins import plugin_name
 from quad_nav.control.controller import Control
@@ -24,9 +25,9 @@ _NO_PLAN = np.zeros((0, 3))
 
 
 class NavigatorTopics:
-    """Writes what ticks say, as the node ``move_base`` publishes it."""
+    """Writes ticks as the topics of the node ``move_base``."""
 
-    def __init__(self, robot: int, navigator: Navigator, topics: TopicWriter):
+    def __init__(self, robot: int, navigator: Navigator, topics: TopicWriter) -> None:
         self.action = ActionTopics(robot, topics)
         self._topics = topics
         self._navigator = navigator
@@ -42,11 +43,17 @@ class NavigatorTopics:
                 ("local", navigator.local_costmap),
             )
         }
-        self._shown: Dict[str, bool] = {}
+        self._published: Dict[str, bool] = {}
 
-    def write(self, tick: Tick, located: RobotPoses) -> None:
+    def write(self, tick: Tick, poses: RobotPoses) -> None:
+        """Write the topics of one tick.
+
+        Args:
+            tick: Result of the tick.
+            poses: Robot poses of the tick; both must be known.
+        """
         stamp = stamp_at(tick.now_s)
-        assert located.in_global is not None and located.in_local is not None
+        assert poses.in_global is not None and poses.in_local is not None
         if tick.state is not self._state:
             self._state = tick.state
             self._write("state", stamp, messages.text(tick.state.value), latched=True)
@@ -56,17 +63,17 @@ class NavigatorTopics:
             )
         self._write_plans(tick, stamp)
         if tick.recovery is not None:
-            self._write_recovery(tick.recovery, located.in_global, stamp)
+            self._write_recovery(tick.recovery, poses.in_global, stamp)
         if tick.cycle:
-            self.action.feedback(tick.now_s, located.in_global)
-        poses = {"global": located.in_global, "local": located.in_local}
+            self.action.feedback(tick.now_s, poses.in_global)
+        pose_of = {"global": poses.in_global, "local": poses.in_local}
         for name, window in tick.windows.items():
-            self._write_costmap(name, window, poses[name], tick.now_s)
+            self._write_costmap(name, window, pose_of[name], tick.now_s)
         if tick.outcome is not None:
             self.action.finish(tick.now_s, tick.outcome)
 
     def _write_plans(self, tick: Tick, stamp: int) -> None:
-        """A failed search takes the old plan off the display."""
+        """Write the plans; a failed search publishes an empty plan, which clears the display."""
         plan = tick.plan if tick.plan is not None else _NO_PLAN if tick.planning_failed else None
         if plan is not None:
             frame = self._navigator.global_costmap.params.global_frame
@@ -76,7 +83,7 @@ class NavigatorTopics:
 
     def _write_control(self, control: Control, stamp: int) -> None:
         frame = self._navigator.local_costmap.params.global_frame
-        # As in the original, the plan that is followed carries no time.
+        # As in C++ move_base, the plan that the controller follows has no stamp.
         for name, plan, own_stamp in (
             ("global_plan", control.global_plan, 0),
             ("local_plan", control.local_plan, stamp),
@@ -84,7 +91,9 @@ class NavigatorTopics:
             if len(plan):
                 self._write_path(f"{self._controller}/{name}", plan, frame, stamp, own_stamp)
 
-    def _write_path(self, name: str, plan: np.ndarray, frame: str, stamp: int, own: int) -> None:
+    def _write_path(
+        self, name: str, plan: NDArray[np.float64], frame: str, stamp: int, own: int
+    ) -> None:
         self._topics.write_bytes(
             f"{self._node}/{name}", "nav_msgs/Path", stamp, plan_bytes(plan, frame, own), self._node
         )
@@ -101,10 +110,7 @@ class NavigatorTopics:
         )
 
     def _write_costmap(self, name: str, window: Window, pose: Pose2D, now_s: float) -> None:
-        """The grid is latched, so that whoever comes late has it, as new listeners do on ROS.
-
-        One full grid is told at the first update, as to a new listener.
-        """
+        """Write the full grid, latched, at the first update, and changes at the costmap's rate."""
         costmap, updates = self._costmaps[name]
         frame, stamp = costmap.params.global_frame, stamp_at(now_s)
         self._write(
@@ -112,10 +118,10 @@ class NavigatorTopics:
             stamp,
             messages.polygon(oriented(costmap.footprint, pose), frame, stamp),
         )
-        is_due, is_first = updates.add(now_s, window), name not in self._shown
+        is_due, is_first = updates.add(now_s, window), name not in self._published
         if not is_due and not is_first:
             return
-        self._shown[name] = True
+        self._published[name] = True
         changed = updates.pop()
         if updates.pop_full_grid():
             self._write(

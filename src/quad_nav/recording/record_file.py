@@ -1,7 +1,7 @@
-"""Files of ROS messages: ROS 1 bags, and MCAP with the same bytes in it.
+"""Write ROS messages to files: ROS 1 bags, or MCAP with the same bytes.
 
-A file is written as ``<name>.active``, as ``rosbag record`` does, and takes its name when it
-is complete, so an older recording of that name is there until then.
+A file is written as ``<name>.active``, as ``rosbag record`` does, and renamed when it is
+complete. Until then an older recording of that name stays in place.
 """
 
 from __future__ import annotations
@@ -24,27 +24,35 @@ SUFFIXES = (".bag", ".mcap")
 
 
 class RecordFile(Protocol):
-    """Takes messages in the order of their stamps. Its methods raise ``OSError``."""
+    """File that takes messages in the order of their stamps.
+
+    All methods raise ``OSError`` if the file cannot be written.
+    """
 
     def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
-        """A handle for ``write``; ``kind`` is as ``nav_msgs/Path``."""
+        """Return a topic's handle for ``write``; ``kind`` is a type such as ``nav_msgs/Path``."""
 
-    def write(self, handle: Any, stamp_ns: int, data: bytes) -> None: ...
+    def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
+        """Append one serialized message."""
 
     def close(self) -> None:
-        """Completes the file. It raises when a part was lost; the rest is readable then."""
+        """Complete the file.
+
+        Raises:
+            OSError: Part of the recording is lost. The rest is readable.
+        """
 
 
 def create(path: Path) -> RecordFile:
-    """A new file, by the name's ending.
+    """Create a recording, in the format of the name's suffix.
 
     Raises:
-        InputError: another ending, or a file that cannot be made there.
+        InputError: The suffix is unknown, or the file cannot be created.
     """
     if path.suffix not in SUFFIXES:
         raise InputError(
             [
-                f"{path}: cannot be recorded to; expected a name that ends with "
+                f"{path}: unknown recording format; expected a name that ends with "
                 f"{' or '.join(SUFFIXES)}"
             ]
         )
@@ -58,17 +66,14 @@ def create(path: Path) -> RecordFile:
         return BagWriter(path, active) if path.suffix == ".bag" else McapWriter(path, active)
     except OSError as error:
         raise InputError(
-            [
-                f"{path}: cannot be recorded to: {error.strerror}; expected a file "
-                "that can be written"
-            ]
+            [f"{path}: cannot write the recording: {error.strerror}; expected a writable file"]
         ) from error
 
 
 class BagWriter:
-    """A ROS 1 bag, in LZ4 chunks of 1 MiB."""
+    """ROS 1 bag in LZ4 chunks of 1 MiB."""
 
-    def __init__(self, path: Path, active: Path):
+    def __init__(self, path: Path, active: Path) -> None:
         self._path, self._active = path, active
         self._writer = BagLibraryWriter(active)
         self._writer.set_compression(BagLibraryWriter.CompressionFormat.LZ4)
@@ -77,12 +82,18 @@ class BagWriter:
         self._writer.open()
 
     def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
+        """Add a connection; see ``RecordFile``."""
         text, digest = definition(kind)
         return self._writer.add_connection(
             topic, long_name(kind), msgdef=text, md5sum=digest, callerid=node, latching=int(latched)
         )
 
     def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
+        """Append one serialized message.
+
+        Raises:
+            OSError: The file cannot be written; ``close`` shortens the bag.
+        """
         try:
             self._writer.write(handle, stamp_ns, data)
         except OSError as error:
@@ -90,6 +101,11 @@ class BagWriter:
             raise
 
     def close(self) -> None:
+        """Complete the bag; after a write error, without its newest chunks.
+
+        Raises:
+            OSError: Part of the recording is lost. The rest is readable.
+        """
         try:
             if self._error is None:
                 self._writer.close()
@@ -102,14 +118,14 @@ class BagWriter:
             raise self._error
 
     def _close_shortened(self) -> None:
-        """On a full disk: give up the newest chunks until there is room for the index."""
+        """Drop the newest chunks of a full disk until the index fits."""
         writer = self._writer
         while True:
             chunks = [chunk for chunk in writer.chunks if chunk.pos != -1]
             lost = chunks.pop() if chunks else None
             if writer.bio is not None:
                 with contextlib.suppress(OSError):
-                    writer.bio.close()  # what waits in its buffer finds no room
+                    writer.bio.close()  # its buffer does not fit on the disk
             if lost is None:
                 raise OSError(None, "no room for a single chunk")
             writer.bio = self._active.open("r+b")
@@ -122,7 +138,7 @@ class BagWriter:
 
 
 def _compressed(data: bytes) -> bytes:
-    """The only kind of LZ4 that ROS reads; rosbags' own is refused by ``rosbag play``."""
+    """Compress to the only kind of LZ4 that ROS reads; ``rosbag play`` refuses rosbags' own."""
     packed: bytes = lz4.frame.compress(
         data, block_linked=False, content_checksum=True, store_size=False
     )
@@ -130,16 +146,17 @@ def _compressed(data: bytes) -> bytes:
 
 
 class McapWriter:
-    """MCAP with ROS 1 messages; the format has no place for what is latched."""
+    """MCAP file with ROS 1 messages; the format cannot mark latched topics."""
 
-    def __init__(self, path: Path, active: Path):
+    def __init__(self, path: Path, active: Path) -> None:
         self._path, self._active = path, active
         self._file = active.open("wb")
-        self._writer = McapLibraryWriter(self._file, compression=CompressionType.LZ4)
+        self._writer: Any = McapLibraryWriter(self._file, compression=CompressionType.LZ4)
         self._writer.start("ros1")
         self._schemas: Dict[str, int] = {}
 
     def add_topic(self, topic: str, kind: str, latched: bool, node: str) -> Any:
+        """Add a channel; see ``RecordFile``."""
         if kind not in self._schemas:
             text, _ = definition(kind)
             self._schemas[kind] = self._writer.register_schema(kind, "ros1msg", text.encode())
@@ -147,9 +164,11 @@ class McapWriter:
         return self._writer.register_channel(topic, "ros1", self._schemas[kind], metadata)
 
     def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
+        """Append one serialized message."""
         self._writer.add_message(handle, stamp_ns, data, stamp_ns)
 
     def close(self) -> None:
+        """Complete the file."""
         self._writer.finish()
         self._file.close()
         os.replace(self._active, self._path)
@@ -159,20 +178,23 @@ START_NS = round(START_S * 1e9)
 
 
 def stamp_at(time_s: float) -> int:
-    """Nanoseconds on the recording's clock at a time of the flight."""
+    """Convert a time of the flight to nanoseconds on the recording's clock."""
     return round(time_s * 1e9) + START_NS
 
 
 class TopicWriter:
-    """Writes messages until the file takes no more; ``problem`` then says why."""
+    """Writes messages by topic; announces each topic with its first message.
 
-    def __init__(self, file: RecordFile):
+    After a write error it drops all further messages, and ``problem`` holds the reason.
+    """
+
+    def __init__(self, file: RecordFile) -> None:
         self._file = file
         self._handles: Dict[str, Any] = {}
         self.problem = ""
 
     def write(self, topic: str, stamp: int, content: Any, node: str, latched: bool = False) -> None:
-        """``content`` is a message of ``record_messages``."""
+        """Serialize a message of ``messages.message`` and append it."""
         self.write_bytes(
             topic, content.__msgtype__.replace("/msg/", "/"), stamp, encode(content), node, latched
         )
@@ -180,6 +202,7 @@ class TopicWriter:
     def write_bytes(
         self, topic: str, kind: str, stamp: int, data: bytes, node: str, latched: bool = False
     ) -> None:
+        """Append a serialized message of type ``kind``."""
         if self.problem:
             return
         try:
@@ -187,14 +210,15 @@ class TopicWriter:
                 self._handles[topic] = self._file.add_topic(topic, kind, latched, node)
             self._file.write(self._handles[topic], stamp, data)
         except OSError as error:
-            self.problem = _said(error)
+            self.problem = _write_problem(error)
 
     def close(self) -> None:
+        """Complete the file; a failure is kept in ``problem``."""
         try:
             self._file.close()
         except OSError as error:
-            self.problem = self.problem or _said(error)
+            self.problem = self.problem or _write_problem(error)
 
 
-def _said(error: OSError) -> str:
-    return f"the recording cannot be written: {error.strerror or error}"
+def _write_problem(error: OSError) -> str:
+    return f"cannot write the recording: {error.strerror or error}"

@@ -1,7 +1,7 @@
-"""Records a flight as the topics of the ROS face, for ``rosbag play`` and RViz.
+"""Record a flight as the topics of the ROS interface, for ``rosbag play`` and RViz.
 
-The recording's clock is the simulator's: 1 s at the flight's start, for nodes take a time
-of 0 for a clock that stands.
+The recording's clock is the simulator's. It starts at 1 s, because ROS nodes take a time of 0
+for a stopped clock.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from quad_nav.recording.navigator_topics import NavigatorTopics
 from quad_nav.recording.record_file import START_NS, TopicWriter, create, stamp_at
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.simulation import RobotState
 from quad_nav.topics import flight_info
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
 from quad_nav.topics.markers import goal_markers, quadcopter_markers, scene_markers
@@ -29,18 +30,17 @@ _SIMULATOR, _SEQUENCER = "/simulator", "/sequencer"
 
 
 class Recorder(FlightObserver):
-    """Writes a flight to a ``.bag`` or ``.mcap``.
+    """Writes a flight to a ``.bag`` or ``.mcap`` file.
 
-    When the file takes no more, the flight is asked to end; what was recorded until then
-    stays readable.
+    If the file cannot be written, the flight stops; messages recorded until then stay readable.
 
     Raises:
-        InputError: the file cannot be made.
+        InputError: The file cannot be created.
     """
 
     needs_single_process = True
 
-    def __init__(self, path: Path, title: str = "flight"):
+    def __init__(self, path: Path, title: str = "flight") -> None:
         self._topics = TopicWriter(create(path))
         self._title = title
         self._navigators: List[NavigatorTopics] = []
@@ -48,16 +48,18 @@ class Recorder(FlightObserver):
 
     @property
     def stop_reason(self) -> str:
+        """Reason to stop the flight: the file cannot be written; empty otherwise."""
         return self._topics.problem
 
     def on_start(self, flight: Flight) -> None:
+        """Write the scene, the goals and the initial state."""
         self._flight = flight
         self._navigators = [
             NavigatorTopics(index, flight.offline_robots[index].navigator, self._topics)
             for index in range(len(flight.robots))
         ]
         self._paths = [FlownPath(_path_pose) for _ in flight.robots]
-        self._tell_flight()
+        self._write_flight()
         self._write(
             "/simulation/scene",
             START_NS,
@@ -72,10 +74,11 @@ class Recorder(FlightObserver):
             _SIMULATOR,
             latched=True,
         )
-        self._tell_goals(0.0)
+        self._write_goals(0.0)
         self.on_move(flight)
 
     def on_contact(self, contact: Contact) -> None:
+        """Write a contact as a diagnostic."""
         stamp = stamp_at(contact.time_s)
         level = messages.constant("diagnostic_msgs/DiagnosticStatus", "WARN")
         self._write(
@@ -92,12 +95,14 @@ class Recorder(FlightObserver):
         )
 
     def on_scan(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
+        """Write a LIDAR scan."""
         stamp = stamp_at(scan.stamp_s)
         self._write(
             f"/scan{robot}", stamp, messages.laser_scan(scan, f"Lidar{robot}", stamp), _SIMULATOR
         )
 
     def on_move(self, flight: Flight) -> None:
+        """Write clock, transforms, odometry and paths of one step."""
         now_s, stamp = flight.now_s, stamp_at(flight.now_s)
         self._write("/clock", stamp, messages.clock(stamp), _SIMULATOR, latched=True)
         self._write(
@@ -115,31 +120,12 @@ class Recorder(FlightObserver):
             latched=True,
         )
         for robot, state in enumerate(flight.states):
-            self._write(
-                f"/odom{robot}",
-                stamp,
-                messages.odometry(
-                    state.map_from_base,
-                    state.linear_mps,
-                    state.angular_radps,
-                    (f"odom{robot}", f"base_link{robot}"),
-                    stamp,
-                ),
-                _SIMULATOR,
-            )
-            path = self._paths[robot]
-            if path.add(now_s, state.map_from_base):
-                self._topics.write_bytes(
-                    f"/path{robot}",
-                    "nav_msgs/Path",
-                    stamp,
-                    path_bytes(path.poses, "map", stamp),
-                    _SEQUENCER,
-                    True,
-                )
-            self._navigators[robot].action.tell_status(now_s)
+            self._write_odometry(robot, state, stamp)
+            self._write_flown_path(robot, state, now_s)
+            self._navigators[robot].action.write_due_status(now_s)
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
+        """Write an action of the sequencer."""
         info = flight_info.event(robot, now_s + flight_info.START_S, action)
         self._write(
             flight_info.EVENTS_TOPIC,
@@ -149,19 +135,40 @@ class Recorder(FlightObserver):
         )
         if isinstance(action, SendGoal):
             self._navigators[robot].action.send(now_s, action.pose)
-        self._tell_goals(now_s)
+        self._write_goals(now_s)
 
     def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+        """Write the topics of a navigator's tick."""
         navigator = self._navigators[robot]
         if navigator.action.is_waiting and not self._flight.robots[robot].goal_waits:
             navigator.action.accept(tick.now_s)
         navigator.write(tick, located)
 
     def on_end(self, flight: Flight) -> None:
-        self._tell_flight()
+        """Write the final flight information and complete the file."""
+        self._write_flight()
         self._topics.close()
 
-    def _tell_flight(self) -> None:
+    def _write_odometry(self, robot: int, state: RobotState, stamp: int) -> None:
+        odometry = messages.odometry(
+            state.map_from_base,
+            state.linear_mps,
+            state.angular_radps,
+            (f"odom{robot}", f"base_link{robot}"),
+            stamp,
+        )
+        self._write(f"/odom{robot}", stamp, odometry, _SIMULATOR)
+
+    def _write_flown_path(self, robot: int, state: RobotState, now_s: float) -> None:
+        """Write the whole path again if it has grown."""
+        path, stamp = self._paths[robot], stamp_at(now_s)
+        if path.add(now_s, state.map_from_base):
+            data = path_bytes(path.poses, "map", stamp)
+            self._topics.write_bytes(
+                f"/path{robot}", "nav_msgs/Path", stamp, data, _SEQUENCER, True
+            )
+
+    def _write_flight(self) -> None:
         flight = self._flight
         setup = flight.setup
         info: Dict[str, Any] = {
@@ -183,7 +190,7 @@ class Recorder(FlightObserver):
             latched=True,
         )
 
-    def _tell_goals(self, now_s: float) -> None:
+    def _write_goals(self, now_s: float) -> None:
         sequencers = [robot.sequencer for robot in self._flight.robots]
         markers = goal_markers(sequencers, self._flight.setup.scene.altitude_m)
         self._write(

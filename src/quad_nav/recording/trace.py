@@ -1,6 +1,6 @@
-"""What happened in a flight, as arrays: what reports, animations and views are made from.
+"""Trace of a flight as arrays: the input of reports, animations and views.
 
-It comes from a flight as it is flown (``TraceObserver``) or from a recorded bag.
+A trace comes from a running flight (``TraceObserver``) or from a recording (``bag_trace``).
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, List, Mapping, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
@@ -21,7 +22,10 @@ from quad_nav.versions import versions
 
 @dataclass(frozen=True)
 class GoalTrace:
-    """One goal's flight. ``ended_s`` is None when it was not over; ``reason`` why it failed."""
+    """Flight to one goal.
+
+    ``ended_s`` is None if the goal had not ended. ``reason`` says why it was not reached.
+    """
 
     index: int
     lap: int
@@ -35,27 +39,35 @@ class GoalTrace:
 
 @dataclass(frozen=True)
 class RobotTrace:
-    """One quadcopter; everything is in ``map`` unless it says otherwise.
+    """Trace of one robot.
 
-    ``times_s`` float64[k]; ``positions_m`` float64[k, 3]; ``quaternions`` float64[k, 4],
-    (x, y, z, w); ``velocities`` float64[k, 3], (vx, vy, vyaw) in the body's frame.
-    ``command_times_s`` float64[c] and ``commands`` float64[c, 3], in the body's frame.
-    ``cycle_times_s`` float64[m]: when a control cycle ran; ``cycle_walls_s`` float64[m]: how
-    long it took, empty where that is not known. ``plans``: (time, float64[n, 2 or 3]).
-    ``states``: (time, state) at each change. ``recoveries``: (time, name).
-    ``parameters``: move_base's tree with ROS spellings, {} where it is not known.
+    Attributes:
+        name: Name of the robot.
+        times_s: Times of the poses, shape (k,).
+        positions_m: Positions in ``map``, shape (k, 3).
+        quaternions: Orientations (x, y, z, w) in ``map``, shape (k, 4).
+        velocities: Velocities (vx, vy, vyaw) in the body frame, shape (k, 3), m/s and rad/s.
+        command_times_s: Times of the commands, shape (c,).
+        commands: Commands (vx, vy, vyaw) in the body frame, shape (c, 3), m/s and rad/s.
+        cycle_times_s: Times of the control cycles, shape (m,).
+        cycle_walls_s: Wall times of the control cycles, shape (m,); empty if unknown.
+        plans: (time, plan) pairs; a plan has shape (n, 2) or (n, 3), in ``map``.
+        states: (time, state) pairs, one for each change.
+        recoveries: (time, name) pairs.
+        goals: Goals in the order of flight.
+        parameters: move_base's parameters with ROS names; empty if unknown.
     """
 
     name: str
-    times_s: np.ndarray
-    positions_m: np.ndarray
-    quaternions: np.ndarray
-    velocities: np.ndarray
-    command_times_s: np.ndarray
-    commands: np.ndarray
-    cycle_times_s: np.ndarray
-    cycle_walls_s: np.ndarray
-    plans: Tuple[Tuple[float, np.ndarray], ...] = ()
+    times_s: NDArray[np.float64]
+    positions_m: NDArray[np.float64]
+    quaternions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    command_times_s: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    cycle_times_s: NDArray[np.float64]
+    cycle_walls_s: NDArray[np.float64]
+    plans: Tuple[Tuple[float, NDArray[np.float64]], ...] = ()
     states: Tuple[Tuple[float, State], ...] = ()
     recoveries: Tuple[Tuple[float, str], ...] = ()
     goals: Tuple[GoalTrace, ...] = ()
@@ -64,7 +76,7 @@ class RobotTrace:
 
 @dataclass(frozen=True)
 class FlightTrace:
-    """All quadcopters of a flight, where they flew and what touched."""
+    """Trace of all robots of a flight, with its contacts and scene."""
 
     title: str
     robots: Tuple[RobotTrace, ...]
@@ -78,12 +90,12 @@ class FlightTrace:
 
 
 class _RobotRecord:
-    """Lists that become a ``RobotTrace``."""
+    """Lists from which a ``RobotTrace`` is built."""
 
     def __init__(self) -> None:
         self.commands: List[Tuple[float, float, float, float]] = []
         self.cycles: List[Tuple[float, float]] = []
-        self.plans: List[Tuple[float, np.ndarray]] = []
+        self.plans: List[Tuple[float, NDArray[np.float64]]] = []
         self.states: List[Tuple[float, State]] = []
         self.recoveries: List[Tuple[float, str]] = []
         self.goals: List[GoalTrace] = []
@@ -91,22 +103,24 @@ class _RobotRecord:
 
 
 class TraceObserver(FlightObserver):
-    """Takes a trace of a flight."""
+    """Traces a running flight."""
 
-    def __init__(self, title: str = "flight"):
+    def __init__(self, title: str = "flight") -> None:
         self._title = title
         self._times_s: List[float] = []
-        self._positions: List[np.ndarray] = []
-        self._quaternions: List[np.ndarray] = []
+        self._positions: List[NDArray[np.float64]] = []
+        self._quaternions: List[NDArray[np.float64]] = []
         self._robots: List[_RobotRecord] = []
         self._flight: Optional[Flight] = None
 
     def on_start(self, flight: Flight) -> None:
+        """Start the trace."""
         self._flight = flight
         self._robots = [_RobotRecord() for _ in flight.robots]
         self.on_move(flight)
 
     def on_move(self, flight: Flight) -> None:
+        """Add the state of all bodies."""
         bodies = flight.simulation.body_state
         self._times_s.append(flight.now_s)
         self._positions.append(bodies.positions_m)
@@ -116,6 +130,7 @@ class TraceObserver(FlightObserver):
             record.velocities.append((twist.vx_mps, twist.vy_mps, twist.vyaw_radps))
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
+        """Add a goal that was sent or ended."""
         goals = self._robots[robot].goals
         if isinstance(action, SendGoal) and not action.resend_reason:
             goals.append(GoalTrace(action.index, action.lap, action.pose, now_s))
@@ -133,6 +148,7 @@ class TraceObserver(FlightObserver):
             )
 
     def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+        """Add the results of a navigator's tick."""
         record, now_s = self._robots[robot], tick.now_s
         if tick.cycle:
             record.cycles.append((now_s, wall_s))
@@ -147,16 +163,34 @@ class TraceObserver(FlightObserver):
             record.recoveries.append((now_s, tick.recovery.name))
 
     def trace(self, contacts: Tuple[Contact, ...] = (), reason: str = "") -> FlightTrace:
-        """What has been seen so far; contacts and reason are the summary's."""
+        """Build the trace of the flight so far.
+
+        Args:
+            contacts: Contacts of the flight's summary.
+            reason: Reason why the flight ended early, from the summary.
+        """
         assert self._flight is not None
         setup = self._flight.setup
+        return FlightTrace(
+            self._title,
+            self._robot_traces(self._flight),
+            contacts,
+            setup.scene,
+            setup.robot_radius_m,
+            setup.seed,
+            setup.config_name,
+            versions(),
+            reason,
+        )
+
+    def _robot_traces(self, flight: Flight) -> Tuple[RobotTrace, ...]:
         times_s, positions = np.array(self._times_s), np.array(self._positions)
         quaternions = np.array(self._quaternions)
-        robots = []
-        for k, (record, robot) in enumerate(zip(self._robots, self._flight.robots)):
+        traces = []
+        for k, (record, robot) in enumerate(zip(self._robots, flight.robots)):
             commands = np.array(record.commands, dtype=float).reshape(-1, 4)
             cycles = np.array(record.cycles, dtype=float).reshape(-1, 2)
-            robots.append(
+            traces.append(
                 RobotTrace(
                     robot.name,
                     times_s,
@@ -174,14 +208,4 @@ class TraceObserver(FlightObserver):
                     robot.configuration.to_tree(),
                 )
             )
-        return FlightTrace(
-            self._title,
-            tuple(robots),
-            contacts,
-            setup.scene,
-            setup.robot_radius_m,
-            setup.seed,
-            setup.config_name,
-            versions(),
-            reason,
-        )
+        return tuple(traces)

@@ -1,6 +1,6 @@
-"""A flight in three dimensions, in rerun's viewer: live, or saved to be looked at later.
+"""Show a flight in rerun's 3D viewer, live or saved to a file.
 
-rerun is an optional extra, ``pip install 'quad-nav[view]'``.
+rerun is an optional extra: ``pip install 'quad-nav[view]'``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, List, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D, Scan
@@ -36,17 +37,18 @@ _BACKGROUND_RGB = (250, 250, 250)
 
 
 class View(FlightObserver):
-    """Shows scene, quadcopters, scans, plans, goals, trails and contacts.
+    """Shows the scene, quadcopters, scans, plans, goals, trails and contacts.
 
-    ``path``: the file to save to; None opens the viewer and shows the flight as it is flown.
+    ``path`` is the file to save to. None opens the viewer and shows the flight live.
 
     Raises:
-        InputError: rerun is not installed, or the file cannot be made.
+        InputError: rerun is not installed, the viewer does not start, or the file cannot be
+            created.
     """
 
     needs_single_process = True
 
-    def __init__(self, path: Optional[Path] = None):
+    def __init__(self, path: Optional[Path] = None) -> None:
         self._rr = _rerun()
         if path is not None:
             _check(path)
@@ -64,6 +66,7 @@ class View(FlightObserver):
         )
 
     def on_start(self, flight: Flight) -> None:
+        """Log the scene, the bodies and the goals."""
         self._flight = flight
         self._altitude_m = flight.setup.scene.altitude_m
         self._trails: List[FlownPath[Tuple[float, float, float]]] = [
@@ -82,6 +85,7 @@ class View(FlightObserver):
         self.on_move(flight)
 
     def on_contact(self, contact: Contact) -> None:
+        """Log a contact."""
         self._at(contact.time_s)
         self._rr.log(
             "map/contacts",
@@ -95,6 +99,7 @@ class View(FlightObserver):
         self._rr.log("contacts", self._rr.TextLog(str(contact), level="WARN"))
 
     def on_scan(self, robot: int, scan: Scan, map_from_lidar: Pose3D) -> None:
+        """Log a scan as points."""
         self._at(scan.stamp_s)
         self._rr.log(
             f"map/quad{robot}/scan",
@@ -104,6 +109,7 @@ class View(FlightObserver):
         )
 
     def on_move(self, flight: Flight) -> None:
+        """Log poses and trails."""
         self._at(flight.now_s)
         for robot, state in enumerate(flight.states):
             pose = state.map_from_base
@@ -123,9 +129,11 @@ class View(FlightObserver):
                 )
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
+        """Log the goals again."""
         self._show_goals(now_s)
 
     def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+        """Log the plans of a tick."""
         self._at(tick.now_s)
         if tick.plan is not None:
             self._line(f"map/quad{robot}/plan", self._lifted(tick.plan), _colour(robot), 0.01)
@@ -138,18 +146,23 @@ class View(FlightObserver):
             )
 
     def on_end(self, flight: Flight) -> None:
+        """Close the connection or the file."""
         self._rr.disconnect()
 
     def _at(self, time_s: float) -> None:
         self._rr.set_time_seconds(_TIMELINE, time_s)
 
     def _line(
-        self, entity: str, points: np.ndarray, colour: Tuple[int, int, int], radius_m: float
+        self,
+        entity: str,
+        points: NDArray[np.float64],
+        colour: Tuple[int, int, int],
+        radius_m: float,
     ) -> None:
         self._rr.log(entity, self._rr.LineStrips3D([points], colors=[colour], radii=[radius_m]))
 
-    def _lifted(self, plan: np.ndarray) -> np.ndarray:
-        """A plan's places at the flying altitude."""
+    def _lifted(self, plan: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a plan's positions at the flight altitude, shape (n, 3)."""
         return np.column_stack((plan[:, :2], np.full(len(plan), self._altitude_m)))
 
     def _show_goals(self, now_s: float) -> None:
@@ -161,22 +174,26 @@ class View(FlightObserver):
             self._rr.Points3D(
                 [marker.place_m for marker in spheres],
                 colors=[colour_of(one) for one in spheres],
-                # A flown goal is a dot: translucent spheres are not drawn.
+                # A reached goal is a dot: rerun draws no translucent spheres.
                 radii=[one.size_m[0] / 2 if one.rgba[3] > 0.5 else 0.05 for one in spheres],
                 labels=[str(one.number + 1) for one in spheres],
             ),
         )
 
 
-def scan_points(scan: Scan, map_from_lidar: Pose3D) -> np.ndarray:
-    """Where the beams hit, float64[n, 3] in ``map``; beams that hit nothing are left out."""
+def scan_points(scan: Scan, map_from_lidar: Pose3D) -> NDArray[np.float64]:
+    """Return the hit points of a scan in ``map``, shape (n, 3), metres.
+
+    Beams without a return are left out.
+    """
     hits = np.isfinite(scan.ranges_m)
     ranges_m = scan.ranges_m[hits].astype(np.float64)
     angles = scan.angle_min_rad + np.nonzero(hits)[0] * scan.angle_increment_rad
     points = np.column_stack(
         (ranges_m * np.cos(angles), ranges_m * np.sin(angles), np.zeros(len(angles)))
     )
-    return map_from_lidar.transform_points(points)
+    placed: NDArray[np.float64] = points @ map_from_lidar.rotation.T + map_from_lidar.translation
+    return placed
 
 
 def _rerun() -> Any:
@@ -185,7 +202,7 @@ def _rerun() -> Any:
     except ImportError as error:
         raise InputError(
             [
-                f"--view: needs rerun ({error}); install it with "
+                f"--view: rerun is not installed ({error}); install it with "
                 "pip install 'quad-nav[view]', in a checkout with "
                 ".venv/bin/pip install '.[view]'"
             ]
@@ -193,19 +210,19 @@ def _rerun() -> Any:
 
 
 def _spawn(rr: Any) -> None:
-    """Opens the viewer, or shows the flight in one that is open.
+    """Open the viewer, or connect to one that is open.
 
-    rerun's own ``spawn`` has it listen to the whole network.
+    rerun's own ``spawn`` listens on all network interfaces; this viewer listens on loopback.
     """
     if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
         raise InputError(
             [
-                "--view: there is no display for the viewer; expected one, or "
-                "--view FILE.rrd to look at later"
+                "--view: no display for the viewer; expected one, or --view FILE.rrd to save "
+                "the flight"
             ]
         )
     if not _is_listening():
-        # pip puts it beside Python, where an unactivated environment's PATH does not look.
+        # pip installs it beside Python, which is not in PATH if the environment is not activated.
         places = os.pathsep.join(
             (str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath))
         )
@@ -230,13 +247,13 @@ def _spawn(rr: Any) -> None:
     rr.connect_tcp(f"{_LOOPBACK}:{_PORT}")
 
 
-def _wait_for(viewer: subprocess.Popen) -> None:
+def _wait_for(viewer: subprocess.Popen[bytes]) -> None:
     end_s = time.monotonic() + _STARTS_WITHIN_S
     while not _is_listening():
         if viewer.poll() is not None:
-            raise InputError([_no_viewer(f"rerun ended with {viewer.returncode}")])
+            raise InputError([_no_viewer(f"rerun exited with status {viewer.returncode}")])
         if time.monotonic() > end_s:
-            raise InputError([_no_viewer(f"rerun is not there after {_STARTS_WITHIN_S:g} s")])
+            raise InputError([_no_viewer(f"rerun does not listen after {_STARTS_WITHIN_S:g} s")])
         time.sleep(0.05)
 
 
@@ -248,22 +265,24 @@ def _is_listening() -> bool:
     return True
 
 
-def _no_viewer(why: Optional[str]) -> str:
+def _no_viewer(problem: Optional[str]) -> str:
     return (
-        f"--view: the viewer does not start: {why}; expected a display, or --view FILE.rrd "
-        "to look at later"
+        f"--view: the viewer does not start: {problem}; expected a display, or "
+        "--view FILE.rrd to save the flight"
     )
 
 
 def _check(path: Path) -> None:
     if path.suffix != SUFFIX:
-        raise InputError([f"{path}: cannot be saved to; expected a name that ends with {SUFFIX}"])
+        raise InputError(
+            [f"{path}: unknown format of a view; expected a name that ends with {SUFFIX}"]
+        )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.open("wb").close()
     except OSError as error:
         raise InputError(
-            [f"{path}: cannot be saved to: {error.strerror}; expected a file that can be written"]
+            [f"{path}: cannot write: {error.strerror}; expected a writable file"]
         ) from error
 
 

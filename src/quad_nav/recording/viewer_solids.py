@@ -1,4 +1,7 @@
-"""Markers as rerun's solids. It draws nothing translucent: that becomes an outline."""
+"""Convert markers to rerun's solids; translucent markers become outlines.
+
+rerun draws nothing translucent.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import math
 from typing import Any, List
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import quaternion_from_yaw, rotation_from_quaternion
 from quad_nav.topics.markers import CUBE, CUBE_LIST, CYLINDER, SPHERE, Marker
@@ -16,41 +20,54 @@ _OPAQUE_FROM = 0.5
 
 
 def solid(rr: Any, marker: Marker) -> Any:
-    """What to log for a marker, in its frame."""
-    colour = colour_of(marker)
-    is_opaque = marker.rgba[3] >= _OPAQUE_FROM
+    """Build the rerun archetype of a marker, in the marker's frame."""
     if marker.kind == CUBE:
-        fill = rr.components.FillMode.Solid if is_opaque else rr.components.FillMode.MajorWireframe
-        return rr.Boxes3D(
-            centers=[marker.place_m],
-            sizes=[marker.size_m],
-            quaternions=[_turn(rr, marker)],
-            colors=[colour],
-            radii=[_LINE_M],
-            fill_mode=fill,
-        )
+        return _box(rr, marker)
     if marker.kind == CUBE_LIST:
-        points = (
-            np.array(marker.points_m)
-            @ rotation_from_quaternion(quaternion_from_yaw(marker.yaw_rad)).T
-        )
-        return rr.Boxes3D(
-            centers=points,
-            sizes=[marker.size_m] * len(points),
-            quaternions=[_turn(rr, marker)] * len(points),
-            colors=[colour],
-            fill_mode=rr.components.FillMode.Solid,
-        )
+        return _boxes(rr, marker)
     if marker.kind == SPHERE:
         return rr.Ellipsoids3D(
             centers=[marker.place_m],
-            colors=[colour],
+            colors=[colour_of(marker)],
             half_sizes=[np.array(marker.size_m) / 2],
             fill_mode=rr.components.FillMode.Solid,
         )
     assert marker.kind == CYLINDER, marker
+    return _cylinder(rr, marker)
+
+
+def _is_opaque(marker: Marker) -> bool:
+    return marker.rgba[3] >= _OPAQUE_FROM
+
+
+def _box(rr: Any, marker: Marker) -> Any:
+    modes = rr.components.FillMode
+    return rr.Boxes3D(
+        centers=[marker.place_m],
+        sizes=[marker.size_m],
+        quaternions=[_turn(rr, marker)],
+        colors=[colour_of(marker)],
+        radii=[_LINE_M],
+        fill_mode=modes.Solid if _is_opaque(marker) else modes.MajorWireframe,
+    )
+
+
+def _boxes(rr: Any, marker: Marker) -> Any:
+    rotation = rotation_from_quaternion(quaternion_from_yaw(marker.yaw_rad))
+    points = np.array(marker.points_m) @ rotation.T
+    return rr.Boxes3D(
+        centers=points,
+        sizes=[marker.size_m] * len(points),
+        quaternions=[_turn(rr, marker)] * len(points),
+        colors=[colour_of(marker)],
+        fill_mode=rr.components.FillMode.Solid,
+    )
+
+
+def _cylinder(rr: Any, marker: Marker) -> Any:
+    colour = colour_of(marker)
     lower, upper = (_ring(marker, side) for side in (-0.5, 0.5))
-    if not is_opaque:
+    if not _is_opaque(marker):
         return rr.LineStrips3D([_closed(lower), _closed(upper)], colors=[colour], radii=[_LINE_M])
     points = np.vstack((lower, upper, *_centres(marker)))
     return rr.Mesh3D(
@@ -61,6 +78,7 @@ def solid(rr: Any, marker: Marker) -> Any:
 
 
 def colour_of(marker: Marker) -> List[int]:
+    """Return the marker's colour as three numbers of 0 to 255."""
     return [round(255 * part) for part in marker.rgba[:3]]
 
 
@@ -68,24 +86,27 @@ def _turn(rr: Any, marker: Marker) -> Any:
     return rr.Quaternion(xyzw=quaternion_from_yaw(marker.yaw_rad))
 
 
-def _ring(marker: Marker, side: float) -> np.ndarray:
-    """The lower or upper edge of a cylinder, float64[n, 3]."""
+def _ring(marker: Marker, side: float) -> NDArray[np.float64]:
+    """Return the lower or upper edge of a cylinder, shape (n, 3)."""
     angles = np.arange(_SIDES) * 2.0 * math.pi / _SIDES
     unit = np.column_stack((np.cos(angles) / 2.0, np.sin(angles) / 2.0, np.full(_SIDES, side)))
-    ring: np.ndarray = unit * marker.size_m + marker.place_m
+    ring: NDArray[np.float64] = unit * marker.size_m + marker.place_m
     return ring
 
 
-def _centres(marker: Marker) -> np.ndarray:
+def _centres(marker: Marker) -> NDArray[np.float64]:
     return np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]]) * marker.size_m + marker.place_m
 
 
-def _closed(ring: np.ndarray) -> np.ndarray:
+def _closed(ring: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.vstack((ring, ring[:1]))
 
 
-def _triangles() -> np.ndarray:
-    """Of the points: lower ring, upper ring, the two centres; seen from outside."""
+def _triangles() -> NDArray[np.int64]:
+    """Return vertex indices of the triangles, shape (n, 3), seen from outside.
+
+    Vertices are the lower ring, the upper ring and the two centres.
+    """
     here = np.arange(_SIDES)
     after = (here + 1) % _SIDES
     bottom, top = np.full(_SIDES, 2 * _SIDES), np.full(_SIDES, 2 * _SIDES + 1)

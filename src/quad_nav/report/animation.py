@@ -89,7 +89,7 @@ class _View:
     ``times_s`` float64[f]: of the frames.
     """
 
-    def __init__(self, trace: FlightTrace):
+    def __init__(self, trace: FlightTrace) -> None:
         self._trace = trace
         self._tracks = tracks(trace)
         self._speed = _speed(self._tracks)
@@ -135,7 +135,7 @@ class _View:
 class _MovingRobot:
     """Hull, nose, trail, number and goal in flight of one quadcopter."""
 
-    def __init__(self, axes: Axes, number: int, trace: FlightTrace):
+    def __init__(self, axes: Axes, number: int, trace: FlightTrace) -> None:
         self._number, self._radius_m = number, trace.robot_radius_m
         self._goals = trace.robots[number].goals
         ink = colour(number)

@@ -29,7 +29,7 @@ class BarnCourse:
 
     ends_at_contact = True
 
-    def __init__(self, options: BarnOptions):
+    def __init__(self, options: BarnOptions) -> None:
         self.options = options
         setup = read_barn_setup(options)
         self.warnings: List[str] = list(setup.warnings)

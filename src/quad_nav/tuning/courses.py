@@ -73,7 +73,7 @@ class MissionCourse:
 
     ends_at_contact = False
 
-    def __init__(self, options: MissionOptions):
+    def __init__(self, options: MissionOptions) -> None:
         self.options = options
         self._missions = (*options.missions, *options.held_out)
 

@@ -79,7 +79,7 @@ class Evaluation:
         journal: FlightCache,
         watcher: Watcher,
         context: Optional[Mapping[str, Any]] = None,
-    ):
+    ) -> None:
         self.course = course
         self.space = space
         self.watcher = watcher

@@ -26,7 +26,7 @@ _TABLE = (
 class FlightCache:
     """``path`` None keeps flights for as long as the object lives."""
 
-    def __init__(self, path: Optional[Path] = None):
+    def __init__(self, path: Optional[Path] = None) -> None:
         self._path = path
         self._flights: Dict[Key, FlightResult] = {}
         if path is not None:

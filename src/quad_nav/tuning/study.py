@@ -32,7 +32,7 @@ _IDENTITY = "identity"
 class TuneStudy:
     """Trials and flights. Open it with ``open_study``."""
 
-    def __init__(self, study: optuna.Study, journal: FlightCache):
+    def __init__(self, study: optuna.Study, journal: FlightCache) -> None:
         self._study = study
         self.journal = journal
 
