@@ -10,13 +10,13 @@ from quad_nav.errors import InputError
 from quad_nav.mission.goal_file import (
     KEYS,
     SETTINGS,
-    WatchedGoalFile,
     clearance_check,
     load_goals,
     parse_goals,
     read_settings,
 )
 from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
+from quad_nav.mission.robot_goals import WatchedGoalFile
 
 GOALS = Path(__file__).parents[2] / "goals"
 
@@ -131,8 +131,8 @@ def test_a_byte_order_mark_is_no_fault():
         (
             '{"goals": [[1, 2], [1, 2.8]], "loop": true}',
             (
-                "f.json: loop: has nowhere to go; expected two goals more than twice the goal_tolerance "
-                "apart (0.8 m)"
+                "f.json: loop: all goals are reached at one position; expected two goals more "
+                "than twice the goal_tolerance apart (0.8 m)"
             ),
         ),
     ],
@@ -152,7 +152,7 @@ def test_all_faults_are_listed_at_once():
         "f.json: goals[0] (goal 1): y is null; expected a finite number of metres",
         (
             "f.json: goals[1] (goal 2): (5, 5) is inside an obstacle; "
-            "expected 0.30 m of room around it"
+            "expected 0.30 m of free space around it"
         ),
         (
             "f.json: goals[3] (goal 4): (11, 2) is outside the arena; "

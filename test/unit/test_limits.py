@@ -26,10 +26,10 @@ TABLE = (Path(__file__).parents[2] / "docs" / "limits.md").read_text(encoding="u
 ROWS = {
     "messages about one file": [errors.MOST_PROBLEMS],
     "goal file": [
-        goal_file.MOST_BYTES,
-        goal_file.MOST_GOALS,
-        goal_file.LONGEST_M,
-        goal_file.LONGEST_S,
+        goal_file.MAX_BYTES,
+        goal_file.MAX_GOALS,
+        goal_file.MAX_COORDINATE_M,
+        goal_file.MAX_TIMEOUT_S,
     ],
     "YAML: scenes, maps, parameters": [
         plain_yaml.MOST_BYTES,

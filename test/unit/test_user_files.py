@@ -12,13 +12,8 @@ from quad_nav.config.files import load_files
 from quad_nav.errors import MOST_PROBLEMS, InputError
 from quad_nav.files.user_files import named_in, open_file, read_bytes, read_text
 from quad_nav.geometry import Pose3D
-from quad_nav.mission.goal_file import (
-    MOST_BYTES,
-    MOST_GOALS,
-    WatchedGoalFile,
-    load_goals,
-    parse_goals,
-)
+from quad_nav.mission.goal_file import MAX_BYTES, MAX_GOALS, load_goals, parse_goals
+from quad_nav.mission.robot_goals import WatchedGoalFile
 from quad_nav.recording import bag_trace, messages
 from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.record_file import create
@@ -94,12 +89,12 @@ def test_names_that_no_file_can_have():
 
 
 def test_goal_files_have_limits():
-    goals = "[1, 2]," * MOST_GOALS
-    assert len(parse_goals(f'{{"goals": [{goals[:-1]}]}}', "f").goals) == MOST_GOALS
+    goals = "[1, 2]," * MAX_GOALS
+    assert len(parse_goals(f'{{"goals": [{goals[:-1]}]}}', "f").goals) == MAX_GOALS
     assert refusal(parse_goals, f'{{"goals": [{goals}[1, 2]]}}', "f") == (
-        f"f: goals: are {MOST_GOALS + 1}; expected {MOST_GOALS} at most"
+        f"f: goals: are {MAX_GOALS + 1}; expected {MAX_GOALS} at most"
     )
-    assert "bytes; expected" in refusal(parse_goals, " " * (MOST_BYTES + 1), "f")
+    assert "bytes; expected" in refusal(parse_goals, " " * (MAX_BYTES + 1), "f")
     assert "x is 1e+07; expected 1e+06 metres at most" in refusal(
         parse_goals, '{"goals": [[1e7, 1]]}', "f"
     )

@@ -1,8 +1,8 @@
 """Goal files: ``{"goals": [[x, y], [x, y, yaw], ...]}``, metres and radians in ``map``.
 
-A file is refused as a whole and every fault in it is listed at once, each as
-``file: place: what is wrong; what was expected``. ``goals/schema.json`` says
-the same to an editor, ``docs/goals.md`` to a person.
+A file with a fault is refused as a whole. The error lists every fault as ``file: place: what is
+wrong; what was expected``. ``goals/schema.json`` describes the format for editors,
+``docs/goals.md`` for people.
 """
 
 from __future__ import annotations
@@ -20,42 +20,44 @@ from quad_nav.errors import InputError
 from quad_nav.files.user_files import read_bytes
 from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, Goal, GoalSequence, SequenceSettings
 
-MOST_BYTES = 4 * 1024 * 1024
-MOST_GOALS = 10_000
-LONGEST_M = 1e6
-"""No goal is farther away along an axis, and no tolerance larger."""
-LONGEST_S = 1e9
+MAX_BYTES = 4 * 1024 * 1024
+MAX_GOALS = 10_000
+MAX_COORDINATE_M = 1e6
+"""Largest coordinate of a goal, and largest tolerance."""
+MAX_TIMEOUT_S = 1e9
 
-# Says what is wrong with a place and what was expected, or None where a robot may be.
 PlaceCheck = Callable[[float, float], Optional[str]]
+"""Returns what is wrong with a position (x, y) in ``map``, or None if a robot fits there."""
 
 
 class _Setting(NamedTuple):
+    """Field of ``SequenceSettings``, test for a value, and phrase for messages."""
+
     field: str
     accepts: Callable[[Any], bool]
     expected: str
 
 
 def _is_number(value: Any) -> bool:
-    # bool is a subclass of int, and true is not a number of metres.
+    # bool is a subclass of int, but true is not a number of metres.
     return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 SETTINGS: Dict[str, _Setting] = {
     "goal_tolerance": _Setting(
         "goal_tolerance_m",
-        lambda v: _is_number(v) and 0 < v <= LONGEST_M,
-        f"a number of metres above 0, {LONGEST_M:g} at most",
+        lambda v: _is_number(v) and 0 < v <= MAX_COORDINATE_M,
+        f"a number of metres above 0, {MAX_COORDINATE_M:g} at most",
     ),
     "goal_timeout": _Setting(
         "goal_timeout_s",
-        lambda v: _is_number(v) and 0 < v <= LONGEST_S,
-        f"a number of seconds above 0, {LONGEST_S:g} at most",
+        lambda v: _is_number(v) and 0 < v <= MAX_TIMEOUT_S,
+        f"a number of seconds above 0, {MAX_TIMEOUT_S:g} at most",
     ),
     "retries": _Setting(
         "retries",
-        lambda v: _is_number(v) and 0 <= v <= MOST_GOALS and v == int(v),
-        f"a whole number, 0 to {MOST_GOALS}",
+        lambda v: _is_number(v) and 0 <= v <= MAX_GOALS and v == int(v),
+        f"a whole number, 0 to {MAX_GOALS}",
     ),
     "loop": _Setting("loop", lambda v: isinstance(v, bool), "true or false"),
 }
@@ -67,8 +69,17 @@ def load_goals(
     check_place: Optional[PlaceCheck] = None,
     defaults: SequenceSettings = DEFAULT_SETTINGS,
 ) -> GoalSequence:
-    """The sequence in a goal file; raises InputError with every fault in it."""
-    return parse_goals(read_bytes(Path(path), MOST_BYTES), str(path), check_place, defaults)
+    """Read a goal file.
+
+    Args:
+        path: The file.
+        check_place: Check for the positions of goals.
+        defaults: Settings that the file does not give.
+
+    Raises:
+        InputError: The file cannot be read, or has faults; lists all of them.
+    """
+    return parse_goals(read_bytes(Path(path), MAX_BYTES), str(path), check_place, defaults)
 
 
 def parse_goals(
@@ -77,9 +88,16 @@ def parse_goals(
     check_place: Optional[PlaceCheck] = None,
     defaults: SequenceSettings = DEFAULT_SETTINGS,
 ) -> GoalSequence:
-    """The sequence in a goal file's content; ``name`` stands for the file in messages.
+    """Parse the content of a goal file.
 
-    ``defaults`` are the settings that the file does not give itself.
+    Args:
+        content: The content, UTF-8 if bytes.
+        name: Name of the file, for messages.
+        check_place: Check for the positions of goals.
+        defaults: Settings that the content does not give.
+
+    Raises:
+        InputError: The content has faults; lists all of them.
     """
     tree, problems = _decode(content, name)
     if not isinstance(tree, dict):
@@ -101,7 +119,7 @@ def parse_goals(
 def read_settings(
     values: Mapping[str, Any], name: str, defaults: SequenceSettings = DEFAULT_SETTINGS
 ) -> Tuple[SequenceSettings, List[str]]:
-    """Settings by their names in a goal file, and what is wrong with them."""
+    """Return the settings with these names in a goal file, and the faults in their values."""
     problems = [
         f"{name}: {key}: is {_show(value)}; expected {SETTINGS[key].expected}"
         for key, value in values.items()
@@ -121,9 +139,13 @@ def clearance_check(
     robot_radius_m: float,
     arena: str = "the arena",
 ) -> PlaceCheck:
-    """Places in the arena and no nearer to anything than the robot's radius.
+    """Make a check for positions in the arena at least a robot's radius from everything.
 
-    ``clearance_m(x, y)`` is the distance to the nearest surface, negative inside.
+    Args:
+        contains: Test for a position (x, y) in the arena.
+        clearance_m: Distance from a position (x, y) to the nearest surface, negative inside.
+        robot_radius_m: The robot's radius.
+        arena: Description of the arena, for messages.
     """
 
     def check(x_m: float, y_m: float) -> Optional[str]:
@@ -131,7 +153,7 @@ def clearance_check(
             return f"is outside the arena; expected a place in {arena}"
         clearance = clearance_m(x_m, y_m)
         if clearance <= 0.0:
-            return f"is inside an obstacle; expected {robot_radius_m:.2f} m of room around it"
+            return f"is inside an obstacle; expected {robot_radius_m:.2f} m of free space around it"
         if clearance < robot_radius_m:
             return (
                 f"is {clearance:.2f} m from an obstacle or a wall; "
@@ -142,50 +164,8 @@ def clearance_check(
     return check
 
 
-class WatchedGoalFile:
-    """A goal file that a person may edit while the mission flies."""
-
-    def __init__(
-        self,
-        path: Union[str, Path],
-        check_place: Optional[PlaceCheck] = None,
-        defaults: SequenceSettings = DEFAULT_SETTINGS,
-    ):
-        self.path = Path(path)
-        self._check_place = check_place
-        self._defaults = defaults
-        self._judged: Optional[bytes] = None
-        self._seen: Optional[bytes] = None
-
-    def load(self) -> GoalSequence:
-        """The sequence now; later polls compare with this content."""
-        self._judged = self._seen = self._content()
-        return load_goals(self.path, self._check_place, self._defaults)
-
-    def poll(self) -> Optional[GoalSequence]:
-        """The new sequence when the file has changed, else None.
-
-        New content is taken when two polls have seen the same, so that a file
-        is not read while an editor is half through writing it. A bad edit
-        raises InputError once.
-        """
-        content = self._content()
-        settled, self._seen = content == self._seen, content
-        if not settled or content == self._judged:
-            return None
-        self._judged = content
-        return load_goals(self.path, self._check_place, self._defaults)
-
-    def _content(self) -> Optional[bytes]:
-        # A file that is gone for good is a changed content like any other: load_goals says so.
-        try:
-            return read_bytes(self.path, MOST_BYTES)
-        except InputError:
-            return None
-
-
 def _decode(content: Union[bytes, str], name: str) -> Tuple[Any, List[str]]:
-    """The JSON tree with every number a float, and the keys that come twice."""
+    """Decode JSON with every number a float; also return a fault for each repeated key."""
     problems: List[str] = []
 
     def unique(pairs: Iterable[Tuple[str, Any]]) -> Dict[str, Any]:
@@ -196,18 +176,18 @@ def _decode(content: Union[bytes, str], name: str) -> Tuple[Any, List[str]]:
             tree[key] = value
         return tree
 
-    if len(content) > MOST_BYTES:
-        raise InputError([f"{name}: has {len(content)} bytes; expected {MOST_BYTES} at most"])
+    if len(content) > MAX_BYTES:
+        raise InputError([f"{name}: has {len(content)} bytes; expected {MAX_BYTES} at most"])
     try:
         text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
     except UnicodeDecodeError as error:
         raise InputError(
             [f"{name}: byte {error.start} is not UTF-8; expected a JSON text"]
         ) from error
-    # The tutorial prints its goal files without the braces around them.
+    # The tutorial prints its goal files without the outer braces.
     bare = text.lstrip().startswith('"goals"')
     try:
-        # parse_int=float: a whole number with a thousand digits becomes infinity, as 1e999 does.
+        # parse_int=float: an integer with a thousand digits becomes infinity, as 1e999 does.
         return json.loads(
             "{" + text + "}" if bare else text, object_pairs_hook=unique, parse_int=float
         ), problems
@@ -231,8 +211,8 @@ def _read_goals(
         return [], [f"{name}: goals: is {_kind(entries)}; expected a list [[x, y], ...]"]
     if not entries:
         return [], [f"{name}: goals: is empty; expected at least one goal [x, y]"]
-    if len(entries) > MOST_GOALS:
-        return [], [f"{name}: goals: are {len(entries)}; expected {MOST_GOALS} at most"]
+    if len(entries) > MAX_GOALS:
+        return [], [f"{name}: goals: are {len(entries)}; expected {MAX_GOALS} at most"]
     goals: List[Goal] = []
     problems: List[str] = []
     for index, entry in enumerate(entries):
@@ -256,8 +236,8 @@ def _goal_faults(entry: Any) -> Iterable[str]:
     for label, unit, value in zip(("x", "y", "yaw"), ("metres", "metres", "radians"), entry):
         if not _is_number(value):
             yield f": {label} is {_show(value)}; expected a finite number of {unit}"
-        elif label != "yaw" and abs(value) > LONGEST_M:
-            yield f": {label} is {value:g}; expected {LONGEST_M:g} metres at most"
+        elif label != "yaw" and abs(value) > MAX_COORDINATE_M:
+            yield f": {label} is {value:g}; expected {MAX_COORDINATE_M:g} metres at most"
         elif label == "yaw" and abs(value) > 2 * math.pi:
             yield (
                 f": yaw is {value:g}; expected radians between -2 pi and 2 pi "
@@ -266,12 +246,12 @@ def _goal_faults(entry: Any) -> Iterable[str]:
 
 
 def _loop_faults(goals: List[Goal], tolerance_m: float, name: str) -> List[str]:
-    """Goals that one place can reach all at once would be flown round endlessly on the spot."""
+    """Refuse a loop whose goals are all reached at one position: it would never end there."""
     places = np.array([(goal.x_m, goal.y_m) for goal in goals])
     if any(np.hypot(*(places - place).T).max() > 2 * tolerance_m for place in places):
         return []
     expected = f"two goals more than twice the goal_tolerance apart ({2 * tolerance_m:g} m)"
-    return [f"{name}: loop: has nowhere to go; expected {expected}"]
+    return [f"{name}: loop: all goals are reached at one position; expected {expected}"]
 
 
 def _unknown_key(name: str, key: str) -> str:
@@ -289,6 +269,6 @@ def _kind(value: Any) -> str:
 
 
 def _show(value: Any) -> str:
-    """A value as the file has it, shortened."""
+    """Return a value as the file shows it, shortened."""
     text = f"{value:g}" if isinstance(value, float) and math.isfinite(value) else json.dumps(value)
     return text if len(text) <= 40 else text[:37] + "..."

@@ -1,20 +1,69 @@
-"""The goal files of all quadcopters of a mission."""
+"""Goal files of all robots of a mission, and edits of them during the mission."""
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple, Union
 
 from quad_nav.errors import InputError
-from quad_nav.mission.goal_file import PlaceCheck, WatchedGoalFile
+from quad_nav.files.user_files import read_bytes
+from quad_nav.mission.goal_file import MAX_BYTES, PlaceCheck, load_goals
 from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, GoalSequence, SequenceSettings
+
+
+class WatchedGoalFile:
+    """Goal file that a person may edit during the mission."""
+
+    def __init__(
+        self,
+        path: Union[str, Path],
+        check_place: Optional[PlaceCheck] = None,
+        defaults: SequenceSettings = DEFAULT_SETTINGS,
+    ):
+        self.path = Path(path)
+        self._check_place = check_place
+        self._defaults = defaults
+        self._checked: Optional[bytes] = None
+        self._seen: Optional[bytes] = None
+
+    def load(self) -> GoalSequence:
+        """Read the file; later polls compare with this content.
+
+        Raises:
+            InputError: The file cannot be read, or has faults; lists all of them.
+        """
+        self._checked = self._seen = self._content()
+        return load_goals(self.path, self._check_place, self._defaults)
+
+    def poll(self) -> Optional[GoalSequence]:
+        """Return the new sequence if the file has changed, else None.
+
+        A change counts when two polls have read the same content, so that a file is not read
+        while an editor is writing it.
+
+        Raises:
+            InputError: The new content has faults. Raised once for each change.
+        """
+        content = self._content()
+        is_stable, self._seen = content == self._seen, content
+        if not is_stable or content == self._checked:
+            return None
+        self._checked = content
+        return load_goals(self.path, self._check_place, self._defaults)
+
+    def _content(self) -> Optional[bytes]:
+        # A missing file counts as a change; load_goals raises the error.
+        try:
+            return read_bytes(self.path, MAX_BYTES)
+        except InputError:
+            return None
 
 
 @dataclass(frozen=True)
 class RobotGoals:
-    """One quadcopter's name, its goal file and what that said at the start."""
+    """A robot's name, its goal file and the goals in it at the start."""
 
     name: str
     file: WatchedGoalFile
@@ -22,21 +71,21 @@ class RobotGoals:
 
 
 def goal_paths(folder: Path, robots: int) -> Tuple[List[Path], List[str]]:
-    """``quad0_goals.json`` and so on as far as they are there, and what is missing."""
+    """Return the existing ones of ``quad0_goals.json`` and so on, and a fault for those missing."""
     if not folder.is_dir():
         return [], [
-            f"goals: there is no folder {folder}; expected one with quad0_goals.json and so on"
+            f"goals: folder {folder} does not exist; expected one with quad0_goals.json and so on"
         ]
     paths = [folder / f"quad{index}_goals.json" for index in range(robots)]
     missing = [path.name for path in paths if not path.exists()]
     if not missing:
         return paths, []
-    there = sorted(path.name for path in folder.glob("*.json")) or ["no JSON file"]
+    present = sorted(path.name for path in folder.glob("*.json")) or ["no JSON file"]
     return (
         [path for path in paths if path.exists()],
         [
             f"{folder}: has no {_listed(missing)}; expected a goal file for each of {robots} "
-            f"robots; there is {_listed(there)}"
+            f"robots; the folder has {_listed(present)}"
         ],
     )
 
@@ -46,7 +95,11 @@ def load_robot_goals(
     check_place: Optional[PlaceCheck] = None,
     settings: SequenceSettings = DEFAULT_SETTINGS,
 ) -> Tuple[List[RobotGoals], List[str]]:
-    """Every quadcopter's goals that can be read, and every fault in the other files."""
+    """Read the goal files of robots 0, 1, ...
+
+    Returns:
+        The goals of each readable file, and all faults in the other files.
+    """
     robots: List[RobotGoals] = []
     problems: List[str] = []
     for index, path in enumerate(paths):
@@ -58,16 +111,16 @@ def load_robot_goals(
     return robots, problems
 
 
-def close_ends(robots: Sequence[RobotGoals], radius_m: float) -> List[str]:
-    """Warnings about quadcopters that stay at their last goals and would touch there."""
+def last_goal_conflicts(robots: Sequence[RobotGoals], radius_m: float) -> List[str]:
+    """Return a warning for each pair of robots whose last goals are too close to stay at both."""
     staying = [robot for robot in robots if robot.sequence.settings.loop is False]
     warnings = []
     for a, b in itertools.combinations(staying, 2):
         distance_m = a.sequence.goals[-1].pose.distance_to(b.sequence.goals[-1].pose)
         if distance_m < 2 * radius_m:
             warnings.append(
-                f"the last goals of {a.name} and {b.name} are {distance_m:.2f} m apart: "
-                f"they would touch there (two radii are {2 * radius_m:.2f} m)"
+                f"{a.name}, {b.name}: their last goals are {distance_m:.2f} m apart, so the robots "
+                f"would collide there; expected at least two radii, {2 * radius_m:.2f} m"
             )
     return warnings
 

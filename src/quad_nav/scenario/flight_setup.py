@@ -16,7 +16,12 @@ from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
-from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
+from quad_nav.mission.robot_goals import (
+    RobotGoals,
+    goal_paths,
+    last_goal_conflicts,
+    load_robot_goals,
+)
 from quad_nav.scenario.random_mission import random_mission
 from quad_nav.scenario.scene_check import scene_check
 from quad_nav.sim.scene import Scene
@@ -109,7 +114,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         round(STEPS_PER_S / options.scans_per_s),
         options.seed,
         options.time_limit_s,
-        warnings=(*scene.remarks, *close_ends(robots, radius_m), *warnings),
+        warnings=(*scene.remarks, *last_goal_conflicts(robots, radius_m), *warnings),
     )
 
 

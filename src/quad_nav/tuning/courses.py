@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
-from quad_nav.mission.goal_file import WatchedGoalFile
+from quad_nav.mission.robot_goals import WatchedGoalFile
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, config_folder, read_setup
 from quad_nav.sim.simulation import SimulationParams
 from quad_nav.tuning.space import Assignments, costmap_paths

@@ -23,7 +23,12 @@ from quad_nav.errors import InputError
 from quad_nav.mission.distances import SurfaceDistance
 from quad_nav.mission.goal_file import SETTINGS, PlaceCheck, read_settings
 from quad_nav.mission.goal_sequence import SequenceSettings
-from quad_nav.mission.robot_goals import RobotGoals, close_ends, goal_paths, load_robot_goals
+from quad_nav.mission.robot_goals import (
+    RobotGoals,
+    goal_paths,
+    last_goal_conflicts,
+    load_robot_goals,
+)
 from quad_nav.scenario.costmap_cover import uncovered
 from quad_nav.scenario.fleet_setup import (
     MISSION_RULES,
@@ -126,7 +131,7 @@ def read_setup(
         values["exit_when_done"],
         (
             *_unknown(parameters, name),
-            *close_ends(robots, radius_m),
+            *last_goal_conflicts(robots, radius_m),
             *(uncovered(scene, navigators) if scene else []),
         ),
         _journal_path(values),
