@@ -37,20 +37,20 @@ class SenseFault(FlightObserver):
 
     def on_start(self, flight: Flight) -> None:
         self._pilot, self._configuration = flight.offline_robots[0], flight.robots[0].configuration
-        self._see, self._navigate = self._pilot.see, self._pilot.navigate
-        self._pilot.see, self._pilot.navigate = self.see, self.navigate
+        self._add_scan, self._navigate = self._pilot.add_scan, self._pilot.navigate
+        self._pilot.add_scan, self._pilot.navigate = self.add_scan, self.navigate
 
     def is_on(self, now_s: float) -> bool:
         return self.begin_s <= now_s < self.end_s
 
-    def see(self, scan, map_from_lidar, now_s):
+    def add_scan(self, scan, map_from_lidar, now_s):
         seen = (
             self.scanned_as(scan, map_from_lidar)
             if self.is_on(now_s)
             else (self.not_scanned_as(scan, map_from_lidar))
         )
         if seen is not None:
-            self._see(*seen, now_s)
+            self._add_scan(*seen, now_s)
 
     def navigate(self, now_s, state, peers):
         if not self.is_on(now_s):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Dict, List, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav import footprint as footprints
 from quad_nav.costmap.cost_grid import Bounds, CostGrid, Window, merge_known, merge_maximum
@@ -80,49 +81,73 @@ class ObstacleLayer(GridLayer):
         now_s: float,
         global_from_origin: Optional[Pose3D] = None,
     ) -> None:
-        """Take a scan; ``now_s`` is when it arrived.
-
-        ``global_from_sensor`` is the pose of the scan's frame at its stamp. Rays start at
-        ``global_from_origin``, which differs only if the source names a ``sensor_frame``
-        other than the scan's.
-        """
-        points = scan_points(scan, self.buffers[source_name].params.inf_is_valid)
-        self.add_cloud(
-            source_name, points, global_from_sensor, scan.stamp_s, now_s, global_from_origin
-        )
+        """Take a scan that arrived at ``now_s``; the other arguments as ``observe_scan``."""
+        observation = self.observe_scan(source_name, scan, global_from_sensor, global_from_origin)
+        self.add_observation(source_name, observation, now_s)
 
     def add_cloud(
         self,
         source_name: str,
-        points: np.ndarray,
+        points: NDArray[np.float32],
         global_from_sensor: Pose3D,
         stamp_s: float,
         now_s: float,
         global_from_origin: Optional[Pose3D] = None,
     ) -> None:
-        """Take points, float32[n, 3] in the sensor's frame; the rest as ``add_scan``.
+        """Take points that arrived at ``now_s``; the other arguments as ``observe_cloud``."""
+        observation = self.observe_cloud(
+            source_name, points, global_from_sensor, stamp_s, global_from_origin
+        )
+        self.add_observation(source_name, observation, now_s)
 
-        Only points within the source's heights count, for marking and for clearing.
+    def add_observation(self, source_name: str, observation: Observation, now_s: float) -> None:
+        """Take an observation that arrived at ``now_s``, perhaps shared with other layers."""
+        self.buffers[source_name].add(observation, now_s)
+
+    def observe_scan(
+        self,
+        source_name: str,
+        scan: Scan,
+        global_from_sensor: Pose3D,
+        global_from_origin: Optional[Pose3D] = None,
+    ) -> Observation:
+        """Project a scan into the global frame.
+
+        Args:
+            source_name: Name of the observation source.
+            scan: The scan.
+            global_from_sensor: Pose of the scan's frame at its stamp.
+            global_from_origin: Pose where rays start, if the source names a ``sensor_frame``
+                other than the scan's.
+
+        Returns:
+            The points within the source's heights, for marking and for clearing.
         """
-        _, low_m, high_m = self.way_of_seeing(source_name)
+        points = scan_points(scan, self.buffers[source_name].params.inf_is_valid)
+        return self.observe_cloud(
+            source_name, points, global_from_sensor, scan.stamp_s, global_from_origin
+        )
+
+    def observe_cloud(
+        self,
+        source_name: str,
+        points: NDArray[np.float32],
+        global_from_sensor: Pose3D,
+        stamp_s: float,
+        global_from_origin: Optional[Pose3D] = None,
+    ) -> Observation:
+        """Transform points, float32[n, 3] in the sensor's frame; see ``observe_scan``."""
+        _, low_m, high_m = self.projection_key(source_name)
         points = transform_points(points, global_from_sensor, low_m, high_m)
         if len(self.left_out):
             points = outside_circles(points, self.left_out)
         origin = global_from_origin or global_from_sensor
-        self.add_observation(source_name, Observation(stamp_s, origin.translation, points), now_s)
+        return Observation(stamp_s, origin.translation, points)
 
-    def add_observation(self, source_name: str, observation: Observation, now_s: float) -> None:
-        """Take what another layer has made of the same message, see ``way_of_seeing``."""
-        self.buffers[source_name].add(observation, now_s)
+    def projection_key(self, source_name: str) -> Tuple[bool, float, float]:
+        """Return what decides a projection besides poses and circles left out.
 
-    def newest(self, source_name: str) -> Observation:
-        """The observation that was added last."""
-        return self.buffers[source_name].observations[0]
-
-    def way_of_seeing(self, source_name: str) -> Tuple[bool, float, float]:
-        """Layers and sources that are equal in this make equal observations of a message.
-
-        That is to say in one frame, and if they leave out the same circles.
+        Layers and sources with equal keys, poses and circles make equal observations.
         """
         source = self.buffers[source_name].params
         return (source.inf_is_valid, source.min_obstacle_height_m, source.max_obstacle_height_m)

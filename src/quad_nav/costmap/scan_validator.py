@@ -1,14 +1,14 @@
-"""Whether a scan tells what is around the robot now, or a broken LIDAR's tale.
+"""Reject scans that no working LIDAR can have taken.
 
-A scan that is not believed counts as none: the sensor is silent, and silence stops the
-robot. What is not believed is what cannot be:
+A rejected scan counts as none: a sensor without valid scans counts as silent, and the
+navigator stops the robot. The validator rejects
 
-* a scan that is as old as the sensor may be silent when it comes;
-* one without a single beam that says anything: all of them are NaN or below the least range;
-* one equal to the bit to one that was taken elsewhere: the LIDAR repeats itself;
-* one in which a quarter of all beams have lost what they had met nearer than half the
-  LIDAR's range, though the robot has hardly moved: a wall does not vanish. What leaves a
-  smaller field of view in a turn may be missing.
+* a late scan: it is as old as the sensor may be silent;
+* an empty scan: every beam is NaN or below the minimum range;
+* a repeated scan: equal to the bit to one that was taken elsewhere;
+* a scan in which a quarter of all beams lost the return that they had nearer than half of the
+  LIDAR's range, although the robot has hardly moved. Returns that a turn takes out of a field
+  of view below 360 degrees are not counted.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from dataclasses import dataclass
 from typing import Iterable, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.costmap.observation import SourceParams
 from quad_nav.geometry import Pose2D, Pose3D, Scan, angle_difference
 from quad_nav.kernels.projection import count_returns
 
 _ELSEWHERE_M, _ELSEWHERE_RAD = 0.05, 0.05
-# A step of the pose from one scan to the next that is no flight but a correction.
+# A larger step of the pose from one scan to the next is a correction of the localisation.
 _CORRECTION_M, _CORRECTION_RAD = 0.25, 0.3
 _LOST_SHARE = 0.25
 _HARDLY_MOVED_M = 2.0
@@ -33,31 +34,42 @@ _ALL_AROUND_RAD = 2.0 * math.pi * 0.98
 
 @dataclass(frozen=True)
 class ScanValidatorParams:
-    """Parameters of the scan validation."""
+    """Parameters of the scan validation.
+
+    Attributes:
+        reject_implausible_scans: Reject them; upstream move_base takes every scan.
+    """
 
     reject_implausible_scans: bool = True
 
 
 class ScanValidator:
-    """Looks at the scans of one sensor, one after the other.
+    """Judge the scans of one sensor, one after the other.
 
-    ``sources`` are those of the layers that take them: how old a scan may be is how long the
-    strictest lets it be silent.
+    Attributes:
+        expected_period_s: Shortest ``expected_update_period_s`` of the sources that set one,
+            else 0. A scan of this age is late; with 0 none is.
     """
 
     def __init__(self, sources: Iterable[SourceParams]):
         periods_s = [source.expected_update_period_s for source in sources]
-        self._timeout_s = min((one for one in periods_s if one > 0.0), default=0.0)
-        self.restart()
+        self.expected_period_s = min((one for one in periods_s if one > 0.0), default=0.0)
+        self.reset()
 
-    def restart(self) -> None:
-        """Forget what was seen: for a clock that has jumped."""
-        self._last: Optional[Tuple[bytes, Pose2D]] = None  # where such a scan was first taken
-        self._before: Optional[Pose2D] = None
-        self._good: Optional[Tuple[Pose2D, int, int]] = None  # pose, beams, near returns
+    def reset(self) -> None:
+        """Forget earlier scans, after the clock has jumped."""
+        self._first_equal: Optional[Tuple[bytes, Pose2D]] = None  # content, pose of the first
+        self._previous_pose: Optional[Pose2D] = None
+        self._accepted: Optional[Tuple[Pose2D, int, int]] = None  # pose, beams, near returns
 
-    def why_not(self, scan: Scan, global_from_sensor: Pose3D, now_s: float) -> str:
-        """Why a scan that came now is not to be believed; "" when it is."""
+    def rejection_reason(self, scan: Scan, global_from_sensor: Pose3D, now_s: float) -> str:
+        """Return the reason to reject a scan that arrives now, "" to accept it.
+
+        Args:
+            scan: The scan.
+            global_from_sensor: Pose of the LIDAR at the scan's stamp.
+            now_s: Current time.
+        """
         here = global_from_sensor.to_2d()
         ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
         returns, near = count_returns(
@@ -67,40 +79,43 @@ class ScanValidator:
             np.float32(0.5 * scan.range_max_m),
         )
         reason = (
-            self._why_late(scan, now_s)
-            or _why_empty(ranges, returns)
-            or self._why_repeated(ranges, here, returns)
-            or self._why_lost(scan, here, returns)
+            self._late(scan, now_s)
+            or _empty(ranges, returns)
+            or self._repeated(ranges, here, returns)
+            or self._lost_returns(scan, here, returns)
         )
         if not reason:
-            self._good = here, len(ranges), near
+            self._accepted = here, len(ranges), near
         return reason
 
-    def _why_late(self, scan: Scan, now_s: float) -> str:
-        late_s = now_s - scan.stamp_s
-        return f"it is {late_s:.2f} s old" if 0.0 < self._timeout_s <= late_s else ""
-
-    def _why_repeated(self, ranges: np.ndarray, here: Pose2D, returns: int) -> str:
-        content, before, self._before = ranges.tobytes(), self._before, here
-        if (
-            self._last is None
-            or self._last[0] != content
-            or (before is not None and _differ(here, before, _CORRECTION_M, _CORRECTION_RAD))
-        ):
-            self._last = content, here
-        first = self._last[1]
-        if returns and _differ(here, first, _ELSEWHERE_M, _ELSEWHERE_RAD):
-            return (
-                f"it is the very one that was taken {here.distance_to(first):.2f} m and "
-                f"{abs(angle_difference(here.yaw_rad, first.yaw_rad)):.2f} rad from here"
-            )
-        return ""
-
-    def _why_lost(self, scan: Scan, here: Pose2D, returns: int) -> str:
-        beams = len(scan.ranges_m)
-        if self._good is None or self._good[1] != beams:
+    def _late(self, scan: Scan, now_s: float) -> str:
+        age_s, limit_s = now_s - scan.stamp_s, self.expected_period_s
+        if not 0.0 < limit_s <= age_s:
             return ""
-        there, _, near = self._good
+        return f"it is {age_s:.2f} s old, expected less than {limit_s:.2f} s"
+
+    def _repeated(self, ranges: NDArray[np.float32], here: Pose2D, returns: int) -> str:
+        content, previous, self._previous_pose = ranges.tobytes(), self._previous_pose, here
+        if (
+            self._first_equal is None
+            or self._first_equal[0] != content
+            or (previous is not None and _differ(here, previous, _CORRECTION_M, _CORRECTION_RAD))
+        ):
+            self._first_equal = content, here
+        first = self._first_equal[1]
+        if not returns or not _differ(here, first, _ELSEWHERE_M, _ELSEWHERE_RAD):
+            return ""
+        turn_rad = abs(angle_difference(here.yaw_rad, first.yaw_rad))
+        return (
+            f"it is identical to a scan taken {here.distance_to(first):.2f} m and "
+            f"{turn_rad:.2f} rad from here"
+        )
+
+    def _lost_returns(self, scan: Scan, here: Pose2D, returns: int) -> str:
+        beams = len(scan.ranges_m)
+        if self._accepted is None or self._accepted[1] != beams:
+            return ""
+        there, _, near = self._accepted
         if here.distance_to(there) > min(_HARDLY_MOVED_M, 0.25 * scan.range_max_m):
             return ""
         field_rad = beams * abs(scan.angle_increment_rad)
@@ -111,13 +126,13 @@ class ScanValidator:
         )
         if near - returns <= (_LOST_SHARE + may_leave) * beams:
             return ""
-        return f"{near - returns} of {beams} beams have lost what they met"
+        return f"{near - returns} of {beams} beams lost their return at once"
 
 
-def _why_empty(ranges: np.ndarray, returns: int) -> str:
+def _empty(ranges: NDArray[np.float32], returns: int) -> str:
     if returns or np.isposinf(ranges).any():
         return ""
-    return f"none of its {len(ranges)} beams says anything"
+    return f"none of its {len(ranges)} beams is valid"
 
 
 def _differ(a: Pose2D, b: Pose2D, by_m: float, by_rad: float) -> bool:

@@ -73,7 +73,7 @@ class NavigatorGroup:
         numbers = list(self.robots)
         for number, scan in zip(numbers, self._lidars.scan(states.bodies, numbers, now_s)):
             map_from_lidar = states[number].map_from_base.compose(base_from_lidar)
-            self.robots[number].see(scan, map_from_lidar, now_s)
+            self.robots[number].add_scan(scan, map_from_lidar, now_s)
             scans[number] = (scan, map_from_lidar)
         return scans
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Optional, Sequence, Tuple
 
 from quad_nav.config import Configuration
-from quad_nav.costmap.obstacle import ObstacleLayer
-from quad_nav.costmap.scan_validator import ScanValidator
+from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, sinks_of
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.peers.peer import Peer
@@ -20,34 +19,13 @@ class OfflineRobot:
     def __init__(self, configuration: Configuration, number: int):
         self.navigator = build_navigator(configuration, number)
         self.waiting_goal: Optional[Pose2D] = None
-        self._sinks = self._sorted_sinks()
-        self._rejects_scans = configuration.scan_validator.reject_implausible_scans
-        self._trust = ScanValidator(
-            layer.buffers[source].params
-            for sinks in self._sinks.values()
-            for layer, source in sinks
-        )
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        self._intake = ScanIntake(sinks_of(costmaps), configuration.scan_validator)
 
-    def _sorted_sinks(self) -> Dict[Tuple, List[Tuple[ObstacleLayer, str]]]:
-        """The layers and sources that take scans, by the way in which they see them."""
-        sinks: Dict[Tuple, List[Tuple[ObstacleLayer, str]]] = {}
-        for costmap in (self.navigator.global_costmap, self.navigator.local_costmap):
-            for layer in costmap.layers.values():
-                if isinstance(layer, ObstacleLayer):
-                    for source in layer.params.sources:
-                        way = layer.way_of_seeing(source.name)
-                        sinks.setdefault(way, []).append((layer, source.name))
-        return sinks
-
-    def see(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> None:
-        """Takes a scan that comes now, if it can be true."""
-        if self._rejects_scans and self._trust.why_not(scan, map_from_lidar, now_s):
-            return
-        for sinks in self._sinks.values():
-            layer, source = sinks[0]
-            layer.add_scan(source, scan, map_from_lidar, scan.stamp_s)
-            for other, other_source in sinks[1:]:
-                other.add_observation(other_source, layer.newest(source), scan.stamp_s)
+    def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> None:
+        """Hand a scan that arrives now to the costmaps, unless it is implausible."""
+        poses = [SensorPose(map_from_lidar, map_from_lidar)] * len(self._intake.sinks)
+        self._intake.add_scan(scan, poses, scan.stamp_s, now_s)
 
     def is_due(self, now_s: float) -> bool:
         """Whether the navigator has something to do; a goal that waits is set if it can be."""

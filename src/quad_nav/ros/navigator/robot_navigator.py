@@ -77,7 +77,9 @@ class RobotNavigator:
         }
         self._topics = PlanTopics(navigator, names)
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
-        self._sensors = sensors.connect(costmaps, names)
+        self._sensors = sensors.connect(
+            f"quad{self.number}", costmaps, configuration.scan_validator, names
+        )
         self._maps = static_maps.connect(costmaps, self._lock, names)
         self._reconfigure = serve_namespaces(self._name, configuration, self._on_reconfigure, names)
         self._services = PlanServices(
@@ -106,7 +108,7 @@ class RobotNavigator:
             [
                 InputMeter(self._odometry),
                 *(
-                    InputMeter(sensor.subscriber, sensor.expected_period_s)
+                    InputMeter(sensor.subscriber, sensor.intake.expected_period_s)
                     for sensor in self._sensors
                 ),
             ],
@@ -122,7 +124,7 @@ class RobotNavigator:
         """Discard messages and restart all schedules after a clock jump."""
         with self._lock:
             for sensor in self._sensors:
-                sensor.forget()
+                sensor.reset()
             self._odometry_s = None
             self._navigator.restart(now_s)
             self._goals.restart(now_s)
@@ -148,6 +150,8 @@ class RobotNavigator:
         with self._lock:
             configuration = config.updated(self._configuration, namespace, changes)
             apply_configuration(self._navigator, configuration)
+            for sensor in self._sensors:
+                sensor.intake.reconfigure(configuration.scan_validator)
             self._configuration = configuration
             return configuration
 
@@ -156,9 +160,7 @@ class RobotNavigator:
     def _step(self, now_s: float) -> None:
         navigator = self._navigator
         for sensor in self._sensors:
-            sensor.deliver(
-                self._transforms, self._configuration.scan_validator.reject_implausible_scans
-            )
+            sensor.deliver(self._transforms)
         self._goals.poll(navigator, now_s)
         self._peers.publish(self.number, navigator.intention, now_s)
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:

@@ -1,7 +1,7 @@
-"""Sensor topics into the costmaps' obstacle layers.
+"""Sensor topics of the costmaps' obstacle layers.
 
-A message waits until tf knows where its sensor was at its stamp, as in the
-original's message filter; the oldest of too many waiting ones is dropped.
+A message waits until tf knows the pose of its sensor at its stamp, as in upstream
+move_base's message filter. When too many wait, the oldest is dropped.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
+from numpy.typing import NDArray
 from sensor_msgs import point_cloud2
 from sensor_msgs.msg import PointCloud, PointCloud2
 
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.obstacle import ObstacleLayer
-from quad_nav.costmap.scan_validator import ScanValidator
+from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, Sink, sinks_of
+from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
 from quad_nav.ros.common.node_tools import Names, ThrottledWarnings, own_node
@@ -27,59 +28,62 @@ from quad_nav.topics.validation import MAX_POINTS, scan_problem
 
 MESSAGE_TYPES = {"LaserScan": ScanMessage, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
 QUEUE_LENGTH = 50
-UNUSABLE = (ValueError, TypeError, ArithmeticError, struct.error)  # what a bad message leads to
+MESSAGE_ERRORS = (ValueError, TypeError, ArithmeticError, struct.error)  # of a bad message
 
 
 class Sensor:
-    """One topic and the (costmap, layer, source) that take what it brings."""
+    """One sensor topic of a robot and the layers that take its messages.
 
-    def __init__(self, topic: str, data_type: str) -> None:
+    Attributes:
+        topic: Resolved name of the topic.
+        data_type: Key of ``MESSAGE_TYPES``.
+        intake: Validates messages and hands them to the layers.
+        subscriber: Fills the queue of waiting messages.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        topic: str,
+        data_type: str,
+        sinks: Sequence[Sink],
+        params: ScanValidatorParams,
+    ) -> None:
         self.topic = topic
         self.data_type = data_type
-        self.targets: List[Tuple[LayeredCostmap, ObstacleLayer, str, str]] = []
-        self.waiting: Deque = deque(maxlen=QUEUE_LENGTH)
-        self._trust: Optional[ScanValidator] = None
-        self._complaints = ThrottledWarnings()
+        self.intake = ScanIntake(sinks, params)
+        self._robot = robot
+        self._waiting: Deque[Tuple[Any, float]] = deque(maxlen=QUEUE_LENGTH)
+        self._warnings = ThrottledWarnings()
         self._lock = threading.Lock()
         self.subscriber = rospy.Subscriber(
             topic, MESSAGE_TYPES[data_type], self._store, queue_size=QUEUE_LENGTH
         )
 
-    @property
-    def expected_period_s(self) -> float:
-        """How often something is to come for every layer to be current, 0 if none minds."""
-        periods_s = [
-            layer.buffers[source].params.expected_update_period_s
-            for _, layer, source, _ in self.targets
-        ]
-        return min((period_s for period_s in periods_s if period_s > 0.0), default=0.0)
-
-    def _store(self, message) -> None:
+    def _store(self, message: Any) -> None:
         with self._lock:
-            self.waiting.append((message, rospy.get_time()))
+            self._waiting.append((message, rospy.get_time()))
 
-    def forget(self) -> None:
-        """For a clock that has jumped: what waits is of another time."""
+    def reset(self) -> None:
+        """Forget waiting messages and earlier scans, after the clock has jumped."""
         with self._lock:
-            self.waiting.clear()
-        self._trust = None
+            self._waiting.clear()
+        self.intake.reset()
 
-    def deliver(self, transforms: Transforms, doubt: bool) -> None:
-        """Hands over every message whose transforms are known.
-
-        With ``doubt`` no scan that cannot be true.
-        """
+    def deliver(self, transforms: Transforms) -> None:
+        """Hand every message whose transforms are known to the layers."""
         while True:
             with self._lock:
-                if not self.waiting:
+                if not self._waiting:
                     return
-                message, received_s = self.waiting[0]
+                message, received_s = self._waiting[0]
             try:
                 poses = self._poses_if_known(transforms, message)
             except TransformUnavailable as error:
                 rospy.logwarn_throttle(
                     5.0,
-                    "%s: a message in frame '%s' is dropped: %s",
+                    "%s: %s: message in frame '%s' dropped: %s",
+                    self._robot,
                     self.topic,
                     message.header.frame_id,
                     error,
@@ -89,37 +93,19 @@ class Sensor:
             if poses is None:
                 return
             self._drop(message)
-            if doubt:
-                # What is seen is as old as its stamp, whenever it comes.
-                received_s = min(received_s, message.header.stamp.to_sec())
-            if not (doubt and self._is_doubtful(message, poses[0][0])):
-                self._hand_over(message, received_s, poses)
+            self._hand_over(message, received_s, poses)
 
-    def _is_doubtful(self, message, global_from_sensor: Pose3D) -> bool:
-        if self.data_type != "LaserScan":
-            return False
-        if self._trust is None:
-            self._trust = ScanValidator(
-                layer.buffers[source].params for _, layer, source, _ in self.targets
-            )
-        try:
-            scan = _checked_scan(message)
-        except UNUSABLE:
-            return False  # when it is handed over it is said why
-        why_not = self._trust.why_not(scan, global_from_sensor, rospy.get_time())
-        if why_not:
-            self._complaints.warn(f"{self.topic}: a scan is not believed: {why_not}")
-        return bool(why_not)
-
-    def _drop(self, message) -> None:
+    def _drop(self, message: Any) -> None:
         with self._lock:
-            if self.waiting and self.waiting[0][0] is message:
-                self.waiting.popleft()
+            if self._waiting and self._waiting[0][0] is message:
+                self._waiting.popleft()
 
-    def _poses_if_known(
-        self, transforms: Transforms, message
-    ) -> Optional[List[Tuple[Pose3D, Pose3D]]]:
-        """None while the transforms may still come."""
+    def _poses_if_known(self, transforms: Transforms, message: Any) -> Optional[List[SensorPose]]:
+        """Look up the sensor's poses; None while the transforms may still come.
+
+        Raises:
+            TransformUnavailable: The transforms cannot come any more.
+        """
         try:
             return self._poses(transforms, message)
         except TransformUnavailable as error:
@@ -129,12 +115,11 @@ class Sensor:
             return None
         return self._poses(transforms, message)  # they may have come in this moment
 
-    def _is_ahead(self, transforms: Transforms, message) -> bool:
-        """Whether the transform may still come: the stamp is younger than tf's latest."""
-        costmap = self.targets[0][0]
+    def _is_ahead(self, transforms: Transforms, message: Any) -> bool:
+        """Tell whether the message's stamp is younger than tf's latest transform."""
         return (
             transforms.locate(
-                costmap.params.global_frame,
+                self.intake.sinks[0].costmap.params.global_frame,
                 message.header.frame_id,
                 message.header.stamp.to_sec(),
                 0.0,
@@ -142,8 +127,8 @@ class Sensor:
             is None
         )
 
-    def _poses(self, transforms: Transforms, message) -> List[Tuple[Pose3D, Pose3D]]:
-        """For each target where its points and its origin are; what is the same is asked once."""
+    def _poses(self, transforms: Transforms, message: Any) -> List[SensorPose]:
+        """Look up the sensor's poses for each sink, each pair of frames once."""
         stamp_s, frame = message.header.stamp.to_sec(), message.header.frame_id
         known: Dict[Tuple[str, str], Pose3D] = {}
 
@@ -153,37 +138,41 @@ class Sensor:
             return known[to_frame, from_frame]
 
         return [
-            (
-                pose(costmap.params.global_frame, frame),
-                pose(costmap.params.global_frame, sensor_frame or frame),
+            SensorPose(
+                pose(sink.costmap.params.global_frame, frame),
+                pose(sink.costmap.params.global_frame, sink.source.sensor_frame or frame),
             )
-            for costmap, _, _, sensor_frame in self.targets
+            for sink in self.intake.sinks
         ]
 
-    def _hand_over(
-        self, message, received_s: float, poses: Sequence[Tuple[Pose3D, Pose3D]]
-    ) -> None:
-        """Layers that see a message in the same way share what the first makes of it."""
-        is_scan, stamp_s = self.data_type == "LaserScan", message.header.stamp.to_sec()
+    def _hand_over(self, message: Any, received_s: float, poses: List[SensorPose]) -> None:
         try:
-            seen: Any = _checked_scan(message) if is_scan else _cloud_points(message)
-        except UNUSABLE as error:
-            rospy.logwarn_throttle(5.0, "%s: a message is dropped: %s", self.topic, error)
-            return
-        made: Dict[tuple, Tuple[ObstacleLayer, str]] = {}
-        for (costmap, layer, source, frame), (points_pose, origin_pose) in zip(self.targets, poses):
-            way = (costmap.params.global_frame, frame, layer.way_of_seeing(source))
-            first, its_source = made.setdefault(way, (layer, source))
-            if first is not layer:
-                layer.add_observation(source, first.newest(its_source), received_s)
-            elif is_scan:
-                layer.add_scan(source, seen, points_pose, received_s, origin_pose)
+            if self.data_type == "LaserScan":
+                reason = self.intake.add_scan(
+                    _checked_scan(message), poses, received_s, rospy.get_time()
+                )
+                if reason:
+                    self._warn_rejected(reason)
             else:
-                layer.add_cloud(source, seen, points_pose, stamp_s, received_s, origin_pose)
+                points, stamp_s = _cloud_points(message), message.header.stamp.to_sec()
+                self.intake.add_cloud(points, poses, stamp_s, received_s)
+        except MESSAGE_ERRORS as error:
+            rospy.logwarn_throttle(
+                5.0, "%s: %s: message dropped: %s", self._robot, self.topic, error
+            )
+
+    def _warn_rejected(self, reason: str) -> None:
+        period_s = self.intake.expected_period_s
+        then = f"; hovering after {period_s:g} s without a valid scan" if period_s > 0.0 else ""
+        self._warnings.warn(f"{self._robot}: scan rejected: {reason}{then}")
 
 
-def _checked_scan(message) -> Scan:
-    """Raises ValueError for one that cannot be used."""
+def _checked_scan(message: Any) -> Scan:
+    """Convert a scan.
+
+    Raises:
+        ValueError: The scan cannot be used.
+    """
     scan = scan_from_message(message)
     problem = scan_problem(scan)
     if problem:
@@ -191,10 +180,12 @@ def _checked_scan(message) -> Scan:
     return scan
 
 
-def _cloud_points(message) -> np.ndarray:
-    """float32[n, 3] in the message's frame, without points that are nowhere.
+def _cloud_points(message: Any) -> NDArray[np.float32]:
+    """Return the finite points of a cloud, float32[n, 3] in the message's frame.
 
-    Raises what numpy and struct raise for a message that is not as long as it says.
+    Raises:
+        ValueError: The cloud has too many points.
+        Exception: What numpy and struct raise for a message shorter than it declares.
     """
     count = (
         len(message.points) if isinstance(message, PointCloud) else message.width * message.height
@@ -209,16 +200,23 @@ def _cloud_points(message) -> np.ndarray:
     return cloud[np.isfinite(cloud).all(axis=1)]
 
 
-def connect(costmaps: Sequence[LayeredCostmap], names: Names = own_node) -> List[Sensor]:
-    """Subscribes to every source of every obstacle layer, each topic once."""
-    sensors: Dict[Tuple[str, str], Sensor] = {}
-    for costmap in costmaps:
-        for layer in costmap.layers.values():
-            if not isinstance(layer, ObstacleLayer):
-                continue
-            for source in layer.params.sources:
-                key = (names(source.topic or source.name), source.data_type)
-                if key not in sensors:
-                    sensors[key] = Sensor(*key)
-                sensors[key].targets.append((costmap, layer, source.name, source.sensor_frame))
-    return list(sensors.values())
+def connect(
+    robot: str,
+    costmaps: Sequence[LayeredCostmap],
+    params: ScanValidatorParams,
+    names: Names = own_node,
+) -> List[Sensor]:
+    """Subscribe to every source of every obstacle layer, to each topic once.
+
+    Args:
+        robot: Name with which log lines begin.
+        costmaps: The robot's costmaps.
+        params: Parameters of the scan validation.
+        names: Resolves the names of topics.
+    """
+    sinks: Dict[Tuple[str, str], List[Sink]] = {}
+    for sink in sinks_of(costmaps):
+        source = sink.source
+        key = (names(source.topic or source.name), source.data_type)
+        sinks.setdefault(key, []).append(sink)
+    return [Sensor(robot, *key, takers, params) for key, takers in sinks.items()]

@@ -1,0 +1,143 @@
+"""Hand a sensor's messages to the obstacle layers that take them.
+
+Both shells use it: ``ros/navigator/sensors.py`` has one ``ScanIntake`` for each topic,
+``offline/offline_robot.py`` one for the LIDAR. The shell knows where the sensor was; the intake
+decides whether a scan counts and lets layers that see a message alike share its projection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Callable, Dict, List, NamedTuple, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.observation import Observation, SourceParams
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.costmap.scan_validator import ScanValidator, ScanValidatorParams
+from quad_nav.geometry import Pose3D, Scan
+
+
+@dataclass(frozen=True)
+class Sink:
+    """An obstacle layer and one of its observation sources."""
+
+    costmap: LayeredCostmap
+    layer: ObstacleLayer
+    source: SourceParams
+
+
+class SensorPose(NamedTuple):
+    """Poses of a sensor in the global frame of a sink's costmap.
+
+    Attributes:
+        frame: Pose of the frame in which the message has its points.
+        origin: Pose where the rays start. It differs from ``frame`` only if the source names
+            a ``sensor_frame`` other than the message's.
+    """
+
+    frame: Pose3D
+    origin: Pose3D
+
+
+_Key = Tuple[SensorPose, Tuple[bool, float, float]]
+_MakeObservation = Callable[[Sink, SensorPose], Observation]
+
+
+def sinks_of(costmaps: Sequence[LayeredCostmap]) -> List[Sink]:
+    """List every source of every obstacle layer."""
+    return [
+        Sink(costmap, layer, source)
+        for costmap in costmaps
+        for layer in costmap.layers.values()
+        if isinstance(layer, ObstacleLayer)
+        for source in layer.params.sources
+    ]
+
+
+class ScanIntake:
+    """Validate the messages of one sensor and hand them to its sinks.
+
+    Attributes:
+        sinks: Layers and sources that take the messages.
+    """
+
+    def __init__(self, sinks: Sequence[Sink], params: ScanValidatorParams):
+        self.sinks = tuple(sinks)
+        self._params = params
+        self._validator = ScanValidator(sink.source for sink in self.sinks)
+
+    @property
+    def expected_period_s(self) -> float:
+        """Longest silence with which every layer stays current, in seconds; 0 for any."""
+        return self._validator.expected_period_s
+
+    def reconfigure(self, params: ScanValidatorParams) -> None:
+        """Take other parameters; what the validator has seen stays."""
+        self._params = params
+
+    def reset(self) -> None:
+        """Forget earlier scans, after the clock has jumped."""
+        self._validator.reset()
+
+    def add_scan(
+        self, scan: Scan, poses: Sequence[SensorPose], received_s: float, now_s: float
+    ) -> str:
+        """Hand a scan to the layers unless it is implausible.
+
+        Args:
+            scan: The scan, in the frame of ``poses[k].frame``.
+            poses: Poses at the scan's stamp, one for each sink.
+            received_s: When the scan arrived. With ``reject_implausible_scans`` the stamp
+                counts if it is earlier, so that late scans are not taken for recent ones.
+            now_s: Current time, against which the validator judges the scan's age.
+
+        Returns:
+            The reason for which the scan was rejected, "" if the layers have it.
+        """
+        if self.sinks and self._params.reject_implausible_scans:
+            reason = self._validator.rejection_reason(scan, poses[0].frame, now_s)
+            if reason:
+                return reason
+
+        def make(sink: Sink, pose: SensorPose) -> Observation:
+            return sink.layer.observe_scan(sink.source.name, scan, pose.frame, pose.origin)
+
+        self._add(make, poses, scan.stamp_s, received_s)
+        return ""
+
+    def add_cloud(
+        self,
+        points: NDArray[np.float32],
+        poses: Sequence[SensorPose],
+        stamp_s: float,
+        received_s: float,
+    ) -> None:
+        """Hand a point cloud to the layers.
+
+        Args:
+            points: float32[n, 3], metres in the frame of ``poses[k].frame``, all finite.
+            poses: Poses at the cloud's stamp, one for each sink.
+            stamp_s: When the points were measured.
+            received_s: When the cloud arrived, as for ``add_scan``.
+        """
+
+        def make(sink: Sink, pose: SensorPose) -> Observation:
+            layer, name = sink.layer, sink.source.name
+            return layer.observe_cloud(name, points, pose.frame, stamp_s, pose.origin)
+
+        self._add(make, poses, stamp_s, received_s)
+
+    def _add(
+        self, make: _MakeObservation, poses: Sequence[SensorPose], stamp_s: float, received_s: float
+    ) -> None:
+        if self._params.reject_implausible_scans:
+            received_s = min(received_s, stamp_s)
+        made: Dict[_Key, Observation] = {}
+        for sink, pose in zip(self.sinks, poses):
+            key = (pose, sink.layer.projection_key(sink.source.name))
+            if key not in made:
+                made[key] = make(sink, pose)
+            sink.layer.add_observation(sink.source.name, made[key], received_s)
