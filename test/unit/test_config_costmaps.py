@@ -45,9 +45,9 @@ def test_sizes_that_no_grid_can_have_are_all_told():
             "/nav",
         )
     assert caught.value.problems == [
-        "/nav/global_costmap: 501 x 500 m cannot be in cells of 0.05 m;"
+        "/nav/global_costmap: 501 x 500 m with cells of 0.05 m is not supported;"
         " expected 1 to 100000000 cells",
-        "/nav/local_costmap: 3 x 12 m cannot be in cells of 4 m; expected 1 to 100000000 cells",
+        "/nav/local_costmap: 3 x 12 m with cells of 4 m is not supported; expected 1 to 100000000 cells",
     ]
     assert local_costmap({"width": 50, "height": 50, "resolution": 0.005}).spec.shape == (
         10000,

@@ -6,16 +6,17 @@ from dataclasses import fields
 
 import pytest
 
-from quad_nav.config.dwa_table import DWA_PLANNER, DWA_TABLE, dwa_params, settle_dwa
+from quad_nav.config.local_planners import DWA_PLANNER, dwa_params, normalise_dwa
 from quad_nav.config.notes import CAUTION, CLAMPED, IGNORED, UNKNOWN, Notes
+from quad_nav.config.tables.dwa_planner import DWA_TABLE
 from quad_nav.control.dwa_planner import DwaParams
 
 FIXES = {"predict_goal_turn"}  # set by the group of that name, not by the planner's own
 
 
-def settled(namespace, **node_level):
+def normalised(namespace, **node_level):
     tree, notes = {DWA_PLANNER: namespace, **node_level}, Notes("/move_base0")
-    settle_dwa(tree, notes)
+    normalise_dwa(tree, notes)
     return tree, notes
 
 
@@ -40,7 +41,7 @@ def test_names_are_unique():
 
 
 def test_an_empty_namespace_is_completed():
-    tree, notes = settled({})
+    tree, notes = normalised({})
     assert not notes.problems and not notes.remarks
     assert dwa_params(tree) == DwaParams()
     assert tree[DWA_PLANNER]["vy_samples"] == 10
@@ -48,7 +49,7 @@ def test_an_empty_namespace_is_completed():
 
 
 def test_values_reach_their_fields():
-    tree, _ = settled(
+    tree, _ = normalised(
         {
             "max_vel_trans": 1.5,
             "theta_stopped_vel": 0.3,
@@ -74,7 +75,7 @@ def test_values_reach_their_fields():
     ],
 )
 def test_old_names_change_nothing_and_are_told(old, new):
-    tree, notes = settled({old: 0.7})
+    tree, notes = normalised({old: 0.7})
     assert dwa_params(tree) == DwaParams()
     assert [(remark.kind, remark.place) for remark in notes.remarks] == [
         (IGNORED, f"/move_base0/DWAPlannerROS/{old}")
@@ -88,7 +89,7 @@ def test_old_names_change_nothing_and_are_told(old, new):
 )
 def test_latch_is_looked_for_upwards(own, node_level, in_force):
     name = "latch_xy_goal_tolerance"
-    tree, notes = settled(
+    tree, notes = normalised(
         {} if own is None else {name: own}, **({} if node_level is None else {name: node_level})
     )
     assert not notes.problems and not notes.remarks
@@ -96,7 +97,7 @@ def test_latch_is_looked_for_upwards(own, node_level, in_force):
 
 
 def test_a_latch_that_is_no_flag():
-    _, notes = settled({}, latch_xy_goal_tolerance="yes")
+    _, notes = normalised({}, latch_xy_goal_tolerance="yes")
     assert notes.problems == [
         "/move_base0/latch_xy_goal_tolerance: 'yes' is neither true nor"
         " false; expected true or false"
@@ -104,7 +105,7 @@ def test_a_latch_that_is_no_flag():
 
 
 def test_what_cannot_be_is_a_problem_and_what_is_odd_a_remark():
-    tree, notes = settled(
+    tree, notes = normalised(
         {
             "sim_time": 0.0,
             "vx_samples": 0,

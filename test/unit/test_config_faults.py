@@ -151,7 +151,7 @@ def test_all_faults_are_told_at_once():
 
 def test_a_tree_that_is_none():
     assert problems([1, 2]) == [
-        "/move_base0: [1, 2] is no parameter tree; expected names with values"
+        "/move_base0: [1, 2] is not a parameter tree; expected names with values"
     ]
 
 

@@ -138,8 +138,8 @@ def test_dwa_flies_with_its_own_parameters_and_those_at_the_nodes_level():
     assert configuration.local_planner == DwaParams(max_vel_x_mps=0.3, latch_xy_goal_tolerance=True)
     assert configuration.local_planner_period_s == 0.1
     assert [line for kind, line in told(tree)] == [
-        "/nav/DWAPlannerROS/controller_frequency: rollouts reckon with 10.0 Hz, while the loop"
-        " runs at 5.0 Hz"
+        "/nav/DWAPlannerROS/controller_frequency: rollouts assume 10.0 Hz, but the control"
+        " loop runs at 5.0 Hz"
     ]
     changed = updated(configuration, "DWAPlannerROS", {"max_vel_x": 0.2})
     assert changed.local_planner.max_vel_x_mps == 0.2

@@ -184,10 +184,12 @@ def test_size_that_no_grid_can_have_is_refused(configuration):
     with pytest.raises(InputError) as caught:
         updated(configuration, "global_costmap", {"width": 21474836})
     assert caught.value.problems == [
-        "global_costmap: 21474836 x 10 m cannot be in cells of 0.05 m;"
+        "global_costmap: 21474836 x 10 m with cells of 0.05 m is not supported;"
         " expected 1 to 100000000 cells"
     ]
-    with pytest.raises(InputError, match="^local_costmap: 10 x 10 m cannot be in cells of 20 m;"):
+    with pytest.raises(
+        InputError, match="^local_costmap: 10 x 10 m with cells of 20 m is not supported;"
+    ):
         updated(configuration, "local_costmap", {"resolution": 20.0})
 
 
@@ -197,8 +199,8 @@ def test_more_trajectories_than_can_be_looked_at_are_refused(configuration):
     # 20 x 20 samples, 0.3 m/s for 1.7 s
     assert caught.value.problems == [
         "TrajectoryPlannerROS: 400 trajectories of up to 5.1e+07 points are too many; expected at"
-        " most 100000000 points altogether: fewer samples, less sim_time or speed, or a coarser"
-        " granularity"
+        " most 100000000 points in total (use fewer samples, a shorter sim_time, a lower speed or a"
+        " coarser granularity)"
     ]
     with pytest.raises(InputError, match="400 trajectories of up to 1.7e[+]08 points"):
         updated(configuration, "TrajectoryPlannerROS", {"angular_sim_granularity": 1e-8})

@@ -98,7 +98,7 @@ def slow(**parameters):
         (
             {**planner(controller_frequency=20.0), "controller_frequency": 5.0},
             "caution",
-            "TrajectoryPlannerROS/controller_frequency: rollouts reckon with 20.0 Hz, while the loop runs"
+            "TrajectoryPlannerROS/controller_frequency: rollouts assume 20.0 Hz, but the control loop runs"
             " at 5.0 Hz",
         ),
         (
@@ -213,7 +213,7 @@ def test_old_names_count_unless_the_new_one_is_there():
     assert both.goal_distance_bias == 1.0
 
 
-def test_rollouts_reckon_with_the_planners_own_rate_then_the_nodes():
+def test_rollouts_assume_the_planners_own_rate_then_the_nodes():
     own = {**planner(controller_frequency=20.0), "controller_frequency": 5.0}
     assert load(own, "").local_planner_period_s == 0.05
     assert load({"controller_frequency": 5.0}, "").local_planner_period_s == 0.2

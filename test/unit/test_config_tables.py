@@ -7,10 +7,26 @@ from pathlib import Path
 
 import pytest
 
-from quad_nav.config import costmap_tables, global_planner_tables, tables
 from quad_nav.config.fixes import FIXES_TABLE, switches_of
 from quad_nav.config.reference import reference
 from quad_nav.config.spec import Table
+from quad_nav.config.tables.costmap import COSTMAP_TABLE
+from quad_nav.config.tables.global_planners import CARROT_TABLE, GLOBAL_PLANNER_TABLE, NAVFN_TABLE
+from quad_nav.config.tables.layers import (
+    INFLATION_LAYER_TABLE,
+    OBSTACLE_LAYER_TABLE,
+    SOURCE_TABLE,
+    STATIC_LAYER_TABLE,
+    VOXEL_LAYER_TABLE,
+)
+from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
+from quad_nav.config.tables.recoveries import (
+    CLEAR_COSTMAP_TABLE,
+    MOVE_SLOW_TABLE,
+    ROTATE_FROM_PLANNER,
+    ROTATE_TABLE,
+)
+from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
 from quad_nav.control.dwa_planner import DwaParams
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
@@ -30,23 +46,23 @@ from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, Rotate
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
 
-ROTATE = Table(fixed=tables.ROTATE.fixed + tables.ROTATE_FROM_PLANNER)
+ROTATE = Table(fixed=ROTATE_TABLE.fixed + ROTATE_FROM_PLANNER)
 # (dataclass, table, fields that are read in another way than from one row)
 PAIRS = [
-    (NavigatorParams, tables.NAVIGATOR, {"recovery_behaviors", "progress"}),
-    (TrajectoryPlannerParams, tables.TRAJECTORY_PLANNER, set()),
-    (NavfnParams, tables.NAVFN, set()),
-    (SearchPlannerParams, global_planner_tables.SEARCH_PLANNER, set()),
-    (CarrotParams, global_planner_tables.CARROT, set()),
-    (ClearCostmapParams, tables.CLEAR_COSTMAP, {"layer_names"}),
+    (NavigatorParams, MOVE_BASE_TABLE, {"recovery_behaviors", "progress"}),
+    (TrajectoryPlannerParams, TRAJECTORY_PLANNER_TABLE, set()),
+    (NavfnParams, NAVFN_TABLE, set()),
+    (SearchPlannerParams, GLOBAL_PLANNER_TABLE, set()),
+    (CarrotParams, CARROT_TABLE, set()),
+    (ClearCostmapParams, CLEAR_COSTMAP_TABLE, {"layer_names"}),
     (RotateParams, ROTATE, set()),
-    (MoveSlowAndClearParams, tables.MOVE_SLOW, {"translation_fields", "rotation_fields"}),
-    (CostmapParams, costmap_tables.COSTMAP, {"layers"}),
-    (ObstacleLayerParams, costmap_tables.OBSTACLE_LAYER, {"sources", "track_unknown_space"}),
-    (VoxelLayerParams, costmap_tables.VOXEL_LAYER, {"sources", "track_unknown_space"}),
-    (SourceParams, costmap_tables.SOURCE, {"name", "obstacle_range_m", "raytrace_range_m"}),
-    (InflationLayerParams, costmap_tables.INFLATION_LAYER, set()),
-    (StaticLayerParams, costmap_tables.STATIC_LAYER, set()),
+    (MoveSlowAndClearParams, MOVE_SLOW_TABLE, {"translation_fields", "rotation_fields"}),
+    (CostmapParams, COSTMAP_TABLE, {"layers"}),
+    (ObstacleLayerParams, OBSTACLE_LAYER_TABLE, {"sources", "track_unknown_space"}),
+    (VoxelLayerParams, VOXEL_LAYER_TABLE, {"sources", "track_unknown_space"}),
+    (SourceParams, SOURCE_TABLE, {"name", "obstacle_range_m", "raytrace_range_m"}),
+    (InflationLayerParams, INFLATION_LAYER_TABLE, set()),
+    (StaticLayerParams, STATIC_LAYER_TABLE, set()),
 ]
 TABLES = [*(table for _, table, _ in PAIRS), FIXES_TABLE]
 SWITCH_OWNERS = [

@@ -1,34 +1,34 @@
-"""A whole configuration, made from a parameter tree."""
+"""The configuration of one navigator, made from a parameter tree."""
 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, field
-from typing import Any, Dict, Iterable, Mapping, Optional, Tuple
+from dataclasses import dataclass, field, replace
+from typing import Any, Dict, Iterable, Iterator, Mapping, Optional, Tuple
 
-from quad_nav.config import tables
-from quad_nav.config.costmaps import costmap_params, remark_on_blindness, settle_costmap
+from quad_nav.config.costmaps import costmap_params, normalise_costmap, remark_on_blindness
 from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
 from quad_nav.config.notes import CAUTION, Notes, Remark, join
 from quad_nav.config.planners import (
     local_planner_frequency,
     local_planner_period_s,
+    normalise_planner_names,
+    normalise_planners,
     planner_keys,
     planner_params,
-    settle_planner_names,
-    settle_planners,
 )
 from quad_nav.config.plugins import plugin_name
-from quad_nav.config.reader import fields, settle, subtree
+from quad_nav.config.reader import fields, normalise, subtree
 from quad_nav.config.recoveries import (
     NamedTypes,
     RecoveryParams,
     circumscribed_radius_m,
     listed_names,
+    normalise_recoveries,
     recoveries,
-    settle_recoveries,
 )
-from quad_nav.config.workload import workload_problems
+from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
+from quad_nav.config.workload import rollout_problem, size_problem
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError
@@ -37,21 +37,25 @@ from quad_nav.navigator.progress_checker import ProgressParams
 from quad_nav.peers.params import PeerParams
 
 COSTMAPS = ("global_costmap", "local_costmap")
-# Costmaps look for these upwards, so they may stand at the node's level.
+# Costmaps look for these upwards too, to the node's level.
 _INHERITED = ("footprint", "robot_radius", "obstacle_range", "raytrace_range")
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """Everything that one navigator is made of.
+    """The configuration of one navigator.
 
-    ``global_planner`` and ``local_planner`` are the parameters of the planners that
-    ``navigator`` names: the dataclass of a planner, or a ``Plugin`` of the user's.
-    ``recoveries`` are (name, parameters) in the order in which they are tried.
-    ``local_planner_period_s`` is the control period that rollouts reckon with;
-    it may differ from the loop's own, as in the original. ``clearing_radius_m`` is
-    half the side of the square that ``make_plan`` clears around the robot. ``robot`` is
-    the robot's number among the ``robots`` that fly together.
+    Attributes:
+        global_planner: Parameters of the planner that ``navigator`` names: its dataclass, or a
+            ``Plugin`` of the user's. The same holds for ``local_planner``.
+        recoveries: (name, parameters) in the order in which they are tried.
+        local_planner_period_s: Control period that rollouts assume; as in move_base it may differ
+            from the period of the control loop.
+        clearing_radius_m: Half the side of the square that ``make_plan`` clears around the robot.
+        robot: Number of the robot among the ``robots`` that fly together.
+        remarks: Remarks on parameters that are legal and odd.
+        tree: The normalised tree, with ROS spellings.
+        tree_at_start: The tree that ``restore_defaults`` restores.
     """
 
     navigator: NavigatorParams
@@ -72,80 +76,101 @@ class Configuration:
 
     @property
     def warnings(self) -> Tuple[str, ...]:
-        """The remarks as lines."""
+        """Remarks as lines of text."""
         return tuple(map(str, self.remarks))
 
     def to_tree(self) -> Dict[str, Any]:
-        """The parameter tree with ROS spellings, as the original leaves it on the server.
+        """Return the parameter tree with ROS spellings, as move_base leaves it on the server.
 
-        What is reconfigurable is there with its value, everything else only when
-        it was set.
+        Reconfigurable parameters have their value in force; others are there if they were set.
         """
         return copy.deepcopy(dict(self.tree))
 
 
 def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
-    """The configuration that the original would fly with.
+    """Make the configuration that move_base would fly with.
 
     Args:
-        tree: the parameters of a move_base node, from ``load_files`` or a
-            parameter server. It may be one that a navigator left there before.
-        place: what messages name in front of paths, such as the node's name.
+        tree: The parameters of a move_base node, from ``load_files`` or a parameter server. The
+            tree that an earlier navigator left on the server will do.
+        place: The prefix of paths in messages, such as the node's name.
 
     Raises:
-        InputError: one line for every value that cannot be used.
+        InputError: One line for every value that cannot be used.
     """
     if not isinstance(tree, Mapping):
-        raise InputError([f"{place}: {tree!r} is no parameter tree; expected names with values"])
+        raise InputError([f"{place}: {tree!r} is not a parameter tree; expected names with values"])
     notes = Notes(place, getattr(tree, "origins", None))
     notes.remarks.extend(getattr(tree, "remarks", ()))
-    settled = copy.deepcopy(dict(tree))
-    listed = _settle(settled, notes)
+    normalised = copy.deepcopy(dict(tree))
+    listed = _normalise(normalised, notes)
     notes.raise_problems()
 
-    costmaps = [costmap_params(settled, name) for name in COSTMAPS]
-    for name, params in zip(COSTMAPS, costmaps):
-        remark_on_blindness(params, name, notes)
-    _remark_on_rates(settled, notes)
-    pruned = _without_empty(settled)
-    configuration = Configuration(
-        navigator=navigator_params(settled, listed, given=tree),
-        peers=with_fixes(PeerParams(), settled),
-        scan_validator=with_fixes(ScanValidatorParams(), settled),
-        global_costmap=costmaps[0],
-        local_costmap=costmaps[1],
-        global_planner=planner_params(settled, "base_global_planner"),
-        local_planner=planner_params(settled, "base_local_planner"),
-        recoveries=recoveries(settled, listed),
-        local_planner_period_s=local_planner_period_s(settled),
-        clearing_radius_m=settled.get("clearing_radius", circumscribed_radius_m(settled)),
-        robot=settled.get("robot", 0),
-        robots=settled.get("robots", 1),
-        remarks=tuple(notes.remarks),
-        tree=pruned,
-        tree_at_start=pruned,
-    )
+    configuration = _made(normalised, listed, tree)
+    for name in COSTMAPS:
+        remark_on_blindness(getattr(configuration, name), name, notes)
+    _remark_on_rates(normalised, notes)
     for name, problem in workload_problems(configuration):
         notes.problem(name, problem)
     notes.raise_problems()
-    return configuration
+    return replace(configuration, remarks=tuple(notes.remarks))
+
+
+def workload_problems(configuration: Configuration) -> Iterator[Tuple[str, str]]:
+    """Yield (namespace, problem) of everything that is too much for a machine."""
+    local_planner = plugin_name(configuration.navigator.base_local_planner)
+    found = {
+        "global_costmap": size_problem(configuration.global_costmap),
+        "local_costmap": size_problem(configuration.local_costmap),
+        local_planner: rollout_problem(configuration.local_planner),
+    }
+    return ((name, problem) for name, problem in found.items() if problem)
+
+
+def _made(
+    tree: Dict[str, Any], listed: Optional[NamedTypes], given: Iterable[str]
+) -> Configuration:
+    """Make the dataclasses of a normalised tree."""
+    pruned = _without_empty(tree)
+    return Configuration(
+        navigator=navigator_params(tree, listed, given),
+        peers=with_fixes(PeerParams(), tree),
+        scan_validator=with_fixes(ScanValidatorParams(), tree),
+        global_costmap=costmap_params(tree, "global_costmap"),
+        local_costmap=costmap_params(tree, "local_costmap"),
+        global_planner=planner_params(tree, "base_global_planner"),
+        local_planner=planner_params(tree, "base_local_planner"),
+        recoveries=recoveries(tree, listed),
+        local_planner_period_s=local_planner_period_s(tree),
+        clearing_radius_m=tree.get("clearing_radius", circumscribed_radius_m(tree)),
+        robot=tree.get("robot", 0),
+        robots=tree.get("robots", 1),
+        tree=pruned,
+        tree_at_start=pruned,
+    )
 
 
 def navigator_params(
     tree: Mapping[str, Any], listed: Optional[NamedTypes], given: Iterable[str]
 ) -> NavigatorParams:
-    """The dataclass of a settled tree; ``given`` are the keys that somebody set."""
+    """Make the dataclass of a normalised tree.
+
+    Args:
+        tree: The normalised tree.
+        listed: (name, type) of the ``recovery_behaviors``, None without that list.
+        given: The keys that were set.
+    """
     params = NavigatorParams(
         recovery_behaviors=listed,
         progress=with_fixes(ProgressParams(), tree),
-        **fields(tree, tables.NAVIGATOR.parameters, given),
+        **fields(tree, MOVE_BASE_TABLE.parameters, given),
     )
     return with_fixes(params, tree)
 
 
-def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
-    """Brings the whole tree into the state in which the original leaves it."""
-    settle_planner_names(tree, notes)
+def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
+    """Normalise the whole tree as move_base does; return the listed recoveries."""
+    normalise_planner_names(tree, notes)
     known = [
         *COSTMAPS,
         FIXES,
@@ -154,12 +179,12 @@ def _settle(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
         "recovery_behaviors",
         *listed_names(tree),
     ]
-    settle(tree, "", tables.NAVIGATOR, notes, also_known=known)
-    settle_planners(tree, notes)
-    settle(subtree(tree, FIXES, "", notes), FIXES, FIXES_TABLE, notes)
+    normalise(tree, "", MOVE_BASE_TABLE, notes, also_known=known)
+    normalise_planners(tree, notes)
+    normalise(subtree(tree, FIXES, "", notes), FIXES, FIXES_TABLE, notes)
     for name in COSTMAPS:
-        settle_costmap(tree, name, notes)
-    return settle_recoveries(tree, notes)
+        normalise_costmap(tree, name, notes)
+    return normalise_recoveries(tree, notes)
 
 
 def _remark_on_rates(tree: Mapping[str, Any], notes: Notes) -> None:
@@ -170,12 +195,12 @@ def _remark_on_rates(tree: Mapping[str, Any], notes: Notes) -> None:
         notes.remark(
             join(planner, "controller_frequency"),
             CAUTION,
-            f"rollouts reckon with {own_hz} Hz, while the loop runs at {loop_hz} Hz",
+            f"rollouts assume {own_hz} Hz, but the control loop runs at {loop_hz} Hz",
         )
 
 
 def _without_empty(tree: Mapping[str, Any]) -> Dict[str, Any]:
-    """Namespaces that hold nothing are not on a parameter server."""
+    """Return the tree without empty namespaces, which a parameter server does not store."""
     pruned = {}
     for key, value in tree.items():
         value = _without_empty(value) if isinstance(value, dict) else value

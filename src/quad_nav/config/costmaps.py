@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, Mapping, Set, Tuple
 
-from quad_nav.config import costmap_tables as tables
-from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, settle_layer
+from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, normalise_layer
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import PluginLayerParams, is_dotted
-from quad_nav.config.reader import Namespace, fields, settle, subtree
+from quad_nav.config.reader import Namespace, fields, normalise, subtree
 from quad_nav.config.spec import Table
+from quad_nav.config.tables.costmap import COSTMAP_TABLE
 from quad_nav.config.texts import polygon_from_list, text_from_polygon
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
@@ -27,16 +27,16 @@ STATIC, INFLATION = "costmap_2d::StaticLayer", "costmap_2d::InflationLayer"
 _OLD_STYLE = ("static_map", "map_type")
 
 
-def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
+def normalise_costmap(tree: Namespace, name: str, notes: Notes) -> None:
     """Brings ``tree[name]`` into the state in which the original leaves it.
 
     Args:
         tree: the node's tree; footprints and ranges may be inherited from it.
     """
     costmap = subtree(tree, name, "", notes)
-    _settle_footprint(costmap, name, tree, notes)
+    _normalise_footprint(costmap, name, tree, notes)
     if "plugins" not in costmap:
-        _settle_old_style(costmap, name, notes)
+        _normalise_old_style(costmap, name, notes)
     plugins = _checked_plugins(costmap, name, notes)
     _remark_on_old_style(costmap, name, [layer_type for _, layer_type in plugins], notes)
     for layer, _ in plugins:
@@ -47,22 +47,22 @@ def settle_costmap(tree: Namespace, name: str, notes: Notes) -> None:
     chain = ((name, costmap), ("", tree))
     for layer, layer_type in plugins:
         if layer_type in LAYERS or is_dotted(layer_type):
-            settle_layer(costmap, name, layer, layer_type, chain, notes)
+            normalise_layer(costmap, name, layer, layer_type, chain, notes)
     known = {layer for layer, _ in plugins} | {"plugins", *_OLD_STYLE}
     for _, layer_type in plugins:
         known |= set(PARENT_PARAMETERS.get(layer_type, ()))
-    settle(costmap, name, _table_with_misplaced(costmap, known), notes, known)
+    normalise(costmap, name, _table_with_misplaced(costmap, known), notes, known)
 
 
 def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
-    """The dataclass of the costmap of that name in a settled tree."""
+    """The dataclass of the costmap of that name in a normalised tree."""
     costmap = tree[name]
     layers = []
     for plugin in costmap["plugins"]:
         params = layer_params(costmap, name, plugin["name"], plugin["type"])
         if params is not None:
             layers.append((plugin["name"], params))
-    return CostmapParams(layers=tuple(layers), **fields(costmap, tables.COSTMAP.parameters))
+    return CostmapParams(layers=tuple(layers), **fields(costmap, COSTMAP_TABLE.parameters))
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
@@ -80,7 +80,7 @@ def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
         )
 
 
-def _settle_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:
+def _normalise_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:
     """Footprint and radius may stand at the node's level; a list becomes a text."""
     for key in ("footprint", "robot_radius"):
         if key not in costmap and key in tree:
@@ -91,7 +91,7 @@ def _settle_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Not
     try:
         polygon = polygon_from_list(costmap["footprint"])
     except ValueError as error:
-        expected = tables.COSTMAP["footprint"].expected
+        expected = COSTMAP_TABLE["footprint"].expected
         notes.problem(
             join(name, "footprint"), f"{costmap['footprint']}: {error}; expected {expected}"
         )
@@ -99,7 +99,7 @@ def _settle_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Not
     costmap["footprint"] = "[]" if polygon is None else text_from_polygon(polygon)
 
 
-def _settle_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
+def _normalise_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
     """Writes the plugins list of a costmap that has none, and moves the layers' parameters."""
     plugins: List[Tuple[str, str]] = []
     static_map = costmap.get("static_map", False)
@@ -209,5 +209,5 @@ def _table_with_misplaced(costmap: Namespace, known: Set[str]) -> Table:
     for key, value in costmap.items():
         if isinstance(value, dict) and key not in known:
             misplaced.setdefault(key, "no layer of that name is in plugins")
-    base = tables.COSTMAP
+    base = COSTMAP_TABLE
     return Table(base.reconfigurable, base.fixed, base.unsupported, tuple(misplaced.items()))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Dict, Iterator, Mapping, Tuple
 
-from quad_nav.config import costmap_tables, tables
 from quad_nav.config.configuration import COSTMAPS
 from quad_nav.config.fixes import FIXES, FIXES_TABLE
 from quad_nav.config.layers import LAYERS
@@ -15,6 +14,9 @@ from quad_nav.config.plugins import plugin_name
 from quad_nav.config.recoveries import TABLES as RECOVERY_TABLES
 from quad_nav.config.recoveries import full_type
 from quad_nav.config.spec import Table
+from quad_nav.config.tables.costmap import COSTMAP_TABLE
+from quad_nav.config.tables.layers import SOURCE_TABLE
+from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Difference:
 
 
 def differences(tree: Mapping[str, Any]) -> Tuple[Difference, ...]:
-    """Every parameter of a settled tree (``Configuration.to_tree``) that is not at its default.
+    """Every parameter of a normalised tree (``Configuration.to_tree``) that is not at its default.
 
     Parameters of the user's own planners, layers and behaviours have no known
     default and are left out, and so are the distances of the default recoveries,
@@ -51,14 +53,14 @@ def _differences(path: str, table: Table, namespace: Mapping[str, Any]) -> Itera
 
 def _namespaces(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
     """(path, table, parameters) of each namespace whose parameters are known."""
-    yield "", tables.NAVIGATOR, tree
+    yield "", MOVE_BASE_TABLE, tree
     for key in SLOTS:
         planner = planner_type(tree, key) if key in tree else None
         if planner is not None:
             name = plugin_name(tree[key])
             yield name, planner.table, _below(tree, name)
     for costmap in COSTMAPS:
-        yield costmap, costmap_tables.COSTMAP, _below(tree, costmap)
+        yield costmap, COSTMAP_TABLE, _below(tree, costmap)
         yield from _layers(costmap, _below(tree, costmap))
     for entry in tree.get("recovery_behaviors", ()):
         table = RECOVERY_TABLES.get(full_type(entry["type"]))
@@ -76,7 +78,7 @@ def _layers(
         place, layer = join(path, plugin["name"]), _below(costmap, plugin["name"])
         yield place, LAYERS[plugin["type"]].table, layer
         for source in str(layer.get("observation_sources", "")).split():
-            yield join(place, source), costmap_tables.SOURCE, _below(layer, source)
+            yield join(place, source), SOURCE_TABLE, _below(layer, source)
 
 
 def _below(tree: Mapping[str, Any], name: str) -> Dict[str, Any]:

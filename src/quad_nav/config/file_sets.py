@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple
 
-from quad_nav.config import costmap_tables, tables
 from quad_nav.config.files import (
     OPTIONAL,
     REQUIRED,
@@ -26,10 +25,13 @@ from quad_nav.config.files import (
     top_level,
 )
 from quad_nav.config.planners import planner_keys
+from quad_nav.config.tables.costmap import COSTMAP_TABLE
+from quad_nav.config.tables.layers import INFLATION_LAYER_TABLE, OBSTACLE_LAYER_TABLE
+from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.errors import InputError
 
 _COSTMAPS = ("global_costmap", "local_costmap")
-_OF_NODE = {parameter.name for parameter in tables.NAVIGATOR.parameters} | {
+_OF_NODE = {parameter.name for parameter in MOVE_BASE_TABLE.parameters} | {
     "recovery_behaviors",
     *planner_keys({}),
     *_COSTMAPS,
@@ -37,9 +39,9 @@ _OF_NODE = {parameter.name for parameter in tables.NAVIGATOR.parameters} | {
 _OF_COSTMAP = {
     parameter.name
     for table in (
-        costmap_tables.COSTMAP,
-        costmap_tables.OBSTACLE_LAYER,
-        costmap_tables.INFLATION_LAYER,
+        COSTMAP_TABLE,
+        OBSTACLE_LAYER_TABLE,
+        INFLATION_LAYER_TABLE,
     )
     for parameter in table.parameters
 } | {"plugins", "map_type", "static_map"}

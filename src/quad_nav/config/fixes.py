@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, Mapping, Tuple, TypeVar, cast
 
 from quad_nav.config.reader import fields
-from quad_nav.config.spec import Parameter, Table, double, flag
+from quad_nav.config.spec import RESTORE_DEFAULTS, Parameter, Table, double, flag
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
@@ -188,7 +188,7 @@ _SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
 FIXES_TABLE = Table(
     reconfigurable=(
         *(parameter for parameter, _ in _SWITCHES),
-        flag("restore_defaults", False, "", "Restore to the original configuration."),
+        RESTORE_DEFAULTS,
     )
 )
 

@@ -5,11 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple
 
-from quad_nav.config import costmap_tables as tables
 from quad_nav.config.notes import CAUTION, Notes, join
 from quad_nav.config.plugins import LAYER, Parameters, PluginLayerParams, is_dotted, load_class
-from quad_nav.config.reader import Namespace, check_class, fields, inherited, settle, subtree
+from quad_nav.config.reader import Namespace, check_class, fields, inherited, normalise, subtree
 from quad_nav.config.spec import Table
+from quad_nav.config.tables.layers import (
+    ENABLED,
+    INFLATION_LAYER_TABLE,
+    OBSTACLE_LAYER_TABLE,
+    SOURCE_TABLE,
+    STATIC_LAYER_TABLE,
+    VOXEL_LAYER_TABLE,
+    VOXEL_PARAMETERS,
+)
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.observation import SourceParams
@@ -33,7 +41,7 @@ PARENT_PARAMETERS: Dict[str, Tuple[str, ...]] = {
         "lethal_cost_threshold",
         "track_unknown_space",
     ),
-    "costmap_2d::VoxelLayer": tables.VOXEL_PARAMETERS + _OBSTACLES,
+    "costmap_2d::VoxelLayer": VOXEL_PARAMETERS + _OBSTACLES,
     "costmap_2d::ObstacleLayer": _OBSTACLES,
     "costmap_2d::InflationLayer": ("cost_scaling_factor", "inflation_radius"),
 }
@@ -47,7 +55,7 @@ class LayerType:
     params: Callable[[Mapping[str, Any], str], LayerParams]
 
 
-def settle_layer(
+def normalise_layer(
     costmap: Namespace, costmap_path: str, name: str, layer_type: str, chain: Chain, notes: Notes
 ) -> None:
     """Brings one layer's namespace into the state in which the original leaves it.
@@ -58,11 +66,11 @@ def settle_layer(
     path = join(costmap_path, name)
     layer = subtree(costmap, name, costmap_path, notes)
     if layer_type not in LAYERS:
-        _settle_plugin(layer, path, costmap_path, name, layer_type, notes)
+        _normalise_plugin(layer, path, costmap_path, name, layer_type, notes)
         return
     table = LAYERS[layer_type].table
-    if table not in (tables.OBSTACLE_LAYER, tables.VOXEL_LAYER):
-        settle(layer, path, table, notes)
+    if table not in (OBSTACLE_LAYER_TABLE, VOXEL_LAYER_TABLE):
+        normalise(layer, path, table, notes)
         return
     sources = _source_names(layer)
     described = {key for key, value in layer.items() if isinstance(value, dict)}
@@ -73,15 +81,15 @@ def settle_layer(
             "looks like a source, and observation_sources does not name it: nothing reads it",
         )
     for source in sources:
-        _settle_source(layer, path, source, notes)
+        _normalise_source(layer, path, source, notes)
     _take_ranges_from_above(layer, path, chain, notes)
-    settle(layer, path, table, notes, also_known=described.union(sources))
+    normalise(layer, path, table, notes, also_known=described.union(sources))
 
 
 def layer_params(
     costmap: Mapping[str, Any], costmap_path: str, name: str, layer_type: str
 ) -> Optional[LayerParams]:
-    """The dataclass of a layer of a settled costmap; None for a type that is not here."""
+    """The dataclass of a layer of a normalised costmap; None for a type that is not here."""
     if layer_type in LAYERS:
         return LAYERS[layer_type].params(costmap, name)
     if not is_dotted(layer_type):
@@ -94,11 +102,11 @@ def layer_params(
     )
 
 
-def _settle_plugin(
+def _normalise_plugin(
     layer: Namespace, path: str, costmap_path: str, name: str, layer_type: str, notes: Notes
 ) -> None:
     """A layer of the user's knows its parameters itself, but for the switch that all have."""
-    settle(layer, path, Table(fixed=(tables.ENABLED,)), notes, also_known=layer)
+    normalise(layer, path, Table(fixed=(ENABLED,)), notes, also_known=layer)
     check_class(layer_type, LAYER, join(costmap_path, "plugins", name), notes)
 
 
@@ -107,17 +115,17 @@ def _source_names(layer: Mapping[str, Any]) -> List[str]:
     return names.split() if isinstance(names, str) else []
 
 
-def _settle_source(layer: Namespace, path: str, name: str, notes: Notes) -> None:
+def _normalise_source(layer: Namespace, path: str, name: str, notes: Notes) -> None:
     place = join(path, name)
     source = subtree(layer, name, path, notes)
-    settle(source, place, tables.SOURCE, notes)
+    normalise(source, place, SOURCE_TABLE, notes)
     data_type = source.get("data_type")
     if data_type is None:
         notes.remark(place, CAUTION, "no data_type: move_base listens for a PointCloud")
     elif isinstance(data_type, str) and data_type not in _DATA_TYPES:
         notes.problem(
             join(place, "data_type"),
-            f"{data_type!r} is no sensor's type; expected {tables.SOURCE['data_type'].expected}",
+            f"{data_type!r} is no sensor's type; expected {SOURCE_TABLE['data_type'].expected}",
         )
     period = source.get("expected_update_rate")
     if isinstance(period, float) and period > _LONG_PERIOD_S:
@@ -154,9 +162,9 @@ def _seeing(table: Table, params: Callable[..., ObstacleLayerParams]) -> LayerTy
 
 
 def _source_params(source: Mapping[str, Any], name: str) -> SourceParams:
-    arguments = fields(source, tables.SOURCE.parameters)
+    arguments = fields(source, SOURCE_TABLE.parameters)
     arguments["topic"] = arguments["topic"] or name
-    for parameter in tables.SOURCE.fixed:
+    for parameter in SOURCE_TABLE.fixed:
         if parameter.name in _RANGES:
             arguments[parameter.field] = source.get(parameter.name)
     return SourceParams(name=name, **arguments)
@@ -170,10 +178,10 @@ def _plain(table: Table, params: Callable[..., LayerParams]) -> LayerType:
 
 
 LAYERS: Dict[str, LayerType] = {
-    "costmap_2d::ObstacleLayer": _seeing(tables.OBSTACLE_LAYER, ObstacleLayerParams),
-    "costmap_2d::VoxelLayer": _seeing(tables.VOXEL_LAYER, VoxelLayerParams),
-    "costmap_2d::InflationLayer": _plain(tables.INFLATION_LAYER, InflationLayerParams),
-    "costmap_2d::StaticLayer": _plain(tables.STATIC_LAYER, StaticLayerParams),
+    "costmap_2d::ObstacleLayer": _seeing(OBSTACLE_LAYER_TABLE, ObstacleLayerParams),
+    "costmap_2d::VoxelLayer": _seeing(VOXEL_LAYER_TABLE, VoxelLayerParams),
+    "costmap_2d::InflationLayer": _plain(INFLATION_LAYER_TABLE, InflationLayerParams),
+    "costmap_2d::StaticLayer": _plain(STATIC_LAYER_TABLE, StaticLayerParams),
 }
 
 

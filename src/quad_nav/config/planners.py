@@ -9,9 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
-from quad_nav.config import global_planner_tables, tables
-from quad_nav.config.dwa_table import DWA_TABLE, LATCH, dwa_params, settle_dwa
 from quad_nav.config.fixes import with_fixes
+from quad_nav.config.local_planners import (
+    TRAJECTORY_PLANNER,
+    dwa_params,
+    normalise_dwa,
+    normalise_trajectory_planner,
+    trajectory_planner_params,
+)
 from quad_nav.config.notes import RENAMED, UNSUPPORTED, UNUSED, Notes
 from quad_nav.config.plugins import (
     GLOBAL_PLANNER,
@@ -23,13 +28,13 @@ from quad_nav.config.plugins import (
     load_class,
     plugin_name,
 )
-from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
+from quad_nav.config.reader import Namespace, check_class, fields, normalise, subtree
 from quad_nav.config.spec import Table
-from quad_nav.config.trajectory_planner_tree import (
-    TRAJECTORY_PLANNER,
-    settle_trajectory_planner,
-    trajectory_planner_params,
-)
+from quad_nav.config.tables.dwa_planner import DWA_TABLE, LATCH
+from quad_nav.config.tables.global_planners import CARROT_TABLE, GLOBAL_PLANNER_TABLE, NAVFN_TABLE
+from quad_nav.config.tables.move_base import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
+from quad_nav.config.tables.recoveries import ROTATE_FROM_PLANNER
+from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
 from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
@@ -43,13 +48,13 @@ DWA_PLANNER = "dwa_local_planner/DWAPlannerROS"
 class PlannerType:
     """One planner: its table, and what makes of the tree what the original makes of it.
 
-    ``settle`` brings the planner's namespace into the state in which the original
-    leaves it, ``params`` makes the dataclass of a settled tree. ``inherited`` are
+    ``normalise`` brings the planner's namespace into the state in which the original
+    leaves it, ``params`` makes the dataclass of a normalised tree. ``inherited`` are
     parameters that may stand at the node's own level as well.
     """
 
     table: Table
-    settle: Callable[[Namespace, Notes], None]
+    normalise: Callable[[Namespace, Notes], None]
     params: Callable[[Mapping[str, Any]], Any]
     inherited: Tuple[str, ...] = ()
 
@@ -59,24 +64,22 @@ def _plain(plugin: str, table: Table, params: Callable[..., Any]) -> PlannerType
     name = plugin_name(plugin)
     return PlannerType(
         table,
-        settle=lambda tree, notes: settle(subtree(tree, name, "", notes), name, table, notes),
+        normalise=lambda tree, notes: normalise(subtree(tree, name, "", notes), name, table, notes),
         params=lambda tree: params(**fields(tree.get(name, {}), table.parameters)),
     )
 
 
 # The first of each flies in the place of planners that are not here.
 GLOBAL_PLANNERS: Dict[str, PlannerType] = {
-    tables.GLOBAL_PLANNER: _plain(tables.GLOBAL_PLANNER, tables.NAVFN, NavfnParams),
-    SEARCH_PLANNER: _plain(
-        SEARCH_PLANNER, global_planner_tables.SEARCH_PLANNER, SearchPlannerParams
-    ),
-    CARROT: _plain(CARROT, global_planner_tables.CARROT, CarrotParams),
+    DEFAULT_GLOBAL_PLANNER: _plain(DEFAULT_GLOBAL_PLANNER, NAVFN_TABLE, NavfnParams),
+    SEARCH_PLANNER: _plain(SEARCH_PLANNER, GLOBAL_PLANNER_TABLE, SearchPlannerParams),
+    CARROT: _plain(CARROT, CARROT_TABLE, CarrotParams),
 }
 LOCAL_PLANNERS: Dict[str, PlannerType] = {
-    tables.LOCAL_PLANNER: PlannerType(
-        tables.TRAJECTORY_PLANNER, settle_trajectory_planner, trajectory_planner_params
+    DEFAULT_LOCAL_PLANNER: PlannerType(
+        TRAJECTORY_PLANNER_TABLE, normalise_trajectory_planner, trajectory_planner_params
     ),
-    DWA_PLANNER: PlannerType(DWA_TABLE, settle_dwa, dwa_params, inherited=(LATCH.name,)),
+    DWA_PLANNER: PlannerType(DWA_TABLE, normalise_dwa, dwa_params, inherited=(LATCH.name,)),
 }
 
 
@@ -109,7 +112,7 @@ def planner_keys(tree: Mapping[str, Any]) -> List[str]:
     return keys
 
 
-def settle_planner_names(tree: Namespace, notes: Notes) -> None:
+def normalise_planner_names(tree: Namespace, notes: Notes) -> None:
     """Replaces planners that do not fly here by those that do, and says so."""
     for key, slot in SLOTS.items():
         name = tree.get(key)
@@ -128,31 +131,31 @@ def settle_planner_names(tree: Namespace, notes: Notes) -> None:
             )
 
 
-def settle_planners(tree: Namespace, notes: Notes) -> None:
+def normalise_planners(tree: Namespace, notes: Notes) -> None:
     """Brings the chosen planners' namespaces into the state in which the original leaves them."""
     chosen = {plugin_name(tree[key]): key for key in SLOTS if isinstance(tree[key], str)}
     for name, key in chosen.items():
         own = planner_type(tree, key)
         if own is not None:
-            own.settle(tree, notes)
+            own.normalise(tree, notes)
         else:  # a user's planner knows its parameters itself
             subtree(tree, name, "", notes)
     flyable = {plugin_name(name): key for key, slot in SLOTS.items() for name in slot.types}
     for name in [name for name in tree if name not in chosen]:
         if name in flyable:
             key = flyable[name]
-            _settle_unused(tree, name, f"unused: {key} is {tree[key]}", notes)
+            _normalise_unused(tree, name, f"unused: {key} is {tree[key]}", notes)
         elif name in _OTHER_PLANNERS:
             notes.remark(name, UNSUPPORTED, "no such planner flies here, nothing below is read")
 
 
 def planner_type(tree: Mapping[str, Any], key: str) -> Optional[PlannerType]:
-    """The type of the planner that a settled tree names, None for a user's."""
+    """The type of the planner that a normalised tree names, None for a user's."""
     return SLOTS[key].types.get(tree[key])
 
 
 def planner_params(tree: Mapping[str, Any], key: str) -> Any:
-    """The dataclass of the planner that a settled tree names, or the user's ``Plugin``."""
+    """The dataclass of the planner that a normalised tree names, or the user's ``Plugin``."""
     own = planner_type(tree, key)
     if own is not None:
         return with_fixes(own.params(tree), tree)
@@ -189,9 +192,9 @@ def local_planner_period_s(tree: Mapping[str, Any]) -> float:
     return 1.0 / rate_hz if rate_hz > 0.0 else 1.0 / _DEFAULT_RATE_HZ
 
 
-def _settle_unused(tree: Namespace, name: str, reason: str, notes: Notes) -> None:
+def _normalise_unused(tree: Namespace, name: str, reason: str, notes: Notes) -> None:
     if name == TRAJECTORY_PLANNER:
         planner = subtree(tree, name, "", notes)
-        settle(planner, name, Table(fixed=tables.ROTATE_FROM_PLANNER), notes, also_known=planner)
+        normalise(planner, name, Table(fixed=ROTATE_FROM_PLANNER), notes, also_known=planner)
         reason += "; recoveries that turn take its limits all the same"
     notes.remark(name, UNUSED, reason)

@@ -1,8 +1,8 @@
 """Checks one namespace of a parameter tree against its table.
 
-``settle`` brings a namespace into the state in which the original leaves it on
+``normalise`` brings a namespace into the state in which the original leaves it on
 the parameter server: types made right, ranges clamped, reconfigurable
-parameters all present. Dataclasses are then made from settled namespaces, where
+parameters all present. Dataclasses are then made from normalised namespaces, where
 nothing can be wrong any more.
 """
 
@@ -18,7 +18,7 @@ from quad_nav.errors import InputError
 Namespace = Dict[str, Any]
 
 
-def settle(
+def normalise(
     namespace: Namespace, path: str, table: Table, notes: Notes, also_known: Iterable[str] = ()
 ) -> None:
     """Checks and completes a namespace in place; faults and remarks go to ``notes``.
@@ -29,13 +29,13 @@ def settle(
     """
     for parameter in table.parameters:
         if parameter.name in namespace:
-            _settle_value(namespace, path, parameter, notes)
+            _normalise_value(namespace, path, parameter, notes)
     for parameter in table.reconfigurable:
         namespace.setdefault(parameter.name, parameter.default)
     _remark_on_other_keys(namespace, path, table, notes, also_known)
 
 
-def _settle_value(namespace: Namespace, path: str, parameter: Parameter, notes: Notes) -> None:
+def _normalise_value(namespace: Namespace, path: str, parameter: Parameter, notes: Notes) -> None:
     given = namespace[parameter.name]
     place = join(path, parameter.name)
     try:
@@ -72,7 +72,7 @@ def _remark_on_other_keys(
 def fields(
     namespace: Mapping[str, Any], parameters: Iterable[Parameter], given: Iterable[str] = ()
 ) -> Dict[str, Any]:
-    """Arguments of a dataclass from a settled namespace.
+    """Arguments of a dataclass from a normalised namespace.
 
     A parameter with a value of its own until the first reconfiguration has that
     one, unless its name is in ``given``.

@@ -6,15 +6,20 @@ import copy
 from dataclasses import replace
 from typing import Any, Dict, List, Mapping, Tuple
 
-from quad_nav.config import costmap_tables, tables
-from quad_nav.config.configuration import COSTMAPS, Configuration, navigator_params
+from quad_nav.config.configuration import (
+    COSTMAPS,
+    Configuration,
+    navigator_params,
+    workload_problems,
+)
 from quad_nav.config.costmaps import costmap_params
 from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
 from quad_nav.config.layers import layer_tables
 from quad_nav.config.notes import join
 from quad_nav.config.planners import SLOTS, planner_params, reconfigurable_planners
 from quad_nav.config.spec import InvalidValue, Parameter
-from quad_nav.config.workload import workload_problems
+from quad_nav.config.tables.costmap import COSTMAP_TABLE
+from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.errors import InputError
 
 _GROUPS = "groups"  # dynamic_reconfigure's own bookkeeping among the values
@@ -26,9 +31,9 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
 
     Namespaces are relative to the node: "" is move_base itself.
     """
-    namespaces = {"": tables.NAVIGATOR, **reconfigurable_planners(configuration.tree)}
+    namespaces = {"": MOVE_BASE_TABLE, **reconfigurable_planners(configuration.tree)}
     for costmap in COSTMAPS:
-        namespaces[costmap] = costmap_tables.COSTMAP
+        namespaces[costmap] = COSTMAP_TABLE
         for layer, table in layer_tables(configuration.tree[costmap]["plugins"]).items():
             namespaces[join(costmap, layer)] = table
     namespaces[FIXES] = FIXES_TABLE
@@ -37,9 +42,9 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
 
 def values(configuration: Configuration, namespace: str) -> Dict[str, Any]:
     """The ROS values in force of a namespace's reconfigurable parameters."""
-    settled = _below(configuration.tree, namespace)
+    normalised = _below(configuration.tree, namespace)
     return {
-        parameter.name: settled[parameter.name]
+        parameter.name: normalised[parameter.name]
         for parameter in reconfigurable(configuration)[namespace]
     }
 

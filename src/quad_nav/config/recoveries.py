@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
-from quad_nav.config import tables
-from quad_nav.config.costmap_tables import COSTMAP
 from quad_nav.config.fixes import with_fixes
+from quad_nav.config.local_planners import TRAJECTORY_PLANNER
 from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
-from quad_nav.config.reader import Namespace, check_class, fields, settle, subtree
+from quad_nav.config.reader import Namespace, check_class, fields, normalise, subtree
 from quad_nav.config.spec import Table
 from quad_nav.config.speed_limits import check_slow, slow_params
-from quad_nav.config.trajectory_planner_tree import TRAJECTORY_PLANNER
+from quad_nav.config.tables.costmap import COSTMAP_TABLE
+from quad_nav.config.tables.recoveries import (
+    CLEAR_COSTMAP_TABLE,
+    MOVE_SLOW_TABLE,
+    ROTATE_FROM_PLANNER,
+    ROTATE_TABLE,
+)
 from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
 
 RecoveryParams = Union[ClearCostmapParams, RotateParams, MoveSlowAndClearParams, Plugin]
@@ -22,15 +27,15 @@ CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
 ROTATE = "rotate_recovery/RotateRecovery"
 MOVE_SLOW = "move_slow_and_clear/MoveSlowAndClear"
 TABLES: Dict[str, Table] = {
-    CLEAR: tables.CLEAR_COSTMAP,
-    ROTATE: tables.ROTATE,
-    MOVE_SLOW: tables.MOVE_SLOW,
+    CLEAR: CLEAR_COSTMAP_TABLE,
+    ROTATE: ROTATE_TABLE,
+    MOVE_SLOW: MOVE_SLOW_TABLE,
 }
 _CONSERVATIVE, _AGGRESSIVE, _ROTATE = "conservative_reset", "aggressive_reset", "rotate_recovery"
 _AFFECTED_MAPS = ("local", "global", "both")
 
 
-def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
+def normalise_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
     """Brings the recoveries' namespaces into the state in which the original leaves them.
 
     Returns:
@@ -38,7 +43,7 @@ def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
     """
     listed = _listed(tree, notes)
     if listed is None:
-        _settle_default_distances(tree, notes)
+        _normalise_default_distances(tree, notes)
     for name, kind in dict(listed or _default_sequence(tree)).items():
         # The behaviours of the default sequence need no namespace, and leave none.
         if name not in tree and listed is None:
@@ -47,7 +52,7 @@ def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         if kind not in TABLES:
             continue  # a behaviour of the user's knows its parameters itself
         layers = ("layer_names",) if kind == CLEAR else ()
-        settle(namespace, name, TABLES[kind], notes, also_known=layers)
+        normalise(namespace, name, TABLES[kind], notes, also_known=layers)
         if kind == CLEAR:
             _check_clearing(namespace, name, notes)
         elif kind == MOVE_SLOW:
@@ -58,7 +63,7 @@ def settle_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
 def recoveries(
     tree: Mapping[str, Any], listed: Optional[NamedTypes]
 ) -> Tuple[Tuple[str, RecoveryParams], ...]:
-    """(name, parameters) in the order in which they are tried, of a settled tree."""
+    """(name, parameters) in the order in which they are tried, of a normalised tree."""
     sequence = _default_sequence(tree) if listed is None else listed
     return tuple((name, with_fixes(_params(name, kind, tree), tree)) for name, kind in sequence)
 
@@ -66,7 +71,7 @@ def recoveries(
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
     """move_base takes it from a parameter of its own, not from the footprint."""
     costmap = tree["local_costmap"]
-    return costmap.get("circumscribed_radius", COSTMAP["circumscribed_radius"].default)
+    return costmap.get("circumscribed_radius", COSTMAP_TABLE["circumscribed_radius"].default)
 
 
 def _default_sequence(tree: Mapping[str, Any]) -> NamedTypes:
@@ -76,7 +81,7 @@ def _default_sequence(tree: Mapping[str, Any]) -> NamedTypes:
     return ((_CONSERVATIVE, CLEAR), *rotation, (_AGGRESSIVE, CLEAR), *rotation)
 
 
-def _settle_default_distances(tree: Namespace, notes: Notes) -> None:
+def _normalise_default_distances(tree: Namespace, notes: Notes) -> None:
     """The original writes these two over whatever is there."""
     radius_m = circumscribed_radius_m(tree)
     if not isinstance(radius_m, float):
@@ -151,7 +156,7 @@ def full_type(kind: str) -> str:
 def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
     maps = namespace.get("affected_maps", "both")
     if isinstance(maps, str) and maps not in _AFFECTED_MAPS:
-        expected = tables.CLEAR_COSTMAP["affected_maps"].expected
+        expected = CLEAR_COSTMAP_TABLE["affected_maps"].expected
         notes.problem(join(name, "affected_maps"), f"{maps!r} is no choice; expected {expected}")
     layers = namespace.get("layer_names", [])
     if not isinstance(layers, list) or not all(isinstance(layer, str) for layer in layers):
@@ -176,11 +181,11 @@ def _clear_params(namespace: Mapping[str, Any]) -> ClearCostmapParams:
     names = namespace.get("layer_names")
     return ClearCostmapParams(
         layer_names=None if names is None else tuple(names),
-        **fields(namespace, tables.CLEAR_COSTMAP.parameters),
+        **fields(namespace, CLEAR_COSTMAP_TABLE.parameters),
     )
 
 
 def _rotate_params(namespace: Mapping[str, Any], planner: Mapping[str, Any]) -> RotateParams:
     return RotateParams(
-        **fields(namespace, tables.ROTATE.parameters), **fields(planner, tables.ROTATE_FROM_PLANNER)
+        **fields(namespace, ROTATE_TABLE.parameters), **fields(planner, ROTATE_FROM_PLANNER)
     )

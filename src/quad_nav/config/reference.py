@@ -7,10 +7,25 @@ from __future__ import annotations
 
 from typing import Iterable, List, Tuple
 
-from quad_nav.config import costmap_tables, global_planner_tables, tables
-from quad_nav.config.dwa_table import DWA_TABLE
 from quad_nav.config.fixes import FIXES_TABLE
 from quad_nav.config.spec import Parameter, Table
+from quad_nav.config.tables.costmap import COSTMAP_TABLE
+from quad_nav.config.tables.dwa_planner import DWA_TABLE
+from quad_nav.config.tables.global_planners import CARROT_TABLE, GLOBAL_PLANNER_TABLE, NAVFN_TABLE
+from quad_nav.config.tables.layers import (
+    INFLATION_LAYER_TABLE,
+    OBSTACLE_LAYER_TABLE,
+    SOURCE_TABLE,
+    STATIC_LAYER_TABLE,
+    VOXEL_LAYER_TABLE,
+)
+from quad_nav.config.tables.move_base import (
+    DEFAULT_GLOBAL_PLANNER,
+    DEFAULT_LOCAL_PLANNER,
+    MOVE_BASE_TABLE,
+)
+from quad_nav.config.tables.recoveries import CLEAR_COSTMAP_TABLE, MOVE_SLOW_TABLE, ROTATE_TABLE
+from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
 
 _HEAD = """# Parameters
 
@@ -65,57 +80,57 @@ def reference() -> str:
 
 
 def _sections() -> Iterable[Tuple[str, str, Table]]:
-    yield "move_base", "At the node's level.", tables.NAVIGATOR
+    yield "move_base", "At the node's level.", MOVE_BASE_TABLE
     yield (
         "TrajectoryPlannerROS",
-        f"The local planner `{tables.LOCAL_PLANNER}`.",
-        tables.TRAJECTORY_PLANNER,
+        f"The local planner `{DEFAULT_LOCAL_PLANNER}`.",
+        TRAJECTORY_PLANNER_TABLE,
     )
     yield "DWAPlannerROS", "The local planner `dwa_local_planner/DWAPlannerROS`.", DWA_TABLE
-    yield "NavfnROS", f"The global planner `{tables.GLOBAL_PLANNER}`.", tables.NAVFN
+    yield "NavfnROS", f"The global planner `{DEFAULT_GLOBAL_PLANNER}`.", NAVFN_TABLE
     yield (
         "GlobalPlanner",
         "The global planner `global_planner/GlobalPlanner`.",
-        global_planner_tables.SEARCH_PLANNER,
+        GLOBAL_PLANNER_TABLE,
     )
     yield (
         "CarrotPlanner",
         "The global planner `carrot_planner/CarrotPlanner`: straight for the goal.",
-        global_planner_tables.CARROT,
+        CARROT_TABLE,
     )
     yield (
         "fixes",
         "[Upstream bugs](upstream_bugs.md) that are fixed by default, and how to restore each.",
         FIXES_TABLE,
     )
-    yield "Costmaps", "Below `global_costmap` and `local_costmap`.", costmap_tables.COSTMAP
-    yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", costmap_tables.OBSTACLE_LAYER)
-    yield ("Voxel layer", "`costmap_2d::VoxelLayer`.", costmap_tables.VOXEL_LAYER)
+    yield "Costmaps", "Below `global_costmap` and `local_costmap`.", COSTMAP_TABLE
+    yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", OBSTACLE_LAYER_TABLE)
+    yield ("Voxel layer", "`costmap_2d::VoxelLayer`.", VOXEL_LAYER_TABLE)
     yield (
         "Sources",
         "Each name in `observation_sources` is a namespace below the layer.",
-        costmap_tables.SOURCE,
+        SOURCE_TABLE,
     )
-    yield ("Inflation layer", "`costmap_2d::InflationLayer`.", costmap_tables.INFLATION_LAYER)
-    yield "Static layer", "`costmap_2d::StaticLayer`.", costmap_tables.STATIC_LAYER
+    yield ("Inflation layer", "`costmap_2d::InflationLayer`.", INFLATION_LAYER_TABLE)
+    yield "Static layer", "`costmap_2d::StaticLayer`.", STATIC_LAYER_TABLE
     yield (
         "Clearing",
         "`clear_costmap_recovery/ClearCostmapRecovery`, below the behaviour's name."
         " `layer_names` lists the layers that are cleared; the obstacle layers when unset.",
-        tables.CLEAR_COSTMAP,
+        CLEAR_COSTMAP_TABLE,
     )
     yield (
         "Turning",
         "`rotate_recovery/RotateRecovery`, below the behaviour's name. Speeds and"
         " accelerations are those of TrajectoryPlannerROS.",
-        tables.ROTATE,
+        ROTATE_TABLE,
     )
     yield (
         "Going slowly",
         "`move_slow_and_clear/MoveSlowAndClear`, below the behaviour's name. It"
         " frees the obstacle layers around the robot and limits the local planner's speeds,"
         " forwards, backwards and turning, until the robot has moved away.",
-        tables.MOVE_SLOW,
+        MOVE_SLOW_TABLE,
     )
 
 

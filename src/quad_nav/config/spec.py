@@ -190,6 +190,9 @@ def text(
     return Parameter(name, "str", default, field, description, expected, **more)
 
 
+RESTORE_DEFAULTS = flag("restore_defaults", False, "", "Restore to the original configuration.")
+
+
 def _hint(value: Any) -> str:
     """YAML 1.1 takes 1e-3 for a text: say so, it looks like a number."""
     if not isinstance(value, str):

@@ -11,13 +11,15 @@ import difflib
 from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Optional, Tuple
 
-from quad_nav.config import tables
-from quad_nav.config.dwa_table import DWA_TABLE
 from quad_nav.config.notes import CAUTION, Notes, join
 from quad_nav.config.planners import DWA_PLANNER
 from quad_nav.config.plugins import plugin_name
 from quad_nav.config.reader import fields
 from quad_nav.config.spec import Table
+from quad_nav.config.tables.dwa_planner import DWA_TABLE
+from quad_nav.config.tables.move_base import DEFAULT_LOCAL_PLANNER
+from quad_nav.config.tables.recoveries import MOVE_SLOW_TABLE
+from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
 from quad_nav.recovery import MoveSlowAndClearParams
 
 
@@ -41,8 +43,8 @@ class Speeds:
 
 # A user's planner is not among them: it has no parameters that change.
 SPEEDS: Dict[str, Speeds] = {
-    tables.LOCAL_PLANNER: Speeds(
-        tables.TRAJECTORY_PLANNER,
+    DEFAULT_LOCAL_PLANNER: Speeds(
+        TRAJECTORY_PLANNER_TABLE,
         translation=("max_vel_x", "min_vel_x", "escape_vel"),
         rotation=("max_vel_theta", "min_vel_theta", "min_in_place_vel_theta", "max_rotational_vel"),
     ),
@@ -87,7 +89,7 @@ def check_slow(namespace: Mapping[str, Any], name: str, planner: str, notes: Not
 
 
 def slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearParams:
-    """The dataclass of a settled namespace."""
+    """The dataclass of a normalised namespace."""
     speeds: Optional[Speeds] = SPEEDS.get(planner)
 
     def limited(names: Tuple[str, ...], key: str) -> Tuple[str, ...]:
@@ -99,5 +101,5 @@ def slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearP
     return MoveSlowAndClearParams(
         translation_fields=limited(speeds.translation if speeds else (), "max_trans_param_name"),
         rotation_fields=limited(speeds.rotation if speeds else (), "max_rot_param_name"),
-        **fields(namespace, tables.MOVE_SLOW.parameters),
+        **fields(namespace, MOVE_SLOW_TABLE.parameters),
     )

@@ -1,42 +1,39 @@
-"""Values that are legal one by one and together ask for more than any machine has.
+"""Limits on what a configuration makes a machine compute.
 
-Sliders of rqt_reconfigure reach to 2147483647 samples and metres, as in the
-original, which then runs out of memory or comes to a stand.
+Values that are legal one by one can together need more memory or time than any machine has. The
+sliders of rqt_reconfigure reach to 2147483647 samples and metres; with such values upstream
+move_base runs out of memory or stops reacting.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Iterator, Tuple
+from typing import Any, Tuple
 
-from quad_nav.config.plugins import plugin_name
 from quad_nav.control.dwa_planner import DwaParams
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.layered import CostmapParams
 
-if TYPE_CHECKING:
-    from quad_nav.config.configuration import Configuration
-
-MOST_CELLS = 10**8  # of one costmap: some GB with its layers and the planner's potential
-MOST_POINTS = 10**8  # of the trajectories in one control period: some seconds
+MOST_CELLS = 10**8  # of one costmap: some GB, with its layers and the planner's potential
+MOST_POINTS = 10**8  # of all trajectories in one control period: some seconds
 
 
 def size_problem(params: CostmapParams) -> str:
-    """Why no grid can be made of this size, "" when one can."""
+    """Return the reason why a costmap of this size is refused, "" if it is accepted."""
     columns = params.width_m / params.resolution_m
     rows = params.height_m / params.resolution_m
     if min(columns, rows) >= 1.0 and columns * rows <= MOST_CELLS:
         return ""
     return (
-        f"{params.width_m:.15g} x {params.height_m:.15g} m cannot be in cells of"
-        f" {params.resolution_m:g} m; expected 1 to {MOST_CELLS} cells"
+        f"{params.width_m:.15g} x {params.height_m:.15g} m with cells of {params.resolution_m:g} m"
+        f" is not supported; expected 1 to {MOST_CELLS} cells"
     )
 
 
 def rollout_problem(params: Any) -> str:
-    """Why a local planner cannot look at so many trajectories, "" when it can.
+    """Return the reason why a local planner's trajectories are refused, "" if they are accepted.
 
-    A trajectory has a point every ``sim_granularity`` or ``angular_sim_granularity``,
-    whichever are more. A user's planner answers for itself.
+    A trajectory has a point every ``sim_granularity`` or ``angular_sim_granularity``, whichever
+    gives more points. Planners of users are not checked.
     """
     if not isinstance(params, (DwaParams, TrajectoryPlannerParams)):
         return ""
@@ -50,21 +47,9 @@ def rollout_problem(params: Any) -> str:
         return ""
     return (
         f"{samples} trajectories of up to {points:.3g} points are too many; expected at"
-        f" most {MOST_POINTS} points altogether: fewer samples, less sim_time or speed, or a"
-        " coarser granularity"
+        f" most {MOST_POINTS} points in total (use fewer samples, a shorter sim_time, a lower"
+        " speed or a coarser granularity)"
     )
-
-
-def workload_problems(configuration: Configuration) -> Iterator[Tuple[str, str]]:
-    """(namespace, problem) of what the configuration cannot be flown with."""
-    found = {
-        "global_costmap": size_problem(configuration.global_costmap),
-        "local_costmap": size_problem(configuration.local_costmap),
-        plugin_name(configuration.navigator.base_local_planner): rollout_problem(
-            configuration.local_planner
-        ),
-    }
-    return ((name, problem) for name, problem in found.items() if problem)
 
 
 def _samples_and_speed(params: Any) -> Tuple[int, float]:

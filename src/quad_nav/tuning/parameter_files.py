@@ -44,7 +44,7 @@ def base_configuration(
 
 
 def base_value(tree: Mapping[str, Any], path: str) -> Any:
-    """The value in force in a settled tree, None when there is none.
+    """The value in force in a normalised tree, None when there is none.
 
     A costmap's own key may have moved into the layer that reads it.
     """

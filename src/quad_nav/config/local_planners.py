@@ -1,16 +1,20 @@
-"""The tree of TrajectoryPlannerROS: old names, and what is odd about its parameters."""
+"""Namespaces of the local planners: old names, remarks, and the dataclasses that they fill."""
 
 from __future__ import annotations
 
 from typing import Any, Dict, Mapping
 
-from quad_nav.config import tables
 from quad_nav.config.fixes import FIXES
 from quad_nav.config.notes import CAUTION, IGNORED, RENAMED, Notes, join
-from quad_nav.config.reader import Namespace, fields, settle, subtree
+from quad_nav.config.reader import Namespace, fields, normalise, subtree
+from quad_nav.config.spec import InvalidValue
+from quad_nav.config.tables.dwa_planner import DWA_TABLE, LATCH
+from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
+from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 
 TRAJECTORY_PLANNER = "TrajectoryPlannerROS"
+DWA_PLANNER = "DWAPlannerROS"
 
 _RENAMED: Dict[str, str] = {
     "pdist_scale": "path_distance_bias",
@@ -19,13 +23,13 @@ _RENAMED: Dict[str, str] = {
 }
 
 
-def settle_trajectory_planner(tree: Namespace, notes: Notes) -> None:
+def normalise_trajectory_planner(tree: Namespace, notes: Notes) -> None:
     """Brings the planner's namespace into the state in which the original leaves it."""
     planner = subtree(tree, TRAJECTORY_PLANNER, "", notes)
     for old, new in _RENAMED.items():
         if old in planner:
             _take_old_name(planner, old, new, notes)
-    settle(planner, TRAJECTORY_PLANNER, tables.TRAJECTORY_PLANNER, notes, also_known=_RENAMED)
+    normalise(planner, TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE, notes, also_known=_RENAMED)
     if planner.get("meter_scoring") is False and not _is_respected(tree):
         notes.remark(
             join(TRAJECTORY_PLANNER, "meter_scoring"),
@@ -46,9 +50,9 @@ def _is_respected(tree: Namespace) -> bool:
 
 
 def trajectory_planner_params(tree: Mapping[str, Any]) -> TrajectoryPlannerParams:
-    """The dataclass of a settled tree."""
+    """The dataclass of a normalised tree."""
     return TrajectoryPlannerParams(
-        **fields(tree[TRAJECTORY_PLANNER], tables.TRAJECTORY_PLANNER.parameters)
+        **fields(tree[TRAJECTORY_PLANNER], TRAJECTORY_PLANNER_TABLE.parameters)
     )
 
 
@@ -60,3 +64,28 @@ def _take_old_name(planner: Namespace, old: str, new: str, notes: Notes) -> None
     planner[new] = planner[old]
     notes.moved(join(TRAJECTORY_PLANNER, new), place)
     notes.remark(place, RENAMED, f"called {new} today")
+
+
+def normalise_dwa(tree: Namespace, notes: Notes) -> None:
+    """Brings the planner's namespace into the state in which the original leaves it."""
+    planner = subtree(tree, DWA_PLANNER, "", notes)
+    normalise(planner, DWA_PLANNER, DWA_TABLE, notes)
+    if LATCH.name in tree:
+        try:
+            LATCH.check(tree[LATCH.name])
+        except InvalidValue as problem:
+            notes.problem(LATCH.name, str(problem))
+    if planner["occdist_scale"] == 0.0:
+        notes.remark(
+            join(DWA_PLANNER, "occdist_scale"),
+            CAUTION,
+            "with 0 move_base looks at no obstacles: the robot may fly into them",
+        )
+
+
+def dwa_params(tree: Mapping[str, Any]) -> DwaParams:
+    """The dataclass of a normalised tree."""
+    arguments = fields(tree[DWA_PLANNER], DWA_TABLE.parameters)
+    if LATCH.name not in tree[DWA_PLANNER]:
+        arguments[LATCH.field] = tree.get(LATCH.name, LATCH.default)
+    return DwaParams(**arguments)

@@ -1,8 +1,4 @@
-"""The parameters of the global planners beside navfn, as the original has them in force.
-
-Ranges and order of the reconfigurable ones are those of GlobalPlanner's
-dynamic_reconfigure description.
-"""
+"""Parameters of the global planners."""
 
 from __future__ import annotations
 
@@ -11,6 +7,23 @@ from quad_nav.plan.orientations import OrientationMode
 
 _ANY = Domain.ANY
 _UNUSED = "the original reads it and never uses it"
+
+
+NAVFN_TABLE = Table(
+    fixed=(
+        flag("allow_unknown", True, "allow_unknown", "Plans may cross unknown space."),
+        double(
+            "default_tolerance",
+            0.0,
+            "default_tolerance_m",
+            "metres",
+            "How far from the goal a plan may end.",
+        ),
+        flag("visualize_potential", False, "visualize_potential", "Publish the potential."),
+        double("planner_window_x", 0.0, "planner_window_x_m", "metres", "Read and never used."),
+        double("planner_window_y", 0.0, "planner_window_y_m", "metres", "Read and never used."),
+    )
+)
 
 
 def _mode(mode: OrientationMode, name: str, description: str) -> Choice:
@@ -51,7 +64,8 @@ _ORIENTATIONS = (
     ),
 )
 
-SEARCH_PLANNER = Table(
+
+GLOBAL_PLANNER_TABLE = Table(
     reconfigurable=(
         integer("lethal_cost", 253, "lethal_cost", "", "Lethal Cost", _ANY, 1, 255),
         integer("neutral_cost", 50, "neutral_cost", "", "Neutral Cost", _ANY, 1, 255),
@@ -137,4 +151,5 @@ SEARCH_PLANNER = Table(
     ),
 )
 
-CARROT = Table(ignored=(("step_size", _UNUSED), ("min_dist_from_robot", _UNUSED)))
+
+CARROT_TABLE = Table(ignored=(("step_size", _UNUSED), ("min_dist_from_robot", _UNUSED)))

@@ -1,21 +1,15 @@
-"""The tree of DWAPlannerROS, as the original has it in force.
+"""Parameters of ``DWAPlannerROS``.
 
-Defaults, ranges and the order are those of the original's dynamic_reconfigure
-description (DWAPlanner). The names that it had before ROS Melodic are warned
-about and not read, in the original as here.
+The planner warns about the names that it had before ROS Melodic and does not read them, upstream as
+here.
 """
 
 from __future__ import annotations
 
-from typing import Any, Mapping
+from quad_nav.config.spec import RESTORE_DEFAULTS, Domain, Table, double, flag, integer, text
 
-from quad_nav.config.notes import CAUTION, Notes, join
-from quad_nav.config.reader import Namespace, fields, settle, subtree
-from quad_nav.config.spec import Domain, InvalidValue, Table, double, flag, integer, text
-from quad_nav.control.dwa_planner import DwaParams
-
-DWA_PLANNER = "DWAPlannerROS"
 _ANY, _POSITIVE = Domain.ANY, Domain.POSITIVE
+
 
 # Read from the planner's namespace or, as the original does, from the node's own level.
 LATCH = flag(
@@ -24,6 +18,7 @@ LATCH = flag(
     "latch_xy_goal_tolerance",
     "Once at the goal, only turn, even if the turn takes the robot off it.",
 )
+
 
 _LIMITS = (
     double(
@@ -128,6 +123,7 @@ _LIMITS = (
     ),
 )
 
+
 _GOAL = (
     flag(
         "prune_plan",
@@ -165,6 +161,7 @@ _GOAL = (
     ),
 )
 
+
 _SIMULATION = (
     double(
         "sim_time",
@@ -194,6 +191,7 @@ _SIMULATION = (
         0,
     ),
 )
+
 
 _SCORING = (
     double(
@@ -281,6 +279,7 @@ _SCORING = (
     ),
 )
 
+
 _SAMPLES = (
     integer(
         "vx_samples",
@@ -315,8 +314,9 @@ _SAMPLES = (
         "use_dwa",
         "Use dynamic window approach to constrain sampling velocities to small window.",
     ),
-    flag("restore_defaults", False, "", "Restore to the original configuration."),
+    RESTORE_DEFAULTS,
 )
+
 
 DWA_TABLE = Table(
     reconfigurable=_LIMITS + _GOAL + _SIMULATION + _SCORING + _SAMPLES,
@@ -382,28 +382,3 @@ DWA_TABLE = Table(
         ("penalize_negative_x", "the original has no such critic any more"),
     ),
 )
-
-
-def settle_dwa(tree: Namespace, notes: Notes) -> None:
-    """Brings the planner's namespace into the state in which the original leaves it."""
-    planner = subtree(tree, DWA_PLANNER, "", notes)
-    settle(planner, DWA_PLANNER, DWA_TABLE, notes)
-    if LATCH.name in tree:
-        try:
-            LATCH.check(tree[LATCH.name])
-        except InvalidValue as problem:
-            notes.problem(LATCH.name, str(problem))
-    if planner["occdist_scale"] == 0.0:
-        notes.remark(
-            join(DWA_PLANNER, "occdist_scale"),
-            CAUTION,
-            "with 0 move_base looks at no obstacles: the robot may fly into them",
-        )
-
-
-def dwa_params(tree: Mapping[str, Any]) -> DwaParams:
-    """The dataclass of a settled tree."""
-    arguments = fields(tree[DWA_PLANNER], DWA_TABLE.parameters)
-    if LATCH.name not in tree[DWA_PLANNER]:
-        arguments[LATCH.field] = tree.get(LATCH.name, LATCH.default)
-    return DwaParams(**arguments)
