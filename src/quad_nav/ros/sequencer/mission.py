@@ -1,7 +1,7 @@
-"""A mission: all quadcopters' sequencers between their topics, one log and one journal.
+"""Run a mission: the sequencers of all quadcopters, one flight log and one journal.
 
-One loop takes what the topics brought and ticks each quadcopter's sequencer; one lock
-guards the flight log against contacts, which come in a thread of rospy's.
+One loop reads the messages and ticks each quadcopter's sequencer. One lock guards the flight log
+against contacts, which arrive in a thread of rospy.
 """
 
 from __future__ import annotations
@@ -26,36 +26,41 @@ from quad_nav.ros.common.diagnostics import DiagnosticsTopic
 from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.ros.common.readiness import Need
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress
+from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress_message
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.ros.sequencer.setup import MissionSetup
-from quad_nav.topics.flight_info import FLIGHT_TOPIC, mission_info, to_text
+from quad_nav.topics.flight_info import CONTACT_STATUS, FLIGHT_TOPIC, mission_info, to_text
 from quad_nav.topics.markers import goal_markers
 
 START_SERVICE = "/simulation/start"
-WAIT_S = 0.2  # wall time, as the next: how soon it is seen that the node shall end
-GATHER_S = 0.02  # odometry of one instant comes in as many messages as there are quadcopters
+WAIT_S = 0.2  # wall time, as the next; longest delay until the node notices a shutdown
+GATHER_S = 0.02  # odometry of one time arrives in one message per quadcopter
 
 
 class MissionRunner:
-    """All quadcopters' flights.
+    """The flights of all quadcopters."""
 
-    ``again`` says that a sequencer of this very flight has died. Raises InputError for a
-    journal that cannot be used.
-    """
+    def __init__(self, setup: MissionSetup, respawned: bool = False) -> None:
+        """Connect to all topics, and read the journal to resume a mission.
 
-    def __init__(self, setup: MissionSetup, again: bool = False) -> None:
-        self._setup, self._again = setup, again
+        Args:
+            setup: The checked parameters.
+            respawned: Whether an earlier sequencer of this flight has been killed.
+
+        Raises:
+            InputError: If the journal is not valid.
+        """
+        self._setup, self._respawned = setup, respawned
         self._journal = MissionJournal(setup.journal, [robot.name for robot in setup.robots])
-        self._before = self._journal.read() if setup.resume or again else None
+        self._before = self._journal.read() if setup.resume or respawned else None
         if self._before is None:
-            self._journal.begin(0.0)  # an older mission's is not to be taken for this one's
+            self._journal.begin(0.0)  # removes the journal of an older mission
         self._lock = threading.Lock()
         self._transforms = Transforms()
-        self._news = threading.Event()
+        self._received = threading.Event()
         self.robots = [
-            MissionRobot(index, goals, self._transforms, self._news)
+            MissionRobot(index, goals, self._transforms, self._received)
             for index, goals in enumerate(setup.robots)
         ]
         self._log = self._new_log()
@@ -76,14 +81,15 @@ class MissionRunner:
                 )
             )
         )
-        self._show_goals()
+        self._publish_goals()
 
     @property
     def is_done(self) -> bool:
+        """Whether all sequencers are done."""
         return all(robot.sequencer.done for robot in self.robots)
 
     def needs(self) -> List[Need]:
-        """What must be there before the start."""
+        """Return the conditions for the start of the mission."""
         needs = (
             [
                 Need(
@@ -99,7 +105,11 @@ class MissionRunner:
         return needs
 
     def start(self) -> None:
-        """Start the simulation. Raises ServiceException when it refuses."""
+        """Start the simulation, and begin or resume the mission.
+
+        Raises:
+            ServiceException: If the simulator refuses.
+        """
         self._start_simulation()
         with self._lock:
             if self._before is None:
@@ -107,50 +117,53 @@ class MissionRunner:
             else:
                 self._resume(self._before, rospy.get_time())
         for robot in self.robots:
-            robot.link.pop()  # what came while waiting is no part of the flight
+            robot.link.pop()  # messages from before the start are not part of the flight
 
     def _start_simulation(self) -> None:
         if self._setup.simulation:
             response = rospy.ServiceProxy(START_SERVICE, Trigger)()
             if not response.success:
-                raise rospy.ServiceException(response.message or "refused without a reason")
+                raise rospy.ServiceException(response.message or "refused without giving a reason")
 
     def advance(self) -> None:
-        """Waits for news and acts on what has come."""
-        self._news.wait(WAIT_S)
-        self._news.clear()
+        """Wait for odometry, then process all messages."""
+        self._received.wait(WAIT_S)
+        self._received.clear()
         time.sleep(GATHER_S)
         inboxes = [robot.link.pop() for robot in self.robots]
         with self._lock, _topics_may_close():
             now_s = rospy.get_time()
             if any(robot.was_reset(inbox) for robot, inbox in zip(self.robots, inboxes)):
-                rospy.logwarn("the simulation was reset: the mission starts again")
+                rospy.logwarn("sequencer: simulation was reset; restarting the mission")
                 self._begin(now_s)
             elif now_s < self._now_s:
                 rospy.logwarn(
-                    "the clock went back by %.2f s: the mission goes on", self._now_s - now_s
+                    "sequencer: /clock jumped back by %.2f s; resuming the mission",
+                    self._now_s - now_s,
                 )
                 self._resume(self._checkpoint(), now_s)
-                self._start_another_simulation()
+                self._start_new_simulation()
             self._now_s = now_s
             changed = [
-                robot.step(inbox, now_s, self._log, self._keep)
+                robot.step(inbox, now_s, self._log, self._write_journal)
                 for robot, inbox in zip(self.robots, inboxes)
             ]
             if any(changed):
-                self._show_goals()
+                self._publish_goals()
 
     def publish_progress(self) -> None:
+        """Publish the progress on `/diagnostics` and retry failed writes of the journal."""
         with self._lock, _topics_may_close():
-            self._diagnostics.publish(progress(self.robots, self._log))
+            self._diagnostics.publish(progress_message(self.robots, self._log))
             self._journal.flush()
 
-    def why_stopped(self) -> str:
-        """When the node is to end before its mission has."""
+    def stop_reason(self) -> str:
+        """Return why the node stops before the mission is done."""
         fault = readiness.lost_service(START_SERVICE, "simulator") if self._setup.simulation else ""
-        return fault or "stopped before all goals were flown"
+        return fault or "stopped before all goals were reached"
 
     def summary(self, reason: str = "") -> MissionSummary:
+        """Summarize the flight so far; `reason` says why it stopped early."""
         with self._lock:
             return summarize(
                 self._log,
@@ -170,15 +183,15 @@ class MissionRunner:
         for robot in self.robots:
             robot.begin(now_s)
 
-    def _start_another_simulation(self) -> None:
-        """One that was started again has a new clock, and stands."""
+    def _start_new_simulation(self) -> None:
+        """Start a restarted simulator: its clock is new and it is paused."""
         try:
             self._start_simulation()
         except rospy.ServiceException as error:
-            rospy.logwarn("%s: %s", START_SERVICE, error)
+            rospy.logwarn("sequencer: %s failed: %s", START_SERVICE, error)
 
     def _checkpoint(self) -> MissionCheckpoint:
-        """For another sequencer, or another clock."""
+        """Return the progress in a form that does not depend on the clock."""
         start_s = self._journal.start_s
         robots = {
             robot.name: RobotCheckpoint(
@@ -199,17 +212,17 @@ class MissionRunner:
         )
 
     def _resume(self, before: MissionCheckpoint, now_s: float) -> None:
-        """From where another sequencer left off."""
+        """Resume the mission from a checkpoint."""
         self._now_s, self._log = now_s, self._new_log()
-        self._journal.resume(before, now_s, same_clock=self._again)
+        self._journal.resume(before, now_s, same_clock=self._respawned)
         start_s = self._journal.start_s
         for robot in self.robots:
             checkpoint = before.robots[robot.name]
-            state = checkpoint.log if self._again else replace(checkpoint.log, pose=None)
+            state = checkpoint.log if self._respawned else replace(checkpoint.log, pose=None)
             self._log.resume(robot.name, state, checkpoint.clearance_m, checkpoint.separation_m)
             robot.begin(now_s, shift_to_clock(checkpoint.progress, start_s))
             rospy.loginfo(
-                "%s: goes on with goal %d of %d, lap %d",
+                "%s: resuming goal %d of %d, lap %d",
                 robot.name,
                 checkpoint.progress.index + 1,
                 len(robot.sequencer.sequence.goals),
@@ -218,8 +231,8 @@ class MissionRunner:
         for contact in before.contacts:
             self._log.add_contact(replace(contact, time_s=contact.time_s + start_s))
 
-    def _keep(self, robot: MissionRobot, leg: Optional[Leg]) -> None:
-        self._journal.keep_robot(robot.name, robot.sequencer, self._log, leg, self._now_s)
+    def _write_journal(self, robot: MissionRobot, leg: Optional[Leg]) -> None:
+        self._journal.write_robot(robot.name, robot.sequencer, self._log, leg, self._now_s)
 
     def _new_log(self) -> FlightLog:
         return FlightLog(
@@ -228,7 +241,7 @@ class MissionRunner:
             self._setup.surface_distance,
         )
 
-    def _show_goals(self) -> None:
+    def _publish_goals(self) -> None:
         heights = [robot.pose.z_m for robot in self.robots if robot.pose is not None]
         altitude_m = self._setup.altitude_m
         if altitude_m is None:
@@ -238,20 +251,20 @@ class MissionRunner:
         )
 
     def _on_contact(self, message: DiagnosticStatus) -> None:
-        if message.name != "contact":
+        if message.name != CONTACT_STATUS:
             return
         try:
             contact = contact_from_message(message)
         except ValueError as error:
-            rospy.logwarn("%s: %s", self._contacts.resolved_name, error)
+            rospy.logwarn("%s: contact dropped: %s", self._contacts.resolved_name, error)
             return
         with self._lock:
             is_new = self._log.add_contact(contact)
             if is_new:
-                self._journal.keep_contact(contact, self._now_s)
+                self._journal.write_contact(contact, self._now_s)
         if is_new:
             rospy.logwarn(
-                "%s: TOUCHED %s at (%.2f, %.2f)",
+                "%s: CONTACT with %s at (%.2f, %.2f) m",
                 contact.robot,
                 contact.other,
                 contact.x_m,
@@ -261,7 +274,7 @@ class MissionRunner:
 
 @contextlib.contextmanager
 def _topics_may_close() -> Iterator[None]:
-    """At shutdown rospy closes the topics while threads still publish."""
+    """Ignore errors of publishing at shutdown, when rospy has closed the topics."""
     try:
         yield
     except rospy.ROSException:
@@ -273,7 +286,7 @@ def _topics_may_close() -> Iterator[None]:
 def _robot_needs(robot: MissionRobot) -> List[Need]:
     link = robot.link
 
-    def why_not_located() -> str:
+    def missing_pose() -> str:
         if link.odometry_frame is None:
             return ""
         try:
@@ -287,7 +300,7 @@ def _robot_needs(robot: MissionRobot) -> List[Need]:
             lambda: link.odometry_frame is not None,
             lambda: readiness.missing_topic(link.odometry.resolved_name, link.odometry.type),
         ),
-        Need(lambda: not why_not_located(), why_not_located),
+        Need(lambda: not missing_pose(), missing_pose),
         Need(
             lambda: link.goals.get_num_connections() > 0,
             lambda: readiness.missing_subscriber(link.goals.resolved_name),

@@ -1,4 +1,4 @@
-"""The mission's progress as ``diagnostic_msgs``."""
+"""Convert the progress of a mission and its contacts to and from `diagnostic_msgs`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.topics.flight_info import contact_from_values
 
 
-def progress(robots: Sequence[MissionRobot], log: FlightLog) -> DiagnosticArray:
+def progress_message(robots: Sequence[MissionRobot], log: FlightLog) -> DiagnosticArray:
+    """Return the status of each robot of the mission."""
     array = DiagnosticArray(status=[_robot_status(robot, log) for robot in robots])
     array.header.stamp = rospy.Time.now()
     return array
@@ -35,7 +36,7 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
     if skipped or contacts or (active is not None and active.attempt > 1):
         level = DiagnosticStatus.WARN
     if robot.is_silent:
-        level, message = DiagnosticStatus.ERROR, "no odometry"
+        level, message = DiagnosticStatus.ERROR, f"no odometry for {robot.silent_s:.0f} s"
     values = {
         "goal": min(sequencer.index + 1, count),
         "goals": count,
@@ -61,5 +62,9 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
 
 
 def contact_from_message(status: DiagnosticStatus) -> Contact:
-    """A contact as the simulator reports it. Raises ValueError for what cannot be read."""
+    """Read a contact that the simulator has published.
+
+    Raises:
+        ValueError: If a value is missing or not a number.
+    """
     return contact_from_values(status.hardware_id, {pair.key: pair.value for pair in status.values})

@@ -1,7 +1,7 @@
-"""The node ``sequencer``: hands N quadcopters their goals and says how well they flew.
+"""Node `sequencer`: send N quadcopters their goals and summarize their flight.
 
-Check everything, wait for everything, start the simulation, fly, sum up. Timers run on
-simulated time, so they stand still with a paused simulation.
+It checks all parameters, waits for the simulator and the navigators, starts the simulation, flies
+the mission and writes the summary. Timers use simulated time and stop with a paused simulation.
 """
 
 from __future__ import annotations
@@ -29,11 +29,15 @@ from quad_nav.ros.common.node_tools import init_node
 from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
 from quad_nav.ros.sequencer.setup import MissionSetup, read_setup, result_path
 
-DIAGNOSTICS_PERIOD_S = 1.0  # wall time, so that a paused simulation shows its state
+DIAGNOSTICS_PERIOD_S = 1.0  # wall time, to show the state of a paused simulation
 
 
 def watch(mission: MissionRunner, exit_when_done: bool, result: Path) -> int:
-    """Until the end: progress once a second, and the summary whenever all goals are flown."""
+    """Run the mission to its end, and report whenever all goals have been flown.
+
+    Returns:
+        The exit status.
+    """
     status: Optional[int] = None
     next_s = 0.0
     while not rospy.is_shutdown():
@@ -48,16 +52,16 @@ def watch(mission: MissionRunner, exit_when_done: bool, result: Path) -> int:
             if exit_when_done:
                 return status
     if status is None:
-        status = report(mission.summary(mission.why_stopped()), result)
+        status = report(mission.summary(mission.stop_reason()), result)
     return status
 
 
 def report(summary: MissionSummary, result: Path) -> int:
-    """The table on the terminal and the JSON where it belongs; the exit status."""
+    """Print the summary table, write the JSON file and return the exit status."""
     print(f"\n{table(summary)}", flush=True)
     if not _write(summary, result):
         return summary.exit_status or EXIT_FAILURE
-    print(f"Written to {result}\n", flush=True)
+    print(f"Summary written to {result}\n", flush=True)
     return summary.exit_status
 
 
@@ -65,16 +69,16 @@ def _write(summary: MissionSummary, result: Path) -> bool:
     try:
         write_json(summary, result)
     except OSError as error:
-        rospy.logerr("%s: cannot be written: %s", result, error.strerror)
+        rospy.logerr("sequencer: cannot write the summary to %s: %s", result, error.strerror)
         return False
     return True
 
 
 def fly(mission: MissionRunner, setup: MissionSetup, result: Path) -> int:
-    """A mission from waiting for its parts to its summary."""
+    """Wait for the nodes, fly the mission, summarize it and return the exit status."""
     missing = readiness.wait_for(mission.needs(), setup.ready_timeout_s)
     if missing:
-        reason = "stopped while waiting for" if rospy.is_shutdown() else "not ready"
+        reason = "stopped while waiting" if rospy.is_shutdown() else "not ready"
         return _not_flown(setup, result, reason, missing)
     try:
         mission.start()
@@ -84,15 +88,15 @@ def fly(mission: MissionRunner, setup: MissionSetup, result: Path) -> int:
         )
     try:
         return watch(mission, setup.exit_when_done, result)
-    except Exception as error:  # what was flown is not lost with a fault of ours
+    except Exception as error:  # keep the result of the flight after a bug
         report(mission.summary(f"internal error: {error!r}"), result)
         raise
     finally:
-        rospy.signal_shutdown("the sequencer is through")
+        rospy.signal_shutdown("the sequencer is done")
 
 
 def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:
-    rospy.logfatal("nothing is flown, %s:\n  %s", reason, "\n  ".join(lines))
+    rospy.logfatal("sequencer: mission not started, %s:\n  %s", reason, "\n  ".join(lines))
     robots = tuple(
         RobotSummary(robot.name, tuple(unflown_legs(robot.sequence))) for robot in setup.robots
     )
@@ -109,7 +113,12 @@ def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str])
 
 
 def main() -> int:
-    """Exit status: 0 all goals reached and nothing touched, 1 otherwise, 2 for bad input."""
+    """Run the node.
+
+    Returns:
+        Exit status: 0 if all goals were reached without a contact, 1 otherwise, 2 for parameters
+        or files that are not valid.
+    """
     init_node("sequencer")
     name = rospy.get_name()
     parameters = rospy.get_param("~", {})
@@ -118,7 +127,9 @@ def main() -> int:
         setup = read_setup(parameters, name, result, rospy.get_param("/", {}))
         mission = MissionRunner(setup, RESPAWNED in sys.argv)
     except InputError as error:
-        rospy.logfatal("nothing is flown:\n  %s", "\n  ".join(error.problems))
+        rospy.logfatal(
+            "sequencer: mission not started, invalid input:\n  %s", "\n  ".join(error.problems)
+        )
         _write(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)
         return EXIT_BAD_INPUT
     for warning in setup.warnings:

@@ -1,4 +1,4 @@
-"""One quadcopter of a mission: its sequencer between its topics, its log and the terminal."""
+"""Run one quadcopter of a mission: connect its sequencer to its topics, log and journal."""
 
 from __future__ import annotations
 
@@ -29,35 +29,45 @@ from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.sequencer.robot_link import Inbox, PathPublisher, RobotLink
 from quad_nav.topics.flight_info import EVENTS_TOPIC, event, to_text
 
-FILE_POLL_S = 0.5  # wall time: a person edits while the simulation is paused, too
+FILE_POLL_S = 0.5  # wall time, because users edit files while the simulation is paused
 ODOMETRY_SILENT_S = 3.0
 WARN_AGAIN_S = 5.0
-# How far odometry may be ahead of our clock; what is further is from before the clock went back.
+# Accepted lead of odometry over our clock; a larger one dates from before a clock jump.
 AHEAD_S = 1.0
-# A step of odometry that no flight makes: a simulation's reset.
+# A step of odometry that no flight makes: the simulation was reset.
 JUMP_M, JUMP_MPS = 1.0, 5.0
-# A smaller one is a fault of the odometry, which may be over soon.
-STEP_M, SETTLE_S = 0.25, 1.0
+# A smaller step is a fault of the odometry, which may end soon.
+STEP_M, JUMP_RECOVERY_S = 0.25, 1.0
 
 
-# Takes a robot and the leg that has ended, if one has, before anything else is done.
-Keep = Callable[["MissionRobot", Optional[Leg]], None]
+# Writes a robot and the leg that has ended, if any, to the journal.
+WriteJournal = Callable[["MissionRobot", Optional[Leg]], None]
 
 
 class MissionRobot:
-    """Flies one quadcopter's goals; ``news`` is set when its odometry comes."""
+    """Fly one quadcopter's goals.
+
+    Attributes:
+        name: Name of the robot.
+        sequencer: State of its goals.
+        link: Its topics.
+        pose: Last pose in `map`.
+        is_silent: Whether odometry has timed out.
+        silent_s: Time since the last odometry.
+    """
 
     def __init__(
-        self, index: int, goals: RobotGoals, transforms: Transforms, news: threading.Event
+        self, index: int, goals: RobotGoals, transforms: Transforms, received: threading.Event
     ) -> None:
+        """Connect to the topics of robot `index`; odometry sets the event."""
         self.name = goals.name
         self.sequencer = Sequencer(goals.sequence)
-        self.link = RobotLink(index, news)
+        self.link = RobotLink(index, received)
         self.pose: Optional[Pose3D] = None
         self.is_silent, self.silent_s = False, 0.0
         self._odometry: Optional[Odometry] = None
         self._begun_s = 0.0
-        self._heard_s = self._settled_s = 0.0
+        self._heard_s = self._valid_again_s = 0.0
         self._file = goals.file
         self._next_poll_s = 0.0
         self._transforms = transforms
@@ -66,24 +76,31 @@ class MissionRobot:
         self._path = PathPublisher(f"/path{index}")
 
     def begin(self, now_s: float, progress: SequenceProgress = START) -> None:
-        """From the first goal: at the start, and after the simulation was reset.
-
-        With ``progress``, from where another sequencer left off.
-        """
+        """Begin with the first goal, or resume the progress of another sequencer."""
         self.sequencer = Sequencer(self.sequencer.sequence, progress)
         self.pose, self.is_silent, self._begun_s, self._heard_s = None, False, now_s, now_s
-        self._odometry, self._settled_s = None, 0.0
+        self._odometry, self._valid_again_s = None, 0.0
         self.link.clear()
         self._path.clear()
 
     def was_reset(self, inbox: Inbox) -> bool:
-        """Whether the odometry that has come says that the quadcopter was put somewhere else."""
+        """Return whether odometry shows that the simulation was reset."""
         usable = [o for o in inbox.odometry if o.header.stamp.to_sec() >= self._begun_s]
         before = [self._odometry, *usable] if self._odometry is not None else usable
         return any(_is_jump(a, b) for a, b in zip(before, before[1:]))
 
-    def step(self, inbox: Inbox, now_s: float, log: FlightLog, keep: Keep) -> bool:
-        """Take what has come and act on it; whether the goals or their states changed."""
+    def step(self, inbox: Inbox, now_s: float, log: FlightLog, write_journal: WriteJournal) -> bool:
+        """Process the messages of a robot and act on them.
+
+        Args:
+            inbox: Messages since the last step.
+            now_s: Present time on the clock.
+            log: Log of the mission.
+            write_journal: Called before an action is carried out.
+
+        Returns:
+            Whether the goals or their states have changed.
+        """
         changed = self._poll_file()
         self._move(inbox.odometry, now_s, log)
         for recovery in inbox.recoveries:
@@ -101,25 +118,29 @@ class MissionRobot:
         for subscriber in inbox.subscribers:
             if self.link.send_to(subscriber):
                 rospy.loginfo(
-                    "%s: %s sent to a node that began to listen",
+                    "%s: %s sent to a new subscriber",
                     self.name,
                     self._goal(self.sequencer.index, self.sequencer.lap),
                 )
         self._watch_silence(now_s)
-        if self.pose is None or self._settled_s > now_s:
+        if self.pose is None or self._valid_again_s > now_s:
             return changed
         actions = self.sequencer.tick(
             now_s, self.pose.to_2d(), inbox.reports, self.link.navigator_is_idle(now_s)
         )
         legs = [log.robots[self.name].add_action(action) for action in actions]
         if actions:
-            keep(self, next((leg for leg in legs if leg is not None), None))
+            write_journal(self, next((leg for leg in legs if leg is not None), None))
         for action, leg in zip(actions, legs):
             self._do(action, leg, now_s)
         return changed or bool(actions)
 
     def map_from(self, frame: str) -> Pose3D:
-        """Raises TransformUnavailable."""
+        """Return the pose of a frame in `map`.
+
+        Raises:
+            TransformUnavailable: If tf does not know it.
+        """
         return self._transforms.lookup("map", frame) if frame != "map" else Pose3D(0.0, 0.0, 0.0)
 
     def _move(self, messages: Sequence[Odometry], now_s: float, log: FlightLog) -> None:
@@ -133,17 +154,17 @@ class MissionRobot:
             map_from_odom = self.map_from(usable[-1].header.frame_id)
         except TransformUnavailable as error:
             rospy.logwarn_throttle(
-                WARN_AGAIN_S, f"{self.name}: its place in map is unknown: {error}"
+                WARN_AGAIN_S, f"{self.name}: pose in map unknown, odometry dropped: {error}"
             )
             return
         self._heard_s = now_s
         if any(_is_jump(a, b, STEP_M) for a, b in zip([before, *usable], usable) if a is not None):
             rospy.logwarn(
-                "%s: its odometry has jumped: nothing counts as reached for %g s",
+                "%s: odometry jumped; no goal counts as reached for %g s",
                 self.name,
-                SETTLE_S,
+                JUMP_RECOVERY_S,
             )
-            self._settled_s = now_s + SETTLE_S
+            self._valid_again_s = now_s + JUMP_RECOVERY_S
         for odometry in usable:
             stamp_s = odometry.header.stamp.to_sec()
             self.pose = map_from_odom.compose(pose_from_message(odometry.pose.pose))
@@ -155,7 +176,7 @@ class MissionRobot:
         was_silent, self.is_silent = self.is_silent, self.silent_s > ODOMETRY_SILENT_S
         if self.is_silent and not was_silent:
             rospy.logwarn(
-                "%s: nothing has come on %s for %.0f s",
+                "%s: no message on %s for %.0f s; waiting for odometry",
                 self.name,
                 self.link.odometry.resolved_name,
                 ODOMETRY_SILENT_S,
@@ -169,7 +190,7 @@ class MissionRobot:
             sequence = self._file.poll()
         except InputError as error:
             rospy.logerr(
-                "%s: its edited goal file cannot be used, the goals stay as they were:\n  %s",
+                "%s: edited goal file is not valid, keeping the previous goals:\n  %s",
                 self.name,
                 "\n  ".join(error.problems),
             )
@@ -178,7 +199,7 @@ class MissionRobot:
             return False
         self.sequencer.replace_sequence(sequence)
         rospy.loginfo(
-            "%s: goal file edited: %d goals, %d of them flown",
+            "%s: goal file reloaded: %d goals, %d of them flown",
             self.name,
             len(sequence.goals),
             min(self.sequencer.index, len(sequence.goals)),
@@ -189,19 +210,19 @@ class MissionRobot:
         self._events.publish(to_text(event(self._index, now_s, action)))
         if isinstance(action, SendGoal):
             self.link.send(action.pose)
-            self._tell_sent(action)
+            self._log_sent(action)
         elif isinstance(action, SequenceDone):
             self.link.clear()
-            rospy.loginfo("%s: no more goals", self.name)
+            rospy.loginfo("%s: all goals flown", self.name)
         elif leg is not None:
-            self._tell_ended(leg)
+            self._log_ended(leg)
 
-    def _tell_sent(self, action: SendGoal) -> None:
+    def _log_sent(self, action: SendGoal) -> None:
         goal = self._goal(action.index, action.lap)
         if not action.resend_reason:
             away_m = self.pose.to_2d().distance_to(action.pose) if self.pose else 0.0
             rospy.loginfo(
-                "%s: %s (%.2f, %.2f) sent, %.2f m away",
+                "%s: %s sent: (%.2f, %.2f) m, %.2f m away",
                 self.name,
                 goal,
                 action.pose.x_m,
@@ -210,7 +231,7 @@ class MissionRobot:
             )
             return
         rospy.logwarn(
-            "%s: %s sent again, attempt %d of %d: %s",
+            "%s: %s sent again (attempt %d of %d): %s",
             self.name,
             goal,
             action.attempt,
@@ -218,7 +239,7 @@ class MissionRobot:
             action.resend_reason,
         )
 
-    def _tell_ended(self, leg: Leg) -> None:
+    def _log_ended(self, leg: Leg) -> None:
         goal = self._goal(leg.index, leg.lap)
         if leg.reached:
             rospy.loginfo(

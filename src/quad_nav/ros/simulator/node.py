@@ -1,8 +1,8 @@
-"""The simulator as a node: it owns the bodies and the clock.
+"""Node `simulator`: owns the bodies and the clock.
 
-Callbacks only store; one loop advances the simulation and publishes. Simulated
-time starts at 1 s, because nodes take a time of 0 for a clock that has not
-started; it only ever grows, also over a reset.
+Callbacks store messages; one loop advances the simulation and publishes. Simulated time starts at
+1 s, because rospy treats a time of 0 as a clock that has not started. It never decreases, not even
+at a reset.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ _COMMANDS_PER_ROBOT = 20
 _HEALTH_PERIOD_S = 1.0  # wall time, as the next two
 _PAUSED_PERIOD_S = 0.5
 _PAUSED_SLEEP_S = 0.02
-_ANSWER_WITHIN_S = 10.0
+_RESPONSE_TIMEOUT_S = 10.0
 
 
 class SimulatorNode:
-    """Topics and services around one simulation."""
+    """Topics and services of one simulation."""
 
     def __init__(self, setup: SimulatorSetup) -> None:
         self._setup = setup
@@ -56,11 +56,11 @@ class SimulatorNode:
         self._topics = SimulatorTopics(self._simulation)
         self._pacer = Pacer(setup.rate, STEP_S)
         self._meter = RateMeter()
-        # Faster than real time, the clock comes with the odometry: nobody needs it more often.
+        # Faster than real time, the clock is published with the odometry, which is often enough.
         self._steps_per_clock = _STEPS_PER_CLOCK if setup.rate <= 1.0 else _STEPS_PER_ODOMETRY
         self._paused, self._stopping = True, False
         self._next_health_s = self._next_republish_s = 0.0
-        # A node that floods a topic costs no more than this.
+        # Bounds the cost of a node that floods a topic.
         self._commands: Deque[Tuple[int, Twist]] = collections.deque(
             maxlen=_COMMANDS_PER_ROBOT * setup.robots
         )
@@ -70,25 +70,25 @@ class SimulatorNode:
         self._requests: Deque[Tuple[Callable[[], str], Future]] = collections.deque()
         self._goals, self._goals_are_shown = MarkerArray(), True
         self._subscribe()
-        self._offer_services()
+        self._advertise_services()
 
     def run(self) -> None:
-        """Until ``stop``, ROS shuts down or the window is closed."""
+        """Run until `stop` is called, ROS shuts down or the window is closed."""
         self._publish_all()
         if not self._setup.start_paused:
             self._start()
         while not (self._stopping or rospy.is_shutdown()) and self._simulation.is_open:
-            self._answer_requests()
+            self._handle_requests()
             self._show_goals()
             self._report()
             if self._paused:
-                self._stand()
+                self._wait_paused()
             else:
                 self._advance()
         self._simulation.close()
 
     def stop(self) -> None:
-        """End ``run`` soon."""
+        """End `run` after the present step."""
         self._stopping = True
 
     def _subscribe(self) -> None:
@@ -103,7 +103,7 @@ class SimulatorNode:
         if self._setup.gui:
             rospy.Subscriber("/goals", MarkerArray, self._store_goals, queue_size=1)
 
-    def _offer_services(self) -> None:
+    def _advertise_services(self) -> None:
         for name, action in (
             ("start", self._start),
             ("pause", self._pause),
@@ -124,15 +124,17 @@ class SimulatorNode:
         self._goals, self._goals_are_shown = message, False
 
     def _trigger_handler(self, action: Callable[[], str]) -> Callable:
-        """A service that answers when the loop has done what it asks for."""
+        """Return a service handler that responds after the loop has carried out the action."""
 
         def handle(_) -> TriggerResponse:
             done: Future = Future()
             self._requests.append((action, done))
             try:
-                return TriggerResponse(True, done.result(_ANSWER_WITHIN_S))
+                return TriggerResponse(True, done.result(_RESPONSE_TIMEOUT_S))
             except FutureTimeoutError:
-                return TriggerResponse(False, f"not done within {_ANSWER_WITHIN_S:g} s")
+                return TriggerResponse(
+                    False, f"the simulator did not respond within {_RESPONSE_TIMEOUT_S:g} s"
+                )
 
         return handle
 
@@ -142,7 +144,7 @@ class SimulatorNode:
 
     # The loop.
 
-    def _answer_requests(self) -> None:
+    def _handle_requests(self) -> None:
         while self._requests:
             action, done = self._requests.popleft()
             done.set_result(action())
@@ -153,26 +155,26 @@ class SimulatorNode:
             self._pacer.start(time.monotonic())
             self._meter.start(time.monotonic(), self._simulation.now_s)
             self._next_health_s = time.monotonic() + _HEALTH_PERIOD_S
-            rospy.loginfo("simulation runs")
-        return "the simulation runs"
+            rospy.loginfo("simulator: running")
+        return "the simulation is running"
 
     def _pause(self) -> str:
         if not self._paused:
             self._paused = True
             self._topics.publish_clock()
-            rospy.loginfo("simulation paused at %.2f s", self._simulation.now_s)
+            rospy.loginfo("simulator: paused at %.2f s", self._simulation.now_s)
         return "the simulation is paused"
 
     def _reset(self) -> str:
-        """Poses change at once and time does not, so one step separates their stamps."""
+        """Reset all poses; one step gives the new poses another stamp."""
         self._simulation.reset()
         self._simulation.step()
         self._commands.clear()
         self._lease.clear()
         self._goals_are_shown = False
         self._publish_all()
-        rospy.loginfo("simulation reset")
-        return "the quadcopters are back at their starts; the clock goes on"
+        rospy.loginfo("simulator: reset")
+        return "the quadcopters are at their start poses; the clock continues"
 
     def _advance(self) -> None:
         """Do the steps that are due, then sleep until the clock's next tick."""
@@ -197,10 +199,9 @@ class SimulatorNode:
         while self._commands:
             robot, message = self._commands.popleft()
             twist = twist_from_message(message)
-            if twist_problem(twist):
-                rospy.logwarn_throttle(
-                    5.0, "/cmd_vel%d: dropped, expected finite numbers: %s", robot, twist
-                )
+            problem = twist_problem(twist)
+            if problem:
+                rospy.logwarn_throttle(5.0, "quad%d: command dropped: %s", robot, problem)
                 continue
             node = message._connection_header["callerid"]
             holder = self._lease.holder(robot, node, self._simulation.now_s)
@@ -209,15 +210,15 @@ class SimulatorNode:
             else:
                 rospy.logwarn_throttle(
                     5.0,
-                    "/cmd_vel%d: %s steers this quadcopter; what %s sends "
-                    "is dropped, expected one node at a time",
+                    "quad%d: command of %s dropped: %s controls this quadcopter, expected one node"
+                    " at a time",
                     robot,
-                    holder,
                     node,
+                    holder,
                 )
 
-    def _stand(self) -> None:
-        """Paused: tell late comers what is, but tf, which is latched."""
+    def _wait_paused(self) -> None:
+        """Republish the state for new subscribers, except tf, which is latched."""
         if time.monotonic() >= self._next_republish_s:
             self._next_republish_s = time.monotonic() + _PAUSED_PERIOD_S
             self._topics.publish_clock()
@@ -244,10 +245,13 @@ class SimulatorNode:
 
 
 def main() -> int:
-    """0 after a shutdown, 2 when the parameters or the scene cannot be used.
+    """Run the node.
 
-    rospy's own signal handler would close the publishers in the middle of a
-    publish of this thread, and wait for ever for a lock that it holds itself.
+    rospy's own signal handler closes the publishers in the thread that it interrupts. It deadlocks
+    if this thread is publishing.
+
+    Returns:
+        0 after a shutdown, 2 if the parameters or the scene are not valid.
     """
     rospy.init_node("simulator", disable_signals=True)
     name = rospy.get_name().lstrip("/")
@@ -269,11 +273,11 @@ def main() -> int:
         rospy.logwarn("%s", remark)
     if not rospy.get_param("/use_sim_time", False):
         rospy.logwarn(
-            "/use_sim_time is not set: other nodes will not follow the simulation's "
-            "clock, expected true before they start"
+            "simulator: /use_sim_time is not set, expected true before other nodes start; they"
+            " use the wall clock"
         )
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: node.stop())
     node.run()
-    rospy.signal_shutdown("the simulation has ended")
+    rospy.signal_shutdown("the simulation is closed")
     return 0

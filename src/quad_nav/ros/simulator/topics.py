@@ -1,4 +1,4 @@
-"""What the simulator tells: clock, transforms, odometry, scans, contacts, health."""
+"""Publish clock, transforms, odometry, scans, contacts and health of the simulation."""
 
 from __future__ import annotations
 
@@ -37,22 +37,26 @@ from quad_nav.topics.flight_info import (
 )
 from quad_nav.topics.markers import quadcopter_markers, scene_markers
 
-_STAYS, _MOUNT = transform(Pose3D(0.0, 0.0, 0.0)), transform(base_from_lidar)
+_IDENTITY, _MOUNT = transform(Pose3D(0.0, 0.0, 0.0)), transform(base_from_lidar)
 _LAGS_BELOW = 0.9
-"""Part of the asked-for rate below which the simulation is said to lag."""
+"""The simulation lags if it reaches less than this part of the requested rate."""
 _LAGGING_REPORTS = 3
-"""Reports in a row that lag before it counts; nodes that start up take their time."""
+"""Consecutive lagging reports that give a warning; starting nodes cause single ones."""
 
 
 class SimulatorTopics:
-    """The publishers, one method for each thing that is told together.
+    """Publishers of the simulator.
 
-    Odometry and scans are made only while somebody listens. ``/clock`` and
-    ``/tf`` are latched: a node that comes while the simulation is paused gets
-    them, and tf is not sent twice with one stamp, which tf2 would complain about.
+    Odometry and scans are computed only for subscribers. `/clock` and `/tf` are latched: a node
+    that starts while the simulation is paused receives them, and no transform is sent twice with
+    the same stamp, about which tf2 would warn.
+
+    Attributes:
+        lidar_enabled: Whether each LIDAR is on; services change it.
     """
 
     def __init__(self, simulation: Simulation) -> None:
+        """Advertise the topics, and publish the scene and the flight info."""
         self._simulation = simulation
         robots = range(simulation.n_robots)
         self.lidar_enabled = [True for _ in robots]
@@ -73,10 +77,11 @@ class SimulatorTopics:
         self._quadcopters.publish(marker_array(quadcopter_markers(simulation.n_robots)))
 
     def publish_clock(self) -> None:
+        """Publish the simulated time."""
         self._clock.publish(Clock(time_message(self._simulation.now_s)))
 
     def publish_poses(self, with_transforms: bool = True) -> None:
-        """Transforms, in one message for all, and odometry, as far as somebody listens."""
+        """Publish the transforms in one message, and the odometry that has subscribers."""
         states = [self._simulation.state(i) for i in range(self._simulation.n_robots)]
         stamp = time_message(self._simulation.now_s)
         if with_transforms:
@@ -84,13 +89,13 @@ class SimulatorTopics:
         self._publish_odometry(states, stamp)
 
     def _publish_transforms(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
-        """``map -> odom{i} -> base_link{i} -> Lidar{i}`` of all quadcopters."""
+        """Publish `map -> odom{i} -> base_link{i} -> Lidar{i}` of all quadcopters."""
         header = Header(0, stamp, "map")
         transforms = []
         for i, state in enumerate(states):
             odom, base, lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
             transforms += [
-                TransformStamped(header, odom, _STAYS),
+                TransformStamped(header, odom, _IDENTITY),
                 transform_message(state.map_from_base, odom, base, stamp),
                 TransformStamped(Header(0, stamp, base), lidar, _MOUNT),
             ]
@@ -110,6 +115,7 @@ class SimulatorTopics:
                 )
 
     def publish_scans(self) -> None:
+        """Publish the scans of enabled LIDARs that have subscribers."""
         robots = [
             i
             for i, publisher in enumerate(self._scans)
@@ -119,6 +125,7 @@ class SimulatorTopics:
             self._scans[i].publish(scan_message(scan, f"Lidar{i}"))
 
     def publish_contact(self, contact: Contact) -> None:
+        """Log and publish the start of a contact."""
         rospy.logwarn(
             "%s at (%.2f, %.2f) m, time %.2f s", contact, contact.x_m, contact.y_m, contact.time_s
         )
@@ -133,7 +140,13 @@ class SimulatorTopics:
         )
 
     def publish_health(self, paused: bool, rate: float, factor: float) -> None:
-        """``factor`` is the real-time factor reached of the ``rate`` asked for."""
+        """Publish the statuses of the clock and of all quadcopters.
+
+        Args:
+            paused: Whether the simulation is paused.
+            rate: Requested simulated seconds per second.
+            factor: Simulated seconds per second since the last call.
+        """
         array = DiagnosticArray(
             status=[self._clock_health(paused, rate, factor), *self._robots_health()]
         )
@@ -146,11 +159,11 @@ class SimulatorTopics:
         if self._lagging_reports >= _LAGGING_REPORTS:
             rospy.logwarn_throttle(
                 10.0 * rate,
-                "simulated time lags: %.2f of %g seconds per second are reached",
+                "simulator: simulation lags: %.2f simulated seconds per second, expected %g",
                 factor,
                 rate,
             )
-        message = "paused" if paused else f"{'lags: ' if lags else ''}{factor:.2f} x real time"
+        message = "paused" if paused else f"{'lagging: ' if lags else ''}{factor:.2f} x real time"
         return DiagnosticStatus(
             level=(
                 DiagnosticStatus.WARN
@@ -174,8 +187,8 @@ class SimulatorTopics:
                 level=DiagnosticStatus.OK if self.lidar_enabled[i] else DiagnosticStatus.WARN,
                 name=f"simulator: quadcopter {i}",
                 hardware_id=f"quad{i}",
-                message=("hovering, no commands" if hovering else "flying")
-                + ("" if self.lidar_enabled[i] else ", LIDAR switched off"),
+                message=("hovering, no command" if hovering else "flying")
+                + ("" if self.lidar_enabled[i] else ", LIDAR off"),
                 values=_pairs(
                     text_values(
                         contacts=sum(c.involves(f"quad{i}") for c in simulation.contacts),
