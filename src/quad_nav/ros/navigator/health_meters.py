@@ -27,7 +27,7 @@ class InputMeter:
         self._read_wall_s = time.monotonic()
         subscriber.impl.add_callback(self._on_message, None)
 
-    def _on_message(self, message: Any, _: object) -> None:
+    def _on_message(self, message: Any) -> None:
         self._count += 1
         self._received_s = rospy.get_time()
         self._late_s = self._received_s - message.header.stamp.to_sec()

@@ -56,9 +56,6 @@ class RobotNavigator:
             transforms: Transform tree, shared by the robots of the process.
             peers: States of the peers, shared as well.
             names: Names of the robot's topics, services and parameters.
-
-        Raises:
-            InputError: If a plugin refuses its parameters.
         """
         self.number = configuration.robot
         self._name = f"quad{self.number}"
@@ -82,14 +79,7 @@ class RobotNavigator:
         )
         self._maps = static_maps.connect(costmaps, self._lock, names)
         self._reconfigure = serve_namespaces(self._name, configuration, self._on_reconfigure, names)
-        self._services = PlanServices(
-            navigator,
-            self._topics,
-            self._lock,
-            self._located_now,
-            lambda: self._configuration.clearing_radius_m,
-            names,
-        )
+        self._services = self._advertise_services(names)
         self._goals = GoalServer(
             self._name, transforms, navigator.global_costmap.params.global_frame, names
         )
@@ -99,6 +89,16 @@ class RobotNavigator:
     def subscribers(self) -> List[rospy.Subscriber]:
         """Subscribers to the topics that the navigator needs."""
         return [self._odometry, *(sensor.subscriber for sensor in self._sensors)]
+
+    def _advertise_services(self, names: Names) -> PlanServices:
+        return PlanServices(
+            self._navigator,
+            self._topics,
+            self._lock,
+            self._located_now,
+            lambda: self._configuration.clearing_radius_m,
+            names,
+        )
 
     def _new_health(self, names: Names) -> NavigatorHealth:
         node = rospy.get_name() if names is own_node else names("~")

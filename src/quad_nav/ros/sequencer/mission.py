@@ -72,15 +72,8 @@ class MissionRunner:
             "/simulation/contacts", DiagnosticStatus, self._on_contact
         )
         self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
-        self._flight.publish(
-            to_text(
-                mission_info(
-                    {robot.name: robot.sequence for robot in setup.robots},
-                    setup.parameters,
-                    setup.robot_radius_m,
-                )
-            )
-        )
+        goals = {robot.name: robot.sequence for robot in setup.robots}
+        self._flight.publish(to_text(mission_info(goals, setup.parameters, setup.robot_radius_m)))
         self._publish_goals()
 
     @property

@@ -103,25 +103,8 @@ class MissionRobot:
         """
         changed = self._poll_file()
         self._move(inbox.odometry, now_s, log)
-        for recovery in inbox.recoveries:
-            log.robots[self.name].recoveries += 1
-            rospy.logwarn(
-                "%s: recovery %d of %d: %s",
-                self.name,
-                recovery.current_recovery_number + 1,
-                recovery.total_number_of_recoveries,
-                recovery.recovery_behavior_name,
-            )
-        log.robots[self.name].aborts += sum(
-            report.verdict is Verdict.ABORTED for report in inbox.reports
-        )
-        for subscriber in inbox.subscribers:
-            if self.link.send_to(subscriber):
-                rospy.loginfo(
-                    "%s: %s sent to a new subscriber",
-                    self.name,
-                    self._goal(self.sequencer.index, self.sequencer.lap),
-                )
+        self._log_reports(inbox, log)
+        self._serve_subscribers(inbox)
         self._watch_silence(now_s)
         if self.pose is None or self._valid_again_s > now_s:
             return changed
@@ -134,6 +117,29 @@ class MissionRobot:
         for action, leg in zip(actions, legs):
             self._do(action, leg, now_s)
         return changed or bool(actions)
+
+    def _log_reports(self, inbox: Inbox, log: FlightLog) -> None:
+        for recovery in inbox.recoveries:
+            log.robots[self.name].recoveries += 1
+            rospy.logwarn(
+                "%s: recovery %d of %d: %s",
+                self.name,
+                recovery.current_recovery_number + 1,
+                recovery.total_number_of_recoveries,
+                recovery.recovery_behavior_name,
+            )
+        log.robots[self.name].aborts += sum(
+            report.verdict is Verdict.ABORTED for report in inbox.reports
+        )
+
+    def _serve_subscribers(self, inbox: Inbox) -> None:
+        for subscriber in inbox.subscribers:
+            if self.link.send_to(subscriber):
+                rospy.loginfo(
+                    "%s: %s sent to a new subscriber",
+                    self.name,
+                    self._goal(self.sequencer.index, self.sequencer.lap),
+                )
 
     def map_from(self, frame: str) -> Pose3D:
         """Return the pose of a frame in `map`.

@@ -18,7 +18,14 @@ from typing import Callable, Deque, Tuple
 
 import rospy
 from geometry_msgs.msg import Twist
-from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
+from std_srvs.srv import (
+    SetBool,
+    SetBoolRequest,
+    SetBoolResponse,
+    Trigger,
+    TriggerRequest,
+    TriggerResponse,
+)
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.errors import InputError
@@ -126,7 +133,7 @@ class SimulatorNode:
     def _trigger_handler(self, action: Callable[[], str]) -> Callable:
         """Return a service handler that responds after the loop has carried out the action."""
 
-        def handle(_) -> TriggerResponse:
+        def handle(_: TriggerRequest) -> TriggerResponse:
             done: Future = Future()
             self._requests.append((action, done))
             try:
@@ -138,7 +145,7 @@ class SimulatorNode:
 
         return handle
 
-    def _enable_lidar(self, robot: int, request) -> SetBoolResponse:
+    def _enable_lidar(self, robot: int, request: SetBoolRequest) -> SetBoolResponse:
         self._topics.lidar_enabled[robot] = request.data
         return SetBoolResponse(True, f"LIDAR {robot} is {'on' if request.data else 'off'}")
 
