@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import List, Sequence
 
-MOST_PROBLEMS = 100
+MAX_PROBLEMS = 100
 _LONGEST_LINE = 2000
 
 
@@ -24,9 +24,9 @@ class InputError(QuadError):
     """
 
     def __init__(self, problems: Sequence[str]):
-        self.problems: List[str] = [_line(problem) for problem in problems[:MOST_PROBLEMS]]
-        if len(problems) > MOST_PROBLEMS:
-            self.problems.append(f"... and {len(problems) - MOST_PROBLEMS} faults more")
+        self.problems: List[str] = [_line(problem) for problem in problems[:MAX_PROBLEMS]]
+        if len(problems) > MAX_PROBLEMS:
+            self.problems.append(f"... and {len(problems) - MAX_PROBLEMS} faults more")
         super().__init__("\n".join(self.problems))
 
 

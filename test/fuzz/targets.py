@@ -24,7 +24,7 @@ from quad_nav.files.shipped import shipped
 from quad_nav.mission.goal_file import parse_goals
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import Message
-from quad_nav.recording.bag_trace import _is_wanted, TraceReader, read_trace
+from quad_nav.recording.bag_trace import TraceReader, _is_wanted, read_trace
 from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.page import flight_page
 from quad_nav.scenario.scene_check import scene_check

@@ -24,7 +24,7 @@ from quad_nav.topics import validation
 
 TABLE = (Path(__file__).parents[2] / "docs" / "limits.md").read_text(encoding="utf-8")
 ROWS = {
-    "messages about one file": [errors.MOST_PROBLEMS],
+    "messages about one file": [errors.MAX_PROBLEMS],
     "goal file": [
         goal_file.MAX_BYTES,
         goal_file.MAX_GOALS,
@@ -32,12 +32,12 @@ ROWS = {
         goal_file.MAX_TIMEOUT_S,
     ],
     "YAML: scenes, maps, parameters": [
-        plain_yaml.MOST_BYTES,
-        plain_yaml.MOST_NODES,
-        plain_yaml.MOST_LEVELS,
-        plain_yaml.MOST_DIGITS,
+        plain_yaml.MAX_BYTES,
+        plain_yaml.MAX_NODES,
+        plain_yaml.MAX_LEVELS,
+        plain_yaml.MAX_DIGITS,
     ],
-    "numbers in a scene": [document.LARGEST, scene_file.MAX_SIZE_M, document.LONGEST_TEXT],
+    "numbers in a scene": [document.MAX_MAGNITUDE, scene_file.MAX_SIZE_M, document.MAX_TEXT_LENGTH],
     "starts in a scene": [scene_file.MAX_STARTS],
     "starts chosen by `quad`": [free_starts.MAX_LOOKS],
     "Gazebo world": [
@@ -50,12 +50,12 @@ ROWS = {
     "models, links and collisions": [world_file.MAX_PARTS, world_file.MAX_OBSTACLES],
     "image of a map": [map_image.MAX_BYTES, map_image.MAX_CELLS],
     "cells of a map": [map_file.MIN_RESOLUTION_M, map_file.MAX_RESOLUTION_M, map_file.MAX_BOXES],
-    "costmap": [workload.MOST_CELLS],
-    "BARN worlds (`.npz`)": [worlds.MOST_BYTES],
+    "costmap": [workload.MAX_CELLS],
+    "BARN worlds (`.npz`)": [worlds.MAX_BYTES],
     "recording that is read": [
-        bag_trace.MOST_MEMORY_BYTES / 1e9,
+        bag_trace.MAX_MEMORY_BYTES / 1e9,
         bag_trace.LONGEST_FLIGHT_S / 86400,
-        bag_info.MOST_ROBOTS,
+        bag_info.MAX_ROBOTS,
     ],
     "scan": [validation.MAX_BEAMS],
     "point cloud": [validation.MAX_POINTS],

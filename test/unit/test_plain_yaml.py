@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from quad_nav.files import plain_yaml
-from quad_nav.files.plain_yaml import MOST_LEVELS, MOST_NODES, load
+from quad_nav.files.plain_yaml import MAX_LEVELS, MAX_NODES, load
 
 
 def refusal(text):
@@ -34,14 +34,14 @@ def test_aliases_may_stand_for_what_was_there():
 
 def test_aliases_count_as_often_as_they_are_used():
     assert len(load(bomb("[", "]", 4))) == 5  # 9^4 is 6561
-    assert f"more than {MOST_NODES} values" in refusal(bomb("[", "]", 9))
+    assert f"more than {MAX_NODES} values" in refusal(bomb("[", "]", 9))
 
 
 def test_merges_count_too():
     text = "a0: &a0 {x: 1}\n" + "".join(
         f"a{k + 1}: &a{k + 1} {{<<: [{','.join([f'*a{k}'] * 9)}]}}\n" for k in range(9)
     )
-    assert f"more than {MOST_NODES} values" in refusal(text)
+    assert f"more than {MAX_NODES} values" in refusal(text)
 
 
 @pytest.mark.parametrize("text", ["&a [*a]", "&a {b: *a}", "a: &a {<<: *a}", "&a [[[*a]]]"])
@@ -50,17 +50,17 @@ def test_nothing_stands_in_itself(text):
 
 
 def test_levels(monkeypatch):
-    inside = MOST_LEVELS - 1
+    inside = MAX_LEVELS - 1
     assert load("[" * inside + "1" + "]" * inside)
-    expected = f"more than {MOST_LEVELS} levels inside each other"
-    assert expected in refusal("[" * MOST_LEVELS + "1" + "]" * MOST_LEVELS)
+    expected = f"more than {MAX_LEVELS} levels inside each other"
+    assert expected in refusal("[" * MAX_LEVELS + "1" + "]" * MAX_LEVELS)
     assert expected in refusal("[" * 100_000)
     chain = "a0: &a0 [1]\n" + "".join(f"a{k}: &a{k} [*a{k - 1}]\n" for k in range(1, 80))
     assert expected in refusal(chain)
 
 
 def test_too_many_values_are_refused_without_reading_on(monkeypatch):
-    monkeypatch.setattr(plain_yaml, "MOST_NODES", 100)
+    monkeypatch.setattr(plain_yaml, "MAX_NODES", 100)
     # The text ends within a list: what comes after the limit is not even looked at.
     assert "more than 100 values" in refusal("a: [" + "1, " * 200 + "{")
 

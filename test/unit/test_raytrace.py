@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from quad_nav.kernels.raytrace import (
-    MOST_OBSTRUCTED,
+    MAX_OBSTRUCTED,
     SECTORS,
     clear_all_rays,
     clear_rays,
@@ -109,4 +109,4 @@ def test_obstructed_cells_of_a_window():
     assert found.tolist() == [7, 13, 0]
     assert find_obstructed(costs, (0, 5, 0, 4), found) == 3
     assert find_obstructed(costs, (0, 5, 0, 4), found[:2]) == 3
-    assert MOST_OBSTRUCTED > 0
+    assert MAX_OBSTRUCTED > 0

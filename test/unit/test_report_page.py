@@ -15,7 +15,7 @@ from PIL import Image
 from quad_nav.report.animation import animate_flight, animation_faults
 from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.page import (
-    MOST_STRIPS,
+    MAX_STRIPS,
     Page,
     comparison_page,
     flight_page,
@@ -78,7 +78,7 @@ def test_page_of_so_many(count):
     names = [picture.name for picture in page.pictures]
     assert [name for name in names if not name.startswith("encounter")] == PICTURES
     strips = [name for name in names if name.startswith("encounter")]
-    assert len(strips) == min(count, MOST_STRIPS)  # a contact, and neighbours 0.4 m apart
+    assert len(strips) == min(count, MAX_STRIPS)  # a contact, and neighbours 0.4 m apart
     for picture in page.pictures:
         image = Image.open(io.BytesIO(picture.png))
         image.load()
@@ -95,7 +95,7 @@ def test_figures_in_the_head():
 
 def test_what_is_left_out_is_told():
     html = page_of(20).html
-    assert f"The {MOST_STRIPS} closest are shown, 14 more are not." in html
+    assert f"The {MAX_STRIPS} closest are shown, 14 more are not." in html
     assert "The 16 quadcopters that came closest to anything are shown, 4 more are not." in html
 
 

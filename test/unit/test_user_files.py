@@ -9,8 +9,8 @@ import pytest
 
 from quad_nav.barn.worlds import load_worlds
 from quad_nav.config.files import load_files
-from quad_nav.errors import MOST_PROBLEMS, InputError
-from quad_nav.files.user_files import named_in, open_file, read_bytes, read_text
+from quad_nav.errors import MAX_PROBLEMS, InputError
+from quad_nav.files.user_files import open_file, read_bytes, read_text, referenced_file
 from quad_nav.geometry import Pose3D
 from quad_nav.mission.goal_file import MAX_BYTES, MAX_GOALS, load_goals, parse_goals
 from quad_nav.mission.robot_goals import WatchedGoalFile
@@ -112,7 +112,7 @@ def test_a_watched_file_that_becomes_a_pipe_is_a_changed_file(tmp_path):
 
 
 def test_many_faults_are_counted_and_no_terminal_is_commanded():
-    error = InputError([f"fault {k}" for k in range(MOST_PROBLEMS + 5)])
+    error = InputError([f"fault {k}" for k in range(MAX_PROBLEMS + 5)])
     assert error.problems[-1] == "... and 5 faults more"
     assert InputError(["a\x1b[2Jb\ud800"]).problems == ["a\\x1b[2Jb\\ud800"]
     assert len(InputError(["x" * 10**6]).problems[0]) < 3000
@@ -191,7 +191,7 @@ def test_a_models_config_leads_nowhere_outside(folder, named):
 def test_links_in_a_circle_are_no_file(folder):
     (folder / "a").symlink_to("b")
     (folder / "b").symlink_to("a")
-    assert "cannot be" in refusal(lambda: open_file(named_in(folder, "a")))
+    assert "cannot be" in refusal(lambda: open_file(referenced_file(folder, "a")))
 
 
 def recording(path, text):
@@ -210,14 +210,14 @@ def recording(path, text):
 
 def test_a_recordings_scene_names_no_file(tmp_path):
     path = recording(tmp_path / "flight.bag", '{"scene": {"map": "/etc/map.yaml"}}')
-    assert "scene: names another file" in refusal(read_trace, path)
+    assert "scene: refers to another file" in refusal(read_trace, path)
 
 
 @pytest.mark.parametrize("name", ["flight.bag", "flight.mcap"])
 def test_a_recording_that_unpacks_to_far_more_is_refused(tmp_path, monkeypatch, name):
     path = recording(tmp_path / name, " " * 200_000_000 + "{}")
     assert path.stat().st_size < 2_000_000
-    monkeypatch.setattr(bag_trace, "MOST_MEMORY_BYTES", 100_000_000)
+    monkeypatch.setattr(bag_trace, "MAX_MEMORY_BYTES", 100_000_000)
     problem = refusal(read_trace, path)  # lz4 says it in its own words
     assert "needs more than 0.1 GB of memory" in problem or "Failed to resize buffer" in problem
     monkeypatch.undo()

@@ -17,9 +17,10 @@ from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
+from quad_nav.files.shipped import config_folder
 from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, WatchedGoalFile
-from quad_nav.scenario.flight_setup import FlightSetup, config_folder, goals_off_the_costmap
+from quad_nav.scenario.flight_setup import FlightSetup, goals_off_the_costmap
 from quad_nav.sim.flight import Airframe, FlightParams
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import STEPS_PER_S, SimulationParams

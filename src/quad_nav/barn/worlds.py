@@ -29,7 +29,7 @@ FIELD = (64, 30)
 """Rows along y, columns along x."""
 MARGIN_M = 5.0
 """Free floor around field, start and goal, before the walls that every scene has."""
-MOST_BYTES = 256 * 1024 * 1024
+MAX_BYTES = 256 * 1024 * 1024
 """Of all arrays of a file, unpacked."""
 _LOW_X_M = -4.5
 
@@ -103,8 +103,8 @@ def _read(path: Path) -> Dict[str, np.ndarray]:
     try:
         with open_file(path) as opened, np.load(opened, allow_pickle=False) as file:
             size = sum(member.file_size for member in file.zip.infolist())
-            if size > MOST_BYTES:
-                raise ValueError(f"it holds {size} bytes, at most {MOST_BYTES} are read")
+            if size > MAX_BYTES:
+                raise ValueError(f"it holds {size} bytes, at most {MAX_BYTES} are read")
             return {name: file[name] for name in file.files}
     except (
         OSError,

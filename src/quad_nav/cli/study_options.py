@@ -15,9 +15,8 @@ from quad_nav.barn.setup import BarnOptions
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
 from quad_nav.cli.parameters import parameter
 from quad_nav.errors import InputError, QuadError
-from quad_nav.files.shipped import shipped
+from quad_nav.files.shipped import config_folder, shipped
 from quad_nav.offline.workers import LocalWorkers, RayWorkers, Workers
-from quad_nav.scenario.flight_setup import config_folder
 from quad_nav.scenario.warm_up import simulate, warm_up
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import SimulationParams

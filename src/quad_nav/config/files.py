@@ -17,7 +17,7 @@ import yaml
 
 from quad_nav.config.notes import CAUTION, Remark
 from quad_nav.errors import InputError
-from quad_nav.files.plain_yaml import MOST_BYTES, MOST_LEVELS, PlainLoader
+from quad_nav.files.plain_yaml import MAX_BYTES, MAX_LEVELS, PlainLoader
 from quad_nav.files.user_files import read_text
 
 COMMON = "costmap_common_params"
@@ -179,7 +179,7 @@ class _Document:
 
 
 def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
-    text = _substituted(read_text(path, MOST_BYTES), path, arguments)
+    text = _substituted(read_text(path, MAX_BYTES), path, arguments)
     document = _Document(path)
     try:
         loader = PlainLoader(text)
@@ -240,11 +240,11 @@ def _collect(
         key = str(loader.construct_object(key_node, deep=True))
         line = key_node.start_mark.line + 1
         path = above + tuple(filter(None, key.split("/")))
-        if not above < path or len(path) > MOST_LEVELS:
+        if not above < path or len(path) > MAX_LEVELS:
             raise InputError(
                 [
                     f"{document.path}:{line}: {key[:40]!r} is no name of a parameter; "
-                    f"expected 1 to {MOST_LEVELS} names with / between them"
+                    f"expected 1 to {MAX_LEVELS} names with / between them"
                 ]
             )
         document.lines[path] = line

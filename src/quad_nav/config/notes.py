@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from typing import Dict, Iterable, List, Mapping, Optional, Sequence
 
 from quad_nav.errors import InputError
+from quad_nav.files.values import nearest
 
 ERROR = "error"  # nothing flies with it
 UNKNOWN = "unknown"  # move_base does not know the key either
@@ -88,8 +88,7 @@ class Notes:
 
     def unknown(self, path: str, name: str, known: Iterable[str]) -> None:
         """A key that nobody reads, with the nearest name that somebody does."""
-        nearest = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
-        self.remark(path, UNKNOWN, "unknown, nothing reads it", *nearest)
+        self.remark(path, UNKNOWN, "unknown, nothing reads it", nearest(name, known))
 
     def raise_problems(self) -> None:
         """Raises ParameterError when there was any problem."""

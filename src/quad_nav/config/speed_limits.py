@@ -7,7 +7,6 @@ backwards fast is not slow.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from typing import Any, Dict, Mapping, Optional, Tuple
 
@@ -20,6 +19,7 @@ from quad_nav.config.tables.dwa_planner import DWA_TABLE
 from quad_nav.config.tables.move_base import DEFAULT_LOCAL_PLANNER
 from quad_nav.config.tables.recoveries import MOVE_SLOW_TABLE
 from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
+from quad_nav.files.values import nearest
 from quad_nav.recovery import MoveSlowAndClearParams
 
 
@@ -84,7 +84,7 @@ def check_slow(namespace: Mapping[str, Any], name: str, planner: str, notes: Not
                 join(name, key),
                 CAUTION,
                 f"{own} has no speed of the name {speed}",
-                *difflib.get_close_matches(speed, speeds.fields, n=1),
+                nearest(speed, speeds.fields),
             )
 
 

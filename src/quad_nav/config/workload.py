@@ -13,19 +13,19 @@ from quad_nav.control.dwa_planner import DwaParams
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.layered import CostmapParams
 
-MOST_CELLS = 10**8  # of one costmap: some GB, with its layers and the planner's potential
-MOST_POINTS = 10**8  # of all trajectories in one control period: some seconds
+MAX_CELLS = 10**8  # of one costmap: some GB, with its layers and the planner's potential
+MAX_POINTS = 10**8  # of all trajectories in one control period: some seconds
 
 
 def size_problem(params: CostmapParams) -> str:
     """Return the reason why a costmap of this size is refused, "" if it is accepted."""
     columns = params.width_m / params.resolution_m
     rows = params.height_m / params.resolution_m
-    if min(columns, rows) >= 1.0 and columns * rows <= MOST_CELLS:
+    if min(columns, rows) >= 1.0 and columns * rows <= MAX_CELLS:
         return ""
     return (
         f"{params.width_m:.15g} x {params.height_m:.15g} m with cells of {params.resolution_m:g} m"
-        f" is not supported; expected 1 to {MOST_CELLS} cells"
+        f" is not supported; expected 1 to {MAX_CELLS} cells"
     )
 
 
@@ -43,11 +43,11 @@ def rollout_problem(params: Any) -> str:
         params.max_vel_theta_radps * params.sim_time_s / params.angular_sim_granularity_rad,
         1.0,
     )
-    if samples * points <= MOST_POINTS:
+    if samples * points <= MAX_POINTS:
         return ""
     return (
         f"{samples} trajectories of up to {points:.3g} points are too many; expected at"
-        f" most {MOST_POINTS} points in total (use fewer samples, a shorter sim_time, a lower"
+        f" most {MAX_POINTS} points in total (use fewer samples, a shorter sim_time, a lower"
         " speed or a coarser granularity)"
     )
 

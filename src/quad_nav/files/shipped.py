@@ -1,7 +1,7 @@
-"""Where the scenes, goals and configurations are that come with the package.
+"""Find the scenes, goals and configurations that come with the package.
 
-In a checkout they stand beside ``src``; pip puts them below the environment's
-``share/quad``, catkin below the workspace's.
+In a checkout they are beside ``src``; pip installs them below the environment's ``share/quad``,
+catkin below the workspace's.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from quad_nav.errors import InputError
+from quad_nav.files.values import nearest
 
 _HERE = Path(__file__).resolve()
 _PLACES = (
@@ -19,19 +20,36 @@ _PLACES = (
 )
 
 
-def shipped(kind: str, name: str = "") -> Path:
-    """A shipped file or folder, as ``shipped("scenes", "arena.yaml")``.
+def shipped(folder: str, name: str = "") -> Path:
+    """Path of a shipped file or folder, as ``shipped("scenes", "arena.yaml")``.
 
     Raises:
-        InputError: it is nowhere.
+        InputError: It is in none of the places where it may be installed.
     """
     for place in _PLACES:
-        path = place / kind / name
+        path = place / folder / name
         if path.exists():
             return path
     raise InputError(
         [
-            f"{kind}/{name}: does not come with quad; expected it in one of "
-            + ", ".join(str(place / kind) for place in _PLACES)
+            f"{folder}/{name}: does not come with quad; expected it in one of "
+            + ", ".join(str(place / folder) for place in _PLACES)
         ]
     )
+
+
+def config_folder(name: str) -> Path:
+    """Folder of a configuration: a folder's path or the name of a shipped configuration.
+
+    Raises:
+        InputError: There is neither.
+    """
+    path = Path(name).expanduser()
+    if path.is_dir():
+        return path
+    names = sorted(folder.name for folder in shipped("config").iterdir() if folder.is_dir())
+    if name in names:
+        return shipped("config", name)
+    near = nearest(name, names)
+    hint = f"did you mean {near}?" if near else f"there are {', '.join(names)}"
+    raise InputError([f"config: {name}: expected a folder or the name of a shipped one; {hint}"])

@@ -11,8 +11,8 @@ from quad_nav.grid import FREE, LETHAL
 from quad_nav.kernels.cells import cell_index
 
 SECTORS = 1024
-MOST_OBSTRUCTED = 512  # cells that are worth looking for lines towards them
-MOST_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
+MAX_OBSTRUCTED = 512  # cells that are worth looking for lines towards them
+MAX_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
 
 
 @njit(cache=True, nogil=True)
@@ -170,7 +170,7 @@ def clear_all_rays(
     lines = no_lines
     everywhere = np.ones(SECTORS, dtype=np.bool_)
     sectors = np.empty(SECTORS, dtype=np.bool_)
-    obstructed = np.empty(MOST_OBSTRUCTED, dtype=np.int64)
+    obstructed = np.empty(MAX_OBSTRUCTED, dtype=np.int64)
     window = _reached(costs, origin_x, origin_y, resolution, sensors, range_m)
     count = find_obstructed(costs, window, obstructed)
     for k in range(len(ends)):
@@ -190,7 +190,7 @@ def clear_all_rays(
                 no_lines,
                 bounds,
             )
-        elif count <= MOST_OBSTRUCTED:
+        elif count <= MAX_OBSTRUCTED:
             _find_sectors(
                 obstructed[:count],
                 costs.shape[1],
@@ -326,9 +326,9 @@ def _keep_obstructed(flat_costs, obstructed, count):
 
 @njit(cache=True, nogil=True)
 def _power_of_two(cells):
-    """The first power of two that is not below ``cells``, but ``MOST_LINES`` at most."""
+    """The first power of two that is not below ``cells``, but ``MAX_LINES`` at most."""
     size = 1
-    while size < cells and size < MOST_LINES:
+    while size < cells and size < MAX_LINES:
         size *= 2
     return size
 

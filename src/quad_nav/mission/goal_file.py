@@ -8,7 +8,6 @@ wrong; what was expected``. ``goals/schema.json`` describes the format for edito
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import json
 import math
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import read_bytes
+from quad_nav.files.values import expected_name, is_number
 from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, Goal, GoalSequence, SequenceSettings
 
 MAX_BYTES = 4 * 1024 * 1024
@@ -38,25 +38,20 @@ class _Setting(NamedTuple):
     expected: str
 
 
-def _is_number(value: Any) -> bool:
-    # bool is a subclass of int, but true is not a number of metres.
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-
-
 SETTINGS: Dict[str, _Setting] = {
     "goal_tolerance": _Setting(
         "goal_tolerance_m",
-        lambda v: _is_number(v) and 0 < v <= MAX_COORDINATE_M,
+        lambda v: is_number(v) and 0 < v <= MAX_COORDINATE_M,
         f"a number of metres above 0, {MAX_COORDINATE_M:g} at most",
     ),
     "goal_timeout": _Setting(
         "goal_timeout_s",
-        lambda v: _is_number(v) and 0 < v <= MAX_TIMEOUT_S,
+        lambda v: is_number(v) and 0 < v <= MAX_TIMEOUT_S,
         f"a number of seconds above 0, {MAX_TIMEOUT_S:g} at most",
     ),
     "retries": _Setting(
         "retries",
-        lambda v: _is_number(v) and 0 <= v <= MAX_GOALS and v == int(v),
+        lambda v: is_number(v) and 0 <= v <= MAX_GOALS and v == int(v),
         f"a whole number, 0 to {MAX_GOALS}",
     ),
     "loop": _Setting("loop", lambda v: isinstance(v, bool), "true or false"),
@@ -234,7 +229,7 @@ def _goal_faults(entry: Any) -> Iterable[str]:
         yield f": has {len(entry)} numbers; expected [x, y] or [x, y, yaw]"
         return
     for label, unit, value in zip(("x", "y", "yaw"), ("metres", "metres", "radians"), entry):
-        if not _is_number(value):
+        if not is_number(value):
             yield f": {label} is {_show(value)}; expected a finite number of {unit}"
         elif label != "yaw" and abs(value) > MAX_COORDINATE_M:
             yield f": {label} is {value:g}; expected {MAX_COORDINATE_M:g} metres at most"
@@ -255,9 +250,7 @@ def _loop_faults(goals: List[Goal], tolerance_m: float, name: str) -> List[str]:
 
 
 def _unknown_key(name: str, key: str) -> str:
-    near = difflib.get_close_matches(key.lower(), KEYS, n=1)
-    expected = near[0] if near else "one of " + ", ".join(KEYS)
-    return f"{name}: {key}: is not a key of goal files; expected {expected}"
+    return f"{name}: {key}: is not a key of goal files; expected {expected_name(key.lower(), KEYS)}"
 
 
 def _kind(value: Any) -> str:

@@ -13,10 +13,10 @@ from quad_nav.config.differences import differences
 from quad_nav.geometry import Pose3D
 
 LARGEST_M = 1e6
-LONGEST_S = 1e10
+MAX_SECONDS = 1e10
 """Larger than any stamp: stamps hold 32 bits of seconds."""
 LARGEST_HZ = 1e6
-MOST_ROBOTS = 100
+MAX_ROBOTS = 100
 _UNIT_WITHIN = 1e-2
 _MOST_LEVELS = 50
 _LONGEST_TEXT = 10_000
@@ -33,7 +33,7 @@ def checked_flight(info: Mapping[str, Any]) -> Dict[str, Any]:
         if key in info:
             given[key] = _text(info, key)
     if "start_s" in info:
-        given["start_s"] = _number(info, "start_s", LONGEST_S)
+        given["start_s"] = _number(info, "start_s", MAX_SECONDS)
     if "robot_radius_m" in info:
         given["robot_radius_m"] = _number(info, "robot_radius_m", LARGEST_M)
     if info.get("seed") is not None:
@@ -43,7 +43,7 @@ def checked_flight(info: Mapping[str, Any]) -> Dict[str, Any]:
             str(key): str(value) for key, value in _mapping(info["versions"], "versions").items()
         }
     if "robots" in info:
-        given["robots"] = [_robot(robot) for robot in _list(info, "robots", MOST_ROBOTS)]
+        given["robots"] = [_robot(robot) for robot in _list(info, "robots", MAX_ROBOTS)]
     return given
 
 
@@ -54,15 +54,15 @@ def checked_event(event: Mapping[str, Any]) -> Dict[str, Any]:
         ValueError: A value has the wrong type or range.
     """
     robot = _whole(event, "robot")
-    if not 0 <= robot < MOST_ROBOTS:
-        raise ValueError(f"robot: {robot}, expected 0 to {MOST_ROBOTS - 1}")
+    if not 0 <= robot < MAX_ROBOTS:
+        raise ValueError(f"robot: {robot}, expected 0 to {MAX_ROBOTS - 1}")
     kind = event.get("event")
     if kind not in ("sent", "ended"):
         return {"robot": robot, "event": None}
     checked: Dict[str, Any] = {
         "robot": robot,
         "event": kind,
-        "time_s": _number(event, "time_s", LONGEST_S),
+        "time_s": _number(event, "time_s", MAX_SECONDS),
     }
     if kind == "ended":
         return {

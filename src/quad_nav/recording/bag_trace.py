@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
 from quad_nav.errors import InputError
-from quad_nav.files.memory_limit import at_most_more
+from quad_nav.files.user_files import limit_memory
 from quad_nav.recording.bag_file import Message, read_messages
 from quad_nav.recording.bag_info import (
-    LONGEST_S,
-    MOST_ROBOTS,
+    MAX_ROBOTS,
+    MAX_SECONDS,
     checked_event,
     checked_flight,
     checked_pose,
@@ -35,7 +35,7 @@ from quad_nav.topics.flight_info import (
     from_text,
 )
 
-MOST_MEMORY_BYTES = 4 * 10**9
+MAX_MEMORY_BYTES = 4 * 10**9
 """Limit for reading a recording: unpacked, it may be a thousand times larger."""
 LONGEST_FLIGHT_S = 30 * 24 * 3600.0
 """Longer flights are refused: two clocks in one recording differ by decades."""
@@ -68,12 +68,12 @@ def read_trace(path: Path) -> FlightTrace:
         InputError: The file is not a recording, is damaged or has no odometry.
     """
     try:
-        with at_most_more(MOST_MEMORY_BYTES):
+        with limit_memory(MAX_MEMORY_BYTES):
             return _read(path)
     except MemoryError as error:
         raise InputError(
             [
-                f"{path}: reading needs more than {MOST_MEMORY_BYTES / 1e9:g} GB of memory, "
+                f"{path}: reading needs more than {MAX_MEMORY_BYTES / 1e9:g} GB of memory, "
                 "expected less; shorten the recording with `rosbag filter`"
             ]
         ) from error
@@ -138,8 +138,8 @@ class TraceReader:
         add(self._robot(robot), message)
 
     def _robot(self, robot: int) -> BagRobot:
-        if robot >= MOST_ROBOTS:
-            raise ValueError(f"quadcopter {robot}, expected 0 to {MOST_ROBOTS - 1}")
+        if robot >= MAX_ROBOTS:
+            raise ValueError(f"quadcopter {robot}, expected 0 to {MAX_ROBOTS - 1}")
         return self.robots.setdefault(robot, BagRobot())
 
     def add_flight(self, message: Message) -> None:
@@ -165,7 +165,7 @@ class TraceReader:
                 status.hardware_id, {pair.key: pair.value for pair in status.values}
             )
             require_finite((contact.x_m, contact.y_m))
-            require_finite((contact.time_s,), LONGEST_S)
+            require_finite((contact.time_s,), MAX_SECONDS)
             self.contacts.append(contact)
 
     def add_transforms(self, message: Message) -> None:

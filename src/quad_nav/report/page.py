@@ -25,7 +25,7 @@ from quad_nav.report.parameter_table import parameter_rows
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.timeline_picture import timeline_picture
 
-MOST_STRIPS = 6
+MAX_STRIPS = 6
 """Close encounters beyond this number are counted and not shown."""
 
 
@@ -67,7 +67,7 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
         among = tracks(trace)
         flight = flight_metrics(trace, among)
         met = encounters(trace, among)
-        shown = met[:MOST_STRIPS]
+        shown = met[:MAX_STRIPS]
         sections = [
             _paths(trace, among, shown),
             _encounters(trace, among, met, shown),
@@ -208,7 +208,7 @@ def _most_endangered(flight: FlightMetrics) -> List[int]:
         gaps = (robot.least_clearance_m, robot.least_separation_m)
         return min((gap for gap in gaps if gap is not None), default=float("inf"))
 
-    return sorted(sorted(range(len(flight.robots)), key=least_gap_m)[: style.MOST_ROWS])
+    return sorted(sorted(range(len(flight.robots)), key=least_gap_m)[: style.MAX_ROWS])
 
 
 def picture(name: str, alt: str, figure: Figure) -> Picture:

@@ -19,7 +19,7 @@ WIDTH_IN = 8.0
 _DPI = 140
 ALARM = "#c01020"  # contacts, failures, limits
 QUIET = "#667080"  # labels and lines that only help
-MOST_ROWS = 16
+MAX_ROWS = 16
 """Pictures with a row for each quadcopter have no more rows than this."""
 _MOST_IN_LEGEND = 24
 

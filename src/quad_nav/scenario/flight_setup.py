@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import shipped
+from quad_nav.files.shipped import config_folder, shipped
 from quad_nav.mission.robot_goals import (
     RobotGoals,
     goal_paths,
@@ -116,23 +115,6 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         options.time_limit_s,
         warnings=(*scene.remarks, *last_goal_conflicts(robots, radius_m), *warnings),
     )
-
-
-def config_folder(name: str) -> Path:
-    """A folder of parameters by its path or, if it is shipped, by its name.
-
-    Raises:
-        InputError: there is neither.
-    """
-    path = Path(name).expanduser()
-    if path.is_dir():
-        return path
-    names = sorted(folder.name for folder in shipped("config").iterdir() if folder.is_dir())
-    if name in names:
-        return shipped("config", name)
-    near = difflib.get_close_matches(name, names, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
-    raise InputError([f"config: {name}: expected a folder or the name of a shipped one; {hint}"])
 
 
 def _faults(options: FlightOptions) -> List[str]:

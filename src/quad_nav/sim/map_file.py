@@ -24,8 +24,8 @@ from typing import Any, List, Optional, Tuple
 import numpy as np
 
 from quad_nav.errors import InputError
-from quad_nav.files.document import Checker, kind
-from quad_nav.files.user_files import named_in
+from quad_nav.files.document import Checker, describe
+from quad_nav.files.user_files import referenced_file
 from quad_nav.geometry import Pose2D
 from quad_nav.kernels.rectangles import cover
 from quad_nav.sim.map_image import Pixels, read_pixels
@@ -182,14 +182,14 @@ def rectangles_of(marked: np.ndarray) -> np.ndarray:
 
 def _read_fields(check: Checker, document: Any, folder: Path) -> Optional[MapFields]:
     if not isinstance(document, dict):
-        check.fault("", f"{kind(document)}, expected a mapping with {', '.join(_KEYS)}")
+        check.fault("", f"{describe(document)}, expected a mapping with {', '.join(_KEYS)}")
         return None
     image = check.text(document, "image", "", "")
     resolution_m = check.number(document, "resolution", "", positive=True)
     origin = Pose2D(*check.numbers(document, "origin", "", 3))
     negate = document.get("negate")
     if not isinstance(negate, int) or negate not in _NEGATE:
-        check.fault("negate", f"{kind(negate)}, expected 0 or 1")
+        check.fault("negate", f"{describe(negate)}, expected 0 or 1")
     occupied, free = (
         _threshold(check, document, key) for key in ("occupied_thresh", "free_thresh")
     )
@@ -197,7 +197,7 @@ def _read_fields(check: Checker, document: Any, folder: Path) -> Optional[MapFie
         check.fault("free_thresh", f"{free:g} is above occupied_thresh, {occupied:g}")
     mode = document.get("mode", "trinary")
     if not isinstance(mode, str) or mode not in _MODES:
-        check.fault("mode", f"{kind(mode)}, expected {', '.join(_MODES)}")
+        check.fault("mode", f"{describe(mode)}, expected {', '.join(_MODES)}")
     if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
         check.fault(
             "resolution",
@@ -210,7 +210,7 @@ def _read_fields(check: Checker, document: Any, folder: Path) -> Optional[MapFie
 
 def _image_path(check: Checker, folder: Path, image: str) -> Path:
     try:
-        return named_in(folder, image)
+        return referenced_file(folder, image)
     except InputError as error:
         check.fault("image", "; ".join(error.problems))
         return folder

@@ -7,7 +7,7 @@ import re
 from pathlib import Path, PurePosixPath
 from typing import Optional, Sequence
 
-from quad_nav.files.user_files import named_in
+from quad_nav.files.user_files import referenced_file
 from quad_nav.sim.xml_tree import read_xml
 
 _SCHEME = "model://"
@@ -30,7 +30,7 @@ def find_model(uri: str, folders: Sequence[Path]) -> Optional[Path]:
         place = folder / name
         if not os.path.exists(place):  # Path.exists raises where a name is too long
             continue
-        named_in(folder, str(name), folders)
+        referenced_file(folder, str(name), folders)
         path = _sdf_in(place, folders) if place.is_dir() else place
         if os.path.exists(path):
             return path
@@ -45,7 +45,7 @@ def _sdf_in(folder: Path, folders: Sequence[Path]) -> Path:
         (_version(sdf.attributes.get("version", "")), sdf.text.strip())
         for sdf in read_xml(config).all("sdf")
     ]
-    return named_in(folder, max(named)[1] if named else "model.sdf", folders)
+    return referenced_file(folder, max(named)[1] if named else "model.sdf", folders)
 
 
 def _version(text: str) -> tuple:

@@ -32,8 +32,8 @@ from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Union
 
 from quad_nav.errors import InputError
-from quad_nav.files.document import Checker, kind, read_yaml
-from quad_nav.files.user_files import named_in
+from quad_nav.files.document import Checker, describe, read_yaml
+from quad_nav.files.user_files import referenced_file
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.free_starts import with_free_starts
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Sphere, Walls
@@ -140,7 +140,7 @@ def _read_surroundings(
     """The world or map that the scene takes its place from, if it does."""
     unknown = fields.get("unknown", "free")
     if not isinstance(unknown, str) or unknown not in ("free", "occupied"):
-        check.fault("unknown", f"{kind(unknown)}, expected free or occupied")
+        check.fault("unknown", f"{describe(unknown)}, expected free or occupied")
     if "unknown" in fields and "map" not in fields:
         check.fault("unknown", "belongs to a map, expected the key map too")
     if "world" in fields and "map" in fields:
@@ -148,10 +148,12 @@ def _read_surroundings(
         return None
     try:
         if "world" in fields:
-            return from_world(named_in(folder, check.text(fields, "world", "", ".")), model_path())
+            return from_world(
+                referenced_file(folder, check.text(fields, "world", "", ".")), model_path()
+            )
         if "map" in fields:
             return from_map(
-                named_in(folder, check.text(fields, "map", "", ".")),
+                referenced_file(folder, check.text(fields, "map", "", ".")),
                 height_m,
                 unknown == "occupied",
             )
@@ -195,11 +197,11 @@ def _read_arena(
 def _read_obstacle(check: Checker, entry: Any, number: int) -> Optional[Obstacle]:
     faults_before, place = len(check.problems), f"obstacles[{number}]"
     if not isinstance(entry, dict):
-        check.fault(place, f"{kind(entry)}, expected a mapping that describes an obstacle")
+        check.fault(place, f"{describe(entry)}, expected a mapping that describes an obstacle")
         return None
     shape = entry.get("shape")
     if not isinstance(shape, str) or shape not in _SHAPE_KEYS:
-        check.fault(f"{place}.shape", f"{kind(shape)}, expected box, cylinder or sphere")
+        check.fault(f"{place}.shape", f"{describe(shape)}, expected box, cylinder or sphere")
         return None
     check.mapping(entry, place, _SHAPE_KEYS[shape])
     name = check.text(entry, "name", place, f"obstacle_{number}")
@@ -253,7 +255,7 @@ def _with_chosen_starts(check: Checker, scene: Scene, around: Surroundings) -> S
 def _read_start(check: Checker, entry: Any, place: str) -> Optional[Pose2D]:
     faults_before = len(check.problems)
     if not isinstance(entry, list) or len(entry) not in (2, 3):
-        check.fault(place, f"{kind(entry)}, expected [x, y] or [x, y, yaw]")
+        check.fault(place, f"{describe(entry)}, expected [x, y] or [x, y, yaw]")
         return None
     start = Pose2D(*[check.as_number(v, f"{place}[{k}]") for k, v in enumerate(entry)])
     return start if len(check.problems) == faults_before else None

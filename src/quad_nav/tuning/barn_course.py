@@ -11,7 +11,8 @@ from quad_nav.barn.setup import BarnOptions, Contestant, flight_setup, read_barn
 from quad_nav.barn.statistics import BarnStatistics, barn_statistics
 from quad_nav.barn.worlds import BarnWorld
 from quad_nav.errors import InputError
-from quad_nav.scenario.flight_setup import FlightSetup, config_folder
+from quad_nav.files.shipped import config_folder
+from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import HELD_OUT_SEED, LIDAR, Case, files_digest
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.space import Assignments

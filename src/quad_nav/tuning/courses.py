@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
+from quad_nav.files.shipped import config_folder
 from quad_nav.mission.robot_goals import WatchedGoalFile
-from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, config_folder, read_setup
+from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.simulation import SimulationParams
 from quad_nav.tuning.space import Assignments, costmap_paths
 

@@ -24,6 +24,7 @@ import yaml
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
 from quad_nav.files.user_files import read_text
+from quad_nav.files.values import is_number
 
 COSTMAPS = ("global_costmap", "local_costmap")
 BOTH = "*_costmap"
@@ -126,7 +127,7 @@ def load_space(path: Path) -> SearchSpace:
         InputError: every fault in it.
     """
     try:
-        entries = plain_yaml.load(read_text(path, plain_yaml.MOST_BYTES))
+        entries = plain_yaml.load(read_text(path, plain_yaml.MAX_BYTES))
     except yaml.YAMLError as error:
         raise InputError([f"{path}: cannot be read: {error}"]) from error
     if not isinstance(entries, dict) or not entries:
@@ -163,7 +164,7 @@ def _dimension(name: str, entry: Any, path: Path, problems: List[str]) -> Option
         if not isinstance(entry.get(key, False), bool)
     ]
     follow = entry.get("follow", {})
-    if not isinstance(follow, dict) or not all(_is_number(value) for value in follow.values()):
+    if not isinstance(follow, dict) or not all(is_number(value) for value in follow.values()):
         faults.append(f"{place}: follow: {follow!r}, expected {{path: factor}}")
     faults += _range_faults(entry, place) if "range" in entry else _choice_faults(entry, place)
     if faults:
@@ -183,7 +184,7 @@ def _range_faults(entry: Mapping[str, Any], place: str) -> List[str]:
     if not (
         isinstance(bounds, list)
         and len(bounds) == 2
-        and all(map(_is_number, bounds))
+        and all(map(is_number, bounds))
         and bounds[0] < bounds[1]
     ):
         return [f"{place}: range: {bounds!r}, expected [low, high] with low < high"]
@@ -204,7 +205,7 @@ def _choice_faults(entry: Mapping[str, Any], place: str) -> List[str]:
         and all(isinstance(one, (bool, int, float, str)) for one in choices)
     ):
         faults.append(f"{place}: choices: {choices!r}, expected two values or more")
-    elif entry.get("follow") and not all(map(_is_number, choices)):
+    elif entry.get("follow") and not all(map(is_number, choices)):
         faults.append(f"{place}: follow: expected choices that are numbers")
     faults += [f"{place}: {key} goes with a range" for key in ("log", "integer") if key in entry]
     return faults
@@ -224,10 +225,6 @@ def _set_twice(dimensions: Sequence[Dimension], path: Path) -> List[str]:
                     )
                 places.setdefault(single, one.path)
     return problems
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _times(value: Any, factor: float) -> Any:

@@ -14,9 +14,9 @@ import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
+from quad_nav.files.shipped import config_folder
 from quad_nav.files.user_files import read_text
 from quad_nav.offline.workers import Workers
-from quad_nav.scenario.flight_setup import config_folder
 from quad_nav.tuning.courses import LIDAR, Case, identity_text
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher, task_of
 from quad_nav.tuning.flight_cache import FlightCache
@@ -94,7 +94,7 @@ def read_points(path: Path) -> Tuple[Point, ...]:
         InputError: it is not such a file.
     """
     try:
-        text = io.StringIO(read_text(path, plain_yaml.MOST_BYTES), newline="")
+        text = io.StringIO(read_text(path, plain_yaml.MAX_BYTES), newline="")
         lines = [line for line in csv.reader(text, skipinitialspace=True) if line]
     except csv.Error as error:
         raise InputError([f"{path}: cannot be read: {error}"]) from error

@@ -13,9 +13,8 @@ from quad_nav import config
 from quad_nav.barn.setup import BarnOptions
 from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import shipped
+from quad_nav.files.shipped import config_folder, shipped
 from quad_nav.offline.workers import Workers
-from quad_nav.scenario.flight_setup import config_folder
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
 from quad_nav.tuning.flight_result import FlightResult

@@ -10,7 +10,7 @@ from quad_nav.report import style
 from quad_nav.report.encounters import encounters
 from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.measures import tracks
-from quad_nav.report.page import MOST_STRIPS, Page, Section, picture, render
+from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.timeline_picture import timeline_picture
 from quad_nav.tuning import study_text
@@ -77,7 +77,7 @@ def _flights(before: FlightTrace, after: FlightTrace) -> Section:
     pictures, notes = [], []
     for name, trace in (("before", before), ("after", after)):
         among = tracks(trace)
-        shown = encounters(trace, among)[:MOST_STRIPS]
+        shown = encounters(trace, among)[:MAX_STRIPS]
         found = flight_metrics(trace, among)
         words = f"{name.capitalize()}: {found.mission_s:.1f} s"
         notes += [words, ""]
