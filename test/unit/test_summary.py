@@ -12,10 +12,10 @@ from quad_nav.mission.summary import (
     MissionSummary,
     RobotSummary,
     summarize_robot,
-    table,
     to_json,
     write_json,
 )
+from quad_nav.mission.summary_table import table
 from quad_nav.sim.contacts import Contact, ContactLog, Touch
 from quad_nav.topics.flight_info import contact_from_values, contact_values
 
@@ -122,26 +122,44 @@ def test_only_a_complete_flight_without_contact_is_a_success(summary, status):
     assert summary.success is (status == 0)
 
 
-def test_the_table_fits_the_terminal_and_says_why():
-    long_reason = "aborted: Failed to find a valid plan. Even after executing recovery behaviors."
-    text = table(
-        mission(
-            leg(),
-            leg(False, reason=long_reason, attempts=2),
-            Leg(2, 1, Goal(9.0, 9.0), False, "not sent", 0),
-            contacts=(CONTACT,),
-            sim_time_s=20.0,
-            wall_time_s=10.0,
-        )
-    )
+LONG_REASON = "aborted: Failed to find a valid plan. Even after executing recovery behaviors."
+SUMMARY = mission(
+    leg(),
+    leg(False, reason=LONG_REASON, attempts=2),
+    Leg(2, 1, Goal(9.0, 9.0), False, "not sent", 0),
+    contacts=(CONTACT,),
+    sim_time_s=20.0,
+    wall_time_s=10.0,
+)
+
+
+def test_the_table_says_what_was_flown_and_why_not():
+    text = table(SUMMARY)
     assert max(map(len, text.splitlines())) <= 100
-    assert f"quad0 goal 1: {long_reason}" in text
+    assert f"quad0: goal 1: {LONG_REASON}" in text
     assert "interrupted" in table(mission(leg(False, reason="interrupted")))
     assert "pillar" in text and "not sent" in text and "1.40" in text
+    for head in ("path (m)", "detour", "recoveries", "contacts", "attempts", "separation (m)"):
+        assert head in text
     assert text.splitlines()[-1] == (
         "Mission FAILED: 1 of 3 goals reached, 1 contact in 20.0 s "
         "(wall 10.0 s, real-time factor 2.00)."
     )
+
+
+def test_a_narrow_terminal_drops_columns_and_names_them():
+    goals, robots, *_ = table(SUMMARY, 60).split("\n\n")
+    lines = goals.splitlines()
+    assert lines[0].split() == "robot goal x (m) y (m) result time (s) path (m)".split()
+    assert lines[-2] == "Not shown in 60 columns: attempts, straight (m), detour"
+    assert max(map(len, lines[:-1])) <= 60
+    heads = robots.splitlines()[1].split()
+    assert heads == "robot reached contacts clearance (m) separation (m)".split()
+    assert "Not shown in 60 columns: skipped, recoveries, path (m), detour" in robots
+
+
+def test_columns_that_matter_most_are_never_dropped():
+    assert table(SUMMARY, 10).splitlines()[0].split() == "robot goal result time (s)".split()
 
 
 def test_the_json_has_the_documented_keys(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import signal
 import sys
 from dataclasses import replace
@@ -19,7 +20,8 @@ from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.mission.flight_log import INTERRUPTED
-from quad_nav.mission.summary import table, to_json, write_json
+from quad_nav.mission.summary import to_json, write_json
+from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
 from quad_nav.offline.worker_process import processes_for
@@ -248,7 +250,8 @@ def _fly(
         summary = fly_setup(setup, [*observers, stop], processes)
     to_terminal = json_path == "-"
     if not quiet:
-        click.echo(table(summary), err=to_terminal)
+        width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
+        click.echo(table(summary, width), err=to_terminal)
     if to_terminal:
         click.echo(json.dumps(to_json(summary), indent=2, allow_nan=False))
     elif json_path is not None:

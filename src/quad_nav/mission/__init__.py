@@ -1,6 +1,7 @@
-"""Which goal next: goal files, the sequencer's state machine, the mission's figures.
+"""Missions: goals in, actions for the navigators and figures of the flight out, without ROS.
 
-Reading order: ``goal_sequence`` (the nouns), ``goal_file`` (a person's JSON to
-the nouns), ``sequencer`` (when to send, send again, skip, stop), ``flight_log``
-(what was flown) and ``summary`` (the figures as table and JSON).
+Reading order: ``goal_sequence`` (goals and settings), ``goal_file`` and ``robot_goals`` (from JSON
+files), ``sequencer`` (the state machine that sends, retries and skips goals), ``distances`` and
+``flight_log`` (what was flown), ``summary`` and ``summary_table`` (the figures), ``checkpoint`` and
+``journal`` (how a mission resumes), ``respawn`` (restarts a sequencer that was killed).
 """

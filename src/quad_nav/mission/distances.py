@@ -76,7 +76,7 @@ class DistanceLog:
         names: Sequence[str],
         radius_m: float,
         surface_distance: Optional[SurfaceDistance] = None,
-    ):
+    ) -> None:
         self._radius_m = radius_m
         self._surface_distance = surface_distance
         self._samples: Dict[str, List[Tuple[float, float, float]]] = {name: [] for name in names}

@@ -77,7 +77,7 @@ class RobotLog:
     first new pose counts as straight.
     """
 
-    def __init__(self, name: str, previous: RobotLogState = RobotLogState()):
+    def __init__(self, name: str, previous: RobotLogState = RobotLogState()) -> None:
         self.name = name
         self.legs: List[Leg] = list(previous.legs)
         self.path_length_m = previous.path_length_m
@@ -177,7 +177,7 @@ class FlightLog:
         names: Sequence[str],
         robot_radius_m: float,
         surface_distance: Optional[SurfaceDistance] = None,
-    ):
+    ) -> None:
         self.robots: Dict[str, RobotLog] = {name: RobotLog(name) for name in names}
         self.robot_radius_m = robot_radius_m
         self.contacts: List[Contact] = []

@@ -22,7 +22,7 @@ class Journal:
     when writing fails for the first time and when it succeeds again, and "" otherwise.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path) -> None:
         self.path = path
         self._file: Optional[int] = None
         self._size = 0  # bytes of complete lines

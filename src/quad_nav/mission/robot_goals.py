@@ -21,7 +21,7 @@ class WatchedGoalFile:
         path: Union[str, Path],
         check_place: Optional[PlaceCheck] = None,
         defaults: SequenceSettings = DEFAULT_SETTINGS,
-    ):
+    ) -> None:
         self.path = Path(path)
         self._check_place = check_place
         self._defaults = defaults

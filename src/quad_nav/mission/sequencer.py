@@ -60,7 +60,7 @@ class SendGoal:
 
 @dataclass(frozen=True)
 class GoalEnded:
-    """Action: the goal is reached, or skipped for ``reason``, ``time_s`` after it was first sent."""
+    """Action: a goal is reached, or skipped for ``reason``; ``time_s`` since it was first sent."""
 
     index: int
     lap: int
@@ -119,7 +119,7 @@ class Sequencer:
     again without counting an attempt, unless the robot has reached it meanwhile.
     """
 
-    def __init__(self, sequence: GoalSequence, progress: SequenceProgress = START):
+    def __init__(self, sequence: GoalSequence, progress: SequenceProgress = START) -> None:
         self._sequence = sequence
         self._index, self._lap, self._active = progress.index, progress.lap, progress.active_goal
         self._is_resumed = progress.active_goal is not None

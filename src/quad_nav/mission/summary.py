@@ -1,6 +1,6 @@
-"""A mission's figures as a table for a person and as JSON for a program.
+"""Summary of a mission: its figures, and their JSON, documented in ``docs/goals.md``.
 
-The keys of the JSON are documented in ``docs/goals.md``.
+``summary_table`` prints the same figures as tables.
 """
 
 from __future__ import annotations
@@ -9,9 +9,7 @@ import json
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
-
-import tabulate
+from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 from quad_nav.mission.flight_log import INTERRUPTED, FlightLog, Leg
 from quad_nav.mission.sequencer import Sequencer
@@ -23,7 +21,7 @@ EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT = 0, 1, 2
 
 @dataclass(frozen=True)
 class RobotSummary:
-    """One quadcopter's part; lengths and gaps are None where they could not be measured."""
+    """Figures of one robot; lengths and distances are None if they were not measured."""
 
     robot: str
     legs: Tuple[Leg, ...]
@@ -37,14 +35,17 @@ class RobotSummary:
 
     @property
     def straight_length_m(self) -> float:
+        """Sum of the legs' straight lengths."""
         return sum(leg.straight_length_m for leg in self.legs)
 
     @property
     def reached(self) -> int:
+        """Number of goals that were reached."""
         return sum(leg.reached for leg in self.legs)
 
     @property
     def skipped(self) -> int:
+        """Number of goals that were sent and given up."""
         return sum(
             not leg.reached and leg.attempts > 0 and leg.reason != INTERRUPTED for leg in self.legs
         )
@@ -52,7 +53,20 @@ class RobotSummary:
 
 @dataclass(frozen=True)
 class MissionSummary:
-    """The whole mission. ``reason`` says why it ended before its goals did, if it did."""
+    """Figures of a mission.
+
+    Attributes:
+        robots: Figures of each robot.
+        contacts: All contacts in the order in which they began.
+        robot_radius_m: Radius of the hulls that clearances and separations are measured from.
+        sim_time_s: Duration of the mission.
+        wall_time_s: Wall time that it took.
+        reason: Reason why the mission ended before its goals did, "" if it did not.
+        problems: Faults in the input, because of which nothing was flown.
+        contacts_reported: False if nothing reports contacts.
+        seed: Seed of the simulation.
+        versions: Versions of the software that flew.
+    """
 
     robots: Tuple[RobotSummary, ...]
     contacts: Tuple[Contact, ...] = ()
@@ -67,7 +81,7 @@ class MissionSummary:
 
     @property
     def success(self) -> bool:
-        """Every goal was reached and nothing touched."""
+        """True if every goal was reached without a contact."""
         return (
             not self.reason
             and not self.problems
@@ -77,18 +91,20 @@ class MissionSummary:
 
     @property
     def exit_status(self) -> int:
+        """Exit status of the program that flew the mission."""
         if self.problems:
             return EXIT_BAD_INPUT
         return EXIT_SUCCESS if self.success else EXIT_FAILURE
 
     @property
     def min_separation_m(self) -> Optional[float]:
-        """Least gap between any two quadcopters."""
-        gaps = [robot.min_separation_m for robot in self.robots]
-        return min((gap for gap in gaps if gap is not None), default=None)
+        """Smallest separation of any two robots."""
+        separations_m = [robot.min_separation_m for robot in self.robots]
+        return min((value_m for value_m in separations_m if value_m is not None), default=None)
 
     @property
     def real_time_factor(self) -> Optional[float]:
+        """Simulated seconds per second of wall time."""
         return self.sim_time_s / self.wall_time_s if self.wall_time_s > 0 else None
 
 
@@ -149,7 +165,7 @@ def summarize_robot(log: FlightLog, name: str, legs: Sequence[Leg]) -> RobotSumm
 
 
 def to_json(summary: MissionSummary) -> Dict[str, Any]:
-    """What ``write_json`` writes; lengths and times to the millimetre and millisecond."""
+    """Return the JSON object; lengths and times are rounded to 1 mm and 1 ms."""
     return {
         "success": summary.success,
         "exit_status": summary.exit_status,
@@ -178,7 +194,11 @@ def to_json(summary: MissionSummary) -> Dict[str, Any]:
 
 
 def write_json(summary: MissionSummary, path: Union[str, Path]) -> None:
-    """Write the JSON, with its folders; a reader never sees half of it."""
+    """Write the JSON object to a file and create its folders; a reader never sees a part of it.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
@@ -186,147 +206,6 @@ def write_json(summary: MissionSummary, path: Union[str, Path]) -> None:
         json.dumps(to_json(summary), indent=2, allow_nan=False) + "\n", encoding="utf-8"
     )
     partial.replace(path)
-
-
-def table(summary: MissionSummary) -> str:
-    """The figures in at most 100 columns."""
-    parts = [_goal_table(summary.robots), _robot_table(summary)]
-    if summary.contacts:
-        parts.append(_contact_table(summary.contacts))
-    parts.append(_verdict(summary))
-    return "\n\n".join(parts)
-
-
-def _goal_table(robots: Sequence[RobotSummary]) -> str:
-    laps = any(leg.lap > 1 for robot in robots for leg in robot.legs)
-    header = [
-        "robot",
-        "goal",
-        "x\nm",
-        "y\nm",
-        "result",
-        "time\ns",
-        "tries",
-        "path\nm",
-        "straight\nm",
-        "path /\nstraight",
-    ]
-    rows: List[Sequence[str]] = []
-    notes: List[str] = []
-    for robot in robots:
-        if rows:
-            rows.append(tabulate.SEPARATING_LINE)
-        for leg in robot.legs:
-            goal = f"{leg.lap}/{leg.index + 1}" if laps else str(leg.index + 1)
-            rows.append(_goal_row(robot.robot if leg is robot.legs[0] else "", goal, leg))
-            if leg.reason and leg.attempts and leg.reason != INTERRUPTED:
-                notes.append(f"{robot.robot} goal {goal}: {leg.reason}")
-    if laps:
-        header[1] = "lap/goal"
-    text = tabulate.tabulate(
-        rows,
-        header,
-        tablefmt="simple",
-        disable_numparse=True,
-        colalign=("left", "right", "right", "right", "left") + ("right",) * 5,
-    )
-    return "\n".join([text, *notes])
-
-
-def _goal_row(robot: str, goal: str, leg: Leg) -> List[str]:
-    flown = leg.time_s is not None
-    result = (
-        "reached"
-        if leg.reached
-        else (leg.reason if leg.reason == INTERRUPTED or not flown else "skipped")
-    )
-    return [
-        robot,
-        goal,
-        f"{leg.goal.x_m:.2f}",
-        f"{leg.goal.y_m:.2f}",
-        result,
-        _figure(leg.time_s, 1),
-        str(leg.attempts),
-        _figure(leg.path_length_m if flown else None, 2),
-        _figure(leg.straight_length_m if flown else None, 2),
-        _ratio(leg.path_length_m, leg.straight_length_m),
-    ]
-
-
-def _robot_table(summary: MissionSummary) -> str:
-    rows = [
-        [
-            robot.robot,
-            f"{robot.reached} of {len(robot.legs)}",
-            str(robot.skipped),
-            str(robot.recoveries),
-            str(robot.contacts) if summary.contacts_reported else "-",
-            f"{robot.path_length_m:.2f}",
-            _ratio(robot.path_length_m, robot.straight_length_m),
-            _figure(robot.min_clearance_m, 2),
-            _figure(robot.min_separation_m, 2),
-        ]
-        for robot in summary.robots
-    ]
-    header = [
-        "robot",
-        "reached",
-        "skipped",
-        "recov-\neries",
-        "con-\ntacts",
-        "path\nm",
-        "path /\nstraight",
-        "least gap to\nobstacle, m",
-        "least gap to\nrobot, m",
-    ]
-    text = tabulate.tabulate(
-        rows, header, tablefmt="simple", disable_numparse=True, colalign=("left",) + ("right",) * 8
-    )
-    note = f"Gaps are between hulls: discs of {summary.robot_radius_m:.2f} m radius."
-    return f"{text}\n{note}"
-
-
-def _contact_table(contacts: Sequence[Contact]) -> str:
-    rows = [
-        [
-            f"{contact.time_s:.2f}",
-            contact.robot,
-            contact.other,
-            f"{contact.x_m:.2f}",
-            f"{contact.y_m:.2f}",
-        ]
-        for contact in contacts
-    ]
-    return tabulate.tabulate(
-        rows,
-        ["contact at\ns", "robot", "touched", "x\nm", "y\nm"],
-        tablefmt="simple",
-        disable_numparse=True,
-        colalign=("right", "left", "left", "right", "right"),
-    )
-
-
-def _verdict(summary: MissionSummary) -> str:
-    legs = [leg for robot in summary.robots for leg in robot.legs]
-    reached = sum(leg.reached for leg in legs)
-    factor = summary.real_time_factor
-    speed = f", real-time factor {factor:.2f}" if factor is not None else ""
-    touched = f", {len(summary.contacts)} contact{'s' * (len(summary.contacts) != 1)}"
-    reason = f"\nIt ended early: {summary.reason}." if summary.reason else ""
-    return (
-        f"Mission {'flown' if summary.success else 'FAILED'}: {reached} of {len(legs)} goals "
-        f"reached{touched if summary.contacts_reported else ''} "
-        f"in {summary.sim_time_s:.1f} s (wall {summary.wall_time_s:.1f} s{speed}).{reason}"
-    )
-
-
-def _figure(value: Optional[float], decimals: int) -> str:
-    return "-" if value is None else f"{value:.{decimals}f}"
-
-
-def _ratio(path_m: float, straight_m: float) -> str:
-    return f"{path_m / straight_m:.2f}" if straight_m > 0.01 else "-"
 
 
 def _rounded(value: Optional[float]) -> Optional[float]:

@@ -6,6 +6,7 @@ the mission and writes the summary. Timers use simulated time and stop with a pa
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -21,9 +22,9 @@ from quad_nav.mission.summary import (
     EXIT_FAILURE,
     MissionSummary,
     RobotSummary,
-    table,
     write_json,
 )
+from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.node_tools import init_node
 from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
@@ -58,7 +59,8 @@ def watch(mission: MissionRunner, exit_when_done: bool, result: Path) -> int:
 
 def report(summary: MissionSummary, result: Path) -> int:
     """Print the summary table, write the JSON file and return the exit status."""
-    print(f"\n{table(summary)}", flush=True)
+    width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
+    print(f"\n{table(summary, width)}", flush=True)
     if not _write(summary, result):
         return summary.exit_status or EXIT_FAILURE
     print(f"Summary written to {result}\n", flush=True)
