@@ -1,4 +1,4 @@
-"""What the tests on running nodes share: waiting for conditions, goals, commands."""
+"""Base of the tests on running nodes: waiting for conditions, goals, commands."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ PUBLISHERS = ("/simulator", "/move_base0", "/move_base1")
 def topics_sent_here():
     """The topics that the simulator and the navigators send to this node.
 
-    Their own lists say so. A subscriber's number of connections counts those that are still being
-    made, which takes a second or more where many are made at once: what is published before
-    their end is lost.
+    Taken from the publishers' own lists. A subscriber's number of connections includes unfinished
+    ones; many at once take a second or more, and messages published before that are lost.
     """
     here, master = rospy.get_name(), rosgraph.Master("/test")
     topics = set()
@@ -50,17 +49,17 @@ class Latest:
     def __init__(self, topic, message_type):
         self.message = None
         self.count = 0
-        self._came = threading.Event()
+        self._received = threading.Event()
         self._subscriber = rospy.Subscriber(topic, message_type, self._store, queue_size=100)
 
     def _store(self, message):
         self.message = message
         self.count += 1
-        self._came.set()
+        self._received.set()
 
     def wait(self):
         """Until there is a message."""
-        if not self._came.wait(PATIENCE_S):
+        if not self._received.wait(PATIENCE_S):
             raise AssertionError(f"nothing on {self._subscriber.resolved_name}")
 
 
@@ -80,7 +79,7 @@ class Record:
         return rate_hz(self.stamps_s())
 
     def stamps_s(self):
-        """What the messages say; when they came for those that say nothing."""
+        """Stamps of the messages; times of arrival for messages without a stamp."""
         stamps_s = [
             message.header.stamp.to_sec() if message._has_header else 0.0
             for message in self.messages
@@ -97,7 +96,7 @@ def rate_hz(times_s):
 
 
 class FlightCase(unittest.TestCase):
-    """Two quadcopters whose simulation has been started and whose odometry comes."""
+    """Two quadcopters with a running simulation and odometry."""
 
     @classmethod
     def setUpClass(cls):

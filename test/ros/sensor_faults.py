@@ -1,4 +1,4 @@
-"""What the simulator tells, on its way to the nodes, and how it is spoiled there."""
+"""Inject faults into the topics of the simulator on their way to the other nodes."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from quad_nav.ros.common.conversions import ScanMessage
 ROBOTS = 2
 
 
-class Senses:
-    """Passes ``/true/...`` on. ``fault`` names what is done to quadcopter 0's topics, "" nothing;
-    ``back_s`` is how far all clocks and stamps are put back."""
+class SensorFaults:
+    """Forwards ``/true/...``. ``fault`` names the fault of quadcopter 0's topics, "" for none;
+    ``back_s`` is how far all clocks and stamps are set back."""
 
     def __init__(self):
         self.fault = ""
@@ -46,17 +46,17 @@ class Senses:
                 rospy.Subscriber(f"/true/scan{i}", ScanMessage, self._on_scan, i, tcp_nodelay=True),
             ]
 
-    def _then(self, stamp, back_s=0.0):
+    def _stamp(self, stamp, back_s=0.0):
         return rospy.Time.from_sec(max(stamp.to_sec() - self.back_s - back_s, 0.001))
 
     def _on_clock(self, message):
-        self._clock.publish(Clock(self._then(message.clock)))
+        self._clock.publish(Clock(self._stamp(message.clock)))
 
     def _on_tf(self, message):
         if self.fault == "no tf":
             return
         for transform in message.transforms:
-            transform.header.stamp = self._then(
+            transform.header.stamp = self._stamp(
                 transform.header.stamp, 2.0 if self.fault == "old tf" else 0.0
             )
             if self.fault == "odometry jumps" and transform.child_frame_id == "base_link0":
@@ -64,7 +64,7 @@ class Senses:
         self._tf.publish(message)
 
     def _on_odometry(self, message, i):
-        message.header.stamp = self._then(message.header.stamp)
+        message.header.stamp = self._stamp(message.header.stamp)
         if i == 0 and self.fault == "no odometry":
             return
         if i == 0 and self.fault == "odometry jumps":
@@ -72,14 +72,14 @@ class Senses:
         self._odometry[i].publish(message)
 
     def _on_scan(self, message, i):
-        message.header.stamp = self._then(message.header.stamp)
+        message.header.stamp = self._stamp(message.header.stamp)
         if i == 0:
-            message = self._spoiled(message)
+            message = self._with_fault(message)
         if message is not None:
             self._scans[i].publish(message)
 
-    def _spoiled(self, scan):
-        """What becomes of a scan, None for nothing."""
+    def _with_fault(self, scan):
+        """The scan with the fault, None for no message."""
         fault = self.fault
         ranges = {"NaN": math.nan, "zeros": 0.0, "+inf": math.inf, "half the beams": math.nan}
         if fault == "no scans":

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Goal files with faults: all of them named, exit status 2, nothing flies."""
+"""Invalid goal files: all faults reported, exit status 2, no robot flies."""
 
 import rospy
 import rostest
@@ -18,7 +18,7 @@ class BadGoals(FlightCase):
             "quad1_goals.json: gaols: is not a key of goal files; expected goals", problems
         )
         self.wait(lambda: self.odometry[0].message is not None, "odometry")
-        self.assertEqual(rospy.get_time(), 1.0)  # where the simulator's clock stands before a start
+        self.assertEqual(rospy.get_time(), 1.0)  # the simulator's clock before the start
         self.assertEqual([command.count for command in self.command], [0, 0])
 
 

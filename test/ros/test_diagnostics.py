@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""/diagnostics tells how every node is, as often while paused, and what becomes of it."""
+"""All nodes publish on /diagnostics, also while paused, and log changes of level."""
 
 import time
 
@@ -12,7 +12,7 @@ from std_srvs.srv import SetBool, Trigger
 
 OK, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 NAVIGATORS = {f"move_base{i}: {part}" for i in (0, 1) for part in ("control", "inputs", "loop")}
-EVERYBODY = NAVIGATORS | {"simulator: clock", "simulator: quadcopter 0", "simulator: quadcopter 1"}
+ALL = NAVIGATORS | {"simulator: clock", "simulator: quadcopter 0", "simulator: quadcopter 1"}
 
 
 class Diagnostics(FlightCase):
@@ -39,8 +39,8 @@ class Diagnostics(FlightCase):
     def value(self, name, key):
         return {pair.key: pair.value for pair in self.statuses[name].values}[key]
 
-    def test_1_every_node_tells_and_all_is_well(self):
-        self.wait(lambda: set(self.statuses) >= EVERYBODY, f"all of {sorted(EVERYBODY)}")
+    def test_1_every_node_publishes_its_status(self):
+        self.wait(lambda: set(self.statuses) >= ALL, f"all of {sorted(ALL)}")
         self.wait(
             lambda: all(self.level(f"move_base{i}: inputs") == OK for i in (0, 1)),
             "inputs that come",
@@ -48,18 +48,18 @@ class Diagnostics(FlightCase):
         for i in (0, 1):
             self.assertEqual(self.statuses[f"move_base{i}: inputs"].hardware_id, f"quad{i}")
 
-    def test_2_a_flight_and_a_lidar_that_falls_silent(self):
+    def test_2_a_flight_with_a_lidar_timeout(self):
         self.goal_topics[0].publish(goal_pose(self.position(0)[0], 6.5))
         self.wait(lambda: self.value("move_base0: control", "state") == "controlling", "a flight")
         self.lidar(0, False)
         self.wait(lambda: self.level("move_base0: inputs") == ERROR, "an error of its inputs")
-        self.assertIn("nothing on /scan0 for", self.statuses["move_base0: inputs"].message)
+        self.assertIn("no message on /scan0 for", self.statuses["move_base0: inputs"].message)
         self.wait(lambda: self.level("move_base0: control") == ERROR, "a navigator that stopped")
         self.assertIn("stopped: nothing from", self.statuses["move_base0: control"].message)
         self.assertEqual(self.level("move_base1: inputs"), OK)
         self.lidar(0, True)
         self.wait(lambda: self.level("move_base0: inputs") == OK, "inputs that come again")
-        self.wait(lambda: self.level("move_base0: control") == OK, "a flight that goes on")
+        self.wait(lambda: self.level("move_base0: control") == OK, "a flight that resumes")
         self.assertIn("stopped: nothing from", self.value("move_base0: control", "last reason"))
 
     def test_3_each_change_of_level_is_one_line_in_the_log(self):
@@ -70,10 +70,10 @@ class Diagnostics(FlightCase):
             and "/scan0" in line
             or line.startswith("move_base0: inputs: ERROR -> OK")
         ]
-        down = [line for line in changes if "OK -> ERROR: nothing on /scan0" in line]
+        down = [line for line in changes if "OK -> ERROR: no message on /scan0" in line]
         self.assertEqual((len(down), len([x for x in changes if "ERROR -> OK" in x])), (1, 1))
 
-    def test_4_a_paused_simulation_is_told_of_too(self):
+    def test_4_statuses_continue_while_the_simulation_is_paused(self):
         rospy.ServiceProxy("/simulation/pause", Trigger)()
         self.wait(lambda: self.statuses["simulator: clock"].message == "paused", "paused")
         before = len(self.arrivals)

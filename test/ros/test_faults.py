@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Senses and commands that go wrong in flight: hover while blind, go on, touch nothing."""
+"""Faults of sensors and commands in flight: hover while blind, resume, no contact."""
 
 import math
 import os
@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from flight_case import FlightCase, Latest, goal_pose
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from sensor_faults import Senses
+from sensor_faults import SensorFaults
 
 BLINDING = [
     "no scans",
@@ -27,27 +27,27 @@ BLINDING = [
     "no odometry",
 ]
 CONTROL_PERIOD_S, BLIND_S = 0.1, 0.5
-TRANSPORT_S = 0.3  # of what is sent and what is heard, on a machine that is busy with other things
+TRANSPORT_S = 0.3  # delay of messages on a busy machine
 LASTS_S = 3.0
 PLACES = [(1.0, 8.0), (1.0, 2.0)]
-REPORT = os.environ.get("QUAD_FAULTS_REPORT", "")  # where bench/faults.py wants the figures
+REPORT = os.environ.get("QUAD_FAULTS_REPORT", "")  # file for the figures, set by bench/faults.py
 
 
 class Faults(FlightCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.sensor_faults = Senses()
+        cls.sensor_faults = SensorFaults()
         cls.odometry = [Latest(f"/true/odom{i}", Odometry) for i in (0, 1)]
         cls.contacts = Latest("/simulation/contacts", DiagnosticStatus)
         cls.moving_s = 0.0
-        cls.subscriber = rospy.Subscriber("/cmd_vel0", Twist, cls.heed)
+        cls.subscriber = rospy.Subscriber("/cmd_vel0", Twist, cls.store_command)
         cls.start()
         cls.place = 0
 
     @classmethod
-    def heed(cls, command):
-        """When quadcopter 0 was last told to move."""
+    def store_command(cls, command):
+        """Time of the last moving command of quadcopter 0."""
         if command.linear.x or command.linear.y or command.angular.z:
             cls.moving_s = rospy.get_time()
 
@@ -72,7 +72,7 @@ class Faults(FlightCase):
         self.sent = 0.0
         self.wait(flies, f"robot 0 under way {when}")
 
-    def test_blind_it_hovers_and_goes_on(self):
+    def test_it_hovers_while_blind_and_resumes(self):
         # One list, and no subTest(): rosunit counts a test whose parts have failed as passed.
         late = {}
         for fault in BLINDING:
@@ -96,15 +96,15 @@ class Faults(FlightCase):
         self.sensor_faults.fault = ""
         self.fly("after the jump back")
 
-    def test_it_goes_on_when_the_clock_goes_back(self):
+    def test_it_resumes_after_a_clock_jump(self):
         self.fly()
         before_s = rospy.get_time()
         self.sensor_faults.back_s += 5.0
-        self.wait(lambda: rospy.get_time() < before_s - 4.0, "a clock that has gone back")
-        self.fly("after the clock went back")
+        self.wait(lambda: rospy.get_time() < before_s - 4.0, "a clock jump")
+        self.fly("after the clock jump")
 
-    def test_commands_at_a_kilohertz_steer_nobody(self):
-        """Another node's are not heeded, whether they are numbers or not."""
+    def test_commands_of_another_node_at_a_kilohertz_are_dropped(self):
+        """Commands of a second node are dropped, finite or not."""
         self.fly()
         begin_s = rospy.get_time()
         flood = [Twist(), Twist()]
@@ -121,7 +121,7 @@ class Faults(FlightCase):
         self.assertEqual(backwards, 0)
 
     def test_goals_at_a_kilohertz(self):
-        """The newest counts, and it flies on."""
+        """The newest one counts, and the robot continues to fly."""
         self.fly()
         begin_s = rospy.get_time()
         while rospy.get_time() < begin_s + LASTS_S:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A fleet in two processes: its ROS face is that of single navigators, and it flies its mission."""
+"""A fleet in two processes has the topics of single navigators and flies its mission."""
 
 import dynamic_reconfigure.client
 import rosgraph
@@ -12,7 +12,7 @@ from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseActionFeedback
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetPlan
-from test_ros_face import SERVICES, absent, names_of
+from test_ros_topics import SERVICES, absent, names_of
 
 from quad_nav.scenario.random_mission import random_mission
 
@@ -26,7 +26,7 @@ class Fleet(FlightCase):
         for i in range(ROBOTS):
             rospy.wait_for_service(f"/move_base{i}/make_plan", timeout=PATIENCE_S)
 
-    def test_1_every_robot_has_the_whole_face(self):
+    def test_1_every_robot_has_all_topics_and_services(self):
         self.wait(lambda: not absent(range(ROBOTS)), "every topic, subscription and service")
         for i in range(ROBOTS):
             for name, kind in names_of(SERVICES, i).items():

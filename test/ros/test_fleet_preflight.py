@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A fleet that cannot be flown is refused before anything starts, with every fault."""
+"""An invalid fleet is refused before any node starts, with all its faults."""
 
 import os
 import shutil
@@ -14,7 +14,7 @@ CONFIG = os.path.join(rospkg.RosPack().get_path("quad"), "config", "default")
 
 
 def preflight(*arguments):
-    """(exit status, what was said) for a launch with these arguments."""
+    """Exit status and error output for a launch with these arguments."""
     dump = subprocess.run(
         ["roslaunch", "--dump-params", "quad", "fleet.launch", "rviz:=false", *arguments],
         stdout=subprocess.PIPE,

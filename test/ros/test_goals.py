@@ -94,7 +94,7 @@ class Goals(FlightCase):
         self.goal_topics[0].publish(goal_pose(3.0, 3.0, frame="nowhere"))
         status = self.result_after(0, count)
         self.assertEqual(status.status, GoalStatus.ABORTED)
-        self.assertIn("frame 'nowhere' can't be transformed to 'map'", status.text)
+        self.assertIn("frame 'nowhere' cannot be transformed to 'map'", status.text)
 
     def test_goal_in_the_robots_own_frame(self):
         count = self.results[0].count

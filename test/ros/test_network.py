@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Nobody but this machine reaches a flight by `make fly`; `address:=` opens it, and says so."""
+"""A flight by `make fly` is reachable from this machine only; `address:=` opens it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Two navigators that know each other from their topics: none touches the other."""
+"""Two navigators that know each other from their topics fly without a contact."""
 
 import rospy
 import rostest
@@ -12,7 +12,7 @@ class Peers(FlightCase):
         intentions = [Latest(f"/move_base{i}/intention", Path) for i in (0, 1)]
         self.wait(
             lambda: all(i.message is not None and i.message.poses for i in intentions),
-            "both navigators telling where they go",
+            "the intentions of both navigators",
         )
         for latest in intentions:
             self.assertEqual(latest.message.header.frame_id, "map")

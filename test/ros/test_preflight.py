@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A launch that cannot be flown is refused before anything starts, with every fault."""
+"""An invalid launch is refused before any node starts, with all its faults."""
 
 import json
 import os
@@ -13,7 +13,7 @@ ARGUMENTS = ["--dump-params", "quad", "two_quads.launch", "rviz:=false"]
 
 
 def preflight(*arguments):
-    """(exit status, what was said) for a launch with these arguments."""
+    """Exit status and error output for a launch with these arguments."""
     dump = subprocess.run(["roslaunch", *ARGUMENTS, *arguments], stdout=subprocess.PIPE, check=True)
     check = subprocess.run(
         ["python3", "-m", "quad_nav.ros.common.preflight"],

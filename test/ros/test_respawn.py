@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Nodes killed and stopped in flight: hover, come back, and no goal is lost or flown twice."""
+"""Nodes killed and stopped in flight: hover, resume, no goal lost or flown twice."""
 
 import json
 import os
@@ -18,7 +18,7 @@ STOPPED_S = 5.0  # wall time
 
 
 def pid_of(name):
-    """None when nobody answers by this name."""
+    """None if no node with this name responds."""
     try:
         uri = rosnode.get_api_uri(rosgraph.Master("/test"), name, skip_cache=True)
         return ServerProxy(uri).getPid("/test")[2] if uri else None
@@ -51,8 +51,8 @@ class Respawn(FlightCase):
             self.assertTrue(
                 all(goal["reached"] and goal["attempts"] == 1 for goal in robot["goals"]), robot
             )
-        self.assertEqual(sorted(self.told("ended")), [(0, 0), (0, 1), (1, 0)])
-        first_sent = self.told("sent", why="")
+        self.assertEqual(sorted(self.events_of("ended")), [(0, 0), (0, 1), (1, 0)])
+        first_sent = self.events_of("sent", why="")
         self.assertEqual(len(first_sent), len(set(first_sent)), first_sent)
 
     def wait_for_flight(self, when):
@@ -64,7 +64,7 @@ class Respawn(FlightCase):
         self.wait(lambda: pid_of(name) not in (None, pid), f"{name} back")
 
     def stop(self, name):
-        """Stopped for a while, as by a machine that is busy with something else."""
+        """Stop a process for a while, as a busy machine does."""
         pid = pid_of(name)
         os.kill(pid, signal.SIGSTOP)
         self.addCleanup(os.kill, pid, signal.SIGCONT)
@@ -74,7 +74,7 @@ class Respawn(FlightCase):
         self.assertLess(self.speed(0), 0.02)
         os.kill(pid, signal.SIGCONT)
 
-    def told(self, kind, **having):
+    def events_of(self, kind, **having):
         return [
             (event["robot"], event["goal"])
             for event in self.events

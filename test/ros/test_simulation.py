@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Start, pause and reset; commands that cannot be used; the watchdog."""
+"""Start, pause and reset; invalid commands; the watchdog."""
 
 import math
 import time
@@ -15,7 +15,7 @@ class Simulation(FlightCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.pilot = rospy.Publisher("/cmd_vel0", Twist, queue_size=1)
+        cls.commands = rospy.Publisher("/cmd_vel0", Twist, queue_size=1)
         cls.start()
 
     def call(self, name):
@@ -27,23 +27,23 @@ class Simulation(FlightCase):
         command.linear.x = vx
 
         def commanded():
-            self.pilot.publish(command)
+            self.commands.publish(command)
             return condition()
 
         self.wait(commanded, what)
 
-    def test_pause_stands_still_and_start_goes_on(self):
+    def test_pause_stops_the_clock_and_start_resumes_it(self):
         self.call("start")
         self.call("pause")
-        self.wait(lambda: self.clock_stands(), "a clock that stands still")
+        self.wait(lambda: self.clock_is_stopped(), "a stopped clock")
         paused_s = rospy.get_time()
         self.call("start")
-        self.wait(lambda: rospy.get_time() > paused_s + 0.5, "a clock that goes on")
+        self.wait(lambda: rospy.get_time() > paused_s + 0.5, "a running clock")
 
     @staticmethod
-    def clock_stands():
+    def clock_is_stopped():
         before = rospy.get_time()
-        time.sleep(0.2)  # what is looked at is that nothing happens meanwhile
+        time.sleep(0.2)  # checks that nothing happens meanwhile
         return rospy.get_time() == before
 
     def test_reset_takes_the_quadcopters_back(self):
@@ -66,7 +66,7 @@ class Simulation(FlightCase):
         command.linear.x = math.nan
         command.angular.z = math.inf
         for _ in range(20):
-            self.pilot.publish(command)
+            self.commands.publish(command)
             self.simulated_seconds(0.05)
         self.assertLess(self.speed(0), 0.05)
         self.assertTrue(all(map(math.isfinite, self.position(0))))

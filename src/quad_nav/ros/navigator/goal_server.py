@@ -102,7 +102,7 @@ class GoalServer:
             pose = self._in_global_frame(message)
         except InvalidGoal as error:
             navigator.cancel()
-            rospy.logerr("%s: goal refused: %s", self._robot, error)
+            rospy.logerr("%s: %s", self._robot, error)
             self._server.set_aborted(MoveBaseResult(), str(error))
             return
         navigator.set_goal(pose.to_2d(), now_s)

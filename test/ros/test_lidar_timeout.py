@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A LIDAR that falls silent stops its quadcopter, and no other."""
+"""A LIDAR timeout stops its quadcopter and no other."""
 
 import rospy
 import rostest
@@ -7,7 +7,7 @@ from flight_case import FlightCase, goal_pose
 from std_srvs.srv import SetBool
 
 
-class DeadLidar(FlightCase):
+class LidarTimeout(FlightCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -17,7 +17,7 @@ class DeadLidar(FlightCase):
         answer = rospy.ServiceProxy(f"/simulation/lidar{i}/enable", SetBool)(on)
         self.assertTrue(answer.success, answer.message)
 
-    def test_stops_within_two_seconds_and_goes_on_when_it_is_back(self):
+    def test_it_stops_within_two_seconds_and_resumes_when_the_lidar_is_back(self):
         for i, y in ((0, 6.5), (1, 8.0)):
             self.goal_topics[i].publish(goal_pose(self.position(i)[0], y))
         self.wait(lambda: all(self.speed(i) > 0.1 for i in (0, 1)), "both under way")
@@ -31,4 +31,4 @@ class DeadLidar(FlightCase):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "dead_lidar", DeadLidar)
+    rostest.rosrun("quad", "lidar_timeout", LidarTimeout)

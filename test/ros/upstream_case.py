@@ -1,7 +1,6 @@
-"""What the tests against the recorded original share: the recordings, and messages with times.
+"""Base of the tests against recordings of C++ move_base: recordings, and messages with times.
 
-What differs on purpose is named where it is tested; the names of the action's topics are in
-``OURS``.
+Each test names the intended differences; ``OURS`` has the names of the action's topics.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from flight_case import PATIENCE_S, FlightCase, Latest
 from move_base_msgs.msg import MoveBaseActionFeedback, MoveBaseActionResult
 from nav_msgs.msg import OccupancyGrid
 
-FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "original")
+FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "upstream")
 ROBOTS = (0, 1)
 
 # With the tutorial's remaps the robots share the action's topics but for the goal, and a cancel
@@ -43,8 +42,8 @@ def recorded_yaml(name, i):
         return yaml.safe_load(file.read().replace("{i}", str(i)))
 
 
-class OriginalCase(FlightCase):
-    """Two quadcopters with the tutorial's parameters, and what their actions say."""
+class UpstreamCase(FlightCase):
+    """Two quadcopters with the tutorial's parameters, and the messages of their actions."""
 
     @classmethod
     def setUpClass(cls):
@@ -55,7 +54,7 @@ class OriginalCase(FlightCase):
         cls.start()
 
     def rest(self, i):
-        """Takes robot i's goal away and lets it come to a stop."""
+        """Cancel robot i's goal and wait until it has stopped."""
         topic = self.cancel_topics[i]
         self.wait(lambda: topic.get_num_connections() > 0, f"a listener on {topic.name}")
         topic.publish(GoalID())

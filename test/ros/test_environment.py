@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A node that roslaunch starts finds ROS, the virtual environment and the package itself."""
+"""A node started by roslaunch finds ROS, the virtual environment and the package."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""dynamic_reconfigure beside the recorded original's: descriptions, values, and that they count."""
+"""Compare dynamic_reconfigure with recordings of C++ move_base: descriptions, values, effects."""
 
 import ast
 
@@ -9,7 +9,7 @@ from dynamic_reconfigure.msg import Config, ConfigDescription
 from flight_case import PATIENCE_S, goal_pose
 from geometry_msgs.msg import PolygonStamped, Twist
 from move_base_msgs.msg import MoveBaseActionFeedback
-from original_case import ROBOTS, OriginalCase, recorded_yaml
+from upstream_case import ROBOTS, UpstreamCase, recorded_yaml
 
 KINDS = ("bools", "ints", "strs", "doubles")
 GOALS = ((3.0, 6.5), (10.5, 10.0))
@@ -20,7 +20,7 @@ def values(config):
     return {entry.name: entry.value for kind in KINDS for entry in getattr(config, kind)}
 
 
-class OriginalReconfigure(OriginalCase):
+class UpstreamReconfigure(UpstreamCase):
     def namespaces(self):
         """Robot, absolute namespace, and what was recorded of it."""
         for i in ROBOTS:
@@ -156,4 +156,4 @@ class OriginalReconfigure(OriginalCase):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "original_reconfigure", OriginalReconfigure)
+    rostest.rosrun("quad", "upstream_reconfigure", UpstreamReconfigure)

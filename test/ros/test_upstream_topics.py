@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Names, types, latching, rates and contents of the topics, beside the recorded original's.
+"""Compare names, types, latching, rates and contents of topics with those of C++ move_base.
 
-One flight of robot 0 is recorded; robot 1 stands. On purpose
+One flight of robot 0 is recorded; robot 1 stands. Intended differences:
 
-* each robot has the action's topics for itself (``original_case.OURS``);
+* each robot has the action's topics for itself (``upstream_case.OURS``);
 * the navigator does not subscribe to its own footprints;
 * updates of the costmaps come exactly at ``publish_frequency``, not at the next turn after it.
 """
@@ -16,9 +16,9 @@ import rosservice
 import rostest
 from flight_case import Record, goal_pose, rate_hz, topics_sent_here
 from nav_msgs.msg import Odometry
-from original_case import ROBOTS, OriginalCase, recorded_lines, recorded_yaml
 from sensor_msgs.msg import PointCloud2, PointField
 from sensor_msgs.point_cloud2 import read_points
+from upstream_case import ROBOTS, UpstreamCase, recorded_lines, recorded_yaml
 
 GOAL = (9.0, 5.5)
 FLIGHT_S = 22.0
@@ -28,7 +28,7 @@ CELL_M, WINDOW_CELLS, REACH_M = 0.025, 120, 1.5  # of the local costmap
 SILENT = {"recovery_status", "result", "global_costmap/costmap_updates"}  # nothing goes wrong
 
 
-class OriginalFace(OriginalCase):
+class UpstreamTopics(UpstreamCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -95,7 +95,7 @@ class OriginalFace(OriginalCase):
                 self.assertEqual(rosservice.get_service_node(name), f"/move_base{i}", name)
 
     def test_parameters_on_the_server(self):
-        """All of the original's; ours has some more."""
+        """All parameters of C++ move_base are there; ours has more."""
         for i in ROBOTS:
             self.assert_holds(
                 rospy.get_param(f"/move_base{i}"),
@@ -261,7 +261,7 @@ class OriginalFace(OriginalCase):
 
     # -- cost cloud ----------------------------------------------------------------
 
-    def test_cost_cloud_has_the_originals_form(self):
+    def test_cost_cloud_has_the_form_of_upstream(self):
         """Seven floats for each cell of the window; those without a score are nan at the end."""
         names = ("x", "y", "z", "path_cost", "goal_cost", "occ_cost", "total_cost")
         fields = [PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(names)]
@@ -297,4 +297,4 @@ def cloud_points(cloud: PointCloud2):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "original_face", OriginalFace)
+    rostest.rosrun("quad", "upstream_topics", UpstreamTopics)

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""How goals, plans, cancels and recoveries go, beside the recorded original's log.
+"""Compare goals, plans, cancels and recoveries with the recorded log of C++ move_base.
 
-On purpose ours differs in this:
+Intended differences:
 
-* a goal in an empty or unknown frame is aborted at once; the original tries it for ever;
-* a goal in another frame is put into the global one at once; the original publishes it as it
-  came in ``current_goal`` until its transform is there;
+* a goal in an empty or unknown frame is aborted at once; C++ move_base retries it for ever;
+* a goal in another frame is transformed to the global one at once; C++ move_base publishes it as it
+  arrived in ``current_goal`` until its transform is there;
 * a search that fails is repeated once per control cycle, not as fast as it goes, and empties
   ``NavfnROS/plan`` for goals off the map too;
-* a refused ``make_plan`` says why;
-* a stop follows a rotation recovery; the original's spins on for the planner's patience.
+* a refused ``make_plan`` returns the reason;
+* a stop follows a rotation recovery; C++ move_base continues to rotate for planner_patience.
 """
 
 import math
@@ -22,8 +22,8 @@ from geometry_msgs.msg import PoseStamped, Twist
 from move_base_msgs.msg import RecoveryStatus
 from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan
-from original_case import OriginalCase
 from std_srvs.srv import Empty
+from upstream_case import UpstreamCase
 
 FREE_PLACES = ((1.5, 1.5), (1.5, 6.4))  # of robot 0; a wall is near all the way between
 OFF_THE_MAP = (20.0, 20.0)
@@ -36,7 +36,7 @@ RECOVERIES = [
 ]
 
 
-class OriginalBehaviour(OriginalCase):
+class UpstreamBehaviour(UpstreamCase):
     def setUp(self):
         self.rest(0)
 
@@ -252,4 +252,4 @@ class OriginalBehaviour(OriginalCase):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "original_behaviour", OriginalBehaviour)
+    rostest.rosrun("quad", "upstream_behaviour", UpstreamBehaviour)

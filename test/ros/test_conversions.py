@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Conversions there and back give what went in."""
+"""Conversions to messages and back return the input."""
 
 import math
 import unittest
@@ -10,7 +10,7 @@ import rostest
 
 from quad_nav.geometry import Pose3D, Scan, Twist2D, quaternion_from_euler
 from quad_nav.peers.peer import IDLE_RANK_S, Intention, rank_of
-from quad_nav.ros.common import convert
+from quad_nav.ros.common import conversions
 from quad_nav.ros.navigator.peer_topics import intention_from_message, intention_message
 
 POSE = Pose3D(1.0, -2.0, 0.5, quaternion_from_euler(0.1, -0.2, 2.0))
@@ -18,36 +18,36 @@ TWIST = Twist2D(0.3, -0.1, 0.7)
 STAMP = rospy.Time(12, 345678901)
 
 
-class Convert(unittest.TestCase):
+class Conversions(unittest.TestCase):
     def test_poses_and_twists(self):
-        self.assertEqual(convert.pose_from_message(convert.pose_message(POSE)), POSE)
-        self.assertEqual(convert.twist_from_message(convert.twist_message(TWIST)), TWIST)
+        self.assertEqual(conversions.pose_from_message(conversions.pose_message(POSE)), POSE)
+        self.assertEqual(conversions.twist_from_message(conversions.twist_message(TWIST)), TWIST)
 
     def test_transforms(self):
-        message = convert.transform_message(POSE, "odom0", "base_link0", STAMP)
+        message = conversions.transform_message(POSE, "odom0", "base_link0", STAMP)
         self.assertEqual(
             (message.header.frame_id, message.child_frame_id, message.header.stamp),
             ("odom0", "base_link0", STAMP),
         )
-        self.assertEqual(convert.pose_from_transform(message), POSE)
+        self.assertEqual(conversions.pose_from_transform(message), POSE)
 
     def test_odometry(self):
-        message = convert.odometry_message(
+        message = conversions.odometry_message(
             POSE, (0.3, -0.1, 9.0), (9.0, 9.0, 0.7), ("odom0", "base_link0"), STAMP
         )
         self.assertEqual(
             (message.header.frame_id, message.child_frame_id, message.header.stamp),
             ("odom0", "base_link0", STAMP),
         )
-        self.assertEqual(convert.odometry_from_message(message), (POSE, TWIST))
+        self.assertEqual(conversions.odometry_from_message(message), (POSE, TWIST))
 
     def test_scans(self):
         ranges = np.array([1.5, math.inf, 0.02, 60.0], dtype=np.float32)
         scan = Scan(12.25, -math.pi, math.pi / 2, 0.02, 60.0, ranges)
-        message = convert.scan_message(scan, "Lidar0")
+        message = conversions.scan_message(scan, "Lidar0")
         self.assertEqual(message.header.frame_id, "Lidar0")
         self.assertAlmostEqual(message.angle_max, math.pi / 2)
-        back = convert.scan_from_message(message)
+        back = conversions.scan_from_message(message)
         np.testing.assert_array_equal(back.ranges_m, ranges)
         self.assertEqual(
             (
@@ -76,9 +76,9 @@ class Convert(unittest.TestCase):
         self.assertEqual((heard.rank_s, len(heard.way)), (staying.rank_s, 0))
 
     def test_times_are_rounded_to_the_nanosecond(self):
-        self.assertEqual(convert.time_message(1.0 + 1.0 / 240), rospy.Time(1, 4166667))
-        self.assertEqual(convert.time_message(2.9999999999), rospy.Time(3, 0))
+        self.assertEqual(conversions.time_message(1.0 + 1.0 / 240), rospy.Time(1, 4166667))
+        self.assertEqual(conversions.time_message(2.9999999999), rospy.Time(3, 0))
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "convert", Convert)
+    rostest.rosrun("quad", "conversions", Conversions)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The topics, types, rates, frames and services that others' tools depend on."""
+"""Topics, types, rates, frames and services that other tools depend on."""
 
 import rosgraph
 import rospy
@@ -58,7 +58,7 @@ def names_of(table, i):
 
 
 def absent(robots):
-    """What is not there, or of another type, of these robots' topics and services."""
+    """Topics and services of these robots that are missing or have another type."""
     _, subscriptions, services = rosgraph.Master("/test").getSystemState()
     published = dict(rospy.get_published_topics())
     heard, served = dict(subscriptions), dict(services)
@@ -70,7 +70,7 @@ def absent(robots):
     return names
 
 
-class RosFace(FlightCase):
+class RosTopics(FlightCase):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
@@ -157,4 +157,4 @@ class RosFace(FlightCase):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "ros_face", RosFace)
+    rostest.rosrun("quad", "ros_topics", RosTopics)

@@ -1,21 +1,21 @@
 #!/usr/bin/env python3
-"""A clock that goes back in flight: the mission goes on, and nothing is flown twice."""
+"""The clock jumps back in flight: the mission resumes and no goal is flown twice."""
 
 import rospy
 import rostest
 from flight_case import FlightCase
-from sensor_faults import Senses
+from sensor_faults import SensorFaults
 
 
-class ClockBack(FlightCase):
-    def test_the_mission_goes_on(self):
-        sensor_faults = Senses()
+class ClockJump(FlightCase):
+    def test_the_mission_resumes(self):
+        sensor_faults = SensorFaults()
         self.wait(lambda: self.odometry[0].message is not None, "odometry")
         self.wait(lambda: self.speed(0) > 0.15, "robot 0 under way")
         self.simulated_seconds(4.0)
         before_s = rospy.get_time()
         sensor_faults.back_s += 5.0
-        self.wait(lambda: rospy.get_time() < before_s - 4.0, "a clock that has gone back")
+        self.wait(lambda: rospy.get_time() < before_s - 4.0, "a clock jump")
         result = self.read_result(rospy.get_param("~result"), patience_s=200.0)
         self.assertTrue(result["success"], result)
         for robot in result["robots"]:
@@ -24,4 +24,4 @@ class ClockBack(FlightCase):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "clock_back", ClockBack)
+    rostest.rosrun("quad", "clock_jump", ClockJump)
