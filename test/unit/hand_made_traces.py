@@ -1,4 +1,4 @@
-"""Traces of flights with figures that can be worked out by hand."""
+"""Traces of flights with metrics that can be worked out by hand."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def test_one_flight(report, tmp_path):
     assert (result.exit_code, result.output) == (0, "report: report.html\n")
     html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "<h1>good.bag</h1>" in html and "0 of 2" in html
-    assert "it ended early (time limit of 0.5 s)" in html
+    assert "ended early (time limit of 0.5 s)" in html
     assert "TrajectoryPlannerROS/max_vel_x" in html
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["report.html"]
 
@@ -69,7 +69,7 @@ def test_several_flights(report, tmp_path):
     assert "<td>good.bag</td><td>tutorial</td>" in html and "<td>good2.bag</td>" in html
 
 
-def test_every_fault_is_told_and_nothing_written(report, tmp_path):
+def test_every_fault_is_listed_and_nothing_written(report, tmp_path):
     result = report("../good.bag", "../bad.bag", "../worse.bag", "--animate", "one.avi")
     assert result.exit_code == 2
     lines = result.output.splitlines()

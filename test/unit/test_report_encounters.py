@@ -9,15 +9,15 @@ import pytest
 from hand_made_traces import TIMES_S, flight, robot
 
 from quad_nav.report.encounter_picture import encounter_picture, frame_times
-from quad_nav.report.encounters import encounters, gap_text
-from quad_nav.report.measures import tracks
+from quad_nav.report.encounters import encounters, separation_text
+from quad_nav.report.measures import resampled_tracks
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.style import styled
 from quad_nav.sim.contacts import Contact
 
 
 def found_in(trace, **options):
-    return encounters(trace, tracks(trace), **options)
+    return encounters(trace, resampled_tracks(trace), **options)
 
 
 def passing(offset_m: float):
@@ -28,7 +28,7 @@ def passing(offset_m: float):
 def test_two_pass_each_other():
     (one,) = found_in(passing(1.0))
     assert (one.robot, one.other, one.names) == (0, 1, ("quad0", "quad1"))
-    assert (one.time_s, one.gap_m) == (pytest.approx(5.0), pytest.approx(0.4))
+    assert (one.time_s, one.separation_m) == (pytest.approx(5.0), pytest.approx(0.4))
     assert (one.x_m, one.y_m) == (pytest.approx(3.5), pytest.approx(2.5))
 
 
@@ -79,24 +79,24 @@ def test_those_that_touched_have_no_gap(offset_m, gap_m):
     trace = passing(offset_m)
     touch = flight(*trace.robots, contacts=[Contact(5.01, "quad1", "quad0", 3.5, 2.3)])
     (apart,), (one,) = found_in(trace), found_in(touch)
-    assert apart.gap_m == pytest.approx(offset_m - 0.6)
-    assert one.gap_m == pytest.approx(gap_m)
-    picture = encounter_picture(touch, tracks(touch), one)
-    assert picture.axes[2].get_xlabel() == gap_text(gap_m)
+    assert apart.separation_m == pytest.approx(offset_m - 0.6)
+    assert one.separation_m == pytest.approx(gap_m)
+    picture = encounter_picture(touch, resampled_tracks(touch), one)
+    assert picture.axes[2].get_xlabel() == separation_text(gap_m)
 
 
 def test_the_legend_of_paths_shows_the_letter():
     trace = passing(1.0)
-    among = tracks(trace)
+    tracks = resampled_tracks(trace)
     with styled():
-        (legend,) = paths_picture(trace, among, encounters(trace, among)).legends
+        (legend,) = paths_picture(trace, tracks, encounters(trace, tracks)).legends
         names = [text.get_text() for text in legend.get_texts()]
         letter = legend.legend_handles[names.index("close encounter")].get_marker()
     width, height = np.ptp(letter.vertices, axis=0)
     assert 0.8 < height / width < 1.3
 
 
-def test_nobody_meets_alone():
+def test_a_single_robot_has_no_encounters():
     assert found_in(flight(robot(0, (1.0, 1.0)))) == ()
     assert found_in(flight()) == ()
 
@@ -104,14 +104,16 @@ def test_nobody_meets_alone():
 def test_frames_are_a_way_of_45_cm_apart():
     trace = passing(1.0)
     (one,) = found_in(trace)
-    assert frame_times(trace, tracks(trace), one) == pytest.approx([3.2, 4.1, 5.0, 5.9, 6.8])
+    assert frame_times(trace, resampled_tracks(trace), one) == pytest.approx(
+        [3.2, 4.1, 5.0, 5.9, 6.8]
+    )
 
 
 def test_frames_of_those_that_stand_and_at_the_begin():
     trace = flight(robot(0, (1.0, 1.0)), robot(1, (2.0, 1.0)))
     (one,) = found_in(trace)
     assert one.time_s == 0.0
-    assert frame_times(trace, tracks(trace), one) == pytest.approx([0.0, 1.5, 3.0])
+    assert frame_times(trace, resampled_tracks(trace), one) == pytest.approx([0.0, 1.5, 3.0])
 
 
 @pytest.mark.parametrize(
@@ -119,4 +121,4 @@ def test_frames_of_those_that_stand_and_at_the_begin():
     [(0.4, "gap 0.40 m"), (-0.02, "overlap 0.02 m"), (-0.004, "touching"), (0.004, "touching")],
 )
 def test_gaps_in_words(gap_m, text):
-    assert gap_text(gap_m) == text
+    assert separation_text(gap_m) == text

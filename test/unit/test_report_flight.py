@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FEW_BEAMS = LidarParams(step_size_rad=2 * np.pi / 128)
 
 
-def test_figures_are_those_of_the_summary():
+def test_metrics_are_those_of_the_summary():
     observer = TraceObserver()
     summary = fly(
         read_setup(
@@ -36,12 +36,12 @@ def test_figures_are_those_of_the_summary():
     )
     found = flight_metrics(observer.trace(summary.contacts, summary.reason))
     assert found.mission_s == pytest.approx(summary.sim_time_s, abs=1 / 40 + 1e-9)
-    assert found.least_separation_m == pytest.approx(summary.min_separation_m, abs=1e-3)
-    assert found.faults == ("it ended early (time limit of 6 s)", "2 of 2 goals not reached")
+    assert found.min_separation_m == pytest.approx(summary.min_separation_m, abs=1e-3)
+    assert found.faults == ("ended early (time limit of 6 s)", "2 of 2 goals not reached")
     for ours, theirs in zip(found.robots, summary.robots):
         assert ours.path_length_m == pytest.approx(theirs.path_length_m, abs=1e-6)
         assert ours.straight_length_m == pytest.approx(theirs.straight_length_m, abs=1e-6)
-        assert ours.least_clearance_m == pytest.approx(theirs.min_clearance_m, abs=1e-3)
+        assert ours.min_clearance_m == pytest.approx(theirs.min_clearance_m, abs=1e-3)
         assert ours.spin_s == pytest.approx(theirs.spin_s, abs=1e-6)
         assert ours.path_length_m > 0.5
 

@@ -1,4 +1,4 @@
-"""Curves and key figures of flights that can be worked out by hand."""
+"""Curves and key metrics of flights that can be worked out by hand."""
 
 from __future__ import annotations
 
@@ -12,56 +12,62 @@ from hand_made_traces import RADIUS_M, SCENE, TIMES_S, flight, goal, robot
 from quad_nav.report.flight_metrics import flight_metrics
 from quad_nav.report.measures import (
     clearances_m,
+    resampled_tracks,
     runs,
     separations_m,
     speed_mps,
     spins,
     straight_length_m,
     tilt_rad,
-    tracks,
 )
 from quad_nav.sim.contacts import Contact
 
 
 def test_gap_between_two_that_meet_head_on():
     """10 m apart, 1 m/s towards each other each: 10 - 2 t - 0.6."""
-    among = tracks(flight(robot(0, (1.0, 2.0), (1.0, 0.0)), robot(1, (11.0, 2.0), (-1.0, 0.0))))
-    gaps_m = separations_m(among, RADIUS_M)
+    tracks = resampled_tracks(
+        flight(robot(0, (1.0, 2.0), (1.0, 0.0)), robot(1, (11.0, 2.0), (-1.0, 0.0)))
+    )
+    gaps_m = separations_m(tracks, RADIUS_M)
     assert gaps_m[0] == pytest.approx(np.abs(10.0 - 2.0 * TIMES_S) - 0.6)
     assert gaps_m[1] == pytest.approx(gaps_m[0])
 
 
 def test_gap_is_to_the_nearest_of_three():
-    among = tracks(flight(robot(0, (1.0, 1.0)), robot(1, (4.0, 1.0)), robot(2, (6.0, 1.0))))
-    assert separations_m(among, RADIUS_M)[:, 0] == pytest.approx([2.4, 1.4, 1.4])
+    tracks = resampled_tracks(
+        flight(robot(0, (1.0, 1.0)), robot(1, (4.0, 1.0)), robot(2, (6.0, 1.0)))
+    )
+    assert separations_m(tracks, RADIUS_M)[:, 0] == pytest.approx([2.4, 1.4, 1.4])
 
 
 def test_alone_there_is_no_gap():
-    assert np.isnan(separations_m(tracks(flight(robot(0, (1.0, 1.0)))), RADIUS_M)).all()
+    assert np.isnan(separations_m(resampled_tracks(flight(robot(0, (1.0, 1.0)))), RADIUS_M)).all()
 
 
 def test_clearance_is_to_the_pillar_or_a_wall():
     """From (2, 6) eastwards: 2 m to the wall, then 3.5 m - t to the pillar; less the radius."""
     scene = replace(SCENE, obstacles=SCENE.obstacles[:1])
-    among = tracks(flight(robot(0, (2.0, 6.0), (0.3, 0.0))))
+    tracks = resampled_tracks(flight(robot(0, (2.0, 6.0), (0.3, 0.0))))
     expected = np.minimum(2.0 + 0.3 * TIMES_S, 3.5 - 0.3 * TIMES_S) - RADIUS_M
-    assert clearances_m(among, scene, RADIUS_M)[0] == pytest.approx(expected)
-    assert np.isnan(clearances_m(among, None, RADIUS_M)).all()
+    assert clearances_m(tracks, scene, RADIUS_M)[0] == pytest.approx(expected)
+    assert np.isnan(clearances_m(tracks, None, RADIUS_M)).all()
 
 
 def test_robots_with_different_samples_are_compared_at_the_same_times():
     slow = np.arange(1, 5) * 2.0
-    among = tracks(flight(robot(0, (1.0, 1.0), (0.5, 0.0), times_s=slow), robot(1, (1.0, 3.0))))
-    assert len(among.times_s) == len(TIMES_S)
-    assert np.isnan(among.positions_m[0, among.index_at(1.9)]).all()
-    assert among.positions_m[0, among.index_at(3.0)] == pytest.approx([2.5, 1.0])
+    tracks = resampled_tracks(
+        flight(robot(0, (1.0, 1.0), (0.5, 0.0), times_s=slow), robot(1, (1.0, 3.0)))
+    )
+    assert len(tracks.times_s) == len(TIMES_S)
+    assert np.isnan(tracks.positions_m[0, tracks.index_at(1.9)]).all()
+    assert tracks.positions_m[0, tracks.index_at(3.0)] == pytest.approx([2.5, 1.0])
 
 
 def test_yaw_is_resampled_the_short_way_round():
     times_s = np.array([0.0, 1.0])
     turning = robot(0, (1.0, 1.0), turn_radps=3.0, times_s=times_s * 2)
-    among = tracks(flight(turning, robot(1, (5.0, 5.0), times_s=times_s)))
-    assert among.yaws_rad[0, 1] == pytest.approx((6.0 - 2.0 * math.pi) / 2.0)
+    tracks = resampled_tracks(flight(turning, robot(1, (5.0, 5.0), times_s=times_s)))
+    assert tracks.yaws_rad[0, 1] == pytest.approx((6.0 - 2.0 * math.pi) / 2.0)
 
 
 def test_speed_and_tilt():
@@ -108,9 +114,9 @@ def test_figures_of_a_flight():
     found = flight_metrics(flight(done, robot(1, (1.0, 4.0))))
     assert (found.sent, found.reached, found.contacts, found.recoveries) == (2, 2, 0, 1)
     assert found.mission_s == pytest.approx(8.0)
-    assert found.path_ratio == pytest.approx(1.0)
-    assert found.least_separation_m == pytest.approx(2.0 - 0.6)
-    assert found.least_clearance_m == pytest.approx(1.0 - 0.3)
+    assert found.detour == pytest.approx(1.0)
+    assert found.min_separation_m == pytest.approx(2.0 - 0.6)
+    assert found.min_clearance_m == pytest.approx(1.0 - 0.3)
     first = found.robots[0]
     assert first.path_length_m == pytest.approx(4.0)
     assert (first.top_speed_mps, first.top_tilt_rad) == (pytest.approx(0.5), pytest.approx(0.1))
@@ -123,7 +129,7 @@ def test_faults_say_why_a_flight_failed():
         flight(failed, contacts=[Contact(2.0, "quad0", "pillar", 1.0, 2.0)], reason="interrupted")
     )
     assert not found.success
-    assert found.faults == ("it ended early (interrupted)", "1 of 1 goals not reached", "1 contact")
+    assert found.faults == ("ended early (interrupted)", "1 of 1 goals not reached", "1 contact")
     assert found.robots[0].contacts == 1
 
 

@@ -93,17 +93,20 @@ def test_figures_in_the_head():
     assert "3 of 4" in html and "real-time factor" in html
 
 
-def test_what_is_left_out_is_told():
+def test_the_page_names_what_it_leaves_out():
     html = page_of(20).html
-    assert f"The {MAX_STRIPS} closest are shown, 14 more are not." in html
-    assert "The 16 quadcopters that came closest to anything are shown, 4 more are not." in html
+    assert f"The {MAX_STRIPS} closest encounters of 20 are shown." in html
+    assert (
+        "The 16 quadcopters of 20 that came closest to an obstacle or to each other are shown."
+        in html
+    )
 
 
 def test_a_good_flight():
     good = flight(robot(0, (1.0, 1.0), (0.3, 0.0), goals=(goal(0, (4.0, 1.0), 0.0, 10.0),)))
     html = flight_page(good).html
-    assert "Mission flown" in html and "real-time factor" not in html
-    assert "No other quadcopter came within 0.5 m" in html
+    assert "Mission completed" in html and "real-time factor" not in html
+    assert "No contact with an obstacle" in html
 
 
 @pytest.mark.parametrize(

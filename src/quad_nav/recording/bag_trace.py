@@ -183,21 +183,7 @@ class TraceReader:
         Raises:
             InputError: The recording has no odometry, too long a flight or an invalid scene.
         """
-        robots = {
-            number: robot for number, robot in sorted(self.robots.items()) if robot.has_odometry
-        }
-        if not robots:
-            raise InputError(
-                [f"{path}: no odometry; expected messages nav_msgs/Odometry on /odom0, ..."]
-            )
-        for number, robot in robots.items():
-            if robot.last_s - robot.first_s > LONGEST_FLIGHT_S:
-                raise InputError(
-                    [
-                        f"{path}: /odom{number}: {robot.last_s - robot.first_s:g} s from "
-                        f"first to last, expected {LONGEST_FLIGHT_S:g} s at most"
-                    ]
-                )
+        robots = self._flown_robots(path)
         start_s = self.info.get("start_s")
         if start_s is None:
             start_s = min(robot.first_s for robot in robots.values())
@@ -220,6 +206,25 @@ class TraceReader:
             self.info.get("versions", {}),
             self.info.get("reason", ""),
         )
+
+    def _flown_robots(self, path: Path) -> Dict[int, BagRobot]:
+        """Return the robots with odometry, by number, after a check of their times."""
+        robots = {
+            number: robot for number, robot in sorted(self.robots.items()) if robot.has_odometry
+        }
+        if not robots:
+            raise InputError(
+                [f"{path}: no odometry; expected messages nav_msgs/Odometry on /odom0, ..."]
+            )
+        for number, robot in robots.items():
+            if robot.last_s - robot.first_s > LONGEST_FLIGHT_S:
+                raise InputError(
+                    [
+                        f"{path}: /odom{number}: {robot.last_s - robot.first_s:g} s from "
+                        f"first to last, expected {LONGEST_FLIGHT_S:g} s at most"
+                    ]
+                )
+        return robots
 
     def _scene(self, path: Path) -> Optional[Scene]:
         document = self.info.get("scene")

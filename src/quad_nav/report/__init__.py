@@ -1,19 +1,20 @@
-"""Pictures and pages of flights: from a ``FlightTrace`` to HTML, PNG, GIF and MP4.
+"""Reports of flights: from a ``FlightTrace`` to HTML, PNG, GIF and MP4.
 
-Read ``measures`` (what is computed from a trace), ``encounters`` (who came close to
-whom), the modules that end in ``_picture`` (one picture each, on matplotlib's figures),
-``page`` (the HTML that holds them), ``animation``, and ``write`` (files).
+Reading order: ``measures`` and ``flight_metrics`` (what is computed from a trace),
+``encounters`` (close encounters and contacts), the modules that end in ``_picture`` (one
+picture each, drawn with matplotlib), ``page`` (the HTML around them), ``animation``.
 
-Nothing outside this package imports matplotlib or jinja2, and commands import this
-package only when a report is asked for: that takes longer than to start a flight.
+Only this package and ``tuning.report`` import matplotlib and jinja2. Commands that fly import
+them only if a report is requested, because that takes longer than starting a flight.
 """
 
 from __future__ import annotations
 
+import importlib
 import warnings
 
-# ROS desktops have an older matplotlib among the system's packages, which takes the place of ours
-# for pictures in 3D. There are none here, and people should not read a warning about them.
+# ROS desktops have an older matplotlib among the system's packages, whose module for 3D plots
+# shadows ours. The reports have no 3D plots, so the warning about it is suppressed.
 with warnings.catch_warnings():
     warnings.filterwarnings("ignore", "Unable to import Axes3D")
-    import matplotlib.projections  # noqa: F401
+    importlib.import_module("matplotlib.projections")

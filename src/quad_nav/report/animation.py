@@ -1,11 +1,11 @@
-"""A flight in motion, as GIF or MP4."""
+"""Write an animation of a flight, as GIF or MP4."""
 
 from __future__ import annotations
 
 import math
 import shutil
 from pathlib import Path
-from typing import List, Optional, Tuple
+from typing import Any, List, Optional, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,11 +13,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
+from numpy.typing import NDArray
 from PIL import Image
 
 from quad_nav.geometry import Pose2D
 from quad_nav.recording.trace import FlightTrace
-from quad_nav.report.measures import Tracks, tracks
+from quad_nav.report.measures import Tracks, resampled_tracks
 from quad_nav.report.scene_drawing import draw_scene, extent
 from quad_nav.report.style import ALARM, colour, styled
 
@@ -31,7 +32,10 @@ _COLOURS = 128
 
 
 def animation_faults(path: Path, flights: int = 1) -> List[str]:
-    """Why it could not be written: several flights, an unknown suffix, ffmpeg is missing."""
+    """Return the reasons why an animation cannot be written.
+
+    These are several flights, an unknown suffix, or a missing ffmpeg.
+    """
     problems = []
     if flights != 1:
         problems.append(f"animation: {flights} flights, expected one")
@@ -46,7 +50,7 @@ def animation_faults(path: Path, flights: int = 1) -> List[str]:
 
 
 def animate_flight(trace: FlightTrace, path: Path) -> None:
-    """Write the animation; ``animation_faults`` has found none."""
+    """Write the animation; ``animation_faults`` must be empty."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with styled():
         view = _View(trace)
@@ -57,7 +61,7 @@ def animate_flight(trace: FlightTrace, path: Path) -> None:
 
 
 def _write_gif(view: _View, path: Path) -> None:
-    """All frames have one palette: nothing flickers, and little changes from each to the next."""
+    """Write all frames with one palette, which avoids flicker and compresses well."""
     palette = view.sample().quantize(_COLOURS, method=Image.Quantize.FASTOCTREE)
     frames = [
         view.image(time_s).quantize(palette=palette, dither=Image.Dither.NONE)
@@ -84,18 +88,15 @@ def _write_mp4(view: _View, path: Path) -> None:
 
 
 class _View:
-    """The scene from above at one time after the other.
-
-    ``times_s`` float64[f]: of the frames.
-    """
+    """Scene from above; ``times_s`` are the times of the frames, shape (f,)."""
 
     def __init__(self, trace: FlightTrace) -> None:
         self._trace = trace
-        self._tracks = tracks(trace)
+        self._tracks = resampled_tracks(trace)
         self._speed = _speed(self._tracks)
         self.times_s = _frame_times(self._tracks, self._speed)
         self.figure, self._axes = _empty_scene(trace, self._tracks)
-        self._canvas = FigureCanvasAgg(self.figure)
+        self._canvas: Any = FigureCanvasAgg(self.figure)
         self._title = self._axes.set_title("")
         self._robots = [_MovingRobot(self._axes, k, trace) for k in range(len(trace.robots))]
         self._contacts: Line2D = self._axes.plot(
@@ -108,7 +109,9 @@ class _View:
             for contact in self._trace.contacts
             if contact.time_s <= time_s < contact.time_s + _CONTACT_S
         ]
-        self._contacts.set_data([one.x_m for one in touched], [one.y_m for one in touched])
+        self._contacts.set_data(
+            [contact.x_m for contact in touched], [contact.y_m for contact in touched]
+        )
         for robot in self._robots:
             robot.show(self._tracks, time_s)
         speed = f"   × {self._speed}" if self._speed > 1 else ""
@@ -120,11 +123,11 @@ class _View:
         return Image.fromarray(np.asarray(self._canvas.buffer_rgba())).convert("RGB")
 
     def sample(self) -> Image.Image:
-        """Frames with all colours, side by side: begin, middle, end and the first contact."""
+        """Return frames with all colours side by side: first, middle, last, first contact."""
         times_s = [float(self.times_s[k]) for k in (0, len(self.times_s) // 2, -1)]
         images = [
             self.image(time_s)
-            for time_s in times_s + [one.time_s for one in self._trace.contacts[:1]]
+            for time_s in times_s + [contact.time_s for contact in self._trace.contacts[:1]]
         ]
         together = Image.new("RGB", (images[0].width * len(images), images[0].height))
         for k, image in enumerate(images):
@@ -133,7 +136,7 @@ class _View:
 
 
 class _MovingRobot:
-    """Hull, nose, trail, number and goal in flight of one quadcopter."""
+    """Hull, nose, trail, number and active goal of one robot."""
 
     def __init__(self, axes: Axes, number: int, trace: FlightTrace) -> None:
         self._number, self._radius_m = number, trace.robot_radius_m
@@ -160,24 +163,24 @@ class _MovingRobot:
             zorder=8,
         )
 
-    def show(self, among: Tracks, time_s: float) -> None:
-        now = among.index_at(time_s) if len(among.times_s) else None
-        there = now is not None and bool(np.isfinite(among.yaws_rad[self._number, now]))
+    def show(self, tracks: Tracks, time_s: float) -> None:
+        now = tracks.index_at(time_s) if len(tracks.times_s) else None
+        there = now is not None and bool(np.isfinite(tracks.yaws_rad[self._number, now]))
         for artist in (self._hull, self._nose, self._trail, self._label):
             artist.set_visible(there)
         if now is not None and there:
-            self._show_body(among, now, among.positions_m[self._number, now])
+            self._show_body(tracks, now, tracks.positions_m[self._number, now])
         goal = self._goal_at(time_s)
         self._goal.set_data(*(([], []) if goal is None else ([goal[0]], [goal[1]])))
 
-    def _show_body(self, among: Tracks, now: int, here: np.ndarray) -> None:
-        yaw_rad = float(among.yaws_rad[self._number, now])
+    def _show_body(self, tracks: Tracks, now: int, here: NDArray[np.float64]) -> None:
+        yaw_rad = float(tracks.yaws_rad[self._number, now])
         ahead = np.array(Pose2D(0.0, 0.0, yaw_rad).rotate(self._radius_m, 0.0))
         self._hull.set(center=tuple(here))
         self._nose.set_data(*np.transpose([here + 0.5 * ahead, here + ahead]))
         self._label.set_position(tuple(here - 0.15 * ahead))
-        first = int(np.searchsorted(among.times_s, among.times_s[now] - _TRAIL_S))
-        self._trail.set_data(*among.positions_m[self._number, first : now + 1].T)
+        first = int(np.searchsorted(tracks.times_s, tracks.times_s[now] - _TRAIL_S))
+        self._trail.set_data(*tracks.positions_m[self._number, first : now + 1].T)
 
     def _goal_at(self, time_s: float) -> Optional[List[float]]:
         for goal in self._goals:
@@ -186,23 +189,23 @@ class _MovingRobot:
         return None
 
 
-def _speed(among: Tracks) -> int:
-    duration_s = float(among.times_s[-1] - among.times_s[0]) if len(among.times_s) else 0.0
+def _speed(tracks: Tracks) -> int:
+    duration_s = float(tracks.times_s[-1] - tracks.times_s[0]) if len(tracks.times_s) else 0.0
     return next(
         (speed for speed in _SPEEDS if duration_s / speed <= _LONGEST_S),
         math.ceil(duration_s / _LONGEST_S),
     )
 
 
-def _frame_times(among: Tracks, speed: int) -> np.ndarray:
-    if len(among.times_s) == 0:
+def _frame_times(tracks: Tracks, speed: int) -> NDArray[np.float64]:
+    if len(tracks.times_s) == 0:
         return np.zeros(1)
-    first_s, last_s = among.times_s[[0, -1]]
+    first_s, last_s = tracks.times_s[[0, -1]]
     return np.append(np.arange(first_s, last_s, speed / _FRAMES_PER_S), last_s)
 
 
-def _empty_scene(trace: FlightTrace, among: Tracks) -> Tuple[Figure, Axes]:
-    x0, x1, y0, y1 = extent(trace.scene, among)
+def _empty_scene(trace: FlightTrace, tracks: Tracks) -> Tuple[Figure, Axes]:
+    x0, x1, y0, y1 = extent(trace.scene, tracks)
     height_in = _WIDTH_IN * min(max((y1 - y0) / (x1 - x0), 0.3), 1.6)
     # MP4 wants even numbers of pixels.
     figure = Figure(figsize=(_WIDTH_IN, 2 * round(height_in * _DPI / 2) / _DPI), dpi=_DPI)

@@ -1,4 +1,4 @@
-"""Several flights side by side: one panel for each figure, one column for each configuration."""
+"""Picture that compares flights: one panel per metric, one column per configuration."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from quad_nav.report.style import ALARM, colour, new_figure, robot_legend
 
 Panel = Tuple[str, Callable[[FlightMetrics], Optional[float]]]
 PANELS: Tuple[Panel, ...] = (
-    ("Mission time, s", lambda one: one.mission_s),
-    ("Path / straight", lambda one: one.path_ratio),
-    ("Recoveries", lambda one: one.recoveries),
-    ("Least gap to obstacle, m", lambda one: one.least_clearance_m),
-    ("Least gap to robot, m", lambda one: one.least_separation_m),
-    ("Contacts", lambda one: one.contacts),
+    ("Mission time (s)", lambda flight: flight.mission_s),
+    ("Detour", lambda flight: flight.detour),
+    ("Recoveries", lambda flight: flight.recoveries),
+    ("Min clearance (m)", lambda flight: flight.min_clearance_m),
+    ("Min separation (m)", lambda flight: flight.min_separation_m),
+    ("Contacts", lambda flight: flight.contacts),
 )
-_BOX_FROM = 5  # flights; of fewer a box says less than the dots
+_BOX_FROM = 5  # flights; for fewer, the dots alone are clearer
 _COUNTS = ("Recoveries", "Contacts")
 
 
 def grouped(flights: Sequence[FlightMetrics]) -> Dict[str, List[FlightMetrics]]:
-    """Flights by the name of their configuration, in the order in which these come first."""
+    """Group flights by the name of their configuration, in order of appearance."""
     groups: Dict[str, List[FlightMetrics]] = {}
-    for one in flights:
-        groups.setdefault(one.config_name or "unknown", []).append(one)
+    for flight in flights:
+        groups.setdefault(flight.config_name or "unknown", []).append(flight)
     return groups
 
 
 def comparison_picture(flights: Sequence[FlightMetrics]) -> Figure:
-    """Each flight is a dot, those that failed a red cross."""
+    """Draw each flight as a dot, and failed flights as red crosses."""
     groups = grouped(flights)
     figure = new_figure(5.2)
     for axes, (title, value) in zip(figure.subplots(2, 3).flat, PANELS):
         axes.set_title(title)
         axes.grid(axis="x", visible=False)
         for k, group in enumerate(groups.values()):
-            _draw_group(axes, k, [(one, value(one)) for one in group])
+            _draw_group(axes, k, [(flight, value(flight)) for flight in group])
         axes.set(xticks=range(len(groups)), xlim=(-0.6, len(groups) - 0.4))
         axes.set_xticklabels(
             list(groups),
@@ -67,7 +67,7 @@ def comparison_picture(flights: Sequence[FlightMetrics]) -> Figure:
 def _draw_group(
     axes: Axes, column: int, values: Sequence[Tuple[FlightMetrics, Optional[float]]]
 ) -> None:
-    known = [(one, value) for one, value in values if value is not None]
+    known = [(flight, value) for flight, value in values if value is not None]
     if len(known) >= _BOX_FROM:
         axes.boxplot(
             [value for _, value in known],
@@ -80,15 +80,15 @@ def _draw_group(
             capprops={"color": "#9aa4ae"},
             medianprops={"color": "black", "lw": 1.4},
         )
-    # Side by side in the order of the flights, so that equal ones do not hide each other.
+    # Side by side in the order of the flights: equal values do not hide each other.
     places = column + (np.linspace(-0.2, 0.2, len(known)) if len(known) > 1 else np.zeros(1))
-    for place, (one, value) in zip(places, known):
+    for place, (flight, value) in zip(places, known):
         axes.plot(
             place,
             value,
-            "o" if one.success else "X",
-            ms=5.5 if one.success else 7.5,
-            color=colour(0) if one.success else ALARM,
+            "o" if flight.success else "X",
+            ms=5.5 if flight.success else 7.5,
+            color=colour(0) if flight.success else ALARM,
             mec="white",
             mew=0.6,
             alpha=0.9,

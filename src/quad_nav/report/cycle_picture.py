@@ -1,4 +1,4 @@
-"""How long control cycles took and how regularly they came."""
+"""Picture of the duration and the regularity of control cycles."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import List, Sequence, Tuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.style import QUIET, colour, label_log, new_figure, robot_legend, time_axis
@@ -15,34 +16,18 @@ _TAIL = 0.001  # smallest part of the cycles that the distribution shows
 
 
 def cycle_picture(trace: FlightTrace) -> Figure:
-    """Wall times where they were measured; otherwise the time from one cycle to the next."""
-    measured = has_walls(trace)
+    """Draw the wall times of cycles if measured, otherwise the time between cycles."""
+    measured = has_wall_times(trace)
     figure = new_figure(3.3)
     left, right = figure.subplots(1, 2, width_ratios=(3, 2), sharey=True)
     for k, robot in enumerate(trace.robots):
         times_s, values_ms = _values(robot, measured)
         left.plot(times_s, values_ms, ".", ms=2.2, color=colour(k), alpha=0.6)
         _draw_distribution(right, k, values_ms)
-    periods_ms = _periods_ms(trace)
-    for period_ms in periods_ms:
-        for axes in (left, right):
-            axes.axhline(period_ms, color=QUIET, lw=0.9, ls="--")
-    if periods_ms:
-        right.annotate(
-            "control period",
-            (1.0, min(periods_ms)),
-            (-2, 3),
-            ha="right",
-            textcoords="offset points",
-            fontsize=8,
-            color=QUIET,
-            xycoords=("axes fraction", "data"),
-        )
+    _draw_periods((left, right), _periods_ms(trace))
     left.set(
-        title="Wall time of each control cycle"
-        if measured
-        else "Time from one control cycle to the next",
-        ylabel="ms",
+        title="Wall time of each control cycle" if measured else "Time between control cycles",
+        ylabel="time (ms)",
     )
     if measured:
         left.set_yscale("log")
@@ -61,18 +46,35 @@ def cycle_picture(trace: FlightTrace) -> Figure:
     return figure
 
 
-def has_walls(trace: FlightTrace) -> bool:
-    """Whether wall times of cycles are known."""
+def _draw_periods(panels: Sequence[Axes], periods_ms: Sequence[float]) -> None:
+    for period_ms in periods_ms:
+        for axes in panels:
+            axes.axhline(period_ms, color=QUIET, lw=0.9, ls="--")
+    if periods_ms:
+        panels[-1].annotate(
+            "control period",
+            (1.0, min(periods_ms)),
+            (-2, 3),
+            ha="right",
+            textcoords="offset points",
+            fontsize=8,
+            color=QUIET,
+            xycoords=("axes fraction", "data"),
+        )
+
+
+def has_wall_times(trace: FlightTrace) -> bool:
+    """Return true if the trace has wall times of cycles."""
     return any(len(robot.cycle_walls_s) for robot in trace.robots)
 
 
-def _values(robot: RobotTrace, measured: bool) -> Tuple[np.ndarray, np.ndarray]:
+def _values(robot: RobotTrace, measured: bool) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
     if measured:
         return robot.cycle_times_s[: len(robot.cycle_walls_s)], 1e3 * robot.cycle_walls_s
     return robot.cycle_times_s[1:], 1e3 * np.diff(robot.cycle_times_s)
 
 
-def _draw_distribution(axes: Axes, number: int, values_ms: np.ndarray) -> None:
+def _draw_distribution(axes: Axes, number: int, values_ms: NDArray[np.float64]) -> None:
     if len(values_ms):
         above = 1.0 - np.arange(len(values_ms)) / len(values_ms)
         axes.step(above, np.sort(values_ms), color=colour(number), where="pre")

@@ -1,4 +1,4 @@
-"""Gaps to the nearest other quadcopter and to the nearest obstacle over time."""
+"""Picture of the separations and clearances over time."""
 
 from __future__ import annotations
 
@@ -8,34 +8,37 @@ from typing import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter
 from quad_nav.report.measures import Tracks, clearances_m, separations_m
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure, robot_legend, time_axis
 
-_SHOWN_M = 3.0  # beyond this nobody asks how far it was
-_FEW = 4  # so many lines can be followed one by one
+_SHOWN_M = 3.0  # larger distances are cut off
+_FEW = 4  # more lines cannot be followed one by one
 
 
-def distance_picture(trace: FlightTrace, among: Tracks, marked: Sequence[Encounter] = ()) -> Figure:
-    """Panels for what could be measured; marked encounters keep their letters."""
+def distance_picture(
+    trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter] = ()
+) -> Figure:
+    """Draw a panel for each measured distance; ``marked`` encounters keep their letters."""
     panels = []
     if len(trace.robots) > 1:
         panels.append(
-            ("Gap to the nearest other quadcopter", separations_m(among, trace.robot_radius_m))
+            ("Separation from the nearest robot", separations_m(tracks, trace.robot_radius_m))
         )
     if trace.scene is not None:
         panels.append(
             (
-                "Gap to the nearest obstacle or wall",
-                clearances_m(among, trace.scene, trace.robot_radius_m),
+                "Clearance to the nearest obstacle or wall",
+                clearances_m(tracks, trace.scene, trace.robot_radius_m),
             )
         )
     figure = new_figure(0.6 + 2.1 * max(len(panels), 1))
     column = figure.subplots(max(len(panels), 1), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (title, gaps_m) in zip(column, panels):
-        _draw_gaps(axes, title, among.times_s, gaps_m)
+        _draw_gaps(axes, title, tracks.times_s, gaps_m)
         for contact in trace.contacts:
             axes.axvline(contact.time_s, color=ALARM, lw=0.9, ls="--")
     if len(trace.robots) > 1:
@@ -45,7 +48,9 @@ def distance_picture(trace: FlightTrace, among: Tracks, marked: Sequence[Encount
     return figure
 
 
-def _draw_gaps(axes: Axes, title: str, times_s: np.ndarray, gaps_m: np.ndarray) -> None:
+def _draw_gaps(
+    axes: Axes, title: str, times_s: NDArray[np.float64], gaps_m: NDArray[np.float64]
+) -> None:
     many = len(gaps_m) > _FEW
     same = len(gaps_m) == 2 and np.array_equal(gaps_m[0], gaps_m[1], equal_nan=True)
     for k, gap_m in enumerate(gaps_m):
@@ -57,7 +62,7 @@ def _draw_gaps(axes: Axes, title: str, times_s: np.ndarray, gaps_m: np.ndarray) 
             alpha=0.55 if many else 1.0,
         )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # times at which nobody was heard of
+        warnings.simplefilter("ignore", RuntimeWarning)  # times without any sample
         least_m = np.nanmin(gaps_m, axis=0) if gaps_m.size else np.empty(0)
     if many:
         axes.plot(times_s, least_m, color="black", lw=1.3)
@@ -66,19 +71,27 @@ def _draw_gaps(axes: Axes, title: str, times_s: np.ndarray, gaps_m: np.ndarray) 
     axes.axhspan(-1.0, 0.0, color=ALARM, alpha=0.10, lw=0)
     bottom = min(-0.1, float(np.nanmin(least_m)) - 0.05) if np.isfinite(least_m).any() else -0.1
     axes.set(
-        title=title + (", the least of all in black" if many else ""),
-        ylabel="m",
+        title=title + (", smallest of all in black" if many else ""),
+        ylabel="distance (m)",
         ylim=(bottom, _SHOWN_M),
     )
 
 
 def _draw_letters(axes: Axes, marked: Sequence[Encounter]) -> None:
-    for letter, one in zip(LETTERS, marked):
-        if one.other is not None:
-            axes.plot(one.time_s, one.gap_m, "o", ms=5, color="none", mec="black", zorder=8)
+    for letter, encounter in zip(LETTERS, marked):
+        if encounter.other is not None:
+            axes.plot(
+                encounter.time_s,
+                encounter.separation_m,
+                "o",
+                ms=5,
+                color="none",
+                mec="black",
+                zorder=8,
+            )
             axes.annotate(
                 letter,
-                (one.time_s, one.gap_m),
+                (encounter.time_s, encounter.separation_m),
                 (5, 8),
                 textcoords="offset points",
                 fontsize=9,

@@ -1,4 +1,4 @@
-"""When quadcopters came close to each other, and what they touched."""
+"""Find close encounters between robots, and contacts with obstacles."""
 
 from __future__ import annotations
 
@@ -7,69 +7,86 @@ from dataclasses import dataclass
 from typing import Dict, List, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks, pair_separations_m, runs
 
 CLOSE_M = 0.5
-"""Two hulls that are less than this apart have a close encounter."""
+"""Separation below which two robots have a close encounter."""
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-"""Names of encounters in pictures, the first ones' in order."""
+"""Names of encounters in pictures, in order."""
 SAME_ENCOUNTER_S = 3.0
-"""What comes again within this time is the same encounter still."""
+"""Close distances within this time belong to one encounter."""
 
 
 @dataclass(frozen=True)
 class Encounter:
-    """The closest moment of an encounter.
+    """Closest moment of an encounter.
 
-    ``robot`` and ``other`` are numbers of quadcopters; ``other`` is None for an obstacle or
-    wall, which only what was touched counts as. ``gap_m`` is between hulls, NaN for an
-    obstacle, and at most 0 when the two touched: that may have been between two poses.
-    ``x_m``, ``y_m``: the middle between the two, or where it touched.
+    Attributes:
+        robot: Number of a robot.
+        other: Number of the other robot; None for an obstacle or wall, which only count on contact.
+        names: Names of both.
+        time_s: Time of the closest moment.
+        separation_m: Distance between the hulls. NaN for an obstacle. At most 0 after a contact,
+            even if the contact was between two samples.
+        x_m: Middle between both robots, or point of contact, in ``map``.
+        y_m: See ``x_m``.
     """
 
     robot: int
     other: Optional[int]
     names: Tuple[str, str]
     time_s: float
-    gap_m: float
+    separation_m: float
     x_m: float
     y_m: float
 
 
 def encounters(
-    trace: FlightTrace, among: Tracks, below_m: float = CLOSE_M
+    trace: FlightTrace, tracks: Tracks, below_m: float = CLOSE_M
 ) -> Tuple[Encounter, ...]:
-    """Obstacles that were touched first, then quadcopters, closest first."""
+    """Find the encounters of a flight: contacts with obstacles first, then the closest."""
     found = _obstacles_touched(trace)
     for a, b in itertools.combinations(range(len(trace.robots)), 2):
-        found += _of_pair(trace, among, a, b, below_m)
-    return tuple(sorted(found, key=lambda one: (one.other is not None, one.gap_m, one.time_s)))
+        found += _of_pair(trace, tracks, a, b, below_m)
+    return tuple(
+        sorted(
+            found,
+            key=lambda encounter: (
+                encounter.other is not None,
+                encounter.separation_m,
+                encounter.time_s,
+            ),
+        )
+    )
 
 
-def gap_text(gap_m: float) -> str:
+def separation_text(separation_m: float) -> str:
     """A gap in words; less than a centimetre is none."""
-    if abs(gap_m) < 0.005:
+    if abs(separation_m) < 0.005:
         return "touching"
-    return f"gap {gap_m:.2f} m" if gap_m > 0 else f"overlap {-gap_m:.2f} m"
+    return f"gap {separation_m:.2f} m" if separation_m > 0 else f"overlap {-separation_m:.2f} m"
 
 
-def _of_pair(trace: FlightTrace, among: Tracks, a: int, b: int, below_m: float) -> List[Encounter]:
-    gap_m = pair_separations_m(among, a, b, trace.robot_radius_m)
-    close = gap_m < below_m
+def _of_pair(trace: FlightTrace, tracks: Tracks, a: int, b: int, below_m: float) -> List[Encounter]:
+    separation_m = pair_separations_m(tracks, a, b, trace.robot_radius_m)
+    close = separation_m < below_m
     if not close.any():
         return []
     found: List[Encounter] = []
-    for first, last in _joined(runs(close), among.times_s):
-        nearest = first + int(np.nanargmin(gap_m[first : last + 1]))
+    for first, last in _joined(runs(close), tracks.times_s):
+        nearest = first + int(np.nanargmin(separation_m[first : last + 1]))
         names = (trace.robots[a].name, trace.robots[b].name)
-        nearest_m = float(gap_m[nearest])
-        if _touched(trace, names, among.times_s[first], among.times_s[last]):
+        nearest_m = float(separation_m[nearest])
+        if _touched(trace, names, tracks.times_s[first], tracks.times_s[last]):
             nearest_m = min(nearest_m, 0.0)
-        x_m, y_m = among.positions_m[[a, b], nearest].mean(axis=0)
+        x_m, y_m = tracks.positions_m[[a, b], nearest].mean(axis=0)
         found.append(
-            Encounter(a, b, names, float(among.times_s[nearest]), nearest_m, float(x_m), float(y_m))
+            Encounter(
+                a, b, names, float(tracks.times_s[nearest]), nearest_m, float(x_m), float(y_m)
+            )
         )
     return found
 
@@ -81,7 +98,8 @@ def _touched(trace: FlightTrace, names: Tuple[str, str], first_s: float, last_s:
     )
 
 
-def _joined(spans: List[Tuple[int, int]], times_s: np.ndarray) -> List[Tuple[int, int]]:
+def _joined(spans: List[Tuple[int, int]], times_s: NDArray[np.float64]) -> List[Tuple[int, int]]:
+    """Join periods of close distance that are less than ``SAME_ENCOUNTER_S`` apart."""
     joined = spans[:1]
     for first, last in spans[1:]:
         if times_s[first] - times_s[joined[-1][1]] < SAME_ENCOUNTER_S:

@@ -1,4 +1,4 @@
-"""The key figures of a flight: what the head of the page and comparisons show."""
+"""Key metrics of a flight, for the head of a report and for comparisons."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.measures import (
     Tracks,
     clearances_m,
-    end_s,
-    flying_span,
-    least,
+    goal_end_s,
+    mission_span,
     path_length_m,
+    resampled_tracks,
     separations_m,
+    smallest,
     speed_mps,
     spins,
     straight_length_m,
     tilt_rad,
-    tracks,
 )
 
 
 @dataclass(frozen=True)
 class RobotMetrics:
-    """One quadcopter's; lengths and gaps are None where they could not be measured."""
+    """Metrics of one robot; lengths and distances that were not measured are None."""
 
     name: str
     sent: int
     reached: int
     path_length_m: float
     straight_length_m: float
-    least_clearance_m: Optional[float]
-    least_separation_m: Optional[float]
+    min_clearance_m: Optional[float]
+    min_separation_m: Optional[float]
     recoveries: int
     contacts: int
     spin_s: float
@@ -44,7 +44,10 @@ class RobotMetrics:
 
 @dataclass(frozen=True)
 class FlightMetrics:
-    """A whole flight's. ``mission_s`` runs from the first goal's sending to the last one's end."""
+    """Metrics of a flight.
+
+    ``mission_s`` runs from sending the first goal to the end of the last one.
+    """
 
     title: str
     config_name: str
@@ -56,21 +59,23 @@ class FlightMetrics:
 
     @property
     def sent(self) -> int:
+        """Number of goals that were sent."""
         return sum(robot.sent for robot in self.robots)
 
     @property
     def reached(self) -> int:
+        """Number of goals that were reached."""
         return sum(robot.reached for robot in self.robots)
 
     @property
     def success(self) -> bool:
-        """Goals were sent, all of them were reached and nothing touched."""
+        """True if goals were sent, all were reached and there was no contact."""
         return not self.faults
 
     @property
     def faults(self) -> Tuple[str, ...]:
-        """Why it was no success."""
-        found = [f"it ended early ({self.reason})"] if self.reason else []
+        """Reasons why the flight failed."""
+        found = [f"ended early ({self.reason})"] if self.reason else []
         if self.reached < self.sent:
             found.append(f"{self.sent - self.reached} of {self.sent} goals not reached")
         if self.contacts:
@@ -78,37 +83,40 @@ class FlightMetrics:
         return tuple(found) if self.sent else (*found, "no goal was sent")
 
     @property
-    def path_ratio(self) -> Optional[float]:
-        """Way flown in parts of the straight one; None where there was none to fly."""
+    def detour(self) -> Optional[float]:
+        """Flown length divided by straight length; None if the straight length is 0."""
         straight_m = sum(robot.straight_length_m for robot in self.robots)
         if straight_m < 0.01:
             return None
         return sum(robot.path_length_m for robot in self.robots) / straight_m
 
     @property
-    def least_clearance_m(self) -> Optional[float]:
-        return least([_number(robot.least_clearance_m) for robot in self.robots])
+    def min_clearance_m(self) -> Optional[float]:
+        """Smallest clearance of all robots."""
+        return smallest([_number(robot.min_clearance_m) for robot in self.robots])
 
     @property
-    def least_separation_m(self) -> Optional[float]:
-        return least([_number(robot.least_separation_m) for robot in self.robots])
+    def min_separation_m(self) -> Optional[float]:
+        """Smallest separation of all robots."""
+        return smallest([_number(robot.min_separation_m) for robot in self.robots])
 
     @property
     def recoveries(self) -> int:
+        """Number of recovery behaviours of all robots."""
         return sum(robot.recoveries for robot in self.robots)
 
 
-def flight_metrics(trace: FlightTrace, among: Optional[Tracks] = None) -> FlightMetrics:
-    """The figures of a flight; ``among`` are its tracks where they are there already."""
-    among = tracks(trace) if among is None else among
-    clearances = clearances_m(among, trace.scene, trace.robot_radius_m)
-    separations = separations_m(among, trace.robot_radius_m)
+def flight_metrics(trace: FlightTrace, tracks: Optional[Tracks] = None) -> FlightMetrics:
+    """Compute the metrics of a flight; ``tracks`` are its resampled tracks, if known."""
+    tracks = resampled_tracks(trace) if tracks is None else tracks
+    clearances = clearances_m(tracks, trace.scene, trace.robot_radius_m)
+    separations = separations_m(tracks, trace.robot_radius_m)
     robots = tuple(
-        _robot(robot, trace, least(clearances[k]), least(separations[k]))
+        _robot(robot, trace, smallest(clearances[k]), smallest(separations[k]))
         for k, robot in enumerate(trace.robots)
     )
     sent = [goal.sent_s for robot in trace.robots for goal in robot.goals]
-    ended = [end_s(goal, robot) for robot in trace.robots for goal in robot.goals]
+    ended = [goal_end_s(goal, robot) for robot in trace.robots for goal in robot.goals]
     return FlightMetrics(
         trace.title,
         trace.config_name,
@@ -126,7 +134,7 @@ def _robot(
     clearance_m: Optional[float],
     separation_m: Optional[float],
 ) -> RobotMetrics:
-    span = flying_span(robot)
+    span = mission_span(robot)
     return RobotMetrics(
         robot.name,
         len(robot.goals),

@@ -1,7 +1,7 @@
-"""Curves and figures of a flight, computed from its trace.
+"""Compute curves and values of a flight from its trace.
 
-Gaps are between hulls: discs of ``robot_radius_m`` around the centres, as in the
-mission's summary.
+Clearances and separations are between hulls: discs of ``robot_radius_m`` around the centres,
+as in the mission's summary.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.mission import distances
 from quad_nav.mission.flight_log import SPIN_ABOVE_RADPS, SPIN_BELOW_MPS
@@ -21,23 +22,25 @@ Span = Tuple[float, float]
 
 @dataclass(frozen=True)
 class Tracks:
-    """Where n quadcopters were at the same times; NaN where one was not heard of.
+    """Poses of n robots at common times, in ``map``; NaN where a robot has no samples.
 
-    ``times_s`` float64[t]; ``positions_m`` float64[n, t, 2] and ``yaws_rad`` float64[n, t]
-    in ``map``.
+    Attributes:
+        times_s: Times, shape (t,).
+        positions_m: Positions, shape (n, t, 2).
+        yaws_rad: Headings, unwrapped, shape (n, t).
     """
 
-    times_s: np.ndarray
-    positions_m: np.ndarray
-    yaws_rad: np.ndarray
+    times_s: NDArray[np.float64]
+    positions_m: NDArray[np.float64]
+    yaws_rad: NDArray[np.float64]
 
     def index_at(self, time_s: float) -> int:
-        """The sample nearest to a time, of at least one."""
+        """Return the index of the sample nearest to a time; there must be at least one."""
         return int(np.argmin(np.abs(self.times_s - time_s)))
 
 
-def tracks(trace: FlightTrace) -> Tracks:
-    """All quadcopters on the union of their times, on straight lines between samples."""
+def resampled_tracks(trace: FlightTrace) -> Tracks:
+    """Interpolate the poses of all robots linearly at the union of their times."""
     times_s = np.unique(np.concatenate([robot.times_s for robot in trace.robots] or [np.empty(0)]))
     positions = np.full((len(trace.robots), len(times_s), 2), np.nan)
     yaws = np.full(positions.shape[:2], np.nan)
@@ -50,70 +53,78 @@ def tracks(trace: FlightTrace) -> Tracks:
     return Tracks(times_s, positions, yaws)
 
 
-def _resampled(times_s: np.ndarray, own_times_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _resampled(
+    times_s: NDArray[np.float64], own_times_s: NDArray[np.float64], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
     return np.interp(times_s, own_times_s, values, left=np.nan, right=np.nan)
 
 
-def yaw_rad(quaternions: np.ndarray) -> np.ndarray:
-    """float64[k, 4] to float64[k]; see ``geometry.yaw_from_quaternion``."""
+def yaw_rad(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert quaternions (x, y, z, w), shape (k, 4), to headings, shape (k,).
+
+    Source: see ``geometry.yaw_from_quaternion``.
+    """
     x, y, z, w = quaternions.T
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def tilt_rad(quaternions: np.ndarray) -> np.ndarray:
-    """Angle float64[k] between the body's z axis and the vertical."""
+def tilt_rad(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the angles between the body's z axis and the vertical, shape (k,)."""
     x, y, _, _ = quaternions.T
     return np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
 
 
-def speed_mps(robot: RobotTrace) -> np.ndarray:
-    """Horizontal speed float64[k]."""
+def speed_mps(robot: RobotTrace) -> NDArray[np.float64]:
+    """Return the horizontal speeds, shape (k,)."""
     return np.hypot(robot.velocities[:, 0], robot.velocities[:, 1])
 
 
-def pair_separations_m(among: Tracks, a: int, b: int, radius_m: float) -> np.ndarray:
-    """Return the distance float64[t] between the hulls of two robots."""
-    return distances.separations_m(among.positions_m[a], among.positions_m[b], radius_m)
+def pair_separations_m(tracks: Tracks, a: int, b: int, radius_m: float) -> NDArray[np.float64]:
+    """Return the distances between the hulls of two robots, shape (t,)."""
+    return distances.separations_m(tracks.positions_m[a], tracks.positions_m[b], radius_m)
 
 
-def separations_m(among: Tracks, radius_m: float) -> np.ndarray:
-    """Return each robot's separation float64[n, t] from the nearest other; NaN if there is none."""
-    return distances.nearest_separations_m(among.positions_m, radius_m)
+def separations_m(tracks: Tracks, radius_m: float) -> NDArray[np.float64]:
+    """Return each robot's separation from its nearest peer, shape (n, t); NaN without one."""
+    return distances.nearest_separations_m(tracks.positions_m, radius_m)
 
 
-def clearances_m(among: Tracks, scene: Optional[Scene], radius_m: float) -> np.ndarray:
-    """Return each robot's clearance float64[n, t]; NaN without a scene."""
-    if scene is None or among.positions_m.size == 0:
-        return np.full(among.yaws_rad.shape, np.nan)
-    return distances.clearances_m(among.positions_m, scene.flight_clearances_m, radius_m)
+def clearances_m(tracks: Tracks, scene: Optional[Scene], radius_m: float) -> NDArray[np.float64]:
+    """Return each robot's clearance, shape (n, t); NaN without a scene."""
+    if scene is None or tracks.positions_m.size == 0:
+        return np.full(tracks.yaws_rad.shape, np.nan)
+    return distances.clearances_m(tracks.positions_m, scene.flight_clearances_m, radius_m)
 
 
-def span_s(trace: FlightTrace) -> Span:
-    """From the first sample to the last; never shorter than a second."""
+def trace_span_s(trace: FlightTrace) -> Span:
+    """Return the times of the first and the last sample, at least one second apart."""
     ends = [
         float(robot.times_s[k]) for robot in trace.robots if len(robot.times_s) for k in (0, -1)
     ] or [0.0]
     return min(ends), max(max(ends), min(ends) + 1.0)
 
 
-def flying_span(robot: RobotTrace) -> Optional[Span]:
-    """From the first goal's sending to the last goal's end; None when none was sent."""
+def mission_span(robot: RobotTrace) -> Optional[Span]:
+    """Return the time from sending the first goal to the last goal's end, or None."""
     if not robot.goals:
         return None
     last = robot.goals[-1]
-    return robot.goals[0].sent_s, end_s(last, robot)
+    return robot.goals[0].sent_s, goal_end_s(last, robot)
 
 
-def end_s(goal: GoalTrace, robot: RobotTrace) -> float:
-    """When a goal ended, or the recording before it did."""
+def goal_end_s(goal: GoalTrace, robot: RobotTrace) -> float:
+    """Return the time at which a goal or, before that, the recording ended."""
     if goal.ended_s is not None:
         return goal.ended_s
     return max(goal.sent_s, float(robot.times_s[-1])) if len(robot.times_s) else goal.sent_s
 
 
 def spins(robot: RobotTrace) -> List[Span]:
-    """When it turned on the spot while it had a goal; limits are the mission's."""
-    span = flying_span(robot)
+    """Return the periods in which a robot with a goal turned in place.
+
+    The limits of speed and turn rate are those of the mission's summary.
+    """
+    span = mission_span(robot)
     if span is None or len(robot.times_s) < 2:
         return []
     times_s = robot.times_s
@@ -129,14 +140,14 @@ def spins(robot: RobotTrace) -> List[Span]:
     return [(float(times_s[first]), float(times_s[last + 1])) for first, last in runs(spinning)]
 
 
-def runs(mask: np.ndarray) -> List[Tuple[int, int]]:
-    """First and last index of each run of true values."""
+def runs(mask: NDArray[np.bool_]) -> List[Tuple[int, int]]:
+    """Return the first and the last index of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2])]
 
 
 def path_length_m(robot: RobotTrace, span: Optional[Span]) -> float:
-    """Horizontal way flown in a span of time."""
+    """Return the horizontal length of the path flown in a period, 0 without one."""
     if span is None:
         return 0.0
     inside = (robot.times_s >= span[0] - 1e-9) & (robot.times_s <= span[1] + 1e-9)
@@ -144,23 +155,23 @@ def path_length_m(robot: RobotTrace, span: Optional[Span]) -> float:
 
 
 def straight_length_m(robot: RobotTrace) -> float:
-    """Sum over its goals of the distance between where each was sent and where it ended."""
+    """Sum the distances between the positions at which each goal was sent and ended."""
     total_m = 0.0
     for goal in robot.goals if len(robot.times_s) else ():
-        way = position_m(robot, end_s(goal, robot)) - position_m(robot, goal.sent_s)
-        total_m += float(np.hypot(way[0], way[1]))
+        displacement = position_m(robot, goal_end_s(goal, robot)) - position_m(robot, goal.sent_s)
+        total_m += float(np.hypot(displacement[0], displacement[1]))
     return total_m
 
 
-def position_m(robot: RobotTrace, time_s: float) -> np.ndarray:
-    """Where a quadcopter with any sample was at a time: float64[2]."""
+def position_m(robot: RobotTrace, time_s: float) -> NDArray[np.float64]:
+    """Interpolate the position of a robot with at least one sample, shape (2,)."""
     return np.array(
         [np.interp(time_s, robot.times_s, robot.positions_m[:, axis]) for axis in range(2)]
     )
 
 
-def least(values: Sequence[float]) -> Optional[float]:
-    """The smallest that is a number, None when none is."""
+def smallest(values: Sequence[float]) -> Optional[float]:
+    """Return the smallest finite value, or None."""
     known = np.asarray(values, dtype=float)
     known = known[np.isfinite(known)]
     return float(known.min()) if len(known) else None

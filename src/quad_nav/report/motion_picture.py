@@ -1,4 +1,4 @@
-"""Speed, turning and tilt of each quadcopter beside what was commanded."""
+"""Picture of each robot's speed, turn rate and tilt beside its commands."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _COMMAND = "#202428"
 
 
 def motion_picture(trace: FlightTrace, shown: Sequence[int]) -> Figure:
-    """A row for each of the ``shown`` quadcopters."""
+    """Draw one row for each robot number in ``shown``."""
     rows = max(len(shown), 1)
     figure = new_figure(0.7 + max(0.95, 1.5 - 0.15 * rows) * rows)
     grid = figure.subplots(rows, 3, sharex=True, sharey="col", squeeze=False)
     for row, number in zip(grid, shown):
         _draw_robot(row, number, trace.robots[number])
-    for axes, title in zip(grid[0], ("Speed ahead, m/s", "Turn rate, rad/s", "Tilt, degrees")):
+    for axes, title in zip(grid[0], ("Forward speed (m/s)", "Turn rate (rad/s)", "Tilt (degrees)")):
         axes.set_title(title)
     for axes in grid[-1]:
         time_axis(axes)
@@ -50,7 +50,7 @@ def _draw_robot(row: Sequence[Axes], number: int, robot: RobotTrace) -> None:
 
 
 def _draw_commands(axes: Axes, robot: RobotTrace, part: int) -> None:
-    """Commands hold until the next one."""
+    """Draw the commands as steps: each holds until the next one."""
     if len(robot.command_times_s):
         axes.step(
             robot.command_times_s, robot.commands[:, part], where="post", color=_COMMAND, lw=0.7

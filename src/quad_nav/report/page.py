@@ -1,4 +1,4 @@
-"""The HTML of a report: one file, pictures within it, nothing to load."""
+"""Reports as single HTML files with embedded pictures that load nothing."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from matplotlib.figure import Figure
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.comparison_picture import comparison_picture, grouped
-from quad_nav.report.cycle_picture import cycle_picture, has_walls
+from quad_nav.report.cycle_picture import cycle_picture, has_wall_times
 from quad_nav.report.distance_picture import distance_picture
 from quad_nav.report.encounter_picture import encounter_picture
-from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, gap_text
+from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, separation_text
 from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
-from quad_nav.report.measures import Tracks, tracks
+from quad_nav.report.measures import Tracks, resampled_tracks
 from quad_nav.report.motion_picture import motion_picture
 from quad_nav.report.parameter_table import parameter_rows
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.timeline_picture import timeline_picture
 
 MAX_STRIPS = 6
-"""Close encounters beyond this number are counted and not shown."""
+"""Number of close encounters that a report shows."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A PNG with its file name; ``alt`` says what it shows."""
+    """PNG picture with its file name; ``alt`` describes its content."""
 
     name: str
     alt: str
@@ -39,12 +39,13 @@ class Picture:
 
     @property
     def source(self) -> str:
+        """The picture as a data URL."""
         return "data:image/png;base64," + base64.b64encode(self.png).decode("ascii")
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading, what to look at, and pictures; ``notes`` stand above each picture."""
+    """Section of a page: heading, caption and pictures; ``notes`` are the pictures' headings."""
 
     anchor: str
     heading: str
@@ -55,25 +56,25 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """The HTML and the pictures in it."""
+    """HTML and the pictures in it."""
 
     html: str
     pictures: Tuple[Picture, ...]
 
 
 def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page:
-    """The report of one flight; ``wall_time_s`` is how long it took, where that is known."""
+    """Build the report of one flight; ``wall_time_s`` is how long it took, if known."""
     with style.styled():
-        among = tracks(trace)
-        flight = flight_metrics(trace, among)
-        met = encounters(trace, among)
-        shown = met[:MAX_STRIPS]
+        tracks = resampled_tracks(trace)
+        flight = flight_metrics(trace, tracks)
+        found = encounters(trace, tracks)
+        shown = found[:MAX_STRIPS]
         sections = [
-            _paths(trace, among, shown),
-            _encounters(trace, among, met, shown),
-            *_curves(trace, among, flight, shown),
+            _paths(trace, tracks, shown),
+            _encounters(trace, tracks, found, shown),
+            *_curves(trace, tracks, flight, shown),
         ]
-    sim_s = float(among.times_s[-1]) if len(among.times_s) else 0.0
+    sim_s = float(tracks.times_s[-1]) if len(tracks.times_s) else 0.0
     factor = sim_s / wall_time_s if wall_time_s else None
     return render(
         "flight.html.jinja",
@@ -87,139 +88,160 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
 
 
 def comparison_page(flights: Sequence[FlightMetrics]) -> Page:
-    """The report of several flights."""
+    """Build the report that compares several flights."""
     with style.styled():
-        compared = picture("comparison", "Figures of each flight", comparison_picture(flights))
+        compared = picture("comparison", "Metrics of each flight", comparison_picture(flights))
     section = Section(
         "comparison",
         "Side by side",
-        "Every dot is a flight; boxes hold the middle half of five or more, with the median.",
+        "A dot is a flight. Boxes span the middle half of five or more flights, with the median.",
         (compared,),
     )
     return render("comparison.html.jinja", [section], flights=flights, groups=grouped(flights))
 
 
-def _paths(trace: FlightTrace, among: Tracks, shown: Sequence[Encounter]) -> Section:
+def _paths(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
     return Section(
         "paths",
         "Paths",
-        "Goals have their numbers in the order of flight and start positions the "
-        "robot's number; discs show where the flight ended. Do paths keep to the middle of gaps, "
-        "and where do they go round in circles?",
-        (picture("paths", "Paths over the scene", paths_picture(trace, among, shown)),),
+        "Goals have their numbers in the order of flight, start positions the robot's number. "
+        "Discs show the final positions. Check whether paths keep to the middle of gaps, and "
+        "whether they circle.",
+        (picture("paths", "Paths over the scene", paths_picture(trace, tracks, shown)),),
     )
 
 
 def _encounters(
-    trace: FlightTrace, among: Tracks, met: Sequence[Encounter], shown: Sequence[Encounter]
+    trace: FlightTrace, tracks: Tracks, found: Sequence[Encounter], shown: Sequence[Encounter]
 ) -> Section:
-    if not met:
-        text = "No two quadcopters came" if len(trace.robots) > 1 else "No other quadcopter came"
-        return Section(
-            "encounters",
-            "Close encounters",
-            f"{text} within {CLOSE_M:g} m, hull to hull, and no obstacle was touched.",
+    if not found:
+        text = (
+            f"No separation below {CLOSE_M:g} m and no contact with an obstacle."
+            if len(trace.robots) > 1
+            else "No contact with an obstacle."
         )
+        return Section("encounters", "Close encounters", text)
     caption = (
-        f"Contacts with obstacles, and whenever two hulls came within {CLOSE_M:g} m: the "
-        "closest moment is framed in red. Discs are to scale, the line in them is the nose, "
-        "arrows are the way of 1.5 s. Each frame is 3.2 m wide."
+        f"Contacts with obstacles, and separations below {CLOSE_M:g} m. The closest moment is "
+        "framed in red. Discs are to scale, the line in a disc points to the nose, arrows show "
+        "the displacement in 1.5 s. Each frame is 3.2 m wide."
     )
-    if len(met) > len(shown):
-        caption += f" The {len(shown)} closest are shown, {len(met) - len(shown)} more are not."
+    if len(found) > len(shown):
+        caption += f" The {len(shown)} closest encounters of {len(found)} are shown."
     pictures = tuple(
-        picture(f"encounter_{letter}", note, encounter_picture(trace, among, one))
-        for letter, note, one in zip(LETTERS, map(_note, shown), shown)
+        picture(f"encounter_{letter}", note, encounter_picture(trace, tracks, encounter))
+        for letter, note, encounter in zip(LETTERS, map(_note, shown), shown)
     )
     return Section(
         "encounters",
         "Close encounters",
         caption,
         pictures,
-        tuple(f"{letter}: {_note(one)}" for letter, one in zip(LETTERS, shown)),
+        tuple(f"{letter}: {_note(encounter)}" for letter, encounter in zip(LETTERS, shown)),
     )
 
 
-def _note(one: Encounter) -> str:
-    if one.other is None:
-        return f"{one.names[0]} touches {one.names[1]} at {one.time_s:.1f} s"
-    return f"{one.names[0]} and {one.names[1]}, {gap_text(one.gap_m)} at {one.time_s:.1f} s"
+def _note(encounter: Encounter) -> str:
+    name, other = encounter.names
+    if encounter.other is None:
+        return f"{name} touches {other} at {encounter.time_s:.1f} s"
+    text = separation_text(encounter.separation_m)
+    return f"{name} and {other}: {text} at {encounter.time_s:.1f} s"
 
 
 def _curves(
-    trace: FlightTrace, among: Tracks, flight: FlightMetrics, shown: Sequence[Encounter]
+    trace: FlightTrace, tracks: Tracks, flight: FlightMetrics, shown: Sequence[Encounter]
 ) -> List[Section]:
-    rows = _most_endangered(flight)
-    left_out = len(trace.robots) - len(rows)
-    motion = (
-        "What was flown, in the robot's colour, and what the navigator commanded, in black. "
-        "Commands that jump to and fro, or that the body does not follow, cost time; a "
-        "tilted LIDAR sees the floor."
-    )
-    if left_out:
-        motion += (
-            f" The {len(rows)} quadcopters that came closest to anything are shown, "
-            f"{left_out} more are not."
-        )
-    cycles = (
-        "A cycle that takes longer than the control period holds everything up."
-        if has_walls(trace)
-        else "The recording has no computing times: this is how regularly cycles came."
-    )
     return [
-        Section(
-            "gaps",
-            "Distances",
-            "Between hulls, discs of "
-            f"{trace.robot_radius_m:.2f} m radius; below zero they overlap. Letters are close "
-            "encounters, dashed lines contacts.",
-            (picture("distances", "Gaps over time", distance_picture(trace, among, shown)),),
-        ),
+        _distances(trace, tracks, shown),
         Section(
             "timeline",
             "Goals",
-            "Bars are goals with their numbers, from being sent to being reached.",
+            "A bar is a goal with its number, from sending it to its end.",
             (picture("timeline", "Goals over time", timeline_picture(trace)),),
         ),
-        Section(
-            "motion",
-            "Motion",
-            motion,
-            (
-                picture(
-                    "motion", "Speed, turn rate and tilt over time", motion_picture(trace, rows)
-                ),
-            ),
-        ),
-        Section(
-            "cycles",
-            "Control cycles",
-            cycles,
-            (picture("cycles", "Times of control cycles", cycle_picture(trace)),),
-        ),
+        _motion(trace, flight),
+        _cycles(trace),
     ]
 
 
-def _most_endangered(flight: FlightMetrics) -> List[int]:
-    """Numbers of the quadcopters that get a row each, in order."""
+def _distances(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
+    return Section(
+        "gaps",
+        "Distances",
+        "Separation is the distance between the hulls of two robots, clearance the distance from "
+        f"a hull to the nearest obstacle or wall. Hulls are discs of {trace.robot_radius_m:.2f} m "
+        "radius; below zero they overlap. Letters are close encounters, dashed lines contacts.",
+        (
+            picture(
+                "distances",
+                "Separation and clearance over time",
+                distance_picture(trace, tracks, shown),
+            ),
+        ),
+    )
 
-    def least_gap_m(number: int) -> float:
+
+def _motion(trace: FlightTrace, flight: FlightMetrics) -> Section:
+    rows = _rows_to_show(flight)
+    caption = (
+        "The flown motion in the robot's colour, the navigator's commands in black. Commands that "
+        "oscillate, or that the body does not follow, cost time. A tilted LIDAR sees the floor."
+    )
+    if len(rows) < len(trace.robots):
+        caption += (
+            f" The {len(rows)} quadcopters of {len(trace.robots)} that came closest to an "
+            "obstacle or to each other are shown."
+        )
+    alt = "Speed, turn rate and tilt over time"
+    return Section(
+        "motion", "Motion", caption, (picture("motion", alt, motion_picture(trace, rows)),)
+    )
+
+
+def _cycles(trace: FlightTrace) -> Section:
+    caption = (
+        "A cycle that takes longer than the control period delays all navigators of its process."
+        if has_wall_times(trace)
+        else "The recording has no wall times. The plot shows the time between control cycles."
+    )
+    return Section(
+        "cycles",
+        "Control cycles",
+        caption,
+        (picture("cycles", "Times of control cycles", cycle_picture(trace)),),
+    )
+
+
+def _rows_to_show(flight: FlightMetrics) -> List[int]:
+    """Return the numbers of the robots with the smallest distances, in order."""
+
+    def min_distance_m(number: int) -> float:
         robot = flight.robots[number]
-        gaps = (robot.least_clearance_m, robot.least_separation_m)
-        return min((gap for gap in gaps if gap is not None), default=float("inf"))
+        distances = (robot.min_clearance_m, robot.min_separation_m)
+        return min(
+            (distance for distance in distances if distance is not None), default=float("inf")
+        )
 
-    return sorted(sorted(range(len(flight.robots)), key=least_gap_m)[: style.MAX_ROWS])
+    return sorted(sorted(range(len(flight.robots)), key=min_distance_m)[: style.MAX_ROWS])
 
 
 def picture(name: str, alt: str, figure: Figure) -> Picture:
-    """A figure as a picture."""
+    """Render a figure as a picture."""
     return Picture(name, alt, style.png(figure))
 
 
 def render(
     template: str, sections: Sequence[Section], folder: Optional[Path] = None, **context: Any
 ) -> Page:
-    """A page from a template of this folder, or of another one; ``context`` is for it."""
+    """Render a page from a template.
+
+    Args:
+        template: Name of the template.
+        sections: Sections of the page.
+        folder: Further folder with templates.
+        context: Variables of the template.
+    """
     folders = [Path(__file__).parent, *([folder] if folder is not None else [])]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folders),
@@ -246,9 +268,13 @@ def write_report(
     pictures: Optional[Path] = None,
     wall_time_s: Optional[float] = None,
 ) -> None:
-    """The report of one flight, with its folders.
+    """Write the report of one flight; folders are created.
 
-    ``pictures``: the folder that gets every picture as a PNG file, None for none.
+    Args:
+        trace: Trace of the flight.
+        path: HTML file.
+        pictures: Folder that gets every picture as a PNG file, or None.
+        wall_time_s: How long the flight took, if known.
     """
     write_page(flight_page(trace, wall_time_s), path, pictures)
 
@@ -256,12 +282,12 @@ def write_report(
 def write_comparison(
     flights: Sequence[FlightMetrics], path: Path, pictures: Optional[Path] = None
 ) -> None:
-    """The report of several flights, written as ``write_report`` does."""
+    """Write the report that compares several flights, as ``write_report`` does."""
     write_page(comparison_page(flights), path, pictures)
 
 
 def write_page(page: Page, path: Path, pictures: Optional[Path] = None) -> None:
-    """The HTML, and its pictures as PNG files for a folder; nobody sees half of the HTML."""
+    """Write the HTML atomically, and its pictures as PNG files to a folder, if given."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     partial.write_text(page.html, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Parameters of all quadcopters that differ from the original's defaults, in few rows."""
+"""Parameters that differ from move_base's defaults, as few table rows."""
 
 from __future__ import annotations
 
@@ -14,17 +14,21 @@ _COSTMAPS = ("global_costmap/", "local_costmap/")
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """``who`` is empty where it holds for all; {i} in a value is the quadcopter's number."""
+    """Row of the table.
+
+    ``robots`` is empty if the row holds for all robots. ``{i}`` in a value stands for the robot's
+    number.
+    """
 
     path: str
     value: str
     default: str
     unit: str
-    who: str = ""
+    robots: str = ""
 
 
 def parameter_rows(trace: FlightTrace) -> Tuple[ParameterRow, ...]:
-    """Costmaps with the same value share a row, and so do quadcopters."""
+    """Build the rows; costmaps with equal values share one, and so do robots."""
     found: Dict[ParameterRow, List[str]] = {}
     known = [robot for robot in trace.robots if robot.parameters]
     for robot in known:
@@ -45,8 +49,8 @@ def parameter_rows(trace: FlightTrace) -> Tuple[ParameterRow, ...]:
 
 def _rows(tree: Any, number: str) -> List[ParameterRow]:
     return [
-        ParameterRow(one.path, _text(one.value, number), _text(one.default, ""), one.unit)
-        for one in differences(tree)
+        ParameterRow(entry.path, _text(entry.value, number), _text(entry.default, ""), entry.unit)
+        for entry in differences(tree)
     ]
 
 
@@ -60,7 +64,7 @@ def _text(value: Any, number: str) -> str:
 
 
 def _with_common_costmaps(rows: List[ParameterRow]) -> List[ParameterRow]:
-    """One row, named ``*_costmap/...``, for what both costmaps have."""
+    """Merge rows that both costmaps have into one named ``*_costmap/...``."""
     everything = set(rows)
     common = []
     for row in rows:

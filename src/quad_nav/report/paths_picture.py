@@ -1,4 +1,4 @@
-"""Paths over the scene with numbered goals, close encounters and contacts."""
+"""Picture of the paths over the scene, with goals, close encounters and contacts."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from matplotlib.textpath import TextPath
 
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.encounters import LETTERS, Encounter
-from quad_nav.report.measures import Tracks, end_s, position_m
+from quad_nav.report.measures import Tracks, goal_end_s, position_m
 from quad_nav.report.scene_drawing import draw_hull, draw_scene, extent
 from quad_nav.report.style import ALARM, QUIET, WIDTH_IN, colour, new_figure, robot_legend
 
-_FULL_SIZE_UP_TO = 10  # quadcopters; symbols of more are smaller
+_FULL_SIZE_UP_TO = 10  # robots; with more, symbols are smaller
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
-def paths_picture(trace: FlightTrace, among: Tracks, marked: Sequence[Encounter]) -> Figure:
-    """``marked`` encounters get letters: A, B, ..."""
-    x0, x1, y0, y1 = extent(trace.scene, among)
+def paths_picture(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter]) -> Figure:
+    """Draw the paths; the encounters ``marked`` get the letters A, B, ..."""
+    x0, x1, y0, y1 = extent(trace.scene, tracks)
     height_in = (WIDTH_IN - 0.6) * min(max((y1 - y0) / (x1 - x0), 0.3), 1.6) + 0.9
     figure = new_figure(height_in)
     axes = figure.subplots()
@@ -33,9 +33,9 @@ def paths_picture(trace: FlightTrace, among: Tracks, marked: Sequence[Encounter]
     scale = min(1.0, (_FULL_SIZE_UP_TO / max(len(trace.robots), 1)) ** 0.2)
     for k, robot in enumerate(trace.robots):
         _draw_path(axes, k, robot, scale)
-        if len(among.times_s):
+        if len(tracks.times_s):
             draw_hull(
-                axes, k, among.positions_m[k, -1], among.yaws_rad[k, -1], trace.robot_radius_m
+                axes, k, tracks.positions_m[k, -1], tracks.yaws_rad[k, -1], trace.robot_radius_m
             )
     for k, robot in enumerate(trace.robots):
         _draw_goals(axes, k, robot, scale)
@@ -43,10 +43,10 @@ def paths_picture(trace: FlightTrace, among: Tracks, marked: Sequence[Encounter]
         axes.plot(
             contact.x_m, contact.y_m, "X", color=ALARM, mec="white", mew=0.8, ms=11, zorder=11
         )
-    for letter, one in zip(LETTERS, marked):
+    for letter, encounter in zip(LETTERS, marked):
         axes.annotate(
             letter,
-            (one.x_m, one.y_m),
+            (encounter.x_m, encounter.y_m),
             (9, 9),
             textcoords="offset points",
             fontsize=10,
@@ -57,7 +57,7 @@ def paths_picture(trace: FlightTrace, among: Tracks, marked: Sequence[Encounter]
             annotation_clip=True,
             arrowprops={"arrowstyle": "-", "color": QUIET, "lw": 0.8, "shrinkB": 0},
         )
-    axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x, m", ylabel="y, m")
+    axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x (m)", ylabel="y (m)")
     robot_legend(figure, [robot.name for robot in trace.robots], _symbols(trace, bool(marked)))
     return figure
 
@@ -68,7 +68,7 @@ def _draw_path(axes: Axes, number: int, robot: RobotTrace, scale: float) -> None
     x_m, y_m = robot.positions_m[:, 0], robot.positions_m[:, 1]
     axes.plot(x_m, y_m, color=colour(number), lw=1.7 * scale, zorder=4)
     for goal in robot.goals:
-        _draw_direction(axes, number, robot, 0.5 * (goal.sent_s + end_s(goal, robot)), scale)
+        _draw_direction(axes, number, robot, 0.5 * (goal.sent_s + goal_end_s(goal, robot)), scale)
     axes.plot(x_m[0], y_m[0], "s", ms=12 * scale, color=colour(number), mec="white", zorder=8)
     axes.text(
         x_m[0],
@@ -87,7 +87,7 @@ def _draw_path(axes: Axes, number: int, robot: RobotTrace, scale: float) -> None
 def _draw_direction(
     axes: Axes, number: int, robot: RobotTrace, time_s: float, scale: float
 ) -> None:
-    """An arrowhead on the path, where it was at a time; none where it stood."""
+    """Draw an arrowhead on the path at a time, unless the robot stands still."""
     tail, head = position_m(robot, time_s - 0.5), position_m(robot, time_s + 0.5)
     if np.hypot(*(head - tail)) > 0.02:
         axes.annotate(
@@ -161,7 +161,7 @@ def _symbols(trace: FlightTrace, lettered: bool) -> List[Any]:
 
 
 def _letter(letter: str) -> Path:
-    """A marker: matplotlib's own ones of text are mathematics, which is switched off here."""
+    """Return a letter as a marker; matplotlib's text markers are math text, switched off here."""
     outline = TextPath((0.0, 0.0), letter, prop=FontProperties(weight="bold"))
     middle = outline.get_extents().get_points().mean(axis=0)
     return Path(outline.vertices - middle, outline.codes)

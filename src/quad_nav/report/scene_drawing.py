@@ -1,4 +1,4 @@
-"""The scene from above, and quadcopters to scale in it."""
+"""Draw the scene from above, with robots to scale."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection
 from matplotlib.patches import Circle, Patch, Rectangle
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.report.measures import Tracks
@@ -20,9 +21,12 @@ _SOLID, _EDGE = "#b9bfc6", "#7c858e"
 
 
 def draw_scene(axes: Axes, scene: Optional[Scene], near: Optional[Extent] = None) -> None:
-    """Obstacles and walls; those that quadcopters fly over or under are only outlined.
+    """Draw obstacles and walls; those above or below the flight altitude are outlined.
 
-    ``near``: what the picture shows, where that is a small part of the scene.
+    Args:
+        axes: Axes to draw in.
+        scene: Scene, or None to draw nothing.
+        near: Visible part, if that is a small part of the scene.
     """
     axes.set_aspect("equal")
     if scene is None:
@@ -66,8 +70,8 @@ def _outline(solid: Obstacle) -> Patch:
     )
 
 
-def extent(scene: Optional[Scene], among: Tracks) -> Extent:
-    """x from, x to, y from, y to in ``map``: the scene with its walls, or what was flown over."""
+def extent(scene: Optional[Scene], tracks: Tracks) -> Extent:
+    """Return (x from, x to, y from, y to) in ``map``: the scene, or without one the paths."""
     if scene is not None:
         west, east, south, north = scene.wall_boxes()
         return (
@@ -76,7 +80,7 @@ def extent(scene: Optional[Scene], among: Tracks) -> Extent:
             south.y_m - south.size_y_m / 2,
             north.y_m + north.size_y_m / 2,
         )
-    flown = among.positions_m.reshape(-1, 2)
+    flown = tracks.positions_m.reshape(-1, 2)
     flown = flown[np.isfinite(flown).all(axis=1)]
     if len(flown) == 0:
         return (0.0, 1.0, 0.0, 1.0)
@@ -87,12 +91,12 @@ def extent(scene: Optional[Scene], among: Tracks) -> Extent:
 def draw_hull(
     axes: Axes,
     robot: int,
-    position_m: np.ndarray,
+    position_m: NDArray[np.float64],
     yaw_rad: float,
     radius_m: float,
     numbered: bool = False,
 ) -> None:
-    """A disc to scale with a line that shows where the nose is."""
+    """Draw a robot as a disc to scale, with a line from its centre to its nose."""
     if not np.isfinite(position_m).all():
         return
     axes.add_patch(
@@ -114,16 +118,19 @@ def draw_hull(
         solid_capstyle="round",
     )
     if numbered:
-        x_m, y_m = position_m - 0.5 * ahead
-        axes.text(
-            x_m,
-            y_m,
-            str(robot),
-            fontsize=6.5,
-            fontweight="bold",
-            color=colour(robot),
-            ha="center",
-            va="center_baseline",
-            zorder=9,
-            clip_on=True,
-        )
+        _draw_number(axes, robot, position_m - 0.5 * ahead)
+
+
+def _draw_number(axes: Axes, robot: int, position_m: NDArray[np.float64]) -> None:
+    axes.text(
+        position_m[0],
+        position_m[1],
+        str(robot),
+        fontsize=6.5,
+        fontweight="bold",
+        color=colour(robot),
+        ha="center",
+        va="center_baseline",
+        zorder=9,
+        clip_on=True,
+    )

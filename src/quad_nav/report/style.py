@@ -1,4 +1,4 @@
-"""What all pictures have in common: sizes, fonts, colours, and PNG."""
+"""Common sizes, fonts and colours of all pictures, and PNG output."""
 
 from __future__ import annotations
 
@@ -48,28 +48,28 @@ RC: Dict[Any, Any] = {
 
 
 def new_figure(height_in: float) -> Figure:
-    """A figure on Agg, without pyplot's global state; its layout keeps things apart."""
+    """Create a figure on Agg without pyplot's global state, with constrained layout."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as a PNG file."""
+    """Encode a figure as PNG."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     return buffer.getvalue()
 
 
 def styled() -> Any:
-    """The context in which figures are made and drawn."""
+    """Return the context manager in which figures must be created and drawn."""
     return matplotlib.rc_context(RC)
 
 
 def label_log(axis: Axis) -> None:
-    """Plain numbers on a logarithmic axis of which the limits are known.
+    """Label a logarithmic axis, whose limits are set, with plain numbers.
 
-    matplotlib's own labels there are mathematics, which is switched off.
+    matplotlib's own labels there are math text, which is switched off.
     """
     low, high = axis.get_view_interval()
     decades = math.log10(high / low)
@@ -80,13 +80,17 @@ def label_log(axis: Axis) -> None:
 
 
 def colour(robot: int) -> Tuple[float, float, float]:
+    """Return a robot's colour as (red, green, blue) from 0 to 1."""
     return robot_rgba(robot)[:3]
 
 
 def robot_legend(figure: Figure, names: Sequence[str], more: Sequence[Any] = ()) -> None:
-    """Below the axes, where it covers nothing; ``more`` are artists with labels.
+    """Add a legend of the robots below the axes.
 
-    Names of more quadcopters than one can tell apart are left out: then labels must do.
+    Args:
+        figure: Figure to add it to.
+        names: Names of the robots. More than 24 cannot be told apart and are left out.
+        more: Further labelled artists.
     """
     handles = []
     if 1 < len(names) <= _MOST_IN_LEGEND:
@@ -107,6 +111,7 @@ def robot_legend(figure: Figure, names: Sequence[str], more: Sequence[Any] = ())
 
 
 def time_axis(axes: Axes, label: bool = True) -> None:
+    """Set the margins and the label of a time axis."""
     axes.margins(x=0.01)
     if label:
-        axes.set_xlabel("time, s")
+        axes.set_xlabel("time (s)")

@@ -1,4 +1,4 @@
-"""When each goal was flown, with recoveries, spins and contacts."""
+"""Picture of the goals over time, with recoveries, spins and contacts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 
 from quad_nav.navigator.tick import State
 from quad_nav.recording.trace import FlightTrace, RobotTrace
-from quad_nav.report.measures import end_s, span_s, spins
+from quad_nav.report.measures import goal_end_s, spins, trace_span_s
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure, robot_legend, time_axis
 
 _BAR = 0.52  # height of a goal's bar in a row of height 1
@@ -20,16 +20,16 @@ _STRIP = 0.14
 _SPIN, _STATE = "#202428", {State.PLANNING: "#9ec4ee", State.CLEARING: "#e8a33d"}
 _RECOVERY: Any = {"marker": "v", "color": "#e8a33d", "mec": "black", "mew": 0.6, "ms": 8}
 _CONTACT: Any = {"marker": "X", "color": ALARM, "mec": "white", "mew": 0.7, "ms": 10}
-_NARROW = 0.02  # bars of less than this part of the whole time have no room for a number
+_NARROW = 0.02  # shorter bars, in parts of the whole time, have no room for a number
 
 
 def timeline_picture(trace: FlightTrace) -> Figure:
-    """A row for each quadcopter, the first at the top."""
+    """Draw one row for each robot, the first at the top."""
     rows = max(len(trace.robots), 1)
     figure = new_figure(1.0 + 0.5 * min(rows, 8) + 0.32 * max(rows - 8, 0))
     axes = figure.subplots()
     axes.grid(axis="y", visible=False)
-    first_s, last_s = span_s(trace)
+    first_s, last_s = trace_span_s(trace)
     for k, robot in enumerate(trace.robots):
         _draw_goals(axes, k, robot, last_s - first_s)
         _draw_states(axes, k, robot, last_s)
@@ -54,7 +54,7 @@ def timeline_picture(trace: FlightTrace) -> Figure:
 
 def _draw_goals(axes: Axes, row: int, robot: RobotTrace, duration_s: float) -> None:
     for k, goal in enumerate(robot.goals):
-        length_s = end_s(goal, robot) - goal.sent_s
+        length_s = goal_end_s(goal, robot) - goal.sent_s
         failed = goal.ended_s is not None and not goal.reached
         axes.barh(
             row,
@@ -82,12 +82,12 @@ def _draw_goals(axes: Axes, row: int, robot: RobotTrace, duration_s: float) -> N
 
 
 def _halo(row: int, k: int) -> List[Any]:
-    """Keeps the hatching away from a number."""
+    """Return an effect that keeps the hatching away from a number."""
     return [withStroke(linewidth=4, foreground=colour(row) if k % 2 == 0 else "white")]
 
 
 def _draw_states(axes: Axes, row: int, robot: RobotTrace, last_s: float) -> None:
-    """A strip above the bar where the navigator planned without moving, or recovered."""
+    """Draw a strip above the bar while the navigator plans without moving or recovers."""
     for time_s, state, until_s in _periods(robot, last_s):
         if state in _STATE:
             axes.barh(
@@ -101,22 +101,22 @@ def _periods(robot: RobotTrace, last_s: float) -> List[Tuple[float, State, float
 
 
 def _symbols(trace: FlightTrace) -> List[Any]:
-    """Legends for what is in the picture."""
+    """Return legend entries for what the picture shows."""
     robots = trace.robots
     found: List[Any] = []
     goals = [goal for robot in robots for goal in robot.goals]
     if any(goal.ended_s is None for goal in goals):
-        found.append(Patch(facecolor=QUIET, edgecolor="white", hatch="//", label="not over"))
+        found.append(Patch(facecolor=QUIET, edgecolor="white", hatch="//", label="not ended"))
     if any(goal.ended_s is not None and not goal.reached for goal in goals):
-        found.append(Patch(facecolor=QUIET, edgecolor=ALARM, hatch="//", label="given up"))
+        found.append(Patch(facecolor=QUIET, edgecolor=ALARM, hatch="//", label="not reached"))
     if any(spins(robot) for robot in robots):
-        found.append(Patch(color=_SPIN, label="turns on the spot"))
+        found.append(Patch(color=_SPIN, label="turns in place"))
     if any(state is State.PLANNING for robot in robots for _, state in robot.states):
-        found.append(Patch(color=_STATE[State.PLANNING], label="waits for a plan"))
+        found.append(Patch(color=_STATE[State.PLANNING], label="planning"))
     if any(state is State.CLEARING for robot in robots for _, state in robot.states):
-        found.append(Patch(color=_STATE[State.CLEARING], label="recovers"))
+        found.append(Patch(color=_STATE[State.CLEARING], label="recovering"))
     if any(robot.recoveries for robot in robots):
-        found.append(Line2D([], [], ls="", label="recovery begins", **_RECOVERY))
+        found.append(Line2D([], [], ls="", label="recovery starts", **_RECOVERY))
     if trace.contacts:
         found.append(Line2D([], [], ls="", label="contact", **_CONTACT))
     return found

@@ -9,7 +9,7 @@ from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.encounters import encounters
 from quad_nav.report.flight_metrics import flight_metrics
-from quad_nav.report.measures import tracks
+from quad_nav.report.measures import resampled_tracks
 from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.timeline_picture import timeline_picture
@@ -76,13 +76,13 @@ def _held_out(result: TuneResult) -> Section:
 def _flights(before: FlightTrace, after: FlightTrace) -> Section:
     pictures, notes = [], []
     for name, trace in (("before", before), ("after", after)):
-        among = tracks(trace)
-        shown = encounters(trace, among)[:MAX_STRIPS]
-        found = flight_metrics(trace, among)
+        tracks = resampled_tracks(trace)
+        shown = encounters(trace, tracks)[:MAX_STRIPS]
+        found = flight_metrics(trace, tracks)
         words = f"{name.capitalize()}: {found.mission_s:.1f} s"
         notes += [words, ""]
         pictures += [
-            picture(f"paths_{name}", f"Paths {name}", paths_picture(trace, among, shown)),
+            picture(f"paths_{name}", f"Paths {name}", paths_picture(trace, tracks, shown)),
             picture(f"timeline_{name}", f"Goals {name}", timeline_picture(trace)),
         ]
     return Section(
