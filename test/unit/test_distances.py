@@ -88,7 +88,7 @@ def test_distances_in_a_scene():
             "quad0": [(0.0, 10.0, 12.0), (1.0, 13.0, 10.0)],
             "quad1": [(0.0, 10.0, 17.0), (1.0, 17.0, 13.0)],
         },
-        surface_distance=scene.flight_clearances_m,
+        surface_distance=scene.flight_surface_distances_m,
     )
     # To the pillar 2 - 0.5 - 0.3; the second is nearest to the walls, 3 - 0.3 away.
     assert log.min_clearance_m("quad0") == pytest.approx(1.2)

@@ -239,7 +239,7 @@ def place_at_random(world: World, scene: Scene, random: np.random.Generator) -> 
         position = random.uniform(
             (0.4, 0.4, 0.35), (scene.size_x_m - 0.4, scene.size_y_m - 0.4, 2.5)
         )
-        if scene.clearance_m(*position) > 0.35 and all(
+        if scene.surface_distance_m(*position) > 0.35 and all(
             np.linalg.norm(position - other) > 0.7 for other in placed
         ):
             placed.append(position)

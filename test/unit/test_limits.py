@@ -13,7 +13,7 @@ from quad_nav.files import document, plain_yaml
 from quad_nav.mission import goal_file
 from quad_nav.recording import bag_info, bag_trace
 from quad_nav.sim import (
-    free_starts,
+    imported_scene,
     map_file,
     map_image,
     scene_file,
@@ -39,7 +39,7 @@ ROWS = {
     ],
     "numbers in a scene": [document.MAX_MAGNITUDE, scene_file.MAX_SIZE_M, document.MAX_TEXT_LENGTH],
     "starts in a scene": [scene_file.MAX_STARTS],
-    "starts chosen by `quad`": [free_starts.MAX_LOOKS],
+    "starts chosen by `quad`": [imported_scene.MAX_CANDIDATES],
     "Gazebo world": [
         xml_tree.MAX_BYTES,
         xml_tree.MAX_ELEMENTS,

@@ -173,13 +173,13 @@ def test_starts_are_chosen_where_the_map_is_known_to_be_free(tmp_path):
     assert scene.starts[0] == Pose2D(12.5, 5.0)
     assert len(scene.starts) == 8 and all(start.x_m >= 12.5 for start in scene.starts)
     for k, start in enumerate(scene.starts):
-        assert scene.clearance_m(start.x_m, start.y_m, 1.0) >= 0.6
+        assert scene.surface_distance_m(start.x_m, start.y_m, 1.0) >= 0.6
         assert all(start.distance_to(other) >= 2.0 for other in scene.starts[:k])
 
 
 def test_a_map_without_room_is_refused(tmp_path):
     assert faults(tmp_path, np.zeros((20, 20))) == [
-        "map.yaml: starts: missing, and no free place was found; "
+        "map.yaml: starts: missing, and no free position was found; "
         "expected a scene with world or map, and starts"
     ]
 
@@ -222,14 +222,14 @@ def test_keys_that_map_server_does_not_read_are_said(tmp_path):
     [
         (
             "map: map.yaml\nworld: a.world\n",
-            "s.yaml: map: is given beside world, expected one of them",
+            "s.yaml: map: given together with world, expected one of them",
         ),
         ("map: map.yaml\norigin: [1, 1]\n", "s.yaml: size: missing, expected a list of 2 numbers"),
         ("map: map.yaml\nsize: [1, 1]\n", "s.yaml: origin: missing, expected a list of 2 numbers"),
         ("map: map.yaml\nunknown: maybe\n", "s.yaml: unknown: 'maybe', expected free or occupied"),
         (
             "size: [4, 4]\nstarts: [[2, 2]]\nunknown: free\n",
-            "s.yaml: unknown: belongs to a map, expected the key map too",
+            "s.yaml: unknown: given without a map, expected the key map too",
         ),
         (
             "map: map.yaml\nstarts: [[50, 2]]\n",

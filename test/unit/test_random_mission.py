@@ -33,9 +33,9 @@ def test_starts_are_apart_and_obstacles_leave_passages():
     for a, b in itertools.combinations(scene.starts, 2):
         assert a.distance_to(b) >= 1.5
     for start in scene.starts:
-        assert scene.flight_clearance_m(start.x_m, start.y_m) >= BODY_RADIUS_M + 0.4
+        assert scene.flight_surface_distance_m(start.x_m, start.y_m) >= BODY_RADIUS_M + 0.4
     for a, b in itertools.combinations(scene.obstacles, 2):
-        assert b.clearance_m(a.x_m, a.y_m, 1.0) >= 1.6
+        assert b.surface_distance_m(a.x_m, a.y_m, 1.0) >= 1.6
 
 
 def test_equal_seeds_give_equal_missions_and_others_do_not():

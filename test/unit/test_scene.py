@@ -30,31 +30,31 @@ def small_document(**changes):
 
 def test_box_clearance_from_face_edge_corner_top_and_inside():
     box = Box("b", 2.0, 1.0, 2.0, 1.0, 1.0)
-    assert box.clearance_m(4.0, 1.0, 0.5) == pytest.approx(1.0)
-    assert box.clearance_m(6.0, 5.5, 0.5) == pytest.approx(5.0)
-    assert box.clearance_m(2.0, 1.0, 1.25) == pytest.approx(0.25)
-    assert box.clearance_m(5.0, 2.5, 3.0) == pytest.approx(3.0)
-    assert box.clearance_m(2.0, 1.4, 0.5) == pytest.approx(-0.1)
+    assert box.surface_distance_m(4.0, 1.0, 0.5) == pytest.approx(1.0)
+    assert box.surface_distance_m(6.0, 5.5, 0.5) == pytest.approx(5.0)
+    assert box.surface_distance_m(2.0, 1.0, 1.25) == pytest.approx(0.25)
+    assert box.surface_distance_m(5.0, 2.5, 3.0) == pytest.approx(3.0)
+    assert box.surface_distance_m(2.0, 1.4, 0.5) == pytest.approx(-0.1)
 
 
 def test_turned_box_clearance():
     box = Box("b", 0.0, 0.0, 2.0, 2.0, 2.0, yaw_rad=math.pi / 4)
-    assert box.clearance_m(math.sqrt(2.0) + 0.5, 0.0, 1.0) == pytest.approx(0.5)
-    assert box.clearance_m(2.0, 2.0, 1.0) == pytest.approx(2.0 * math.sqrt(2.0) - 1.0)
+    assert box.surface_distance_m(math.sqrt(2.0) + 0.5, 0.0, 1.0) == pytest.approx(0.5)
+    assert box.surface_distance_m(2.0, 2.0, 1.0) == pytest.approx(2.0 * math.sqrt(2.0) - 1.0)
 
 
 def test_cylinder_clearance_beside_above_and_below_a_lifted_one():
     cylinder = Cylinder("c", 1.0, 1.0, 0.5, 1.0, bottom_m=2.0)
-    assert cylinder.clearance_m(4.0, 5.0, 2.5) == pytest.approx(4.5)
-    assert cylinder.clearance_m(1.0, 1.0, 3.2) == pytest.approx(0.2)
-    assert cylinder.clearance_m(1.0, 1.0, 1.0) == pytest.approx(1.0)
-    assert cylinder.clearance_m(1.1, 1.0, 2.5) == pytest.approx(-0.4)
+    assert cylinder.surface_distance_m(4.0, 5.0, 2.5) == pytest.approx(4.5)
+    assert cylinder.surface_distance_m(1.0, 1.0, 3.2) == pytest.approx(0.2)
+    assert cylinder.surface_distance_m(1.0, 1.0, 1.0) == pytest.approx(1.0)
+    assert cylinder.surface_distance_m(1.1, 1.0, 2.5) == pytest.approx(-0.4)
 
 
 def test_sphere_clearance():
     sphere = Sphere("s", 1.0, 1.0, 2.0, 0.5)
-    assert sphere.clearance_m(1.0, 4.0, 6.0) == pytest.approx(4.5)
-    assert sphere.clearance_m(1.0, 1.2, 2.0) == pytest.approx(-0.3)
+    assert sphere.surface_distance_m(1.0, 4.0, 6.0) == pytest.approx(4.5)
+    assert sphere.surface_distance_m(1.0, 1.2, 2.0) == pytest.approx(-0.3)
     assert (sphere.bottom_m, sphere.height_m) == (1.5, 1.0)
 
 
@@ -82,8 +82,10 @@ def test_the_nearest_of_many_solids_is_the_one_with_the_least_clearance():
     solids = [*scene.wall_boxes(), *scene.obstacles]
     for x, y, z in random.uniform(0.0, 10.0, (200, 3)):
         nearest = scene.nearest(x, y, z)
-        assert nearest.clearance_m(x, y, z) == min(s.clearance_m(x, y, z) for s in solids)
-        assert scene.clearance_m(x, y, z) == nearest.clearance_m(x, y, z)
+        assert nearest.surface_distance_m(x, y, z) == min(
+            s.surface_distance_m(x, y, z) for s in solids
+        )
+        assert scene.surface_distance_m(x, y, z) == nearest.surface_distance_m(x, y, z)
 
 
 def test_clearances_of_many_points_are_those_of_each():
@@ -92,8 +94,8 @@ def test_clearances_of_many_points_are_those_of_each():
     scene = Scene("s", 40.0, 40.0, 1.0, Walls(), (*boxes, Sphere("ball", 9.0, 9.0, 1.0, 0.5)), ())
     for centre in random.uniform(1.0, 39.0, (20, 2)):
         points = centre + random.uniform(-1.0, 1.0, (3, 4, 2))
-        expected = [[scene.flight_clearance_m(x, y) for x, y in row] for row in points]
-        assert scene.flight_clearances_m(points).tolist() == expected
+        expected = [[scene.flight_surface_distance_m(x, y) for x, y in row] for row in points]
+        assert scene.flight_surface_distances_m(points).tolist() == expected
 
 
 def test_a_written_scene_reads_the_same(tmp_path):
@@ -121,18 +123,18 @@ def test_an_arena_may_lie_anywhere():
     scene = scene_from_document(small_document(origin=[-3.0, 10.0], starts=[[-1.0, 12.0]]), "s")
     assert scene.contains(-2.9, 15.9) and not scene.contains(0.5, 0.5)
     assert scene.centre == (-1.0, 13.0)
-    assert scene.clearance_m(-2.5, 13.0, 1.0) == pytest.approx(0.5)
-    assert scene.clearance_m(0.75, 13.0, 1.0) == pytest.approx(0.25)
-    assert scene.clearance_m(-1.0, 10.1, 1.0) == pytest.approx(0.1)
-    assert scene.clearance_m(-1.0, 15.8, 1.0) == pytest.approx(0.2)
+    assert scene.surface_distance_m(-2.5, 13.0, 1.0) == pytest.approx(0.5)
+    assert scene.surface_distance_m(0.75, 13.0, 1.0) == pytest.approx(0.25)
+    assert scene.surface_distance_m(-1.0, 10.1, 1.0) == pytest.approx(0.1)
+    assert scene.surface_distance_m(-1.0, 15.8, 1.0) == pytest.approx(0.2)
 
 
 def test_walls_have_their_inner_faces_on_the_border():
     scene = Scene("s", 4.0, 6.0, 1.0, Walls(2.0, 0.1), (), (Pose2D(1.0, 1.0),))
-    assert scene.clearance_m(0.5, 3.0, 1.0) == pytest.approx(0.5)
-    assert scene.clearance_m(3.75, 3.0, 1.0) == pytest.approx(0.25)
-    assert scene.clearance_m(2.0, 5.9, 1.0) == pytest.approx(0.1)
-    assert scene.clearance_m(-0.05, 3.0, 1.0) == pytest.approx(-0.05)
+    assert scene.surface_distance_m(0.5, 3.0, 1.0) == pytest.approx(0.5)
+    assert scene.surface_distance_m(3.75, 3.0, 1.0) == pytest.approx(0.25)
+    assert scene.surface_distance_m(2.0, 5.9, 1.0) == pytest.approx(0.1)
+    assert scene.surface_distance_m(-0.05, 3.0, 1.0) == pytest.approx(-0.05)
     assert scene.nearest(2.0, 0.3, 1.0).name == "wall_south"
     assert scene.contains(3.9, 5.9) and not scene.contains(4.0, 3.0)
 
@@ -144,9 +146,9 @@ def test_arena_leaves_the_tutorial_goals_free():
     assert scene.starts[0] == Pose2D(1.5, 1.5, 0.0)
     assert scene.starts[1] == Pose2D(10.0, 2.0, math.pi)
     for x, y in GOALS:
-        assert scene.clearance_m(x, y, 1.0) > 0.8
+        assert scene.surface_distance_m(x, y, 1.0) > 0.8
     for start in scene.starts:
-        assert scene.clearance_m(start.x_m, start.y_m, 1.0) > 0.8
+        assert scene.surface_distance_m(start.x_m, start.y_m, 1.0) > 0.8
 
 
 def test_arena_passages_let_an_inflated_quadcopter_through():
@@ -159,7 +161,7 @@ def test_arena_passages_let_an_inflated_quadcopter_through():
     for k in range(240):
         for j in range(240):
             x, y = 0.025 + 0.05 * k, 0.025 + 0.05 * j
-            first, second = sorted((s.clearance_m(x, y, 1.0), s.name) for s in solids)[:2]
+            first, second = sorted((s.surface_distance_m(x, y, 1.0), s.name) for s in solids)[:2]
             if first[0] > 0.0 and not (first[1][:4] == second[1][:4] == "wall"):
                 assert first[0] + second[0] > 1.2, (x, y, first, second)
 

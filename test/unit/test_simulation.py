@@ -304,7 +304,7 @@ def test_jittered_starts_are_free():
         assert starts[0].distance_to(starts[1]) > 0.6
         for start, nominal in zip(starts, scene.starts):
             assert 0.0 < start.distance_to(nominal) <= 0.5
-            assert scene.clearance_m(start.x_m, start.y_m, 1.0) > 0.3
+            assert scene.surface_distance_m(start.x_m, start.y_m, 1.0) > 0.3
         seen.update((s.x_m, s.y_m) for s in starts)
     assert len(seen) == 100
 
@@ -350,7 +350,7 @@ def test_starts_are_as_far_from_things_as_the_body_is_wide():
     for seed in range(20):
         for radius_m in (0.2, 0.5):
             (start,) = start_poses(scene, 1, 1.0, seed, radius_m)
-            assert scene.flight_clearance_m(start.x_m, start.y_m) > radius_m
+            assert scene.flight_surface_distance_m(start.x_m, start.y_m) > radius_m
     with pytest.raises(InputError, match="leaves no free start"):
         start_poses(scene, 1, 0.2, 0, 0.6)
 

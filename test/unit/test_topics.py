@@ -16,8 +16,8 @@ from quad_nav.mission.goal_sequence import Goal, GoalSequence
 from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
-from quad_nav.sim.scene_document import scene_document
 from quad_nav.sim.scene_file import load_scene, scene_from_document
+from quad_nav.sim.scene_writer import scene_document
 from quad_nav.topics.flight_info import (
     contact_from_values,
     contact_values,

@@ -270,13 +270,13 @@ def test_a_bare_world_is_a_scene(tmp_path):
     assert (scene.end_x_m, scene.end_y_m) == pytest.approx((4.5, 4.5))
     assert scene.starts[0].x_m == pytest.approx(0.25) and scene.starts[0].y_m == pytest.approx(1.0)
     assert scene.remarks[0].startswith(
-        f"{path}: starts: none are given, quadcopters start at [0.25, 1.00], "
+        f"{path}: starts: not given, quadcopters start at [0.25, 1.00], "
     )
 
 
 def test_an_empty_world_needs_a_scene_around_it(tmp_path):
     path = written(tmp_path)
-    with pytest.raises(InputError, match="a.world: size: missing, and nothing stands"):
+    with pytest.raises(InputError, match="a.world: size: missing, and the world has no obstacles"):
         load_scene(path)
     scene_path = tmp_path / "s.yaml"
     scene_path.write_text("world: a.world\nsize: [4, 4]\norigin: [-2, -2]\nstarts: [[0, 0]]\n")

@@ -214,7 +214,7 @@ def _frames(configuration: Configuration) -> Tuple[str, ...]:
 def _blocked_starts(worlds: Tuple[BarnWorld, ...], radius_m: float, path: Path) -> List[str]:
     problems = []
     for world in worlds:
-        clearance_m = world.scene().flight_clearance_m(START.x_m, START.y_m)
+        clearance_m = world.scene().flight_surface_distance_m(START.x_m, START.y_m)
         if clearance_m <= radius_m:
             problems.append(
                 f"{path}: world {world.number}: a cylinder is {clearance_m:.2f} m from "

@@ -144,7 +144,7 @@ class Flight:
         self.log = FlightLog(
             [goals.name for goals in setup.robots],
             setup.robot_radius_m,
-            setup.scene.flight_clearances_m,
+            setup.scene.flight_surface_distances_m,
         )
         self.robots = [
             FlightRobot(goals, configuration, self.log)

@@ -19,8 +19,8 @@ from quad_nav.offline.offline_robot import OfflineRobot
 from quad_nav.peers.peer import Intention, Peer, peer_at
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.scenario.scene_map import SceneMaps
+from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.lidars import Lidars
 from quad_nav.sim.simulation import RobotStates
 
 LocatedScan = Tuple[Scan, Pose3D]

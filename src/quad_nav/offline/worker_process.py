@@ -18,8 +18,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.offline.navigator_group import NavigatorGroup, NavigatorResult
 from quad_nav.peers.peer import Intention
 from quad_nav.scenario.flight_setup import FlightSetup
+from quad_nav.sim.casters import kernel_lidars
 from quad_nav.sim.flight import BodyState
-from quad_nav.sim.lidars import kernel_lidars
 from quad_nav.sim.simulation import RobotStates
 
 PROCESS_NAME = "navigators"

@@ -93,7 +93,7 @@ def clearances_m(tracks: Tracks, scene: Optional[Scene], radius_m: float) -> NDA
     """Return each robot's clearance, shape (n, t); NaN without a scene."""
     if scene is None or tracks.positions_m.size == 0:
         return np.full(tracks.yaws_rad.shape, np.nan)
-    return distances.clearances_m(tracks.positions_m, scene.flight_clearances_m, radius_m)
+    return distances.clearances_m(tracks.positions_m, scene.flight_surface_distances_m, radius_m)
 
 
 def trace_span_s(trace: FlightTrace) -> Span:

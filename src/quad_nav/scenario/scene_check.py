@@ -9,7 +9,7 @@ from quad_nav.sim.scene import Scene
 def scene_check(scene: Scene, robot_radius_m: float) -> PlaceCheck:
     """Tells goals outside the arena, and those nearer to something than the radius."""
     return clearance_check(
-        scene.contains, scene.flight_clearance_m, robot_radius_m, arena_text(scene)
+        scene.contains, scene.flight_surface_distance_m, robot_radius_m, arena_text(scene)
     )
 
 

@@ -52,5 +52,5 @@ def scene_map(scene: Scene, resolution_m: float) -> StaticMap:
     for row in range(0, spec.size_y, _ROWS):
         rows = slice(row, row + _ROWS)
         centres = np.stack(np.meshgrid(x_m, y_m[rows]), axis=-1)
-        occupancy[rows][scene.flight_clearances_m(centres) <= 0.0] = 100
+        occupancy[rows][scene.flight_surface_distances_m(centres) <= 0.0] = 100
     return StaticMap(occupancy, spec)

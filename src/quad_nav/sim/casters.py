@@ -1,54 +1,69 @@
-"""What the LIDARs' beams hit: found by a kernel of ours, or by the physics engine.
+"""LIDARs of all quadcopters, and the two ray casters that find what their beams hit.
 
-Both know the same shapes; the kernel is some ten times as fast and exact.
+``KernelCaster`` uses a numba kernel, ``WorldCaster`` the physics engine. Both have the same
+shapes. The kernel is exact and about ten times as fast.
 """
 
 from __future__ import annotations
 
-from typing import Protocol, Sequence
+from typing import List, Protocol, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from quad_nav.geometry import Scan
 from quad_nav.kernels.lidar import Beams, Solids, cast_scans
 from quad_nav.kernels.rays import CYLINDER
 from quad_nav.sim.flight import BodyState
-from quad_nav.sim.lidar import MOUNT_HEIGHT_M, LidarParams, beam_directions, lidar_poses
+from quad_nav.sim.lidar import MOUNT_HEIGHT_M, LidarParams, beam_directions, lidar_poses, make_scan
 from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, Scene
 from quad_nav.sim.solids import join, split_scene
 
+Floats = NDArray[np.float64]
+
 
 class Caster(Protocol):
-    """Finds what the beams of quadcopters' LIDARs hit."""
+    """Finder of what the beams of LIDARs hit."""
 
-    def cast(self, bodies: BodyState, robots: Sequence[int]) -> np.ndarray:
-        """Distances float64[len(robots), beams] to the first hits, +inf for none.
+    def cast(self, bodies: BodyState, robots: Sequence[int]) -> Floats:
+        """Cast the beams of some robots' LIDARs.
 
-        ``bodies`` is where all quadcopters are. A solid that a beam begins inside of, as
-        each does in the guard of its own quadcopter, is not hit.
+        Args:
+            bodies: State of all quadcopters.
+            robots: Numbers of the robots.
+
+        Returns:
+            float64[len(robots), beams], distances to the first hits in m; +inf for no hit. A beam
+            does not hit a solid that it starts in, such as the guard of its own quadcopter.
         """
 
 
 class RayWorld(Protocol):
-    """Bodies that rays can be cast at; ``body.World`` is one."""
+    """World with bodies that rays can hit, such as ``body.World``."""
 
-    def cast(self, starts_m: np.ndarray, ends_m: np.ndarray) -> np.ndarray:
-        """Fraction of the way to the first hit float64[m], +inf for none.
+    def cast(self, starts_m: Floats, ends_m: Floats) -> Floats:
+        """Cast rays.
 
-        ``starts_m`` and ``ends_m`` are float64[m, 3] in ``map``. A solid that
-        a ray starts inside of is not hit.
+        Args:
+            starts_m: float64[m, 3], in ``map``.
+            ends_m: float64[m, 3], in ``map``.
+
+        Returns:
+            float64[m], distance to the first hit as a fraction of the ray's length; +inf for no
+            hit. A ray does not hit a solid that it starts in.
         """
 
 
 class WorldCaster:
-    """Casts at the bodies of a world, which are where that world has them."""
+    """Caster that uses the bodies of the physics engine's world."""
 
     def __init__(self, params: LidarParams, world: RayWorld):
         self._params = params
         self._world = world
         self._directions = beam_directions(params)
 
-    def cast(self, bodies: BodyState, robots: Sequence[int]) -> np.ndarray:
-        """See ``Caster``."""
+    def cast(self, bodies: BodyState, robots: Sequence[int]) -> Floats:
+        """Cast the beams; see ``Caster.cast``."""
         near_m, far_m = self._params.range_min_m, self._params.range_max_m
         origins, rotations = lidar_poses(bodies, robots)
         directions = self._directions @ np.swapaxes(rotations, 1, 2)
@@ -59,7 +74,7 @@ class WorldCaster:
 
 
 class KernelCaster:
-    """Casts at a scene's shapes, the floor and the guards of quadcopters."""
+    """Caster that computes hits with a scene's solids, the floor and the quadcopters' guards."""
 
     def __init__(
         self, params: LidarParams, scene: Scene, n_robots: int, body_radius_m: float = BODY_RADIUS_M
@@ -76,8 +91,8 @@ class KernelCaster:
         self._solids = join(resting, _guards(n_robots, body_radius_m))
         self._guards = slice(len(resting.kinds), None)
 
-    def cast(self, bodies: BodyState, robots: Sequence[int]) -> np.ndarray:
-        """See ``Caster``."""
+    def cast(self, bodies: BodyState, robots: Sequence[int]) -> Floats:
+        """Cast the beams; see ``Caster.cast``."""
         self._solids.centres[self._guards] = (
             bodies.positions_m + MOUNT_HEIGHT_M * bodies.rotations[:, :, 2]
         )
@@ -89,7 +104,7 @@ class KernelCaster:
 
 
 def _guards(count: int, radius_m: float) -> Solids:
-    """Cylinders of quadcopters, anywhere."""
+    """Return the guards' cylinders, at positions that ``KernelCaster.cast`` sets."""
     sizes = (radius_m, radius_m, GUARD_HEIGHT_M / 2)
     return Solids(
         np.full(count, CYLINDER, np.int64),
@@ -97,3 +112,39 @@ def _guards(count: int, radius_m: float) -> Solids:
         np.zeros((count, 3, 3)),
         np.tile(sizes, (count, 1)),
     )
+
+
+class Lidars:
+    """LIDARs of all quadcopters.
+
+    ``caster`` finds what the beams hit. The noise of each LIDAR follows from ``seed``.
+    """
+
+    def __init__(self, params: LidarParams, caster: Caster, n_robots: int, seed: int):
+        self.params = params
+        self._caster = caster
+        self._noise = [np.random.default_rng([seed, 1, robot]) for robot in range(n_robots)]
+
+    def scan(self, bodies: BodyState, robots: Sequence[int], now_s: float) -> List[Scan]:
+        """Return a scan of each of some robots.
+
+        Args:
+            bodies: State of all quadcopters.
+            robots: Numbers of the robots.
+            now_s: Present time, the stamp of the scans.
+        """
+        return [
+            make_scan(self.params, now_s, row, self._noise[robot])
+            for robot, row in zip(robots, self._caster.cast(bodies, robots))
+        ]
+
+
+def kernel_lidars(
+    params: LidarParams,
+    scene: Scene,
+    n_robots: int,
+    seed: int,
+    body_radius_m: float = BODY_RADIUS_M,
+) -> Lidars:
+    """Return LIDARs that need no physics engine."""
+    return Lidars(params, KernelCaster(params, scene, n_robots, body_radius_m), n_robots, seed)

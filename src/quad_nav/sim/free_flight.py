@@ -68,7 +68,7 @@ class FreeFlight:
 
     def _has_room(self, robot: int) -> bool:
         x_m, y_m, z_m = self._centres_m[robot].tolist()
-        clearance_m = min(self._scene.clearance_m(x_m, y_m, z_m), z_m)
+        clearance_m = min(self._scene.surface_distance_m(x_m, y_m, z_m), z_m)
         self._known_m[robot] = x_m, y_m, z_m
         self._rooms_m[robot] = max(0.0, clearance_m - self._reach_m)
         return bool(self._rooms_m[robot] > 0.0)

@@ -1,10 +1,10 @@
-"""The place that quadcopters fly in: an arena with walls and obstacles.
+"""Scenes: an arena with walls and obstacles that quadcopters fly in.
 
-In frame ``map`` the floor is at z = 0, x runs along the arena's first size, y
-along the second, z up; the arena's lower left corner is at the scene's origin.
-Walls stand outside the arena, with their inner faces on its border.
+In ``map`` the floor is at z = 0, x runs along the arena's first size, y along the second and z
+upwards. The arena's lower left corner is at the scene's origin. The walls stand outside the arena
+with their inner faces on its border.
 
-Scenes are read from files by ``scene_file.load_scene``.
+``scene_file.load_scene`` reads a scene from a file.
 """
 
 from __future__ import annotations
@@ -15,20 +15,22 @@ from functools import cached_property
 from typing import Any, List, Sequence, Tuple, Union
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, rotate_vectors
 
-Lengths = Union[float, np.ndarray]
+Floats = NDArray[np.float64]
+Lengths = Union[float, Floats]
 
 BODY_RADIUS_M = 0.30
-"""Radius of the cylinder that a quadcopter touches things with, if nothing else is asked for."""
+"""Default radius of the quadcopter's guard, the cylinder that collides and that beams hit."""
 GUARD_HEIGHT_M = 0.24
-"""Its height; its centre is the LIDAR."""
+"""Height of the guard; the LIDAR is at its centre."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """Upright box, turned by ``yaw_rad`` about its vertical axis."""
+    """Upright box with its centre at (x, y), rotated by ``yaw_rad`` about its vertical axis."""
 
     name: str
     x_m: float
@@ -39,8 +41,17 @@ class Box:
     yaw_rad: float = 0.0
     bottom_m: float = 0.0
 
-    def clearance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
-        """Distance from a point, or from each of many, to the surface; negative inside."""
+    def surface_distance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+        """Return the distance from a point, or from each of many, to the surface.
+
+        Args:
+            x_m: Number or float64[...], in ``map``.
+            y_m: Of the same shape.
+            z_m: Height above the floor.
+
+        Returns:
+            Of the same shape; negative inside the obstacle.
+        """
         x, y = Pose2D(self.x_m, self.y_m, self.yaw_rad).inverse_transform(x_m, y_m)
         outside = (
             np.abs(x) - self.size_x_m / 2.0,
@@ -52,7 +63,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """Upright cylinder."""
+    """Upright cylinder with its axis at (x, y)."""
 
     name: str
     x_m: float
@@ -61,8 +72,17 @@ class Cylinder:
     height_m: float
     bottom_m: float = 0.0
 
-    def clearance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
-        """Distance from a point, or from each of many, to the surface; negative inside."""
+    def surface_distance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+        """Return the distance from a point, or from each of many, to the surface.
+
+        Args:
+            x_m: Number or float64[...], in ``map``.
+            y_m: Of the same shape.
+            z_m: Height above the floor.
+
+        Returns:
+            Of the same shape; negative inside the obstacle.
+        """
         outside = (
             np.hypot(x_m - self.x_m, y_m - self.y_m) - self.radius_m,
             _outside_slab(z_m, self.bottom_m, self.height_m),
@@ -72,7 +92,7 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Sphere:
-    """A ball around (x, y, z)."""
+    """Sphere with its centre at (x, y, z)."""
 
     name: str
     x_m: float
@@ -82,14 +102,25 @@ class Sphere:
 
     @property
     def bottom_m(self) -> float:
+        """Height of the lowest point above the floor."""
         return self.z_m - self.radius_m
 
     @property
     def height_m(self) -> float:
+        """Distance from the lowest to the highest point."""
         return 2.0 * self.radius_m
 
-    def clearance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
-        """Distance from a point, or from each of many, to the surface; negative inside."""
+    def surface_distance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+        """Return the distance from a point, or from each of many, to the surface.
+
+        Args:
+            x_m: Number or float64[...], in ``map``.
+            y_m: Of the same shape.
+            z_m: Height above the floor.
+
+        Returns:
+            Of the same shape; negative inside the obstacle.
+        """
         dx, dy, dz = x_m - self.x_m, y_m - self.y_m, z_m - self.z_m
         return np.sqrt(dx * dx + dy * dy + dz * dz) - self.radius_m
 
@@ -99,7 +130,7 @@ Obstacle = Union[Box, Cylinder, Sphere]
 
 @dataclass(frozen=True)
 class Walls:
-    """The four walls around the arena."""
+    """Dimensions of the four walls around the arena."""
 
     height_m: float = 2.0
     thickness_m: float = 0.1
@@ -107,10 +138,20 @@ class Walls:
 
 @dataclass(frozen=True)
 class Scene:
-    """Arena, walls, obstacles, flying altitude and where each quadcopter starts.
+    """Arena, walls, obstacles, flying altitude and start poses.
 
-    ``remarks`` is what whoever flies should know about it: what a file holds that
-    the scene does not, what was chosen where the file says nothing.
+    Attributes:
+        name: Name for messages and reports.
+        size_x_m: Size of the arena along x.
+        size_y_m: Size of the arena along y.
+        altitude_m: Altitude that all quadcopters fly at.
+        walls: The walls around the arena.
+        obstacles: The obstacles, with unique names.
+        starts: Start pose of quadcopter 0, 1, ... in ``map``.
+        origin_x_m: x of the arena's lower left corner.
+        origin_y_m: y of the arena's lower left corner.
+        remarks: Notes for the user: content of the file that the scene leaves out, and values
+            that were chosen because the file does not give them.
     """
 
     name: str
@@ -140,33 +181,32 @@ class Scene:
         return (self.origin_x_m + self.size_x_m / 2, self.origin_y_m + self.size_y_m / 2)
 
     def contains(self, x_m: float, y_m: float) -> bool:
-        """Whether a point lies on the arena's floor, border excluded."""
+        """Return whether a point lies inside the arena, not on its border."""
         return self.origin_x_m < x_m < self.end_x_m and self.origin_y_m < y_m < self.end_y_m
 
-    def clearance_m(self, x_m: float, y_m: float, z_m: float) -> float:
-        """Distance from a point to the nearest obstacle or wall; negative inside one.
+    def surface_distance_m(self, x_m: float, y_m: float, z_m: float) -> float:
+        """Return the distance from a point to the nearest obstacle or wall, not to the floor.
 
-        The floor does not count. Above the walls their upper edge is the
-        nearest part of them.
+        It is negative inside an obstacle or wall. Above the walls, their upper edge is nearest.
         """
-        return self.nearest(x_m, y_m, z_m).clearance_m(x_m, y_m, z_m)
+        return self.nearest(x_m, y_m, z_m).surface_distance_m(x_m, y_m, z_m)
 
-    def flight_clearance_m(self, x_m: float, y_m: float) -> float:
-        """``clearance_m`` at the flying altitude."""
-        return self.clearance_m(x_m, y_m, self.altitude_m)
+    def flight_surface_distance_m(self, x_m: float, y_m: float) -> float:
+        """Return the distance to the nearest obstacle or wall at the flying altitude."""
+        return self.surface_distance_m(x_m, y_m, self.altitude_m)
 
-    def flight_clearances_m(self, positions_m: np.ndarray) -> np.ndarray:
-        """``flight_clearance_m`` of many points: float64[..., 2] to float64[...]."""
+    def flight_surface_distances_m(self, positions_m: Floats) -> Floats:
+        """Return ``flight_surface_distance_m`` of many points: float64[..., 2] to float64[...]."""
         x_m, y_m = positions_m[..., 0], positions_m[..., 1]
         nearest = np.full(x_m.shape, np.inf)
         for solid in self._nearest_to_any(positions_m.reshape(-1, 2)):
-            np.minimum(nearest, solid.clearance_m(x_m, y_m, self.altitude_m), out=nearest)
+            np.minimum(nearest, solid.surface_distance_m(x_m, y_m, self.altitude_m), out=nearest)
         return nearest
 
-    def _nearest_to_any(self, positions_m: np.ndarray) -> List[Obstacle]:
-        """Everything that can be the nearest to one of these points, float64[n, 2].
+    def _nearest_to_any(self, positions_m: Floats) -> List[Obstacle]:
+        """Return all obstacles that can be the nearest to one of the points float64[n, 2].
 
-        A clearance changes by no more than the way between two points.
+        The surface distances of two points differ by at most the distance of the points.
         """
         x_m, y_m = positions_m[0]
         reach_m = float(np.hypot(*(positions_m - positions_m[0]).T).max())
@@ -174,14 +214,14 @@ class Scene:
         return [*boxes, *self._round_obstacles]
 
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Obstacle:
-        """The obstacle or wall whose surface is nearest to a point."""
+        """Return the obstacle or wall whose surface is nearest to a point."""
         nearest: List[Obstacle] = [self._boxes.nearest(x_m, y_m, z_m)]
         if self._round_obstacles:
             nearest.append(self._rounds.nearest(x_m, y_m, z_m))
-        return min(nearest, key=lambda solid: solid.clearance_m(x_m, y_m, z_m))
+        return min(nearest, key=lambda solid: solid.surface_distance_m(x_m, y_m, z_m))
 
     def wall_boxes(self) -> List[Box]:
-        """The walls as boxes; the ones at the lower and upper y hold the corners."""
+        """Return the walls as boxes; the southern and northern ones include the corners."""
         t, h = self.walls.thickness_m, self.walls.height_m
         size_x, size_y = self.size_x_m, self.size_y_m
         x, y = self.centre
@@ -206,7 +246,7 @@ class Scene:
 
 
 class _Boxes:
-    """Many boxes, asked for the nearest one: a map has thousands of them."""
+    """Index of many boxes for the nearest one; a map has thousands."""
 
     def __init__(self, boxes: Sequence[Box]):
         self.boxes = boxes
@@ -216,17 +256,17 @@ class _Boxes:
         self._sin = np.array([math.sin(b.yaw_rad) for b in boxes])
 
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Box:
-        """The box with the least clearance."""
-        return self.boxes[int(np.argmin(self._clearances_m(x_m, y_m, z_m)))]
+        """Return the box whose surface is nearest."""
+        return self.boxes[int(np.argmin(self._surface_distances_m(x_m, y_m, z_m)))]
 
     def within(self, x_m: float, y_m: float, z_m: float, margin_m: float) -> List[Box]:
-        """The boxes with up to ``margin_m`` more clearance than the nearest one."""
-        clearances_m = self._clearances_m(x_m, y_m, z_m)
-        near = clearances_m <= clearances_m.min() + margin_m + 1e-9
+        """Return the boxes that are up to ``margin_m`` further away than the nearest one."""
+        distances_m = self._surface_distances_m(x_m, y_m, z_m)
+        near = distances_m <= distances_m.min() + margin_m + 1e-9
         return [self.boxes[k] for k in np.flatnonzero(near)]
 
-    def _clearances_m(self, x_m: float, y_m: float, z_m: float) -> np.ndarray:
-        """Of each box, float64[n]; see ``Box.clearance_m``."""
+    def _surface_distances_m(self, x_m: float, y_m: float, z_m: float) -> Floats:
+        """Return the distances float64[n] to the boxes; see ``Box.surface_distance_m``."""
         dx, dy, dz = ((x_m, y_m, z_m) - self._centres).T
         local = (*rotate_vectors(self._cos, -self._sin, dx, dy), dz)
         outside = np.abs(local).T - self._halves
@@ -234,7 +274,7 @@ class _Boxes:
 
 
 class _Rounds:
-    """Many cylinders and spheres, asked for the nearest one."""
+    """Index of many cylinders and spheres for the nearest one."""
 
     def __init__(self, rounds: Sequence[Union[Cylinder, Sphere]]):
         self._rounds = rounds
@@ -244,24 +284,24 @@ class _Rounds:
         self._are_spheres = np.array([isinstance(o, Sphere) for o in rounds])
 
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Union[Cylinder, Sphere]:
-        """The one with the least clearance; see ``Cylinder.clearance_m``."""
+        """Return the one whose surface is nearest; see ``Cylinder.surface_distance_m``."""
         dx, dy, dz = ((x_m, y_m, z_m) - self._centres).T
         beside = np.hypot(dx, dy)
         upright_m = _signed_distance((beside - self._radii, np.abs(dz) - self._half_heights))
-        clearances_m = np.where(self._are_spheres, np.hypot(beside, dz) - self._radii, upright_m)
-        return self._rounds[int(np.argmin(clearances_m))]
+        distances_m = np.where(self._are_spheres, np.hypot(beside, dz) - self._radii, upright_m)
+        return self._rounds[int(np.argmin(distances_m))]
 
 
 def _outside_slab(z_m: float, bottom_m: float, height_m: float) -> float:
-    """How far z is above or below a horizontal slab; negative inside."""
+    """Return the distance of z from a horizontal slab; negative inside."""
     return max(bottom_m - z_m, z_m - bottom_m - height_m)
 
 
 def _signed_distance(outside_m: Tuple[Lengths, ...]) -> Any:
-    """Distance to a product of intervals from how far outside each one a point is.
+    """Return the distance to a product of intervals from the distances to each interval.
 
-    Outside, the positive parts are the legs of a right triangle; inside, the
-    nearest face decides.
+    Outside, the distance is the norm of the positive parts. Inside, it is that to the nearest
+    face.
     """
     distance_m = np.sqrt(sum(np.maximum(d, 0.0) ** 2 for d in outside_m))
     deepest_m = outside_m[0]

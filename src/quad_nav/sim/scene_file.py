@@ -1,9 +1,9 @@
-"""Scenes from files: our own YAML, Gazebo worlds and ``map_server`` maps.
+"""Scenes from files: ``quad``'s own YAML, Gazebo worlds and ``map_server`` maps.
 
     name: two rooms                # optional, else the file's name
     size: [12.0, 12.0]             # arena along x and y, m
     origin: [0.0, 0.0]             # its lower left corner in map, m; default 0, 0
-    altitude: 1.0                  # that all quadcopters fly at, m; default 1.0
+    altitude: 1.0                  # flying altitude of all quadcopters, m; default 1.0
     walls: {height: 2.0, thickness: 0.1}        # optional; these are the defaults
     obstacles:
       - {name: crate, shape: box, centre: [2.2, 4.0], size: [0.8, 0.8], height: 2.0, yaw: 0.3}
@@ -12,16 +12,16 @@
     starts:                        # x, y, yaw of quadcopter 0, 1, ...; yaw may be left out
       - [1.5, 1.5, 0.0]
 
-``bottom`` (default 0) lifts an obstacle off the floor. Instead of drawing the place itself
-a scene may take it from another file, with its own obstacles on top:
+``bottom`` (default 0) lifts an obstacle off the floor. A scene may also import a world or a map
+and add obstacles to it:
 
     world: depot.world             # or map: office.yaml; in this file's folder or below it
-    unknown: free                  # or occupied: what cells of a map that nobody saw are
+    unknown: free                  # or occupied: how to treat unknown cells of a map
 
-Then ``size`` with ``origin`` may be left out, for the extent of the solids or of the map,
-and ``starts``, see ``free_starts``. The world or map by itself is the scene that says
-nothing else. A file is refused as a whole: every fault is listed at once in one
-``InputError``.
+Then ``size`` and ``origin`` may be left out; they default to the extent of the obstacles or of the
+map. ``starts`` may be left out too, see ``imported_scene.with_free_starts``. A world or map file
+loads as a scene that imports it and gives nothing else. A file with a fault is refused as a
+whole; the ``InputError`` lists every fault.
 """
 
 from __future__ import annotations
@@ -35,9 +35,8 @@ from quad_nav.errors import InputError
 from quad_nav.files.document import Checker, describe, read_yaml
 from quad_nav.files.user_files import referenced_file
 from quad_nav.geometry import Pose2D
-from quad_nav.sim.free_starts import with_free_starts
+from quad_nav.sim.imported_scene import ImportedScene, from_map, from_world, with_free_starts
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Sphere, Walls
-from quad_nav.sim.surroundings import Surroundings, from_map, from_world
 
 _KEYS = [
     "name",
@@ -62,13 +61,15 @@ MAX_STARTS = 1000
 
 
 def load_scene(path: Union[str, Path]) -> Scene:
-    """Read and check a scene file, by what it is: a Gazebo world (``.world``, ``.sdf``), a
-    ``map_server`` map (YAML with the key ``image``) or a scene of ours.
+    """Read a scene, a Gazebo world (``.world``, ``.sdf``) or a ``map_server`` map.
 
-    Raises ``InputError`` with one line per fault.
+    A YAML file with the key ``image`` is a map.
+
+    Raises:
+        InputError: The file cannot be read, or has faults; lists all of them.
     """
     path = Path(path)
-    place = path.resolve() if path.is_symlink() else path  # files beside it are looked for there
+    place = path.resolve() if path.is_symlink() else path  # other files are relative to the target
     if path.suffix in _WORLD_SUFFIXES:
         document: Any = {"world": place.name}
     else:
@@ -81,8 +82,16 @@ def load_scene(path: Union[str, Path]) -> Scene:
 def scene_from_document(
     document: Any, source: str, default_name: str = "scene", folder: Path = Path()
 ) -> Scene:
-    """Check a parsed document; ``source`` names it in messages, ``folder`` is where the files
-    that it refers to are. Raises ``InputError``.
+    """Check a parsed document and make a scene of it.
+
+    Args:
+        document: The document.
+        source: Name of the document, for messages.
+        default_name: Name of the scene if the document gives none.
+        folder: Folder of the files that the document refers to.
+
+    Raises:
+        InputError: The document has faults; lists all of them.
     """
     check = Checker(source)
     scene = _read_scene(check, document, default_name, folder)
@@ -98,29 +107,29 @@ def _read_scene(check: Checker, document: Any, default_name: str, folder: Path) 
     faults_before = len(check.problems)
     altitude = check.number(fields, "altitude", "", 1.0, positive=True)
     walls = _read_walls(check, fields)
-    around = _read_surroundings(check, fields, folder, walls.height_m)
-    arena = _read_arena(check, fields, around)
+    imported = _read_import(check, fields, folder, walls.height_m)
+    arena = _read_arena(check, fields, imported)
     arena_is_sound = len(check.problems) == faults_before
     obstacles = [
         _read_obstacle(check, entry, k)
         for k, entry in enumerate(check.sequence(fields, "obstacles", []))
     ]
-    starts = _read_starts(check, fields, around)
+    starts = _read_starts(check, fields, imported)
     scene = Scene(
         check.text(fields, "name", "", default_name),
         arena[2],
         arena[3],
         altitude,
         walls,
-        (*(around.obstacles if around else ()), *(o for o in obstacles if o is not None)),
+        (*(imported.obstacles if imported else ()), *(o for o in obstacles if o is not None)),
         tuple(s for s in starts if s is not None),
         arena[0],
         arena[1],
-        around.remarks if around else (),
+        imported.remarks if imported else (),
     )
     _check_names(check, scene)
-    if arena_is_sound and around and "starts" not in fields:
-        return _with_chosen_starts(check, scene, around)
+    if arena_is_sound and imported and "starts" not in fields:
+        return _with_chosen_starts(check, scene, imported)
     if arena_is_sound:
         _check_starts(check, scene, starts)
     return scene
@@ -134,17 +143,17 @@ def _read_walls(check: Checker, fields: Dict[str, Any]) -> Walls:
     )
 
 
-def _read_surroundings(
+def _read_import(
     check: Checker, fields: Dict[str, Any], folder: Path, height_m: float
-) -> Optional[Surroundings]:
-    """The world or map that the scene takes its place from, if it does."""
+) -> Optional[ImportedScene]:
+    """Import the world or map that the scene names, if it names one."""
     unknown = fields.get("unknown", "free")
     if not isinstance(unknown, str) or unknown not in ("free", "occupied"):
         check.fault("unknown", f"{describe(unknown)}, expected free or occupied")
     if "unknown" in fields and "map" not in fields:
-        check.fault("unknown", "belongs to a map, expected the key map too")
+        check.fault("unknown", "given without a map, expected the key map too")
     if "world" in fields and "map" in fields:
-        check.fault("map", "is given beside world, expected one of them")
+        check.fault("map", "given together with world, expected one of them")
         return None
     try:
         if "world" in fields:
@@ -163,33 +172,33 @@ def _read_surroundings(
 
 
 def model_path() -> List[Path]:
-    """The folders of the environment variable GAZEBO_MODEL_PATH."""
+    """Return the folders of the environment variable GAZEBO_MODEL_PATH."""
     folders = os.environ.get("GAZEBO_MODEL_PATH", "").split(os.pathsep)
     return [Path(folder) for folder in folders if folder]
 
 
 def _read_arena(
-    check: Checker, fields: Dict[str, Any], around: Optional[Surroundings]
+    check: Checker, fields: Dict[str, Any], imported: Optional[ImportedScene]
 ) -> Sequence[float]:
-    """Lower left x and y, and sizes along x and y."""
-    is_elsewhere = "world" in fields or "map" in fields
-    if is_elsewhere and "size" not in fields and "origin" not in fields:
-        if around is None:
+    """Return x and y of the lower left corner, and the sizes along x and y."""
+    is_imported = "world" in fields or "map" in fields
+    if is_imported and "size" not in fields and "origin" not in fields:
+        if imported is None:
             return (0.0, 0.0, 1.0, 1.0)
-        if around.extent is None:
+        if imported.extent is None:
             check.fault(
                 "size",
-                "missing, and nothing stands in the world that an arena could be "
-                "drawn around; expected a scene with world, size and origin",
+                "missing, and the world has no obstacles that give the arena its size; "
+                "expected a scene with world, size and origin",
             )
             return (0.0, 0.0, 1.0, 1.0)
-        x, y, end_x, end_y = around.extent
+        x, y, end_x, end_y = imported.extent
         return (x, y, end_x - x, end_y - y)
     size = check.numbers(fields, "size", "", 2, positive=True)
     if max(size) > MAX_SIZE_M:
         check.fault("size", f"{max(size):g} m, expected {MAX_SIZE_M:g} m at most")
     origin = (
-        check.numbers(fields, "origin", "", 2) if "origin" in fields or is_elsewhere else (0.0, 0.0)
+        check.numbers(fields, "origin", "", 2) if "origin" in fields or is_imported else (0.0, 0.0)
     )
     return (*origin, *size)
 
@@ -214,7 +223,10 @@ def _read_obstacle(check: Checker, entry: Any, number: int) -> Optional[Obstacle
     if shape != "box":
         radius = check.number(entry, "radius", place, positive=True)
         if bottom + 2 * radius <= 0.0:
-            check.fault(f"{place}.bottom", f"{bottom:g} m puts all of it below the floor")
+            check.fault(
+                f"{place}.bottom",
+                f"{bottom:g} m puts the obstacle below the floor, expected a higher one",
+            )
         obstacle = (
             Cylinder(name, x, y, radius, height, bottom)
             if shape == "cylinder"
@@ -228,10 +240,10 @@ def _read_obstacle(check: Checker, entry: Any, number: int) -> Optional[Obstacle
 
 
 def _read_starts(
-    check: Checker, fields: Dict[str, Any], around: Optional[Surroundings]
+    check: Checker, fields: Dict[str, Any], imported: Optional[ImportedScene]
 ) -> List[Optional[Pose2D]]:
-    is_elsewhere = "world" in fields or "map" in fields
-    starts = check.sequence(fields, "starts", [] if is_elsewhere else None)
+    is_imported = "world" in fields or "map" in fields
+    starts = check.sequence(fields, "starts", [] if is_imported else None)
     if len(starts) > MAX_STARTS:
         check.fault("starts", f"{len(starts)} poses, expected {MAX_STARTS} at most")
         return []
@@ -240,15 +252,15 @@ def _read_starts(
     return [_read_start(check, entry, f"starts[{k}]") for k, entry in enumerate(starts)]
 
 
-def _with_chosen_starts(check: Checker, scene: Scene, around: Surroundings) -> Scene:
-    scene = with_free_starts(scene, around.may_start)
+def _with_chosen_starts(check: Checker, scene: Scene, imported: ImportedScene) -> Scene:
+    scene = with_free_starts(scene, imported.may_start)
     if not scene.starts:
         check.fault(
             "starts",
-            "missing, and no free place was found; expected a scene with world or map, and starts",
+            "missing, and no free position was found; expected a scene with world or map, and starts",
         )
     chosen = ", ".join(f"[{start.x_m:.2f}, {start.y_m:.2f}]" for start in scene.starts)
-    remark = f"{check.source}: starts: none are given, quadcopters start at {chosen}"
+    remark = f"{check.source}: starts: not given, quadcopters start at {chosen}"
     return replace(scene, remarks=(*scene.remarks, remark))
 
 
@@ -262,7 +274,7 @@ def _read_start(check: Checker, entry: Any, place: str) -> Optional[Pose2D]:
 
 
 def _check_names(check: Checker, scene: Scene) -> None:
-    """Names identify obstacles in contact reports, so they must differ."""
+    """Check that names are unique, because they identify obstacles in contacts."""
     taken = {wall.name for wall in scene.wall_boxes()} | {"floor"}
     for obstacle in scene.obstacles:
         if obstacle.name in taken:
@@ -271,7 +283,7 @@ def _check_names(check: Checker, scene: Scene) -> None:
 
 
 def _check_starts(check: Checker, scene: Scene, starts: Sequence[Optional[Pose2D]]) -> None:
-    """Every start must be free for a quadcopter; ``starts`` has None where unreadable."""
+    """Check that a quadcopter fits at each start; unreadable ones are None."""
     readable = [(k, start) for k, start in enumerate(starts) if start is not None]
     for k, start in readable:
         problem = _start_problem(scene, start)
@@ -295,10 +307,10 @@ def _start_problem(scene: Scene, start: Pose2D) -> Optional[str]:
         )
     point = (start.x_m, start.y_m, scene.altitude_m)
     nearest = scene.nearest(*point)
-    clearance_m = nearest.clearance_m(*point)
-    if clearance_m <= BODY_RADIUS_M:
+    distance_m = nearest.surface_distance_m(*point)
+    if distance_m <= BODY_RADIUS_M:
         return (
-            f"is {clearance_m:.2f} m from {nearest.name}, expected more than "
+            f"is {distance_m:.2f} m from {nearest.name}, expected more than "
             f"a quadcopter's radius, {BODY_RADIUS_M:g} m"
         )
     return None

@@ -1,4 +1,4 @@
-"""Scenes as YAML, for ``scene_file`` to read."""
+"""Scenes as documents and YAML files that ``scene_file`` reads."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
 
 
 def scene_document(scene: Scene) -> Dict[str, Any]:
-    """The document that ``scene_from_document`` reads the same scene from, but for remarks."""
+    """Return the document of a scene, without its remarks.
+
+    ``scene_file.scene_from_document`` makes an equal scene of it. ``write_scene`` writes it to a
+    file, and recordings contain it.
+    """
     walls = {"height": scene.walls.height_m, "thickness": scene.walls.thickness_m}
     return {
         "name": scene.name,
@@ -26,7 +30,13 @@ def scene_document(scene: Scene) -> Dict[str, Any]:
 
 
 def write_scene(scene: Scene, path: Path) -> None:
-    """Write a file that ``load_scene`` reads the same scene from, one obstacle a line."""
+    """Write a scene to a YAML file with one obstacle per line.
+
+    ``scene_file.load_scene`` reads an equal scene, but for its remarks.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     document = scene_document(scene)
     head = {key: document[key] for key in ("name", "size", "origin", "altitude", "walls")}
     if head["origin"] == [0.0, 0.0]:

@@ -15,12 +15,11 @@ import numpy as np
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
 from quad_nav.sim.body import GoalSphere, World
-from quad_nav.sim.casters import WorldCaster
+from quad_nav.sim.casters import Lidars, WorldCaster, kernel_lidars
 from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import Airframe, BodyState, FlightLaw, FlightParams, limit_command
 from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.lidars import Lidars, kernel_lidars
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 STEPS_PER_S = 240
@@ -317,7 +316,7 @@ def _displaced(
         pose = Pose2D(x_m, y_m, start.yaw_rad)
         if (
             scene.contains(x_m, y_m)
-            and scene.clearance_m(x_m, y_m, scene.altitude_m) > body_radius_m + _START_GAP_M
+            and scene.surface_distance_m(x_m, y_m, scene.altitude_m) > body_radius_m + _START_GAP_M
             and all(pose.distance_to(o) > 2 * body_radius_m + _START_GAP_M for o in others)
         ):
             return pose

@@ -15,7 +15,7 @@ from quad_nav.mission.goal_sequence import GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
-from quad_nav.sim.scene_document import scene_document
+from quad_nav.sim.scene_writer import scene_document
 from quad_nav.versions import versions
 
 FLIGHT_TOPIC, EVENTS_TOPIC = "/quad/flight", "/quad/events"

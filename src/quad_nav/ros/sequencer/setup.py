@@ -125,7 +125,7 @@ def read_setup(
         tuple(robots),
         radius_m,
         scene.altitude_m if scene else None,
-        scene.flight_clearances_m if scene else None,
+        scene.flight_surface_distances_m if scene else None,
         values["simulation"],
         float(values["ready_timeout"]),
         values["exit_when_done"],

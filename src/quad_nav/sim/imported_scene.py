@@ -1,0 +1,148 @@
+"""Scenes imported from a Gazebo world or a ``map_server`` map, and start poses for them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Callable, Iterable, List, Optional, Sequence, Set, Tuple
+
+from quad_nav.files.document import read_yaml
+from quad_nav.geometry import Pose2D
+from quad_nav.sim.map_file import load_map
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene
+from quad_nav.sim.world_file import load_world
+
+Extent = Tuple[float, float, float, float]
+"""Smallest x and y, largest x and y in m, in ``map``."""
+
+MAX_CHOSEN_STARTS = 8
+MAX_CANDIDATES = 1000
+"""Candidates whose surface distance is computed; with 200000 boxes that takes about 10 s."""
+START_DISTANCE_M = 2 * BODY_RADIUS_M
+"""Least distance of a chosen start from obstacles and walls."""
+START_SPACING_M = 2.0
+"""Least distance of two chosen starts."""
+_MAX_LATTICE_POINTS = 20_000
+
+
+@dataclass(frozen=True)
+class ImportedScene:
+    """Content of a world or map.
+
+    Attributes:
+        obstacles: The obstacles, with unique names.
+        extent: Bounding box of the obstacles, or of the map; None if there is nothing.
+        may_start: Returns whether a robot may start at a position (x, y) in ``map``.
+        remarks: Notes for the user on content that was left out.
+    """
+
+    obstacles: Tuple[Obstacle, ...]
+    extent: Optional[Extent]
+    may_start: Callable[[float, float], bool]
+    remarks: Tuple[str, ...]
+
+
+def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
+    """Import a Gazebo world; its extent is that of its obstacles.
+
+    Args:
+        path: The world file.
+        model_path: Further folders with models.
+
+    Raises:
+        InputError: A file has faults; lists all of them.
+    """
+    world = load_world(path, model_path)
+    obstacles = _with_unique_names(world.obstacles)
+    corners = [corner for obstacle in obstacles for corner in _corners(obstacle)]
+    return ImportedScene(tuple(obstacles), _extent(corners), lambda x_m, y_m: True, world.remarks)
+
+
+def from_map(path: Path, height_m: float, unknown_is_occupied: bool) -> ImportedScene:
+    """Import a map; its extent is that of its image.
+
+    Args:
+        path: The map's YAML file.
+        height_m: Height of the boxes that stand on occupied cells.
+        unknown_is_occupied: Put boxes on unknown cells too. Robots start on free cells only.
+
+    Raises:
+        InputError: A file has faults; lists all of them.
+    """
+    occupancy = load_map(read_yaml(path), path)
+    boxes = occupancy.boxes(height_m, unknown_is_occupied)
+    return ImportedScene(
+        tuple(boxes), _extent(occupancy.corners()), occupancy.is_free, occupancy.remarks
+    )
+
+
+def _with_unique_names(obstacles: Sequence[Obstacle]) -> List[Obstacle]:
+    """Number equal names from the second on: Gazebo allows them, a scene does not."""
+    taken: Set[str] = set()
+    named = []
+    for obstacle in obstacles:
+        name, number = obstacle.name, 1
+        while name in taken:
+            number += 1
+            name = f"{obstacle.name}_{number}"
+        taken.add(name)
+        named.append(obstacle if name == obstacle.name else replace(obstacle, name=name))
+    return named
+
+
+def _corners(obstacle: Obstacle) -> List[Tuple[float, float]]:
+    """Return points that span the extent of an obstacle along x and y."""
+    if isinstance(obstacle, Box):
+        pose = Pose2D(obstacle.x_m, obstacle.y_m, obstacle.yaw_rad)
+        x, y = obstacle.size_x_m / 2, obstacle.size_y_m / 2
+        return [pose.transform(*corner) for corner in ((-x, -y), (-x, y), (x, -y), (x, y))]
+    reach = obstacle.radius_m
+    return [
+        (obstacle.x_m - reach, obstacle.y_m - reach),
+        (obstacle.x_m + reach, obstacle.y_m + reach),
+    ]
+
+
+def _extent(corners: Iterable[Tuple[float, float]]) -> Optional[Extent]:
+    points = list(corners)
+    if not points:
+        return None
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    return (min(xs), min(ys), max(xs), max(ys))
+
+
+def with_free_starts(scene: Scene, may_start: Callable[[float, float], bool]) -> Scene:
+    """Return the scene with up to ``MAX_CHOSEN_STARTS`` start poses, none if no point is free.
+
+    Candidates are the points of a lattice from the arena's centre outwards. A start may be used
+    by ``may_start``, is at least ``START_DISTANCE_M`` from everything and ``START_SPACING_M``
+    from the other starts, and faces along x. The choice is deterministic.
+    """
+    starts: List[Pose2D] = []
+    candidates = 0
+    for x_m, y_m in _lattice(scene):
+        place = Pose2D(x_m, y_m)
+        if not may_start(x_m, y_m) or any(
+            place.distance_to(start) < START_SPACING_M for start in starts
+        ):
+            continue
+        candidates += 1
+        if scene.surface_distance_m(x_m, y_m, scene.altitude_m) >= START_DISTANCE_M:
+            starts.append(place)
+        if len(starts) == MAX_CHOSEN_STARTS or candidates == MAX_CANDIDATES:
+            break
+    return replace(scene, starts=tuple(starts))
+
+
+def _lattice(scene: Scene) -> List[Tuple[float, float]]:
+    """Return a lattice over the arena, with a spacing of 0.5 m or more, from the centre outwards."""
+    step_m = max(0.5, math.sqrt(scene.size_x_m * scene.size_y_m / _MAX_LATTICE_POINTS))
+    x_centre, y_centre = scene.centre
+    reach_x = math.floor(scene.size_x_m / 2 / step_m)
+    reach_y = math.floor(scene.size_y_m / 2 / step_m)
+    cells = itertools.product(range(-reach_y, reach_y + 1), range(-reach_x, reach_x + 1))
+    ordered = sorted(cells, key=lambda cell: (cell[0] ** 2 + cell[1] ** 2, cell))
+    places = ((x_centre + column * step_m, y_centre + row * step_m) for row, column in ordered)
+    return [place for place in places if scene.contains(*place)]
