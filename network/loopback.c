@@ -1,8 +1,8 @@
-/* Keeps servers on this machine: who binds to every address binds to the loopback address.
+/* Bind servers to the loopback address: bind() to all addresses becomes bind() to 127.0.0.1 or ::1.
 
-   With ROS_HOSTNAME=localhost rospy and rosmaster do so of their own accord, but the XML-RPC
-   server of every C++ node, such as rosout and RViz, listens on every address all the same.
-   scripts/fly sets LD_PRELOAD to this library; docs/network.md says more. */
+   With ROS_HOSTNAME=localhost, rospy and rosmaster listen on this machine only. The XML-RPC server
+   of each C++ node, such as rosout and RViz, still listens on all addresses. scripts/fly sets
+   LD_PRELOAD to this library; see docs/network.md. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <netinet/in.h>

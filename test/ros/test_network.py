@@ -113,7 +113,7 @@ class Network(unittest.TestCase):
         # C++ nodes listen everywhere again; this is what the test above would see.
         self.assertIn(("rosout", "00000000"), found)
         self.assertRegex(
-            printed.read_text(), r"open to the network at http://127\.0\.1\.1:\d+ .*whoever reaches"
+            printed.read_text(), r"open to the network at http://127\.0\.1\.1:\d+ .*everyone who reaches"
         )
 
 

@@ -104,8 +104,8 @@ def test_rviz_shows_every_quadcopter_in_its_colour():
         topics = {one["Name"]: one["Topic"] for one in group["Displays"]}
         assert topics["Scan"] == f"/scan{number}"
         assert topics["Local costmap"] == f"/move_base{number}/local_costmap/costmap"
-        trail = next(one for one in group["Displays"] if one["Name"] == "Trail")
-        assert trail["Color"] == "; ".join(map(str, ROBOT_COLOURS[number]))
+        path = next(one for one in group["Displays"] if one["Name"] == "Flown path")
+        assert path["Color"] == "; ".join(map(str, ROBOT_COLOURS[number]))
 
 
 def test_rviz_of_many_listens_to_the_overview_only():
@@ -114,7 +114,7 @@ def test_rviz_of_many_listens_to_the_overview_only():
         group = displays["Visualization Manager"]["Displays"][-1]
         return {one["Name"] for one in group["Displays"] if one["Enabled"]}
 
-    assert shown(5) == {"Global plan", "Trail"}
+    assert shown(5) == {"Global plan", "Flown path"}
     assert {"Scan", "Global costmap"} <= shown(4)
 
 

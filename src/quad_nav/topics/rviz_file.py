@@ -24,7 +24,7 @@ from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.scene import Scene
 
 FEW = 4
-_ENABLED_FOR_MANY = ("Global plan", "Trail")
+_ENABLED_FOR_MANY = ("Global plan", "Flown path")
 _GOAL_TOOL = "rviz/SetGoal"
 _NUMBERED_TOOLS = (_GOAL_TOOL, "rviz/SetInitialPose", "rviz/PublishPoint")
 _WINDOW_PX = 750.0  # the shorter side of the view in an ordinary window
