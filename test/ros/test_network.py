@@ -113,7 +113,8 @@ class Network(unittest.TestCase):
         # C++ nodes listen everywhere again; this is what the test above would see.
         self.assertIn(("rosout", "00000000"), found)
         self.assertRegex(
-            printed.read_text(), r"open to the network at http://127\.0\.1\.1:\d+ .*everyone who reaches"
+            printed.read_text(),
+            r"open to the network at http://127\.0\.1\.1:\d+ .*everyone who reaches",
         )
 
 
