@@ -17,7 +17,7 @@ import numpy as np
 from PIL import Image
 
 from quad_nav import config
-from quad_nav.cli.parameters import parameter
+from quad_nav.cli.options import parameter
 from quad_nav.config.files import REQUIRED
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped

@@ -130,23 +130,23 @@ def test_a_world_has_cylinders_where_its_cells_say_and_the_path_counts_from_star
     assert (scene.origin_y_m, scene.end_y_m) == (0.0 - 5.0, 13.0 + 5.0)
 
 
-def test_only_some_worlds_are_read_and_absent_ones_are_told(tmp_path):
+def test_only_some_worlds_are_read_and_absent_ones_are_named(tmp_path):
     path = write_worlds(tmp_path / "w.npz", w6=free(), w7=one_ahead(), w9=free())
     assert [world.number for world in load_worlds(path, (9, 7))] == [7, 9]
     assert [world.number for world in setup_of(path, sample=True).worlds] == [6]
-    with pytest.raises(InputError, match="has no world 8; expected numbers of its 3 worlds"):
+    with pytest.raises(InputError, match="no world 8; expected numbers of its 3 worlds"):
         load_worlds(path, (6, 8))
 
 
 @pytest.mark.parametrize(
     "arrays, told",
     [
-        ({}, "has no array index"),
+        ({}, "no array index"),
         (
             {"index": np.array([0.5]), "occupied": np.zeros((1, 64, 30))},
             "expected a row of integers",
         ),
-        ({"index": np.array([3, 3]), "occupied": np.zeros((2, 64, 30))}, "has numbers twice"),
+        ({"index": np.array([3, 3]), "occupied": np.zeros((2, 64, 30))}, "duplicate numbers"),
         ({"index": np.array([3]), "occupied": np.zeros((1, 30, 64))}, r"expected \(1, 64, 30\)"),
         (
             {"index": np.array([3]), "occupied": np.zeros((1, 64, 30))},
@@ -173,7 +173,7 @@ def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
     with pytest.raises(InputError) as error:
         setup_of(
             write_worlds(tmp_path / "w.npz", w1=cells),
-            params="tutorial",
+            config="tutorial",
             parameters=(("local_costmap/base_scan/data_type", "PointCloud2"),),
         )
     start, sensor, goal = error.value.problems
@@ -324,7 +324,7 @@ def test_what_a_flight_counts_for(flown, contacts, expected, time_s, gave_up):
     assert (run.outcome, run.time_s, run.gave_up, run.seed) == (expected, time_s, gave_up, 3)
 
 
-def test_the_command_prints_figures_and_differences_and_writes_files(tmp_path):
+def test_the_command_prints_statistics_and_differences_and_writes_files(tmp_path):
     path = write_worlds(tmp_path / "w.npz", w6=one_ahead())
     sets = [word for name, value in BLIND for word in ("--set", f"{name}={value}")]
     done = CliRunner().invoke(
@@ -346,7 +346,7 @@ def test_the_command_prints_figures_and_differences_and_writes_files(tmp_path):
     rows = [line.split() for line in done.output.splitlines()]
     assert ["official", "sample", "1", "1", "0.0", "0.0-79.3", "100.0", "0.0", "-", "0.000"] in rows
     assert ["world", "6", "1", "1", "0.0", "0.0-79.3", "100.0", "0.0", "-", "0.000"] in rows
-    assert "Not as in the challenge:" in done.output and "seed 0" in done.output
+    assert "Differences from the challenge:" in done.output and "seed 0" in done.output
     assert "touches cylinder [30, 14]" in done.output
     told = json.loads((tmp_path / "figures.json").read_text())
     assert told["figures"]["official sample"]["collisions"] == 1
@@ -370,11 +370,11 @@ def test_bad_input_ends_with_2_and_ctrl_c_with_130_and_what_was_flown(tmp_path, 
     monkeypatch.setattr("quad_nav.cli.barn.fly_all", two_flights)
     cut = CliRunner().invoke(barn, ["--worlds", str(path)])
     assert cut.exit_code == 130
-    assert "Interrupted: 1 of 2 flights." in cut.output
+    assert "Interrupted after 1 of 2 flights." in cut.output
     assert "official sample" in cut.output
 
 
-def test_without_a_flight_there_are_no_figures(tmp_path):
+def test_without_a_flight_there_are_no_statistics(tmp_path):
     setup = setup_of(write_worlds(tmp_path / "w.npz", w6=free()))
     assert Results(setup.contestant, (), 1, 0.0).rows == []
     with pytest.raises(ValueError, match="no runs"):

@@ -1,5 +1,6 @@
-"""The BARN benchmark, offline: narrow worlds that one quadcopter flies through.
+"""BARN benchmark, offline: one quadcopter flies through narrow worlds.
 
-``worlds`` reads them, ``setup`` checks what flies, ``runs`` flies, ``figures`` counts and
-``results`` says it. The protocol itself is in ``protocol``.
+Reading order: ``protocol`` (start, goal, outcomes, score), ``worlds`` (the worlds as scenes),
+``setup`` (checked parameters), ``runs`` (flights), ``statistics`` (counts and means),
+``results`` (text, JSON and CSV).
 """

@@ -1,7 +1,7 @@
-"""BARN's protocol: from where to where, how long, what counts and how it is scored.
+"""Protocol of the BARN benchmark: start, goal, time limit, outcomes and score.
 
-Xiao et al., "Autonomous Ground Navigation in Highly Constrained Spaces"; the numbers are
-those of the challenge's own runner.
+Source: X. Xiao et al., "Autonomous Ground Navigation in Highly Constrained Spaces". The numbers
+are those of the challenge's own runner.
 """
 
 from __future__ import annotations
@@ -14,18 +14,20 @@ from typing import Optional, Tuple
 from quad_nav.geometry import Pose2D
 
 START = Pose2D(-2.25, 3.0, math.pi / 2)
-"""In the worlds' frame, which is ``map`` here."""
+"""Start pose in the worlds' frame, which is ``map`` here."""
 GOAL_M: Tuple[float, float] = (-2.25, 13.0)
 GOAL_TOLERANCE_M = 1.0
 TIME_LIMIT_S = 100.0
 OPTIMAL_SPEED_MPS = 2.0
 CLIP = (2.0, 8.0)
-"""The times that are told apart, in optimal times; the upper one was 4 before March 2026."""
+"""Limits of the scored time, in optimal times; the upper limit was 4 before March 2026."""
 SAMPLE_STEP = 6
-"""Every sixth world, from 0 on, is in the official sample of 50."""
+"""Step between the worlds of the official sample: 0, 6, ..., 50 worlds in total."""
 
 
 class Outcome(enum.Enum):
+    """Outcome of a run."""
+
     SUCCESS = "success"
     COLLISION = "collision"
     TIME_OUT = "time-out"
@@ -33,11 +35,21 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class Run:
-    """One flight through one world.
+    """Flight through one world.
 
-    ``time_s`` from the goal to its end; the whole time limit after a time-out, also where
-    ``gave_up`` says why the navigator had dropped the goal before. ``touched`` and
-    ``touched_at_m`` are of the contact that ended it. ``min_clearance_m`` is between hulls.
+    Attributes:
+        world: Number of the world.
+        run: Number of the flight through this world.
+        seed: Seed of the LIDAR's noise.
+        outcome: Outcome.
+        time_s: Time from sending the goal to its end; the time limit after a time-out.
+        metric: Score, see ``metric``.
+        path_length_m: Length of the flown path.
+        min_clearance_m: Smallest distance from the hull to an obstacle.
+        recoveries: Number of recovery behaviours.
+        gave_up: Reason why the navigator aborted the goal before the time limit, or empty.
+        touched: Name of the touched obstacle, or empty.
+        touched_at_m: Position of that contact.
     """
 
     world: int
@@ -55,15 +67,15 @@ class Run:
 
     @property
     def in_sample(self) -> bool:
-        """Whether the world is one of the official sample."""
+        """True if the world belongs to the official sample."""
         return self.world % SAMPLE_STEP == 0
 
 
 def metric(outcome: Outcome, time_s: float, path_length_m: float) -> float:
-    """The challenge's score of a run: success * OT / clip(AT, 2 OT, 8 OT).
+    """Return the challenge's score of a run: success * OT / clip(AT, 2 OT, 8 OT).
 
-    AT is the time taken; OT is the time that the reference path, ``path_length_m``, takes at
-    2 m/s. At best 1/2, and 1/8 for anything slow.
+    AT is the time taken. OT is the time for the reference path, ``path_length_m``, at 2 m/s. The
+    best score is 1/2; a slow success scores 1/8.
     """
     if outcome is not Outcome.SUCCESS:
         return 0.0

@@ -1,4 +1,4 @@
-"""A benchmark's figures for a person, as JSON and as CSV."""
+"""Results of the benchmark as text, JSON and CSV."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _HEADER = [
     "",
     "worlds",
     "flights",
-    "success\n%",
+    "success\n(%)",
     "95 %\ninterval",
-    "collision\n%",
-    "time-out\n%",
-    "mean\ntime, s",
+    "collision\n(%)",
+    "time-out\n(%)",
+    "mean\ntime (s)",
     "metric",
 ]
 _COLUMNS = (
@@ -48,7 +48,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Results:
-    """Runs, in the order of worlds and runs, and how they came about."""
+    """Runs, in the order of worlds and runs, with their conditions."""
 
     contestant: Contestant
     runs: Tuple[Run, ...]
@@ -57,7 +57,7 @@ class Results:
 
     @property
     def rows(self) -> List[Tuple[str, BarnStatistics]]:
-        """The figures by what they are of; none without a run."""
+        """Statistics of the official sample and of all worlds, by name; empty without a run."""
         sample = [run for run in self.runs if run.in_sample]
         rows = [("official sample", barn_statistics(sample))] if sample else []
         if len(sample) < len(self.runs):
@@ -66,7 +66,7 @@ class Results:
 
     @property
     def world_rows(self) -> List[Tuple[str, BarnStatistics]]:
-        """The figures of each world."""
+        """Statistics of each world, by name."""
         worlds: Dict[int, List[Run]] = {}
         for run in self.runs:
             worlds.setdefault(run.world, []).append(run)
@@ -74,46 +74,48 @@ class Results:
 
 
 def text(results: Results, per_world: bool = False) -> str:
-    """What the terminal shows, in at most 100 columns."""
+    """Format the results for a terminal of 100 columns."""
     seeds = sorted({run.seed for run in results.runs})
     with_versions = ", ".join(f"{name} {version}" for name, version in versions().items())
     parts = [_table(results.world_rows)] if per_world and results.runs else []
-    parts += [_table(results.rows) if results.runs else "Nothing was flown to its end."]
+    parts += [_table(results.rows) if results.runs else "No flight was completed."]
     notes = _collisions(results.runs)
     if len(results.runs) < results.wanted:
-        notes.append(f"Interrupted: {len(results.runs)} of {results.wanted} flights.")
+        notes.append(f"Interrupted after {len(results.runs)} of {results.wanted} flights.")
     if seeds:
         per_minute = 60.0 * len(results.runs) / max(results.wall_time_s, 1e-3)
         notes.append(
-            f"Parameters {results.contestant.name}, seed "
+            f"Configuration {results.contestant.name}, seed "
             f"{seeds[0] if len(seeds) == 1 else f'{seeds[0]} to {seeds[-1]}'}, "
-            f"{results.wall_time_s:.0f} s, {per_minute:.1f} flights a minute."
+            f"{results.wall_time_s:.0f} s, {per_minute:.1f} flights per minute."
         )
     notes.append(with_versions)
     return "\n\n".join([*parts, "\n".join(notes), differences(results.contestant)])
 
 
 def differences(contestant: Contestant) -> str:
-    """What is not as in the challenge, a Jackal in Gazebo: its figures are no more than a hint."""
+    """Describe how the simulation differs from the challenge, a Jackal in Gazebo."""
     simulation = contestant.simulation
     flight, lidar = simulation.flight, simulation.lidar
     lines = [
         f"body: a quadcopter, radius {simulation.airframe.radius_m:.2f} m, limited to the "
-        f"parameters' {flight.max_speed_mps:.2f} m/s and {flight.max_yaw_rate_radps:.2f} rad/s, "
+        f"configuration's {flight.max_speed_mps:.2f} m/s and "
+        f"{flight.max_yaw_rate_radps:.2f} rad/s, "
         f"and to its own {flight.max_acceleration_mps2:.1f} m/s2 and "
         f"{flight.max_yaw_acceleration_radps2:.1f} rad/s2",
-        f"simulator: pybullet at {STEPS_PER_S} Hz, exact odometry, nothing takes time to arrive; "
-        f"the body flies {ALTITUDE_M:g} m high, any touch is a collision; walls {MARGIN_M:g} m "
-        "off field, start and goal",
+        f"simulator: pybullet at {STEPS_PER_S} Hz, exact odometry, no latency; flight "
+        f"altitude {ALTITUDE_M:g} m; any contact is a collision; walls {MARGIN_M:g} m from field, "
+        "start and goal",
         f"LIDAR: {math.degrees(lidar.scan_range_rad):.0f} degrees, {lidar.beam_count} beams, "
         f"{lidar.range_min_m:g} to {lidar.range_max_m:g} m, noise {lidar.noise_std_m:g} m, as "
-        f"there; but {SCANS_PER_S} scans a second, not 50, and in the body's middle",
-        "clock: it starts with the goal, not after the first 0.1 m; a goal that the navigator "
-        "gives up is a time-out",
+        f"in the challenge; but {SCANS_PER_S} scans per second instead of 50, and mounted at the "
+        "centre of the body",
+        "clock: it starts with the goal instead of after the first 0.1 m; a goal that "
+        "the navigator aborts is a time-out",
     ]
     return "\n".join(
         [
-            "Not as in the challenge:",
+            "Differences from the challenge:",
             *(
                 textwrap.fill(line, _WIDTH, initial_indent="  ", subsequent_indent="    ")
                 for line in lines
@@ -123,22 +125,22 @@ def differences(contestant: Contestant) -> str:
 
 
 def to_json(results: Results) -> Dict[str, Any]:
-    """Everything, with the figures of each group of worlds."""
+    """Convert the results to JSON data."""
     return {
-        "params": results.contestant.name,
+        "config": results.contestant.name,
         "seed": results.contestant.seed,
         "flights_wanted": results.wanted,
         "wall_time_s": round(results.wall_time_s, 3),
         "versions": versions(),
         "differences": differences(results.contestant),
-        "figures": {name: _figures_json(row) for name, row in results.rows},
-        "worlds": {name: _figures_json(row) for name, row in results.world_rows},
+        "figures": {name: _statistics_json(row) for name, row in results.rows},
+        "worlds": {name: _statistics_json(row) for name, row in results.world_rows},
         "runs": [_run_row(run) for run in results.runs],
     }
 
 
 def write_csv(results: Results, file: TextIO) -> None:
-    """A line for each run."""
+    """Write a row for each run."""
     writer = csv.DictWriter(file, _COLUMNS, lineterminator="\n")
     writer.writeheader()
     writer.writerows(_run_row(run) for run in results.runs)
@@ -175,7 +177,7 @@ def _percent(count: int, runs: int) -> str:
 
 
 def _collisions(runs: Sequence[Run]) -> List[str]:
-    """Where something was touched: what a person looks at first."""
+    """Describe each collision in a line."""
     lines = []
     for run in runs:
         if run.touched_at_m is not None:
@@ -187,7 +189,7 @@ def _collisions(runs: Sequence[Run]) -> List[str]:
     return lines
 
 
-def _figures_json(row: BarnStatistics) -> Dict[str, Any]:
+def _statistics_json(row: BarnStatistics) -> Dict[str, Any]:
     low, high = row.success_interval
     return {
         **asdict(row),

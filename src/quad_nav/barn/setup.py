@@ -40,13 +40,13 @@ SCANS_PER_S = 40
 class BarnOptions:
     """What a person asks for.
 
-    ``params``: the name of a shipped folder of parameters, or a folder's path;
+    ``config``: the name of a shipped folder of parameters, or a folder's path;
     ``parameters``: (path, value) on top of it. ``only``: numbers of worlds, all when empty;
     ``sample``: those of the official sample. ``runs``: flights through each.
     """
 
     worlds: Path
-    params: str = "barn"
+    config: str = "barn"
     parameters: Tuple[Tuple[str, Any], ...] = ()
     only: Tuple[int, ...] = ()
     sample: bool = False
@@ -131,7 +131,7 @@ _GOALS = GoalSequence((Goal(*GOAL_M),), SequenceSettings(GOAL_TOLERANCE_M, TIME_
 
 
 def _contestant(options: BarnOptions) -> Contestant:
-    folder = config_folder(options.params)
+    folder = config_folder(options.config)
     tree = config.load_files(folder, {"i": "0"})
     for path, value in options.parameters:
         set_value(tree, path, value, "the command line")
@@ -150,7 +150,7 @@ def _contestant(options: BarnOptions) -> Contestant:
         controller_period_s=1.0 / configuration.navigator.controller_frequency_hz,
     )
     return Contestant(
-        options.params, configuration, simulation, options.seed, _frames(configuration)
+        options.config, configuration, simulation, options.seed, _frames(configuration)
     )
 
 

@@ -1,4 +1,4 @@
-"""What many runs come to."""
+"""Statistics of many runs."""
 
 from __future__ import annotations
 
@@ -10,15 +10,23 @@ from typing import DefaultDict, List, Optional, Sequence, Tuple
 from quad_nav.barn.protocol import Outcome, Run
 
 _Z = 1.959963984540054
-"""Of the normal distribution, 95 % on both sides."""
+"""Two-sided 95 % quantile of the normal distribution."""
 
 
 @dataclass(frozen=True)
 class BarnStatistics:
-    """Counts of outcomes, and means. ``gave_up`` of the time-outs ended before their time.
+    """Counts of outcomes, and means.
 
-    ``mean_time_s``: of the successful runs of each world, and of that over the worlds, as the
-    challenge has it; None without any. ``metric``: of all runs.
+    Attributes:
+        worlds: Number of worlds.
+        runs: Number of runs.
+        successes: Runs that reached the goal without contact.
+        collisions: Runs that ended with a contact.
+        time_outs: Runs that reached the time limit, or whose goal the navigator aborted.
+        gave_up: Time-outs whose goal the navigator aborted.
+        mean_time_s: Mean over the worlds of each world's mean time of successful runs, as in the
+            challenge; None without a success.
+        metric: Mean score of all runs.
     """
 
     worlds: int
@@ -32,14 +40,18 @@ class BarnStatistics:
 
     @property
     def success_interval(self) -> Tuple[float, float]:
-        """Within which the rate of success lies, with 95 % confidence."""
+        """The 95 % confidence interval of the success rate."""
         return wilson_interval(self.successes, self.runs)
 
 
 def barn_statistics(runs: Sequence[Run]) -> BarnStatistics:
-    """Raises ValueError without any run."""
+    """Compute the statistics of runs.
+
+    Raises:
+        ValueError: There are no runs.
+    """
     if not runs:
-        raise ValueError("no runs, no figures")
+        raise ValueError("no runs, expected at least one")
     counts = {outcome: sum(run.outcome is outcome for run in runs) for outcome in Outcome}
     times_s: DefaultDict[int, List[float]] = defaultdict(list)
     for run in runs:
@@ -59,9 +71,9 @@ def barn_statistics(runs: Sequence[Run]) -> BarnStatistics:
 
 
 def wilson_interval(successes: int, trials: int) -> Tuple[float, float]:
-    """Wilson's score interval of a rate, 95 %; it takes the trials for independent.
+    """Return Wilson's 95 % score interval of a rate, for independent trials.
 
-    E. B. Wilson, "Probable inference, the law of succession, and statistical inference",
+    Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference",
     Journal of the American Statistical Association 22, 1927.
     """
     rate, weight = successes / trials, _Z * _Z / trials

@@ -1,7 +1,11 @@
-"""BARN's worlds, read from a file, as scenes.
+"""Read BARN's worlds as scenes.
 
-The file is an ``.npz``: ``index`` int[n], the worlds' numbers; ``occupied`` [n, 64, 30], not 0
-where a cylinder stands; ``path_<number>`` float[k, 2] for each, a reference path in metres.
+The file is an ``.npz`` with these arrays:
+
+- ``index``: numbers of the worlds, integer, shape (n,);
+- ``occupied``: nonzero where a cylinder stands, shape (n, 64, 30);
+- ``path_<number>``: reference path of a world in metres, shape (k, 2).
+
 Cell [row, column] is centred at x = 0.15 column - 4.425, y = 0.15 row + 0.075.
 """
 
@@ -11,9 +15,10 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, List, Sequence, Tuple
+from typing import Any, Dict, List, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.barn.protocol import GOAL_M, START
 from quad_nav.errors import InputError
@@ -21,14 +26,14 @@ from quad_nav.files.user_files import open_file
 from quad_nav.sim.scene import Cylinder, Scene, Walls
 
 ALTITUDE_M = 0.5
-"""Half the cylinders' height: a tilted LIDAR sees neither the floor nor past their tops nearby."""
+"""Half the cylinders' height: a tilted LIDAR sees neither the floor nor over close cylinders."""
 CELL_M = 0.15
 CYLINDER_RADIUS_M = 0.075
 CYLINDER_HEIGHT_M = 1.0
 FIELD = (64, 30)
-"""Rows along y, columns along x."""
+"""Number of rows along y and of columns along x."""
 MARGIN_M = 5.0
-"""Free floor around field, start and goal, before the walls that every scene has."""
+"""Free floor between the field, start and goal and the scene's walls."""
 MAX_BYTES = 256 * 1024 * 1024
 """Of all arrays of a file, unpacked."""
 _LOW_X_M = -4.5
@@ -36,18 +41,21 @@ _LOW_X_M = -4.5
 
 @dataclass(frozen=True)
 class BarnWorld:
-    """``cells`` int[n, 2]: rows and columns that hold cylinders.
+    """World of the benchmark.
 
-    ``path_length_m`` is that of the reference path, with the ways from the start to it and
-    from it to the goal, as the challenge counts it.
+    Attributes:
+        number: Number of the world.
+        cells: Rows and columns of the cells with cylinders, shape (n, 2).
+        path_length_m: Length of the reference path with its connections to start and goal, as
+            the challenge computes it.
     """
 
     number: int
-    cells: np.ndarray
+    cells: NDArray[np.intp]
     path_length_m: float
 
     def scene(self) -> Scene:
-        """The cylinders, on a floor that is open where the world is."""
+        """Build the scene: the cylinders inside walls at a distance from the field."""
         cylinders = tuple(
             Cylinder(
                 f"cylinder [{row}, {column}]",
@@ -73,10 +81,10 @@ class BarnWorld:
 
 
 def load_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[BarnWorld, ...]:
-    """The worlds in a file, or those with the numbers ``only``, in the file's order.
+    """Load all worlds of a file, or those in ``only``, in the file's order.
 
     Raises:
-        InputError: the file, or what is in it, is not as this module's text says.
+        InputError: Lists every fault of the file.
     """
     arrays = _read(path)
     numbers = _numbers(arrays, path)
@@ -84,7 +92,7 @@ def load_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[BarnWorld, ...]:
     if absent:
         raise InputError(
             [
-                f"{path}: has no world {', '.join(absent)}; expected numbers of its "
+                f"{path}: no world {', '.join(absent)}; expected numbers of its "
                 f"{len(numbers)} worlds, such as {numbers[0]}"
             ]
         )
@@ -99,12 +107,12 @@ def load_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[BarnWorld, ...]:
     return tuple(worlds)
 
 
-def _read(path: Path) -> Dict[str, np.ndarray]:
+def _read(path: Path) -> Dict[str, NDArray[Any]]:
     try:
         with open_file(path) as opened, np.load(opened, allow_pickle=False) as file:
             size = sum(member.file_size for member in file.zip.infolist())
             if size > MAX_BYTES:
-                raise ValueError(f"it holds {size} bytes, at most {MAX_BYTES} are read")
+                raise ValueError(f"{size} bytes, expected at most {MAX_BYTES} are read")
             return {name: file[name] for name in file.files}
     except (
         OSError,
@@ -119,24 +127,22 @@ def _read(path: Path) -> Dict[str, np.ndarray]:
     ) as error:
         raise InputError(
             [
-                f"{path}: cannot be read: {error}; expected an .npz with index, "
+                f"{path}: cannot read: {error}; expected an .npz with index, "
                 "occupied and path_<index>"
             ]
         ) from error
 
 
-def _numbers(arrays: Dict[str, np.ndarray], path: Path) -> List[int]:
-    """The worlds' numbers, after a look at both arrays that hold all worlds."""
-    problems = [
-        f"{path}: has no array {name}" for name in ("index", "occupied") if name not in arrays
-    ]
+def _numbers(arrays: Dict[str, NDArray[Any]], path: Path) -> List[int]:
+    """Return the worlds' numbers after a check of both arrays that hold all worlds."""
+    problems = [f"{path}: no array {name}" for name in ("index", "occupied") if name not in arrays]
     if problems:
         raise InputError(problems)
     index, occupied = arrays["index"], arrays["occupied"]
     if index.ndim != 1 or index.dtype.kind not in "iu" or len(index) == 0:
         problems.append(f"{path}: index: {index.dtype} {index.shape}, expected a row of integers")
     elif len(set(index.tolist())) < len(index):
-        problems.append(f"{path}: index: has numbers twice, expected each once")
+        problems.append(f"{path}: index: duplicate numbers, expected each once")
     expected = (*index.shape[:1], *FIELD)
     if occupied.shape != expected:
         problems.append(f"{path}: occupied: {occupied.shape}, expected {expected}")
@@ -145,7 +151,9 @@ def _numbers(arrays: Dict[str, np.ndarray], path: Path) -> List[int]:
     return list(map(int, index))
 
 
-def _length_m(arrays: Dict[str, np.ndarray], number: int, path: Path, problems: List[str]) -> float:
+def _length_m(
+    arrays: Dict[str, NDArray[Any]], number: int, path: Path, problems: List[str]
+) -> float:
     points = arrays.get(f"path_{number}", np.zeros(0))
     if (
         points.ndim != 2

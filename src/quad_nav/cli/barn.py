@@ -1,68 +1,74 @@
-"""``quad barn``: the benchmark of narrow worlds, offline."""
+"""``quad barn``: BARN benchmark, offline."""
 
 from __future__ import annotations
 
 import json
-import signal
 import sys
 import time
-from pathlib import Path
 from typing import Any, List, Optional, TextIO, Tuple
 
 import click
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from quad_nav.barn.protocol import Outcome, Run
 from quad_nav.barn.results import Results, text, to_json, write_csv
 from quad_nav.barn.runs import fly_all
 from quad_nav.barn.setup import BarnOptions, BarnSetup, read_barn_setup
-from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED, EXIT_SUCCESS
-from quad_nav.cli.parameters import parameter
+from quad_nav.cli import EXIT_INTERRUPTED, EXIT_SUCCESS
+from quad_nav.cli.options import (
+    A_FILE,
+    COUNT,
+    OUTPUT,
+    POSITIVE,
+    exit_on_faults,
+    is_terminal,
+    parameter,
+    raise_on_signals,
+)
+from quad_nav.cli.progress import flights_progress
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import LocalWorkers
 from quad_nav.scenario.warm_up import simulate, warm_up
-
-_OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # refused now, not after an hour
 
 
 @click.command()
 @click.option(
     "--worlds",
     required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="The .npz with the worlds; docs/barn.md says what is in it.",
+    type=A_FILE,
+    help="File with the worlds (.npz), see docs/barn.md.",
 )
 @click.option(
-    "--params",
+    "--config",
     default="barn",
     show_default=True,
     metavar="NAME|FOLDER",
-    help="move_base's parameters: the challenge's own folder, one that comes with quad, or yours.",
+    help="move_base's parameters: a shipped configuration or a folder, such as the challenge's.",
 )
 @click.option(
     "--set",
     "parameters",
     multiple=True,
     metavar="PATH=VALUE",
-    help="A parameter on top of the folder's, as global_costmap/width=60; repeatable.",
+    help="Override a parameter, for example global_costmap/width=60; repeatable.",
 )
-@click.option("--only", metavar="NUMBERS", default="", help="These worlds, as 0,6,12.")
-@click.option("--sample", is_flag=True, help="The worlds of the official sample.")
+@click.option(
+    "--only", metavar="NUMBERS", default="", help="Fly only these worlds, for example 0,6,12."
+)
+@click.option("--sample", is_flag=True, help="Fly only the worlds of the official sample.")
 @click.option(
     "--runs",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=1,
     show_default=True,
     metavar="N",
-    help="Flights through each world; the seed counts up from --seed.",
+    help="Flights through each world, with seeds counted up from --seed.",
 )
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="For the LIDAR's noise; the same seed gives the same figures.",
+    help="Seed of the LIDAR's noise; equal seeds give equal results.",
 )
 @click.option(
     "--body-radius",
@@ -70,28 +76,32 @@ _OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # refused now, not afte
     default=0.20,
     show_default=True,
     metavar="M",
-    type=click.FloatRange(min=0.0, min_open=True),
-    help="The quadcopter's.",
+    type=POSITIVE,
+    help="Radius of the quadcopter.",
 )
 @click.option(
     "--workers",
-    type=click.IntRange(min=1),
+    type=COUNT,
     default=lambda: LocalWorkers().count,
     metavar="N",
-    help="Flights at the same time.  [default: as many as there are cores]",
+    help="Flights at the same time.  [default: number of cores]",
 )
-@click.option("--per-world", is_flag=True, help="A row for each world.")
+@click.option("--per-world", is_flag=True, help="Print a row for each world.")
 @click.option(
     "--json",
     "json_file",
-    type=_OUTPUT,
+    type=OUTPUT,
     metavar="FILE",
-    help="Write figures and flights there; - is the terminal.",
+    help="Write statistics and flights to this file; - is the terminal.",
 )
 @click.option(
-    "--csv", "csv_file", type=_OUTPUT, metavar="FILE", help="Write a line for each flight there."
+    "--csv",
+    "csv_file",
+    type=OUTPUT,
+    metavar="FILE",
+    help="Write a row for each flight to this file.",
 )
-@click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
+@click.option("--quiet", "-q", is_flag=True, help="Show neither progress bar nor table.")
 def barn(
     workers: int,
     per_world: bool,
@@ -102,33 +112,26 @@ def barn(
 ) -> None:
     """Fly through the worlds of the BARN benchmark without ROS, several at once.
 
-    From (-2.25, 3) to within 1 m of (-2.25, 13), in 100 s, without any contact. Ctrl-C ends it
-    with the figures of the flights that were over.
+    A flight succeeds if it gets from (-2.25, 3) to within 1 m of (-2.25, 13) in 100 s without
+    contact. Ctrl-C prints the results of the flights completed so far.
 
-    Exit status: 0, or 2 for input that cannot be used, or 130 after Ctrl-C.
+    Exit status: 0, 1 if workers die repeatedly, 2 for invalid input, 130 after Ctrl-C.
     """
-    try:
+    with exit_on_faults():
         setup = read_barn_setup(_options(**given))
-    except InputError as error:
-        click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
-        sys.exit(EXIT_BAD_INPUT)
-    workers = min(workers, setup.wanted)
+        workers = min(workers, setup.wanted)
+        if not quiet:
+            for warning in setup.warnings:
+                click.echo(warning, err=True)
+            click.echo(f"{setup.wanted} flights, {workers} at the same time", err=True)
+        results, interrupted = _fly(setup, workers, quiet)
     if not quiet:
-        for warning in setup.warnings:
-            click.echo(warning, err=True)
-        click.echo(f"{setup.wanted} flights, {workers} at a time", err=True)
-    results, interrupted = _fly(setup, workers, quiet)
-    if not quiet:
-        click.echo(text(results, per_world), err=_is_terminal(json_file) or _is_terminal(csv_file))
+        click.echo(text(results, per_world), err=is_terminal(json_file) or is_terminal(csv_file))
     if json_file is not None:
         click.echo(json.dumps(to_json(results), indent=2, allow_nan=False), json_file)
     if csv_file is not None:
         write_csv(results, csv_file)
     sys.exit(EXIT_INTERRUPTED if interrupted else EXIT_SUCCESS)
-
-
-def _is_terminal(file: Optional[TextIO]) -> bool:
-    return file is not None and file.name == "<stdout>"
 
 
 def _options(parameters: Tuple[str, ...], only: str, **given: Any) -> BarnOptions:
@@ -139,20 +142,21 @@ def _numbers(text: str) -> Tuple[int, ...]:
     try:
         return tuple(int(word) for word in text.split(",") if word.strip())
     except ValueError as error:
-        raise InputError([f"--only {text}: expected numbers of worlds, as 0,6,12"]) from error
+        raise InputError(
+            [f"--only {text}: expected numbers of worlds, for example 0,6,12"]
+        ) from error
 
 
 def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
-    """The results, and whether Ctrl-C has cut them short."""
+    """Return the results, and true if Ctrl-C interrupted the flights."""
     bar = _Bar(setup.wanted, quiet)
     runs: List[Run] = []
     interrupted = False
     start_s = time.monotonic()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
+    raise_on_signals()
     try:
         with bar:
-            warm_up(setup.contestant.configuration)  # once, and not in every worker at once
+            warm_up(setup.contestant.configuration)  # compile once instead of in every worker
             simulate()
             for run in fly_all(setup, workers):
                 runs.append(run)
@@ -165,27 +169,11 @@ def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
 
 
 class _Bar:
-    """Flights, rate and time left; on stderr, and only where that is a terminal.
-
-    It begins with the first flight that is over: until then the workers' libraries may say
-    something of their own.
-    """
+    """Progress bar with counts of outcomes and the rate of flights."""
 
     def __init__(self, wanted: int, quiet: bool) -> None:
-        console = Console(stderr=True)
-        self._progress = Progress(
-            TextColumn("flights"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[told]}"),
-            TimeRemainingColumn(elapsed_when_finished=True),
-            TextColumn("left"),
-            console=console,
-            transient=True,
-            speed_estimate_period=300.0,
-            disable=quiet or not console.is_terminal,
-        )
-        self._task = self._progress.add_task("", total=wanted, told="")
+        self._progress = flights_progress(quiet)
+        self._task = self._progress.add_task("flights", total=wanted, status="")
         self._start_s = time.monotonic()
 
     def __enter__(self) -> _Bar:
@@ -195,11 +183,14 @@ class _Bar:
         self._progress.stop()
 
     def show(self, runs: List[Run]) -> None:
+        """Update the bar."""
         counts = [
             f"{sum(run.outcome is outcome for run in runs)} {outcome.value}" for outcome in Outcome
         ]
         per_minute = 60.0 * len(runs) / max(time.monotonic() - self._start_s, 1e-3)
         self._progress.update(
-            self._task, completed=len(runs), told=f"{', '.join(counts)}; {per_minute:.1f} a minute"
+            self._task,
+            completed=len(runs),
+            status=f"{', '.join(counts)}; {per_minute:.1f} per minute",
         )
         self._progress.start()

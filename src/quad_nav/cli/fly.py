@@ -14,7 +14,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 import click
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
-from quad_nav.cli.parameters import parameter
+from quad_nav.cli.options import parameter
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import InputError

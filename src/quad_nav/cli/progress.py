@@ -1,4 +1,4 @@
-"""The progress of a flight in the terminal."""
+"""Progress bars on stderr, shown only if that is a terminal."""
 
 from __future__ import annotations
 
@@ -6,14 +6,43 @@ import time
 from typing import Optional
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from quad_nav.mission.sequencer import Action, GoalEnded
 from quad_nav.offline.flight import Flight, FlightObserver
 
-_PERIOD_S = 0.1  # wall time between two looks at the clock
+_PERIOD_S = 0.1  # wall time between two updates
 
-_STARTING = "starting; the first flight after an install compiles its kernels, half a minute"
+_STARTING = "starting (the first flight after an installation compiles kernels for 30 s)"
+
+
+def flights_progress(quiet: bool) -> Progress:
+    """Create a bar for many flights, with the time left.
+
+    A task has a description, and a field ``status`` with text behind the count. Start the bar
+    with the first completed flight: before that, the workers' libraries may print messages.
+    """
+    console = Console(stderr=True)
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[status]}"),
+        TimeRemainingColumn(elapsed_when_finished=True),
+        TextColumn("left"),
+        console=console,
+        transient=True,
+        speed_estimate_period=300.0,
+        disable=quiet or not console.is_terminal,
+    )
 
 
 class ProgressBar(FlightObserver):
@@ -57,7 +86,7 @@ class ProgressBar(FlightObserver):
             self._task,
             completed=self._ended,
             refresh=True,
-            sim=f"{flight.now_s:.1f} s simulated, {speed:.0f} x real time",
+            sim=f"{flight.now_s:.1f} s simulated, {speed:.0f}x real time",
         )
 
     def on_end(self, flight: Flight) -> None:

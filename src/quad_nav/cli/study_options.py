@@ -13,7 +13,7 @@ import click
 
 from quad_nav.barn.setup import BarnOptions
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
-from quad_nav.cli.parameters import parameter
+from quad_nav.cli.options import parameter
 from quad_nav.errors import InputError, QuadError
 from quad_nav.files.shipped import config_folder, shipped
 from quad_nav.offline.workers import LocalWorkers, RayWorkers, Workers

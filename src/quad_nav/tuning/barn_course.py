@@ -54,7 +54,7 @@ class BarnCourse:
 
     @property
     def config(self) -> str:
-        return self.options.params
+        return self.options.config
 
     @property
     def fixed(self) -> Tuple[Tuple[str, Any], ...]:
@@ -91,7 +91,7 @@ class BarnCourse:
         """What flights depend on besides candidate and case; plain JSON."""
         given = self.options
         return {
-            "config": {"name": given.params, "files": files_digest(config_folder(given.params))},
+            "config": {"name": given.config, "files": files_digest(config_folder(given.config))},
             "parameters": dict(given.parameters),
             "worlds": {"name": Path(given.worlds).name, "files": files_digest(Path(given.worlds))},
             "body_radius_m": given.body_radius_m,

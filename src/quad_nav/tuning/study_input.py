@@ -36,7 +36,7 @@ def read_course(given: CourseOptions) -> Tuple[Course, Sequence[str]]:
 def with_config(given: CourseOptions, name: str) -> CourseOptions:
     """The same flights with another folder of parameters as it is."""
     if isinstance(given, BarnOptions):
-        return replace(given, params=name, parameters=())
+        return replace(given, config=name, parameters=())
     return replace(given, config=name, parameters=())
 
 

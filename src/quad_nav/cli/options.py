@@ -1,0 +1,72 @@
+"""Option types, parameters and error handling that several commands share."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Iterator, Optional, TextIO, Tuple
+
+import click
+import yaml
+
+from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
+from quad_nav.errors import InputError, QuadError
+from quad_nav.files import plain_yaml
+
+A_FILE = click.Path(dir_okay=False, path_type=Path)
+A_FOLDER = click.Path(file_okay=False, path_type=Path)
+OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # fails now, not after an hour of flights
+POSITIVE = click.FloatRange(min=0.0, min_open=True)
+AMOUNT = click.FloatRange(min=0.0)
+COUNT = click.IntRange(min=1)
+
+
+def parameter(text: str) -> Tuple[str, Any]:
+    """Parse "global_costmap/width=60" to a path and a YAML value.
+
+    Raises:
+        InputError: The text has another form.
+    """
+    path, equals, value = text.partition("=")
+    if not equals or not path.strip("/"):
+        raise InputError(
+            [f"--set {text}: expected PATH=VALUE, for example global_costmap/width=60"]
+        )
+    try:
+        return path, plain_yaml.load(value)
+    except yaml.YAMLError as error:
+        raise InputError(
+            [
+                f"--set {text}: {value!r} is not YAML, expected a value as in a "
+                f"parameter file: {error}"
+            ]
+        ) from error
+
+
+@contextmanager
+def exit_on_faults() -> Iterator[None]:
+    """Exit the command with the status for the error, after printing a line per fault."""
+    try:
+        yield
+    except InputError as error:
+        click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
+        sys.exit(EXIT_BAD_INPUT)
+    except QuadError as error:
+        click.echo(str(error), err=True)
+        sys.exit(EXIT_FAILURE)
+
+
+def is_terminal(file: Optional[TextIO]) -> bool:
+    """Return true if the output file is the terminal's standard output."""
+    return file is not None and file.name == "<stdout>"
+
+
+def raise_on_signals() -> None:
+    """Raise KeyboardInterrupt on SIGINT and SIGTERM.
+
+    Python ignores SIGINT in the background jobs of a shell otherwise.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
