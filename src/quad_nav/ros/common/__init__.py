@@ -1,5 +1,5 @@
 """Parts that several nodes share: messages, transforms, names, diagnostics.
 
-Reading order: `node_tools`, `conversions`, `nav_messages`, `marker_messages`, `transforms`,
+Reading order: `node_tools`, `conversions`, `nav_messages`, `transforms`,
 `readiness`, `diagnostics`, `preflight`, `rviz_node`.
 """

@@ -60,8 +60,7 @@ class RobotNavigator:
         self.number = configuration.robot
         self._name = f"quad{self.number}"
         self.due_s = 0.0
-        self._warnings = ThrottledWarnings()
-        self._configuration = configuration
+        self._warnings, self._configuration = ThrottledWarnings(), configuration
         self._navigator = navigator = build_navigator(configuration)
         self._lock = threading.RLock()
         self._velocity = Twist2D()
@@ -74,9 +73,7 @@ class RobotNavigator:
         }
         self._topics = PlanTopics(navigator, names)
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
-        self._sensors = sensors.connect(
-            f"quad{self.number}", costmaps, configuration.scan_validator, names
-        )
+        self._sensors = sensors.connect(self._name, costmaps, configuration.scan_validator, names)
         self._maps = static_maps.connect(costmaps, self._lock, names)
         self._reconfigure = serve_namespaces(self._name, configuration, self._on_reconfigure, names)
         self._services = self._advertise_services(names)

@@ -22,8 +22,8 @@ from quad_nav.mission.checkpoint import MissionCheckpoint, RobotCheckpoint, shif
 from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.ros.common import readiness
+from quad_nav.ros.common.conversions import replacing_markers
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
-from quad_nav.ros.common.marker_messages import replacing_markers
 from quad_nav.ros.common.readiness import Need
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress_message

@@ -14,7 +14,7 @@ import sys
 import time
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import Callable, Deque, Tuple
+from typing import Callable, Deque, List, Tuple
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -26,11 +26,10 @@ from std_srvs.srv import (
     TriggerRequest,
     TriggerResponse,
 )
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.errors import InputError
 from quad_nav.ros.common.conversions import twist_from_message
-from quad_nav.ros.common.marker_messages import goal_spheres
 from quad_nav.ros.simulator.topics import SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
     DEFAULTS,
@@ -38,6 +37,7 @@ from quad_nav.scenario.simulator_setup import (
     longest_controller_period_s,
     read_setup,
 )
+from quad_nav.sim.body import GoalSphere
 from quad_nav.sim.pacing import Pacer, RateMeter
 from quad_nav.sim.simulation import STEP_S, STEPS_PER_S, Simulation
 from quad_nav.topics.validation import CommandLease, twist_problem
@@ -248,7 +248,20 @@ class SimulatorNode:
     def _show_goals(self) -> None:
         if not self._goals_are_shown:
             self._goals_are_shown = True
-            self._simulation.show_goals(goal_spheres(self._goals))
+            self._simulation.show_goals(_goal_spheres(self._goals))
+
+
+def _goal_spheres(message: MarkerArray) -> List[GoalSphere]:
+    """Return the spheres among markers in `map`: centre, radius and colour."""
+    return [
+        (
+            (m.pose.position.x, m.pose.position.y, m.pose.position.z),
+            m.scale.x / 2,
+            (m.color.r, m.color.g, m.color.b, m.color.a),
+        )
+        for m in message.markers
+        if m.type == Marker.SPHERE and m.action == Marker.ADD
+    ]
 
 
 def main() -> int:

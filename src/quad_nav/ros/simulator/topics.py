@@ -16,6 +16,7 @@ from visualization_msgs.msg import MarkerArray
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import (
     ScanMessage,
+    marker_array,
     odometry_message,
     scan_message,
     time_message,
@@ -23,7 +24,6 @@ from quad_nav.ros.common.conversions import (
     transform_message,
 )
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
-from quad_nav.ros.common.marker_messages import marker_array
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.simulation import RobotState, Simulation
