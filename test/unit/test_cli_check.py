@@ -173,7 +173,7 @@ def test_what_is_not_move_bases(tmp_path, name, text):
     status, output = quad(tmp_path)
     assert status == 2
     assert output.strip() == (
-        f"{tmp_path}: no move_base parameters in it; expected files such as"
+        f"{tmp_path}: no move_base parameters found; expected files such as"
         " costmap_common_params.yaml"
     )
 
@@ -201,7 +201,9 @@ def test_table(tmp_path, monkeypatch):
         {
             **STANDARD,
             "move_base_params.yaml": "recovery_behaviour_enabled: true\n",
-            "base_local_planner_params.yaml": "TrajectoryPlannerROS:\n  pdist_scale: 1.0\n  max_vel_x: 25\n",
+            "base_local_planner_params.yaml": (
+                "TrajectoryPlannerROS:\n  pdist_scale: 1.0\n  max_vel_x: 25\n"
+            ),
             "costmap_common_params.yaml": SEEING + "zzz: 1\n",
         },
     )
@@ -215,14 +217,15 @@ def test_table(tmp_path, monkeypatch):
   costmap_common_params.yaml, local_costmap_params.yaml, global_costmap_params.yaml,
   base_local_planner_params.yaml, move_base_params.yaml
 
-place                               kind     what                          nearest name
-----------------------------------  -------  ----------------------------  -------------------------
-recovery_behaviour_enabled          unknown  nothing reads it              recovery_behavior_enabled
+parameter                           kind     message                  nearest name
+----------------------------------  -------  -----------------------  -------------------------
+recovery_behaviour_enabled          unknown  nothing reads it         recovery_behavior_enabled
   move_base_params.yaml:1
-TrajectoryPlannerROS/pdist_scale    renamed  called path_distance_bias
-  base_local_planner_params.yaml:2           today
-TrajectoryPlannerROS/max_vel_x      clamped  25 becomes 20.0, the largest
-  base_local_planner_params.yaml:3           that move_base allows
+TrajectoryPlannerROS/pdist_scale    renamed  old name of
+  base_local_planner_params.yaml:2           path_distance_bias
+TrajectoryPlannerROS/max_vel_x      clamped  25 clamped to 20.0, the
+  base_local_planner_params.yaml:3           largest that move_base
+                                             allows
 *_costmap/zzz                       unknown  nothing reads it
   costmap_common_params.yaml:3"""
     )
@@ -233,7 +236,9 @@ def test_all_errors_at_once_and_remarks_after_them(tmp_path):
         tmp_path,
         {
             **STANDARD,
-            "local_costmap_params.yaml": "local_costmap:\n  width: three\n  static_mapp: true\n  height: -1.0\n",
+            "local_costmap_params.yaml": (
+                "local_costmap:\n  width: three\n  static_mapp: true\n  height: -1.0\n"
+            ),
         },
     )
     status, output = quad(tmp_path)
@@ -274,7 +279,9 @@ def test_the_robots_number(tmp_path):
         tmp_path,
         {
             **STANDARD,
-            "costmap_common_params.yaml": "observation_sources: scan\nscan: {data_type: LaserScan, topic: scan$(arg i)}\n",
+            "costmap_common_params.yaml": (
+                "observation_sources: scan\nscan: {data_type: LaserScan, topic: scan$(arg i)}\n"
+            ),
         },
     )
     assert quad(tmp_path)[0] == 0
@@ -296,7 +303,7 @@ def test_tables_keep_to_the_width(width):
         Remark(
             "/recovery_behaviour_enabled",
             "unknown",
-            "unknown, nothing reads it",
+            "unknown parameter, nothing reads it",
             "move_base.yaml:2",
             "recovery_behavior_enabled",
         ),

@@ -47,7 +47,8 @@ def test_sizes_that_no_grid_can_have_are_all_told():
     assert caught.value.problems == [
         "/nav/global_costmap: 501 x 500 m with cells of 0.05 m is not supported;"
         " expected 1 to 100000000 cells",
-        "/nav/local_costmap: 3 x 12 m with cells of 4 m is not supported; expected 1 to 100000000 cells",
+        "/nav/local_costmap: 3 x 12 m with cells of 4 m is not supported; expected 1 to 100000000"
+        " cells",
     ]
     assert local_costmap({"width": 50, "height": 50, "resolution": 0.005}).spec.shape == (
         10000,
@@ -171,10 +172,12 @@ def test_voxel_layer_among_plugins():
     assert (layer.origin_z_m, layer.z_voxels, layer.max_obstacle_height_m) == (0.5, 16, 1.0)
     told = [str(remark) for remark in configuration.remarks]
     assert (
-        "/local_costmap/space/origin_z: ignored by move_base: local_costmap/origin_z replaces it"
+        "/local_costmap/space/origin_z: ignored by move_base: local_costmap/origin_z overrides it"
     ) in told
-    assert "/local_costmap/space/z_voxels: 20 becomes 16, the largest that move_base allows" in told
-    with pytest.raises(InputError, match="^/local_costmap/z_voxels: 0 cannot be; expected a"):
+    assert (
+        "/local_costmap/space/z_voxels: 20 clamped to 16, the largest that move_base allows" in told
+    )
+    with pytest.raises(InputError, match="^/local_costmap/z_voxels: 0 is out of range; expected a"):
         load({"local_costmap": {"map_type": "voxel", "z_voxels": 0}}, "")
 
 

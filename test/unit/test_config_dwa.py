@@ -80,7 +80,7 @@ def test_old_names_change_nothing_and_are_told(old, new):
     assert [(remark.kind, remark.place) for remark in notes.remarks] == [
         (IGNORED, f"/move_base0/DWAPlannerROS/{old}")
     ]
-    assert notes.remarks[0].text == f"ignored by move_base: the name is {new}"
+    assert notes.remarks[0].text == f"ignored by move_base: renamed to {new}"
 
 
 @pytest.mark.parametrize(
@@ -99,8 +99,7 @@ def test_latch_is_looked_for_upwards(own, node_level, in_force):
 def test_a_latch_that_is_no_flag():
     _, notes = normalised({}, latch_xy_goal_tolerance="yes")
     assert notes.problems == [
-        "/move_base0/latch_xy_goal_tolerance: 'yes' is neither true nor"
-        " false; expected true or false"
+        "/move_base0/latch_xy_goal_tolerance: 'yes' is not a boolean; expected true or false"
     ]
 
 
@@ -115,7 +114,8 @@ def test_what_cannot_be_is_a_problem_and_what_is_odd_a_remark():
         }
     )
     assert notes.problems == [
-        "/move_base0/DWAPlannerROS/sim_time: 0.0 cannot be; expected a positive number of seconds"
+        "/move_base0/DWAPlannerROS/sim_time: 0.0 is out of range; expected a positive number"
+        " of seconds"
     ]
     assert {remark.place.split("/")[-1]: remark.kind for remark in notes.remarks} == {
         "vx_samples": CLAMPED,

@@ -23,15 +23,17 @@ def problems(tree):
         ),
         (
             {"local_costmap": {"resolution": 0}},
-            "local_costmap/resolution: 0 cannot be; expected a positive number of metres",
+            "local_costmap/resolution: 0 is out of range; expected a positive number of metres",
         ),
         (
             {"local_costmap": {"robot_radius": -0.1}},
-            "local_costmap/robot_radius: -0.1 cannot be; expected a number of metres, 0 or more",
+            "local_costmap/robot_radius: -0.1 is out of range; expected a number of metres, 0"
+            " or more",
         ),
         (
             {"global_costmap": {"update_frequency": float("nan")}},
-            "global_costmap/update_frequency: nan is not finite; expected a number of Hz, 0 or more",
+            "global_costmap/update_frequency: nan is not finite; expected a number of Hz, 0 or"
+            " more",
         ),
         (
             {"global_costmap": {"origin_x": float("inf")}},
@@ -39,30 +41,31 @@ def problems(tree):
         ),
         (
             {"global_costmap": {"inflation_radius": True}},
-            "global_costmap/inflation_radius: True is not a number; expected a number of metres, 0 or"
+            "global_costmap/inflation_radius: True is not a number; expected a number of metres, 0"
+            " or"
             " more",
         ),
         (
             {"global_costmap": {"inflation_radius": "1e-1"}},
-            "global_costmap/inflation_radius: '1e-1' is not a number but a text (write 0.1); expected a"
-            " number of metres, 0 or more",
+            "global_costmap/inflation_radius: '1e-1' is not a number but a string (write 0.1);"
+            " expected a number of metres, 0 or more",
         ),
         (
             {"local_costmap": {"rolling_window": 1}},
-            "local_costmap/rolling_window: 1 is neither true nor false; expected true or false",
+            "local_costmap/rolling_window: 1 is not a boolean; expected true or false",
         ),
         (
             {"local_costmap": {"static_map": "yes"}},
-            "local_costmap/static_map: 'yes' is neither true nor false; expected true or false",
+            "local_costmap/static_map: 'yes' is not a boolean; expected true or false",
         ),
         (
             {"local_costmap": {"global_frame": 3}},
-            "local_costmap/global_frame: 3 is not a text; expected a frame's name",
+            "local_costmap/global_frame: 3 is not a string; expected a frame's name",
         ),
         ({"local_costmap": 3}, "local_costmap: 3 is a value; expected a namespace of parameters"),
         (
             {"controller_frequency": 0},
-            "controller_frequency: 0 cannot be; expected a positive number of Hz",
+            "controller_frequency: 0 is out of range; expected a positive number of Hz",
         ),
         (
             {"max_planning_retries": "many"},
@@ -70,35 +73,39 @@ def problems(tree):
         ),
         (
             {"TrajectoryPlannerROS": {"y_vels": [-0.3, 0.3]}},
-            "TrajectoryPlannerROS/y_vels: [-0.3, 0.3] is not a text; expected numbers of m/s separated by"
-            " commas",
+            "TrajectoryPlannerROS/y_vels: [-0.3, 0.3] is not a string; expected numbers of m/s"
+            " separated by commas",
         ),
         (
             {"TrajectoryPlannerROS": {"pdist_scale": "high"}},
-            "TrajectoryPlannerROS/pdist_scale: 'high' is not a number; expected a number, 0 or more",
+            "TrajectoryPlannerROS/pdist_scale: 'high' is not a number; expected a number, 0 or"
+            " more",
         ),
         (
             {"local_costmap": {"obstacle_layer": {"combination_method": 2}}},
-            "local_costmap/obstacle_layer/combination_method: 2 is no choice; expected one of 0"
-            " (Overwrite), 1 (Maximum), 99 (Nothing)",
+            "local_costmap/obstacle_layer/combination_method: 2 is not a valid choice;"
+            " expected one of 0 (Overwrite), 1 (Maximum), 99 (Nothing)",
         ),
         (
             {"local_costmap": {"observation_sources": "scan", "scan": {"data_type": "Laser"}}},
-            "local_costmap/scan/data_type: 'Laser' is no sensor's type; expected LaserScan, PointCloud or"
-            " PointCloud2",
+            "local_costmap/scan/data_type: 'Laser' is not a type of sensor; expected"
+            " LaserScan, PointCloud or PointCloud2",
         ),
         (
             {"local_costmap": {"plugins": [{"name": "obstacles"}]}},
-            "local_costmap/plugins: {'name': 'obstacles'} is no layer; expected {name: , type: }",
+            "local_costmap/plugins: {'name': 'obstacles'} is not a layer; expected {name: ,"
+            " type: }",
         ),
         (
             {"local_costmap": {"footprint": [[0, 1], [1, 0]]}},
-            "local_costmap/footprint: [[0, 1], [1, 0]]: fewer than three points; expected a list [[x1,"
+            "local_costmap/footprint: [[0, 1], [1, 0]]: fewer than three points; expected a list"
+            " [[x1,"
             " y1], [x2, y2], [x3, y3], ...] of metres",
         ),
         (
             {"local_costmap": {"footprint": "[[0, 1], [1, 0], [x, 1]]"}},
-            "local_costmap/footprint: '[[0, 1], [1, 0], [x, 1]]': 'x' is not a number; expected a list"
+            "local_costmap/footprint: '[[0, 1], [1, 0], [x, 1]]': 'x' is not a number; expected a"
+            " list"
             " [[x1, y1], [x2, y2], [x3, y3], ...] of metres",
         ),
         (
@@ -110,15 +117,15 @@ def problems(tree):
                 "recovery_behaviors": [{"name": "clear", "type": "ClearCostmapRecovery"}],
                 "clear": {"layer_names": "obstacle_layer"},
             },
-            "clear/layer_names: 'obstacle_layer' is no list of names; expected the names of layers, as in"
-            " [obstacle_layer]",
+            "clear/layer_names: 'obstacle_layer' is not a list of names; expected names of"
+            " layers, as in [obstacle_layer]",
         ),
         (
             {
                 "recovery_behaviors": [{"name": "clear", "type": "ClearCostmapRecovery"}],
                 "clear": {"affected_maps": "all"},
             },
-            "clear/affected_maps: 'all' is no choice; expected local, global or both",
+            "clear/affected_maps: 'all' is not a valid choice; expected local, global or both",
         ),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",

@@ -9,7 +9,9 @@ from quad_nav.config.files import PlacedFile
 from quad_nav.errors import InputError
 
 FILES = {
-    "costmap_common_params": "robot_radius: 0.35\nbase_scan: {topic: scan$(arg i), marking: true}\n",
+    "costmap_common_params": (
+        "robot_radius: 0.35\nbase_scan: {topic: scan$(arg i), marking: true}\n"
+    ),
     "local_costmap_params": "local_costmap:\n  width: 3.0\n  robot_radius: 0.2\n",
     "global_costmap_params": "global_costmap: {width: 12.0}\n",
     "base_local_planner_params": "TrajectoryPlannerROS: {max_vel_x: 0.3}\n",
@@ -78,14 +80,14 @@ def test_values_remember_their_file_and_line(folder):
     ]
 
 
-def test_missing_files_are_all_named(tmp_path):
+def test_every_missing_file_is_named(tmp_path):
     (tmp_path / "global_costmap_params.yaml").write_text("")
     assert problems(tmp_path, {"i": "0"}) == [
-        f"{tmp_path}: no {stem}.yaml or {stem}0.yaml"
+        f"{tmp_path}: missing {stem}.yaml or {stem}0.yaml"
         for stem in ("costmap_common_params", "local_costmap_params", "base_local_planner_params")
     ]
     assert problems(tmp_path / "nowhere") == [
-        f"{tmp_path / 'nowhere'}: no such folder; expected one with costmap_common_params.yaml"
+        f"{tmp_path / 'nowhere'}: no such folder; expected a folder with costmap_common_params.yaml"
     ]
 
 
@@ -94,7 +96,10 @@ def test_every_broken_file_is_named_with_its_line(folder):
     (folder / "global_costmap_params.yaml").write_text("- a list\n")
     told = problems(folder, {"i": "0"})
     assert told[0].startswith(f"{folder / 'local_costmap_params.yaml'}:3:1: not YAML: ")
-    assert told[1] == f"{folder / 'global_costmap_params.yaml'}:1: not a list of names with values"
+    assert told[1] == (
+        f"{folder / 'global_costmap_params.yaml'}:1: not a mapping; expected names of parameters"
+        " with values"
+    )
 
 
 def test_tabs_are_told_as_yaml_tells_them(folder):
@@ -104,24 +109,24 @@ def test_tabs_are_told_as_yaml_tells_them(folder):
     assert "'\\t'" in told
 
 
-def test_substitution_that_stands_for_nothing(folder):
+def test_unknown_substitution(folder):
     (folder / "global_costmap_params.yaml").write_text("# $(arg i)\na: $(find quad)\nb: $(arg j)\n")
     path = folder / "global_costmap_params.yaml"
     assert problems(folder, {"i": "0"}) == [
-        f"{path}:2: $(find quad) stands for nothing; expected $(arg i)",
-        f"{path}:3: $(arg j) stands for nothing; expected $(arg i)",
+        f"{path}:2: unknown $(find quad); expected $(arg i)",
+        f"{path}:3: unknown $(arg j); expected $(arg i)",
     ]
 
 
-def test_key_that_is_there_twice_counts_once_and_is_told(folder):
+def test_key_that_is_set_twice_has_its_last_value_and_a_remark(folder):
     (folder / "local_costmap_params.yaml").write_text(
         "local_costmap:\n  width: 3.0\n  height: 3.0\n  width: 5.0\n"
     )
     tree = load_files(folder, {"i": "0"})
     assert tree["local_costmap"]["width"] == 5.0
     assert [str(remark) for remark in load(tree, "").remarks if "twice" in remark.text] == [
-        f"local_costmap/width ({folder / 'local_costmap_params.yaml'}:4): there twice; YAML takes"
-        " the last one"
+        f"local_costmap/width ({folder / 'local_costmap_params.yaml'}:4): set twice; YAML uses"
+        " the last value"
     ]
 
 

@@ -94,29 +94,29 @@ def test_carrot_has_the_footprint_in_force():
         (
             {**SEARCH, "GlobalPlanner": {"default_tolerance": 0.5}},
             "ignored",
-            "GlobalPlanner/default_tolerance: ignored by move_base: the original reads it and never uses"
-            " it",
+            "GlobalPlanner/default_tolerance: ignored by move_base: read and never used",
         ),
         (
             {**SEARCH, "GlobalPlanner": {"use_djikstra": True}},
             "unknown",
-            "GlobalPlanner/use_djikstra: unknown, nothing reads it; did you mean use_dijkstra?",
+            "GlobalPlanner/use_djikstra: unknown parameter, nothing reads it; did you mean"
+            " use_dijkstra?",
         ),
         (
             {"base_global_planner": "GlobalPlanner"},
             "renamed",
-            "base_global_planner: GlobalPlanner is called global_planner/GlobalPlanner today",
+            "base_global_planner: GlobalPlanner is an old name of global_planner/GlobalPlanner",
         ),
         (
             {"base_global_planner": "sbpl/SBPLLatticePlanner"},
             "unsupported",
-            "base_global_planner: sbpl/SBPLLatticePlanner is not supported here; navfn/NavfnROS flies"
-            " instead",
+            "base_global_planner: sbpl/SBPLLatticePlanner is not supported; using"
+            " navfn/NavfnROS instead",
         ),
         (
             {"TebLocalPlannerROS": {}},
             "unsupported",
-            "TebLocalPlannerROS: no such planner flies here, nothing below is read",
+            "TebLocalPlannerROS: planner not supported; its parameters are not read",
         ),
     ],
     ids=str,
@@ -156,8 +156,7 @@ def test_turns_take_their_limits_from_the_trajectory_planner_when_it_does_not_fl
         (
             "unused",
             "/nav/TrajectoryPlannerROS: unused: base_local_planner is"
-            " dwa_local_planner/DWAPlannerROS; recoveries that turn take its limits all the"
-            " same",
+            " dwa_local_planner/DWAPlannerROS; rotate_recovery still reads its limits",
         )
     ]
     assert "TrajectoryPlannerROS" not in reconfigurable(configuration)
@@ -198,15 +197,15 @@ def test_local_planner_is_reconfigurable_beside_any_global_one():
 
 def test_planners_without_reconfigurable_parameters():
     for name in ("NavfnROS", "CarrotPlanner"):
-        with pytest.raises(InputError, match=f"^{name}: nothing to reconfigure"):
+        with pytest.raises(InputError, match=f"^{name}: not reconfigurable"):
             updated(load({"base_global_planner": name}), name, {})
 
 
 def test_a_planner_cannot_be_exchanged_in_flight():
     with pytest.raises(
         InputError,
-        match="^base_global_planner: 'navfn/NavfnROS' cannot take over"
-        " in flight; expected global_planner/GlobalPlanner$",
+        match="^base_global_planner: planners cannot change in flight, got 'navfn/NavfnROS';"
+        " expected global_planner/GlobalPlanner$",
     ):
         updated(load(SEARCH), "", {"base_global_planner": "navfn/NavfnROS"})
     same = updated(load(SEARCH), "", {**SEARCH, "planner_frequency": 1.0})
@@ -215,8 +214,8 @@ def test_a_planner_cannot_be_exchanged_in_flight():
 
 def test_a_choice_that_is_none():
     for value, expected in (
-        (3, "3 is not a text; expected a plugin's name"),
-        (None, "None is not a text; expected a plugin's name"),
+        (3, "3 is not a string; expected a plugin's name"),
+        (None, "None is not a string; expected a plugin's name"),
     ):
         with pytest.raises(InputError, match=expected):
             load({"base_global_planner": value})

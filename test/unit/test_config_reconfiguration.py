@@ -171,11 +171,11 @@ def test_changes_that_cannot_be_made_are_all_told_and_none_is_made(configuration
             },
         )
     assert caught.value.problems == [
-        "controller_frequency: 0.0 cannot be; expected a positive number of Hz",
+        "controller_frequency: 0.0 is out of range; expected a positive number of Hz",
         "planner_patience: nan is not finite; expected a number of seconds, 0 or more",
-        "shutdown_costmaps: 1 is neither true nor false; expected true or false",
-        "base_local_planner: 'dwa_local_planner/DWAPlannerROS' cannot take over in flight;"
-        " expected base_local_planner/TrajectoryPlannerROS",
+        "shutdown_costmaps: 1 is not a boolean; expected true or false",
+        "base_local_planner: planners cannot change in flight, got"
+        " 'dwa_local_planner/DWAPlannerROS'; expected base_local_planner/TrajectoryPlannerROS",
     ]
     assert configuration.navigator.planner_frequency_hz == 0.0
 
@@ -223,9 +223,11 @@ def test_dwa_planner_is_refused_the_same(change, told):
 
 
 def test_names_and_namespaces_that_do_not_exist(configuration):
-    with pytest.raises(InputError, match="^TrajectoryPlannerROS/speed: unknown; expected one of"):
+    with pytest.raises(
+        InputError, match="^TrajectoryPlannerROS/speed: unknown parameter; expected one of"
+    ):
         updated(configuration, "TrajectoryPlannerROS", {"speed": 1.0})
-    with pytest.raises(InputError, match="^NavfnROS: nothing to reconfigure; expected one of"):
+    with pytest.raises(InputError, match="^NavfnROS: not reconfigurable; expected one of"):
         updated(configuration, "NavfnROS", {})
 
 

@@ -33,78 +33,83 @@ def slow(**parameters):
         (
             {"recovery_behaviour_enabled": True},
             "unknown",
-            "recovery_behaviour_enabled: unknown, nothing reads it; did you mean"
+            "recovery_behaviour_enabled: unknown parameter, nothing reads it; did you mean"
             " recovery_behavior_enabled?",
         ),
-        ({"zzz": 1}, "unknown", "zzz: unknown, nothing reads it"),
+        ({"zzz": 1}, "unknown", "zzz: unknown parameter, nothing reads it"),
         (
             planner(max_vel_y=0.0),
             "unknown",
-            "TrajectoryPlannerROS/max_vel_y: unknown, nothing reads it; did you mean max_vel_x?",
+            "TrajectoryPlannerROS/max_vel_y: unknown parameter, nothing reads it; did you mean"
+            " max_vel_x?",
         ),
         (
             planner(path_distance_bias=32.0),
             "clamped",
-            "TrajectoryPlannerROS/path_distance_bias: 32.0 becomes 5.0, the largest that move_base"
-            " allows",
+            "TrajectoryPlannerROS/path_distance_bias: 32.0 clamped to 5.0, the largest that"
+            " move_base allows",
         ),
         (
             planner(min_vel_theta=0.4),
             "clamped",
-            "TrajectoryPlannerROS/min_vel_theta: 0.4 becomes 0.0, the largest that move_base allows",
+            "TrajectoryPlannerROS/min_vel_theta: 0.4 clamped to 0.0, the largest that"
+            " move_base allows",
         ),
         (
             planner(vx_samples=0),
             "clamped",
-            "TrajectoryPlannerROS/vx_samples: 0 becomes 1, the smallest that move_base allows",
+            "TrajectoryPlannerROS/vx_samples: 0 clamped to 1, the smallest that move_base allows",
         ),
         (
             planner(vx_samples=6.5),
             "clamped",
-            "TrajectoryPlannerROS/vx_samples: 6.5 becomes 7: move_base takes whole numbers only",
+            "TrajectoryPlannerROS/vx_samples: 6.5 rounded to 7; expected a whole number",
         ),
         (
             planner(pdist_scale=2.0),
             "renamed",
-            "TrajectoryPlannerROS/pdist_scale: called path_distance_bias today",
+            "TrajectoryPlannerROS/pdist_scale: old name of path_distance_bias",
         ),
         (
             planner(pdist_scale=2.0, path_distance_bias=1.0),
             "ignored",
-            "TrajectoryPlannerROS/pdist_scale: ignored by move_base: path_distance_bias is there as well",
+            "TrajectoryPlannerROS/pdist_scale: ignored by move_base: path_distance_bias is set too",
         ),
         (
             planner(acc_limit_x=2.0),
             "ignored",
-            "TrajectoryPlannerROS/acc_limit_x: ignored by move_base: the name is acc_lim_x",
+            "TrajectoryPlannerROS/acc_limit_x: ignored by move_base: renamed to acc_lim_x",
         ),
         (
             planner(meter_scoring=False),
             "ignored",
-            "TrajectoryPlannerROS/meter_scoring: ignored by move_base: distances are always scored in"
+            "TrajectoryPlannerROS/meter_scoring: ignored by move_base: distances are always scored"
+            " in"
             " metres",
         ),
         (
             planner(world_model="costmap"),
             "unsupported",
-            "TrajectoryPlannerROS/world_model: known to move_base but not supported here: the costmap is"
+            "TrajectoryPlannerROS/world_model: not supported by this package: the costmap is"
             " the only world model",
         ),
         (
             planner(escape_vel=0.1),
             "caution",
-            "TrajectoryPlannerROS/escape_vel: the robot escapes forwards: a velocity below 0 backs up",
+            "TrajectoryPlannerROS/escape_vel: the robot escapes forwards; expected a negative"
+            " velocity, to back up",
         ),
         (
             {**planner(controller_frequency=20.0), "controller_frequency": 5.0},
             "caution",
-            "TrajectoryPlannerROS/controller_frequency: rollouts assume 20.0 Hz, but the control loop runs"
+            "TrajectoryPlannerROS/controller_frequency: rollouts assume 20.0 Hz, but the control"
+            " loop runs"
             " at 5.0 Hz",
         ),
         (
             {"TebLocalPlannerROS": {"max_vel_x": 1.0}},
             "unsupported",
-            "TebLocalPlannerROS: no such planner flies here, nothing below is read",
+            "TebLocalPlannerROS: planner not supported; its parameters are not read",
         ),
         (
             {"DWAPlannerROS": {"max_vel_x": 1.0}},
@@ -114,86 +119,89 @@ def slow(**parameters):
         (
             {"base_local_planner": "teb_local_planner/TebLocalPlannerROS"},
             "unsupported",
-            "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported here;"
-            " base_local_planner/TrajectoryPlannerROS flies instead",
+            "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported; using"
+            " base_local_planner/TrajectoryPlannerROS instead",
         ),
         (
             {"base_global_planner": "NavfnROS"},
             "renamed",
-            "base_global_planner: NavfnROS is called navfn/NavfnROS today",
+            "base_global_planner: NavfnROS is an old name of navfn/NavfnROS",
         ),
         (
             {"aggressive_reset": {"reset_distance": 0.5}},
             "ignored",
-            "aggressive_reset/reset_distance: ignored by move_base: without recovery_behaviors it is"
+            "aggressive_reset/reset_distance: ignored by move_base: without recovery_behaviors it"
+            " is"
             " 1.84",
         ),
         (
             {"recovery_behaviors": [{"name": "back", "type": "twist_recovery/TwistRecovery"}]},
             "unsupported",
-            "recovery_behaviors/back: twist_recovery/TwistRecovery is not supported here, the"
-            " behaviour is left out; there are clear_costmap_recovery/ClearCostmapRecovery,"
+            "recovery_behaviors/back: twist_recovery/TwistRecovery is not supported, skipping"
+            " this behaviour; expected one of clear_costmap_recovery/ClearCostmapRecovery,"
             " rotate_recovery/RotateRecovery, move_slow_and_clear/MoveSlowAndClear",
         ),
         (
             slow(planner_namespace="DWAPlannerROS", max_trans_param_name="max_vel_trans"),
             "caution",
-            "slow/planner_namespace: DWAPlannerROS does not fly here: TrajectoryPlannerROS is limited",
+            "slow/planner_namespace: DWAPlannerROS is not the local planner; limiting"
+            " TrajectoryPlannerROS instead",
         ),
         (
             slow(max_rot_param_name="max_vel_thet"),
             "caution",
-            "slow/max_rot_param_name: TrajectoryPlannerROS has no speed of the name max_vel_thet; did you"
-            " mean max_vel_theta?",
+            "slow/max_rot_param_name: TrajectoryPlannerROS has no speed parameter"
+            " max_vel_thet; did you mean max_vel_theta?",
         ),
         (
             slow(limited_speed=0.1),
             "unknown",
-            "slow/limited_speed: unknown, nothing reads it; did you mean limited_rot_speed?",
+            "slow/limited_speed: unknown parameter, nothing reads it; did you mean"
+            " limited_rot_speed?",
         ),
         (
             {"local_costmap": {**SEEING, "plugins": []}},
             "ignored",
-            "local_costmap/observation_sources: ignored by move_base: with plugins it belongs below the"
-            " obstacle layer's name",
+            "local_costmap/observation_sources: ignored by move_base: with plugins, expected"
+            " in the obstacle layer's namespace",
         ),
         (
             {"local_costmap": {"plugins": [], "inflation_radius": 1.0}},
             "ignored",
-            "local_costmap/inflation_radius: ignored by move_base: no costmap_2d::InflationLayer in"
-            " plugins takes it",
+            "local_costmap/inflation_radius: ignored by move_base: plugins has no"
+            " costmap_2d::InflationLayer",
         ),
         (
             {"local_costmap": {"plugins": [], "inflater": {"inflation_radius": 1.0}}},
             "ignored",
-            "local_costmap/inflater: ignored by move_base: no layer of that name is in plugins",
+            "local_costmap/inflater: ignored by move_base: plugins has no layer of this name",
         ),
         (
             {"local_costmap": {"plugins": [], "static_map": True}},
             "ignored",
-            "local_costmap/static_map: ignored by move_base: plugins say which layers there are, and"
-            " costmap_2d::StaticLayer is not among them",
+            "local_costmap/static_map: ignored by move_base: plugins has no"
+            " costmap_2d::StaticLayer",
         ),
         (
             {"local_costmap": {}},
             "caution",
-            "local_costmap: no map and no observation_sources: there are no obstacles in this costmap",
+            "local_costmap: no map and no observation_sources: this costmap never has obstacles",
         ),
         (
             {"local_costmap": {**SEEING, "obstacle_layer": {"rear": {"topic": "scan1"}}}},
             "caution",
-            "local_costmap/obstacle_layer/rear: looks like a source, and observation_sources does not"
-            " name it: nothing reads it",
+            "local_costmap/obstacle_layer/rear: looks like a source, but observation_sources"
+            " does not list it; not read",
         ),
         (
             {"local_costmap": {"observation_sources": "scan", "scan": {"topic": "scan0"}}},
             "caution",
-            "local_costmap/scan: no data_type: move_base listens for a PointCloud",
+            "local_costmap/scan: no data_type: move_base subscribes to a PointCloud",
         ),
         (
             {"local_costmap": {**SEEING, "inflation_layer": {"robot_radius": 0.3}}},
             "unknown",
-            "local_costmap/inflation_layer/robot_radius: unknown, nothing reads it",
+            "local_costmap/inflation_layer/robot_radius: unknown parameter, nothing reads it",
         ),
     ],
     ids=str,

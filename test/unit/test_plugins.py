@@ -190,7 +190,7 @@ def test_missing_parameter_is_told_with_its_place(tree):
 def test_layers_switch_has_to_be_one(tree):
     tree["global_costmap"]["pond"] = {"enabled": "no"}
     assert problems(tree) == [
-        "/nav/global_costmap/pond/enabled: 'no' is neither true nor false; expected true or false"
+        "/nav/global_costmap/pond/enabled: 'no' is not a boolean; expected true or false"
     ]
 
 
@@ -215,10 +215,10 @@ def test_what_is_not_there(package):
             "base_local_planner": "my_package.nowhere.Mine",
         }
     ) == [
-        "/nav/base_local_planner: there is no module my_package.nowhere; expected"
-        " package.module.Class with the package's folder in PYTHONPATH",
-        "/nav/base_global_planner: there is no module no_such_package; expected"
-        " package.module.Class with the package's folder in PYTHONPATH",
+        "/nav/base_local_planner: no module my_package.nowhere; expected package.module.Class"
+        " with the package's folder in PYTHONPATH",
+        "/nav/base_global_planner: no module no_such_package; expected package.module.Class"
+        " with the package's folder in PYTHONPATH",
     ]
     [line] = problems({"base_global_planner": "my_package.planners.Mine"})
     assert re.fullmatch(
@@ -241,7 +241,7 @@ def test_what_is_not_there(package):
 def test_module_that_cannot_be_imported(package, source, complaint):
     package("broken.py", source)
     [line] = problems({"base_global_planner": "my_package.broken.Mine"})
-    assert line.startswith("/nav/base_global_planner: my_package.broken cannot be imported: ")
+    assert line.startswith("/nav/base_global_planner: cannot import my_package.broken: ")
     assert re.search(complaint, line)
 
 

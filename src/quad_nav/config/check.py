@@ -1,4 +1,4 @@
-"""What is to be said about somebody's move_base parameters, as a table: ``quad check``."""
+"""Check a configuration and report its faults and remarks as a table: ``quad check``."""
 
 from __future__ import annotations
 
@@ -20,37 +20,48 @@ from quad_nav.errors import InputError
 _COSTMAPS = ("global_costmap/", "local_costmap/")
 _BOTH = "*_costmap/"
 _GAP = 2  # characters between the columns of a table
-_ROOM = 50  # characters for place and what, below which there is no column of nearest names
+_ROOM = 50  # least characters of parameter and message beside a column of nearest names
 
 
 @dataclass(frozen=True)
 class Report:
-    """One set of files: every fault first, then every remark; what a common file brings into
-    both costmaps once."""
+    """Faults and remarks of one set of files.
+
+    Faults come first. A fault or remark on both costmaps that comes from one file is one line.
+    """
 
     files: FileSet
     lines: Tuple[Remark, ...]
 
     @property
     def errors(self) -> int:
+        """Number of faults."""
         return sum(line.kind == ERROR for line in self.lines)
 
     @property
     def warnings(self) -> int:
+        """Number of remarks."""
         return len(self.lines) - self.errors
 
 
 def check_folder(folder: Path, number: Optional[str] = None) -> Tuple[List[Report], List[Path]]:
-    """A report on every set of files in a folder, and the YAML files that are in none.
+    """Check every set of files in a folder.
+
+    Args:
+        folder: The folder; folders below it are searched too.
+        number: Number of the robot; None for every robot that has files of its own.
+
+    Returns:
+        A report for each set, and the YAML files that are in none of them.
 
     Raises:
-        InputError: there are no move_base parameters in the folder.
+        InputError: The folder has no move_base parameters.
     """
     sets, left = file_sets(folder, number)
     if not sets:
         raise InputError(
             [
-                f"{folder}: no move_base parameters in it; expected files such as"
+                f"{folder}: no move_base parameters found; expected files such as"
                 " costmap_common_params.yaml"
             ]
         )
@@ -58,12 +69,12 @@ def check_folder(folder: Path, number: Optional[str] = None) -> Tuple[List[Repor
 
 
 def check_files(files: Sequence[PlacedFile], number: Optional[str] = None) -> Report:
-    """A report on files that are loaded in this order."""
+    """Check files that are loaded in this order."""
     return check_set(FileSet(None, "", tuple(files), number or "0"))
 
 
 def check_set(file_set: FileSet) -> Report:
-    """Loads a set as a navigator would, and keeps all that was said."""
+    """Load a set as a navigator does and collect the faults and remarks."""
     substitutions = {"i": file_set.number}
     faults: List[Remark] = []
     readable = []
@@ -78,19 +89,19 @@ def check_set(file_set: FileSet) -> Report:
     except ParameterError as error:
         faults += error.faults
         remarks = error.remarks
-    # Without the files that cannot be read it can't be known what else is odd.
+    # Remarks mean nothing while some of the files are missing from the tree.
     lines = faults if len(readable) < len(file_set.files) else [*faults, *remarks]
     return Report(file_set, tuple(_merged(lines)))
 
 
 def _fault_of_file(problem: str) -> Remark:
-    """Faults in the writing of a file begin with its name and line."""
+    """Convert a syntax error, which begins with the file's name and line."""
     origin, _, text = problem.partition(": ")
     return Remark("", ERROR, text, origin)
 
 
 def report_text(report: Report, width: int = 100) -> str:
-    """The report with its heading and its files, in at most ``width`` columns."""
+    """Format a report with its heading and files, in at most ``width`` columns."""
     files = report.files
     names = ", ".join(_seen_from(_root(files), str(file.path)) for file in files.files)
     parts = [
@@ -110,7 +121,7 @@ def report_text(report: Report, width: int = 100) -> str:
 
 
 def counts(reports: Sequence[Report]) -> str:
-    """As in "no errors, 1 remark"."""
+    """Format the counts of reports, such as "no errors, 1 remark"."""
     errors, remarks = sum(r.errors for r in reports), sum(r.warnings for r in reports)
     return ", ".join(
         f"{number or 'no'} {noun}{'s' * (number != 1)}"
@@ -119,11 +130,16 @@ def counts(reports: Sequence[Report]) -> str:
 
 
 def table(lines: Sequence[Remark], root: str, width: int) -> str:
-    """Place, kind, what, and the nearest known name if there is any and room for it.
+    """Format faults and remarks as a table.
 
-    Files are named as they are seen from the folder ``root``.
+    The columns are place, kind, text, and the nearest known name if it fits.
+
+    Args:
+        lines: The faults and remarks.
+        root: Folder that paths of files are relative to.
+        width: Width of the table in characters.
     """
-    header = ["place", "kind", "what", "nearest name"]
+    header = ["parameter", "kind", "message", "nearest name"]
     kinds = _widest(header[1], [line.kind for line in lines])
     nearest = _widest(header[3], [line.nearest for line in lines])
     left = width - kinds - nearest - 3 * _GAP
@@ -138,7 +154,7 @@ def table(lines: Sequence[Remark], root: str, width: int) -> str:
         ]
     whats = _widest(header[2], [_what(line) for line in lines])
     places = _widest(header[0], [part for line in lines for part in _place(line, root, left)])
-    # As wide as its longest piece that cannot be cut, and then as much as fits into that.
+    # The column is at least as wide as its longest piece, then as wide as fits.
     place = min(places, max(left // 2, left - whats))
     for _ in range(2):
         cells = [_place(line, root, place) for line in lines]
@@ -159,7 +175,7 @@ def _widest(header: str, cells: Sequence[str]) -> int:
 
 
 def _place(line: Remark, root: str, width: int) -> List[str]:
-    """The parameter's path and below it its file and line, cut at slashes where too long."""
+    """Wrap the parameter's path, and file and line below it, at slashes."""
     path = _wrapped_path(line.place.lstrip("/"), width)
     if not line.origin:
         return path
@@ -176,15 +192,15 @@ def _wrapped_path(path: str, width: int) -> List[str]:
 
 
 def _what(line: Remark) -> str:
-    """The text without its kind, which stands beside it."""
-    for prefix in (f"{line.kind}, ", f"{line.kind}: ", f"{line.kind} by move_base: "):
+    """Return the text without its kind, which has a column of its own."""
+    for prefix in (f"{line.kind}: ", f"{line.kind} parameter, ", f"{line.kind} by move_base: "):
         if line.text.startswith(prefix):
             return line.text[len(prefix) :]
     return line.text
 
 
 def _merged(lines: Sequence[Remark]) -> List[Remark]:
-    """What a common file brings into both costmaps is told once."""
+    """Merge lines that one file causes in both costmaps."""
     merged: Dict[Tuple[str, ...], Remark] = {}
     for line in lines:
         place = line.place.lstrip("/")
@@ -211,7 +227,7 @@ def _title(files: FileSet) -> str:
 
 
 def _root(files: FileSet) -> str:
-    """The folder that holds all files of a set that was found; files given keep their names."""
+    """Return the folder of all files of a set, "" for files that were named."""
     if files.folder is None:
         return ""
     return os.path.commonpath([file.path.parent for file in files.files])

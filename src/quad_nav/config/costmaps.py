@@ -1,10 +1,9 @@
-"""The trees of ``global_costmap`` and ``local_costmap``.
+"""Namespaces of ``global_costmap`` and ``local_costmap``.
 
-Two styles are in use. With a ``plugins`` list each layer has a namespace of its
-name. Without one, layer parameters stand among the costmap's own (before ROS
-Hydro) and move_base moves them: ``observation_sources`` and the sources below
-``obstacle_layer``, ``inflation_radius`` below ``inflation_layer``, and so on.
-In both styles some parameters of the costmap replace the layer's.
+There are two styles. With a ``plugins`` list each layer has a namespace of its name. Without it (as
+before ROS Hydro) layer parameters are among the costmap's own, and move_base moves them:
+``observation_sources`` and the sources to ``obstacle_layer``, ``inflation_radius`` to
+``inflation_layer``, and so on. In both styles some parameters of the costmap override the layer's.
 """
 
 from __future__ import annotations
@@ -28,10 +27,12 @@ _OLD_STYLE = ("static_map", "map_type")
 
 
 def normalise_costmap(tree: Namespace, name: str, notes: Notes) -> None:
-    """Brings ``tree[name]`` into the state in which the original leaves it.
+    """Normalise a costmap's namespace as move_base does.
 
     Args:
-        tree: the node's tree; footprints and ranges may be inherited from it.
+        tree: The node's tree; the costmap inherits footprint and ranges from it.
+        name: ``global_costmap`` or ``local_costmap``.
+        notes: Receives faults and remarks.
     """
     costmap = subtree(tree, name, "", notes)
     _normalise_footprint(costmap, name, tree, notes)
@@ -41,7 +42,7 @@ def normalise_costmap(tree: Namespace, name: str, notes: Notes) -> None:
     _remark_on_old_style(costmap, name, [layer_type for _, layer_type in plugins], notes)
     for layer, _ in plugins:
         if layer in _OLD_STYLE and not isinstance(costmap.get(layer), dict):
-            costmap.pop(layer, None)  # a parameter server replaces it by the layer's namespace
+            costmap.pop(layer, None)  # the layer's namespace replaces it
     for layer, layer_type in plugins:
         _copy_parent_parameters(costmap, name, layer, layer_type, notes)
     chain = ((name, costmap), ("", tree))
@@ -55,7 +56,7 @@ def normalise_costmap(tree: Namespace, name: str, notes: Notes) -> None:
 
 
 def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
-    """The dataclass of the costmap of that name in a normalised tree."""
+    """Make the dataclass of a costmap from a normalised tree."""
     costmap = tree[name]
     layers = []
     for plugin in costmap["plugins"]:
@@ -66,7 +67,7 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
 
 
 def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
-    """A costmap that nothing writes to is legal, and flies into things."""
+    """Add a remark on a costmap that no layer writes obstacles to."""
     if not any(
         isinstance(layer, (StaticLayerParams, PluginLayerParams))
         or isinstance(layer, ObstacleLayerParams)
@@ -76,12 +77,12 @@ def remark_on_blindness(params: CostmapParams, name: str, notes: Notes) -> None:
         notes.remark(
             name,
             CAUTION,
-            "no map and no observation_sources: there are no obstacles in this costmap",
+            "no map and no observation_sources: this costmap never has obstacles",
         )
 
 
 def _normalise_footprint(costmap: Namespace, name: str, tree: Namespace, notes: Notes) -> None:
-    """Footprint and radius may stand at the node's level; a list becomes a text."""
+    """Inherit footprint and radius from the node's level; convert a list to a string."""
     for key in ("footprint", "robot_radius"):
         if key not in costmap and key in tree:
             costmap[key] = tree[key]
@@ -100,13 +101,13 @@ def _normalise_footprint(costmap: Namespace, name: str, tree: Namespace, notes: 
 
 
 def _normalise_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
-    """Writes the plugins list of a costmap that has none, and moves the layers' parameters."""
+    """Add the plugins list to a costmap without one, and move the layers' parameters."""
     plugins: List[Tuple[str, str]] = []
     static_map = costmap.get("static_map", False)
     if not isinstance(static_map, bool):
         notes.problem(
             join(name, "static_map"),
-            f"{static_map!r} is neither true nor false; expected true or false",
+            f"{static_map!r} is not a boolean; expected true or false",
         )
     elif static_map:
         plugins.append(("static_layer", STATIC))
@@ -126,14 +127,13 @@ def _normalise_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
 
 
 def _remark_on_old_style(costmap: Namespace, name: str, types: List[str], notes: Notes) -> None:
-    """Old switches that promise a layer which plugins do not have."""
+    """Add remarks on old switches for layers that ``plugins`` does not list."""
     for key, value, promised in (("static_map", True, STATIC), ("map_type", "voxel", VOXEL)):
         if costmap.get(key) == value and promised not in types:
             notes.remark(
                 join(name, key),
                 IGNORED,
-                "ignored by move_base: plugins say which layers"
-                f" there are, and {promised} is not among them",
+                f"ignored by move_base: plugins has no {promised}",
             )
 
 
@@ -150,7 +150,7 @@ def _copy_parent_parameters(
             notes.remark(
                 join(name, layer, key),
                 IGNORED,
-                f"ignored by move_base: {join(name, key)} replaces it",
+                f"ignored by move_base: {join(name, key)} overrides it",
             )
         _move(costmap, name, layer, key, notes, keep=True)
 
@@ -166,7 +166,7 @@ def _move(costmap: Namespace, name: str, layer: str, key: str, notes: Notes, kee
 
 
 def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[str, str]]:
-    """(name, type) of each layer; what cannot be one is a problem or a remark."""
+    """Return (name, type) of each layer; report entries that are not supported."""
     place = join(name, "plugins")
     plugins = costmap["plugins"]
     if not isinstance(plugins, list):
@@ -177,9 +177,9 @@ def _checked_plugins(costmap: Namespace, name: str, notes: Notes) -> List[Tuple[
         if not isinstance(entry, dict) or not all(
             isinstance(entry.get(key), str) for key in ("name", "type")
         ):
-            notes.problem(place, f"{entry!r} is no layer; expected {{name: , type: }}")
+            notes.problem(place, f"{entry!r} is not a layer; expected {{name: , type: }}")
         elif entry["name"] in dict(checked):
-            notes.problem(place, f"{entry['name']!r} is there twice; expected a name for each")
+            notes.problem(place, f"{entry['name']!r} is used twice; expected unique names")
         else:
             checked.append((entry["name"], entry["type"]))
             _remark_on_type(join(place, entry["name"]), entry["type"], notes)
@@ -191,23 +191,23 @@ def _remark_on_type(place: str, layer_type: str, notes: Notes) -> None:
         notes.remark(
             place,
             UNSUPPORTED,
-            f"{layer_type} is not supported here, the layer is left"
-            f" out; there are {', '.join(sorted(LAYERS))}",
+            f"{layer_type} is not supported, skipping this layer; expected one of"
+            f" {', '.join(sorted(LAYERS))}",
         )
 
 
 def _table_with_misplaced(costmap: Namespace, known: Set[str]) -> Table:
-    """COSTMAP, and among its ignored keys those of layers that are not there to take them."""
+    """Return the costmap's table, with keys of layers that are not listed as ignored keys."""
     misplaced: Dict[str, str] = {}
     for layer_type, keys in PARENT_PARAMETERS.items():
         for key in set(keys) - known:
-            misplaced[key] = f"no {layer_type} in plugins takes it"
+            misplaced[key] = f"plugins has no {layer_type}"
     if "observation_sources" in costmap:
-        reason = "with plugins it belongs below the obstacle layer's name"
+        reason = "with plugins, expected in the obstacle layer's namespace"
         for key in ("observation_sources", *str(costmap["observation_sources"]).split()):
             misplaced[key] = reason
     for key, value in costmap.items():
         if isinstance(value, dict) and key not in known:
-            misplaced.setdefault(key, "no layer of that name is in plugins")
+            misplaced.setdefault(key, "plugins has no layer of this name")
     base = COSTMAP_TABLE
     return Table(base.reconfigurable, base.fixed, base.unsupported, tuple(misplaced.items()))

@@ -1,4 +1,4 @@
-"""What a parameter tree sets otherwise than the original would have it."""
+"""Parameters of a tree that differ from move_base's defaults."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 
 @dataclass(frozen=True)
 class Difference:
-    """A parameter that has another value than the default; ``path`` from the node's level."""
+    """Parameter that differs from its default; ``path`` starts at the node's level."""
 
     path: str
     value: Any
@@ -30,11 +30,13 @@ class Difference:
 
 
 def differences(tree: Mapping[str, Any]) -> Tuple[Difference, ...]:
-    """Every parameter of a normalised tree (``Configuration.to_tree``) that is not at its default.
+    """List the parameters of a normalised tree that differ from their defaults.
 
-    Parameters of the user's own planners, layers and behaviours have no known
-    default and are left out, and so are the distances of the default recoveries,
-    which follow from other parameters.
+    Parameters of plugins have no known default and are left out. So are the distances of the
+    default recoveries, which follow from other parameters.
+
+    Args:
+        tree: A tree of ``Configuration.to_tree``.
     """
     return tuple(
         difference
@@ -52,7 +54,7 @@ def _differences(path: str, table: Table, namespace: Mapping[str, Any]) -> Itera
 
 
 def _namespaces(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
-    """(path, table, parameters) of each namespace whose parameters are known."""
+    """Yield (path, table, parameters) of each namespace whose parameters are known."""
     yield "", MOVE_BASE_TABLE, tree
     for key in SLOTS:
         planner = planner_type(tree, key) if key in tree else None

@@ -1,11 +1,10 @@
-"""Which YAML files of somebody's folder are flown together.
+"""Find the sets of YAML files in a folder that belong to one robot each.
 
-A folder with the four files that this package's launch files load is one set, or
-one for each robot that has files of its own. Elsewhere people have other names, a
-file for each of several robots or maps beside each other, and folders of changes
-below a common one. So files are told apart by name and content; files of the same
-kind in one folder are alternatives, of which each set holds one; and a folder's
-files are loaded after those of the folders above it.
+A folder with the four files of this package's launch files is one set, or one for each robot that
+has files of its own. Other folders have other file names, a file for each of several robots or
+maps, and folders of changes below a common one. Their files are classified by name and content.
+Files of the same kind in one folder are alternatives: each set has one of them. A folder's files
+are loaded after those of the folders above it.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ _OF_COSTMAP = {
     )
     for parameter in table.parameters
 } | {"plugins", "map_type", "static_map"}
-# Names that other nodes have as well do not make a costmap's file.
+# Parameters that only costmaps have.
 _OF_COSTMAP_ONLY = {
     "plugins",
     "observation_sources",
@@ -56,17 +55,20 @@ _OF_COSTMAP_ONLY = {
 _OF_ONE_COSTMAP = {"rolling_window", "static_map", "global_frame", "width"}
 _NUMBERED = re.compile(f"(?:{'|'.join(REQUIRED + OPTIONAL)}|robot)([0-9]+)")
 
-# The order in which kinds are loaded; what a kind is, is (order, more).
+# A kind is (order of loading, more).
 _COMMON, _ONE_COSTMAP, _NODE = 0, 1, 2
 Kind = Tuple[int, Tuple[str, ...]]
 
 
 @dataclass(frozen=True)
 class FileSet:
-    """Files of one robot in the order in which they are loaded.
+    """Files of one robot, in the order of loading.
 
-    ``folder``: where they were found, None for files that were given. ``name``: which set
-    of the folder, "" for its only one. ``number``: the robot's, for ``$(arg i)``.
+    Attributes:
+        folder: Folder that was searched, None for files that were named.
+        name: Name of the set in its folder, "" for the only one.
+        files: The files.
+        number: Number of the robot, for ``$(arg i)``.
     """
 
     folder: Optional[Path]
@@ -82,14 +84,18 @@ class _KnownFile:
 
 
 def file_sets(top: Path, number: Optional[str] = None) -> Tuple[List[FileSet], List[Path]]:
-    """The sets in a folder and the folders below it, and YAML files that are in none.
+    """Find the sets in a folder and in the folders below it.
 
     Args:
-        number: the robot; None for every robot that has files of its own.
+        top: The folder.
+        number: Number of the robot; None for every robot that has files of its own.
+
+    Returns:
+        The sets, and the YAML files that are in none of them.
     """
     sets: List[FileSet] = []
     left: List[Path] = []
-    above: Dict[Path, List[_KnownFile]] = {}  # with the files of the folders further up
+    above: Dict[Path, List[_KnownFile]] = {}  # with the files of the enclosing folders
     for folder, paths in _folders(top):
         standard = _standard_sets(folder, number)
         if standard:
@@ -109,7 +115,7 @@ def file_sets(top: Path, number: Optional[str] = None) -> Tuple[List[FileSet], L
 
 
 def _folders(top: Path) -> List[Tuple[Path, List[Path]]]:
-    """Every folder that is not hidden, parents first, with its YAML files."""
+    """List every folder that is not hidden, parents first, with its YAML files."""
     found = []
     for name, below, files in os.walk(top):
         below[:] = sorted(folder for folder in below if not folder.startswith("."))
@@ -149,11 +155,11 @@ def _known(paths: Sequence[Path], number: str) -> List[_KnownFile]:
 
 
 def _placed(path: Path, number: str) -> Optional[_KnownFile]:
-    """What a file is by name and content; None when it is not move_base's."""
+    """Classify a file by name and content; None if it is not one of move_base."""
     named = costmaps_named(path)
     try:
         values = top_level(path, {"i": number})
-    except InputError:  # its faults are told when the set is loaded
+    except InputError:  # check_set reports its faults
         by_name = named or "move_base" in path.stem or "planner" in path.stem
         return _known_file(path, named, {path.stem}) if by_name else None
     keys = set(values)
@@ -179,14 +185,14 @@ def _kind_of(costmaps: Tuple[str, ...], keys: Set[str]) -> Kind:
 
 
 def _costmaps_meant(values: Mapping[str, Any]) -> Tuple[str, ...]:
-    """A costmap's file whose name does not say which: the one that moves is the local one."""
+    """Guess the costmaps of a file from its content: the rolling one is the local costmap."""
     if not _OF_ONE_COSTMAP.intersection(values):
         return _COSTMAPS
     return ("local_costmap",) if values.get("rolling_window") is True else ("global_costmap",)
 
 
 def _sets_of(folder: Path, files: Sequence[_KnownFile], number: Optional[str]) -> List[FileSet]:
-    """One set for each name that alternatives go by."""
+    """Make one set for each name of alternatives."""
     groups: Dict[Tuple[Kind, Path], List[PlacedFile]] = {}
     for one in files:
         groups.setdefault((one.kind, one.file.path.parent), []).append(one.file)
@@ -207,7 +213,7 @@ def _sets_of(folder: Path, files: Sequence[_KnownFile], number: Optional[str]) -
 
 
 def _alternatives(files: Sequence[PlacedFile]) -> Dict[str, PlacedFile]:
-    """Files of one kind by what their names do not have in common: whole words or numbers."""
+    """Return name -> file; a name is the part of whole words or numbers that differs."""
     stems = [file.path.stem for file in files]
     cut = len(os.path.commonprefix(stems))
     if not all(stem[cut:].isdigit() for stem in stems):

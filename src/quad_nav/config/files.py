@@ -1,9 +1,9 @@
-"""A robot's YAML files, read offline as the launch files load them.
+"""Read a robot's YAML files as the launch files load them, without ROS.
 
-``costmap_common_params`` goes into both costmaps; the others hold their own
-namespaces, or stand at the node's level. Later files win, key by key. Files may
-be numbered by hand (``costmap_common_params0.yaml``) or be one template in which
-roslaunch puts the robot's number for ``$(arg i)``.
+``costmap_common_params`` goes into both costmaps. The other files name their namespaces, or are at
+the node's level. Later files override earlier ones key by key. Files are numbered by hand
+(``costmap_common_params0.yaml``), or they are one template in which roslaunch replaces ``$(arg i)``
+by the robot's number.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ _SUBSTITUTION = re.compile(r"\$\(([^)]*)\)")
 
 @dataclass(frozen=True)
 class PlacedFile:
-    """A file and the namespaces below which it is loaded; "" is the node's level.
+    """File and the namespaces that it is loaded into; "" is the node's level.
 
-    Without any, its name and its keys say which: a costmap's own file may leave its
-    namespace to roslaunch.
+    Without namespaces they follow from the file's name and keys: the file of a costmap may leave
+    the namespace to roslaunch.
     """
 
     path: Path
@@ -44,9 +44,11 @@ FileName = Union[str, Path, PlacedFile]
 
 
 class ParameterTree(Dict[str, Any]):
-    """A tree that knows where its values were written.
+    """Parameter tree with the origin of its values.
 
-    ``origins``: path -> "file:line". ``remarks``: what was odd about the files.
+    Attributes:
+        origins: Path -> "file:line".
+        remarks: Remarks on the files.
     """
 
     def __init__(self) -> None:
@@ -58,31 +60,21 @@ class ParameterTree(Dict[str, Any]):
 def load_files(
     source: Union[str, Path, Sequence[FileName]], substitutions: Optional[Mapping[str, str]] = None
 ) -> ParameterTree:
-    """The parameter tree of one robot.
+    """Load the parameter tree of one robot.
 
     Args:
-        source: a folder with the four files (and ``move_base_params.yaml`` and
-            ``robot{i}.yaml`` if there are such), or a list of files, whose order
-            is kept. In a folder a file with the robot's number goes before one
-            without.
-        substitutions: what ``$(arg name)`` stands for; ``{"i": "0"}``.
+        source: A folder with the four files, and optionally ``move_base_params.yaml`` and
+            ``robot{i}.yaml``; or a list of files in the order of loading. In a folder a file
+            with the robot's number replaces the one without.
+        substitutions: Values of ``$(arg name)``, such as ``{"i": "0"}``.
 
     Raises:
-        InputError: every file that is missing or cannot be read, with its line.
+        InputError: One line for every file that is missing or cannot be read.
     """
     arguments = {} if substitutions is None else dict(substitutions)
-    if isinstance(source, (str, Path)):
-        files = [
-            PlacedFile(path, _COSTMAPS if path.name.startswith(COMMON) else ("",))
-            for path in files_of(Path(source), arguments.get("i"))
-        ]
-    else:
-        files = [
-            file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ()) for file in source
-        ]
     tree = ParameterTree()
     problems: List[str] = []
-    for file in files:
+    for file in _placed_files(source, arguments):
         try:
             document = _read(file.path, arguments)
         except InputError as error:
@@ -92,28 +84,39 @@ def load_files(
             _merge(tree, document, namespace)
         for line, key in document.duplicates:
             tree.remarks.append(
-                Remark(key, CAUTION, "there twice; YAML takes the last one", f"{file.path}:{line}")
+                Remark(key, CAUTION, "set twice; YAML uses the last value", f"{file.path}:{line}")
             )
     if problems:
         raise InputError(problems)
     return tree
 
 
+def _placed_files(
+    source: Union[str, Path, Sequence[FileName]], arguments: Mapping[str, str]
+) -> List[PlacedFile]:
+    if isinstance(source, (str, Path)):
+        return [
+            PlacedFile(path, _COSTMAPS if path.name.startswith(COMMON) else ("",))
+            for path in files_of(Path(source), arguments.get("i"))
+        ]
+    return [file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ()) for file in source]
+
+
 def set_value(tree: ParameterTree, path: str, value: Any, origin: str) -> None:
-    """Sets one parameter, as a file loaded last would; ``path`` as ``global_costmap/width``."""
+    """Set one parameter as a file loaded last does; ``path`` is like ``global_costmap/width``."""
     keys = tuple(key for key in path.split("/") if key)
     _namespace(tree, keys[:-1])[keys[-1]] = value
     tree.origins["/".join(keys)] = origin
 
 
 def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
-    """The files of a robot in a folder, in the order in which they are loaded.
+    """List the files of a robot in a folder, in the order of loading.
 
     Raises:
-        InputError: the folder, or one of the four files, is missing.
+        InputError: The folder or one of the four files is missing.
     """
     if not folder.is_dir():
-        raise InputError([f"{folder}: no such folder; expected one with {REQUIRED[0]}.yaml"])
+        raise InputError([f"{folder}: no such folder; expected a folder with {REQUIRED[0]}.yaml"])
     paths: List[Path] = []
     problems: List[str] = []
     for stem in REQUIRED + OPTIONAL:
@@ -123,7 +126,7 @@ def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
             paths.append(found[0])
         elif stem in REQUIRED:
             names = plain.name if number is None else f"{plain.name} or {numbered.name}"
-            problems.append(f"{folder}: no {names}")
+            problems.append(f"{folder}: missing {names}")
     if problems:
         raise InputError(problems)
     own = folder / f"robot{number}.yaml"
@@ -131,10 +134,10 @@ def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
 
 
 def top_level(path: Path, substitutions: Mapping[str, str]) -> Dict[str, Any]:
-    """The names and values at a file's top level; a namespace is {}, whatever is in it.
+    """Return the names and values at a file's top level; a namespace is ``{}``.
 
     Raises:
-        InputError: the file cannot be read.
+        InputError: The file cannot be read.
     """
     document = _read(path, substitutions)
     values = {path[0]: value for path, value in document.values if len(path) == 1}
@@ -142,7 +145,7 @@ def top_level(path: Path, substitutions: Mapping[str, str]) -> Dict[str, Any]:
 
 
 def costmaps_named(path: Path) -> Tuple[str, ...]:
-    """The costmaps that a file without their namespaces is meant for, by its name."""
+    """Return the costmaps that a file without their namespaces is for, by its name."""
     stem = path.stem.lower()
     if "costmap" not in stem:
         return ()
@@ -157,9 +160,9 @@ def _namespaces(document: _Document) -> Tuple[str, ...]:
 
 
 class _Document:
-    """One file: its values, the line of each path, and keys that are there twice."""
+    """Contents of a file: values, the line of each path, and keys that are set twice."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path) -> None:
         self.path = path
         self.values: List[Tuple[Tuple[str, ...], Any]] = []  # leaves, in order
         self.lines: Dict[Tuple[str, ...], int] = {}
@@ -171,7 +174,7 @@ class _Document:
         return list(dict.fromkeys(path[0] for path, _ in self.values))
 
     def enter(self, node: str) -> None:
-        """Keeps what is below a node's name, as in a dump of a parameter server."""
+        """Keep the namespace of a node, as in a dump of a parameter server."""
         self.values = [
             (path[1:], value) for path, value in self.values if path[0] == node and len(path) > 1
         ]
@@ -183,17 +186,17 @@ def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
     document = _Document(path)
     try:
         loader = PlainLoader(text)
-    except yaml.YAMLError as error:  # characters that no YAML may have
-        raise InputError([_told(error, path)]) from error
+    except yaml.YAMLError as error:  # characters that YAML does not allow
+        raise InputError([_syntax_error(error, path)]) from error
     try:
         node = loader.get_single_node()
         if node is None:
             return document
         if not isinstance(node, yaml.MappingNode):
-            raise InputError([f"{path}:1: not a list of names with values"])
+            raise InputError([f"{path}:1: not a mapping; expected names of parameters with values"])
         _collect(node, (), document, loader)
     except yaml.YAMLError as error:
-        raise InputError([_told(error, path)]) from error
+        raise InputError([_syntax_error(error, path)]) from error
     finally:
         loader.dispose()
     nodes = [key for key in document.keys if _NODE.fullmatch(key)]
@@ -204,16 +207,16 @@ def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
 
 
 def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
-    """The text with every ``$(arg name)`` replaced, in comments too, as roslaunch does."""
+    """Replace every ``$(arg name)`` in a text, comments included, as roslaunch does."""
     problems: List[str] = []
 
-    def value(match: re.Match) -> str:
+    def value(match: re.Match[str]) -> str:
         words = match.group(1).split()
         if len(words) == 2 and words[0] == "arg" and words[1] in arguments:
             return str(arguments[words[1]])
         line = text.count("\n", 0, match.start()) + 1
-        known = ", ".join(f"$(arg {name})" for name in arguments) or "nothing in $( )"
-        problems.append(f"{path}:{line}: {match.group(0)} stands for nothing; expected {known}")
+        known = ", ".join(f"$(arg {name})" for name in arguments) or "no $( )"
+        problems.append(f"{path}:{line}: unknown {match.group(0)}; expected {known}")
         return match.group(0)
 
     substituted = _SUBSTITUTION.sub(value, text)
@@ -225,7 +228,7 @@ def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
 def _collect(
     node: yaml.MappingNode, above: Tuple[str, ...], document: _Document, loader: PlainLoader
 ) -> None:
-    """Walks the nodes rather than the values: only they have lines and duplicates."""
+    """Collect values with their lines, and duplicate keys, from the nodes of a mapping."""
     seen = set()
     for key_node, _ in node.value:
         if not isinstance(key_node, yaml.ScalarNode):
@@ -235,7 +238,7 @@ def _collect(
                 (key_node.start_mark.line + 1, "/".join((*above, key_node.value)))
             )
         seen.add(key_node.value)
-    loader.flatten_mapping(node)  # merge keys, "<<": what they bring in is no duplicate
+    loader.flatten_mapping(node)  # merge keys, "<<": their values are not duplicates
     for key_node, value_node in node.value:
         key = str(loader.construct_object(key_node, deep=True))
         line = key_node.start_mark.line + 1
@@ -243,7 +246,7 @@ def _collect(
         if not above < path or len(path) > MAX_LEVELS:
             raise InputError(
                 [
-                    f"{document.path}:{line}: {key[:40]!r} is no name of a parameter; "
+                    f"{document.path}:{line}: {key[:40]!r} is not the name of a parameter; "
                     f"expected 1 to {MAX_LEVELS} names with / between them"
                 ]
             )
@@ -256,7 +259,7 @@ def _collect(
 
 
 def _merge(tree: ParameterTree, document: _Document, prefix: str) -> None:
-    """Key by key: a namespace that is there already keeps what the file does not set."""
+    """Merge a file into the tree key by key."""
     above = (prefix,) if prefix else ()
     for below, value in document.values:
         path = above + below
@@ -277,7 +280,7 @@ def _namespace(tree: Dict[str, Any], path: Iterable[str]) -> Dict[str, Any]:
     return tree
 
 
-def _told(error: yaml.YAMLError, path: Path) -> str:
+def _syntax_error(error: yaml.YAMLError, path: Path) -> str:
     mark = getattr(error, "problem_mark", None)
     if mark is None:
         return f"{path}: not YAML: {error}"

@@ -1,4 +1,4 @@
-"""The trees of a costmap's layers."""
+"""Namespaces of a costmap's layers, and the dataclasses that they fill."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from quad_nav.costmap.voxel import VoxelLayerParams
 Chain = Tuple[Tuple[str, Mapping[str, Any]], ...]
 _DATA_TYPES = ("LaserScan", "PointCloud", "PointCloud2")
 _RANGES = ("obstacle_range", "raytrace_range")
-# A longer silence than this goes unnoticed only by mistake.
+# A longer expected_update_rate is probably meant as a rate.
 _LONG_PERIOD_S = 2.0
 
 _OBSTACLES = ("max_obstacle_height", *_RANGES, "track_unknown_space")
 
-# What a costmap hands down to a layer of each type, over the layer's own value.
+# Parameters of the costmap that override those of a layer, by the layer's type.
 PARENT_PARAMETERS: Dict[str, Tuple[str, ...]] = {
     "costmap_2d::StaticLayer": (
         "map_topic",
@@ -49,7 +49,7 @@ PARENT_PARAMETERS: Dict[str, Tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class LayerType:
-    """A type of layer: its table, and the maker of its dataclass from (costmap, name)."""
+    """Type of layer: its table, and the function (costmap, name) that makes its dataclass."""
 
     table: Table
     params: Callable[[Mapping[str, Any], str], LayerParams]
@@ -58,10 +58,15 @@ class LayerType:
 def normalise_layer(
     costmap: Namespace, costmap_path: str, name: str, layer_type: str, chain: Chain, notes: Notes
 ) -> None:
-    """Brings one layer's namespace into the state in which the original leaves it.
+    """Normalise one layer's namespace as move_base does.
 
     Args:
-        chain: the namespaces above, nearest first, for what is looked for upwards.
+        costmap: The costmap's namespace.
+        costmap_path: Path of the costmap.
+        name: The layer's name.
+        layer_type: The layer's type, or the dotted name of a plugin.
+        chain: The enclosing (path, namespace), the innermost first, for inherited parameters.
+        notes: Receives faults and remarks.
     """
     path = join(costmap_path, name)
     layer = subtree(costmap, name, costmap_path, notes)
@@ -78,18 +83,18 @@ def normalise_layer(
         notes.remark(
             join(path, source),
             CAUTION,
-            "looks like a source, and observation_sources does not name it: nothing reads it",
+            "looks like a source, but observation_sources does not list it; not read",
         )
     for source in sources:
         _normalise_source(layer, path, source, notes)
-    _take_ranges_from_above(layer, path, chain, notes)
+    _inherit_ranges(layer, path, chain, notes)
     normalise(layer, path, table, notes, also_known=described.union(sources))
 
 
 def layer_params(
     costmap: Mapping[str, Any], costmap_path: str, name: str, layer_type: str
 ) -> Optional[LayerParams]:
-    """The dataclass of a layer of a normalised costmap; None for a type that is not here."""
+    """Make a layer's dataclass from a normalised costmap; None if its type is not supported."""
     if layer_type in LAYERS:
         return LAYERS[layer_type].params(costmap, name)
     if not is_dotted(layer_type):
@@ -105,7 +110,7 @@ def layer_params(
 def _normalise_plugin(
     layer: Namespace, path: str, costmap_path: str, name: str, layer_type: str, notes: Notes
 ) -> None:
-    """A layer of the user's knows its parameters itself, but for the switch that all have."""
+    """Check a plugin's class and ``enabled``; it checks its other parameters itself."""
     normalise(layer, path, Table(fixed=(ENABLED,)), notes, also_known=layer)
     check_class(layer_type, LAYER, join(costmap_path, "plugins", name), notes)
 
@@ -121,24 +126,23 @@ def _normalise_source(layer: Namespace, path: str, name: str, notes: Notes) -> N
     normalise(source, place, SOURCE_TABLE, notes)
     data_type = source.get("data_type")
     if data_type is None:
-        notes.remark(place, CAUTION, "no data_type: move_base listens for a PointCloud")
+        notes.remark(place, CAUTION, "no data_type: move_base subscribes to a PointCloud")
     elif isinstance(data_type, str) and data_type not in _DATA_TYPES:
         notes.problem(
             join(place, "data_type"),
-            f"{data_type!r} is no sensor's type; expected {SOURCE_TABLE['data_type'].expected}",
+            f"{data_type!r} is not a type of sensor; expected {SOURCE_TABLE['data_type'].expected}",
         )
     period = source.get("expected_update_rate")
     if isinstance(period, float) and period > _LONG_PERIOD_S:
         notes.remark(
             join(place, "expected_update_rate"),
             CAUTION,
-            f"{period} is a period in seconds, not a rate: the sensor may be silent for"
-            " that long before it is missed",
+            f"{period} is a period in seconds, not a rate: the sensor times out after that long",
         )
 
 
-def _take_ranges_from_above(layer: Namespace, path: str, chain: Chain, notes: Notes) -> None:
-    """Sources look for their ranges upwards to the node's level; the layer keeps what they find."""
+def _inherit_ranges(layer: Namespace, path: str, chain: Chain, notes: Notes) -> None:
+    """Inherit the sources' ranges from the costmap or the node's level."""
     for key in _RANGES:
         written_at, value = inherited(key, chain)
         if key not in layer and written_at:
@@ -146,8 +150,8 @@ def _take_ranges_from_above(layer: Namespace, path: str, chain: Chain, notes: No
             notes.moved(join(path, key), written_at)
 
 
-def _seeing(table: Table, params: Callable[..., ObstacleLayerParams]) -> LayerType:
-    """A layer with sources."""
+def _with_sources(table: Table, params: Callable[..., ObstacleLayerParams]) -> LayerType:
+    """Make the type of a layer with sources."""
 
     def make(costmap: Mapping[str, Any], name: str) -> LayerParams:
         layer = costmap[name]
@@ -178,15 +182,15 @@ def _plain(table: Table, params: Callable[..., LayerParams]) -> LayerType:
 
 
 LAYERS: Dict[str, LayerType] = {
-    "costmap_2d::ObstacleLayer": _seeing(OBSTACLE_LAYER_TABLE, ObstacleLayerParams),
-    "costmap_2d::VoxelLayer": _seeing(VOXEL_LAYER_TABLE, VoxelLayerParams),
+    "costmap_2d::ObstacleLayer": _with_sources(OBSTACLE_LAYER_TABLE, ObstacleLayerParams),
+    "costmap_2d::VoxelLayer": _with_sources(VOXEL_LAYER_TABLE, VoxelLayerParams),
     "costmap_2d::InflationLayer": _plain(INFLATION_LAYER_TABLE, InflationLayerParams),
     "costmap_2d::StaticLayer": _plain(STATIC_LAYER_TABLE, StaticLayerParams),
 }
 
 
 def layer_tables(plugins: Iterable[Mapping[str, str]]) -> Dict[str, Table]:
-    """The table of each supported layer, by the layer's name."""
+    """Return name -> table of the supported layers."""
     return {
         plugin["name"]: LAYERS[plugin["type"]].table
         for plugin in plugins

@@ -24,11 +24,11 @@ _RENAMED: Dict[str, str] = {
 
 
 def normalise_trajectory_planner(tree: Namespace, notes: Notes) -> None:
-    """Brings the planner's namespace into the state in which the original leaves it."""
+    """Normalise the planner's namespace as move_base does."""
     planner = subtree(tree, TRAJECTORY_PLANNER, "", notes)
     for old, new in _RENAMED.items():
         if old in planner:
-            _take_old_name(planner, old, new, notes)
+            _rename(planner, old, new, notes)
     normalise(planner, TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE, notes, also_known=_RENAMED)
     if planner.get("meter_scoring") is False and not _is_respected(tree):
         notes.remark(
@@ -40,7 +40,7 @@ def normalise_trajectory_planner(tree: Namespace, notes: Notes) -> None:
         notes.remark(
             join(TRAJECTORY_PLANNER, "escape_vel"),
             CAUTION,
-            "the robot escapes forwards: a velocity below 0 backs up",
+            "the robot escapes forwards; expected a negative velocity, to back up",
         )
 
 
@@ -50,24 +50,24 @@ def _is_respected(tree: Namespace) -> bool:
 
 
 def trajectory_planner_params(tree: Mapping[str, Any]) -> TrajectoryPlannerParams:
-    """The dataclass of a normalised tree."""
+    """Make the planner's dataclass from a normalised tree."""
     return TrajectoryPlannerParams(
         **fields(tree[TRAJECTORY_PLANNER], TRAJECTORY_PLANNER_TABLE.parameters)
     )
 
 
-def _take_old_name(planner: Namespace, old: str, new: str, notes: Notes) -> None:
+def _rename(planner: Namespace, old: str, new: str, notes: Notes) -> None:
     place = join(TRAJECTORY_PLANNER, old)
     if new in planner:
-        notes.remark(place, IGNORED, f"ignored by move_base: {new} is there as well")
+        notes.remark(place, IGNORED, f"ignored by move_base: {new} is set too")
         return
     planner[new] = planner[old]
     notes.moved(join(TRAJECTORY_PLANNER, new), place)
-    notes.remark(place, RENAMED, f"called {new} today")
+    notes.remark(place, RENAMED, f"old name of {new}")
 
 
 def normalise_dwa(tree: Namespace, notes: Notes) -> None:
-    """Brings the planner's namespace into the state in which the original leaves it."""
+    """Normalise the planner's namespace as move_base does."""
     planner = subtree(tree, DWA_PLANNER, "", notes)
     normalise(planner, DWA_PLANNER, DWA_TABLE, notes)
     if LATCH.name in tree:
@@ -79,12 +79,12 @@ def normalise_dwa(tree: Namespace, notes: Notes) -> None:
         notes.remark(
             join(DWA_PLANNER, "occdist_scale"),
             CAUTION,
-            "with 0 move_base looks at no obstacles: the robot may fly into them",
+            "0 disables the scoring of obstacles: the robot may hit them",
         )
 
 
 def dwa_params(tree: Mapping[str, Any]) -> DwaParams:
-    """The dataclass of a normalised tree."""
+    """Make the planner's dataclass from a normalised tree."""
     arguments = fields(tree[DWA_PLANNER], DWA_TABLE.parameters)
     if LATCH.name not in tree[DWA_PLANNER]:
         arguments[LATCH.field] = tree.get(LATCH.name, LATCH.default)

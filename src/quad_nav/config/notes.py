@@ -1,4 +1,4 @@
-"""What is to be said about a configuration: every fault and every remark, with its place."""
+"""Faults and remarks that are found while a configuration is read, each with its place."""
 
 from __future__ import annotations
 
@@ -8,22 +8,26 @@ from typing import Dict, Iterable, List, Mapping, Optional, Sequence
 from quad_nav.errors import InputError
 from quad_nav.files.values import nearest
 
-ERROR = "error"  # nothing flies with it
+ERROR = "error"  # no navigator starts with it
 UNKNOWN = "unknown"  # move_base does not know the key either
 UNSUPPORTED = "unsupported"  # move_base knows it, this package does not
-IGNORED = "ignored"  # the original reads past it as well
-UNUSED = "unused"  # of a planner that does not fly
-CLAMPED = "clamped"  # the value in force is another one
-RENAMED = "renamed"  # an old name, still honoured
-CAUTION = "caution"  # legal, and probably not what was meant
+IGNORED = "ignored"  # move_base ignores it too
+UNUSED = "unused"  # of a planner that is not chosen
+CLAMPED = "clamped"  # the value in force differs
+RENAMED = "renamed"  # an old name that still works
+CAUTION = "caution"  # legal, but probably a mistake
 
 
 @dataclass(frozen=True)
 class Remark:
-    """One line of ``quad check``: where, which kind, what about it.
+    """One fault or remark, a line of ``quad check``.
 
-    ``origin``: "file:line" where the value was written, when it came from a file.
-    ``nearest``: the known name that an unknown one is most like, if there is one.
+    Attributes:
+        place: Path of the parameter.
+        kind: One of the kinds above.
+        text: What is wrong or odd, and what was expected.
+        origin: "file:line" of a value that a file sets.
+        nearest: The known name that is most similar to an unknown one, if there is any.
     """
 
     place: str
@@ -39,23 +43,28 @@ class Remark:
 
 
 class ParameterError(InputError):
-    """Parameters that nothing flies with: ``faults``, and ``remarks`` on the others."""
+    """Parameters with faults.
 
-    def __init__(self, faults: Sequence[Remark], remarks: Sequence[Remark]):
+    Attributes:
+        faults: The faults; each is a line of the error's message.
+        remarks: Remarks on the other parameters.
+    """
+
+    def __init__(self, faults: Sequence[Remark], remarks: Sequence[Remark]) -> None:
         super().__init__([str(fault) for fault in faults])
         self.faults = tuple(faults)
         self.remarks = tuple(remarks)
 
 
 class Notes:
-    """Collects problems and remarks while a tree is read.
+    """Collect faults and remarks while a tree is read.
 
     Args:
-        place: what paths are relative to, such as the node's name.
-        origins: path -> "file:line" for values that came from files.
+        place: Prefix of all paths, such as the node's name.
+        origins: Path -> "file:line" of values that come from files.
     """
 
-    def __init__(self, place: str, origins: Optional[Mapping[str, str]] = None):
+    def __init__(self, place: str, origins: Optional[Mapping[str, str]] = None) -> None:
         self._place = place
         self._origins = origins or {}
         self._moved: Dict[str, str] = {}
@@ -63,20 +72,22 @@ class Notes:
         self.remarks: List[Remark] = []
 
     def moved(self, path: str, written_at: str) -> None:
-        """The value at ``path`` was written at another place; complaints name that one."""
+        """Name another place, where the value at ``path`` was written, in messages about it."""
         self._moved[path] = self._moved.get(written_at, written_at)
 
     @property
     def problems(self) -> List[str]:
-        """The faults as lines."""
+        """The faults as lines of text."""
         return list(map(str, self.faults))
 
     def problem(self, path: str, text: str) -> None:
+        """Add a fault."""
         fault = self._about(path, ERROR, text)
         if fault not in self.faults:
             self.faults.append(fault)
 
     def remark(self, path: str, kind: str, text: str, nearest: str = "") -> None:
+        """Add a remark."""
         remark = self._about(path, kind, text, nearest)
         if remark not in self.remarks:
             self.remarks.append(remark)
@@ -87,15 +98,19 @@ class Notes:
         return Remark(place, kind, text, self._origins.get(path, ""), nearest)
 
     def unknown(self, path: str, name: str, known: Iterable[str]) -> None:
-        """A key that nobody reads, with the nearest name that somebody does."""
-        self.remark(path, UNKNOWN, "unknown, nothing reads it", nearest(name, known))
+        """Add a remark on an unknown key, with the nearest of the known names."""
+        self.remark(path, UNKNOWN, "unknown parameter, nothing reads it", nearest(name, known))
 
     def raise_problems(self) -> None:
-        """Raises ParameterError when there was any problem."""
+        """Raise an error if there is any fault.
+
+        Raises:
+            ParameterError: There are faults.
+        """
         if self.faults:
             raise ParameterError(self.faults, self.remarks)
 
 
 def join(*parts: str) -> str:
-    """A path from its parts; empty ones do not count."""
+    """Join the parts of a path; empty parts are left out."""
     return "/".join(part for part in parts if part)

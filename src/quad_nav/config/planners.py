@@ -1,7 +1,7 @@
-"""The trees of the planners: which ones fly, and with which namespaces.
+"""Choice of the planners, and their namespaces.
 
-A planner of another kind is one line in ``GLOBAL_PLANNERS`` or
-``LOCAL_PLANNERS``, and one in ``assembly``.
+To add a planner, add a line to ``GLOBAL_PLANNERS`` or ``LOCAL_PLANNERS``, and one to
+``quad_nav.scenario.assembly``.
 """
 
 from __future__ import annotations
@@ -46,11 +46,13 @@ DWA_PLANNER = "dwa_local_planner/DWAPlannerROS"
 
 @dataclass(frozen=True)
 class PlannerType:
-    """One planner: its table, and what makes of the tree what the original makes of it.
+    """Planner that can be chosen.
 
-    ``normalise`` brings the planner's namespace into the state in which the original
-    leaves it, ``params`` makes the dataclass of a normalised tree. ``inherited`` are
-    parameters that may stand at the node's own level as well.
+    Attributes:
+        table: Parameters in the planner's namespace.
+        normalise: Normalises that namespace as move_base does.
+        params: Makes the planner's dataclass from a normalised tree.
+        inherited: Parameters that may be at the node's level too.
     """
 
     table: Table
@@ -60,7 +62,7 @@ class PlannerType:
 
 
 def _plain(plugin: str, table: Table, params: Callable[..., Any]) -> PlannerType:
-    """A planner whose namespace holds what its table says, and nothing else."""
+    """Make the type of a planner whose namespace holds the table's parameters only."""
     name = plugin_name(plugin)
     return PlannerType(
         table,
@@ -69,7 +71,7 @@ def _plain(plugin: str, table: Table, params: Callable[..., Any]) -> PlannerType
     )
 
 
-# The first of each flies in the place of planners that are not here.
+# The first of each replaces planners that are not supported.
 GLOBAL_PLANNERS: Dict[str, PlannerType] = {
     DEFAULT_GLOBAL_PLANNER: _plain(DEFAULT_GLOBAL_PLANNER, NAVFN_TABLE, NavfnParams),
     SEARCH_PLANNER: _plain(SEARCH_PLANNER, GLOBAL_PLANNER_TABLE, SearchPlannerParams),
@@ -85,7 +87,7 @@ LOCAL_PLANNERS: Dict[str, PlannerType] = {
 
 @dataclass(frozen=True)
 class Slot:
-    """A parameter that names a planner: which ones there are, and what a user's has to be."""
+    """Parameter that names a planner: the supported types, and the interface of plugins."""
 
     types: Mapping[str, PlannerType]
     interface: Interface
@@ -95,13 +97,13 @@ SLOTS: Dict[str, Slot] = {
     "base_local_planner": Slot(LOCAL_PLANNERS, LOCAL_PLANNER),
     "base_global_planner": Slot(GLOBAL_PLANNERS, GLOBAL_PLANNER),
 }
-# Namespaces of planners that people configure beside the one that they fly.
+# Other planners that configurations often have a namespace for.
 _OTHER_PLANNERS = ("TebLocalPlannerROS", "EBandPlannerROS", "DWBLocalPlanner", "SBPLLatticePlanner")
 _DEFAULT_RATE_HZ = 20.0
 
 
 def planner_keys(tree: Mapping[str, Any]) -> List[str]:
-    """What planners may have at the node's level: namespaces, and what the chosen inherit."""
+    """List the keys of planners at the node's level: namespaces and inherited parameters."""
     keys = list(_OTHER_PLANNERS)
     for key, slot in SLOTS.items():
         keys += map(plugin_name, slot.types)
@@ -113,7 +115,7 @@ def planner_keys(tree: Mapping[str, Any]) -> List[str]:
 
 
 def normalise_planner_names(tree: Namespace, notes: Notes) -> None:
-    """Replaces planners that do not fly here by those that do, and says so."""
+    """Replace unsupported planners by the defaults, with a remark."""
     for key, slot in SLOTS.items():
         name = tree.get(key)
         if not isinstance(name, str) or name in slot.types:
@@ -123,22 +125,20 @@ def normalise_planner_names(tree: Namespace, notes: Notes) -> None:
             continue
         tree[key] = next((known for known in slot.types if plugin_name(known) == name), None)
         if tree[key] is not None:
-            notes.remark(key, RENAMED, f"{name} is called {tree[key]} today")
+            notes.remark(key, RENAMED, f"{name} is an old name of {tree[key]}")
         else:
             tree[key] = next(iter(slot.types))
-            notes.remark(
-                key, UNSUPPORTED, f"{name} is not supported here; {tree[key]} flies instead"
-            )
+            notes.remark(key, UNSUPPORTED, f"{name} is not supported; using {tree[key]} instead")
 
 
 def normalise_planners(tree: Namespace, notes: Notes) -> None:
-    """Brings the chosen planners' namespaces into the state in which the original leaves them."""
+    """Normalise the namespaces of the chosen planners as move_base does."""
     chosen = {plugin_name(tree[key]): key for key in SLOTS if isinstance(tree[key], str)}
     for name, key in chosen.items():
         own = planner_type(tree, key)
         if own is not None:
             own.normalise(tree, notes)
-        else:  # a user's planner knows its parameters itself
+        else:  # plugins check their parameters themselves
             subtree(tree, name, "", notes)
     flyable = {plugin_name(name): key for key, slot in SLOTS.items() for name in slot.types}
     for name in [name for name in tree if name not in chosen]:
@@ -146,16 +146,16 @@ def normalise_planners(tree: Namespace, notes: Notes) -> None:
             key = flyable[name]
             _normalise_unused(tree, name, f"unused: {key} is {tree[key]}", notes)
         elif name in _OTHER_PLANNERS:
-            notes.remark(name, UNSUPPORTED, "no such planner flies here, nothing below is read")
+            notes.remark(name, UNSUPPORTED, "planner not supported; its parameters are not read")
 
 
 def planner_type(tree: Mapping[str, Any], key: str) -> Optional[PlannerType]:
-    """The type of the planner that a normalised tree names, None for a user's."""
+    """Return the type of the planner that a normalised tree names, None for a plugin."""
     return SLOTS[key].types.get(tree[key])
 
 
 def planner_params(tree: Mapping[str, Any], key: str) -> Any:
-    """The dataclass of the planner that a normalised tree names, or the user's ``Plugin``."""
+    """Make the dataclass of the planner that a normalised tree names, or a ``Plugin``."""
     own = planner_type(tree, key)
     if own is not None:
         return with_fixes(own.params(tree), tree)
@@ -164,7 +164,10 @@ def planner_params(tree: Mapping[str, Any], key: str) -> Any:
 
 
 def reconfigurable_planners(tree: Mapping[str, Any]) -> Dict[str, Table]:
-    """Namespace -> table of the chosen planners that can be reconfigured, the local one first."""
+    """Return namespace -> table of the chosen planners with reconfigurable parameters.
+
+    The local planner comes first.
+    """
     found = {}
     for key in SLOTS:
         own = planner_type(tree, key)
@@ -174,7 +177,7 @@ def reconfigurable_planners(tree: Mapping[str, Any]) -> Dict[str, Table]:
 
 
 def local_planner_frequency(tree: Mapping[str, Any]) -> Any:
-    """The local planner's own ``controller_frequency``, None where there is none."""
+    """Return the local planner's own ``controller_frequency``, None if it has none."""
     key = "base_local_planner"
     if planner_type(tree, key) is None:
         return None
@@ -182,10 +185,10 @@ def local_planner_frequency(tree: Mapping[str, Any]) -> Any:
 
 
 def local_planner_period_s(tree: Mapping[str, Any]) -> float:
-    """The period that rollouts reckon with.
+    """Return the control period that rollouts assume.
 
-    The original looks for ``controller_frequency`` from the local planner
-    upwards, and assumes 20 Hz when it is missing or not positive.
+    As in move_base ``controller_frequency`` is looked up from the local planner's namespace
+    upwards. If it is missing or not positive, the rate is 20 Hz.
     """
     own = local_planner_frequency(tree)
     rate_hz = tree["controller_frequency"] if own is None else own
@@ -196,5 +199,5 @@ def _normalise_unused(tree: Namespace, name: str, reason: str, notes: Notes) -> 
     if name == TRAJECTORY_PLANNER:
         planner = subtree(tree, name, "", notes)
         normalise(planner, name, Table(fixed=ROTATE_FROM_PLANNER), notes, also_known=planner)
-        reason += "; recoveries that turn take its limits all the same"
+        reason += "; rotate_recovery still reads its limits"
     notes.remark(name, UNUSED, reason)

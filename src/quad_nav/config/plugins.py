@@ -1,8 +1,8 @@
-"""Planners, costmap layers and recoveries of one's own.
+"""Plugins: planners, costmap layers and recoveries of users.
 
-Where move_base expects a plugin's name, a dotted Python name loads a class,
-``my_package.my_module.MyPlanner``. What the class has to offer is an
-``Interface``; ``docs/plugins.md`` shows a working example of each.
+Where move_base expects the name of a plugin, a dotted Python name such as
+``my_package.my_module.MyPlanner`` loads a class. An ``Interface`` says what the class needs;
+``docs/plugins.md`` has a working example of each.
 """
 
 from __future__ import annotations
@@ -23,11 +23,13 @@ from quad_nav.recovery import Recovery
 
 @dataclass(frozen=True)
 class Interface:
-    """What a plugin's class must have.
+    """Requirements on the class of a plugin.
 
-    ``methods_of``: the class whose public methods and annotated attributes are
-    needed. ``arguments``: what the constructor is called with. ``derived``: whether
-    the plugin has to be derived from ``methods_of``.
+    Attributes:
+        kind: Name of the kind, for messages.
+        methods_of: Class whose public methods and annotated attributes are required.
+        arguments: Arguments of the constructor.
+        derived: True if the plugin has to be derived from ``methods_of``.
     """
 
     kind: str
@@ -47,13 +49,13 @@ RECOVERY = Interface("a recovery behaviour", Recovery, ("params",))
 
 
 class Parameters(Dict[str, Any]):
-    """The parameters below a plugin's name, as they were written.
+    """Parameters in a plugin's namespace, unchecked.
 
-    ``parameters["radius"]`` that nobody wrote is an InputError with its place;
-    ``get`` has a default instead.
+    ``parameters["radius"]`` raises an InputError with its place if the parameter is not set;
+    ``parameters.get("radius", 1.0)`` has a default.
     """
 
-    def __init__(self, written: Mapping[str, Any], place: str):
+    def __init__(self, written: Mapping[str, Any], place: str) -> None:
         super().__init__(written)
         self.place = place
 
@@ -63,24 +65,25 @@ class Parameters(Dict[str, Any]):
 
 @dataclass(frozen=True)
 class Plugin:
-    """A class of the user's and its parameters."""
+    """Class of a plugin and its parameters."""
 
     plugin_class: Any
     parameters: Parameters
 
     def make(self, *arguments: Any) -> Any:
-        """An object of the class; ``arguments`` follow the parameters."""
+        """Make an object of the class; ``arguments`` follow the parameters."""
         return self.plugin_class(self.parameters, *arguments)
 
 
 @dataclass(frozen=True)
 class PluginLayerParams(LayerParams):
-    """The parameters of a user's layer, which gets them like ``Parameters``."""
+    """Parameters of a plugin that is a layer; it reads them as it reads ``Parameters``."""
 
     plugin_class: Any = Layer
     parameters: Parameters = field(default_factory=lambda: Parameters({}, ""))
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> Layer:
+        """Make the layer."""
         return self.plugin_class(self, spec, rolling_window, default_cost)
 
     def __getitem__(self, name: str) -> Any:
@@ -90,27 +93,28 @@ class PluginLayerParams(LayerParams):
         return name in self.parameters
 
     def get(self, name: str, default: Any = None) -> Any:
+        """Return a parameter, or the default if it is not set."""
         return self.parameters.get(name, default)
 
 
 def is_dotted(name: str) -> bool:
-    """Whether a plugin's name is a Python class's rather than one of pluginlib's."""
+    """Tell if a plugin's name is that of a Python class, not one of pluginlib."""
     return "." in name and "/" not in name and ":" not in name
 
 
 def plugin_name(plugin: str) -> str:
-    """The namespace of a plugin's parameters and topics.
+    """Return the namespace of a plugin's parameters and topics.
 
-    ``NavfnROS`` for ``navfn/NavfnROS``, ``MyPlanner`` for ``my_package.MyPlanner``.
+    It is ``NavfnROS`` for ``navfn/NavfnROS``, ``MyPlanner`` for ``my_package.MyPlanner``.
     """
     return plugin.replace("::", "/").replace(".", "/").split("/")[-1]
 
 
 def load_class(name: str, interface: Interface) -> Any:
-    """The class of a dotted name.
+    """Load the class of a dotted name.
 
     Raises:
-        InputError: no such module or class, or one line for everything that it
+        InputError: The module or class does not exist, or one line for everything that the class
             lacks of the interface.
     """
     module_name, _, class_name = name.rpartition(".")
@@ -138,25 +142,25 @@ def _imported(module_name: str) -> Any:
         if module_name == missing or module_name.startswith(missing + "."):
             raise InputError(
                 [
-                    f"there is no module {missing}; expected package.module.Class with"
-                    " the package's folder in PYTHONPATH"
+                    f"no module {missing}; expected package.module.Class with the package's"
+                    " folder in PYTHONPATH"
                 ]
             ) from error
         raise InputError([_failure(module_name, error)]) from error
-    except Exception as error:  # whatever a user's module does wrong while it is imported
+    except Exception as error:  # an import runs arbitrary code
         raise InputError([_failure(module_name, error)]) from error
 
 
 def _failure(module_name: str, error: Exception) -> str:
     last = traceback.extract_tb(error.__traceback__)[-1]
     return (
-        f"{module_name} cannot be imported: {type(error).__name__}: {error}"
-        f" ({last.filename}:{last.lineno}); expected a module that can"
+        f"cannot import {module_name}: {type(error).__name__}: {error}"
+        f" ({last.filename}:{last.lineno}); expected a module that imports without errors"
     )
 
 
 def _misfits(plugin_class: Any, interface: Interface) -> Iterator[str]:
-    """Everything that the class lacks."""
+    """Yield everything that the class lacks."""
     wanted = interface.methods_of
     if interface.derived and not issubclass(plugin_class, wanted):
         yield (
@@ -185,7 +189,7 @@ def _takes(function: Any, arguments: Tuple[str, ...]) -> bool:
         inspect.signature(function).bind(*arguments)
     except TypeError:
         return False
-    except ValueError:  # compiled functions may not tell their signature
+    except ValueError:  # compiled functions may lack a signature
         return True
     return True
 
@@ -199,7 +203,7 @@ def _expectation(name: str, own: Any, arguments: Tuple[str, ...]) -> str:
 
 
 def _signature(function: Any) -> str:
-    """The names of the parameters, as they are written."""
+    """Format the parameters of a function as they are written."""
     parameters = inspect.signature(function).parameters.values()
     return f"({', '.join(str(parameter).split(':')[0] for parameter in parameters)})"
 

@@ -1,9 +1,8 @@
-"""Checks one namespace of a parameter tree against its table.
+"""Check one namespace of a parameter tree against its table.
 
-``normalise`` brings a namespace into the state in which the original leaves it on
-the parameter server: types made right, ranges clamped, reconfigurable
-parameters all present. Dataclasses are then made from normalised namespaces, where
-nothing can be wrong any more.
+``normalise`` changes a namespace as move_base does on the parameter server: values get the
+parameter's type, ranges are clamped, and all reconfigurable parameters are set. Dataclasses are
+made from normalised namespaces, which hold no faults.
 """
 
 from __future__ import annotations
@@ -21,11 +20,14 @@ Namespace = Dict[str, Any]
 def normalise(
     namespace: Namespace, path: str, table: Table, notes: Notes, also_known: Iterable[str] = ()
 ) -> None:
-    """Checks and completes a namespace in place; faults and remarks go to ``notes``.
+    """Check and complete a namespace in place.
 
     Args:
-        path: the namespace's path, for messages.
-        also_known: keys that somebody else reads.
+        namespace: The namespace, changed in place.
+        path: The namespace's path, for messages.
+        table: The parameters of the namespace.
+        notes: Receives faults and remarks.
+        also_known: Keys that other tables describe.
     """
     for parameter in table.parameters:
         if parameter.name in namespace:
@@ -46,9 +48,11 @@ def _normalise_value(namespace: Namespace, path: str, parameter: Parameter, note
     value = parameter.clamp(checked)
     if value != checked:
         bound = "largest" if value < checked else "smallest"
-        notes.remark(place, CLAMPED, f"{given} becomes {value}, the {bound} that move_base allows")
+        notes.remark(
+            place, CLAMPED, f"{given} clamped to {value}, the {bound} that move_base allows"
+        )
     elif value != given:
-        notes.remark(place, CLAMPED, f"{given} becomes {value}: move_base takes whole numbers only")
+        notes.remark(place, CLAMPED, f"{given} rounded to {value}; expected a whole number")
     namespace[parameter.name] = value
 
 
@@ -62,7 +66,7 @@ def _remark_on_other_keys(
         place = join(path, str(key))
         if key in dict(table.unsupported):
             reason = dict(table.unsupported)[key]
-            notes.remark(place, UNSUPPORTED, f"known to move_base but not supported here: {reason}")
+            notes.remark(place, UNSUPPORTED, f"not supported by this package: {reason}")
         elif key in dict(table.ignored):
             notes.remark(place, IGNORED, f"ignored by move_base: {dict(table.ignored)[key]}")
         else:
@@ -72,10 +76,13 @@ def _remark_on_other_keys(
 def fields(
     namespace: Mapping[str, Any], parameters: Iterable[Parameter], given: Iterable[str] = ()
 ) -> Dict[str, Any]:
-    """Arguments of a dataclass from a normalised namespace.
+    """Return the arguments of a dataclass from a normalised namespace.
 
-    A parameter with a value of its own until the first reconfiguration has that
-    one, unless its name is in ``given``.
+    Args:
+        namespace: The normalised namespace.
+        parameters: The parameters that fill fields of the dataclass.
+        given: Names that were set. The others have their ``initial`` value, where the table has
+            one, until the first reconfiguration.
     """
     given = set(given)
     arguments = {}
@@ -90,7 +97,7 @@ def fields(
 
 
 def subtree(tree: Namespace, name: str, path: str, notes: Notes) -> Namespace:
-    """The namespace of that name, made when it is missing; a problem when it is a value."""
+    """Return the namespace of that name; create it if it is missing, report it if it is a value."""
     value = tree.setdefault(name, {})
     if value is None:  # a YAML key with nothing below it
         value = tree[name] = {}
@@ -101,7 +108,7 @@ def subtree(tree: Namespace, name: str, path: str, notes: Notes) -> Namespace:
 
 
 def check_class(name: str, interface: Interface, place: str, notes: Notes) -> None:
-    """Problems for everything that keeps a user's class from being what it has to be."""
+    """Report everything that a user's class lacks of the interface."""
     try:
         load_class(name, interface)
     except InputError as error:
@@ -110,8 +117,15 @@ def check_class(name: str, interface: Interface, place: str, notes: Notes) -> No
 
 
 def inherited(name: str, chain: Iterable[Tuple[str, Mapping[str, Any]]]) -> Tuple[str, Any]:
-    """ROS's searchParam: (path, value) of the first (path, namespace) that has the name,
-    or ("", None)."""
+    """Look a parameter up in enclosing namespaces, as ROS's ``searchParam`` does.
+
+    Args:
+        name: The parameter.
+        chain: (path, namespace), the innermost first.
+
+    Returns:
+        (path, value) of the first namespace that has the name, or ("", None).
+    """
     for path, namespace in chain:
         if name in namespace:
             return join(path, name), namespace[name]

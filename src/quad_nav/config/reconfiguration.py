@@ -1,4 +1,4 @@
-"""Changing a configuration while it is in force, as dynamic_reconfigure does."""
+"""Change a configuration in flight, as dynamic_reconfigure does."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _RESTORE = "restore_defaults"
 
 
 def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, ...]]:
-    """Namespace -> its reconfigurable parameters, in the original's order.
+    """Return namespace -> reconfigurable parameters, in the order of upstream move_base.
 
-    Namespaces are relative to the node: "" is move_base itself.
+    Namespaces are relative to the node; "" is move_base itself.
     """
     namespaces = {"": MOVE_BASE_TABLE, **reconfigurable_planners(configuration.tree)}
     for costmap in COSTMAPS:
@@ -41,7 +41,7 @@ def reconfigurable(configuration: Configuration) -> Dict[str, Tuple[Parameter, .
 
 
 def values(configuration: Configuration, namespace: str) -> Dict[str, Any]:
-    """The ROS values in force of a namespace's reconfigurable parameters."""
+    """Return the ROS values in force of a namespace's reconfigurable parameters."""
     normalised = _below(configuration.tree, namespace)
     return {
         parameter.name: normalised[parameter.name]
@@ -52,19 +52,23 @@ def values(configuration: Configuration, namespace: str) -> Dict[str, Any]:
 def updated(
     configuration: Configuration, namespace: str, changes: Mapping[str, Any]
 ) -> Configuration:
-    """The configuration with some parameters of one namespace changed.
+    """Return the configuration with some parameters of one namespace changed.
 
-    Values are clamped to their ranges. ``restore_defaults`` puts the namespace
-    back to how it was loaded. As in the original, recoveries keep the parameters
-    that they were loaded with.
+    Values are clamped to their ranges. ``restore_defaults`` restores the namespace as it was
+    loaded. As in move_base, recoveries keep the parameters that they were loaded with.
+
+    Args:
+        configuration: The configuration in force.
+        namespace: A namespace of ``reconfigurable``.
+        changes: Name -> new value.
 
     Raises:
-        InputError: one line for every change that cannot be made; none is made then.
+        InputError: One line for every change that is refused; then no change is made.
     """
     parameters = reconfigurable(configuration).get(namespace)
     if parameters is None:
         names = ", ".join(repr(name) for name in reconfigurable(configuration))
-        raise InputError([f"{namespace}: nothing to reconfigure; expected one of {names}"])
+        raise InputError([f"{namespace}: not reconfigurable; expected one of {names}"])
     checked = _checked(parameters, namespace, changes, configuration.tree)
     if checked.get(_RESTORE):
         start = _below(configuration.tree_at_start, namespace)
@@ -92,9 +96,11 @@ def _checked(
             continue
         place = join(namespace, name)
         if name not in known:
-            problems.append(f"{place}: unknown; expected one of {', '.join(known)}")
+            problems.append(f"{place}: unknown parameter; expected one of {', '.join(known)}")
         elif name in SLOTS and value != tree[name]:
-            problems.append(f"{place}: {value!r} cannot take over in flight; expected {tree[name]}")
+            problems.append(
+                f"{place}: planners cannot change in flight, got {value!r}; expected {tree[name]}"
+            )
         else:
             try:
                 checked[name] = _clamped(known[name], value)
@@ -106,7 +112,7 @@ def _checked(
 
 
 def _clamped(parameter: Parameter, value: Any) -> Any:
-    """Clamped first: -1 m/s is then 0 m/s, while 0 Hz stays an error where it cannot be."""
+    """Clamp, then check: -1 m/s becomes 0 m/s, but 0 Hz is refused where it makes no sense."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         value = parameter.clamp(value)
     return parameter.check(value)

@@ -1,4 +1,4 @@
-"""The recovery behaviours: move_base's default sequence, or a list of one's own."""
+"""Recovery behaviours: move_base's default sequence, or a listed one."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ _AFFECTED_MAPS = ("local", "global", "both")
 
 
 def normalise_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
-    """Brings the recoveries' namespaces into the state in which the original leaves them.
+    """Normalise the recoveries' namespaces as move_base does.
 
     Returns:
-        (name, type) of each behaviour when the tree lists any, else None.
+        (name, type) of each behaviour in ``recovery_behaviors``, None without that list.
     """
     listed = _listed(tree, notes)
     if listed is None:
         _normalise_default_distances(tree, notes)
     for name, kind in dict(listed or _default_sequence(tree)).items():
-        # The behaviours of the default sequence need no namespace, and leave none.
+        # Behaviours of the default sequence need no namespace.
         if name not in tree and listed is None:
             continue
         namespace = subtree(tree, name, "", notes)
         if kind not in TABLES:
-            continue  # a behaviour of the user's knows its parameters itself
+            continue  # plugins check their parameters themselves
         layers = ("layer_names",) if kind == CLEAR else ()
         normalise(namespace, name, TABLES[kind], notes, also_known=layers)
         if kind == CLEAR:
@@ -63,13 +63,13 @@ def normalise_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
 def recoveries(
     tree: Mapping[str, Any], listed: Optional[NamedTypes]
 ) -> Tuple[Tuple[str, RecoveryParams], ...]:
-    """(name, parameters) in the order in which they are tried, of a normalised tree."""
+    """Return (name, parameters) of a normalised tree's recoveries, in the order of trial."""
     sequence = _default_sequence(tree) if listed is None else listed
     return tuple((name, with_fixes(_params(name, kind, tree), tree)) for name, kind in sequence)
 
 
 def circumscribed_radius_m(tree: Mapping[str, Any]) -> float:
-    """move_base takes it from a parameter of its own, not from the footprint."""
+    """Return move_base's circumscribed radius: its own parameter, not the footprint's."""
     costmap = tree["local_costmap"]
     return costmap.get("circumscribed_radius", COSTMAP_TABLE["circumscribed_radius"].default)
 
@@ -82,10 +82,10 @@ def _default_sequence(tree: Mapping[str, Any]) -> NamedTypes:
 
 
 def _normalise_default_distances(tree: Namespace, notes: Notes) -> None:
-    """The original writes these two over whatever is there."""
+    """Set the two distances that move_base overwrites."""
     radius_m = circumscribed_radius_m(tree)
     if not isinstance(radius_m, float):
-        return  # already told
+        return  # a fault, already noted
     distances = {_CONSERVATIVE: tree["conservative_reset_dist"], _AGGRESSIVE: 4.0 * radius_m}
     for name, distance in distances.items():
         namespace = subtree(tree, name, "", notes)
@@ -99,7 +99,7 @@ def _normalise_default_distances(tree: Namespace, notes: Notes) -> None:
 
 
 def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
-    """The ``recovery_behaviors`` that can be flown, None when there is no such list."""
+    """Return (name, type) of the supported ``recovery_behaviors``, None without that list."""
     if "recovery_behaviors" not in tree:
         return None
     entries = tree["recovery_behaviors"]
@@ -115,11 +115,11 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
             isinstance(entry.get(key), str) for key in ("name", "type")
         ):
             notes.problem(
-                "recovery_behaviors", f"{entry!r} is no behaviour; expected {{name: , type: }}"
+                "recovery_behaviors", f"{entry!r} is not a behaviour; expected {{name: , type: }}"
             )
         elif entry["name"] in listed:
             notes.problem(
-                "recovery_behaviors", f"{entry['name']!r} is there twice; expected a name for each"
+                "recovery_behaviors", f"{entry['name']!r} is used twice; expected unique names"
             )
         else:
             listed[entry["name"]] = full_type(entry["type"])
@@ -130,14 +130,14 @@ def _listed(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         notes.remark(
             join("recovery_behaviors", name),
             UNSUPPORTED,
-            f"{listed.pop(name)} is not supported here, the behaviour is left out;"
-            f" there are {', '.join(TABLES)}",
+            f"{listed.pop(name)} is not supported, skipping this behaviour; expected one of"
+            f" {', '.join(TABLES)}",
         )
     return tuple(listed.items())
 
 
 def listed_names(tree: Mapping[str, Any]) -> List[str]:
-    """Namespaces that recoveries may have, supported or not."""
+    """List the namespaces of recoveries, supported or not."""
     entries = tree.get("recovery_behaviors")
     names = []
     if isinstance(entries, list):
@@ -146,7 +146,7 @@ def listed_names(tree: Mapping[str, Any]) -> List[str]:
 
 
 def full_type(kind: str) -> str:
-    """Old configurations leave the package away."""
+    """Complete a type without its package, as old configurations have it."""
     for known in TABLES:
         if kind == known.split("/")[1]:
             return known
@@ -157,12 +157,14 @@ def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
     maps = namespace.get("affected_maps", "both")
     if isinstance(maps, str) and maps not in _AFFECTED_MAPS:
         expected = CLEAR_COSTMAP_TABLE["affected_maps"].expected
-        notes.problem(join(name, "affected_maps"), f"{maps!r} is no choice; expected {expected}")
+        notes.problem(
+            join(name, "affected_maps"), f"{maps!r} is not a valid choice; expected {expected}"
+        )
     layers = namespace.get("layer_names", [])
     if not isinstance(layers, list) or not all(isinstance(layer, str) for layer in layers):
         notes.problem(
             join(name, "layer_names"),
-            f"{layers!r} is no list of names; expected the names of layers, as in [obstacle_layer]",
+            f"{layers!r} is not a list of names; expected names of layers, as in [obstacle_layer]",
         )
 
 

@@ -1,11 +1,11 @@
-"""The reference page of parameters, written from the tables: ``docs/parameters.md``.
+"""Generate ``docs/parameters.md`` from the tables of parameters.
 
 python -m quad_nav.config.reference > docs/parameters.md
 """
 
 from __future__ import annotations
 
-from typing import Iterable, List, Tuple
+from typing import List, Tuple
 
 from quad_nav.config.fixes import FIXES_TABLE
 from quad_nav.config.spec import Parameter, Table
@@ -29,109 +29,117 @@ from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
 
 _HEAD = """# Parameters
 
-Written by `python -m quad_nav.config.reference`; edit the tables in `src/quad_nav/config/`.
+Look up the name, default, range and meaning of every parameter of the navigator.
 
-Parameters have the names, places and meanings that they have in ROS's `move_base` (navigation
-1.17.3). A default is the value in force when nothing is set: where dynamic_reconfigure's
-description and the wiki differ, it is dynamic_reconfigure's. Values outside a range are clamped to
-it, and told. Parameters with a mark (R) can be changed while flying, with dynamic_reconfigure.
+`python -m quad_nav.config.reference` generates this page from the tables in
+`src/quad_nav/config/`.
 
-What cannot be a value at all (a text for a number, NaN, a negative radius) is an error; every error
-is told before anything flies. What is legal and odd is told and flown: unknown keys with the
-nearest known name, keys and plugins that move_base knows and this package does not, keys that the
-original ignores, old names.
+Parameters have the names, places and meanings of ROS's `move_base` (navigation 1.17.3). A default
+is the value in force when nothing is set. Where the wiki differs from dynamic_reconfigure's
+description, the latter is used. Values outside a range are clamped, with a warning. Parameters
+marked (R) can change in flight, with dynamic_reconfigure.
+
+The navigator refuses wrong types and impossible values, such as a string for a number, NaN or a
+negative radius. It lists all errors before anything flies. It starts, with a warning for each, with
+unknown keys, with keys and plugins that `move_base` knows and this package does not, with keys that
+`move_base` ignores too, and with old names. [`quad check`](check.md) lists the same errors and
+warnings without flying.
 
 ## Where parameters go
 
-* A costmap with a `plugins` list reads each layer's parameters below the layer's name. Without one
-  it has an `obstacle_layer` and an `inflation_layer` (and a `static_layer` first, with
-  `static_map: true`), and layer parameters stand among the costmap's own, as before ROS Hydro.
-* In both cases what stands at the costmap's level replaces the layer's own value:
-  `inflation_radius` and `cost_scaling_factor`; `obstacle_range`, `raytrace_range`,
-  `max_obstacle_height` and `track_unknown_space`; `map_topic`, `lethal_cost_threshold` and
-  `unknown_cost_value`.
-* Topics are relative to the node's namespace: `scan0` is `/scan0` for `/move_base0`.
-* `footprint` counts before `robot_radius`. move_base's own radii are other parameters:
-  `local_costmap/circumscribed_radius` and `clearing_radius`.
-* Old names that still count: `pdist_scale`, `gdist_scale`, `min_in_place_rotational_vel`.
-* `controller_patience` is 15 s at start, and 5 s from the first reconfiguration of move_base on,
-  unless it is set: the original's two defaults differ.
-* `TrajectoryPlannerROS/controller_frequency` changes what rollouts reckon with, not the loop's
-  rate.
-* Without `recovery_behaviors` the sequence is `conservative_reset`, `rotate_recovery`,
-  `aggressive_reset`, `rotate_recovery`, and the two `reset_distance` are `conservative_reset_dist`
-  and four times `local_costmap/circumscribed_radius`, whatever is set below those names.
+* A costmap with a `plugins` list reads each layer's parameters from a namespace of the layer's
+  name. Without the list it has an `obstacle_layer` and an `inflation_layer`, and with
+  `static_map: true` a `static_layer` before them. Its layer parameters are then among the
+  costmap's own, as before ROS Hydro.
+* In both cases these parameters of the costmap override the layer's: `inflation_radius` and
+  `cost_scaling_factor`; `obstacle_range`, `raytrace_range`, `max_obstacle_height` and
+  `track_unknown_space`; `map_topic`, `lethal_cost_threshold` and `unknown_cost_value`; all
+  parameters of voxels.
 * `map_type: voxel` makes the `obstacle_layer` of a costmap without `plugins` a
-  `costmap_2d::VoxelLayer`. Voxel parameters at the costmap's level, too, replace the layer's own.
-* Layers, planners and behaviours of other packages are left out, or replaced by the ones that fly
-  here. Planners, layers and behaviours of your own are named as Python classes: see
+  `costmap_2d::VoxelLayer`.
+* Topics are relative to the node's namespace: `scan0` is `/scan0` for `/move_base0`.
+* `footprint` overrides `robot_radius`. move_base has radii of its own:
+  `local_costmap/circumscribed_radius` and `clearing_radius`.
+* These old names still work: `pdist_scale`, `gdist_scale`, `min_in_place_rotational_vel`.
+* If `controller_patience` is not set, it is 15 s at the start, and 5 s from the first
+  reconfiguration of move_base on. Upstream has these two defaults.
+* `TrajectoryPlannerROS/controller_frequency` changes the rate that rollouts assume, not the rate of
+  the control loop.
+* Without `recovery_behaviors` the sequence is `conservative_reset`, `rotate_recovery`,
+  `aggressive_reset`, `rotate_recovery`. The `reset_distance` of the first is
+  `conservative_reset_dist`, that of the third is four times
+  `local_costmap/circumscribed_radius`. Values in their namespaces have no effect.
+* Layers and recoveries of other packages are skipped. Planners of other packages are replaced by
+  the defaults. Planners, layers and recoveries of your own are named as Python classes: see
   [plugins](plugins.md).
-* Only the namespaces of the chosen planners are read; a turning recovery takes its limits from
+* Only the namespaces of the chosen planners are read. `rotate_recovery` reads its limits from
   `TrajectoryPlannerROS` whatever the local planner.
 """
 
-
-def reference() -> str:
-    """The page, as Markdown."""
-    parts = [_HEAD]
-    for title, text, table in _sections():
-        parts.append(f"\n## {title}\n\n{text}\n\n" + "\n".join(_rows(table)) + "\n")
-    return "".join(parts)
-
-
-def _sections() -> Iterable[Tuple[str, str, Table]]:
-    yield "move_base", "At the node's level.", MOVE_BASE_TABLE
-    yield (
+_BEHAVIOUR = "in the namespace of the behaviour's name."
+# (title, text, table) of each section.
+_SECTIONS: Tuple[Tuple[str, str, Table], ...] = (
+    ("move_base", "At the node's level.", MOVE_BASE_TABLE),
+    (
         "TrajectoryPlannerROS",
         f"The local planner `{DEFAULT_LOCAL_PLANNER}`.",
         TRAJECTORY_PLANNER_TABLE,
-    )
-    yield "DWAPlannerROS", "The local planner `dwa_local_planner/DWAPlannerROS`.", DWA_TABLE
-    yield "NavfnROS", f"The global planner `{DEFAULT_GLOBAL_PLANNER}`.", NAVFN_TABLE
-    yield (
+    ),
+    ("DWAPlannerROS", "The local planner `dwa_local_planner/DWAPlannerROS`.", DWA_TABLE),
+    ("NavfnROS", f"The global planner `{DEFAULT_GLOBAL_PLANNER}`.", NAVFN_TABLE),
+    (
         "GlobalPlanner",
         "The global planner `global_planner/GlobalPlanner`.",
         GLOBAL_PLANNER_TABLE,
-    )
-    yield (
+    ),
+    (
         "CarrotPlanner",
-        "The global planner `carrot_planner/CarrotPlanner`: straight for the goal.",
+        "The global planner `carrot_planner/CarrotPlanner`: a straight line to the goal.",
         CARROT_TABLE,
-    )
-    yield (
+    ),
+    (
         "fixes",
-        "[Upstream bugs](upstream_bugs.md) that are fixed by default, and how to restore each.",
+        "Not in upstream move_base: fixes of its bugs, and additions. See"
+        " [upstream bugs](upstream_bugs.md).",
         FIXES_TABLE,
-    )
-    yield "Costmaps", "Below `global_costmap` and `local_costmap`.", COSTMAP_TABLE
-    yield ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", OBSTACLE_LAYER_TABLE)
-    yield ("Voxel layer", "`costmap_2d::VoxelLayer`.", VOXEL_LAYER_TABLE)
-    yield (
+    ),
+    ("Costmaps", "In `global_costmap` and `local_costmap`.", COSTMAP_TABLE),
+    ("Obstacle layer", "`costmap_2d::ObstacleLayer`.", OBSTACLE_LAYER_TABLE),
+    ("Voxel layer", "`costmap_2d::VoxelLayer`.", VOXEL_LAYER_TABLE),
+    (
         "Sources",
-        "Each name in `observation_sources` is a namespace below the layer.",
+        "Each name in `observation_sources` is a namespace in the layer's.",
         SOURCE_TABLE,
-    )
-    yield ("Inflation layer", "`costmap_2d::InflationLayer`.", INFLATION_LAYER_TABLE)
-    yield "Static layer", "`costmap_2d::StaticLayer`.", STATIC_LAYER_TABLE
-    yield (
-        "Clearing",
-        "`clear_costmap_recovery/ClearCostmapRecovery`, below the behaviour's name."
-        " `layer_names` lists the layers that are cleared; the obstacle layers when unset.",
+    ),
+    ("Inflation layer", "`costmap_2d::InflationLayer`.", INFLATION_LAYER_TABLE),
+    ("Static layer", "`costmap_2d::StaticLayer`.", STATIC_LAYER_TABLE),
+    (
+        "ClearCostmapRecovery",
+        f"`clear_costmap_recovery/ClearCostmapRecovery`, {_BEHAVIOUR} `layer_names` lists the"
+        " layers that are cleared; the obstacle layers if unset.",
         CLEAR_COSTMAP_TABLE,
-    )
-    yield (
-        "Turning",
-        "`rotate_recovery/RotateRecovery`, below the behaviour's name. Speeds and"
-        " accelerations are those of TrajectoryPlannerROS.",
+    ),
+    (
+        "RotateRecovery",
+        f"`rotate_recovery/RotateRecovery`, {_BEHAVIOUR} Speeds and accelerations are those of"
+        " TrajectoryPlannerROS.",
         ROTATE_TABLE,
-    )
-    yield (
-        "Going slowly",
-        "`move_slow_and_clear/MoveSlowAndClear`, below the behaviour's name. It"
-        " frees the obstacle layers around the robot and limits the local planner's speeds,"
-        " forwards, backwards and turning, until the robot has moved away.",
+    ),
+    (
+        "MoveSlowAndClear",
+        f"`move_slow_and_clear/MoveSlowAndClear`, {_BEHAVIOUR} It clears the obstacle layers around"
+        " the robot and limits all speeds of the local planner until the robot has moved away.",
         MOVE_SLOW_TABLE,
-    )
+    ),
+)
+
+
+def reference() -> str:
+    """Return the page as Markdown."""
+    parts = [_HEAD]
+    for title, text, table in _SECTIONS:
+        parts.append(f"\n## {title}\n\n{text}\n\n" + "\n".join(_rows(table)) + "\n")
+    return "".join(parts)
 
 
 def _rows(table: Table) -> List[str]:
@@ -144,7 +152,7 @@ def _rows(table: Table) -> List[str]:
             f" {unit} | {parameter.description} |"
         )
     for name, reason in table.unsupported:
-        rows.append(f"| `{name}` | | | | not supported here: {reason} |")
+        rows.append(f"| `{name}` | | | | not supported: {reason} |")
     for name, reason in table.ignored:
         rows.append(f"| `{name}` | | | | ignored: {reason} |")
     return rows

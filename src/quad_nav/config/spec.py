@@ -1,4 +1,4 @@
-"""What a parameter is: its ROS spelling, its type, its range and the field that it fills."""
+"""Parameters and tables of parameters: ROS spelling, type, range, and the field that is filled."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Callable, Optional, Tuple
 
 
 class Domain(enum.Enum):
-    """Which numbers make sense at all; the others are errors."""
+    """Set of numbers that a parameter accepts; others are errors."""
 
     ANY = "a {number}"
     NOT_NEGATIVE = "a {number}, 0 or more"
@@ -18,7 +18,7 @@ class Domain(enum.Enum):
 
 @dataclass(frozen=True)
 class Choice:
-    """One value of an enumeration, as dynamic_reconfigure shows it."""
+    """Value of an enumeration, as dynamic_reconfigure shows it."""
 
     name: str
     value: int
@@ -26,19 +26,27 @@ class Choice:
 
 
 class InvalidValue(ValueError):
-    """A value that no parameter of this kind can have; says what was expected."""
+    """A value that a parameter does not accept; the message says what was expected."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of move_base.
+    """Parameter of move_base.
 
-    ``name``: the ROS spelling. ``kind``: "double", "int", "bool" or "str", as
-    dynamic_reconfigure calls them. ``field``: the dataclass field that it fills,
-    "" when nothing here reads it. ``default``: the value in force when nothing is
-    set; ``initial`` where a different one is in force until the first
-    reconfiguration. ``low`` and ``high``: the range that dynamic_reconfigure
-    clamps to, None for none. ``convert`` turns the ROS value into the field's.
+    Attributes:
+        name: ROS spelling.
+        kind: "double", "int", "bool" or "str", as in dynamic_reconfigure.
+        default: Value in force when nothing is set.
+        field: Dataclass field that the parameter fills, "" if nothing here reads it.
+        description: One sentence, shown by dynamic_reconfigure and in the reference.
+        unit: Unit of a number; for a text, what is expected.
+        domain: Numbers that are accepted.
+        low: Lower end of the range that dynamic_reconfigure clamps to, None without one.
+        high: Upper end of that range.
+        initial: Value in force until the first reconfiguration, where it is not ``default``.
+        convert: Converts the ROS value to the field's; raises ``ValueError``.
+        choices: Values of an enumeration.
+        choices_description: Description of the enumeration.
     """
 
     name: str
@@ -57,11 +65,11 @@ class Parameter:
 
     @property
     def expected(self) -> str:
-        """What a value has to be, for messages."""
+        """Description of the values that are accepted, for messages."""
         if self.kind == "bool":
             return "true or false"
         if self.kind == "str":
-            return self.unit or "a text"
+            return self.unit or "a string"
         number = f"number of {self.unit}" if self.unit else "number"
         if self.kind == "int" and not self.unit:
             number = "whole number"
@@ -69,22 +77,22 @@ class Parameter:
 
     @property
     def in_force(self) -> Any:
-        """The value that counts at start when nothing is set."""
+        """Value in force at the start when nothing is set."""
         return self.default if self.initial is None else self.initial
 
     def field_value(self, value: Any) -> Any:
-        """The dataclass field's value for a checked ROS value."""
+        """Return the dataclass field's value for a checked ROS value."""
         return value if self.convert is None else self.convert(value)
 
     def check(self, value: Any) -> Any:
-        """The value in this parameter's own type, not yet clamped.
+        """Return a value in the parameter's own type, not clamped.
 
         Raises:
-            InvalidValue: wrong type, not finite, or outside the domain.
+            InvalidValue: The type is wrong, or the number is not finite or not accepted.
         """
         if self.kind == "bool":
             if not isinstance(value, bool):
-                raise InvalidValue(f"{value!r} is neither true nor false; expected {self.expected}")
+                raise InvalidValue(f"{value!r} is not a boolean; expected {self.expected}")
             return value
         if self.kind == "str":
             return self._checked_text(value)
@@ -92,7 +100,7 @@ class Parameter:
 
     def _checked_text(self, value: Any) -> str:
         if not isinstance(value, str):
-            raise InvalidValue(f"{value!r} is not a text; expected {self.expected}")
+            raise InvalidValue(f"{value!r} is not a string; expected {self.expected}")
         try:
             self.field_value(value)
         except ValueError as error:
@@ -109,15 +117,15 @@ class Parameter:
             and self.domain is not Domain.ANY
             or (value == 0 and self.domain is Domain.POSITIVE)
         ):
-            raise InvalidValue(f"{value} cannot be; expected {self.expected}")
+            raise InvalidValue(f"{value} is out of range; expected {self.expected}")
         if self.choices and value not in [choice.value for choice in self.choices]:
             names = ", ".join(f"{choice.value} ({choice.name})" for choice in self.choices)
-            raise InvalidValue(f"{value} is no choice; expected one of {names}")
+            raise InvalidValue(f"{value} is not a valid choice; expected one of {names}")
         # roscpp rounds a double that is read as an int, halves upwards.
         return float(value) if self.kind == "double" else math.floor(value + 0.5)
 
     def clamp(self, value: Any) -> Any:
-        """The nearest value within dynamic_reconfigure's range."""
+        """Clamp a value to dynamic_reconfigure's range."""
         if self.kind in ("bool", "str"):
             return value
         if self.low is not None and value < self.low:
@@ -129,11 +137,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Table:
-    """The parameters of one namespace.
+    """Parameters of one namespace.
 
-    ``reconfigurable`` are in the order in which dynamic_reconfigure lists them;
-    ``fixed`` are read once at start. ``unsupported`` and ``ignored`` are keys
-    that move_base knows: (name, why it changes nothing here), or in the original.
+    Attributes:
+        reconfigurable: Parameters that can change in flight, in the order of dynamic_reconfigure.
+        fixed: Parameters that are read once, at the start.
+        unsupported: (name, reason) of keys that move_base reads and this package does not.
+        ignored: (name, reason) of keys that move_base ignores too.
     """
 
     reconfigurable: Tuple[Parameter, ...] = ()
@@ -143,6 +153,7 @@ class Table:
 
     @property
     def parameters(self) -> Tuple[Parameter, ...]:
+        """All parameters, the reconfigurable ones first."""
         return self.reconfigurable + self.fixed
 
     def __getitem__(self, name: str) -> Parameter:
@@ -163,6 +174,7 @@ def double(
     high: Any = None,
     **more: Any,
 ) -> Parameter:
+    """Make a parameter that is a number."""
     return Parameter(name, "double", default, field, description, unit, domain, low, high, **more)
 
 
@@ -177,16 +189,19 @@ def integer(
     high: Any = None,
     **more: Any,
 ) -> Parameter:
+    """Make a parameter that is a whole number."""
     return Parameter(name, "int", default, field, description, unit, domain, low, high, **more)
 
 
 def flag(name: str, default: bool, field: str, description: str) -> Parameter:
+    """Make a parameter that is true or false."""
     return Parameter(name, "bool", default, field, description)
 
 
 def text(
     name: str, default: str, field: str, expected: str, description: str, **more: Any
 ) -> Parameter:
+    """Make a parameter that is a string; ``expected`` describes it in messages."""
     return Parameter(name, "str", default, field, description, expected, **more)
 
 
@@ -194,10 +209,10 @@ RESTORE_DEFAULTS = flag("restore_defaults", False, "", "Restore to the original 
 
 
 def _hint(value: Any) -> str:
-    """YAML 1.1 takes 1e-3 for a text: say so, it looks like a number."""
+    """Explain a string that looks like a number: YAML 1.1 reads 1e-3 as a string."""
     if not isinstance(value, str):
         return ""
     try:
-        return f" but a text (write {float(value)})"
+        return f" but a string (write {float(value)})"
     except ValueError:
         return ""

@@ -1,8 +1,7 @@
-"""What ``move_slow_and_clear/MoveSlowAndClear`` limits of the local planner that flies.
+"""Speeds that ``move_slow_and_clear/MoveSlowAndClear`` limits.
 
-The original changes two parameters of a planner that is named; which, suits one planner only.
-Here it is always the planner that flies, and all of its speeds: one that may still go
-backwards fast is not slow.
+Upstream changes two parameters of a planner that the configuration names. Here the recovery limits
+all speeds of the chosen local planner, those of flying backwards included.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from quad_nav.recovery import MoveSlowAndClearParams
 
 @dataclass(frozen=True)
 class Speeds:
-    """The parameters of a local planner that say how fast the robot may go and turn."""
+    """Parameters of a local planner that limit its speeds."""
 
     table: Table
     translation: Tuple[str, ...]
@@ -33,7 +32,7 @@ class Speeds:
 
     @property
     def fields(self) -> Dict[str, str]:
-        """Parameter -> field of everything that a limit can be put on."""
+        """Return parameter -> field of every speed."""
         return {
             parameter.name: parameter.field
             for parameter in self.table.parameters
@@ -41,7 +40,7 @@ class Speeds:
         }
 
 
-# A user's planner is not among them: it has no parameters that change.
+# Plugins are not in it: they have no reconfigurable parameters.
 SPEEDS: Dict[str, Speeds] = {
     DEFAULT_LOCAL_PLANNER: Speeds(
         TRAJECTORY_PLANNER_TABLE,
@@ -61,20 +60,22 @@ SPEEDS: Dict[str, Speeds] = {
         rotation=("max_vel_theta", "min_vel_theta"),
     ),
 }
-# The parameters that name one more speed, and what they are in the original when unset.
+# Parameters that name one more speed, and their upstream defaults.
 _NAMES = {"max_trans_param_name": "max_trans_vel", "max_rot_param_name": "max_rot_vel"}
 
 
 def check_slow(namespace: Mapping[str, Any], name: str, planner: str, notes: Notes) -> None:
-    """Remarks on names that fit another planner than ``planner``, the one that flies."""
+    """Add remarks on names that are not of ``planner``, the chosen local planner."""
     own, speeds = plugin_name(planner), SPEEDS.get(planner)
     if speeds is None:
-        notes.remark(name, CAUTION, f"{own} is not limited: it has no parameters that change")
+        notes.remark(name, CAUTION, f"{own} is not limited: plugins have no reconfigurable speeds")
         return
     given = namespace.get("planner_namespace", "")
     if isinstance(given, str) and given.strip("/") not in ("", own):
         notes.remark(
-            join(name, "planner_namespace"), CAUTION, f"{given} does not fly here: {own} is limited"
+            join(name, "planner_namespace"),
+            CAUTION,
+            f"{given} is not the local planner; limiting {own} instead",
         )
         return
     for key, original in _NAMES.items():
@@ -83,13 +84,13 @@ def check_slow(namespace: Mapping[str, Any], name: str, planner: str, notes: Not
             notes.remark(
                 join(name, key),
                 CAUTION,
-                f"{own} has no speed of the name {speed}",
+                f"{own} has no speed parameter {speed}",
                 nearest(speed, speeds.fields),
             )
 
 
 def slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearParams:
-    """The dataclass of a normalised namespace."""
+    """Make the recovery's dataclass from a normalised namespace."""
     speeds: Optional[Speeds] = SPEEDS.get(planner)
 
     def limited(names: Tuple[str, ...], key: str) -> Tuple[str, ...]:

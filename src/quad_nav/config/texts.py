@@ -1,4 +1,4 @@
-"""Parameters that are lists of numbers written as text."""
+"""Convert strings that hold lists of numbers: footprints and velocities."""
 
 from __future__ import annotations
 
@@ -13,12 +13,15 @@ Polygon = Tuple[Tuple[float, float], ...]
 
 
 def polygon_from_text(text: str) -> Optional[Polygon]:
-    """A footprint's vertices in metres; None for "" and "[]", which mean "a circle".
+    """Convert a footprint's string to vertices in metres.
 
-    The original reads these numbers as float32, so they are rounded to that.
+    As in move_base the numbers are rounded to float32.
+
+    Returns:
+        The vertices, or None for "" and "[]": a circular footprint.
 
     Raises:
-        ValueError: not a list of at least three [x, y].
+        ValueError: The string is not a list of at least three [x, y].
     """
     if text.strip() in ("", "[]"):
         return None
@@ -30,7 +33,11 @@ def polygon_from_text(text: str) -> Optional[Polygon]:
 
 
 def polygon_from_list(points: Any) -> Optional[Polygon]:
-    """The same of a list. Raises ValueError as ``polygon_from_text`` does."""
+    """Convert a footprint's list to vertices in metres; None for an empty list.
+
+    Raises:
+        ValueError: The list has fewer than three points, or an entry is not [x, y].
+    """
     if points == []:
         return None
     if not isinstance(points, list) or len(points) < 3:
@@ -39,12 +46,16 @@ def polygon_from_list(points: Any) -> Optional[Polygon]:
 
 
 def text_from_polygon(polygon: Sequence[Tuple[float, float]]) -> str:
-    """As the original writes it back to the parameter server: six digits."""
+    """Convert vertices to a string as move_base does for the parameter server: six digits."""
     return "[" + ",".join(f"[{x:g},{y:g}]" for x, y in polygon) + "]"
 
 
 def numbers_from_text(text: str) -> Tuple[float, ...]:
-    """ "-0.3, 0.3" as numbers. Raises ValueError when one of them is none."""
+    """Convert a string such as ``-0.3, 0.3`` to numbers.
+
+    Raises:
+        ValueError: A word is not a finite number.
+    """
     words = text.strip().strip("[]").replace(",", " ").split()
     numbers = tuple(float(word) for word in words)
     if not np.all(np.isfinite(numbers)):
@@ -62,6 +73,6 @@ def _vertex(point: Any) -> Tuple[float, float]:
             or (not np.isfinite(number))
         ):
             raise ValueError(f"{number!r} is not a number")
-    # Through six digits and float32, the way that the original takes them.
+    # Rounded to six digits and float32, as in move_base.
     x, y = (float(np.float32(f"{number:g}")) for number in point)
     return (x, y)

@@ -11,12 +11,12 @@ from quad_nav.config.spec import RESTORE_DEFAULTS, Domain, Table, double, flag, 
 _ANY, _POSITIVE = Domain.ANY, Domain.POSITIVE
 
 
-# Read from the planner's namespace or, as the original does, from the node's own level.
+# Read from the planner's namespace or from the node's level, as upstream does.
 LATCH = flag(
     "latch_xy_goal_tolerance",
     False,
     "latch_xy_goal_tolerance",
-    "Once at the goal, only turn, even if the turn takes the robot off it.",
+    "Once at the goal, only turn, even if the robot drifts off it.",
 )
 
 
@@ -326,15 +326,15 @@ DWA_TABLE = Table(
             "sum_scores",
             False,
             "sum_scores",
-            "Cell costs on the way are summed; otherwise the highest counts.",
+            "Sum the costs of cells along a trajectory; otherwise use the highest.",
         ),
         double(
             "cheat_factor",
             1.0,
             "cheat_factor",
             "",
-            "Within forward_point_distance times the root of this of the local goal, the robot"
-            " need not point along the path.",
+            "Nearer to the local goal than forward_point_distance times the square root of this,"
+            " the robot need not point along the path.",
         ),
         flag(
             "publish_cost_grid_pc",
@@ -354,31 +354,31 @@ DWA_TABLE = Table(
             20.0,
             "",
             "Hz",
-            "The rate that sampling reckons with; when unset, move_base's own.",
+            "The rate that sampling assumes; move_base's own if unset.",
             _ANY,
         ),
     ),
     unsupported=(
         ("publish_traj_pc", "the sampled trajectories are not published"),
-        ("odom_topic", "the odometry's topic is odom, remapped"),
+        ("odom_topic", "the topic of the odometry is odom; remap it"),
     ),
     ignored=(
-        ("max_trans_vel", "the name is max_vel_trans"),
-        ("min_trans_vel", "the name is min_vel_trans"),
-        ("max_rot_vel", "the name is max_vel_theta"),
-        ("min_rot_vel", "the name is min_vel_theta"),
-        ("rot_stopped_vel", "the name is theta_stopped_vel"),
-        ("trans_stopped_velocity", "the name is trans_stopped_vel"),
-        ("rot_stopped_velocity", "the name is theta_stopped_vel"),
-        ("acc_lim_th", "the name is acc_lim_theta"),
-        ("acc_limit_x", "the name is acc_lim_x"),
-        ("acc_limit_y", "the name is acc_lim_y"),
-        ("acc_limit_th", "the name is acc_lim_theta"),
-        ("acc_limit_trans", "the name is acc_lim_trans"),
-        ("pdist_scale", "the name is path_distance_bias"),
-        ("gdist_scale", "the name is goal_distance_bias"),
-        ("vtheta_samples", "the name is vth_samples"),
-        ("dwa", "the name is use_dwa"),
-        ("penalize_negative_x", "the original has no such critic any more"),
+        ("max_trans_vel", "renamed to max_vel_trans"),
+        ("min_trans_vel", "renamed to min_vel_trans"),
+        ("max_rot_vel", "renamed to max_vel_theta"),
+        ("min_rot_vel", "renamed to min_vel_theta"),
+        ("rot_stopped_vel", "renamed to theta_stopped_vel"),
+        ("trans_stopped_velocity", "renamed to trans_stopped_vel"),
+        ("rot_stopped_velocity", "renamed to theta_stopped_vel"),
+        ("acc_lim_th", "renamed to acc_lim_theta"),
+        ("acc_limit_x", "renamed to acc_lim_x"),
+        ("acc_limit_y", "renamed to acc_lim_y"),
+        ("acc_limit_th", "renamed to acc_lim_theta"),
+        ("acc_limit_trans", "renamed to acc_lim_trans"),
+        ("pdist_scale", "renamed to path_distance_bias"),
+        ("gdist_scale", "renamed to goal_distance_bias"),
+        ("vtheta_samples", "renamed to vth_samples"),
+        ("dwa", "renamed to use_dwa"),
+        ("penalize_negative_x", "upstream has removed this critic"),
     ),
 )

@@ -6,7 +6,7 @@ from quad_nav.config.spec import Choice, Domain, Table, double, flag, integer
 from quad_nav.plan.orientations import OrientationMode
 
 _ANY = Domain.ANY
-_UNUSED = "the original reads it and never uses it"
+_UNUSED = "read and never used"
 
 
 NAVFN_TABLE = Table(
@@ -17,7 +17,7 @@ NAVFN_TABLE = Table(
             0.0,
             "default_tolerance_m",
             "metres",
-            "How far from the goal a plan may end.",
+            "Maximum distance between the goal and the end of a plan.",
         ),
         flag("visualize_potential", False, "visualize_potential", "Publish the potential."),
         double("planner_window_x", 0.0, "planner_window_x_m", "metres", "Read and never used."),

@@ -51,22 +51,22 @@ _SENSORS = (
         2.5,
         "obstacle_range_m",
         "metres",
-        "Obstacles further off are not marked, for sources that set none.",
+        "Maximum distance at which obstacles are marked, for sources that set none.",
     ),
     double(
         "raytrace_range",
         3.0,
         "raytrace_range_m",
         "metres",
-        "Space further off is not cleared, for sources that set none.",
+        "Maximum distance to which space is cleared, for sources that set none.",
     ),
-    flag("track_unknown_space", False, "track_unknown_space", "When unset, as the costmap."),
+    flag("track_unknown_space", False, "track_unknown_space", "The costmap's if unset."),
     text(
         "observation_sources",
         "",
         "",
         "names separated by blanks",
-        "The sensors; each has a namespace of its name.",
+        "The sensors. Each has a namespace of its name.",
     ),
 )
 
@@ -125,13 +125,13 @@ VOXEL_LAYER_TABLE = Table(
             "publish_voxel_map",
             False,
             "publish_voxel_map",
-            "Publish the marked voxels, as markers.",
+            "Publish the marked voxels as markers.",
         ),
     ),
 )
 
 
-# What a voxel layer has on top of an obstacle layer.
+# Parameters of a voxel layer that an obstacle layer lacks.
 VOXEL_PARAMETERS = (
     "origin_z",
     "z_resolution",
@@ -151,13 +151,13 @@ OBSTACLE_LAYER_TABLE = Table(
 
 SOURCE_TABLE = Table(
     fixed=(
-        text("topic", "", "topic", "a topic's name", "When unset, the source's name."),
+        text("topic", "", "topic", "a topic's name", "The source's name if unset."),
         text(
             "sensor_frame",
             "",
             "sensor_frame",
             "a frame's name",
-            "Where the sensor is; when unset, the frame of its messages.",
+            "Frame of the sensor; the frame of its messages if unset.",
         ),
         text(
             "data_type",
@@ -171,22 +171,22 @@ SOURCE_TABLE = Table(
             0.0,
             "observation_persistence_s",
             "seconds",
-            "How long an observation counts; 0 keeps only the newest.",
+            "Time for which observations are kept; 0 keeps only the newest.",
         ),
         double(
             "expected_update_rate",
             0.0,
             "expected_update_period_s",
             "seconds",
-            "Not a rate but a period: a sensor that is silent for longer makes the costmap"
-            " not current. 0 never does.",
+            "A period, not a rate: the costmap is not current when the sensor has sent nothing"
+            " for longer. 0 disables the check.",
         ),
         double(
             "min_obstacle_height",
             0.0,
             "min_obstacle_height_m",
             "metres",
-            "Lower points are dropped.",
+            "Points below this height are ignored.",
             _ANY,
         ),
         double(
@@ -194,7 +194,7 @@ SOURCE_TABLE = Table(
             2.0,
             "max_obstacle_height_m",
             "metres",
-            "Higher points are dropped.",
+            "Points above this height are ignored.",
             _ANY,
         ),
         double(
@@ -202,17 +202,17 @@ SOURCE_TABLE = Table(
             2.5,
             "obstacle_range_m",
             "metres",
-            "Obstacles further off are not marked; when unset, the layer's.",
+            "Maximum distance at which obstacles are marked; the layer's if unset.",
         ),
         double(
             "raytrace_range",
             3.0,
             "raytrace_range_m",
             "metres",
-            "Space further off is not cleared; when unset, the layer's.",
+            "Maximum distance to which space is cleared; the layer's if unset.",
         ),
         flag("marking", True, "marking", "The sensor marks obstacles."),
-        flag("clearing", False, "clearing", "The sensor clears the space in front of them."),
+        flag("clearing", False, "clearing", "The sensor clears the space in front of obstacles."),
         flag(
             "inf_is_valid",
             False,
@@ -252,13 +252,13 @@ INFLATION_LAYER_TABLE = Table(
 STATIC_LAYER_TABLE = Table(
     reconfigurable=(ENABLED,),
     fixed=(
-        text("map_topic", "map", "map_topic", "a topic's name", "Where the map comes from."),
-        flag("first_map_only", False, "first_map_only", "Later maps are ignored."),
+        text("map_topic", "map", "map_topic", "a topic's name", "Topic of the map."),
+        flag("first_map_only", False, "first_map_only", "Ignore all maps but the first."),
         flag(
             "subscribe_to_updates",
             False,
             "subscribe_to_updates",
-            "Listen to map_topic_updates as well.",
+            "Subscribe to the updates of the map too.",
         ),
         flag(
             "track_unknown_space",
@@ -266,13 +266,18 @@ STATIC_LAYER_TABLE = Table(
             "track_unknown_space",
             "Unknown cells of the map stay unknown.",
         ),
-        flag("use_maximum", False, "use_maximum", "Take the higher of map and master cost."),
+        flag(
+            "use_maximum",
+            False,
+            "use_maximum",
+            "Use the maximum of the map's and the other layers' costs.",
+        ),
         integer(
             "lethal_cost_threshold",
             100,
             "lethal_cost_threshold",
             "",
-            "Occupancies from here on are obstacles.",
+            "Minimum occupancy of an obstacle.",
             low=0,
             high=100,
         ),
@@ -289,7 +294,7 @@ STATIC_LAYER_TABLE = Table(
             "trinary_costmap",
             True,
             "trinary_costmap",
-            "Cells are free, unknown or obstacles, nothing between.",
+            "Cells are free, unknown or obstacles, without values between.",
         ),
     ),
 )

@@ -146,15 +146,15 @@ MOVE_BASE_TABLE = Table(
             0.46,
             "",
             "metres",
-            "Half the side of the square that make_plan clears around the robot; when unset,"
-            " local_costmap/circumscribed_radius.",
+            "Half the side of the square that make_plan clears around the robot;"
+            " local_costmap/circumscribed_radius if unset.",
         ),
         integer(
             "robot",
             0,
             "",
             "",
-            "This robot's number among those that fly together. Not in the original; see peers.md.",
+            "Number of this robot in its fleet. Not in upstream move_base; see peers.md.",
             low=0,
         ),
         integer(
@@ -162,8 +162,8 @@ MOVE_BASE_TABLE = Table(
             1,
             "",
             "",
-            "How many fly together: the peers are the other numbers below"
-            " this. Not in the original; see peers.md.",
+            "Number of robots in the fleet; the peers are the other numbers below it. Not in"
+            " upstream move_base; see peers.md.",
             low=1,
         ),
     ),

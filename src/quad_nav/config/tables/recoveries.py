@@ -14,9 +14,14 @@ CLEAR_COSTMAP_TABLE = Table(
             3.0,
             "reset_distance_m",
             "metres",
-            "Side of the square around the robot whose outside is cleared.",
+            "Side of the square around the robot outside of which costs are cleared.",
         ),
-        flag("invert_area_to_clear", False, "invert_area_to_clear", "Clear the inside instead."),
+        flag(
+            "invert_area_to_clear",
+            False,
+            "invert_area_to_clear",
+            "Clear the inside of the square instead.",
+        ),
         flag("force_updating", False, "force_updating", "Update the costmaps after clearing."),
         text(
             "affected_maps",
@@ -44,7 +49,7 @@ ROTATE_TABLE = Table(
 )
 
 
-# The turn also takes these from TrajectoryPlannerROS, with defaults of its own.
+# RotateRecovery reads these from TrajectoryPlannerROS, with its own defaults.
 ROTATE_FROM_PLANNER = (
     double("yaw_goal_tolerance", 0.10, "yaw_goal_tolerance_rad", "radians", ""),
     double("acc_lim_theta", 3.2, "acc_lim_theta_radps2", "rad/s^2", ""),
@@ -60,14 +65,14 @@ MOVE_SLOW_TABLE = Table(
             0.5,
             "clearing_distance_m",
             "metres",
-            "Obstacles are cleared so far to each side of the robot.",
+            "Distance around the robot within which obstacles are cleared.",
         ),
         double(
             "limited_trans_speed",
             0.25,
             "limited_trans_speed_mps",
             "m/s",
-            "Greatest speed afterwards.",
+            "Maximum translational speed after clearing.",
             _POSITIVE,
         ),
         double(
@@ -75,7 +80,7 @@ MOVE_SLOW_TABLE = Table(
             0.45,
             "limited_rot_speed_radps",
             "rad/s",
-            "Fastest turn afterwards.",
+            "Maximum rotational speed after clearing.",
             _POSITIVE,
         ),
         double(
@@ -83,28 +88,28 @@ MOVE_SLOW_TABLE = Table(
             0.3,
             "limited_distance_m",
             "metres",
-            "The limits are lifted when the robot has moved so far.",
+            "The limits end when the robot has moved this far.",
         ),
         text(
             "planner_namespace",
             "",
             "",
             "a planner's namespace",
-            "The planner that is limited: it is the local planner that flies, whatever is set.",
+            "Read and not used: the chosen local planner is limited.",
         ),
         text(
             "max_trans_param_name",
             "",
             "",
             "a parameter's name",
-            "One more parameter of the planner that limited_trans_speed limits.",
+            "Another parameter of the planner that limited_trans_speed limits.",
         ),
         text(
             "max_rot_param_name",
             "",
             "",
             "a parameter's name",
-            "One more parameter of the planner that limited_rot_speed limits.",
+            "Another parameter of the planner that limited_rot_speed limits.",
         ),
     )
 )
