@@ -132,7 +132,7 @@ class FlightCase(unittest.TestCase):
 
     @staticmethod
     def wait(condition, what, patience_s=PATIENCE_S):
-        """Until the condition holds; a failure says ``what`` did not come, or what it returns."""
+        """Until the condition holds; a failure names ``what``, or what it returns."""
         end = time.monotonic() + patience_s
         while time.monotonic() < end and not rospy.is_shutdown():
             if condition():

@@ -61,19 +61,19 @@ class Conversions(unittest.TestCase):
         )
 
     def test_intentions(self):
-        told = Intention(rank_of(1700000012.25, 3), np.array([[1.0, 2.0], [1.5, 2.5]]))
-        message = intention_message(told, "map", 1700000020.5)
+        sent = Intention(rank_of(1700000012.25, 3), np.array([[1.0, 2.0], [1.5, 2.5]]))
+        message = intention_message(sent, "map", 1700000020.5)
         self.assertEqual(
             (message.header.frame_id, message.header.stamp.to_sec()), ("map", 1700000020.5)
         )
-        heard = intention_from_message(message, 3)
-        self.assertAlmostEqual(heard.rank_s, told.rank_s, places=6)
-        np.testing.assert_array_equal(heard.way, told.way)
+        received = intention_from_message(message, 3)
+        self.assertAlmostEqual(received.rank_s, sent.rank_s, places=6)
+        np.testing.assert_array_equal(received.way, sent.way)
 
     def test_an_intention_to_stay_is_an_empty_path(self):
         staying = Intention(rank_of(IDLE_RANK_S, 3))
-        heard = intention_from_message(intention_message(staying, "map", 1.0), 3)
-        self.assertEqual((heard.rank_s, len(heard.way)), (staying.rank_s, 0))
+        received = intention_from_message(intention_message(staying, "map", 1.0), 3)
+        self.assertEqual((received.rank_s, len(received.way)), (staying.rank_s, 0))
 
     def test_times_are_rounded_to_the_nanosecond(self):
         self.assertEqual(conversions.time_message(1.0 + 1.0 / 240), rospy.Time(1, 4166667))

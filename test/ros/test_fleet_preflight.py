@@ -55,30 +55,30 @@ class FleetPreflight(unittest.TestCase):
         folder = self.config(
             robot1="controller_frequency: often\n", robot3="\nlocal_costmap:\n  resolution: -1.0\n"
         )
-        status, said = preflight("robots:=4", f"config:={folder}")
+        status, errors = preflight("robots:=4", f"config:={folder}")
         self.assertEqual(status, 2)
-        self.assertEqual(said.count(f"{folder}/robot1.yaml:1"), 1)
-        self.assertEqual(said.count(f"{folder}/robot3.yaml:3"), 1)
+        self.assertEqual(errors.count(f"{folder}/robot1.yaml:1"), 1)
+        self.assertEqual(errors.count(f"{folder}/robot3.yaml:3"), 1)
 
     def test_the_files_of_robots_that_do_not_fly_do_not_count(self):
         folder = self.config(robot4="controller_frequency: often\n")
         self.assertEqual(preflight("robots:=4", f"config:={folder}")[0], 0)
 
     def test_too_many_for_the_arena(self):
-        status, said = preflight("robots:=50", "size:=8.0")
+        status, errors = preflight("robots:=50", "size:=8.0")
         self.assertEqual(status, 2)
-        self.assertEqual(said.count("no room for"), 1)
+        self.assertEqual(errors.count("no room for"), 1)
 
     def test_hosts_without_robots(self):
-        status, said = preflight("robots:=2", "hosts:=3")
+        status, errors = preflight("robots:=2", "hosts:=3")
         self.assertEqual(status, 2)
-        self.assertIn("expected a robot for each host", said)
+        self.assertIn("expected a robot for each host", errors)
 
     def test_random_goals_belong_to_a_random_scene(self):
         scene = os.path.join(CONFIG, "..", "..", "scenes", "arena.yaml")
-        status, said = preflight("robots:=2", f"scene:={scene}")
+        status, errors = preflight("robots:=2", f"scene:={scene}")
         self.assertEqual(status, 2)
-        self.assertIn("expected a folder of goal files", said)
+        self.assertIn("expected a folder of goal files", errors)
 
 
 if __name__ == "__main__":

@@ -29,19 +29,19 @@ class Preflight(unittest.TestCase):
         self.assertEqual(preflight("config:=tutorial")[0], 0)
 
     def test_unknown_scene(self):
-        status, said = preflight("scene:=/nowhere.yaml")
+        status, errors = preflight("scene:=/nowhere.yaml")
         self.assertEqual(status, 2)
-        self.assertEqual(said.count("/nowhere.yaml: cannot be read"), 1)
+        self.assertEqual(errors.count("/nowhere.yaml: cannot be read"), 1)
 
     def test_faults_of_all_kinds_are_listed_together(self):
         with tempfile.TemporaryDirectory() as folder:
             result = os.path.join(folder, "result.json")
-            status, said = preflight(f"goals:={folder}", "rate:=-1", f"result:={result}")
+            status, errors = preflight(f"goals:={folder}", "rate:=-1", f"result:={result}")
             with open(result, encoding="utf-8") as file:
                 written = json.load(file)
         self.assertEqual(status, 2)
-        self.assertIn("has no quad0_goals.json, quad1_goals.json", said)
-        self.assertIn("simulator: rate: is -1, expected a number above 0", said)
+        self.assertIn("has no quad0_goals.json, quad1_goals.json", errors)
+        self.assertIn("simulator: rate: is -1, expected a number above 0", errors)
         self.assertEqual(written["exit_status"], 2)
         self.assertEqual(len(written["problems"]), 2)
 

@@ -160,9 +160,9 @@ class UpstreamBehaviour(UpstreamCase):
         self.wait(lambda: len(goals.messages) == 1 and len(plans.messages) == 2, "the new plan")
         self.assertEqual(self.end_distance(plans.messages[1], x, y + 0.5), 0.0)
 
-    # -- goals that cannot be taken ------------------------------------------------
+    # -- invalid goals -------------------------------------------------------------
 
-    def test_goals_that_cannot_be_taken(self):
+    def test_invalid_goals(self):
         quaternion = "Aborting on goal because it was sent with an invalid quaternion"
         for keywords, text in (
             ({"w": 0.0}, quaternion),

@@ -33,7 +33,7 @@ class UpstreamReconfigure(UpstreamCase):
     # -- descriptions and values ---------------------------------------------------
 
     def test_descriptions(self):
-        """In the recorded order; the recordings end early, and ours has parameters of its own."""
+        """In the recorded order; the recordings end early, and ours has more parameters."""
         for _, namespace, recorded in self.namespaces():
             message = self.latched(f"{namespace}/parameter_descriptions", ConfigDescription)
             (group,) = message.groups

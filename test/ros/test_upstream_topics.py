@@ -47,7 +47,10 @@ class UpstreamTopics(UpstreamCase):
             lambda: f"sent here: {sorted(self.records.keys() - topics_sent_here())}",
         )
         self.wait(lambda: all(self.of(0, f"{name}/footprint") for name in UPDATE_HZ), "footprints")
-        self.wait(lambda: self.of(0, "local_costmap/costmap_updates"), "an update while it stands")
+        self.wait(
+            lambda: self.of(0, "local_costmap/costmap_updates"),
+            "an update while the robot stands still",
+        )
         cls = type(self)
         cls.footprints_at_start = [self.of(0, f"{name}/footprint")[-1] for name in UPDATE_HZ]
         cls.goal = goal_pose(*GOAL)
@@ -84,7 +87,7 @@ class UpstreamTopics(UpstreamCase):
         types = dict(master.getTopicTypes())
         for i in ROBOTS:
             for name, kind in recorded_lines("subscriptions.txt", i):
-                if not name.endswith("/footprint"):  # of its own: see above
+                if not name.endswith("/footprint"):  # its own: see above
                     self.assertIn(f"/move_base{i}", subscribers.get(name, ()), name)
                     self.assertEqual(types.get(name), kind, name)
 

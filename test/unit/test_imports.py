@@ -109,7 +109,7 @@ def test_rules_refuse(module, statement):
     [
         ("costmap/layered.py", "from . import static\nfrom quad_nav import footprint, grid"),
         ("navigator/navigator.py", "import numpy\nfrom quad_nav.plan.navfn import Navfn"),
-        ("ros/navigator/move_base_node.py", "import rospy\nfrom nav_msgs.msg import Path"),
+        ("ros/navigator/nodes.py", "import rospy\nfrom nav_msgs.msg import Path"),
         ("sim/body.py", "import pybullet"),
         ("kernels/navfn.py", "from numba import njit"),
     ],

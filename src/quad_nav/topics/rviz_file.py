@@ -104,7 +104,7 @@ def _tools(tools: Sequence[Dict[str, Any]], robots: int) -> List[Dict[str, Any]]
     """Return goal buttons for the first `FEW` quadcopters.
 
     Pose and point buttons are added only if these are all. RViz gives all buttons the same icon,
-    so more of them could not be told apart.
+    so more of them would be indistinguishable.
     """
     made: List[Dict[str, Any]] = []
     for tool in tools:

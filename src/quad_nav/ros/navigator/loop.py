@@ -127,7 +127,7 @@ class StallDetector:
         self._now_s, self._wall_s = now_s, time.monotonic()
 
     def ended_after_s(self, now_s: float) -> float:
-        """Return for how long of wall time the clock stood before `now_s`; 0 while it stands."""
+        """Return how long the clock stood still before `now_s`, in wall time; 0 until it moves."""
         wall_s = time.monotonic()
         stalled_s = wall_s - self._wall_s
         if now_s == self._now_s:
