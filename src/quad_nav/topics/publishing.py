@@ -1,4 +1,4 @@
-"""What to publish of a costmap and of a flown path, and when."""
+"""Publication schedules of costmaps and flown paths."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
     python -m quad_nav.topics.rviz_file --robots 8 > fleet.rviz
 
-The group of quadcopter 0 is the template for all. With more than `FEW` quadcopters only plans and
+The group of quadcopter 0 is the template for all. With more than `MAX_WITH_ALL_DISPLAYS` quadcopters only plans and
 trails are enabled at first. The other displays stay disabled until the user enables them; a
 disabled display does not subscribe and costs nothing.
 """
@@ -23,7 +23,7 @@ from quad_nav.scenario.fleet_setup import RANDOM, scene_of
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.scene import Scene
 
-FEW = 4
+MAX_WITH_ALL_DISPLAYS = 4
 _ENABLED_FOR_MANY = ("Global plan", "Flown path")
 _GOAL_TOOL = "rviz/SetGoal"
 _NUMBERED_TOOLS = (_GOAL_TOOL, "rviz/SetInitialPose", "rviz/PublishPoint")
@@ -62,7 +62,7 @@ def _fit_general(display: Dict[str, Any], robots: int, scene: Scene) -> None:
             "Y": scene.origin_y_m + 0.5 * cells,
             "Z": 0,
         }
-    elif display["Class"] == "rviz/TF" and robots > FEW:
+    elif display["Class"] == "rviz/TF" and robots > MAX_WITH_ALL_DISPLAYS:
         display["Enabled"] = display["Value"] = False
 
 
@@ -73,7 +73,7 @@ def _of_robot(group: Dict[str, Any], number: int, robots: int) -> Dict[str, Any]
         colour = _rgb(number)
         if display.get("Color") == _rgb(0):
             display["Color"] = colour
-        if robots > FEW:
+        if robots > MAX_WITH_ALL_DISPLAYS:
             display["Enabled"] = display["Value"] = display["Name"] in _ENABLED_FOR_MANY
     return own
 
@@ -101,7 +101,7 @@ def _with_number(topic: str, number: int) -> str:
 
 
 def _tools(tools: Sequence[Dict[str, Any]], robots: int) -> List[Dict[str, Any]]:
-    """Return goal buttons for the first `FEW` quadcopters.
+    """Return goal buttons for the first `MAX_WITH_ALL_DISPLAYS` quadcopters.
 
     Pose and point buttons are added only if these are all. RViz gives all buttons the same icon,
     so more of them would be indistinguishable.
@@ -110,10 +110,12 @@ def _tools(tools: Sequence[Dict[str, Any]], robots: int) -> List[Dict[str, Any]]
     for tool in tools:
         if tool["Class"] not in _NUMBERED_TOOLS:
             made.append(tool)
-        elif tool["Topic"].endswith("0") and (robots <= FEW or tool["Class"] == _GOAL_TOOL):
+        elif tool["Topic"].endswith("0") and (
+            robots <= MAX_WITH_ALL_DISPLAYS or tool["Class"] == _GOAL_TOOL
+        ):
             made += [
                 {**tool, "Topic": _with_number(tool["Topic"], number)}
-                for number in range(min(robots, FEW))
+                for number in range(min(robots, MAX_WITH_ALL_DISPLAYS))
             ]
     return made
 
@@ -133,7 +135,7 @@ def _centre(view: Dict[str, Any], scene: Scene) -> None:
 
 def _fold(template: Dict[str, Any], robots: int) -> None:
     for panel in template["Panels"]:
-        if panel["Class"] == "rviz/Displays" and robots > FEW:
+        if panel["Class"] == "rviz/Displays" and robots > MAX_WITH_ALL_DISPLAYS:
             panel["Property Tree Widget"]["Expanded"] = []
 
 

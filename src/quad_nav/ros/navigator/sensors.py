@@ -36,7 +36,7 @@ class Sensor:
 
     Attributes:
         topic: Resolved name of the topic.
-        data_type: Key of ``MESSAGE_TYPES``.
+        data_type: Key of `MESSAGE_TYPES`.
         intake: Validates messages and hands them to the layers.
         subscriber: Fills the queue of waiting messages.
     """

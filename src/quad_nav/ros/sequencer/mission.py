@@ -78,7 +78,7 @@ class MissionRunner:
 
     @property
     def is_done(self) -> bool:
-        """Whether all sequencers are done."""
+        """True when all sequencers are done."""
         return all(robot.sequencer.done for robot in self.robots)
 
     def needs(self) -> List[Need]:

@@ -66,8 +66,8 @@ class MissionRobot:
         self.pose: Optional[Pose3D] = None
         self.is_silent, self.silent_s = False, 0.0
         self._odometry: Optional[Odometry] = None
-        self._begun_s = 0.0
-        self._heard_s = self._valid_again_s = 0.0
+        self._start_s = 0.0
+        self._odometry_s = self._valid_again_s = 0.0
         self._file = goals.file
         self._next_poll_s = 0.0
         self._transforms = transforms
@@ -78,14 +78,14 @@ class MissionRobot:
     def begin(self, now_s: float, progress: SequenceProgress = START) -> None:
         """Begin with the first goal, or resume the progress of another sequencer."""
         self.sequencer = Sequencer(self.sequencer.sequence, progress)
-        self.pose, self.is_silent, self._begun_s, self._heard_s = None, False, now_s, now_s
+        self.pose, self.is_silent, self._start_s, self._odometry_s = None, False, now_s, now_s
         self._odometry, self._valid_again_s = None, 0.0
         self.link.clear()
         self._path.clear()
 
     def was_reset(self, inbox: Inbox) -> bool:
         """Return whether odometry shows that the simulation was reset."""
-        usable = [o for o in inbox.odometry if o.header.stamp.to_sec() >= self._begun_s]
+        usable = [o for o in inbox.odometry if o.header.stamp.to_sec() >= self._start_s]
         before = [self._odometry, *usable] if self._odometry is not None else usable
         return any(_is_jump(a, b) for a, b in zip(before, before[1:]))
 
@@ -151,7 +151,7 @@ class MissionRobot:
 
     def _move(self, messages: Sequence[Odometry], now_s: float, log: FlightLog) -> None:
         usable = [
-            one for one in messages if self._begun_s <= one.header.stamp.to_sec() <= now_s + AHEAD_S
+            one for one in messages if self._start_s <= one.header.stamp.to_sec() <= now_s + AHEAD_S
         ]
         if not usable:
             return
@@ -163,7 +163,7 @@ class MissionRobot:
                 WARN_AGAIN_S, f"{self.name}: pose in map unknown, odometry dropped: {error}"
             )
             return
-        self._heard_s = now_s
+        self._odometry_s = now_s
         if any(_is_jump(a, b, STEP_M) for a, b in zip([before, *usable], usable) if a is not None):
             rospy.logwarn(
                 "%s: odometry jumped; no goal counts as reached for %g s",
@@ -178,7 +178,7 @@ class MissionRobot:
             self._path.add(stamp_s, self.pose)
 
     def _watch_silence(self, now_s: float) -> None:
-        self.silent_s = now_s - self._heard_s
+        self.silent_s = now_s - self._odometry_s
         was_silent, self.is_silent = self.is_silent, self.silent_s > ODOMETRY_SILENT_S
         if self.is_silent and not was_silent:
             rospy.logwarn(

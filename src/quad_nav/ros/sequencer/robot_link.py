@@ -91,7 +91,7 @@ class RobotLink(rospy.SubscribeListener):
         return status_s is not None and now_s - status_s < STATUS_FRESH_S and not self._busy
 
     def send(self, pose: Pose2D) -> None:
-        """Send a goal in ``map`` to the navigator."""
+        """Send a goal in `map` to the navigator."""
         now = rospy.Time.now()
         self._goal = pose_stamped(planar_pose(pose), "map", now)
         self._sent_s = now.to_sec()
