@@ -9,7 +9,7 @@ import rospy
 import rostest
 
 from quad_nav.geometry import Pose3D, Scan, Twist2D, quaternion_from_euler
-from quad_nav.peers.peer import IDLE_RANK_S, Intention, rank_of
+from quad_nav.peers.peer import Intention, idle_priority, priority_of
 from quad_nav.ros.common import conversions
 from quad_nav.ros.navigator.peer_topics import intention_from_message, intention_message
 
@@ -61,19 +61,19 @@ class Conversions(unittest.TestCase):
         )
 
     def test_intentions(self):
-        sent = Intention(rank_of(1700000012.25, 3), np.array([[1.0, 2.0], [1.5, 2.5]]))
+        sent = Intention(priority_of(1700000012.25, 3), np.array([[1.0, 2.0], [1.5, 2.5]]))
         message = intention_message(sent, "map", 1700000020.5)
         self.assertEqual(
             (message.header.frame_id, message.header.stamp.to_sec()), ("map", 1700000020.5)
         )
         received = intention_from_message(message, 3)
-        self.assertAlmostEqual(received.rank_s, sent.rank_s, places=6)
-        np.testing.assert_array_equal(received.way, sent.way)
+        self.assertAlmostEqual(received.priority, sent.priority, places=6)
+        np.testing.assert_array_equal(received.path, sent.path)
 
     def test_an_intention_to_stay_is_an_empty_path(self):
-        staying = Intention(rank_of(IDLE_RANK_S, 3))
+        staying = Intention(idle_priority(3))
         received = intention_from_message(intention_message(staying, "map", 1.0), 3)
-        self.assertEqual((received.rank_s, len(received.way)), (staying.rank_s, 0))
+        self.assertEqual((received.priority, len(received.path)), (staying.priority, 0))
 
     def test_times_are_rounded_to_the_nanosecond(self):
         self.assertEqual(conversions.time_message(1.0 + 1.0 / 240), rospy.Time(1, 4166667))

@@ -55,12 +55,12 @@ class Diagnostics(FlightCase):
         self.wait(lambda: self.level("move_base0: inputs") == ERROR, "an error of its inputs")
         self.assertIn("no message on /scan0 for", self.statuses["move_base0: inputs"].message)
         self.wait(lambda: self.level("move_base0: control") == ERROR, "a navigator that stopped")
-        self.assertIn("stopped: nothing from", self.statuses["move_base0: control"].message)
+        self.assertIn("stopping: no data from", self.statuses["move_base0: control"].message)
         self.assertEqual(self.level("move_base1: inputs"), OK)
         self.lidar(0, True)
         self.wait(lambda: self.level("move_base0: inputs") == OK, "inputs that come again")
         self.wait(lambda: self.level("move_base0: control") == OK, "a flight that resumes")
-        self.assertIn("stopped: nothing from", self.value("move_base0: control", "last reason"))
+        self.assertIn("stopping: no data from", self.value("move_base0: control", "last reason"))
 
     def test_3_each_change_of_level_is_one_line_in_the_log(self):
         changes = [

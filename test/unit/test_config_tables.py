@@ -36,9 +36,9 @@ from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
+from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.navigator import NavigatorParams
-from quad_nav.navigator.progress_checker import ProgressParams
-from quad_nav.peers.params import PeerParams
+from quad_nav.peers.coordinator import PeerParams
 from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams

@@ -9,9 +9,9 @@ from upstream import UPSTREAM
 from quad_nav.config import load, updated
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import LETHAL
-from quad_nav.navigator.progress_checker import ProgressParams
+from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.tick import RobotPoses
-from quad_nav.peers.params import PeerParams
+from quad_nav.peers.coordinator import PeerParams
 from quad_nav.recovery import RecoveryContext
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
 

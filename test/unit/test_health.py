@@ -81,9 +81,9 @@ def test_values_of_inputs():
         ({"state": State.CLEARING}, Level.WARN, "clearing at 9.6 Hz: recovery behaviour active"),
         ({"fault": "no plan: blocked"}, Level.WARN, "controlling: no plan: blocked"),
         (
-            {"fault": "stopped: nothing from scan"},
+            {"fault": "stopping: no data from scan"},
             Level.ERROR,
-            "controlling: stopped: nothing from scan",
+            "controlling: stopping: no data from scan",
         ),
     ],
 )

@@ -14,7 +14,8 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
-from quad_nav.navigator.tick import RobotPoses, State, Trigger, local_from_global
+from quad_nav.navigator.tick import RobotPoses, State, Trigger
+from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.near import ring_offsets
 from quad_nav.recovery import Step
 from quad_nav.timing import Schedule
@@ -124,7 +125,7 @@ class Flight:
             self.planner,
             self.controller,
             recoveries,
-            configuration.peers,
+            PeerCoordinator(configuration.peers, self.global_costmap, self.local_costmap),
         )
         self.now_s = 0.0
         self.pose = HERE
@@ -237,7 +238,7 @@ def test_standing_still_is_replanned_then_recovered_then_aborted():
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(12.0)
     warnings = [warning for tick in ticks for warning in tick.warnings]
-    assert warnings[0] == "no progress for 2 s at (1.00, 1.00): planning anew"
+    assert warnings[0] == "no progress for 2 s at (1.00, 1.00), replanning"
     assert [tick.recovery.name for tick in ticks if tick.recovery] == ["r"]
     assert outcomes(ticks) == [(False, Trigger.OSCILLATION.value)]
 
@@ -304,7 +305,7 @@ def test_silent_sensor_stops_the_robot_and_says_which():
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
     ticks = [tick for tick in flight.until(1.2) if tick.cycle]
     assert {tick.command for tick in ticks} == {Twist2D()}
-    assert ticks[0].warnings == ["stopped: nothing from obstacle_layer/base_scan for 1.3 s"]
+    assert ticks[0].warnings == ["stopping: no data from obstacle_layer/base_scan for 1.3 s"]
     flight.local_costmap.stale = []
     assert FORWARD in {tick.command for tick in flight.until(2.0)}
 
@@ -340,7 +341,7 @@ def test_unknown_pose_stops_the_robot():
     flight.until(1.0)
     tick = flight.navigator.tick(flight.now_s, RobotPoses(None, None), FORWARD)
     assert tick.command == Twist2D()
-    assert "stopped: the robot's pose is unknown" in tick.warnings
+    assert "stopping: robot pose unknown" in tick.warnings
 
 
 def test_schedule_drops_missed_turns():
@@ -354,8 +355,9 @@ def test_schedule_drops_missed_turns():
 
 
 def test_local_from_global_takes_the_global_pose_to_the_local_one():
-    located = RobotPoses(Pose2D(2.0, 1.0, np.pi / 2), Pose2D(0.0, 3.0, 0.0))
-    transform = local_from_global(located)
+    poses = RobotPoses(Pose2D(2.0, 1.0, np.pi / 2), Pose2D(0.0, 3.0, 0.0))
+    transform = poses.local_from_global
+    assert transform is not None
     # Turned by -90 degrees: (2, 1) becomes (1, -2); (0, 3) - (1, -2) = (-1, 5).
     assert (transform.x_m, transform.y_m) == pytest.approx((-1.0, 5.0))
     assert transform.yaw_rad == pytest.approx(-np.pi / 2)

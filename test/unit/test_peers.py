@@ -1,4 +1,4 @@
-"""Cells, tracks, ranks and refuges, with numbers that can be worked out by hand."""
+"""Voronoi cells, predictions, priorities and holding points, with numbers computed by hand."""
 
 from __future__ import annotations
 
@@ -12,26 +12,28 @@ from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels.discs import nearest_cell, raise_discs
-from quad_nav.peers.holding_point import COMFORTABLE, can_be_reached, find_holding_point
+from quad_nav.peers.holding_point import COMFORTABLE, find_holding_point, is_reachable
 from quad_nav.peers.peer import (
-    IDLE_RANK_S,
+    HIGHEST_PRIORITY,
+    IDLE_PRIORITY,
     Intention,
     Peer,
+    assumed_intention,
+    idle_priority,
     peer_at,
-    rank_of,
-    thinned,
-    unknown_intention,
+    priority_of,
+    resample,
 )
-from quad_nav.peers.right_of_way import Manner, comes_near, gives_way, positions_ahead
+from quad_nav.peers.right_of_way import Yield, approaches, find_conflict, predict_positions
 from quad_nav.peers.voronoi_cell import COASTING_S, limit_to_cell
 
-KEEP_OFF_M = 0.4
-APART_M = 0.9
-CRUISING_MPS = 0.3
+SAFETY_RADIUS_M = 0.4
+MIN_SEPARATION_M = 0.9
+CRUISE_MPS = 0.3
 STANDING = Twist2D()
 
 
-def peer(x_m, y_m, vx_mps=0.0, vy_mps=0.0, rank_s=IDLE_RANK_S, way=(), name="other"):
+def peer(x_m, y_m, vx_mps=0.0, vy_mps=0.0, priority=IDLE_PRIORITY, path=(), name="other"):
     return Peer(
         name,
         x_m,
@@ -39,26 +41,28 @@ def peer(x_m, y_m, vx_mps=0.0, vy_mps=0.0, rank_s=IDLE_RANK_S, way=(), name="oth
         vx_mps,
         vy_mps,
         0.0,
-        Intention(rank_s, np.array(way, dtype=np.float64).reshape(-1, 2)),
+        Intention(priority, np.array(path, dtype=np.float64).reshape(-1, 2)),
     )
 
 
-# -- the cell between peers --------------------------------------------------------------
+# -- Voronoi cells ----------------------------------------------------------------------
 
 
-def test_a_command_ends_where_the_own_half_ends():
+def test_a_command_ends_at_the_border_of_the_cell():
     # 1.2 m apart: 0.6 m to the middle, less 0.4 m, leaves 0.2 m of the 0.4 m in 1 s.
-    held = limit_to_cell(
-        Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), [peer(1.2, 0.0)], KEEP_OFF_M, 1.0
+    limited = limit_to_cell(
+        Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), [peer(1.2, 0.0)], SAFETY_RADIUS_M, 1.0
     )
-    assert held.by == "other"
-    assert held.command.vx_mps == pytest.approx(0.2)
+    assert limited.limited_by == "other"
+    assert limited.command.vx_mps == pytest.approx(0.2)
 
 
-def test_the_way_that_speed_still_carries_counts():
+def test_the_coasting_distance_counts():
     speed = Twist2D(0.1 / COASTING_S)  # carries 0.1 m
-    held = limit_to_cell(Pose2D(0.0, 0.0), speed, Twist2D(0.4), [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
-    assert held.command.vx_mps == pytest.approx(0.1)
+    limited = limit_to_cell(
+        Pose2D(0.0, 0.0), speed, Twist2D(0.4), [peer(1.2, 0.0)], SAFETY_RADIUS_M, 1.0
+    )
+    assert limited.command.vx_mps == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(
@@ -69,26 +73,28 @@ def test_the_way_that_speed_still_carries_counts():
         (0.0, (1.6, 0.0)),  # towards it, but no farther than the own half
     ],
 )
-def test_what_stays_in_the_cell_is_not_touched(yaw_rad, other):
+def test_a_command_inside_the_cell_is_not_limited(yaw_rad, other):
     command = Twist2D(0.4)
-    held = limit_to_cell(
-        Pose2D(0.0, 0.0, yaw_rad), STANDING, command, [peer(*other)], KEEP_OFF_M, 1.0
+    limited = limit_to_cell(
+        Pose2D(0.0, 0.0, yaw_rad), STANDING, command, [peer(*other)], SAFETY_RADIUS_M, 1.0
     )
-    assert held.command == command and held.by == ""
+    assert limited.command == command and limited.limited_by == ""
 
 
 def test_the_path_stays_the_same_when_it_is_flown_more_slowly():
     command = Twist2D(0.4, 0.0, 0.5)
-    held = limit_to_cell(Pose2D(0.0, 0.0), STANDING, command, [peer(1.2, 0.0)], KEEP_OFF_M, 1.0)
-    assert 0.0 < held.command.vx_mps < 0.4
-    assert held.command.vyaw_radps / held.command.vx_mps == pytest.approx(0.5 / 0.4)
-
-
-def test_too_near_it_only_turns():
-    held = limit_to_cell(
-        Pose2D(0.0, 0.0), STANDING, Twist2D(0.4, 0.0, 0.5), [peer(0.7, 0.0)], KEEP_OFF_M, 1.0
+    limited = limit_to_cell(
+        Pose2D(0.0, 0.0), STANDING, command, [peer(1.2, 0.0)], SAFETY_RADIUS_M, 1.0
     )
-    assert held.command == Twist2D(0.0, 0.0, 0.5)
+    assert 0.0 < limited.command.vx_mps < 0.4
+    assert limited.command.vyaw_radps / limited.command.vx_mps == pytest.approx(0.5 / 0.4)
+
+
+def test_too_near_a_robot_turns_in_place():
+    limited = limit_to_cell(
+        Pose2D(0.0, 0.0), STANDING, Twist2D(0.4, 0.0, 0.5), [peer(0.7, 0.0)], SAFETY_RADIUS_M, 1.0
+    )
+    assert limited.command == Twist2D(0.0, 0.0, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -100,11 +106,11 @@ def test_too_near_it_only_turns():
         (math.pi + 0.8, -0.4, 0.4),
     ],
 )  # it backs, with the peer to the right of its course
-def test_too_near_and_straight_it_turns_away(yaw_rad, vx_mps, turn_radps):
-    held = limit_to_cell(
-        Pose2D(0.0, 0.0, yaw_rad), STANDING, Twist2D(vx_mps), [peer(0.7, 0.0)], KEEP_OFF_M, 1.0
+def test_too_near_and_straight_a_robot_turns_away(yaw_rad, vx_mps, turn_radps):
+    limited = limit_to_cell(
+        Pose2D(0.0, 0.0, yaw_rad), STANDING, Twist2D(vx_mps), [peer(0.7, 0.0)], SAFETY_RADIUS_M, 1.0
     )
-    assert held.command == Twist2D(0.0, 0.0, turn_radps)
+    assert limited.command == Twist2D(0.0, 0.0, turn_radps)
 
 
 def test_the_nearest_of_several_peers_decides():
@@ -113,13 +119,13 @@ def test_the_nearest_of_several_peers_decides():
         peer(1.2, 0.0, name="near"),
         peer(-0.9, 0.0, name="behind"),
     ]
-    held = limit_to_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), peers, KEEP_OFF_M, 1.0)
-    assert held.by == "near"
+    limited = limit_to_cell(Pose2D(0.0, 0.0), STANDING, Twist2D(0.4), peers, SAFETY_RADIUS_M, 1.0)
+    assert limited.limited_by == "near"
 
 
 @pytest.mark.parametrize("stagger, lost_m", [(0, 0.0), (5, 0.025)])
 @pytest.mark.parametrize("seed", range(3))
-def test_point_masses_that_keep_their_cells_never_meet(seed, stagger, lost_m):
+def test_point_masses_inside_their_cells_never_collide(seed, stagger, lost_m):
     """Four that all want to the middle, each commanded once a second.
 
     Commanded at different times they see each other's cells turn, and lose up to
@@ -139,65 +145,67 @@ def test_point_masses_that_keep_their_cells_never_meet(seed, stagger, lost_m):
                     STANDING,
                     Twist2D(0.5),
                     seen[:k] + seen[k + 1 :],
-                    KEEP_OFF_M,
+                    SAFETY_RADIUS_M,
                     1.0,
                 ).command
                 velocity[k] = command.vx_mps * np.array([math.cos(yaw), math.sin(yaw)])
         at += 0.05 * velocity
         gaps = [np.hypot(*(at[i] - at[j])) for i in range(4) for j in range(i)]
-        assert min(gaps) >= 2 * (KEEP_OFF_M - lost_m) - 1e-6
+        assert min(gaps) >= 2 * (SAFETY_RADIUS_M - lost_m) - 1e-6
     assert min(gaps) < 1.0  # they did come as near as they may
 
 
-# -- where they will be ------------------------------------------------------------------
+# -- predicted positions ----------------------------------------------------------------
 
 
-def test_a_robot_follows_its_way_at_an_even_speed_and_stays_at_its_end():
-    way = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    ahead = positions_ahead(np.array([0.0, 0.0]), way, 0.5, np.array([0.0, 1.0, 3.0, 9.0]))
+def test_a_predicted_robot_follows_its_path_at_constant_speed_and_stays_at_the_end():
+    path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    ahead = predict_positions(np.array([0.0, 0.0]), path, 0.5, np.array([0.0, 1.0, 3.0, 9.0]))
     np.testing.assert_allclose(ahead, [[0.0, 0.0], [0.5, 0.0], [1.0, 0.5], [1.0, 1.0]])
 
 
-def test_what_lies_behind_on_the_way_is_left_out():
-    way = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
-    ahead = positions_ahead(np.array([2.0, 0.1]), way, 1.0, np.array([1.0]))
+def test_the_part_of_the_path_behind_a_robot_is_skipped():
+    path = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]])
+    ahead = predict_positions(np.array([2.0, 0.1]), path, 1.0, np.array([1.0]))
     assert ahead[0, 0] > 2.9
 
 
-def test_a_peer_without_a_way_stays():
-    ahead = positions_ahead(np.array([1.0, 2.0]), np.zeros((0, 2)), 0.5, np.array([0.0, 5.0]))
+def test_a_peer_without_a_path_stays():
+    ahead = predict_positions(np.array([1.0, 2.0]), np.zeros((0, 2)), 0.5, np.array([0.0, 5.0]))
     np.testing.assert_array_equal(ahead, [[1.0, 2.0], [1.0, 2.0]])
 
 
-def test_velocities_are_turned_into_the_map_and_kept_up():
+def test_velocities_are_rotated_into_the_map_and_extrapolated():
     seen = peer_at("a", Pose2D(1.0, 1.0, math.pi / 2), Twist2D(0.4), 10.0)
     assert (seen.vx_mps, seen.vy_mps) == pytest.approx((0.0, 0.4))
-    later = seen.moved_to(10.5)
+    later = seen.extrapolated(10.5)
     assert (later.x_m, later.y_m) == pytest.approx((1.0, 1.2))
 
 
-def test_one_that_tells_nothing_is_expected_straight_ahead_and_goes_first():
-    assert unknown_intention(peer(0.0, 0.0, 0.01)).rank_s == IDLE_RANK_S
-    intention = unknown_intention(peer(1.0, 0.0, 0.2))
-    assert intention.rank_s == 0.0
-    np.testing.assert_allclose(intention.way, [[1.0, 0.0], [2.0, 0.0]])
+def test_a_peer_without_an_intention_is_expected_straight_on_and_goes_first():
+    assert assumed_intention(peer(0.0, 0.0, 0.01)).priority == IDLE_PRIORITY
+    intention = assumed_intention(peer(1.0, 0.0, 0.2))
+    assert intention.priority == HIGHEST_PRIORITY == 0.0
+    np.testing.assert_allclose(intention.path, [[1.0, 0.0], [2.0, 0.0]])
 
 
-def test_a_thinned_way_keeps_its_ends():
-    way = np.column_stack((np.linspace(0.0, 1.0, 41), np.zeros(41)))
-    thin = thinned(way, 0.25)
+def test_a_resampled_path_keeps_its_ends():
+    path = np.column_stack((np.linspace(0.0, 1.0, 41), np.zeros(41)))
+    thin = resample(path, 0.25)
     assert len(thin) == 6
-    np.testing.assert_allclose(thin[[0, -1]], way[[0, -1]])
+    np.testing.assert_allclose(thin[[0, -1]], path[[0, -1]])
 
 
-# -- the rule of way ---------------------------------------------------------------------
+# -- right of path -----------------------------------------------------------------------
 
 EAST, WEST = [(0.0, 0.0), (6.0, 0.0)], [(6.0, 0.0), (0.0, 0.0)]
 NORTH = [(3.0, -3.0), (3.0, 3.0)]
 
 
-def decide(way, rank_s, others):
-    found = gives_way(np.array(way[0]), np.array(way), rank_s, others, APART_M, CRUISING_MPS)
+def decide(path, priority, others):
+    found = find_conflict(
+        np.array(path[0]), np.array(path), priority, others, MIN_SEPARATION_M, CRUISE_MPS
+    )
     return None if found is None else (found[0].name, found[1])
 
 
@@ -208,71 +216,71 @@ def decide(way, rank_s, others):
         ([(1.0, 0.0), (6.0, 0.0)], [(3.0, -2.0), (3.0, 3.0)]),
     ],
 )
-def test_of_two_exactly_one_gives_way(one, other):
-    first, second = rank_of(0.0, 0), rank_of(0.0, 1)
+def test_of_two_robots_exactly_one_yields(one, other):
+    first, second = priority_of(0.0, 0), priority_of(0.0, 1)
     outcomes = [
-        decide(one, first, [peer(*other[0], rank_s=second, way=other)]),
-        decide(other, second, [peer(*one[0], rank_s=first, way=one)]),
+        decide(one, first, [peer(*other[0], priority=second, path=other)]),
+        decide(other, second, [peer(*one[0], priority=first, path=one)]),
     ]
     assert outcomes[0] is None and outcomes[1] is not None
     swapped = [
-        decide(one, second, [peer(*other[0], rank_s=first, way=other)]),
-        decide(other, first, [peer(*one[0], rank_s=second, way=one)]),
+        decide(one, second, [peer(*other[0], priority=first, path=other)]),
+        decide(other, first, [peer(*one[0], priority=second, path=one)]),
     ]
     assert swapped[0] is not None and swapped[1] is None
 
 
-def test_who_has_been_under_way_longer_goes_first_and_then_the_lower_number():
-    assert rank_of(10.0, 7) < rank_of(11.0, 0) < rank_of(11.0, 1) < rank_of(IDLE_RANK_S, 0)
+def test_the_older_goal_goes_first_and_then_the_lower_number():
+    assert priority_of(10.0, 7) > priority_of(11.0, 0) > priority_of(11.0, 1) > idle_priority(0)
 
 
-def test_one_that_is_not_in_the_way_waits_and_one_that_is_leaves():
-    first = peer(1.0, 0.0, rank_s=0.0, way=[(1.0, 0.0), (6.0, 0.0)])
-    assert decide([(2.5, -1.2), (2.5, 3.0)], 1.0, [first]) == ("other", Manner.WAIT)
-    assert decide([(2.5, -0.5), (2.5, 3.0)], 1.0, [first]) == ("other", Manner.LEAVE)
+def test_a_robot_waits_beside_the_path_of_a_peer_and_makes_room_on_it():
+    first = peer(1.0, 0.0, priority=HIGHEST_PRIORITY, path=[(1.0, 0.0), (6.0, 0.0)])
+    assert decide([(2.5, -1.2), (2.5, 3.0)], -1.0, [first]) == ("other", Yield.WAIT)
+    assert decide([(2.5, -0.5), (2.5, 3.0)], -1.0, [first]) == ("other", Yield.MAKE_ROOM)
 
 
 def test_passing_at_another_time_is_no_conflict():
     """The one has left the crossing when the other gets there: 0.9 m / 0.3 m/s = 3 s."""
     crossing = [(3.0, -2.2), (3.0, 3.0)]
-    late = peer(-1.0, 0.0, rank_s=0.0, way=[(-1.0, 0.0), (6.0, 0.0)])
-    assert decide([(3.0, 0.5), (3.0, 3.0)], 1.0, [late]) is None
-    on_time = peer(1.0, 0.0, rank_s=0.0, way=[(1.0, 0.0), (6.0, 0.0)])
-    assert decide(crossing, 1.0, [on_time]) == ("other", Manner.WAIT)
+    late = peer(-1.0, 0.0, priority=HIGHEST_PRIORITY, path=[(-1.0, 0.0), (6.0, 0.0)])
+    assert decide([(3.0, 0.5), (3.0, 3.0)], -1.0, [late]) is None
+    on_time = peer(1.0, 0.0, priority=HIGHEST_PRIORITY, path=[(1.0, 0.0), (6.0, 0.0)])
+    assert decide(crossing, -1.0, [on_time]) == ("other", Yield.WAIT)
 
 
-def test_following_somebody_is_no_conflict():
-    ahead = peer(1.5, 0.0, 0.3, rank_s=0.0, way=[(1.5, 0.0), (6.0, 0.0)])
-    assert decide(EAST, 1.0, [ahead]) is None
+def test_following_a_peer_is_no_conflict():
+    ahead = peer(1.5, 0.0, 0.3, priority=HIGHEST_PRIORITY, path=[(1.5, 0.0), (6.0, 0.0)])
+    assert decide(EAST, -1.0, [ahead]) is None
 
 
-def test_for_a_parked_one_nobody_gives_way():
-    assert decide(EAST, rank_of(IDLE_RANK_S, 1), [peer(1.0, 0.0)]) is None
+def test_no_robot_yields_to_a_parked_peer():
+    assert decide(EAST, idle_priority(1), [peer(1.0, 0.0)]) is None
 
 
-def test_nobody_waits_for_one_that_stands_but_who_is_in_its_way_makes_room():
-    standing = peer(1.0, 0.0, rank_s=0.0, way=[(1.0, 0.0), (6.0, 0.0)])
-    for at, manner in ([(2.5, -1.2), None], [(2.5, -0.5), Manner.LEAVE], [(3.0, 0.0), None]):
-        found = gives_way(
+def test_a_robot_does_not_wait_for_a_stationary_peer_but_makes_room_on_its_path():
+    standing = peer(1.0, 0.0, priority=HIGHEST_PRIORITY, path=[(1.0, 0.0), (6.0, 0.0)])
+    for at, action in ([(2.5, -1.2), None], [(2.5, -0.5), Yield.MAKE_ROOM], [(3.0, 0.0), None]):
+        found = find_conflict(
             np.array(at),
             np.array([at, (2.5, 3.0)]),
-            1.0,
+            -1.0,
             [standing],
-            APART_M,
-            CRUISING_MPS,
+            MIN_SEPARATION_M,
+            CRUISE_MPS,
             {"other"},
         )
-        assert (found and found[1]) == manner
+        assert (found and found[1]) == action
 
 
-def test_a_track_that_leads_away_does_not_come_near():
+def test_a_track_that_leads_away_does_not_approach():
     place = np.array([0.0, 0.0])
     away = np.column_stack((np.linspace(0.5, 3.0, 11), np.zeros(11)))
-    assert not comes_near(place, away, APART_M)
-    assert comes_near(place, away[::-1], APART_M)
+    assert not approaches(place, away, MIN_SEPARATION_M)
+    assert approaches(place, away[::-1], MIN_SEPARATION_M)
 
 
-# -- discs, refuges, the layer -----------------------------------------------------------
+# -- discs, holding points, the layer ----------------------------------------------------------
 
 SPEC = GridSpec(40, 40, 0.1)
 
@@ -300,61 +308,71 @@ def test_the_nearest_cell_is_found_round_a_wall():
     assert tuple(nearest_cell(blocked, unwanted, 0, 0)) == (-1, -1)
 
 
-def test_a_refuge_is_beside_the_way():
+def test_a_holding_point_is_beside_the_path():
     costs = np.zeros(SPEC.shape, dtype=np.uint8)
-    way = np.array([[0.5, 2.0], [3.5, 2.0]])
-    refuge = find_holding_point(
-        SPEC, costs, Pose2D(2.5, 2.2), [way], np.array([[0.5, 2.0]]), APART_M
+    path = np.array([[0.5, 2.0], [3.5, 2.0]])
+    holding_point = find_holding_point(
+        SPEC, costs, Pose2D(2.5, 2.2), [path], np.array([[0.5, 2.0]]), MIN_SEPARATION_M
     )
-    assert refuge is not None
-    assert refuge.x_m == pytest.approx(2.5, abs=0.11)
-    assert refuge.y_m == pytest.approx(2.0 + APART_M, abs=0.11)
+    assert holding_point is not None
+    assert holding_point.x_m == pytest.approx(2.5, abs=0.11)
+    assert holding_point.y_m == pytest.approx(2.0 + MIN_SEPARATION_M, abs=0.11)
 
 
-def test_in_a_corridor_the_refuge_is_beyond_its_end():
+def test_in_a_corridor_the_holding_point_is_beyond_its_end():
     costs = np.full(SPEC.shape, LETHAL, dtype=np.uint8)
     costs[19:22, :] = FREE  # the corridor along x ...
-    costs[:, 34:38] = FREE  # ... opens into a cross-way
-    way = np.array([[0.5, 2.05], [3.8, 2.05]])
-    refuge = find_holding_point(
-        SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]), APART_M
+    costs[:, 34:38] = FREE  # ... opens into a cross-path
+    path = np.array([[0.5, 2.05], [3.8, 2.05]])
+    holding_point = find_holding_point(
+        SPEC, costs, Pose2D(2.0, 2.05), [path], np.array([[0.5, 2.05]]), MIN_SEPARATION_M
     )
-    assert refuge is not None and refuge.x_m > 3.3 and abs(refuge.y_m - 2.05) > APART_M - 0.1
+    assert (
+        holding_point is not None
+        and holding_point.x_m > 3.3
+        and abs(holding_point.y_m - 2.05) > MIN_SEPARATION_M - 0.1
+    )
 
 
-def test_a_refuge_has_room_to_turn():
-    """Costs beside the wall at the top are high: the refuge is on the other side."""
+def test_a_holding_point_has_room_to_turn():
+    """Costs beside the wall at the top are high: the holding_point is on the other side."""
     costs = np.zeros(SPEC.shape, dtype=np.uint8)
     costs[28:, :] = COMFORTABLE
-    way = np.array([[0.5, 2.0], [3.5, 2.0]])
-    refuge = find_holding_point(
-        SPEC, costs, Pose2D(2.5, 2.2), [way], np.array([[0.5, 2.0]]), APART_M
+    path = np.array([[0.5, 2.0], [3.5, 2.0]])
+    holding_point = find_holding_point(
+        SPEC, costs, Pose2D(2.5, 2.2), [path], np.array([[0.5, 2.0]]), MIN_SEPARATION_M
     )
-    assert refuge is not None and refuge.y_m == pytest.approx(2.0 - APART_M, abs=0.11)
+    assert holding_point is not None and holding_point.y_m == pytest.approx(
+        2.0 - MIN_SEPARATION_M, abs=0.11
+    )
 
 
 @pytest.mark.parametrize(
     "gap, other, reached",
     [(True, (0.5, 0.5), True), (False, (0.5, 0.5), False), (True, (2.05, 3.0), False)],
 )
-def test_whether_a_refuge_can_still_be_reached(gap, other, reached):
+def test_reachability_of_a_holding_point(gap, other, reached):
     """Through the only gap of a wall, unless a peer is in it."""
     costs = np.zeros(SPEC.shape, dtype=np.uint8)
     costs[:, 20] = LETHAL
     if gap:
         costs[25:35, 20] = FREE
     assert (
-        can_be_reached(SPEC, costs, Pose2D(1.0, 1.0), Pose2D(3.0, 1.0), np.array([other]), APART_M)
+        is_reachable(
+            SPEC, costs, Pose2D(1.0, 1.0), Pose2D(3.0, 1.0), np.array([other]), MIN_SEPARATION_M
+        )
         is reached
     )
 
 
-def test_there_may_be_no_refuge():
+def test_without_room_there_is_no_holding_point():
     costs = np.full(SPEC.shape, LETHAL, dtype=np.uint8)
     costs[20, :] = FREE
-    way = np.array([[0.5, 2.05], [4.0, 2.05]])
+    path = np.array([[0.5, 2.05], [4.0, 2.05]])
     assert (
-        find_holding_point(SPEC, costs, Pose2D(2.0, 2.05), [way], np.array([[0.5, 2.05]]), APART_M)
+        find_holding_point(
+            SPEC, costs, Pose2D(2.0, 2.05), [path], np.array([[0.5, 2.05]]), MIN_SEPARATION_M
+        )
         is None
     )
 
@@ -378,10 +396,12 @@ def test_the_layer_without_peers_changes_nothing():
     assert (master.costs == UNKNOWN).all()
 
 
-def test_places_on_the_way_of_a_peer():
-    """From (1, 1) it goes on to the point after the nearest one, then along the way to its end."""
-    way = np.array([(0.0, 0.0), (1.0, 0.0), (4.0, 5.0), (4.0, 7.0)])
-    ahead = positions_ahead(np.array([1.0, 1.0]), way, 0.5, np.array([0.0, 5.0, 10.0, 12.0, 99.0]))
+def test_positions_on_the_path_of_a_peer():
+    """From (1, 1) it goes on to the point after the nearest one, then along the path to its end."""
+    path = np.array([(0.0, 0.0), (1.0, 0.0), (4.0, 5.0), (4.0, 7.0)])
+    ahead = predict_positions(
+        np.array([1.0, 1.0]), path, 0.5, np.array([0.0, 5.0, 10.0, 12.0, 99.0])
+    )
     np.testing.assert_allclose(ahead, [(1.0, 1.0), (2.5, 3.0), (4.0, 5.0), (4.0, 6.0), (4.0, 7.0)])
-    stays = positions_ahead(np.array([1.0, 1.0]), np.empty((0, 2)), 0.5, np.array([0.0, 9.0]))
+    stays = predict_positions(np.array([1.0, 1.0]), np.empty((0, 2)), 0.5, np.array([0.0, 9.0]))
     assert stays.tolist() == [[1.0, 1.0], [1.0, 1.0]]

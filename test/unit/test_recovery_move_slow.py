@@ -119,9 +119,9 @@ def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
     assert limited == replace(
         usual, max_vel_x_mps=0.25, max_vel_theta_radps=0.45, min_vel_theta_radps=-0.45
     )
-    speed.follow(Pose2D(2.5, 2.79))
+    speed.track(Pose2D(2.5, 2.79))
     assert controller.params == limited
-    speed.follow(Pose2D(2.5, 2.81))
+    speed.track(Pose2D(2.5, 2.81))
     assert controller.params == usual
 
 
@@ -141,9 +141,9 @@ def test_a_limit_of_the_same_parameters_replaces_the_first_and_counts_from_its_o
     assert controller.params == replace(
         usual, max_vel_x_mps=0.4, max_vel_theta_radps=0.4, min_vel_theta_radps=-0.4
     )
-    speed.follow(Pose2D(2.5, 3.0))
+    speed.track(Pose2D(2.5, 3.0))
     assert controller.params.max_vel_x_mps == 0.4
-    speed.follow(Pose2D(2.5, 3.8))
+    speed.track(Pose2D(2.5, 3.8))
     assert controller.params == TrajectoryPlannerParams()
 
 
@@ -281,9 +281,9 @@ def test_limits_of_different_parameters_hold_side_by_side():
     limiter.impose(ParameterLimit((("weight", 0.001),), 0.5), Pose2D(0.0, 0.0))
     assert controller.params == Params(0.25, 0.001)
     assert limiter.usual == Params(0.6, 0.01)
-    limiter.follow(Pose2D(0.6, 0.0))
+    limiter.track(Pose2D(0.6, 0.0))
     assert controller.params == Params(0.25, 0.01)
-    limiter.follow(Pose2D(1.1, 0.0))
+    limiter.track(Pose2D(1.1, 0.0))
     assert controller.params == Params(0.6, 0.01)
 
 

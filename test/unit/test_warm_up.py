@@ -52,7 +52,7 @@ def test_a_peer_is_left_out_of_the_last_scans(missions):
 
 def test_each_mission_makes_room_for_a_peer(missions):
     for _, ticks in missions:
-        assert ticks[-1].giving_way is not None and ticks[-1].giving_way.refuge is not None
+        assert ticks[-1].yielding is not None and ticks[-1].yielding.holding_point is not None
 
 
 def test_every_planner_and_obstacle_layer_flies(missions):

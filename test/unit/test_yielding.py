@@ -1,4 +1,4 @@
-"""Navigators among each other: bodies that follow their commands exactly, no walls."""
+"""Navigators that yield to each other: bodies that follow commands exactly, no walls."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from quad_nav.config import load, updated
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.navigator.tick import RobotPoses, State
-from quad_nav.peers.peer import IDLE_RANK_S, Intention, peer_at
+from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, idle_priority, peer_at
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
 
 STEP_S = 0.1
@@ -44,7 +44,7 @@ TREE = {
 
 
 class Fleet:
-    """Navigators that know each other, and their bodies."""
+    """Navigators that are peers of each other, and their bodies."""
 
     def __init__(self, *poses, fixes=None):
         tree = {**TREE, "fixes": fixes or {}}
@@ -55,13 +55,13 @@ class Fleet:
         self.nearest_m = math.inf
         self.outcomes = [[] for _ in poses]
         self.notes = [[] for _ in poses]
-        self.gave_way = [False] * len(poses)
+        self.yielded = [False] * len(poses)
 
     def fly(self, seconds, until=lambda: False):
         end_s = self.now_s + seconds
         while self.now_s < end_s and not until():
             seen = [
-                peer_at(f"quad{k}", pose, velocity, self.now_s, navigator.intention)
+                peer_at(f"quad{k}", pose, velocity, self.now_s, navigator.peers.intention)
                 for k, (pose, velocity, navigator) in enumerate(
                     zip(self.poses, self.velocities, self.navigators)
                 )
@@ -84,7 +84,7 @@ class Fleet:
         if tick.outcome is not None:
             self.outcomes[k].append(tick.outcome)
         self.notes[k] += tick.notes
-        self.gave_way[k] |= tick.giving_way is not None
+        self.yielded[k] |= tick.yielding is not None
 
 
 def moved(pose, velocity):
@@ -95,51 +95,51 @@ def moved(pose, velocity):
     )
 
 
-def test_head_on_one_goes_and_the_other_makes_room():
+def test_head_on_one_robot_goes_and_the_other_makes_room():
     fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi))
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
     fleet.navigators[1].set_goal(Pose2D(2.0, 5.0), 0.0)
     fleet.fly(90.0, until=lambda: all(fleet.outcomes))
     assert [[o.succeeded for o in outcomes] for outcomes in fleet.outcomes] == [[True], [True]]
-    assert fleet.gave_way == [False, True]
+    assert fleet.yielded == [False, True]
     assert fleet.nearest_m > 2 * RADIUS_M
 
 
-def test_without_the_switch_they_do_not_see_each_other():
+def test_without_avoid_peers_they_do_not_avoid_each_other():
     fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), fixes={"avoid_peers": False})
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
     fleet.navigators[1].set_goal(Pose2D(2.0, 5.0), 0.0)
     fleet.fly(20.0)
-    assert fleet.gave_way == [False, False]
+    assert fleet.yielded == [False, False]
     assert fleet.nearest_m < RADIUS_M
 
 
-def test_the_switch_can_be_thrown_in_flight():
+def test_avoid_peers_can_be_switched_off_in_flight():
     fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(3.0, 5.0, math.pi))
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)
     fleet.fly(1.0)
-    assert len(fleet.navigators[0]._yielding.traffic.peers) == 1
+    assert len(fleet.navigators[0].peers.peers) == 1
     off = updated(load({**TREE, "robot": 0}), "fixes", {"avoid_peers": False})
     apply_configuration(fleet.navigators[0], off)
     fleet.fly(0.5)
-    assert fleet.navigators[0]._yielding.traffic.peers == []
+    assert fleet.navigators[0].peers.peers == []
 
 
-def test_an_idle_robot_on_a_goal_makes_room_and_comes_back():
+def test_an_idle_robot_on_a_goal_makes_room_and_returns():
     fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0))
     fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
     fleet.fly(60.0, until=lambda: fleet.outcomes[0])
     assert fleet.outcomes[0][0].succeeded
     assert fleet.poses[1].distance_to(Pose2D(6.0, 5.0)) > 2 * RADIUS_M
     fleet.navigators[0].set_goal(Pose2D(2.0, 5.0), fleet.now_s)
-    fleet.fly(60.0, until=lambda: "is back in its place" in fleet.notes[1])
+    fleet.fly(60.0, until=lambda: "back at its parking pose" in fleet.notes[1])
     assert fleet.poses[1].distance_to(Pose2D(6.0, 5.0)) < 0.2
     assert fleet.navigators[1].state is State.IDLE
-    assert fleet.outcomes[1] == []  # nobody had given it a goal
+    assert fleet.outcomes[1] == []  # it had no goal of its own
     assert fleet.nearest_m > 2 * RADIUS_M
 
 
-def test_an_idle_robot_that_is_told_to_stay_stays():
+def test_without_yield_when_idle_an_idle_robot_stays():
     fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(6.0, 5.0), fixes={"yield_when_idle": False})
     fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
     fleet.fly(25.0)
@@ -147,21 +147,21 @@ def test_an_idle_robot_that_is_told_to_stay_stays():
     assert fleet.nearest_m > 2 * RADIUS_M
 
 
-def test_a_goal_ends_an_errand():
+def test_a_goal_ends_a_yielding_manoeuvre():
     fleet = Fleet(Pose2D(3.5, 5.0), Pose2D(6.0, 5.0))
     fleet.navigators[0].set_goal(Pose2D(6.0, 5.0), 0.0)
-    fleet.fly(20.0, until=lambda: fleet.gave_way[1])
+    fleet.fly(20.0, until=lambda: fleet.yielded[1])
     fleet.navigators[1].set_goal(Pose2D(8.0, 8.0), fleet.now_s)
     fleet.fly(60.0, until=lambda: fleet.outcomes[1])
     assert fleet.outcomes[1][0].succeeded
     assert fleet.poses[1].distance_to(Pose2D(8.0, 8.0)) < 0.2
 
 
-def test_one_that_gets_nowhere_lets_the_others_go_first():
+def test_a_robot_without_progress_gives_up_its_priority():
     fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(8.0, 8.0))
     navigator = fleet.navigators[0]
     navigator.set_goal(Pose2D(8.0, 5.0), 0.0)
-    rank_s = navigator.intention.rank_s
+    priority = navigator.peers.priority
     here = fleet.poses[0]
     while fleet.now_s < 20.0:
         peers = [peer_at("quad1", fleet.poses[1], Twist2D(), fleet.now_s)]
@@ -169,27 +169,27 @@ def test_one_that_gets_nowhere_lets_the_others_go_first():
             fleet.now_s, RobotPoses(here, here), Twist2D(), peers
         ).notes
         fleet.now_s += STEP_S
-    assert navigator.intention.rank_s > rank_s + 15.0
-    assert any("lets the others go first" in note for note in fleet.notes[0])
+    assert navigator.peers.priority < priority - 15.0
+    assert any("giving up priority" in note for note in fleet.notes[0])
 
 
-def test_a_lost_peer_is_left_to_the_lidar_and_said_once():
+def test_a_lost_peer_is_logged_once():
     fleet = Fleet(Pose2D(5.0, 5.0))
     navigator = fleet.navigators[0]
     here = fleet.poses[0]
     notes = []
-    for k in range(30):  # the frame of 0 s counts for half a second
+    for k in range(30):  # the state at 0 s is fresh for half a second
         seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 0.0)]
         notes += navigator.tick(k * STEP_S, RobotPoses(here, here), Twist2D(), seen).notes
-    assert notes == ["nothing from quad1 for 0.5 s: only the LIDAR sees it"]
+    assert notes == ["no data from quad1 for 0.5 s, avoiding it by LIDAR only"]
     seen = [peer_at("quad1", Pose2D(7.0, 5.0), Twist2D(), 3.0)]
     assert navigator.tick(3.0, RobotPoses(here, here), Twist2D(), seen).notes == [
-        "quad1 is heard of again"
+        "receiving data from quad1 again"
     ]
 
 
 @pytest.mark.parametrize("age_s, is_marked", [(0.0, False), (5.0, True)])
-def test_the_lidars_points_on_a_known_peer_are_left_out(age_s, is_marked):
+def test_obstacle_layers_ignore_points_on_a_known_peer(age_s, is_marked):
     source = {
         "observation_sources": "scan",
         "obstacle_range": 5.0,
@@ -206,7 +206,7 @@ def test_the_lidars_points_on_a_known_peer_are_left_out(age_s, is_marked):
     assert (layer.grid.costs == LETHAL).any() == is_marked
 
 
-def test_what_the_lidar_has_marked_of_a_peer_is_forgotten_when_it_is_known():
+def test_marks_of_a_peer_are_cleared_when_it_becomes_known():
     source = {
         "observation_sources": "scan",
         "obstacle_range": 5.0,
@@ -227,36 +227,36 @@ def test_what_the_lidar_has_marked_of_a_peer_is_forgotten_when_it_is_known():
     assert not (layer.grid.costs == LETHAL).any()
 
 
-def test_peers_are_known_as_far_as_the_lidar_marks():
+def test_the_reach_covers_the_obstacle_range():
     source = {"observation_sources": "scan", "scan": {"obstacle_range": 9.0, "marking": True}}
     far = build_navigator(load({"global_costmap": source}))
     near = build_navigator(load({}))
-    assert far.peer_reach_m > 9.0 + 2 * RADIUS_M > near.peer_reach_m > 2 * 0.3 * 7.0
+    assert far.peers.reach_m > 9.0 + 2 * RADIUS_M > near.peers.reach_m > 2 * 0.3 * 7.0
 
 
-def test_what_a_robot_tells_of_itself():
+def test_intention_of_a_robot():
     navigator = build_navigator(load({**TREE, "robot": 3}))
-    idle = navigator.intention
-    assert idle.rank_s == IDLE_RANK_S + 0.03 and not len(idle.way)
+    idle = navigator.peers.intention
+    assert idle.priority == idle_priority(3) == -4.0e9 - 0.03 and not len(idle.path)
     here = Pose2D(2.0, 5.0)
     navigator.set_goal(Pose2D(4.0, 5.0), 7.0)
     navigator.tick(7.0, RobotPoses(here, here), Twist2D())
-    told: Intention = navigator.intention
-    assert told.rank_s == pytest.approx(7.03)
-    assert len(told.way) == pytest.approx(21, abs=2)  # 2 m, a point every 0.1 m
-    np.testing.assert_allclose(told.way[-1], [4.0, 5.0])
+    told: Intention = navigator.peers.intention
+    assert told.priority == pytest.approx(-7.03)
+    assert len(told.path) == pytest.approx(21, abs=2)  # 2 m, a point every 0.1 m
+    np.testing.assert_allclose(told.path[-1], [4.0, 5.0])
     navigator.cancel()
-    assert not len(navigator.intention.way)
+    assert not len(navigator.peers.intention.path)
 
 
-def test_rollouts_go_round_one_that_stands_whatever_it_says():
-    """It is under way, stands for 9 s and moves on. The centre is to keep 2 x (r + 0.05 m) off."""
+def test_a_stationary_peer_is_an_obstacle_whatever_its_intention():
+    """The peer stands for 9 s and moves on. The separation of centres is 2 x (r + 0.05 m)."""
     navigator = build_navigator(load(TREE))
     here = Pose2D(5.0, 5.0)
 
     def solid(now_s, x_m):
-        way = Intention(0.0, np.array([[x_m, 5.0], [9.0, 5.0]]))
-        seen = [peer_at("quad1", Pose2D(x_m, 5.0), Twist2D(), now_s).intending(way)]
+        intention = Intention(HIGHEST_PRIORITY, np.array([[x_m, 5.0], [9.0, 5.0]]))
+        seen = [peer_at("quad1", Pose2D(x_m, 5.0), Twist2D(), now_s).with_intention(intention)]
         navigator.tick(now_s, RobotPoses(here, here), Twist2D(), seen)
         navigator.local_costmap.update(now_s, here)
         return np.count_nonzero(navigator.local_costmap.costs == LETHAL)
@@ -268,8 +268,8 @@ def test_rollouts_go_round_one_that_stands_whatever_it_says():
     assert solid(9.2, 6.15) == 0
 
 
-def test_an_idle_robot_makes_room_for_one_that_it_has_made_stand():
-    """The goal is 0.71 m from the parked one; who stands for long is taken for parked, too."""
+def test_an_idle_robot_makes_room_for_a_peer_that_it_blocks():
+    """The goal is 0.71 m from the parked robot; a robot that stands for long counts as parked."""
     fleet = Fleet(Pose2D(5.0, 5.0), Pose2D(4.72, 6.2, -1.0), fixes={"yield_when_idle": False})
     fleet.navigators[1].set_goal(Pose2D(5.5, 5.5), 0.0)
     fleet.fly(12.0)

@@ -32,9 +32,9 @@ from quad_nav.config.workload import rollout_problem, size_problem
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError
+from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
-from quad_nav.navigator.progress_checker import ProgressParams
-from quad_nav.peers.params import PeerParams
+from quad_nav.peers.coordinator import PeerParams
 
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards too, to the node's level.

@@ -15,9 +15,9 @@ from quad_nav.config.spec import RESTORE_DEFAULTS, Parameter, Table, double, fla
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
+from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
-from quad_nav.navigator.progress_checker import ProgressParams
-from quad_nav.peers.params import PeerParams
+from quad_nav.peers.coordinator import PeerParams
 from quad_nav.recovery import ClearCostmapParams, RotateParams
 
 FIXES = "fixes"  # the name of the group below the node's own namespace

@@ -1,4 +1,4 @@
-"""When the two costmaps are updated, and whether one may drive by them."""
+"""Costmap updates: each of the two costmaps at its own frequency."""
 
 from __future__ import annotations
 
@@ -11,46 +11,59 @@ from quad_nav.timing import Schedule
 
 
 class CostmapUpdates:
-    """Each costmap at its own frequency."""
+    """Updates the costmaps of one robot and checks that their sensor data is current."""
 
-    def __init__(self, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap):
-        self._local = local_costmap
+    def __init__(self, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap) -> None:
+        """Create schedules that have not started."""
+        self._global, self._local = global_costmap, local_costmap
         self._costmaps: Dict[str, Tuple[LayeredCostmap, Schedule]] = {
             "global": (global_costmap, Schedule(global_costmap.params.update_frequency_hz)),
             "local": (local_costmap, Schedule(local_costmap.params.update_frequency_hz)),
         }
 
     def start(self, now_s: float) -> None:
-        """Both are due now."""
+        """Make both updates due now."""
         for _, schedule in self._costmaps.values():
             schedule.start(now_s)
 
     @property
     def due_s(self) -> float:
+        """Time of the next update."""
         return min((schedule.due_s for _, schedule in self._costmaps.values()), default=math.inf)
 
-    def update(self, tick: Tick, located: RobotPoses) -> None:
-        """Updates what is due; the changed windows go into the tick."""
-        poses = {"global": located.in_global, "local": located.in_local}
+    def update(self, tick: Tick, poses: RobotPoses) -> None:
+        """Run the updates that are due; the changed windows go into the tick."""
+        of_costmaps = {"global": poses.in_global, "local": poses.in_local}
         for name, (costmap, schedule) in self._costmaps.items():
             schedule.set_frequency(costmap.params.update_frequency_hz, tick.now_s)
             if not schedule.pop(tick.now_s):
                 continue
-            pose = poses[name]
+            pose = of_costmaps[name]
             if pose is None:
-                tick.warnings.append(f"{name} costmap not updated: the robot's pose is unknown")
+                tick.warnings.append(f"{name} costmap not updated: robot pose unknown")
                 continue
             tick.windows[name] = costmap.update(tick.now_s, pose)
 
-    def out_of_date(self, now_s: float) -> str:
-        """Why the local costmap is not to be driven by, "" when it is."""
+    def clear(self, now_s: float) -> None:
+        """Reset the layers of both costmaps, as the service ``~clear_costmaps`` does."""
+        self._global.reset_layers(now_s)
+        self._local.reset_layers(now_s)
+
+    def free_square(self, poses: RobotPoses, radius_m: float) -> None:
+        """Mark the square around the robot as free until the next updates."""
+        for costmap, pose in ((self._global, poses.in_global), (self._local, poses.in_local)):
+            if pose is not None:
+                costmap.free_square(pose.x_m, pose.y_m, 2.0 * radius_m)
+
+    def outdated_reason(self, now_s: float) -> str:
+        """Return why the local costmap is out of date, "" if it is current."""
         if self._local.is_current(now_s):
             return ""
-        return self.silence(now_s) or "the local costmap is out of date"
+        return self.missing_data(now_s) or "local costmap out of date"
 
-    def silence(self, now_s: float) -> str:
-        """Which of the local costmap's sensors say nothing, "" when all do."""
+    def missing_data(self, now_s: float) -> str:
+        """Return which sensors of the local costmap have timed out, "" if none has."""
         return "; ".join(
-            f"nothing from {name} for {age_s:.1f} s"
+            f"no data from {name} for {age_s:.1f} s"
             for name, age_s in self._local.stale_sources(now_s)
         )

@@ -1,4 +1,7 @@
-"""A controller whose parameters are held down for a while, to go slowly or to dare more."""
+"""Parameter limiter: temporary limits of a local planner's parameters.
+
+Recoveries limit the speed for a while, and a stuck robot relaxes its obstacle weight.
+"""
 
 from __future__ import annotations
 
@@ -10,43 +13,44 @@ from quad_nav.recovery import ParameterLimit
 
 
 class ParameterLimiter:
-    """Sets a controller's parameters: the usual ones, or the usual ones limited.
+    """Sets a local planner's parameters, with limits while there are any.
 
-    A limit holds until the robot has moved far enough, whatever becomes of the goal: what
-    makes it necessary is around the robot. Limits of different parameters hold side by
-    side; one of the same parameters takes the other's place. The controller has
-    ``params``, a frozen dataclass, and ``set_params``; one that has not cannot be limited.
+    A limit holds until the robot has moved far enough, for other goals as well: the reason for
+    it is near the robot. Limits of different parameters hold side by side; a limit of the same
+    parameters replaces the one before. The local planner has ``params``, a frozen dataclass,
+    and ``set_params``; one without them cannot be limited.
     """
 
-    def __init__(self, controller: Any):
+    def __init__(self, controller: Any) -> None:
+        """Create a limiter without limits."""
         self._controller = controller
         self._limits: Dict[Tuple[str, ...], Tuple[ParameterLimit, Pose2D]] = {}
         self._usual: Any = None  # the parameters without limits, while there are any
 
     @property
     def usual(self) -> Any:
-        """The controller's parameters without limits; None if it has none."""
+        """The local planner's parameters without limits, None if it has no parameters."""
         if self._limits:
             return self._usual
         return getattr(self._controller, "params", None)
 
     def set_params(self, params: Any) -> None:
-        """Takes other usual parameters; limits stay in force."""
+        """Change the parameters without limits; limits stay in force."""
         self._usual = params
         for limit, _ in self._limits.values():
             params = _limited(params, limit)
         self._controller.set_params(params)
 
     def impose(self, limit: ParameterLimit, pose: Pose2D) -> None:
-        """Begins a limit; ``pose`` is where the robot is."""
+        """Impose a limit on a robot at ``pose``."""
         if not limit.greatest:
             return
         usual = self.usual
         self._limits[tuple(field for field, _ in limit.greatest)] = limit, pose
         self.set_params(usual)
 
-    def follow(self, pose: Pose2D) -> None:
-        """To be called with the robot's pose in every control cycle."""
+    def track(self, pose: Pose2D) -> None:
+        """Lift the limits from which the robot has moved away; to be called in every cycle."""
         over = [
             fields
             for fields, (limit, since) in self._limits.items()
@@ -55,7 +59,7 @@ class ParameterLimiter:
         self._lift(over)
 
     def lift(self) -> None:
-        """Ends all limits."""
+        """Lift all limits."""
         self._lift(list(self._limits))
 
     def _lift(self, over: List[Tuple[str, ...]]) -> None:

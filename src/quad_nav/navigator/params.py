@@ -5,21 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from quad_nav.navigator.progress_checker import ProgressParams
+from quad_nav.navigator.control_supervisor import ProgressParams
 
 
 @dataclass(frozen=True)
 class NavigatorParams:
-    """move_base's own parameters.
+    """Parameters of the state machine.
 
-    The last three are ours. ``sensor_timeout_s``: the robot stops when a sensor has sent
-    nothing for so long; 0 leaves it to the sensor's own period. ``escape_collision``: a round
-    robot without a legal trajectory moves to where costs are lower.
+    Those without an entry below are move_base's own, see ``docs/parameters.md``.
+
+    Attributes:
+        recovery_behaviors: (name, type) of each recovery behaviour, None for the default ones.
+        sensor_timeout_s: The robot stops when a sensor of the local costmap has sent nothing
+            for so long; 0 restores upstream behaviour, which leaves the limit to the sensor's
+            own period and keeps recovering without sensor data.
+        escape_collision: A round robot without a legal trajectory moves to where costs are
+            lower; False restores upstream behaviour.
+        progress: Detection of a robot that makes no progress.
     """
 
     base_global_planner: str = "navfn/NavfnROS"
     base_local_planner: str = "base_local_planner/TrajectoryPlannerROS"
-    recovery_behaviors: Optional[Tuple[Tuple[str, str], ...]] = None  # (name, type); None: default
+    recovery_behaviors: Optional[Tuple[Tuple[str, str], ...]] = None
     controller_frequency_hz: float = 20.0
     planner_frequency_hz: float = 0.0
     planner_patience_s: float = 5.0

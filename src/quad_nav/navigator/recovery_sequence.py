@@ -1,4 +1,4 @@
-"""Which recovery behaviour is on, which is next, and why."""
+"""Recovery sequence: which recovery behaviour runs, which is next, and why."""
 
 from __future__ import annotations
 
@@ -6,66 +6,93 @@ import math
 from dataclasses import dataclass
 from typing import Optional, Sequence
 
-from quad_nav.navigator.tick import RecoveryStart, Trigger
-from quad_nav.recovery import Recovery, RecoveryContext, Step
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.navigator.parameter_limiter import ParameterLimiter
+from quad_nav.navigator.tick import RecoveryStart, RobotPoses, Tick, Trigger
+from quad_nav.recovery import Recovery, RecoveryContext
 
 
 @dataclass(frozen=True)
 class NamedRecovery:
+    """A recovery behaviour with the name that the configuration gives it."""
+
     name: str
     behaviour: Recovery
 
 
 class RecoverySequence:
-    """Goes through the behaviours, one after the other, until what failed works again.
+    """Runs the behaviours one after the other until what failed succeeds again.
 
-    Readable: ``trigger``, why the last one was begun, and ``due_s``, when the running one
-    wants its next step (+inf without one).
+    Attributes:
+        recoveries: The behaviours in order.
+        trigger: Why the last behaviour was started.
+        due_s: Time of the running behaviour's next step, +inf if none runs.
     """
 
-    def __init__(self, recoveries: Sequence[NamedRecovery]):
+    def __init__(
+        self,
+        recoveries: Sequence[NamedRecovery],
+        global_costmap: LayeredCostmap,
+        local_costmap: LayeredCostmap,
+    ) -> None:
+        """Create a sequence of which no behaviour runs; behaviours may change the costmaps."""
         self.recoveries = tuple(recoveries)
+        self._costmaps = (global_costmap, local_costmap)
         self.reset()
 
     def reset(self) -> None:
-        """For another goal: from the first behaviour on."""
+        """Start with the first behaviour again, for another goal."""
         self._index = 0
         self.trigger: Optional[Trigger] = None
         self.stop()
 
     def stop(self) -> None:
-        """Leaves the running behaviour."""
+        """Stop the running behaviour."""
         self._active: Optional[Recovery] = None
         self.due_s = math.inf
 
     @property
     def is_running(self) -> bool:
+        """True while a behaviour runs."""
         return self._active is not None
 
-    def works_again(self, trigger: Trigger) -> None:
-        """What failed has worked: if that was the reason, the next time begins anew."""
+    def reset_after(self, trigger: Trigger) -> None:
+        """Start with the first behaviour again if what triggered the last one has succeeded."""
         if self.trigger is trigger:
             self._index = 0
 
-    def start(self, context: RecoveryContext) -> Optional[RecoveryStart]:
-        """Begins the next behaviour; None when they are used up."""
+    def start(self, tick: Tick, poses: RobotPoses) -> bool:
+        """Start the next behaviour; return False if all have run."""
         assert self.trigger is not None
         if self._index >= len(self.recoveries):
-            return None
+            return False
         named = self.recoveries[self._index]
         self._active = named.behaviour
-        self.due_s = context.now_s
-        named.behaviour.start(context)
-        return RecoveryStart(named.name, self._index, len(self.recoveries), self.trigger)
+        self.due_s = tick.now_s
+        named.behaviour.start(self._context(tick, poses))
+        tick.recovery = RecoveryStart(named.name, self._index, len(self.recoveries), self.trigger)
+        return True
 
-    def step(self, context: RecoveryContext) -> Optional[Step]:
-        """The running behaviour's step; None before it is due."""
+    def step(self, tick: Tick, poses: RobotPoses, limiter: ParameterLimiter) -> bool:
+        """Run the behaviour's step if it is due; return whether the behaviour is done.
+
+        The command and the message of the step go into the tick, its limit to ``limiter``.
+        """
         assert self._active is not None
-        if context.now_s < self.due_s - 1e-9:
-            return None
-        step = self._active.step(context)
-        self.due_s = context.now_s + self._active.period_s
+        if tick.now_s < self.due_s - 1e-9:
+            return False
+        step = self._active.step(self._context(tick, poses))
+        self.due_s = tick.now_s + self._active.period_s
+        if step.command is not None:
+            tick.command = step.command
+        if step.message:
+            tick.warnings.append(step.message)
+        if step.limit is not None and poses.in_global is not None:
+            limiter.impose(step.limit, poses.in_global)
         if step.done:
             self._index += 1
             self.stop()
-        return step
+        return step.done
+
+    def _context(self, tick: Tick, poses: RobotPoses) -> RecoveryContext:
+        return RecoveryContext(tick.now_s, *self._costmaps, poses.in_global, poses.in_local)

@@ -1,4 +1,4 @@
-"""What goes into one tick of the navigator and what comes out of it."""
+"""Input and output of one step of the navigator."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Dict, List, Optional
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.control.controller import Control
 from quad_nav.costmap.cost_grid import Window
@@ -15,6 +16,8 @@ from quad_nav.peers.right_of_way import YieldDecision
 
 
 class State(enum.Enum):
+    """States of move_base."""
+
     IDLE = "idle"
     PLANNING = "planning"
     CONTROLLING = "controlling"
@@ -22,7 +25,7 @@ class State(enum.Enum):
 
 
 class Trigger(enum.Enum):
-    """Why recoveries are run; the value is the original's closing sentence."""
+    """Reasons for recoveries; the value is move_base's result text of an aborted goal."""
 
     PLANNING = "Failed to find a valid plan. Even after executing recovery behaviors."
     CONTROLLING = "Failed to find a valid control. Even after executing recovery behaviors."
@@ -31,16 +34,34 @@ class Trigger(enum.Enum):
 
 @dataclass(frozen=True)
 class RobotPoses:
-    """Where the robot is in each costmap's frame; None when it is not known, and why not."""
+    """Poses of the robot in the frames of both costmaps.
+
+    Attributes:
+        in_global: Pose in the frame of the global costmap, None if unknown.
+        in_local: Pose in the frame of the local costmap, None if unknown.
+        unknown_reason: Why a pose is unknown, "" if there is no particular reason.
+    """
 
     in_global: Optional[Pose2D]
     in_local: Optional[Pose2D]
-    why_not: str = ""
+    unknown_reason: str = ""
+
+    @property
+    def local_from_global(self) -> Optional[Pose2D]:
+        """Transform from the global costmap's frame to the local one's, None if unknown."""
+        a, b = self.in_local, self.in_global
+        if a is None or b is None:
+            return None
+        if a == b:
+            return Pose2D(0.0, 0.0, 0.0)
+        rotation = Pose2D(0.0, 0.0, a.yaw_rad - b.yaw_rad)
+        x_m, y_m = rotation.rotate(b.x_m, b.y_m)
+        return Pose2D(a.x_m - x_m, a.y_m - y_m, rotation.yaw_rad)
 
 
 @dataclass(frozen=True)
 class RecoveryStart:
-    """A recovery behaviour begins: its name, its number and how many there are."""
+    """Start of a recovery behaviour: number ``index`` (from 0) of ``total``."""
 
     name: str
     index: int
@@ -50,7 +71,7 @@ class RecoveryStart:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a goal."""
+    """End of a goal, with the result text of the action."""
 
     succeeded: bool
     text: str
@@ -58,30 +79,37 @@ class Outcome:
 
 @dataclass
 class Tick:
-    """What one tick did, for topics, report and tuner alike."""
+    """Result of one step, for topics, reports and tuning.
+
+    Attributes:
+        now_s: Time of the step.
+        state: State after the step.
+        windows: Cells that costmap updates changed, by costmap: "global", "local".
+        cycle: A control cycle ran.
+        command: Command to publish now, if any.
+        plan: New global plan, float64[n, 3] of (x_m, y_m, yaw_rad) in the global costmap's
+            frame.
+        planning_failed: Why the search for a plan failed, "" if it did not.
+        control: Result of the local planner.
+        recovery: The recovery behaviour that started.
+        outcome: End of the goal.
+        yielding: The decision to yield that is in force.
+        limited_by: Name of the peer that limited the command, "" if none did.
+        notes: Messages for the log that tell no fault.
+        warnings: Messages for the log that tell a fault.
+    """
 
     now_s: float
     state: State = State.IDLE
-    windows: Dict[str, Window] = field(default_factory=dict)  # changed by costmap updates
-    cycle: bool = False  # whether a control cycle ran
-    command: Optional[Twist2D] = None  # to be sent now, if any
-    plan: Optional[np.ndarray] = None  # a new global plan float64[n, 3]
+    windows: Dict[str, Window] = field(default_factory=dict)
+    cycle: bool = False
+    command: Optional[Twist2D] = None
+    plan: Optional[NDArray[np.float64]] = None
     planning_failed: str = ""
     control: Optional[Control] = None
     recovery: Optional[RecoveryStart] = None
     outcome: Optional[Outcome] = None
-    giving_way: Optional[YieldDecision] = None  # what it does for a peer just now
-    limited_by: str = ""  # the peer that the command was slowed down for
-    notes: List[str] = field(default_factory=list)  # what is worth knowing, and no fault
+    yielding: Optional[YieldDecision] = None
+    limited_by: str = ""
+    notes: List[str] = field(default_factory=list)
     warnings: List[str] = field(default_factory=list)
-
-
-def local_from_global(located: RobotPoses) -> Pose2D:
-    """The planar transform between the costmaps' frames, from the two poses."""
-    if located.in_local == located.in_global:
-        return Pose2D(0.0, 0.0, 0.0)
-    assert located.in_local is not None and located.in_global is not None
-    a, b = located.in_local, located.in_global
-    turn = Pose2D(0.0, 0.0, a.yaw_rad - b.yaw_rad)
-    x_m, y_m = turn.rotate(b.x_m, b.y_m)
-    return Pose2D(a.x_m - x_m, a.y_m - y_m, turn.yaw_rad)

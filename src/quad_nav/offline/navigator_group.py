@@ -57,7 +57,7 @@ class NavigatorGroup:
         self._names = [goals.name for goals in setup.robots]
         self._intentions = [Intention()] * len(setup.robots)
         for number, robot in self.robots.items():
-            self._intentions[number] = robot.navigator.intention
+            self._intentions[number] = robot.navigator.peers.intention
         maps = SceneMaps(setup.scene)
         for robot in self.robots.values():
             maps.set_map_of(robot.navigator.global_costmap)
@@ -115,13 +115,13 @@ class NavigatorGroup:
             located,
             time.perf_counter() - start_s,
             robot.waiting_goal is not None,
-            robot.navigator.intention,
+            robot.navigator.peers.intention,
         )
 
     def _peers_in_reach(
         self, robots: Sequence[int], now_s: float, states: RobotStates
     ) -> Dict[int, List[Peer]]:
-        """The peers within each robot's ``peer_reach_m``, by the robots' numbers."""
+        """The peers within each robot's ``peers.reach_m``, by the robots' numbers."""
         if len(self._names) == 1:
             return {robot: [] for robot in robots}
         positions = states.bodies.positions_m[:, :2]
@@ -130,7 +130,7 @@ class NavigatorGroup:
             distance_m = np.hypot(*(positions - positions[robot]).T)
             distance_m[robot] = np.inf
             near[robot] = np.flatnonzero(
-                distance_m < self.robots[robot].navigator.peer_reach_m
+                distance_m < self.robots[robot].navigator.peers.reach_m
             ).tolist()
         peers = {
             robot: self._as_peer(robot, now_s, states) for robot in set().union(*near.values())

@@ -1,149 +1,303 @@
-"""One robot among its peers: its rank, what it does for whom, and where it belongs.
+"""Coordination of one robot with its peers.
 
-The navigator asks ``decide`` in each control cycle and obeys ``now``: None to fly on, or
-to wait, or to fly to a refuge first. A robot without a goal makes room on an errand:
-it flies to a refuge and then back to its home, with nobody to report to.
+The navigator asks three things: ``observe`` updates the peers, ``decide`` says whether the
+robot yields, ``limit`` keeps a command inside the robot's Voronoi cell. A robot without a goal
+makes room by a yielding manoeuvre: it flies to a holding point and back to its parking pose.
 """
 
 from __future__ import annotations
 
-from typing import List, Optional
+from dataclasses import dataclass
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from quad_nav.geometry import Pose2D
-from quad_nav.peers.params import PeerParams
-from quad_nav.peers.peer import IDLE_RANK_S, NO_WAY_POINTS, Intention, rank_of, thinned
-from quad_nav.peers.right_of_way import Manner, YieldDecision
-from quad_nav.peers.traffic import Traffic
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.peers.peer import (
+    IDLE_PRIORITY,
+    NO_PATH,
+    Intention,
+    Peer,
+    priority_of,
+    resample,
+)
+from quad_nav.peers.peer_costs import PeerCosts
+from quad_nav.peers.peer_tracker import PeerTracker
+from quad_nav.peers.right_of_way import Yield, YieldDecision
+from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell
+from quad_nav.peers.yielding import YieldRules
 from quad_nav.timing import StallTimer
 
-TURN_AFTER_S = 15.0  # one that gets no farther for so long lets the others go first
-REPLAN_AFTER_S = 3.0  # one that is slowed down on the spot looks for another plan
-_FARTHER_M = 0.2
-_AT_REFUGE_M = 0.15
-_SPACING_M = 0.1  # of the way that peers are told
+LATENCY_S = 0.15  # how much later than due the next command may come
+GIVE_UP_PRIORITY_AFTER_S = 15.0  # without progress
+REPLAN_AFTER_S = 3.0  # of limited commands without progress
+_PROGRESS_M = 0.2
+_AT_HOLDING_POINT_M = 0.15
+_SPACING_M = 0.1  # of the points of the path in the intention
 
 
-class Yielding:
-    """Readable: ``now``, what is done for a peer; ``is_errand``; ``home``, None if it is there."""
+@dataclass(frozen=True)
+class PeerParams:
+    """Parameters of the avoidance of peers, see ``docs/peers.md``.
 
-    def __init__(self, traffic: Traffic, number: int):
-        self.traffic = traffic
+    Attributes:
+        avoid_peers: Avoid the peers whose poses are known; False restores upstream behaviour.
+        margin_m: Distance that each of two robots keeps its footprint from the bisector
+            between them; hulls stay twice as far apart.
+        timeout_s: Age from which the state of a peer is ignored.
+        yield_when_idle: A robot without a goal leaves the path of a peer, and comes back.
+    """
+
+    avoid_peers: bool = True
+    margin_m: float = 0.05
+    timeout_s: float = 0.5
+    yield_when_idle: bool = True
+
+
+@dataclass(frozen=True)
+class PeerAdvice:
+    """Result of ``PeerCoordinator.decide``.
+
+    Attributes:
+        messages: What the robot does for its peers from now on, for the log.
+        replan: The target has changed to or from a holding point.
+        manoeuvre_goal: Goal of the yielding manoeuvre that an idle robot begins.
+    """
+
+    messages: Tuple[str, ...] = ()
+    replan: bool = False
+    manoeuvre_goal: Optional[Pose2D] = None
+
+
+class PeerCoordinator:
+    """Coordinates one robot with its peers.
+
+    Attributes:
+        params: The parameters; they may change in flight.
+        decision: The decision to yield that is in force, None if the robot does not yield.
+        parking_pose: Pose that an idle robot has left to make room, None if it is there.
+        is_yield_manoeuvre: The robot flies a yielding manoeuvre, not to a goal of its own.
+    """
+
+    def __init__(
+        self,
+        params: PeerParams,
+        global_costmap: LayeredCostmap,
+        local_costmap: LayeredCostmap,
+        number: int = 0,
+    ) -> None:
+        """Coordinate an idle robot.
+
+        Args:
+            params: The parameters.
+            global_costmap: Costmap of the global planner, in ``map``.
+            local_costmap: Costmap of the local planner, with the robot's footprint.
+            number: Number of the robot among those that fly together.
+        """
+        self.params = params
+        self.decision: Optional[YieldDecision] = None
+        self.parking_pose: Optional[Pose2D] = None
+        self.is_yield_manoeuvre = False
         self._number = number
-        self.now: Optional[YieldDecision] = None
-        self.home: Optional[Pose2D] = None
-        self.is_errand = False
-        self._since_s = IDLE_RANK_S
-        self._way = NO_WAY_POINTS
+        self._tracker = PeerTracker(global_costmap, local_costmap)
+        self._costs = PeerCosts(self._tracker, global_costmap, local_costmap)
+        self._rules = YieldRules(self._tracker, global_costmap)
+        self._goal_set_s = -IDLE_PRIORITY
+        self._path = NO_PATH
         self._progress = StallTimer()
-        self._held_up = StallTimer()
+        self._limited = StallTimer()
 
-    # -- what it is up to --------------------------------------------------------------
+    @property
+    def peers(self) -> Sequence[Peer]:
+        """The peers within reach whose state is fresh."""
+        return self._tracker.peers
+
+    @property
+    def reach_m(self) -> float:
+        """Distance up to which peers matter; ``observe`` ignores the others."""
+        return self._tracker.reach_m
+
+    @property
+    def priority(self) -> float:
+        """Priority of the robot; the higher one goes first."""
+        return priority_of(self._goal_set_s, self._number)
 
     @property
     def intention(self) -> Intention:
-        """What the peers may know."""
-        return Intention(self.rank_s, self._way)
+        """Message to the peers."""
+        return Intention(self.priority, self._path)
 
     @property
-    def rank_s(self) -> float:
-        return rank_of(self._since_s, self._number)
+    def holding_point(self) -> Optional[Pose2D]:
+        """Where the robot makes room, None if it does not."""
+        return self.decision.holding_point if self.decision is not None else None
 
-    def target(self, goal: Optional[Pose2D]) -> Optional[Pose2D]:
-        """Where it flies just now: to a refuge, or to its goal."""
-        return self.refuge or goal
+    # -- goals and plans -----------------------------------------------------------------
 
-    @property
-    def refuge(self) -> Optional[Pose2D]:
-        return self.now.refuge if self.now is not None else None
-
-    def set_out(self, goal: Pose2D, now_s: float) -> None:
-        """Somebody has given it a goal: from now on it has a rank."""
-        self.stand()
-        self.home = None
-        self._since_s = now_s
-        self._way = _straight_to(goal)
+    def start_goal(self, goal: Pose2D, now_s: float) -> None:
+        """Give the robot the priority of a goal that is set now; ``goal`` is in ``map``."""
+        self.end_goal()
+        self.parking_pose = None
+        self._goal_set_s = now_s
+        self._path = _straight_to(goal)
         self._progress = StallTimer()
-        self._held_up = StallTimer()
+        self._limited = StallTimer()
 
-    def set_out_on_errand(self, now: Optional[YieldDecision], home: Pose2D) -> None:
-        """To a refuge or, without one, home."""
-        self.stand()
-        self.now, self.home, self.is_errand = now, home, True
-        self._way = _straight_to(home)
+    def end_goal(self) -> None:
+        """Make the robot idle; a parking pose that it has not reached stays."""
+        self.decision, self.is_yield_manoeuvre = None, False
+        self._goal_set_s = -IDLE_PRIORITY
+        self._path = NO_PATH
 
-    def follow(self, plan: np.ndarray) -> None:
-        """The plan that is flown, float64[n, 3]."""
-        self._way = thinned(plan[:, :2], _SPACING_M)
+    def end_manoeuvre(self, succeeded: bool) -> None:
+        """End a yielding manoeuvre; the robot is at its parking pose if it succeeded."""
+        if succeeded:
+            self.parking_pose = None
 
-    def stand(self) -> None:
-        """It has no goal any more. A home that it has not reached stays its home."""
-        self.now, self.is_errand = None, False
-        self._since_s = IDLE_RANK_S
-        self._way = NO_WAY_POINTS
+    def follow_plan(self, plan: NDArray[np.float64]) -> None:
+        """Tell the peers another path: the plan float64[n, 3] of (x_m, y_m, yaw_rad) in ``map``."""
+        self._path = resample(plan[:, :2], _SPACING_M)
 
-    # -- what it does ------------------------------------------------------------------
+    def reject_holding_point(self) -> None:
+        """Wait in place, because no plan leads to the holding point."""
+        if self.decision is not None:
+            self.decision = YieldDecision(self.decision.peer, Yield.WAIT)
 
-    @property
-    def concerns(self) -> bool:
-        """Whether there is anybody to give way to."""
-        return bool(self.traffic.peers) or self.now is not None
+    def restart(self) -> None:
+        """Forget all peers, after a jump of the clock."""
+        self._tracker.restart()
+        self._rules.restart()
 
-    def decide(self, now_s: float, here: Pose2D, goal: Pose2D) -> List[str]:
-        """Sets ``now`` for a robot with a goal; returns what is to be said about it."""
-        notes = self._take_turns(now_s, here)
-        before = self.now
-        self.now = self.traffic.give_way(
-            now_s, here, self._way, _straight_to(goal), self.rank_s, before
+    # -- observe -------------------------------------------------------------------------
+
+    def observe(
+        self,
+        now_s: float,
+        pose: Optional[Pose2D],
+        local_from_global: Optional[Pose2D],
+        peers: Sequence[Peer],
+        cruise_mps: float,
+    ) -> List[str]:
+        """Update the peers and their costs in both costmaps.
+
+        Args:
+            now_s: Time of the update.
+            pose: Pose of the robot in ``map``, None if unknown.
+            local_from_global: Transform from ``map`` to the frame of the local costmap, None if
+                unknown.
+            peers: All peers with a known pose, however old.
+            cruise_mps: Speed at which robots are expected to fly.
+
+        Returns:
+            Messages about peers that were lost or came back, for the log.
+        """
+        had_peers = bool(self._tracker.peers)
+        self._tracker.cruise_mps = cruise_mps
+        messages = self._tracker.observe(
+            now_s,
+            pose,
+            peers if self.params.avoid_peers else (),
+            self.params.margin_m,
+            self.params.timeout_s,
         )
-        if self.now != before:
-            notes.append(str(self.now) if self.now is not None else "goes on")
-        return notes
+        changed = had_peers or bool(self._tracker.peers)
+        if changed and pose is not None and local_from_global is not None:
+            self._costs.update(now_s, pose, local_from_global, self.priority)
+        return messages
 
-    def waits_at(self, here: Pose2D) -> bool:
-        """Whether it stands still for a peer, under way or at its refuge."""
-        if self.now is None:
+    # -- decide --------------------------------------------------------------------------
+
+    def decide(self, now_s: float, pose: Pose2D, goal: Optional[Pose2D]) -> PeerAdvice:
+        """Decide whether the robot yields; ``decision`` holds the result.
+
+        Args:
+            now_s: Time of the decision.
+            pose: Pose of the robot in ``map``.
+            goal: Goal of the robot in ``map``, None if it is idle.
+        """
+        if goal is None:
+            return self._decide_idle(now_s, pose)
+        if not self._tracker.peers and self.decision is None:
+            return PeerAdvice()
+        messages = self._give_up_priority(now_s, pose)
+        before = self.decision
+        self.decision = self._rules.decide(
+            now_s, pose, self._path, _straight_to(goal), self.priority, before
+        )
+        if self.decision != before:
+            messages += (str(self.decision or "path clear, resuming its goal"),)
+        replan = self.holding_point != (before.holding_point if before is not None else None)
+        return PeerAdvice(messages, replan)
+
+    def waits_at(self, pose: Pose2D) -> bool:
+        """Return whether the robot stands still for a peer, on its path or a holding point."""
+        if self.decision is None:
             return False
-        return self.refuge is None or here.distance_to(self.refuge) <= _AT_REFUGE_M
+        point = self.decision.holding_point
+        return point is None or pose.distance_to(point) <= _AT_HOLDING_POINT_M
 
-    def refuse_refuge(self) -> None:
-        """There is no way to the refuge."""
-        if self.now is not None:
-            self.now = YieldDecision(self.now.to, Manner.WAIT)
+    def _decide_idle(self, now_s: float, pose: Pose2D) -> PeerAdvice:
+        """Begin a yielding manoeuvre of a robot without a goal, if it is on a peer's path."""
+        if not self.params.yield_when_idle or not self._tracker.peers:
+            return PeerAdvice()
+        decision = self._rules.decide(now_s, pose, NO_PATH, NO_PATH, self.priority, None)
+        parking_pose = self.parking_pose
+        if decision is not None and decision.holding_point is not None:
+            parking_pose = parking_pose or pose
+        elif parking_pose is None or decision is not None or not self._rules.is_free(parking_pose):
+            return PeerAdvice()
+        self.end_goal()
+        self.decision, self.parking_pose, self.is_yield_manoeuvre = decision, parking_pose, True
+        self._path = _straight_to(parking_pose)
+        message = str(decision or "path clear, returning to its parking pose")
+        return PeerAdvice((message,), manoeuvre_goal=parking_pose)
 
-    def errand(self, now_s: float, here: Pose2D, params: PeerParams) -> Optional[Pose2D]:
-        """For a robot without a goal: the home of an errand that it sets out on, if any."""
-        if not params.yield_when_idle or not self.traffic.peers:
-            return None
-        now = self.traffic.give_way(now_s, here, NO_WAY_POINTS, NO_WAY_POINTS, self.rank_s, None)
-        home = self.home
-        if now is not None and now.refuge is not None:
-            home = home or here
-        elif home is None or now is not None or not self.traffic.is_free(home):
-            return None
-        self.set_out_on_errand(now, home)
-        return home
+    def _give_up_priority(self, now_s: float, pose: Pose2D) -> Tuple[str, ...]:
+        """Give a robot that goes first and makes no progress the lowest priority of all goals."""
+        self._progress.has_moved(now_s, pose, _PROGRESS_M)
+        if self.decision is not None or self.is_yield_manoeuvre:
+            self._progress.restart(now_s)
+        if not self._progress.exceeds(now_s, GIVE_UP_PRIORITY_AFTER_S):
+            return ()
+        self._progress.restart(now_s)
+        self._goal_set_s = now_s
+        return (f"no progress for {GIVE_UP_PRIORITY_AFTER_S:g} s, giving up priority",)
 
-    def is_held_up(self, now_s: float, here: Pose2D) -> bool:
-        """For a command that was slowed down: whether that goes on; then it begins anew."""
-        self._held_up.has_moved(now_s, here, _FARTHER_M)
-        if not self._held_up.exceeds(now_s, REPLAN_AFTER_S):
+    # -- limit ---------------------------------------------------------------------------
+
+    def limit(
+        self, pose: Pose2D, velocity: Twist2D, command: Twist2D, control_period_s: float
+    ) -> LimitedCommand:
+        """Limit a command to the robot's Voronoi cell.
+
+        Args:
+            pose: Pose of the robot in ``map``.
+            velocity: Current velocity in the robot's frame.
+            command: Commanded velocity in the robot's frame.
+            control_period_s: Period of commands; the next one may come later by a latency.
+        """
+        return limit_to_cell(
+            pose,
+            velocity,
+            command,
+            self._tracker.peers,
+            self._tracker.safety_radius_m,
+            control_period_s + LATENCY_S,
+        )
+
+    def is_blocked(self, now_s: float, pose: Pose2D) -> bool:
+        """Return whether limited commands have kept the robot in place; then count anew.
+
+        To be called for each limited command.
+        """
+        self._limited.has_moved(now_s, pose, _PROGRESS_M)
+        if not self._limited.exceeds(now_s, REPLAN_AFTER_S):
             return False
-        self._held_up.restart(now_s)
+        self._limited.restart(now_s)
         return True
 
-    def _take_turns(self, now_s: float, here: Pose2D) -> List[str]:
-        """One that goes first and gets nowhere becomes the last of those under way."""
-        self._progress.has_moved(now_s, here, _FARTHER_M)
-        if self.now is not None or self.is_errand:
-            self._progress.restart(now_s)
-        if not self._progress.exceeds(now_s, TURN_AFTER_S):
-            return []
-        self._progress.restart(now_s)
-        self._since_s = now_s
-        return [f"no way for {TURN_AFTER_S:g} s: lets the others go first"]
 
-
-def _straight_to(goal: Pose2D) -> np.ndarray:
+def _straight_to(goal: Pose2D) -> NDArray[np.float64]:
     return np.array([[goal.x_m, goal.y_m]])

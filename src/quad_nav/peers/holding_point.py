@@ -1,4 +1,4 @@
-"""Where a robot goes that is in another's way: the nearest place that is in nobody's."""
+"""Holding points: where a robot makes room, the nearest place off all paths of its peers."""
 
 from __future__ import annotations
 
@@ -6,80 +6,94 @@ import math
 from typing import Optional, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import INSCRIBED, GridSpec
 from quad_nav.kernels.discs import nearest_cell, raise_discs
-from quad_nav.peers.peer import thinned
+from quad_nav.peers.peer import resample
 
-COMFORTABLE = 128  # who stands where costs are lower has room to turn
+COMFORTABLE = 128  # below this cost a robot has room to turn
 
 
 def find_holding_point(
     spec: GridSpec,
-    costs: np.ndarray,
-    here: Pose2D,
-    ways: Sequence[np.ndarray],
-    others: np.ndarray,
+    costs: NDArray[np.uint8],
+    pose: Pose2D,
+    paths: Sequence[NDArray[np.float64]],
+    peers: NDArray[np.float64],
     min_separation_m: float,
 ) -> Optional[Pose2D]:
-    """The nearest place on the global costmap, uint8[H, W], that is ``min_separation_m`` from all ways.
+    """Find the nearest place that keeps the minimum separation from all paths and peers.
 
-    ``ways`` are float64[n, 2] each, the present positions of those who go included.
-    ``others``, float64[k, 2], are the positions of all peers: they are kept off too and
-    not passed through. None when there is no such place that can be reached.
+    Args:
+        spec: Geometry of the global costmap.
+        costs: Costs of the global costmap, uint8[H, W].
+        pose: Pose of the robot in ``map``.
+        paths: Paths to keep clear, float64[n, 2] each, metres in ``map``, from the present
+            positions of their robots on.
+        peers: Positions of all peers, float64[k, 2], metres in ``map``; the path to the
+            holding point does not pass through them.
+        min_separation_m: Minimum separation of centres.
+
+    Returns:
+        The holding point, facing away from the robot; None if no such place is reachable.
     """
-    start = spec.cell_of(here.x_m, here.y_m)
+    start = spec.cell_of(pose.x_m, pose.y_m)
     if start is None:
         return None
-    unwanted = (costs >= COMFORTABLE).astype(np.uint8)
+    occupied = (costs >= COMFORTABLE).astype(np.uint8)
     grid = (spec.origin_x_m, spec.origin_y_m, spec.resolution_m)
-    raise_discs(unwanted, *grid, others, min_separation_m, 1)
-    for way in ways:
-        raise_discs(unwanted, *grid, thinned(way, 2.0 * spec.resolution_m), min_separation_m, 1)
-    cell_x, cell_y = nearest_cell(
-        _blocked(spec, costs, here, others, min_separation_m), unwanted, *start
-    )
+    raise_discs(occupied, *grid, peers, min_separation_m, 1)
+    for path in paths:
+        raise_discs(occupied, *grid, resample(path, 2.0 * spec.resolution_m), min_separation_m, 1)
+    blocked = _impassable(spec, costs, pose, peers, min_separation_m)
+    cell_x, cell_y = nearest_cell(blocked, occupied, *start)
     if cell_x < 0:
         return None
     x_m, y_m = spec.centre_of(cell_x, cell_y)
-    return Pose2D(x_m, y_m, math.atan2(y_m - here.y_m, x_m - here.x_m))
+    return Pose2D(x_m, y_m, math.atan2(y_m - pose.y_m, x_m - pose.x_m))
 
 
-def can_be_reached(
+def is_reachable(
     spec: GridSpec,
-    costs: np.ndarray,
-    here: Pose2D,
-    place: Pose2D,
-    others: np.ndarray,
+    costs: NDArray[np.uint8],
+    pose: Pose2D,
+    target: Pose2D,
+    peers: NDArray[np.float64],
     min_separation_m: float,
 ) -> bool:
-    """Whether there is a way to a place that passes through no peer."""
-    start, end = spec.cell_of(here.x_m, here.y_m), spec.cell_of(place.x_m, place.y_m)
+    """Return whether a path leads to the target that passes through no peer.
+
+    The arguments are those of ``find_holding_point``.
+    """
+    start, end = spec.cell_of(pose.x_m, pose.y_m), spec.cell_of(target.x_m, target.y_m)
     if start is None or end is None:
         return False
-    unwanted = np.ones(spec.shape, dtype=np.uint8)
-    unwanted[end[1], end[0]] = 0
-    return (
-        nearest_cell(_blocked(spec, costs, here, others, min_separation_m), unwanted, *start)[0]
-        >= 0
-    )
+    occupied = np.ones(spec.shape, dtype=np.uint8)
+    occupied[end[1], end[0]] = 0
+    blocked = _impassable(spec, costs, pose, peers, min_separation_m)
+    return bool(nearest_cell(blocked, occupied, *start)[0] >= 0)
 
 
-def _blocked(
-    spec: GridSpec, costs: np.ndarray, here: Pose2D, others: np.ndarray, min_separation_m: float
-) -> np.ndarray:
-    """Where no way out leads through, uint8[H, W]; it begins outside of every peer's disc."""
-    blocked = (costs >= INSCRIBED).astype(np.uint8)
-    for other in others:
-        away_m = math.hypot(other[0] - here.x_m, other[1] - here.y_m)
+def _impassable(
+    spec: GridSpec,
+    costs: NDArray[np.uint8],
+    pose: Pose2D,
+    peers: NDArray[np.float64],
+    min_separation_m: float,
+) -> NDArray[np.uint8]:
+    """Return the cells that no path may cross, uint8[H, W]; the robot is in none of them."""
+    blocked: NDArray[np.uint8] = (costs >= INSCRIBED).astype(np.uint8)
+    for peer in peers:
+        distance_m = math.hypot(peer[0] - pose.x_m, peer[1] - pose.y_m)
         raise_discs(
             blocked,
             spec.origin_x_m,
             spec.origin_y_m,
             spec.resolution_m,
-            other[None, :],
-            min(min_separation_m, away_m - 2.0 * spec.resolution_m),
+            peer[None, :],
+            min(min_separation_m, distance_m - 2.0 * spec.resolution_m),
             1,
         )
     return blocked

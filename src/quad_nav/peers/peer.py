@@ -1,7 +1,7 @@
-"""The other quadcopters: where they are, how they move and what they are up to.
+"""Peers: state, intention and priority of the other robots.
 
-All positions are in ``map``, the global costmap's frame. A peer says of itself where
-it is going (``Intention``); from that and its velocity follows where it will be.
+All positions are in ``map``, the frame of the global costmap. Each robot tells its peers its
+intention: its priority and the path that it follows.
 """
 
 from __future__ import annotations
@@ -10,40 +10,53 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Twist2D
 
-NO_WAY_POINTS = np.zeros((0, 2))
-IDLE_RANK_S = 4.0e9  # later than any time; a ROS stamp can still hold it
+NO_PATH = np.zeros((0, 2))
+HIGHEST_PRIORITY = 0.0
+IDLE_PRIORITY = -4.0e9  # below that of every goal; a ROS stamp can still hold 4.0e9 s
 _NUMBER_S = 0.01
-_STANDS_MPS = 0.05
-_GOES_ON_S = 5.0
+_STATIONARY_MPS = 0.05
+_EXTRAPOLATION_S = 5.0
 
 
-def rank_of(since_s: float, number: int) -> float:
-    """Who goes first: the lower rank, who has been under way to its goal for longer.
+def priority_of(goal_set_s: float, number: int) -> float:
+    """Return the priority of a robot with a goal; the higher one goes first.
 
-    ``since_s`` is when the goal was set, ``IDLE_RANK_S`` without one. A hundredth of a
-    second for each robot's ``number`` orders those that set out together.
+    The robot with the older goal goes first. A hundredth of a second for each robot number
+    decides between goals that are set together.
+
+    Args:
+        goal_set_s: Time at which the goal was set.
+        number: Number of the robot.
     """
-    return since_s + _NUMBER_S * number
+    return -(goal_set_s + _NUMBER_S * number)
+
+
+def idle_priority(number: int) -> float:
+    """Return the priority of a robot without a goal."""
+    return priority_of(-IDLE_PRIORITY, number)
 
 
 @dataclass(frozen=True)
 class Intention:
-    """What a robot tells its peers.
+    """Message of a robot to its peers.
 
-    ``way`` float64[n, 2] is what is left of its plan, empty when it is to stay where it
-    is; ``rank_s`` as ``rank_of``.
+    Attributes:
+        priority: See ``priority_of``; the higher one goes first.
+        path: float64[n, 2], metres in ``map``: the remaining plan, empty for a robot that
+            stays where it is.
     """
 
-    rank_s: float = IDLE_RANK_S
-    way: np.ndarray = field(default_factory=lambda: NO_WAY_POINTS)
+    priority: float = IDLE_PRIORITY
+    path: NDArray[np.float64] = field(default_factory=lambda: NO_PATH)
 
 
 @dataclass(frozen=True)
 class Peer:
-    """Another robot as it was seen at ``stamp_s``."""
+    """State of another robot at ``stamp_s``; position and velocity in ``map``."""
 
     name: str
     x_m: float
@@ -54,21 +67,22 @@ class Peer:
     intention: Intention = Intention()
 
     @property
-    def position(self) -> np.ndarray:
-        """float64[2]"""
+    def position(self) -> NDArray[np.float64]:
+        """Position in metres, float64[2]."""
         return np.array([self.x_m, self.y_m])
 
     @property
     def speed_mps(self) -> float:
+        """Speed over ground."""
         return math.hypot(self.vx_mps, self.vy_mps)
 
     @property
     def is_parked(self) -> bool:
-        """Whether it means to stay where it is."""
-        return not len(self.intention.way)
+        """True if the peer intends to stay where it is."""
+        return not len(self.intention.path)
 
-    def moved_to(self, now_s: float) -> Peer:
-        """The peer now, if it has kept its velocity."""
+    def extrapolated(self, now_s: float) -> Peer:
+        """Return the peer at another time, moved at its velocity."""
         age_s = now_s - self.stamp_s
         return replace(
             self,
@@ -77,39 +91,42 @@ class Peer:
             stamp_s=now_s,
         )
 
-    def intending(self, intention: Intention) -> Peer:
-        """The same with another intention."""
+    def with_intention(self, intention: Intention) -> Peer:
+        """Return the same peer with another intention."""
         return replace(self, intention=intention)
 
 
 def peer_at(
     name: str, pose: Pose2D, velocity: Twist2D, stamp_s: float, intention: Intention = Intention()
 ) -> Peer:
-    """A peer from its pose in ``map`` and its odometry's velocity, in its own frame."""
+    """Make a peer from its pose in ``map`` and its velocity in its own frame."""
     vx_mps, vy_mps = pose.rotate(velocity.vx_mps, velocity.vy_mps)
-    return Peer(
-        name,
-        pose.x_m,
-        pose.y_m,
-        vx_mps,
-        vy_mps,
-        stamp_s,
-        intention,
-    )
+    return Peer(name, pose.x_m, pose.y_m, vx_mps, vy_mps, stamp_s, intention)
 
 
-def unknown_intention(peer: Peer) -> Intention:
-    """Of one that tells nothing: it goes on as it does, and before everybody else."""
-    if peer.speed_mps < _STANDS_MPS:
+def assumed_intention(peer: Peer) -> Intention:
+    """Return the intention assumed of a peer that sends none.
+
+    A moving peer is expected to fly straight on and to go first; a stationary one is parked.
+    """
+    if peer.speed_mps < _STATIONARY_MPS:
         return Intention()
-    ahead = peer.position + _GOES_ON_S * np.array([peer.vx_mps, peer.vy_mps])
-    return Intention(0.0, np.array([peer.position, ahead]))
+    ahead = peer.position + _EXTRAPOLATION_S * np.array([peer.vx_mps, peer.vy_mps])
+    return Intention(HIGHEST_PRIORITY, np.array([peer.position, ahead]))
 
 
-def thinned(way: np.ndarray, spacing_m: float) -> np.ndarray:
-    """A way, float64[n, 2], with a point about every ``spacing_m`` and both of its ends."""
-    if len(way) < 2:
-        return way
-    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))))
+def resample(path: NDArray[np.float64], spacing_m: float) -> NDArray[np.float64]:
+    """Resample a path with a point about every ``spacing_m``; both ends stay.
+
+    Args:
+        path: float64[n, 2] in metres.
+        spacing_m: Distance of the points along the path.
+
+    Returns:
+        float64[k, 2] in metres, in the same frame.
+    """
+    if len(path) < 2:
+        return path
+    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))
     at = np.linspace(0.0, lengths[-1], 2 + int(lengths[-1] / spacing_m))
-    return np.column_stack((np.interp(at, lengths, way[:, 0]), np.interp(at, lengths, way[:, 1])))
+    return np.column_stack((np.interp(at, lengths, path[:, 0]), np.interp(at, lengths, path[:, 1])))

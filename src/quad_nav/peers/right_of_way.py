@@ -1,13 +1,12 @@
-"""Who goes and who makes room.
+"""Right of way: which robot yields in a conflict, and how.
 
-Two robots that follow their plans come too near to each other: the one of the higher
-rank number (``peers.rank_of``) gives way. It waits where it is, if the other passes it
-there; if not it leaves the other's way. All know all ranks and ranks differ, so of two
-exactly one gives way, and of any number one goes.
+Two robots are in conflict if their predicted positions come nearer to each other than the
+minimum separation. The robot of lower priority yields. It waits where it is if the other can
+pass it there; otherwise it makes room. Every robot knows the priorities of its peers, and
+priorities differ. So of two robots exactly one yields, and of any number one goes on.
 
-Where robots will be is reckoned at an even cruising speed. They turn and slow down
-besides, so two count as meeting when they are at one place within ``EARLIER_LATER_S``
-of each other.
+Positions are predicted at constant cruise speed. Robots also turn and slow down, so two are
+in conflict if they pass the same place within ``TIME_TOLERANCE_S`` of each other.
 """
 
 from __future__ import annotations
@@ -17,102 +16,137 @@ from dataclasses import dataclass
 from typing import Container, Optional, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.kernels.paths import sample_path
 from quad_nav.peers.peer import Peer
 
 HORIZON_S = 7.0
-EARLIER_LATER_S = 1.5
+TIME_TOLERANCE_S = 1.5
 _STEP_S = 0.25
 _TIMES_S = np.arange(0.0, HORIZON_S + 1e-9, _STEP_S)
 _STEPS_APART = np.abs(np.subtract.outer(np.arange(len(_TIMES_S)), np.arange(len(_TIMES_S))))
-_MEETING = _STEPS_APART * _STEP_S <= EARLIER_LATER_S + 1e-9
-_NEARER_M = 0.05  # what counts as coming nearer
-_WHY_IT_STANDS = 2.0  # times min_separation_m: who is farther away cannot be what a peer stands for
+_SIMULTANEOUS = _STEPS_APART * _STEP_S <= TIME_TOLERANCE_S + 1e-9
+_NEARER_M = 0.05  # an approach by less does not count
+_BLOCKING_FACTOR = 2.0  # a robot beyond this times the separation does not block a peer
 
 
-class Manner(enum.Enum):
-    """How a robot gives way."""
+class Yield(enum.Enum):
+    """Ways to yield; the value begins the log line."""
 
-    WAIT = "waits for"
-    LEAVE = "makes room for"
+    WAIT = "waiting for"
+    MAKE_ROOM = "making room for"
 
 
 @dataclass(frozen=True)
 class YieldDecision:
-    """What a robot does for a peer: wait, or go to ``refuge`` first."""
+    """Decision to yield to a peer: wait, or move to ``holding_point`` first.
 
-    to: str
-    manner: Manner
-    refuge: Optional[Pose2D] = None
+    Attributes:
+        peer: Name of the peer that goes first.
+        action: Way to yield.
+        holding_point: Where to make room, in ``map``; None to wait where the robot is.
+    """
+
+    peer: str
+    action: Yield
+    holding_point: Optional[Pose2D] = None
 
     def __str__(self) -> str:
-        where = (
-            f" at ({self.refuge.x_m:.2f}, {self.refuge.y_m:.2f})" if self.refuge is not None else ""
-        )
-        return f"{self.manner.value} {self.to}{where}"
+        text = f"{self.action.value} {self.peer} (higher priority) to pass"
+        if self.holding_point is not None:
+            text += f", at ({self.holding_point.x_m:.2f}, {self.holding_point.y_m:.2f})"
+        return text
 
 
-def gives_way(
-    position: np.ndarray,
-    way: np.ndarray,
-    rank_s: float,
+def find_conflict(
+    position: NDArray[np.float64],
+    path: NDArray[np.float64],
+    priority: float,
     peers: Sequence[Peer],
     min_separation_m: float,
-    speed_mps: float,
-    standing: Container[str] = (),
-) -> Optional[Tuple[Peer, Manner]]:
-    """To whom a robot gives way, and how; None when it goes.
+    cruise_mps: float,
+    stationary: Container[str] = (),
+) -> Optional[Tuple[Peer, Yield]]:
+    """Find the peer of highest priority that the robot has to yield to.
 
-    The robot is at ``position``, float64[2], and follows ``way``, float64[n, 2]; centres
-    are to stay ``min_separation_m`` from each other. Of several peers the first in rank counts.
-    Nobody waits for those ``standing``, by name; but who is near and in their way makes
-    room, for it may be why they stand.
+    A robot does not wait for a stationary peer. It makes room for one if it is near and on
+    its path, because it may be the reason why the peer stands.
+
+    Args:
+        position: Position of the robot, float64[2], metres in ``map``.
+        path: Path of the robot, float64[n, 2], metres in ``map``.
+        priority: Priority of the robot.
+        peers: Peers whose state is fresh.
+        min_separation_m: Minimum separation of two robots' centres.
+        cruise_mps: Speed at which positions are predicted.
+        stationary: Names of the peers that do not move.
+
+    Returns:
+        The peer and how to yield to it, None to go on.
     """
-    own = positions_ahead(position, way, speed_mps, _TIMES_S)
-    for peer in sorted(peers, key=lambda peer: peer.intention.rank_s):
-        if peer.intention.rank_s >= rank_s or peer.is_parked:
+    own = predict_positions(position, path, cruise_mps, _TIMES_S)
+    for peer in sorted(peers, key=lambda peer: -peer.intention.priority):
+        if peer.intention.priority <= priority or peer.is_parked:
             continue
-        stands = peer.name in standing
-        if stands and np.hypot(*(peer.position - position)) > _WHY_IT_STANDS * min_separation_m:
+        stands = peer.name in stationary
+        if stands and np.hypot(*(peer.position - position)) > _BLOCKING_FACTOR * min_separation_m:
             continue
-        theirs = track(peer, speed_mps)
-        if comes_near(position, theirs, min_separation_m):
-            return peer, Manner.LEAVE
-        if not stands and _meet(own, theirs, min_separation_m):
-            return peer, Manner.WAIT
+        theirs = predict_peer(peer, cruise_mps)
+        if approaches(position, theirs, min_separation_m):
+            return peer, Yield.MAKE_ROOM
+        if not stands and _conflict(own, theirs, min_separation_m):
+            return peer, Yield.WAIT
     return None
 
 
-def track(peer: Peer, speed_mps: float, times_s: np.ndarray = _TIMES_S) -> np.ndarray:
-    """Where a peer will be, float64[k, 2]."""
-    return positions_ahead(
-        peer.position, peer.intention.way, max(speed_mps, peer.speed_mps), times_s
+def predict_peer(
+    peer: Peer, cruise_mps: float, times_s: NDArray[np.float64] = _TIMES_S
+) -> NDArray[np.float64]:
+    """Predict the positions of a peer, float64[k, 2], at times from now, float64[k]."""
+    return predict_positions(
+        peer.position, peer.intention.path, max(cruise_mps, peer.speed_mps), times_s
     )
 
 
-def comes_near(position: np.ndarray, theirs: np.ndarray, min_separation_m: float) -> bool:
-    """Whether a track, float64[k, 2], comes nearer to a place than it may."""
-    distances = np.hypot(*(theirs - position).T)
+def predict_positions(
+    start: NDArray[np.float64],
+    path: NDArray[np.float64],
+    speed_mps: float,
+    times_s: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Predict the positions of a robot that follows a path at constant speed.
+
+    The robot moves from ``start`` to the nearest point of the path and along it; it stays at
+    the end.
+
+    Args:
+        start: float64[2], metres in ``map``.
+        path: float64[n, 2], metres in ``map``.
+        speed_mps: Speed along the path.
+        times_s: float64[k], times from now.
+
+    Returns:
+        float64[k, 2], metres in ``map``.
+    """
+    if not len(path):
+        return np.repeat(start[None, :], len(times_s), axis=0)
+    return sample_path(start, path, speed_mps * times_s)
+
+
+def approaches(
+    position: NDArray[np.float64], track: NDArray[np.float64], min_separation_m: float
+) -> bool:
+    """Return whether a track, float64[k, 2], comes nearer to a position than it may."""
+    distances = np.hypot(*(track - position).T)
     return bool(distances.min() < min(min_separation_m, distances[0] - _NEARER_M))
 
 
-def _meet(own: np.ndarray, theirs: np.ndarray, min_separation_m: float) -> bool:
-    """Whether two tracks come nearer than they may, and nearer than they are now."""
+def _conflict(
+    own: NDArray[np.float64], theirs: NDArray[np.float64], min_separation_m: float
+) -> bool:
+    """Return whether two tracks come nearer than they may, and nearer than they are now."""
     distances = np.hypot(*np.moveaxis(own[:, None] - theirs[None], 2, 0))
-    nearest = distances[_MEETING].min()
+    nearest = distances[_SIMULTANEOUS].min()
     return bool(nearest < min(min_separation_m, distances[0, 0] - _NEARER_M))
-
-
-def positions_ahead(
-    start: np.ndarray, way: np.ndarray, speed_mps: float, times_s: np.ndarray
-) -> np.ndarray:
-    """Where a robot will be at times from now, float64[k, 2].
-
-    It goes from ``start``, float64[2], to the nearest point of its ``way``,
-    float64[n, 2], and along it at an even speed; at the end it stays.
-    """
-    if not len(way):
-        return np.repeat(start[None, :], len(times_s), axis=0)
-    return sample_path(start, way, speed_mps * times_s)

@@ -1,48 +1,50 @@
-"""Commands that keep a robot on its own side of each peer.
+"""Limit velocity commands to the robot's buffered Voronoi cell.
 
-Half-way between two robots stands a line. Each keeps its circle, of radius r, and a
-margin on its own side, for as long as a command may last and for the way that it
-takes to stop: its buffered Voronoi cell (D. Zhou, Z. Wang, S. Bandyopadhyay and
-M. Schwager 2017, "Fast, On-line Collision Avoidance for Dynamic Vehicles Using Buffered
-Voronoi Cells"). With n the direction to a peer at distance d, a displacement p is allowed
-if
+The cell is bounded by the perpendicular bisectors between the robot and its peers, each
+shifted towards the robot by its radius plus a margin. With n the direction to a peer at
+distance d, a displacement p stays inside the cell if
 
-    p . n <= d / 2 - r - margin
+    p . n <= d / 2 - radius - margin
 
-If all do so none touch, at any control rate and without agreeing on anything. A
-displacement is the arc that the command flies plus the way that the present velocity
-still carries, ``COASTING_S * v``: a velocity loop of unit gain answers like a lag, and
-after the lag has died away it has covered just that much more.
+A command is safe if the robot stays inside its cell until the command expires, stopping
+distance included. If every robot obeys this, no two collide, whatever their control rates and
+without communication. The displacement is the arc of the command plus the distance
+``COASTING_S * v`` that the present velocity still carries the robot: a velocity loop of unit
+gain responds as a first-order lag, and that is the area under its decay.
 
-Where the arc leaves the cell it is flown more slowly, so that it ends before. The path
-stays the one that the planner has checked. Where nothing of it is left the robot turns
-on the spot, as it was to or else away from the peer: otherwise one that grazes a cell's
-border would stand there for ever. Of two that meet head-on each turns to its right.
+Source: D. Zhou, Z. Wang, S. Bandyopadhyay, M. Schwager, "Fast, On-line Collision Avoidance
+for Dynamic Vehicles Using Buffered Voronoi Cells", RA-L 2(2), 2017, section III.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Sequence
+from typing import Optional, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.peers.peer import Peer
 
 COASTING_S = 0.35
 _PARTS = 20
-_SLOWEST_PART = 0.15  # slower than that is standing
+_MIN_FRACTION = 0.15  # below this part of the command the robot turns in place
 _TURN_RADPS = 0.4
 
 
 @dataclass(frozen=True)
 class LimitedCommand:
-    """A command within the cell; ``by`` names the peer that it was slowed down for."""
+    """A command that keeps the robot inside its cell.
+
+    Attributes:
+        command: The command to publish.
+        limited_by: Name of the peer that limited it, "" if none did.
+    """
 
     command: Twist2D
-    by: str = ""
+    limited_by: str = ""
 
 
 def limit_to_cell(
@@ -53,16 +55,29 @@ def limit_to_cell(
     safety_radius_m: float,
     hold_s: float,
 ) -> LimitedCommand:
-    """The command, slowed down as far as the cell between the peers demands.
+    """Scale a command down so that the robot stays inside its cell.
 
-    ``velocity`` and ``command`` are in the robot's frame; ``safety_radius_m`` is r + margin;
-    ``hold_s`` is how long the command may last.
+    The path (arc) of the command is kept and flown more slowly, as the local planner has
+    checked it. If too little of it is inside the cell, the robot turns in place, away from the
+    nearest peer; otherwise two robots that graze each other's cells would stand for ever.
+
+    Args:
+        pose: Robot pose in ``map``.
+        velocity: Current velocity in the robot's frame.
+        command: Commanded velocity in the robot's frame.
+        peers: Peers whose state is fresh.
+        safety_radius_m: Robot radius plus margin.
+        hold_s: How long the command may stay in force.
+
+    Returns:
+        The limited command, and the peer that limited it, if any.
     """
     if not peers or (command.vx_mps == 0.0 and command.vy_mps == 0.0):
         return LimitedCommand(command)
     coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
     arc = np.column_stack(pose.rotate(*_arc(command, hold_s).T))
-    fraction, nearest = 1.0, None
+    fraction = 1.0
+    nearest: Optional[Peer] = None
     for peer in peers:
         allowed = _allowed_fraction(
             arc, coasting, peer.x_m - pose.x_m, peer.y_m - pose.y_m, safety_radius_m
@@ -71,8 +86,8 @@ def limit_to_cell(
             fraction, nearest = allowed, peer
     if nearest is None:
         return LimitedCommand(command)
-    if fraction < _SLOWEST_PART:
-        return LimitedCommand(_turn_instead(pose, command, nearest), nearest.name)
+    if fraction < _MIN_FRACTION:
+        return LimitedCommand(_turn_in_place(pose, command, nearest), nearest.name)
     return LimitedCommand(
         Twist2D(
             fraction * command.vx_mps, fraction * command.vy_mps, fraction * command.vyaw_radps
@@ -81,8 +96,11 @@ def limit_to_cell(
     )
 
 
-def _turn_instead(pose: Pose2D, command: Twist2D, peer: Peer) -> Twist2D:
-    """The commanded turn, or if that is hardly one, a turn that takes the course off the peer."""
+def _turn_in_place(pose: Pose2D, command: Twist2D, peer: Peer) -> Twist2D:
+    """Return the commanded turn or, if it is slow, a turn of the course away from the peer.
+
+    Of two robots that meet head-on each turns to its right.
+    """
     if abs(command.vyaw_radps) >= _TURN_RADPS:
         return Twist2D(0.0, 0.0, command.vyaw_radps)
     course_rad = pose.yaw_rad + math.atan2(command.vy_mps, command.vx_mps)
@@ -90,29 +108,36 @@ def _turn_instead(pose: Pose2D, command: Twist2D, peer: Peer) -> Twist2D:
     return Twist2D(0.0, 0.0, _TURN_RADPS if bearing_rad < -1e-6 else -_TURN_RADPS)
 
 
-def room_towards(dx_m: float, dy_m: float, coasting: np.ndarray, safety_radius_m: float) -> float:
-    """How far a command may bring the robot nearer to a peer that is (dx, dy) away."""
+def _room_towards(
+    dx_m: float, dy_m: float, coasting: NDArray[np.float64], safety_radius_m: float
+) -> float:
+    """Return how much nearer a command may bring the robot to a peer at offset (dx, dy)."""
     distance_m = math.hypot(dx_m, dy_m)
     if distance_m == 0.0:
         return 0.0
     approach_m = (coasting[0] * dx_m + coasting[1] * dy_m) / distance_m
-    return max(0.5 * distance_m - safety_radius_m - max(approach_m, 0.0), 0.0)
+    return float(max(0.5 * distance_m - safety_radius_m - max(approach_m, 0.0), 0.0))
 
 
 def _allowed_fraction(
-    arc: np.ndarray, coasting: np.ndarray, dx_m: float, dy_m: float, safety_radius_m: float
+    arc: NDArray[np.float64],
+    coasting: NDArray[np.float64],
+    dx_m: float,
+    dy_m: float,
+    safety_radius_m: float,
 ) -> float:
+    """Return the part of the arc, 0 to 1, that is inside the half-plane of one peer."""
     distance_m = math.hypot(dx_m, dy_m)
     if distance_m == 0.0:
         return 0.0
-    room_m = room_towards(dx_m, dy_m, coasting, safety_radius_m)
+    room_m = _room_towards(dx_m, dy_m, coasting, safety_radius_m)
     towards_m = (arc[:, 0] * dx_m + arc[:, 1] * dy_m) / distance_m
     outside = towards_m > room_m + 1e-9
     return float(np.argmax(outside)) / _PARTS if outside.any() else 1.0
 
 
-def _arc(command: Twist2D, hold_s: float) -> np.ndarray:
-    """Displacements in the robot's frame after 1, 2, ... parts of the time, float64[n, 2]."""
+def _arc(command: Twist2D, hold_s: float) -> NDArray[np.float64]:
+    """Return displacements in the robot's frame at equal steps of time, float64[n, 2]."""
     times = hold_s * np.arange(1, _PARTS + 1) / _PARTS
     turns = command.vyaw_radps * times
     if abs(command.vyaw_radps) < 1e-6:

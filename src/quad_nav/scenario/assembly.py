@@ -1,4 +1,4 @@
-"""A navigator made from a configuration, and changed by another one."""
+"""Assembly: a navigator made from a configuration, and changed by another one."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any, Callable, Dict, Optional
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.config import Configuration
 from quad_nav.config.plugins import Plugin
@@ -22,6 +23,7 @@ from quad_nav.costmap.peer_layer import PeerLayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
+from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.carrot import Carrot, CarrotParams
 from quad_nav.plan.global_planner import SearchPlanner, SearchPlannerParams
 from quad_nav.plan.navfn import Navfn, NavfnParams
@@ -35,107 +37,111 @@ from quad_nav.recovery import (
     Rotate,
 )
 
-# The planner that each dataclass of parameters is for.
-GLOBAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray], GlobalPlanner]] = {
+# The planner that each dataclass of parameters is for; both take the footprint, float64[n, 2].
+GLOBAL_PLANNERS: Dict[type, Callable[[Any, NDArray[np.float64]], GlobalPlanner]] = {
     NavfnParams: lambda params, footprint: Navfn(params),
     SearchPlannerParams: lambda params, footprint: SearchPlanner(params),
     CarrotParams: Carrot,
 }
-LOCAL_PLANNERS: Dict[type, Callable[[Any, np.ndarray, float], LocalPlanner]] = {
+LOCAL_PLANNERS: Dict[type, Callable[[Any, NDArray[np.float64], float], LocalPlanner]] = {
     TrajectoryPlannerParams: TrajectoryPlanner,
     DwaParams: DwaPlanner,
 }
 
-
-_PEERS = ("peer_layer", PeerLayerParams())
+_PEER_LAYER = ("peer_layer", PeerLayerParams())
 
 
 def build_navigator(configuration: Configuration, number: Optional[int] = None) -> Navigator:
-    """The navigator that a configuration describes, standing idle.
+    """Build the idle navigator that a configuration describes.
 
-    ``number`` is the robot's among its peers if it is not the configuration's ``robot``.
+    Args:
+        configuration: The configuration.
+        number: Number of the robot among its peers, by default the configuration's ``robot``.
     """
     global_costmap = LayeredCostmap(_global_costmap(configuration))
     local_costmap = LayeredCostmap(_local_costmap(configuration))
-    planner = _global_planner(configuration.global_planner, global_costmap.footprint)
-    controller = _local_planner(
-        configuration.local_planner,
-        local_costmap.footprint,
-        configuration.local_planner_period_s,
-    )
-    recoveries = [
-        NamedRecovery(name, _recovery(params)) for name, params in configuration.recoveries
-    ]
     return Navigator(
         configuration.navigator,
         global_costmap,
         local_costmap,
-        planner,
-        controller,
-        recoveries,
-        configuration.peers,
-        configuration.robot if number is None else number,
+        _global_planner(configuration.global_planner, global_costmap.footprint),
+        _local_planner(
+            configuration.local_planner,
+            local_costmap.footprint,
+            configuration.local_planner_period_s,
+        ),
+        [NamedRecovery(name, _recovery(params)) for name, params in configuration.recoveries],
+        PeerCoordinator(
+            configuration.peers,
+            global_costmap,
+            local_costmap,
+            configuration.robot if number is None else number,
+        ),
     )
 
 
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
-    """Takes over every parameter that may change in flight; plan and goal stay."""
+    """Change every parameter that may change in flight; plan and goal stay."""
     footprint = navigator.global_costmap.footprint
-    navigator.params = configuration.navigator
-    navigator.peer_params = configuration.peers
+    navigator.set_params(configuration.navigator)
+    navigator.peers.params = configuration.peers
     navigator.global_costmap.reconfigure(_global_costmap(configuration))
     navigator.local_costmap.reconfigure(_local_costmap(configuration))
     new_footprint = navigator.global_costmap.footprint
-    # A user's planner has no parameters that change, and may have learnt something.
+    # A user's planner has no parameters that change, and may hold a state of its own.
     if not isinstance(configuration.global_planner, Plugin) or not np.array_equal(
         footprint, new_footprint
     ):
-        navigator.planner = _global_planner(configuration.global_planner, new_footprint)
+        navigator.set_planner(_global_planner(configuration.global_planner, new_footprint))
     if not isinstance(configuration.local_planner, Plugin):
         navigator.set_controller_params(configuration.local_planner)
     navigator.controller.set_footprint(navigator.local_costmap.footprint)
 
 
-def _global_planner(params: Any, footprint: np.ndarray) -> GlobalPlanner:
+def _global_planner(params: Any, footprint: NDArray[np.float64]) -> GlobalPlanner:
     if isinstance(params, Plugin):
-        return params.make(footprint)
+        planner: GlobalPlanner = params.make(footprint)
+        return planner
     return GLOBAL_PLANNERS[type(params)](params, footprint)
 
 
-def _local_planner(params: Any, footprint: np.ndarray, control_period_s: float) -> LocalPlanner:
+def _local_planner(
+    params: Any, footprint: NDArray[np.float64], control_period_s: float
+) -> LocalPlanner:
     if isinstance(params, Plugin):
-        return params.make(footprint, control_period_s)
+        planner: LocalPlanner = params.make(footprint, control_period_s)
+        return planner
     return LOCAL_PLANNERS[type(params)](params, footprint, control_period_s)
 
 
 def _global_costmap(configuration: Configuration) -> CostmapParams:
-    """Peers are no obstacles there, so their layer comes after the one that inflates."""
-    costmap = _watched(configuration, configuration.global_costmap)
-    return replace(costmap, layers=(*costmap.layers, _PEERS))
+    """Add the peer layer after the inflation layer: peers are no obstacles in this costmap."""
+    costmap = _with_sensor_timeout(configuration, configuration.global_costmap)
+    return replace(costmap, layers=(*costmap.layers, _PEER_LAYER))
 
 
 def _local_costmap(configuration: Configuration) -> CostmapParams:
-    """Peers are obstacles there, so their layer comes before the first that inflates."""
-    costmap = _watched(configuration, configuration.local_costmap)
+    """Add the peer layer before the inflation layer: peers are obstacles in this costmap."""
+    costmap = _with_sensor_timeout(configuration, configuration.local_costmap)
     kinds = [isinstance(layer, InflationLayerParams) for _, layer in costmap.layers]
     place = kinds.index(True) if any(kinds) else len(kinds)
-    return replace(costmap, layers=(*costmap.layers[:place], _PEERS, *costmap.layers[place:]))
+    return replace(costmap, layers=(*costmap.layers[:place], _PEER_LAYER, *costmap.layers[place:]))
 
 
-def _watched(configuration: Configuration, costmap: CostmapParams) -> CostmapParams:
-    """The costmap with no sensor trusted for longer than ``sensor_timeout_s``.
+def _with_sensor_timeout(configuration: Configuration, costmap: CostmapParams) -> CostmapParams:
+    """Limit the period of every sensor to the sensor timeout.
 
-    ``expected_update_rate`` is a period in seconds, and people write 21.0 into it
-    for a LIDAR of 20 Hz; the robot would fly blind for 21 s.
+    ``expected_update_rate`` is a period in seconds. Many configurations set 21.0 for a LIDAR of
+    20 Hz; the robot would fly 21 s without sensor data.
     """
     limit_s = configuration.navigator.sensor_timeout_s
     if limit_s <= 0.0:
         return costmap
-    layers = tuple((name, _watched_layer(layer, limit_s)) for name, layer in costmap.layers)
+    layers = tuple((name, _layer_with_timeout(layer, limit_s)) for name, layer in costmap.layers)
     return replace(costmap, layers=layers)
 
 
-def _watched_layer(layer: LayerParams, limit_s: float) -> LayerParams:
+def _layer_with_timeout(layer: LayerParams, limit_s: float) -> LayerParams:
     if not isinstance(layer, ObstacleLayerParams):
         return layer
     sources = tuple(
@@ -150,7 +156,8 @@ def _watched_layer(layer: LayerParams, limit_s: float) -> LayerParams:
 
 def _recovery(params: RecoveryParams) -> Recovery:
     if isinstance(params, Plugin):
-        return params.make()
+        recovery: Recovery = params.make()
+        return recovery
     if isinstance(params, ClearCostmapParams):
         return ClearCostmap(params)
     if isinstance(params, MoveSlowAndClearParams):

@@ -18,7 +18,7 @@ from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
-from quad_nav.peers.peer import Intention, Peer
+from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
 from quad_nav.scenario.assembly import build_navigator
 
 _AHEAD_M = 1.0
@@ -70,8 +70,9 @@ def warm_up(configuration: config.Configuration) -> None:
 
 def _coming(here: Pose2D, now_s: float) -> Peer:
     """A peer that goes first and for which the robot has to make room."""
-    way = np.array([[here.x_m + 2.0, here.y_m], [here.x_m, here.y_m]])
-    return Peer("peer", here.x_m + 2.0, here.y_m, 0.0, 0.0, now_s, Intention(-1.0, way))
+    path = np.array([[here.x_m + 2.0, here.y_m], [here.x_m, here.y_m]])
+    intention = Intention(HIGHEST_PRIORITY + 1.0, path)
+    return Peer("peer", here.x_m + 2.0, here.y_m, 0.0, 0.0, now_s, intention)
 
 
 def _look_around(navigator: Navigator, here: Pose2D) -> None:

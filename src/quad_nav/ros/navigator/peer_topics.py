@@ -2,7 +2,8 @@
 
 `/odom{j}` and tf carry the pose of robot j. `/move_base{j}/intention` is a `nav_msgs/Path` with
 its intention: `header.stamp` is the time of publication, the poses are the path, and the stamps
-of the poses hold the rank (`peers.rank_of`). An empty path means that the robot stays where it is.
+of the poses hold the negated priority (`peers.peer.priority_of`), the time at which the goal was
+set. An empty path means that the robot stays where it is.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import rospy
 from nav_msgs.msg import Odometry, Path
 
 from quad_nav.geometry import Pose2D
-from quad_nav.peers.peer import IDLE_RANK_S, Intention, Peer, peer_at, rank_of, unknown_intention
+from quad_nav.peers.peer import Intention, Peer, assumed_intention, idle_priority, peer_at
 from quad_nav.ros.common.conversions import odometry_from_message, time_message
 from quad_nav.ros.common.nav_messages import path_message
 from quad_nav.ros.common.node_tools import Names
@@ -87,7 +88,7 @@ class PeerTopics:
                 continue
             intention = self._intention(number, peer, now_s)
             if intention is not peer.intention:
-                peer = peer.intending(intention)
+                peer = peer.with_intention(intention)
             self._peers[number] = odometry, peer
 
     def near(self, number: int, here: Optional[Pose2D], reach_m: float) -> List[Peer]:
@@ -126,10 +127,10 @@ class PeerTopics:
 
     def _intention(self, number: int, peer: Peer, now_s: float) -> Intention:
         if number not in self._intentions:
-            return unknown_intention(peer)
+            return assumed_intention(peer)
         sent_s, intention = self._intentions[number]
         if now_s - sent_s > INTENTION_VALID_S:
-            return Intention(rank_of(IDLE_RANK_S, number))
+            return Intention(idle_priority(number))
         return intention
 
     def publish(self, number: int, intention: Intention, now_s: float) -> None:
@@ -140,8 +141,8 @@ class PeerTopics:
         published_s, published = self._published.get(number, (0.0, None))
         is_same = (
             published is not None
-            and published.way is intention.way
-            and published.rank_s == intention.rank_s
+            and published.path is intention.path
+            and published.priority == intention.priority
         )
         if is_same and 0.0 <= now_s - published_s < REPEAT_S:
             return
@@ -151,8 +152,8 @@ class PeerTopics:
 
 def intention_message(intention: Intention, frame: str, now_s: float) -> Path:
     """Convert an intention in `frame` to a message."""
-    way = np.column_stack((intention.way, np.zeros(len(intention.way))))
-    message = path_message(way, frame, time_message(intention.rank_s))
+    path = np.column_stack((intention.path, np.zeros(len(intention.path))))
+    message = path_message(path, frame, time_message(-intention.priority))
     message.header.stamp = time_message(now_s)
     return message
 
@@ -160,10 +161,10 @@ def intention_message(intention: Intention, frame: str, now_s: float) -> Path:
 def intention_from_message(message: Path, number: int) -> Intention:
     """Convert the message of robot `number`; an invalid one counts as "stays where it is"."""
     if not message.poses:
-        return Intention(rank_of(IDLE_RANK_S, number))
-    way = np.array([(p.pose.position.x, p.pose.position.y) for p in message.poses[: MAX_POSES + 1]])
-    problem = path_problem(way)
+        return Intention(idle_priority(number))
+    path = np.array([(p.pose.position.x, p.pose.position.y) for p in message.poses[: MAX_POSES + 1]])
+    problem = path_problem(path)
     if problem:
         rospy.logwarn_throttle(5.0, f"quad{number}: intention dropped: {problem}")
-        return Intention(rank_of(IDLE_RANK_S, number))
-    return Intention(message.poses[0].header.stamp.to_sec(), way)
+        return Intention(idle_priority(number))
+    return Intention(-message.poses[0].header.stamp.to_sec(), path)

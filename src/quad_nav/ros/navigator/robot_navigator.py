@@ -159,11 +159,11 @@ class RobotNavigator:
         for sensor in self._sensors:
             sensor.deliver(self._transforms)
         self._goals.poll(navigator, now_s)
-        self._peers.publish(self.number, navigator.intention, now_s)
+        self._peers.publish(self.number, navigator.peers.intention, now_s)
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
             return
         in_global, located = self._locate(now_s)
-        peers = self._peers.near(self.number, located.in_global, navigator.peer_reach_m)
+        peers = self._peers.near(self.number, located.in_global, navigator.peers.reach_m)
         tick = navigator.tick(now_s, located, self._velocity, peers)
         self.health.expected_hz = navigator.params.controller_frequency_hz
         self.health.update(tick, located)

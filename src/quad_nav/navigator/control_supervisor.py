@@ -1,0 +1,200 @@
+"""Control supervisor: runs the local planner and detects a robot that makes no progress.
+
+Upstream move_base accepts in-place turns as valid control for ever. Here a robot that stays
+within a small distance for too long first gets a new plan and less weight of obstacle costs,
+then the recovery behaviours.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Any, Optional
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.control.controller import LocalPlanner
+from quad_nav.control.escape import escape
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.errors import ControlError
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.navigator.parameter_limiter import ParameterLimiter
+from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.recovery import ParameterLimit
+from quad_nav.timing import StallTimer
+
+
+@dataclass(frozen=True)
+class ProgressParams:
+    """Parameters of the progress checker.
+
+    Attributes:
+        timeout_s: Seconds within ``distance_m`` until a new plan, and as many again until
+            the recoveries; 0 disables the checker, as upstream.
+        distance_m: A robot that has moved so far makes progress.
+        stuck_cost_factor: Factor of the obstacle weight from the new plan on, until the
+            robot has moved by the oscillation distance; 1 keeps the weight.
+    """
+
+    timeout_s: float = 10.0
+    distance_m: float = 0.1
+    stuck_cost_factor: float = 0.1
+
+
+class StuckAction(enum.Enum):
+    """Reaction to missing progress."""
+
+    NONE = "none"
+    REPLAN = "replan"
+    RECOVER = "recover"
+
+
+class ProgressChecker:
+    """Measures how long a robot has made no progress."""
+
+    def __init__(self) -> None:
+        """Create a checker that does not run yet."""
+        self._stall_timer = StallTimer()
+        self._has_replanned = False
+
+    def restart(self, now_s: float) -> None:
+        """Set the elapsed time to zero."""
+        self._stall_timer.restart(now_s)
+
+    def reset(self, now_s: float) -> None:
+        """Set the elapsed time to zero and start with a new plan again."""
+        self.restart(now_s)
+        self._has_replanned = False
+
+    def check(self, now_s: float, pose: Pose2D, params: ProgressParams) -> StuckAction:
+        """Return the reaction that is due; the time counts anew after each."""
+        if self._stall_timer.has_moved(now_s, pose, params.distance_m):
+            self._has_replanned = False
+        if not self._stall_timer.exceeds(now_s, params.timeout_s):
+            return StuckAction.NONE
+        self._stall_timer.restart(now_s)
+        if self._has_replanned:
+            return StuckAction.RECOVER
+        self._has_replanned = True
+        return StuckAction.REPLAN
+
+
+def relaxed_obstacle_weight(
+    params: Any, factor: float, distance_m: float
+) -> Optional[ParameterLimit]:
+    """Return a limit that relaxes the obstacle weight of a local planner.
+
+    A robot that spins in place has usually found that obstacle costs outweigh all progress.
+    Trajectories that collide stay illegal.
+
+    Args:
+        params: Parameters of the local planner.
+        factor: Factor of ``occdist_scale``.
+        distance_m: The limit ends when the robot has moved so far.
+
+    Returns:
+        The limit; None for a factor of 1 or a planner without ``occdist_scale``.
+    """
+    weight = getattr(params, "occdist_scale", None)
+    if weight is None or factor >= 1.0:
+        return None
+    return ParameterLimit((("occdist_scale", factor * weight),), distance_m)
+
+
+class ControlSupervisor:
+    """Runs the local planner of one robot.
+
+    Attributes:
+        limiter: Limits of the planner's parameters, from recoveries and stalls.
+    """
+
+    def __init__(self, controller: LocalPlanner) -> None:
+        """Supervise a local planner that has no plan yet."""
+        self.limiter = ParameterLimiter(controller)
+        self._controller = controller
+        self._last_valid_s = -math.inf
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all progress, for another goal."""
+        self._oscillation = StallTimer()
+        self._progress = ProgressChecker()
+
+    def start(self, now_s: float) -> None:
+        """Count the patience from now, for another goal."""
+        self._last_valid_s = now_s
+
+    def restart_timers(self, now_s: float) -> None:
+        """Restart all stall timers of a robot that has to stand, for a peer or without data."""
+        self._progress.restart(now_s)
+        self._oscillation.restart(now_s)
+        self._last_valid_s = now_s
+
+    def end_recovery(self, now_s: float) -> None:
+        """Restart the stall timers after a recovery behaviour."""
+        self._oscillation.restart(now_s)
+        self._progress.reset(now_s)
+
+    def track(self, now_s: float, pose: Pose2D, oscillation_distance_m: float) -> bool:
+        """Update limits and timers by the robot's pose; return whether it does not oscillate."""
+        self.limiter.track(pose)
+        return self._oscillation.has_moved(now_s, pose, oscillation_distance_m)
+
+    def set_plan(self, plan: NDArray[np.float64]) -> None:
+        """Give the local planner a plan, float64[n, 3] of (x_m, y_m, yaw_rad)."""
+        self._controller.set_plan(plan)
+
+    def is_goal_reached(self) -> bool:
+        """Return whether the robot is at the end of its plan."""
+        return self._controller.is_goal_reached()
+
+    def is_oscillating(self, now_s: float, timeout_s: float) -> bool:
+        """Return whether the robot has stayed near one place for too long; 0 disables it."""
+        return self._oscillation.exceeds(now_s, timeout_s)
+
+    def check_progress(
+        self, tick: Tick, pose: Pose2D, params: ProgressParams, oscillation_distance_m: float
+    ) -> StuckAction:
+        """Check the progress; warn and relax the obstacle weight of a robot without it."""
+        action = self._progress.check(tick.now_s, pose, params)
+        if action is StuckAction.NONE:
+            return action
+        stall = f"no progress for {params.timeout_s:g} s at ({pose.x_m:.2f}, {pose.y_m:.2f})"
+        if action is StuckAction.RECOVER:
+            tick.warnings.append(f"{stall} after replanning, starting recoveries")
+            return action
+        tick.warnings.append(f"{stall}, replanning")
+        limit = relaxed_obstacle_weight(
+            self.limiter.usual, params.stuck_cost_factor, oscillation_distance_m
+        )
+        if limit is not None:
+            self.limiter.impose(limit, pose)
+        return action
+
+    def compute_velocity(
+        self, tick: Tick, costmap: LayeredCostmap, poses: RobotPoses, velocity: Twist2D
+    ) -> bool:
+        """Compute a command; return False and warn if the local planner has none."""
+        local_from_global = poses.local_from_global
+        assert poses.in_local is not None and local_from_global is not None
+        try:
+            tick.control = self._controller.compute_velocity(
+                costmap.spec, costmap.costs, poses.in_local, velocity, local_from_global
+            )
+        except ControlError as error:
+            tick.warnings.append(str(error))
+            return False
+        tick.command = tick.control.command
+        self._last_valid_s = tick.now_s
+        return True
+
+    def is_patience_exhausted(self, now_s: float, patience_s: float) -> bool:
+        """Return whether the local planner has had no command for too long."""
+        return now_s > self._last_valid_s + patience_s
+
+
+def escape_command(costmap: LayeredCostmap, pose: Pose2D) -> Twist2D:
+    """Return the command that leads a robot in collision to lower costs, else a stop."""
+    return escape(costmap.spec, costmap.costs, costmap.footprint, pose) or Twist2D()

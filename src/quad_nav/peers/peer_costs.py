@@ -1,0 +1,98 @@
+"""Peers in the costmaps: areas of cost around them, and no obstacles from their LIDAR points.
+
+In the global costmap, places near a stationary peer and along the path of a peer of higher
+priority cost more, so plans avoid them where there is room. In the local costmap, stationary
+peers are obstacles. Obstacle layers ignore LIDAR points on known peers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import List
+
+import numpy as np
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
+from quad_nav.geometry import Pose2D
+from quad_nav.grid import LETHAL
+from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
+from quad_nav.peers.right_of_way import HORIZON_S, TIME_TOLERANCE_S, predict_peer
+
+_LIDAR_TOLERANCE_M = 0.15  # points so far outside of a peer's circle still belong to it
+_OUTSIDE_M = 0.05
+_STATIONARY_COST, _PATH_COST = 120, 100
+_PATH_TIMES_S = np.arange(0.0, HORIZON_S + TIME_TOLERANCE_S, 0.25)
+
+
+class PeerCosts:
+    """Writes the tracked peers to the layers of a robot's two costmaps."""
+
+    def __init__(
+        self, tracker: PeerTracker, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap
+    ) -> None:
+        """Write to the peer layers and obstacle layers of both costmaps."""
+        self._tracker = tracker
+        self._global, self._local = global_costmap, local_costmap
+
+    def update(
+        self, now_s: float, pose: Pose2D, local_from_global: Pose2D, priority: float
+    ) -> None:
+        """Update the layers; they take effect with the costmaps' next update.
+
+        Args:
+            now_s: Time of the update.
+            pose: Pose of the robot in ``map``.
+            local_from_global: Transform from ``map`` to the frame of the local costmap.
+            priority: Priority of the robot.
+        """
+        peers = self._tracker.peers
+        positions = np.array([peer.position for peer in peers]).reshape(-1, 2)
+        newcomers = [k for k, peer in enumerate(peers) if peer.name in self._tracker.newcomers]
+        self._tracker.newcomers = []
+        radius_m = self._tracker.radius_m + _LIDAR_TOLERANCE_M
+        for costmap, points, areas in (
+            (self._global, positions, self._areas(now_s, priority)),
+            (
+                self._local,
+                local_from_global.transform_points(positions),
+                self._obstacles(now_s, pose, local_from_global),
+            ),
+        ):
+            for layer in costmap.layers.values():
+                if isinstance(layer, PeerLayer):
+                    layer.see(areas)
+                elif isinstance(layer, ObstacleLayer):
+                    layer.left_out = np.column_stack((points, np.full(len(points), radius_m)))
+                    for x_m, y_m in points[newcomers]:  # marked as obstacles until now
+                        layer.free_square(float(x_m), float(y_m), 2.0 * radius_m)
+
+    def _areas(self, now_s: float, priority: float) -> List[PeerArea]:
+        """Return the areas of the global costmap: stationary peers, and paths that go first."""
+        tracker = self._tracker
+        radius_m = tracker.min_separation_m + TOLERANCE_M
+        areas: List[PeerArea] = []
+        for peer in tracker.peers:
+            if tracker.is_stationary(peer, now_s):
+                areas.append(PeerArea(peer.position[None, :], radius_m, _STATIONARY_COST))
+            elif peer.intention.priority > priority:
+                path = predict_peer(peer, tracker.cruise_mps, _PATH_TIMES_S)
+                areas.append(PeerArea(path, radius_m, _PATH_COST))
+        return areas
+
+    def _obstacles(self, now_s: float, pose: Pose2D, local_from_global: Pose2D) -> List[PeerArea]:
+        """Return the obstacles of the local costmap: stationary peers with their safety radius.
+
+        No area contains the robot itself, because then no trajectory would be legal.
+        """
+        tracker = self._tracker
+        obstacles = []
+        for peer in tracker.peers:
+            distance_m = math.hypot(peer.x_m - pose.x_m, peer.y_m - pose.y_m)
+            radius_m = min(2.0 * tracker.safety_radius_m, distance_m - _OUTSIDE_M)
+            radius_m = radius_m - tracker.radius_m
+            if tracker.is_stationary(peer, now_s) and radius_m > 0.0:
+                position = local_from_global.transform_points(peer.position[None, :])
+                obstacles.append(PeerArea(position, radius_m, LETHAL))
+        return obstacles

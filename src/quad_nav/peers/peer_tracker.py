@@ -1,0 +1,144 @@
+"""Peer tracker: the peers around one robot whose state is fresh, and their motion."""
+
+from __future__ import annotations
+
+import math
+from typing import Dict, List, Optional, Sequence
+
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.geometry import Pose2D
+from quad_nav.peers.peer import Peer
+from quad_nav.peers.right_of_way import HORIZON_S
+from quad_nav.timing import StallTimer
+
+CRUISE_MPS = 0.3  # of a robot whose local planner has no max_vel_x
+STATIONARY_AFTER_S = 8.0  # a peer that stays in place for so long counts as stationary
+TOLERANCE_M = 0.1  # added to distances that a robot can choose
+_MOVED_M = 0.1
+
+
+class PeerTracker:
+    """Tracks the peers around one robot.
+
+    Attributes:
+        peers: Peers within reach whose state is fresh, extrapolated to now.
+        newcomers: Names of peers that came into reach and are not yet in the costmaps.
+        cruise_mps: Speed at which robots are expected to fly.
+        margin_m: Distance from footprint to bisector; 0 until a peer is observed.
+    """
+
+    def __init__(self, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap) -> None:
+        """Create a tracker without peers.
+
+        Args:
+            global_costmap: Costmap in ``map``; its obstacle layers extend the reach.
+            local_costmap: Costmap with the footprint of the robot; extends the reach as well.
+        """
+        self._global, self._local = global_costmap, local_costmap
+        self.cruise_mps = CRUISE_MPS
+        self.margin_m = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all peers, after a jump of the clock."""
+        self.peers: List[Peer] = []
+        self.newcomers: List[str] = []
+        self._lost: List[str] = []
+        self._stall_timers: Dict[str, StallTimer] = {}
+
+    def observe(
+        self,
+        now_s: float,
+        pose: Optional[Pose2D],
+        peers: Sequence[Peer],
+        margin_m: float,
+        timeout_s: float,
+    ) -> List[str]:
+        """Update the peers.
+
+        Args:
+            now_s: Time of the update.
+            pose: Pose of the robot in ``map``, None if unknown.
+            peers: All peers with a known pose, however old.
+            margin_m: Distance from footprint to bisector.
+            timeout_s: Age from which a state is ignored.
+
+        Returns:
+            Messages about peers that were lost or came back.
+        """
+        if not peers and not self.peers and not self._lost:
+            return []
+        if pose is None:
+            peers = ()
+        fresh = [peer for peer in peers if abs(now_s - peer.stamp_s) <= timeout_s]
+        lost = [peer.name for peer in peers if abs(now_s - peer.stamp_s) > timeout_s]
+        messages = [
+            f"no data from {name} for {timeout_s:g} s, avoiding it by LIDAR only"
+            for name in lost
+            if name not in self._lost
+        ]
+        names = {peer.name for peer in fresh}
+        messages += [f"receiving data from {name} again" for name in self._lost if name in names]
+        self._lost = lost
+        self.margin_m = margin_m
+        reach_m = self.reach_m
+        self.peers = [
+            peer.extrapolated(now_s)
+            for peer in fresh
+            if pose is not None and math.hypot(peer.x_m - pose.x_m, peer.y_m - pose.y_m) < reach_m
+        ]
+        self._update_stall_timers(now_s)
+        return messages
+
+    def _update_stall_timers(self, now_s: float) -> None:
+        self.newcomers += [p.name for p in self.peers if p.name not in self._stall_timers]
+        self._stall_timers = {
+            peer.name: self._stall_timers.get(peer.name, StallTimer()) for peer in self.peers
+        }
+        for peer in self.peers:
+            self._stall_timers[peer.name].has_moved(now_s, Pose2D(peer.x_m, peer.y_m), _MOVED_M)
+
+    def is_stationary(self, peer: Peer, now_s: float) -> bool:
+        """Return whether a peer stays: it intends to, or it has not moved for long."""
+        return peer.is_parked or self._stall_timers[peer.name].exceeds(now_s, STATIONARY_AFTER_S)
+
+    @property
+    def radius_m(self) -> float:
+        """Circumscribed radius of the footprint."""
+        return self._local.circumscribed_radius_m
+
+    @property
+    def safety_radius_m(self) -> float:
+        """Robot radius plus margin."""
+        return self.radius_m + self.margin_m
+
+    @property
+    def min_separation_m(self) -> float:
+        """Minimum separation of two robots' centres where a robot can choose."""
+        return 2.0 * self.safety_radius_m + TOLERANCE_M
+
+    @property
+    def reach_m(self) -> float:
+        """Distance up to which a peer matters: to meet it, or to see it by LIDAR."""
+        meeting_m = 2.0 * (self.cruise_mps * HORIZON_S + self.min_separation_m)
+        return max(meeting_m, self._obstacle_range_m() + self.min_separation_m)
+
+    def _obstacle_range_m(self) -> float:
+        """Return the largest range at which an obstacle layer marks points."""
+        layers = [
+            layer.params
+            for costmap in (self._global, self._local)
+            for layer in costmap.layers.values()
+            if isinstance(layer, ObstacleLayer)
+        ]
+        return max(
+            (
+                layer.obstacle_range_m
+                if source.obstacle_range_m is None
+                else source.obstacle_range_m
+                for layer in layers
+                for source in layer.sources
+            ),
+            default=0.0,
+        )
