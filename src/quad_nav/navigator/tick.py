@@ -15,6 +15,9 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.peers.right_of_way import YieldDecision
 
 
+STOPPING = "stopping: "  # begins the warnings of a robot that stops for lack of data
+
+
 class State(enum.Enum):
     """States of move_base."""
 

@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import Dict, Mapping, Optional, Sequence
 
-from quad_nav.navigator.tick import State
+from quad_nav.navigator.tick import STOPPING, State
 
 SLOW_BELOW = 0.8
 """A second is slow if the control rate is below this part of the configured one."""
@@ -144,7 +144,7 @@ def control_health(node: str, robot: str, control: Control) -> Health:
         level, message = Level.WARN, f"{message}: recovery behaviour active"
     if control.fault:
         level, message = Level.WARN, f"{control.state.value}: {control.fault}"
-        if control.fault.startswith("stopped"):
+        if control.fault.startswith(STOPPING):
             level = Level.ERROR
     return Health(
         f"{node}: control",
