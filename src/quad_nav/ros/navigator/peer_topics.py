@@ -162,7 +162,9 @@ def intention_from_message(message: Path, number: int) -> Intention:
     """Convert the message of robot `number`; an invalid one counts as "stays where it is"."""
     if not message.poses:
         return Intention(idle_priority(number))
-    path = np.array([(p.pose.position.x, p.pose.position.y) for p in message.poses[: MAX_POSES + 1]])
+    path = np.array(
+        [(p.pose.position.x, p.pose.position.y) for p in message.poses[: MAX_POSES + 1]]
+    )
     problem = path_problem(path)
     if problem:
         rospy.logwarn_throttle(5.0, f"quad{number}: intention dropped: {problem}")
