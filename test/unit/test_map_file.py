@@ -199,7 +199,7 @@ def test_all_faults_of_the_yaml_are_listed(tmp_path):
 @pytest.mark.parametrize(
     "pixels, problem",
     [
-        (b"GIF89a", "m.pgm: is no PGM or PNG image"),
+        (b"GIF89a", "m.pgm: is not a PGM or PNG image"),
         (b"P5 4 4 255\n12", "m.pgm: cannot be read: "),
         (b"P5 12000 10000 255\n", "m.pgm: is 12000 x 10000 pixels, expected 1 to 1e+08 pixels"),
         (b"P5 100000 100000 255\n", "m.pgm: cannot be read: Image size (10000000000 pixels)"),
@@ -213,7 +213,7 @@ def test_bad_images(tmp_path, pixels, problem):
 def test_keys_that_map_server_does_not_read_are_said(tmp_path):
     path = written(tmp_path, np.full((20, 20), 254), unknown_thresh=0.5)
     assert load_scene(path).remarks[0] == (
-        f"{path}: unknown_thresh: is not read, map_server has no such key"
+        f"{path}: unknown_thresh: ignored, map_server has no such key"
     )
 
 

@@ -8,7 +8,7 @@ from quad_nav.sim.pacing import Pacer, RateMeter
 
 
 def run(pacer: Pacer, *wall_s: float) -> list:
-    return [pacer.take_due(t) for t in wall_s]
+    return [pacer.pop_due(t) for t in wall_s]
 
 
 def test_steps_come_at_the_rate():
@@ -40,7 +40,7 @@ def test_bursts_are_bounded_at_high_rates():
 def test_time_spent_paused_is_not_caught_up():
     pacer = Pacer(rate=1.0, step_s=0.01)
     pacer.start(0.0)
-    pacer.take_due(0.05)
+    pacer.pop_due(0.05)
     pacer.start(9.0)
     assert run(pacer, 9.0, 9.0125) == [0, 1]
 
@@ -48,7 +48,7 @@ def test_time_spent_paused_is_not_caught_up():
 def test_long_runs_keep_their_rate():
     pacer = Pacer(rate=1.0, step_s=1.0 / 240)
     pacer.start(0.0)
-    steps = sum(pacer.take_due(0.0083 * k) for k in range(1, 1001))
+    steps = sum(pacer.pop_due(0.0083 * k) for k in range(1, 1001))
     assert steps == pytest.approx(8.3 * 240, abs=1.5)
 
 

@@ -166,7 +166,7 @@ def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
             "left out, looks without a collision: m/l",
         ),
         ('<actor name="walker"/>', "left out, actor: walker"),
-        (model(BOX, static="false"), "not static in Gazebo, stands fixed here: m"),
+        (model(BOX, static="false"), "not static in Gazebo, but fixed here: m"),
     ],
 )
 def test_what_is_left_out_is_named(tmp_path, content, remark):
@@ -209,7 +209,7 @@ def test_a_model_that_includes_itself_is_refused(tmp_path):
     include = "<include><uri>model://a.world</uri></include>"
     path = tmp_path / "a.world"
     path.write_text(f'<sdf>\n<model name="m">{include}</model></sdf>')
-    assert faults(path) == ["a.world: line 2: <include>: more than 16 files inside each other"]
+    assert faults(path) == ["a.world: line 2: <include>: more than 16 nested files"]
 
 
 @pytest.mark.parametrize(

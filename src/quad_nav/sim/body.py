@@ -1,8 +1,8 @@
-"""Rigid bodies: the scene and the quadcopters in pybullet, the only file that imports it.
+"""Rigid bodies: the scene and the quadcopters in pybullet; the only module that imports it.
 
-A quadcopter touches and is seen as an upright cylinder, its propeller guard. It
-is centred on its own LIDAR, so that two level quadcopters see each other, also
-while one of them tilts by a few degrees.
+A quadcopter collides as a cylinder, its propeller guard, which other LIDARs see too. The guard is
+centred on the quadcopter's LIDAR, so that two level quadcopters see each other, even if one
+of them tilts by a few degrees.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import pybullet
+from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, quaternion_from_yaw
@@ -23,14 +24,16 @@ from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Box, Obstacle, Scene, Sphere
 
+Floats = NDArray[np.float64]
+
 _MAX_RAYS_PER_CALL = 16383
-"""One less than ``pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE``: of that many the last is dropped."""
+"""One less than ``pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE``, with which the last is dropped."""
 _MANY_BOXES = 256
 _STRIPE_M = 4.0
 _BOXES_PER_BODY = 16
-"""pybullet's limit for the shapes of one collision shape."""
+"""pybullet's limit for the number of shapes in a body."""
 _PARKED_M = 100.0
-"""Below the floor, without contacts: quadcopters that are not engaged."""
+"""Depth below the floor at which quadcopters that are not engaged wait without contacts."""
 _LEVEL = [0.0, 0.0, 0.0, 1.0]
 
 GoalSphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float, float]]
@@ -38,11 +41,19 @@ GoalSphere = Tuple[Tuple[float, float, float], float, Tuple[float, float, float,
 
 
 class World:
-    """Scene and quadcopters; steps by a fixed time under given forces.
+    """Scene and quadcopters in the physics engine; steps by a fixed time under given forces.
 
-    Quadcopters are engaged at first, see ``engage``.
+    All quadcopters are engaged at first, see ``engage``.
 
-    With ``gui`` pybullet opens a window; ``InputError`` if there is no display.
+    Args:
+        scene: The scene.
+        starts: Start poses of the quadcopters in ``map``.
+        airframe: Mass properties and size of the quadcopters.
+        step_s: Duration of a step.
+        gui: Open pybullet's window.
+
+    Raises:
+        InputError: There is no display for the window.
     """
 
     def __init__(
@@ -52,7 +63,7 @@ class World:
         airframe: Airframe,
         step_s: float,
         gui: bool = False,
-    ):
+    ) -> None:
         self._scene = scene
         self._airframe = airframe
         self._step_s = step_s
@@ -62,7 +73,7 @@ class World:
         self.reset(starts)
 
     def reset(self, starts: Sequence[Pose2D]) -> None:
-        """Build everything anew, so that nothing of the past is left in the engine."""
+        """Rebuild the world, so that the engine keeps nothing of the past."""
         client = self._client
         pybullet.resetSimulation(physicsClientId=client)
         self._draw(False)
@@ -74,10 +85,10 @@ class World:
         self._names: Dict[int, Optional[str]] = {
             pybullet.createMultiBody(0.0, floor, physicsClientId=client): "floor"
         }
-        single, grouped = _by_number((*self._scene.wall_boxes(), *self._scene.obstacles))
+        single, groups = _grouped((*self._scene.wall_boxes(), *self._scene.obstacles))
         for solid in single:
             self._names[self._add_obstacle(solid)] = solid.name
-        for group in grouped:
+        for group in groups:
             self._names[self._add_boxes(group)] = None
         self._robots = [self._add_quadcopter(k, start) for k, start in enumerate(starts)]
         self._engaged = list(range(len(starts)))
@@ -86,24 +97,27 @@ class World:
         self._draw(True)
 
     def close(self) -> None:
+        """Free the engine."""
         if pybullet.isConnected(self._client):
             pybullet.disconnect(self._client)
 
     @property
     def is_open(self) -> bool:
-        """False once the window has been closed."""
+        """False after the window was closed."""
         return bool(pybullet.isConnected(self._client))
 
     def state(self) -> BodyState:
-        """Read all bodies."""
+        """Return the state of all quadcopters."""
         rows = np.empty((len(self._robots), 13))
         self._read(range(len(self._robots)), rows)
         return BodyState(rows)
 
     def engage(self, robots: Sequence[int], state: BodyState) -> None:
-        """From now on only these quadcopters can be touched and are moved by ``step``.
+        """Choose the quadcopters that ``step`` moves and that can be touched.
 
-        Those that were not engaged are put where ``state`` has them.
+        Args:
+            robots: Numbers of the quadcopters, in increasing order.
+            state: State that newly engaged quadcopters start from.
         """
         if list(robots) == self._engaged:
             return
@@ -119,10 +133,13 @@ class World:
             pybullet.resetBaseVelocity(body, row[7:10], row[10:13], client)
         self._engaged = list(robots)
 
-    def step(self, state: BodyState, forces_n: np.ndarray, torques_nm: np.ndarray) -> BodyState:
-        """``state`` after one time step of the quadcopters that are engaged.
+    def step(self, state: BodyState, forces_n: Floats, torques_nm: Floats) -> BodyState:
+        """Return the state after one step of the engaged quadcopters.
 
-        Under forces at the bodies' centres and torques, float64[n, 3] in map.
+        Args:
+            state: Present state of all quadcopters.
+            forces_n: float64[n, 3], forces at the bodies' centres in ``map``.
+            torques_nm: float64[n, 3], torques in ``map``.
         """
         client, in_map = self._client, pybullet.WORLD_FRAME
         positions, forces, torques = (
@@ -137,7 +154,7 @@ class World:
         self._read(self._engaged, rows)
         return BodyState(rows)
 
-    def _read(self, robots: Sequence[int], rows: np.ndarray) -> None:
+    def _read(self, robots: Sequence[int], rows: Floats) -> None:
         client = self._client
         for robot in robots:
             body = self._robots[robot]
@@ -146,7 +163,7 @@ class World:
             rows[robot] = (*position, *quaternion, *linear, *angular)
 
     def touches(self) -> List[Touch]:
-        """What presses on the quadcopters after the last step."""
+        """Return what presses on the quadcopters after the last step, in the robots' order."""
         touches = {}
         for point in pybullet.getContactPoints(physicsClientId=self._client):
             body_a, body_b, position, normal_force = point[1], point[2], point[5], point[9]
@@ -156,8 +173,8 @@ class World:
             touches[touch.robot, touch.other] = touch
         return [touches[key] for key in sorted(touches)]
 
-    def cast(self, starts_m: np.ndarray, ends_m: np.ndarray) -> np.ndarray:
-        """See ``casters.RayWorld``. A quadcopter's own beams start inside its guard: unseen."""
+    def cast(self, starts_m: Floats, ends_m: Floats) -> Floats:
+        """Cast rays; see ``casters.RayWorld``. Beams start inside the robot's own guard."""
         starts, ends = starts_m.tolist(), ends_m.tolist()
         hits: List[float] = []
         for k in range(0, len(starts), _MAX_RAYS_PER_CALL):
@@ -171,7 +188,7 @@ class World:
         return np.array(hits)
 
     def show_goals(self, spheres: Sequence[GoalSphere]) -> None:
-        """Draw goals that nothing can touch or see, in place of the last ones."""
+        """Replace the drawn goals, which neither collide nor appear in scans."""
         client = self._client
         for goal in self._goal_ids:
             pybullet.removeBody(goal, physicsClientId=client)
@@ -187,7 +204,7 @@ class World:
             )
 
     def _draw(self, on: bool) -> None:
-        """Stop drawing while bodies are added, which is slow otherwise, and go on after it."""
+        """Switch drawing on or off; adding bodies is slow while it is on."""
         if not self._gui:
             return
         client, scene = self._client, self._scene
@@ -243,7 +260,7 @@ class World:
         )
 
     def _add_boxes(self, boxes: Sequence[Box]) -> int:
-        """Boxes as one body: each step goes through all bodies, which tells from thousands on."""
+        """Add boxes as one body, because each step visits all bodies."""
         shape = pybullet.createCollisionShapeArray(
             shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
             halfExtents=[[b.size_x_m / 2, b.size_y_m / 2, b.height_m / 2] for b in boxes],
@@ -267,7 +284,7 @@ class World:
             collisionFramePosition=offset,
             physicsClientId=client,
         )
-        looks = pybullet.createVisualShape(
+        visual = pybullet.createVisualShape(
             pybullet.GEOM_CYLINDER,
             radius=radius,
             length=GUARD_HEIGHT_M,
@@ -279,7 +296,7 @@ class World:
             pybullet.createMultiBody(
                 self._airframe.mass_kg,
                 guard,
-                looks,
+                visual,
                 basePosition=[start.x_m, start.y_m, self._scene.altitude_m],
                 baseOrientation=quaternion_from_yaw(start.yaw_rad),
                 physicsClientId=client,
@@ -298,10 +315,10 @@ class World:
         return body
 
 
-def _by_number(solids: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], List[List[Box]]]:
-    """Solids that get a body each, and groups of near boxes with a body per group.
+def _grouped(solids: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], List[List[Box]]]:
+    """Split solids into those with a body each and groups of near boxes with a body per group.
 
-    A usual scene has no groups, so that each obstacle is a body.
+    Only scenes with many boxes have groups.
     """
     boxes = [solid for solid in solids if isinstance(solid, Box)]
     if len(boxes) < _MANY_BOXES:
@@ -314,18 +331,20 @@ def _by_number(solids: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], List[Lis
 
 
 def _connect(gui: bool) -> int:
-    """Open the engine; a window needs a display, without which pybullet ends the process."""
+    """Connect to the engine; check the display first, because pybullet exits without one."""
     if gui and sys.platform == "linux" and not _has_display():
         display = os.environ.get("DISPLAY", "")
-        raise InputError([f"gui: no display at DISPLAY={display!r}, expected one or gui:=false"])
+        raise InputError([f"gui: no display at DISPLAY={display!r}, expected one, or gui:=false"])
     client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
     if client < 0:
-        raise InputError(["gui: pybullet cannot open its window; gui:=false simulates without"])
+        raise InputError(
+            ["gui: pybullet cannot open its window, expected a display, or gui:=false"]
+        )
     return int(client)
 
 
 def _has_display() -> bool:
-    """Whether an X server answers."""
+    """Return whether an X server answers."""
     try:
         x11 = ctypes.CDLL("libX11.so.6")
     except OSError:

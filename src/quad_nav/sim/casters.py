@@ -57,7 +57,7 @@ class RayWorld(Protocol):
 class WorldCaster:
     """Caster that uses the bodies of the physics engine's world."""
 
-    def __init__(self, params: LidarParams, world: RayWorld):
+    def __init__(self, params: LidarParams, world: RayWorld) -> None:
         self._params = params
         self._world = world
         self._directions = beam_directions(params)
@@ -78,7 +78,7 @@ class KernelCaster:
 
     def __init__(
         self, params: LidarParams, scene: Scene, n_robots: int, body_radius_m: float = BODY_RADIUS_M
-    ):
+    ) -> None:
         directions = np.ascontiguousarray(beam_directions(params)[:, :2])
         self._beams = Beams(
             directions,
@@ -120,7 +120,7 @@ class Lidars:
     ``caster`` finds what the beams hit. The noise of each LIDAR follows from ``seed``.
     """
 
-    def __init__(self, params: LidarParams, caster: Caster, n_robots: int, seed: int):
+    def __init__(self, params: LidarParams, caster: Caster, n_robots: int, seed: int) -> None:
         self.params = params
         self._caster = caster
         self._noise = [np.random.default_rng([seed, 1, robot]) for robot in range(n_robots)]

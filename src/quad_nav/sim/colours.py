@@ -1,4 +1,4 @@
-"""One colour per quadcopter: the window, the markers, the goals and the report show the same."""
+"""Colours of the quadcopters in the simulator's window, RViz and reports."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ ROBOT_COLOURS = (
     (120, 185, 250),
     (235, 180, 20),
 )
-"""RGB in 0..255 of quadcopter 0, 1, ...; the colours of further ones are computed."""
+"""RGB, 0 to 255, of quadcopters 0, 1, ...; the colours of further ones are computed."""
 
-_GOLDEN = 0.618034  # steps of this part of a turn never come near an earlier hue soon
+_GOLDEN = 0.618034  # golden ratio: steps of this part of a turn spread the hues evenly
 _LIGHTNESSES = (0.25, 0.62, 0.42)
 
 
 def robot_rgba(robot: int, alpha: float = 1.0) -> Tuple[float, float, float, float]:
-    """A quadcopter's colour, each part in 0..1."""
+    """Return a quadcopter's colour (red, green, blue, alpha), 0 to 1."""
     if robot < len(ROBOT_COLOURS):
         red, green, blue = (part / 255.0 for part in ROBOT_COLOURS[robot])
     else:
-        further = robot - len(ROBOT_COLOURS)
+        extra = robot - len(ROBOT_COLOURS)
         red, green, blue = colorsys.hls_to_rgb(
-            further * _GOLDEN % 1.0, _LIGHTNESSES[further % len(_LIGHTNESSES)], 0.65
+            extra * _GOLDEN % 1.0, _LIGHTNESSES[extra % len(_LIGHTNESSES)], 0.65
         )
     return (red, green, blue, alpha)

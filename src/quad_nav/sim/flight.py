@@ -1,25 +1,24 @@
-"""From a commanded velocity to thrust and torque.
+"""Flight controller: thrust and torque that track a commanded velocity.
 
-Three loops, each faster than the one around it; all arrays hold one row per
-quadcopter.
+Three nested loops, each faster than the one around it. All arrays have one row per quadcopter.
 
 1. Velocity. ``a = k_v (v_commanded - v)`` in the horizontal plane, plus the
    acceleration that a turning quadcopter needs to keep its body-frame velocity,
    ``r z x v_commanded``. Its length is limited to the acceleration limit and to
    what the largest tilt gives, ``g tan(tilt)``.
 2. Altitude. ``a_z = w_z^2 (z_0 - z) - 2 w_z v_z``, critically damped. The thrust
-   is what makes the vertical force right at the present tilt.
-3. Attitude. Accelerating by a means thrusting along ``a + g z``, so the body's
+   gives the vertical force at the present tilt.
+3. Attitude. An acceleration a needs a thrust along ``a + g z``, so the body's
    z axis b has to reach that direction d. The rotation error is ``b x d``, which
    is (-d_y, d_x, 0) in the body frame, and ``angular acceleration =
    w_a^2 (b x d) - 2 w_a omega`` is critically damped too. About b, the yaw rate
    is tracked with its acceleration limited.
 
-Loop 3 answers the outer one like a lag of ``2 / w_a``. With ``k_v = w_a / 8``
+Loop 3 responds to the outer one like a lag of ``2 / w_a``. With ``k_v = w_a / 8``
 the velocity loop is a double real pole at ``w_a / 4``: the fastest that does not
 overshoot. With ``w_a = 25 rad/s`` a step is within 5 % after 0.76 s.
 
-The law has no memory: equal states and commands give equal forces.
+The controller has no state: equal states and commands give equal forces.
 """
 
 from __future__ import annotations
@@ -30,20 +29,31 @@ from functools import cached_property
 from typing import Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Twist2D
 from quad_nav.kernels import flight_law
 from quad_nav.sim.scene import BODY_RADIUS_M
 
+Floats = NDArray[np.float64]
+
 GRAVITY_MPS2 = 9.81
 
 
 @dataclass(frozen=True)
 class Airframe:
-    """Mass properties and limits of a 1 kg quadcopter with 0.2 m arms.
+    """Mass properties and limits; the defaults are a 1 kg quadcopter with arms of 0.2 m.
 
-    ``radius_m`` is that of the cylinder that it touches things with, see ``scene``.
+    Attributes:
+        mass_kg: Mass.
+        inertia_kgm2: Principal moments of inertia about the body's x, y and z axes.
+        max_thrust_n: Largest thrust.
+        max_torques_nm: Largest torques about the body's x, y and z axes.
+        radius_m: Radius of the guard, the cylinder that collides.
+
+    Raises:
+        InputError: The radius is not above 0.
     """
 
     mass_kg: float = 1.0
@@ -59,7 +69,7 @@ class Airframe:
 
 @dataclass(frozen=True)
 class FlightParams:
-    """What a command is limited to, and how stiffly it is tracked."""
+    """Limits of commands, and gains of the flight controller."""
 
     max_speed_mps: float = 2.0
     max_yaw_rate_radps: float = 2.0
@@ -72,42 +82,44 @@ class FlightParams:
 
     @property
     def velocity_gain_per_s(self) -> float:
+        """Gain of the velocity loop; see the module's docstring."""
         return self.attitude_bandwidth_radps / 8.0
 
 
 @dataclass(frozen=True)
 class BodyState:
-    """Where the bodies are and how they move, in the frame ``map``.
+    """Poses and velocities of all quadcopters in ``map``.
 
-    ``rows`` float64[n, 13]: position (3), quaternion (x, y, z, w), velocity (3), angular
-    velocity (3); m, m/s and rad/s.
+    Attributes:
+        rows: float64[n, 13]: position (3) in m, quaternion (x, y, z, w), velocity (3) in m/s,
+            angular velocity (3) in rad/s.
     """
 
-    rows: np.ndarray
+    rows: Floats
 
     @property
-    def positions_m(self) -> np.ndarray:
-        """float64[n, 3]"""
+    def positions_m(self) -> Floats:
+        """Positions float64[n, 3] in ``map``."""
         return self.rows[:, 0:3]
 
     @property
-    def quaternions(self) -> np.ndarray:
-        """float64[n, 4], (x, y, z, w)."""
+    def quaternions(self) -> Floats:
+        """Quaternions float64[n, 4], (x, y, z, w), from the body's frame to ``map``."""
         return self.rows[:, 3:7]
 
     @property
-    def velocities_mps(self) -> np.ndarray:
-        """float64[n, 3]"""
+    def velocities_mps(self) -> Floats:
+        """Velocities float64[n, 3] in ``map``."""
         return self.rows[:, 7:10]
 
     @property
-    def angular_radps(self) -> np.ndarray:
-        """float64[n, 3]"""
+    def angular_radps(self) -> Floats:
+        """Angular velocities float64[n, 3] in ``map``."""
         return self.rows[:, 10:13]
 
     @cached_property
-    def rotations(self) -> np.ndarray:
-        """float64[n, 3, 3], the body axes as columns."""
+    def rotations(self) -> Floats:
+        """Rotation matrices float64[n, 3, 3] with the bodies' axes in ``map`` as columns."""
         rotations = np.empty((len(self.rows), 3, 3))
         for row, rotation in zip(self.rows, rotations):
             flight_law.rotation_from_quaternion(row[3:7], rotation)
@@ -115,7 +127,11 @@ class BodyState:
 
 
 def limit_command(twist: Twist2D, params: FlightParams) -> Tuple[float, float, float]:
-    """(vx, vy, vyaw) within the limits; a velocity that is too long keeps its direction."""
+    """Limit a command; a velocity that is too fast keeps its direction.
+
+    Returns:
+        (vx, vy, vyaw) in m/s and rad/s, in the body's frame.
+    """
     speed = math.hypot(twist.vx_mps, twist.vy_mps)
     shorten = min(1.0, params.max_speed_mps / speed) if speed > 0.0 else 1.0
     limit = params.max_yaw_rate_radps
@@ -127,12 +143,14 @@ def limit_command(twist: Twist2D, params: FlightParams) -> Tuple[float, float, f
 
 
 class FlightLaw:
-    """The law for one airframe; it has no memory of what it was called with.
+    """Controller for quadcopters of one airframe; it has no state.
 
-    ``law`` and ``airframe`` are what ``flight_law.fly`` calls so.
+    Attributes:
+        law: Gains and limits, as ``kernels.flight_law.fly`` takes them.
+        airframe: Mass properties and limits, as ``kernels.flight_law.fly`` takes them.
     """
 
-    def __init__(self, airframe: Airframe, params: FlightParams):
+    def __init__(self, airframe: Airframe, params: FlightParams) -> None:
         limit_mps2 = min(params.max_acceleration_mps2, GRAVITY_MPS2 * math.tan(params.max_tilt_rad))
         self.law = (
             params.velocity_gain_per_s,
@@ -152,12 +170,18 @@ class FlightLaw:
         )
 
     def thrust_and_torque(
-        self, state: BodyState, commands: np.ndarray, altitude_m: float
-    ) -> Tuple[np.ndarray, np.ndarray]:
-        """Forces and torques float64[n, 3] in ``map`` that track the commands.
+        self, state: BodyState, commands: Floats, altitude_m: float
+    ) -> Tuple[Floats, Floats]:
+        """Compute forces and torques that track commands.
 
-        ``commands`` float64[n, 3] are (vx, vy, vyaw) as from ``limit_command``: m/s
-        ahead and to the left of the heading, rad/s.
+        Args:
+            state: State of the quadcopters.
+            commands: float64[n, 3], (vx, vy, vyaw) in m/s and rad/s in the bodies' frames, as
+                ``limit_command`` returns them.
+            altitude_m: Altitude to hold.
+
+        Returns:
+            Forces float64[n, 3] in N and torques float64[n, 3] in Nm, in ``map``.
         """
         forces, torques = np.empty_like(commands), np.empty_like(commands)
         flight_law.fly(

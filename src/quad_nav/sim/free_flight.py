@@ -1,7 +1,8 @@
-"""Quadcopters far from everything, which fly without the physics engine.
+"""Free flight: quadcopters that are far from everything move without the physics engine.
 
-As long as a quadcopter can touch nothing, only its own thrust moves it. A clearance changes
-by no more than the way flown since it was taken, so that it is asked for only now and then.
+While a quadcopter cannot touch anything, only gravity and its own thrust and torque act on it.
+Its distance to the nearest surface changes by at most the distance that it flies, so that this
+distance is computed only now and then.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import math
 from typing import List, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.kernels.rigid_body import NOBODY, fly_freely
 from quad_nav.sim.flight import GRAVITY_MPS2, BodyState, FlightLaw
@@ -17,36 +19,50 @@ from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
 
 _MARGIN_M = 0.03
-"""More than two quadcopters fly in a step, and than the engine adds to its shapes."""
+"""More than two quadcopters approach in a step, plus the engine's collision margin."""
 
 
 class FreeFlight:
-    """Moves ``n_robots`` quadcopters with guards of a radius through a scene."""
+    """Moves quadcopters with guards of ``radius_m`` through a scene, in steps of ``step_s``."""
 
-    def __init__(self, scene: Scene, n_robots: int, radius_m: float, law: FlightLaw, step_s: float):
+    def __init__(
+        self, scene: Scene, n_robots: int, radius_m: float, law: FlightLaw, step_s: float
+    ) -> None:
         self._scene = scene
         self._law = law
         self._step_s = step_s
-        # A ball around the guard's centre holds it, however the quadcopter tilts.
+        # Radius of a sphere that contains the guard at any tilt.
         self._reach_m = math.hypot(radius_m, GUARD_HEIGHT_M / 2) + _MARGIN_M
         self._centres_m = np.empty((n_robots, 3))
-        self._known_m = np.zeros((n_robots, 3))
-        self._rooms_m = np.zeros(n_robots)  # around known_m, no clearance is known yet
+        self._checked_m = np.zeros((n_robots, 3))
+        self._free_m = np.zeros(
+            n_robots
+        )  # radius around checked_m in which nothing is near; 0 is not known
 
     def advance(
-        self, bodies: BodyState, commands: np.ndarray, held: np.ndarray, steps: int
+        self,
+        bodies: BodyState,
+        commands: NDArray[np.float64],
+        excluded: NDArray[np.bool_],
+        steps: int,
     ) -> Tuple[BodyState, int, List[int]]:
-        """Move all but those that are held, bool[n], by up to so many steps.
+        """Move quadcopters until one may touch something.
 
-        ``commands`` as for the flight law. Returns the bodies after it, the steps done, and
-        who may touch something in the next one, which is why they are fewer.
+        Args:
+            bodies: State of all quadcopters.
+            commands: float64[n, 3], as for the flight controller.
+            excluded: bool[n], quadcopters that do not move.
+            steps: Largest number of steps.
+
+        Returns:
+            The new state, the number of steps, and the robots that may touch something next.
         """
         rows, done = bodies.rows.copy(), 0
         while done < steps:
             more, found, other = fly_freely(
                 rows,
                 commands,
-                held,
+                excluded,
                 steps - done,
                 self._step_s,
                 self._scene.altitude_m,
@@ -55,20 +71,21 @@ class FreeFlight:
                 self._law.law,
                 MOUNT_HEIGHT_M,
                 2 * self._reach_m,
-                self._known_m,
-                self._rooms_m,
+                self._checked_m,
+                self._free_m,
                 self._centres_m,
             )
             done += more
             if other != NOBODY:
                 return BodyState(rows), done, [found, other]
-            if found != NOBODY and not self._has_room(found):
+            if found != NOBODY and not self._is_far(found):
                 return BodyState(rows), done, [found]
         return BodyState(rows), done, []
 
-    def _has_room(self, robot: int) -> bool:
+    def _is_far(self, robot: int) -> bool:
+        """Compute a robot's distance to the nearest surface; return whether it is far from it."""
         x_m, y_m, z_m = self._centres_m[robot].tolist()
-        clearance_m = min(self._scene.surface_distance_m(x_m, y_m, z_m), z_m)
-        self._known_m[robot] = x_m, y_m, z_m
-        self._rooms_m[robot] = max(0.0, clearance_m - self._reach_m)
-        return bool(self._rooms_m[robot] > 0.0)
+        distance_m = min(self._scene.surface_distance_m(x_m, y_m, z_m), z_m)
+        self._checked_m[robot] = x_m, y_m, z_m
+        self._free_m[robot] = max(0.0, distance_m - self._reach_m)
+        return bool(self._free_m[robot] > 0.0)

@@ -137,7 +137,7 @@ def with_free_starts(scene: Scene, may_start: Callable[[float, float], bool]) ->
 
 
 def _lattice(scene: Scene) -> List[Tuple[float, float]]:
-    """Return a lattice over the arena, with a spacing of 0.5 m or more, from the centre outwards."""
+    """Return a lattice over the arena, spaced 0.5 m or more, from the centre outwards."""
     step_m = max(0.5, math.sqrt(scene.size_x_m * scene.size_y_m / _MAX_LATTICE_POINTS))
     x_centre, y_centre = scene.centre
     reach_x = math.floor(scene.size_x_m / 2 / step_m)

@@ -1,6 +1,6 @@
-"""The LIDAR: where it is, which way its beams look, and the ranges they return.
+"""LIDAR: its mount, its beams, and scans from the distances that its beams measure.
 
-What the beams hit is somebody else's business, see ``casters.Caster``.
+``casters`` finds what the beams hit.
 """
 
 from __future__ import annotations
@@ -10,10 +10,13 @@ from dataclasses import dataclass
 from typing import Optional, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.sim.flight import BodyState
+
+Floats = NDArray[np.float64]
 
 MOUNT_HEIGHT_M = 0.06
 base_from_lidar = Pose3D(0.0, 0.0, MOUNT_HEIGHT_M)
@@ -23,9 +26,18 @@ base_from_lidar = Pose3D(0.0, 0.0, MOUNT_HEIGHT_M)
 class LidarParams:
     """Beam pattern and noise.
 
-    Beams start at ``-scan_range_rad / 2`` and are ``step_size_rad`` apart; the
-    last one is a step short of ``+scan_range_rad / 2``, so that a full turn has
-    no beam twice.
+    The first beam is at ``-scan_range_rad / 2``, the last one a step before
+    ``+scan_range_rad / 2``, so that no beam of a full turn occurs twice.
+
+    Attributes:
+        scan_range_rad: Angle that a scan covers.
+        step_size_rad: Angle between two beams.
+        range_min_m: Smallest range.
+        range_max_m: Largest range.
+        noise_std_m: Standard deviation of the ranges' Gaussian noise.
+
+    Raises:
+        InputError: A value is out of range; lists all of them.
     """
 
     scan_range_rad: float = 2.0 * math.pi
@@ -56,28 +68,32 @@ class LidarParams:
 
     @property
     def beam_count(self) -> int:
+        """Number of beams in a scan."""
         return round(self.scan_range_rad / self.step_size_rad)
 
     @property
     def angle_min_rad(self) -> float:
+        """Angle of the first beam."""
         return -self.scan_range_rad / 2.0
 
     @property
     def angle_max_rad(self) -> float:
-        """The last beam, one step short of ``scan_range_rad / 2``."""
+        """Angle of the last beam, one step before ``scan_range_rad / 2``."""
         return self.angle_min_rad + (self.beam_count - 1) * self.step_size_rad
 
 
-def beam_directions(params: LidarParams) -> np.ndarray:
-    """Unit vectors float64[beams, 3] in the LIDAR's frame."""
+def beam_directions(params: LidarParams) -> Floats:
+    """Return the beams' unit vectors float64[beams, 3] in the LIDAR's frame."""
     angles = params.angle_min_rad + params.step_size_rad * np.arange(params.beam_count)
     return np.column_stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)])
 
 
-def lidar_poses(bodies: BodyState, robots: Sequence[int]) -> Tuple[np.ndarray, np.ndarray]:
-    """Where the LIDARs of quadcopters are: float64[n, 3], float64[n, 3, 3] in ``map``.
+def lidar_poses(bodies: BodyState, robots: Sequence[int]) -> Tuple[Floats, Floats]:
+    """Return positions float64[n, 3] and rotation matrices float64[n, 3, 3] of LIDARs in ``map``.
 
-    The axes are the rotations' columns.
+    Args:
+        bodies: State of all quadcopters.
+        robots: Numbers of the robots, n of them.
     """
     chosen = list(robots)
     rotations = bodies.rotations[chosen]
@@ -87,12 +103,19 @@ def lidar_poses(bodies: BodyState, robots: Sequence[int]) -> Tuple[np.ndarray, n
 def make_scan(
     params: LidarParams,
     stamp_s: float,
-    distances_m: np.ndarray,
+    distances_m: Floats,
     random: Optional[np.random.Generator] = None,
 ) -> Scan:
-    """One turn, taken at an instant, of distances float64[beams], +inf for no hit.
+    """Make a scan of the distances at an instant.
 
-    ``random`` is needed when there is noise.
+    Args:
+        params: Beam pattern and noise.
+        stamp_s: Time of the scan.
+        distances_m: float64[beams], +inf for no hit.
+        random: Source of the noise.
+
+    Raises:
+        ValueError: There is noise but no source for it.
     """
     if params.noise_std_m > 0.0:
         if random is None:
@@ -108,10 +131,8 @@ def make_scan(
     )
 
 
-def _with_noise(
-    params: LidarParams, distances_m: np.ndarray, random: np.random.Generator
-) -> np.ndarray:
-    """Gaussian noise on the hits; a return stays within what the sensor can tell."""
+def _with_noise(params: LidarParams, distances_m: Floats, random: np.random.Generator) -> Floats:
+    """Add Gaussian noise to the hits, within the limits of the range."""
     noisy = distances_m + random.normal(0.0, params.noise_std_m, len(distances_m))
     return np.where(
         np.isfinite(distances_m), np.clip(noisy, params.range_min_m, params.range_max_m), np.inf

@@ -1,4 +1,4 @@
-"""Maps of ROS's ``map_server`` as obstacles: a YAML file beside an image.
+"""Maps of ROS's ``map_server`` as obstacles: a YAML file and an image.
 
     image: office.pgm              # in this file's folder or below it; PGM or PNG
     resolution: 0.05               # metres per pixel
@@ -8,10 +8,9 @@
     free_thresh: 0.196
     mode: trinary                  # or scale, raw; trinary if left out
 
-Occupied cells stand up as boxes, as high as the scene's walls. Cells are read as
-``map_server`` reads them (its ``image_loader.cpp``) and taken for obstacles where
-``costmap_2d``'s static layer has a lethal cost by its default parameters, see
-``occupancy_of``.
+Occupied cells become boxes as high as the scene's walls. Cells are read as ``map_server`` reads
+them (``image_loader.cpp``). They are obstacles where ``costmap_2d``'s static layer with its
+default parameters has a lethal cost, see ``occupancy_of``.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any, List, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.files.document import Checker, describe
@@ -30,6 +30,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.kernels.rectangles import cover
 from quad_nav.sim.map_image import Pixels, read_pixels
 from quad_nav.sim.scene import Box
+
+Cells = NDArray[np.int8]
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 MAX_BOXES = 200_000
@@ -42,7 +44,17 @@ _NEGATE = {0: False, 1: True}  # also False and True, which are equal to them
 
 @dataclass(frozen=True)
 class MapFields:
-    """What the YAML file says."""
+    """Content of the YAML file.
+
+    Attributes:
+        image: Path of the image.
+        resolution_m: Size of a cell.
+        origin: Pose in ``map`` of the image's lower left corner.
+        negate: Dark pixels are free instead of occupied.
+        occupied_thresh: Occupancy, 0 to 1, above which a cell is occupied.
+        free_thresh: Occupancy, 0 to 1, below which a cell is free.
+        mode: trinary, scale or raw; see ``occupancy_of``.
+    """
 
     image: Path
     resolution_m: float
@@ -55,14 +67,20 @@ class MapFields:
 
 @dataclass(frozen=True)
 class OccupancyMap:
-    """``occupancy``, int8[H, W], row 0 at the lower edge; 0 free, 100 occupied, -1 unknown."""
+    """Occupancy of a map's cells.
+
+    Attributes:
+        fields: Content of the YAML file.
+        occupancy: int8[H, W], row 0 at the lower edge; 0 free, 100 occupied, -1 unknown.
+        remarks: Notes for the user on keys that are ignored.
+    """
 
     fields: MapFields
-    occupancy: np.ndarray
+    occupancy: Cells
     remarks: Tuple[str, ...] = ()
 
-    def occupied(self, unknown_too: bool) -> np.ndarray:
-        """bool[H, W]: where obstacles stand."""
+    def occupied(self, unknown_too: bool) -> NDArray[np.bool_]:
+        """Return the mask bool[H, W] of occupied cells, with unknown ones if asked."""
         return (
             (self.occupancy >= OCCUPIED) | (self.occupancy == UNKNOWN)
             if unknown_too
@@ -70,7 +88,7 @@ class OccupancyMap:
         )
 
     def is_free(self, x_m: float, y_m: float) -> bool:
-        """Whether the cell under a point in ``map`` is known to be free."""
+        """Return whether the cell at a point in ``map`` is known to be free."""
         origin, height_width = self.fields.origin, self.occupancy.shape
         right_m, up_m = origin.inverse_transform(x_m, y_m)
         column = math.floor(right_m / self.fields.resolution_m)
@@ -79,7 +97,7 @@ class OccupancyMap:
         return inside and 0 <= self.occupancy[row, column] < OCCUPIED
 
     def corners(self) -> List[Tuple[float, float]]:
-        """The image's four corners in ``map``."""
+        """Return the image's four corners in ``map``."""
         height, width = self.occupancy.shape
         return [self._in_map(x, y) for x in (0.0, width) for y in (0.0, height)]
 
@@ -88,16 +106,21 @@ class OccupancyMap:
         return self.fields.origin.transform(column * resolution_m, row * resolution_m)
 
     def boxes(self, height_m: float, unknown_too: bool) -> List[Box]:
-        """The occupied cells as few boxes: every one is in exactly one, and no other cell is.
+        """Cover the occupied cells, and no other cells, with few disjoint boxes.
 
-        Raises ``InputError`` when they are too many to fly in.
+        Args:
+            height_m: Height of the boxes.
+            unknown_too: Cover unknown cells too.
+
+        Raises:
+            InputError: There are more than ``MAX_BOXES`` boxes.
         """
         rectangles = rectangles_of(self.occupied(unknown_too)).tolist()
         if len(rectangles) > MAX_BOXES:
             raise InputError(
                 [
                     f"{self.fields.image}: occupied cells make {len(rectangles)} boxes, "
-                    f"expected {MAX_BOXES} at most; is it a map without specks?"
+                    f"expected {MAX_BOXES} at most (remove isolated pixels from the image)"
                 ]
             )
         resolution_m, yaw_rad = self.fields.resolution_m, self.fields.origin.yaw_rad
@@ -119,28 +142,36 @@ class OccupancyMap:
 
 
 def load_map(document: Any, path: Path) -> OccupancyMap:
-    """Check a map's YAML, given as ``document``, and read its image. Raises ``InputError``."""
+    """Check the document of a map's YAML file and read the image.
+
+    Args:
+        document: The parsed YAML.
+        path: The YAML file.
+
+    Raises:
+        InputError: The document or the image has faults; lists all of them.
+    """
     check = Checker(str(path))
     fields = _read_fields(check, document, path.parent)
     if check.problems or fields is None:
         raise InputError(check.problems)
     pixels = read_pixels(fields.image, fields.mode == "trinary")
     remarks = tuple(
-        f"{path}: {key}: is not read, map_server has no such key"
+        f"{path}: {key}: ignored, map_server has no such key"
         for key in document
         if key not in _KEYS
     )
     return OccupancyMap(fields, occupancy_of(pixels, fields), remarks)
 
 
-def occupancy_of(pixels: Pixels, fields: MapFields) -> np.ndarray:
-    """Pixels as ``map_server`` reads them, int8[H, W]; row 0 is the image's last.
+def occupancy_of(pixels: Pixels, fields: MapFields) -> Cells:
+    """Return the occupancy int8[H, W] of pixels as ``map_server`` reads them.
 
-    With p = (255 - value) / 255, or value / 255 where negated, a cell is occupied, 100,
-    above ``occupied_thresh``, free, 0, below ``free_thresh``, and unknown, -1, between
-    them. In mode scale what is between is 1 to 99, unless the pixel is transparent; 99
-    is no obstacle yet. In mode raw the value itself counts: obstacles from 100 to 254,
-    and 255 is unknown.
+    With p = (255 - value) / 255, or value / 255 if negated, a cell is occupied (100) above
+    ``occupied_thresh``, free (0) below ``free_thresh``, and unknown (-1) between them. In mode
+    scale, cells between the thresholds are 1 to 99, which is not an obstacle, or unknown if the
+    pixel is transparent. In mode raw the value itself is the occupancy: 100 to 254 are obstacles,
+    255 is unknown. Row 0 is the image's last row.
     """
     values = np.arange(255 * pixels.channels + 1) / pixels.channels
     if fields.negate:
@@ -152,8 +183,8 @@ def occupancy_of(pixels: Pixels, fields: MapFields) -> np.ndarray:
     return np.ascontiguousarray(cells[::-1])
 
 
-def _cells_of(values: np.ndarray, fields: MapFields) -> np.ndarray:
-    """Cells, int8[n], of opaque pixels with these mean values, 0..255."""
+def _cells_of(values: NDArray[np.float64], fields: MapFields) -> Cells:
+    """Return the cells int8[n] of opaque pixels with mean values float64[n], 0 to 255."""
     if fields.mode == "raw":
         raw = np.floor(values)
         return np.where(raw >= 255, UNKNOWN, np.minimum(raw, OCCUPIED)).astype(np.int8)
@@ -166,10 +197,11 @@ def _cells_of(values: np.ndarray, fields: MapFields) -> np.ndarray:
     return np.select([occupied, free], [OCCUPIED, FREE], between).astype(np.int8)
 
 
-def rectangles_of(marked: np.ndarray) -> np.ndarray:
-    """Few disjoint rectangles that cover the true cells of bool[H, W] and no others.
+def rectangles_of(marked: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Cover the true cells of bool[H, W], and no others, with few disjoint rectangles.
 
-    int64[n, 4], each row first column, first row, width, height.
+    Returns:
+        int64[n, 4]: first column, first row, width and height in cells.
     """
     left = marked.copy()
     parts, row = [], 0

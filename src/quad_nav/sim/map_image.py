@@ -1,4 +1,4 @@
-"""Images of maps as numbers, the only file that imports pillow."""
+"""Images of maps as arrays; the only module of ``sim`` that imports pillow."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from quad_nav.errors import InputError
@@ -14,26 +15,34 @@ from quad_nav.files.user_files import open_file
 
 MAX_CELLS = 10_000 * 10_000
 MAX_BYTES = 512 * 1024 * 1024
-_FORMATS = ("PPM", "PNG")  # PPM stands for the whole family, PGM among it
+_FORMATS = ("PPM", "PNG")  # PPM includes PGM
 _PALETTE_MODES = {"1": "L", "P": "RGBA", "PA": "RGBA", "CMYK": "RGB", "La": "LA", "RGBa": "RGBA"}
 
 
 @dataclass(frozen=True)
 class Pixels:
-    """Sums over ``channels`` channels of 0..255 each; row 0 is the uppermost.
+    """Pixels of an image; row 0 is the uppermost.
 
-    ``sums`` is uint16[H, W], ``opaque`` bool[H, W].
+    Attributes:
+        sums: uint16[H, W], sums over the channels, each of them 0 to 255.
+        channels: Number of channels.
+        opaque: bool[H, W], false where a pixel is transparent.
     """
 
-    sums: np.ndarray
+    sums: NDArray[np.uint16]
     channels: int
-    opaque: np.ndarray
+    opaque: NDArray[np.bool_]
 
 
 def read_pixels(path: Path, alpha_counts: bool) -> Pixels:
-    """The sum of each pixel's channels; with ``alpha_counts`` alpha is one of them.
+    """Read an image.
 
-    Raises ``InputError`` when it is no PGM or PNG image, broken, or too large.
+    Args:
+        path: A PGM or PNG file.
+        alpha_counts: Count alpha as one of the channels.
+
+    Raises:
+        InputError: The file is not a PGM or PNG image, is damaged, or is too large.
     """
     try:
         with warnings.catch_warnings():
@@ -42,7 +51,7 @@ def read_pixels(path: Path, alpha_counts: bool) -> Pixels:
                 _check_size(path, image)
                 return _pixels(image, alpha_counts)
     except UnidentifiedImageError:
-        raise InputError([f"{path}: is no PGM or PNG image"]) from None
+        raise InputError([f"{path}: is not a PGM or PNG image"]) from None
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise InputError([f"{path}: cannot be read: {error}"]) from error
 
@@ -61,7 +70,7 @@ def _pixels(image: Image.Image, alpha_counts: bool) -> Pixels:
     if image.mode in _PALETTE_MODES:
         image = image.convert(_PALETTE_MODES[image.mode])
     array = np.asarray(image)
-    if array.dtype != np.uint8:  # 16 bits a channel, of which the upper 8 count
+    if array.dtype != np.uint8:  # 16 bits per channel, of which the upper 8 are used
         array = (array.astype(np.uint32) >> 8).astype(np.uint8)
     channels = array if array.ndim == 3 else array[:, :, None]
     has_alpha = channels.shape[2] in (2, 4)

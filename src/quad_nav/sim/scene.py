@@ -17,7 +17,7 @@ from typing import Any, List, Sequence, Tuple, Union
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.geometry import Pose2D, rotate_vectors
+from quad_nav.geometry import Coordinate, Pose2D, rotate_vectors
 
 Floats = NDArray[np.float64]
 Lengths = Union[float, Floats]
@@ -41,7 +41,7 @@ class Box:
     yaw_rad: float = 0.0
     bottom_m: float = 0.0
 
-    def surface_distance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+    def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
         """Return the distance from a point, or from each of many, to the surface.
 
         Args:
@@ -72,7 +72,7 @@ class Cylinder:
     height_m: float
     bottom_m: float = 0.0
 
-    def surface_distance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+    def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
         """Return the distance from a point, or from each of many, to the surface.
 
         Args:
@@ -110,7 +110,7 @@ class Sphere:
         """Distance from the lowest to the highest point."""
         return 2.0 * self.radius_m
 
-    def surface_distance_m(self, x_m: Lengths, y_m: Lengths, z_m: float) -> Any:
+    def surface_distance_m(self, x_m: Coordinate, y_m: Coordinate, z_m: float) -> Any:
         """Return the distance from a point, or from each of many, to the surface.
 
         Args:
@@ -248,7 +248,7 @@ class Scene:
 class _Boxes:
     """Index of many boxes for the nearest one; a map has thousands."""
 
-    def __init__(self, boxes: Sequence[Box]):
+    def __init__(self, boxes: Sequence[Box]) -> None:
         self.boxes = boxes
         self._centres = np.array([[b.x_m, b.y_m, b.bottom_m + b.height_m / 2] for b in boxes])
         self._halves = np.array([[b.size_x_m, b.size_y_m, b.height_m] for b in boxes]) / 2
@@ -276,7 +276,7 @@ class _Boxes:
 class _Rounds:
     """Index of many cylinders and spheres for the nearest one."""
 
-    def __init__(self, rounds: Sequence[Union[Cylinder, Sphere]]):
+    def __init__(self, rounds: Sequence[Union[Cylinder, Sphere]]) -> None:
         self._rounds = rounds
         self._centres = np.array([[o.x_m, o.y_m, o.bottom_m + o.height_m / 2] for o in rounds])
         self._radii = np.array([o.radius_m for o in rounds])

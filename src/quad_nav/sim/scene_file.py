@@ -257,7 +257,8 @@ def _with_chosen_starts(check: Checker, scene: Scene, imported: ImportedScene) -
     if not scene.starts:
         check.fault(
             "starts",
-            "missing, and no free position was found; expected a scene with world or map, and starts",
+            "missing, and no free position was found; "
+            "expected a scene with world or map, and starts",
         )
     chosen = ", ".join(f"[{start.x_m:.2f}, {start.y_m:.2f}]" for start in scene.starts)
     remark = f"{check.source}: starts: not given, quadcopters start at {chosen}"

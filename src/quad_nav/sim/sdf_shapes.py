@@ -1,4 +1,4 @@
-"""Shapes of SDF collisions as obstacles, if ours can stand where and as they do."""
+"""Shapes of SDF collisions as obstacles, if an obstacle can have their shape and pose."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Optional, Union
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose3D
 from quad_nav.sim.scene import Box, Cylinder, Obstacle, Sphere
@@ -14,16 +15,29 @@ from quad_nav.sim.sdf_values import NotRepresented, SdfReader
 from quad_nav.sim.xml_tree import Element
 
 UPRIGHT_RAD = 1e-3
-"""How far a vertical axis may lean: saved worlds hold the traces of numerical physics."""
+"""Tilt up to which an axis counts as vertical: saved worlds have numerical errors."""
 
 FLOOR_M = 1e-3
-"""Planes and solids that end less than this above the floor are part of it."""
+"""Height up to which planes and solids count as part of the floor."""
 
 
 def obstacle_of(
     reader: SdfReader, geometry: Element, name: str, map_from_shape: Pose3D
 ) -> Optional[Obstacle]:
-    """The obstacle, or None where it is the floor or faulty. Raises ``NotRepresented``."""
+    """Convert a collision's geometry.
+
+    Args:
+        reader: Reader of the file; collects faults.
+        geometry: The ``<geometry>`` element.
+        name: Name of the obstacle.
+        map_from_shape: Pose of the shape.
+
+    Returns:
+        The obstacle, or None if it is the floor or has a fault.
+
+    Raises:
+        NotRepresented: No obstacle has this shape or pose.
+    """
     if not geometry.children:
         raise NotRepresented("geometry without a shape")
     shape = geometry.children[0]
@@ -46,7 +60,7 @@ def obstacle_of(
 
 
 def _above_floor(obstacle: Union[Box, Cylinder]) -> Obstacle:
-    """The part of it that can be seen."""
+    """Return the part above the floor."""
     sunk_m = max(0.0, -obstacle.bottom_m)
     return replace(
         obstacle, bottom_m=obstacle.bottom_m + sunk_m, height_m=obstacle.height_m - sunk_m
@@ -54,10 +68,10 @@ def _above_floor(obstacle: Union[Box, Cylinder]) -> Obstacle:
 
 
 def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
-    """A box may lie on any of its sides."""
+    """Convert a box, which may lie on any of its sides."""
     sizes = reader.lengths(shape, "size", 3, "three numbers of metres")
     rotation = pose.rotation
-    up = [axis for axis in range(3) if _lean_rad(rotation[:, axis]) <= UPRIGHT_RAD]
+    up = [axis for axis in range(3) if _tilt_rad(rotation[:, axis]) <= UPRIGHT_RAD]
     if not up:
         raise NotRepresented("tilted box")
     along, across = (up[0] + 1) % 3, (up[0] + 2) % 3
@@ -76,7 +90,7 @@ def _box(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle
 
 def _cylinder(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obstacle:
     radius_m, length_m = reader.length(shape, "radius"), reader.length(shape, "length")
-    if _lean_rad(pose.rotation[:, 2]) > UPRIGHT_RAD:
+    if _tilt_rad(pose.rotation[:, 2]) > UPRIGHT_RAD:
         raise NotRepresented("tilted cylinder")
     return Cylinder(name, pose.x_m, pose.y_m, radius_m, length_m, pose.z_m - length_m / 2)
 
@@ -86,11 +100,11 @@ def _sphere(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> Obsta
 
 
 def _plane(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> None:
-    """Horizontal at z = 0 and seen from above it is the floor."""
+    """Check that a plane is the floor: horizontal, at z = 0 and with its normal upwards."""
     element = shape.first("normal")
     given = reader.numbers(element, 3, "three numbers") if element else None
     normal = pose.rotation @ (given or (0.0, 0.0, 1.0))
-    if _lean_rad(normal) > UPRIGHT_RAD or normal[2] <= 0.0 or abs(pose.z_m) > FLOOR_M:
+    if _tilt_rad(normal) > UPRIGHT_RAD or normal[2] <= 0.0 or abs(pose.z_m) > FLOOR_M:
         raise NotRepresented("plane that is not the floor")
 
 
@@ -98,6 +112,6 @@ def _nothing(reader: SdfReader, shape: Element, name: str, pose: Pose3D) -> None
     return None
 
 
-def _lean_rad(axis: np.ndarray) -> float:
-    """Angle between a line and the vertical."""
+def _tilt_rad(axis: NDArray[np.float64]) -> float:
+    """Return the angle between a line and the vertical."""
     return math.atan2(math.hypot(axis[0], axis[1]), abs(axis[2]))

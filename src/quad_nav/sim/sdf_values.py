@@ -1,4 +1,4 @@
-"""Poses and numbers in SDF files, read with the line of what is wrong."""
+"""Poses and numbers in SDF files; faults are collected with their lines."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ _TRUE = ("true", "1")
 
 
 class NotRepresented(Exception):
-    """Why something is left out of the scene, in a few words."""
+    """Reason in a few words why an element is left out of the scene."""
 
 
 class SdfReader:
-    """Reads the values of one file's elements and notes what is wrong with them."""
+    """Reader of the values in one file; adds a message to ``problems`` for each fault."""
 
-    def __init__(self, path: Path, problems: List[str]):
+    def __init__(self, path: Path, problems: List[str]) -> None:
         self.path = path
         self.problems = problems
 
     def fault(self, element: Element, problem: str) -> None:
+        """Add a fault of an element."""
         self.problems.append(f"{self.path}: line {element.line}: <{element.tag}>: {problem}")
 
     def pose(self, parent: Element, default: Pose3D = IDENTITY) -> Pose3D:
-        """The pose given in an element, relative to what the element is in.
+        """Return the ``<pose>`` of an element, relative to the element that contains it.
 
-        Raises ``NotRepresented`` if it is relative to a named frame.
+        Raises:
+            NotRepresented: The pose is relative to a named frame.
         """
         element = parent.first("pose")
         if element is not None and element.attributes.get("relative_to", "world") != "world":
@@ -53,11 +55,11 @@ class SdfReader:
         return Pose3D(values[0], values[1], values[2], quaternion_from_euler(roll, pitch, yaw))
 
     def length(self, parent: Element, tag: str) -> float:
-        """A number of metres above 0, or NaN after a fault."""
+        """Return a length above 0 in m, NaN after a fault."""
         return self.lengths(parent, tag, 1, "a number of metres")[0]
 
     def lengths(self, parent: Element, tag: str, count: int, expected: str) -> List[float]:
-        """Metres above 0, or NaNs after a fault."""
+        """Return lengths above 0 in m, NaNs after a fault."""
         element = parent.first(tag)
         faulty = [math.nan] * count
         if element is None:
@@ -70,7 +72,7 @@ class SdfReader:
         return values or faulty
 
     def numbers(self, element: Element, count: int, expected: str) -> Optional[List[float]]:
-        """Finite numbers separated by blanks; None after a fault."""
+        """Return the finite numbers of a text, separated by blanks; None after a fault."""
         text = element.text.strip()
         try:
             values = [float(word) for word in text.split()]
@@ -83,4 +85,5 @@ class SdfReader:
 
 
 def is_true(text: str) -> bool:
+    """Return whether a text is SDF's true."""
     return text.strip().lower() in _TRUE

@@ -1,7 +1,6 @@
-"""The simulated quadcopters: commands in, poses, scans and contacts out.
+"""Simulation of quadcopters: commands in; poses, scans and contacts out.
 
-Time is counted in whole steps of 1/240 s. Equal arguments and equal calls give
-equal results, bit for bit.
+Time advances in steps of 1/240 s. Equal arguments and equal calls give bit-identical results.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
@@ -26,19 +26,29 @@ STEPS_PER_S = 240
 STEP_S = 1.0 / STEPS_PER_S
 LIDAR_CASTERS = ("kernel", "bullet")
 _STEPS_NEAR = 12
-"""Who is near to something mostly stays so for a while; asking less often is cheaper."""
+"""Steps that the engine moves a quadcopter after it came near something, before a new check."""
 _START_GAP_M = 0.05
 _START_TRIES = 1000
 
 
 @dataclass(frozen=True)
 class SimulationParams:
-    """Everything but the scene and the number of quadcopters.
+    """Parameters of a simulation, apart from the scene and the number of quadcopters.
 
-    Commands count for ``command_timeout_s + controller_period_s`` after they
-    arrive, then a quadcopter hovers. Starts are displaced at random by up to
-    ``jitter_m``. ``lidar_caster`` is who finds what beams hit, see ``casters``: the
-    "kernel" or the physics engine, "bullet".
+    A quadcopter hovers when its last command is older than ``command_timeout_s`` plus
+    ``controller_period_s``.
+
+    Attributes:
+        lidar: Beam pattern and noise.
+        flight: Limits of commands and gains of the flight controller.
+        airframe: Mass properties and size of the quadcopters.
+        command_timeout_s: Age up to which a command is valid, without the controller's period.
+        controller_period_s: Period of the navigators' commands.
+        jitter_m: Largest random displacement of a start pose.
+        lidar_caster: Ray caster, see ``casters``: "kernel", or "bullet" for the physics engine.
+
+    Raises:
+        InputError: A value is out of range; lists all of them.
     """
 
     lidar: LidarParams = field(default_factory=LidarParams)
@@ -67,9 +77,12 @@ class SimulationParams:
 
 @dataclass(frozen=True)
 class RobotState:
-    """Pose of ``base_link`` in ``map``, velocities in ``base_link``.
+    """Pose and velocities of one quadcopter.
 
-    ``linear_mps`` and ``angular_radps`` are (x, y, z).
+    Attributes:
+        map_from_base: Pose of ``base_link`` in ``map``.
+        linear_mps: Velocity (x, y, z) in ``base_link``.
+        angular_radps: Angular velocity (x, y, z) in ``base_link``.
     """
 
     map_from_base: Pose3D
@@ -78,13 +91,14 @@ class RobotState:
 
     @property
     def twist(self) -> Twist2D:
+        """Planar velocity in ``base_link``."""
         return Twist2D(self.linear_mps[0], self.linear_mps[1], self.angular_radps[2])
 
 
 class RobotStates(Sequence[RobotState]):
-    """The states of all quadcopters at one instant, each made when it is asked for."""
+    """States of all quadcopters at one instant; each is computed on its first access."""
 
-    def __init__(self, bodies: BodyState):
+    def __init__(self, bodies: BodyState) -> None:
         self.bodies = bodies
         self._states: List[Optional[RobotState]] = [None] * len(bodies.rows)
 
@@ -98,7 +112,7 @@ class RobotStates(Sequence[RobotState]):
         return state
 
 
-def _robot_state(row: np.ndarray) -> RobotState:
+def _robot_state(row: NDArray[np.float64]) -> RobotState:
     x, y, z, qx, qy, qz, qw, *twist = row.tolist()
     quaternion, to_base = (qx, qy, qz, qw), (-qx, -qy, -qz, qw)
     return RobotState(
@@ -107,11 +121,19 @@ def _robot_state(row: np.ndarray) -> RobotState:
 
 
 class Simulation:
-    """N quadcopters in a scene, one step at a time.
+    """Quadcopters in a scene.
 
-    Raises ``InputError`` when the scene has fewer start poses than ``n_robots``,
-    or no free place near one of them with ``jitter_m``. ``start_step`` is the
-    step that the clock starts at.
+    Args:
+        scene: The scene.
+        n_robots: Number of quadcopters.
+        params: Parameters.
+        seed: Seed of the LIDARs' noise and of the starts' displacements.
+        gui: Open the engine's window.
+        start_step: Step at which the clock starts.
+
+    Raises:
+        InputError: The scene has fewer start poses than quadcopters, there is no free position
+            near a start with ``jitter_m``, or there is no display for the window.
     """
 
     def __init__(
@@ -122,7 +144,7 @@ class Simulation:
         seed: int = 0,
         gui: bool = False,
         start_step: int = 0,
-    ):
+    ) -> None:
         self.scene = scene
         self.params = params
         self.seed = seed
@@ -133,14 +155,14 @@ class Simulation:
         )
         self._starts = start_poses(scene, n_robots, params.jitter_m, seed, params.airframe.radius_m)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
-        # Who looks into the engine, by its window or its rays, has to find the bodies there.
-        self._engine_is_seen = gui or params.lidar_caster == "bullet"
+        # The engine's window and rays need the bodies in the engine.
+        self._always_in_engine = gui or params.lidar_caster == "bullet"
         self._begin()
 
     def _begin(self) -> None:
         n = self.n_robots
         self._commands = np.zeros((n, 3))
-        self._hover_step = np.full(n, -math.inf)  # the last step that a command counts for
+        self._hover_step = np.full(n, -math.inf)  # last step for which a command is valid
         self._next_hover_step = math.inf
         self._contact_log = ContactLog()
         self.lidars = self._new_lidars()
@@ -148,8 +170,8 @@ class Simulation:
         self._free_flight = FreeFlight(
             self.scene, n, self.params.airframe.radius_m, self._law, STEP_S
         )
-        # The step up to which the engine moves a quadcopter.
-        self._engine_until = np.full(n, math.inf if self._engine_is_seen else -math.inf)
+        # Step up to which the engine moves a quadcopter.
+        self._engine_until = np.full(n, math.inf if self._always_in_engine else -math.inf)
 
     def _new_lidars(self) -> Lidars:
         params = self.params
@@ -163,45 +185,51 @@ class Simulation:
 
     @property
     def n_robots(self) -> int:
+        """Number of quadcopters."""
         return len(self._starts)
 
     @property
     def now_s(self) -> float:
+        """Simulated time."""
         return self.step_count / STEPS_PER_S
 
     @property
     def contacts(self) -> List[Contact]:
-        """Contacts since the start or the last reset, oldest first."""
+        """Contacts since the start or the last reset, in the order in which they began."""
         return self._contact_log.contacts
 
     def reset(self) -> None:
-        """Back to the start poses without commands or contacts; the clock goes on."""
+        """Return to the start poses without commands or contacts; the clock continues."""
         self._world.reset(self._starts)
         self._begin()
 
     def close(self) -> None:
-        """Free the physics engine; nothing else may be called afterwards."""
+        """Free the physics engine; call nothing else afterwards."""
         self._world.close()
 
     @property
     def is_open(self) -> bool:
-        """False once the window has been closed."""
+        """False after the window was closed."""
         return self._world.is_open
 
     def set_command(self, robot: int, twist: Twist2D) -> None:
-        """Velocity for a quadcopter, from the next step on. Raises ValueError if not finite."""
+        """Set the commanded velocity of a quadcopter, from the next step on.
+
+        Raises:
+            ValueError: The velocity is not finite.
+        """
         if not twist.is_finite:
-            raise ValueError(f"command for quadcopter {robot} is not finite: {twist}")
+            raise ValueError(f"quad{robot}: command is not finite: {twist}")
         self._commands[robot] = limit_command(twist, self.params.flight)
         self._hover_step[robot] = self.step_count + self._command_steps
         self._next_hover_step = min(self._next_hover_step, self._hover_step[robot])
 
     def step(self) -> List[Contact]:
-        """Advance by ``STEP_S``; returns the contacts that begin."""
+        """Advance by one step; return the contacts that begin."""
         return self.advance(1)
 
     def advance(self, steps: int) -> List[Contact]:
-        """Advance by so many ``STEP_S``; returns the contacts that begin."""
+        """Advance by a number of steps; return the contacts that begin."""
         end = self.step_count + steps
         contacts: List[Contact] = []
         while self.step_count < end:
@@ -214,10 +242,13 @@ class Simulation:
                 contacts += self._step_with_engine(in_engine)
         return contacts
 
-    def _fly_freely(self, in_engine: np.ndarray, end: int) -> bool:
-        """All others up to a step; False if fewer, because the engine has to move more.
+    def _fly_freely(self, in_engine: NDArray[np.bool_], end: int) -> bool:
+        """Move quadcopters that are not in the engine up to a step.
 
-        With somebody in the engine that has to make the same step, time goes on there.
+        The step count advances here only if no quadcopter is in the engine.
+
+        Returns:
+            False if a quadcopter came near something before that step and is in the engine now.
         """
         state, done, near = self._free_flight.advance(
             self._state, self._commands, in_engine, end - self.step_count
@@ -230,7 +261,7 @@ class Simulation:
             self.step_count += done
         return not near
 
-    def _step_with_engine(self, in_engine: np.ndarray) -> List[Contact]:
+    def _step_with_engine(self, in_engine: NDArray[np.bool_]) -> List[Contact]:
         forces, torques = self._law.thrust_and_torque(
             self._state, self._commands, self.scene.altitude_m
         )
@@ -240,44 +271,54 @@ class Simulation:
         return self._contact_log.update(self.now_s, self._world.touches())
 
     def _hover(self) -> None:
-        """Commands that are too old count for nothing from now on."""
+        """Replace commands that have timed out by zero velocity."""
         is_hovering = self.is_hovering
         self._commands[is_hovering] = 0.0
         self._next_hover_step = np.min(self._hover_step[~is_hovering], initial=math.inf)
 
     @property
     def body_state(self) -> BodyState:
-        """All quadcopters as arrays, in ``map``."""
+        """State of all quadcopters in ``map``."""
         return self._state
 
     @property
-    def is_hovering(self) -> np.ndarray:
-        """bool[n]: no command has come yet or the last one is too old."""
+    def is_hovering(self) -> NDArray[np.bool_]:
+        """Mask bool[n] of the quadcopters without a command, or with one that has timed out."""
         return self.step_count > self._hover_step
 
     def state(self, robot: int) -> RobotState:
+        """Return the state of a quadcopter."""
         return _robot_state(self._state.rows[robot])
 
     def scan(self, robot: int) -> Scan:
-        """What the LIDAR of a quadcopter sees at this instant."""
+        """Return a scan of a quadcopter's LIDAR at the present time."""
         return self.scans([robot])[0]
 
     def scans(self, robots: Sequence[int]) -> List[Scan]:
-        """What the LIDARs of several quadcopters see at this instant, in one go."""
+        """Return scans of some quadcopters' LIDARs at the present time."""
         return self.lidars.scan(self._state, robots, self.now_s)
 
     def show_goals(self, spheres: Sequence[GoalSphere]) -> None:
-        """Draw goals in the window."""
+        """Replace the goals drawn in the window."""
         self._world.show_goals(spheres)
 
 
 def start_poses(
     scene: Scene, n_robots: int, jitter_m: float, seed: int, body_radius_m: float = BODY_RADIUS_M
 ) -> List[Pose2D]:
-    """Start poses of the first robots, displaced within a disc of radius ``jitter_m``.
+    """Displace the start poses of a scene at random.
 
-    Each stays clear of obstacles, walls and the robots before it. Raises
-    ``InputError`` when the scene has too few starts or no free place is found.
+    Each keeps clear of obstacles, walls and the starts before it.
+
+    Args:
+        scene: The scene.
+        n_robots: Number of start poses to use.
+        jitter_m: Radius of the disc around a start that it is displaced in.
+        seed: Seed of the displacements.
+        body_radius_m: Radius of the quadcopters' guards.
+
+    Raises:
+        InputError: The scene has too few starts, or a start has no free position around it.
     """
     if not 1 <= n_robots <= len(scene.starts):
         raise InputError(
@@ -323,8 +364,8 @@ def _displaced(
     raise InputError(
         [
             (
-                f"jitter: {jitter_m:g} m leaves no free start for quadcopter {robot} around "
-                f"({start.x_m:g}, {start.y_m:g}), expected a smaller one"
+                f"jitter: {jitter_m:g} m leaves no free start for quad{robot} around "
+                f"({start.x_m:g}, {start.y_m:g}), expected a smaller jitter"
             )
         ]
     )

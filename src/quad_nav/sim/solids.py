@@ -1,4 +1,4 @@
-"""A scene's obstacles and walls as the arrays that the LIDAR's kernel casts beams at."""
+"""Obstacles and walls of a scene as arrays for the LIDAR's kernel."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from typing import List, Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import yaw_rotations
 from quad_nav.kernels.lidar import SolidGrid, Solids
@@ -13,35 +14,35 @@ from quad_nav.kernels.rays import BOX, CYLINDER, SPHERE
 from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
 
 _MANY = 500
-"""Solids that are projected one by one in as long as beams need to walk through a grid."""
+"""Number of solids up to which projecting each is as fast as walking beams through a grid."""
 _LARGE_CELLS = 32
-"""Columns that a solid may cover in the grid; a larger one is projected."""
+"""Number of the grid's cells above which a solid is projected instead."""
 _MIN_CELL_M = 0.25
 _PADDING_M = 1e-6
-"""More than rounding: a solid is in every column that its faces touch."""
+"""More than rounding errors, so that a solid is in every cell that its faces touch."""
 
 
 def split_scene(scene: Scene) -> Tuple[Solids, SolidGrid]:
-    """The solids to project one by one, and those to walk through in a grid.
+    """Split a scene into solids that are projected one by one and those in a grid.
 
-    Up to some hundreds all are projected; beyond, only the large ones.
+    Up to ``_MANY`` solids all are projected, otherwise only the large ones.
     """
     solids = solids_of([*scene.wall_boxes(), *scene.obstacles])
     count = len(solids.kinds)
     if count <= _MANY:
-        return solids, grid_of(take(solids, np.zeros(0, int)), _MIN_CELL_M)
+        return solids, grid_of(select(solids, np.zeros(0, int)), _MIN_CELL_M)
     low, high = extents(solids)
     area_m2 = float(np.prod((high.max(axis=0) - low.min(axis=0))[:2]))
     cell_m = max(_MIN_CELL_M, math.sqrt(area_m2 / count))
     covered = np.prod((high - low)[:, :2] / cell_m + 1.0, axis=1)
     return (
-        take(solids, np.flatnonzero(covered > _LARGE_CELLS)),
-        grid_of(take(solids, np.flatnonzero(covered <= _LARGE_CELLS)), cell_m),
+        select(solids, np.flatnonzero(covered > _LARGE_CELLS)),
+        grid_of(select(solids, np.flatnonzero(covered <= _LARGE_CELLS)), cell_m),
     )
 
 
 def solids_of(obstacles: Sequence[Obstacle]) -> Solids:
-    """One row for each obstacle."""
+    """Return the solids with a row for each obstacle."""
     kinds, centres, yaws, sizes = [], [], [], []
     for solid in obstacles:
         kind, yaw_rad, size = _shape(solid)
@@ -58,7 +59,7 @@ def solids_of(obstacles: Sequence[Obstacle]) -> Solids:
 
 
 def _shape(solid: Obstacle) -> Tuple[int, float, Tuple[float, float, float]]:
-    """Kind, yaw and sizes as in ``kernels.rays``."""
+    """Return kind, yaw and sizes as in ``kernels.rays``."""
     if isinstance(solid, Box):
         return BOX, solid.yaw_rad, (solid.size_x_m / 2, solid.size_y_m / 2, solid.height_m / 2)
     if isinstance(solid, Sphere):
@@ -66,18 +67,18 @@ def _shape(solid: Obstacle) -> Tuple[int, float, Tuple[float, float, float]]:
     return CYLINDER, 0.0, (solid.radius_m, solid.radius_m, solid.height_m / 2)
 
 
-def take(solids: Solids, rows: np.ndarray) -> Solids:
-    """Some of them, int64[k]."""
+def select(solids: Solids, rows: NDArray[np.int64]) -> Solids:
+    """Return the solids in some rows, int64[k]."""
     return Solids(*(column[rows] for column in solids))
 
 
 def join(first: Solids, second: Solids) -> Solids:
-    """All of both."""
+    """Return the solids of both."""
     return Solids(*(np.concatenate(columns) for columns in zip(first, second)))
 
 
-def extents(solids: Solids) -> Tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corners float64[s, 3] of upright boxes around solids."""
+def extents(solids: Solids) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return lower and upper corners float64[s, 3] of the solids' bounding boxes in ``map``."""
     reach = np.sum(np.abs(solids.rotations) * solids.sizes[:, :, None], axis=1) + _PADDING_M
     round_ = solids.kinds != BOX
     reach[round_] = solids.sizes[round_] + _PADDING_M  # they have no corners, and stand upright
@@ -85,7 +86,7 @@ def extents(solids: Solids) -> Tuple[np.ndarray, np.ndarray]:
 
 
 def grid_of(solids: Solids, cell_m: float) -> SolidGrid:
-    """Solids that rest, sorted into the square columns that they reach into."""
+    """Sort static solids into the square cells of a horizontal grid that they reach into."""
     if len(solids.kinds) == 0:
         return SolidGrid(
             solids,

@@ -1,20 +1,22 @@
-"""Gazebo worlds as obstacles: ``.world`` and ``.sdf`` files.
+"""Gazebo worlds as obstacles: ``.world`` and ``.sdf`` files, and the models that they include.
 
-Boxes, cylinders and spheres of the models' collisions become obstacles, a plane at
-z = 0 is the floor. Everything else that could be touched is left out by name, with the
-reason. Poses are composed along world, models in models, link and collision; a saved
-``<state>`` has the last word on where models and links are, as in Gazebo.
+Boxes, cylinders and spheres of the models' collisions become obstacles. A plane at z = 0 is the
+floor. A remark names every other solid that is left out, with the reason. Poses are composed
+along world, nested models, link and collision. As in Gazebo, a saved ``<state>`` overrides the
+poses of models and links.
 """
 
 from __future__ import annotations
 
+import os
+import re
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
+from quad_nav.files.user_files import referenced_file
 from quad_nav.geometry import Pose3D
-from quad_nav.sim.model_folders import find_model
 from quad_nav.sim.scene import Obstacle
 from quad_nav.sim.sdf_shapes import obstacle_of
 from quad_nav.sim.sdf_values import IDENTITY, NotRepresented, SdfReader, is_true
@@ -22,19 +24,20 @@ from quad_nav.sim.xml_tree import Element, read_xml
 
 MAX_OBSTACLES = 100_000
 MAX_INCLUDES = 16
-"""Files inside each other; one that includes itself would never end."""
+"""Depth of included files; without a limit, a file that includes itself never ends."""
 MAX_PARTS = 200_000
-"""Models, links and collisions; files that include each other twice would make it 2^16."""
+"""Number of models, links and collisions, included ones too: nested files multiply them."""
 MAX_BYTES = 64 * 1024 * 1024
-"""Of the world and all the files that it includes, each counted once."""
+"""Size of the world and of all files that it includes, each counted once."""
 
 _LONGEST_NAME = 200
+_SCHEME = "model://"
 _OTHER_SOLIDS = ("actor", "population", "road")
 
 
 @dataclass(frozen=True)
 class GazeboWorld:
-    """What stands in a world, and remarks on what of it does not stand in ours."""
+    """Obstacles of a world, and remarks on solids that are left out."""
 
     obstacles: Tuple[Obstacle, ...]
     remarks: Tuple[str, ...]
@@ -42,6 +45,8 @@ class GazeboWorld:
 
 @dataclass
 class _Findings:
+    """Results so far of reading a world and the files that it includes."""
+
     obstacles: List[Obstacle] = field(default_factory=list)
     left_out: Dict[str, List[str]] = field(default_factory=dict)
     not_static: List[str] = field(default_factory=list)
@@ -51,14 +56,14 @@ class _Findings:
     parts: int = 0
 
     def read(self, path: Path) -> Element:
-        """The root of a file, read once however often it is included."""
+        """Return the root of a file; read a file once even if it is included repeatedly."""
         if path not in self.files:
             self.files[path] = read_xml(path)
             self.bytes_read += path.stat().st_size
             if self.bytes_read > MAX_BYTES:
                 raise InputError(
                     [
-                        f"{path}: makes it {self.bytes_read} bytes of included files, "
+                        f"{path}: brings the included files to {self.bytes_read} bytes, "
                         f"expected {MAX_BYTES} at most"
                     ]
                 )
@@ -69,8 +74,8 @@ class _Findings:
         if self.parts > MAX_PARTS:
             raise InputError(
                 [
-                    f"{path}: more than {MAX_PARTS} models, links and collisions with "
-                    "what is included"
+                    f"{path}: more than {MAX_PARTS} models, links and collisions, "
+                    "included ones counted"
                 ]
             )
 
@@ -81,8 +86,11 @@ class _Findings:
 def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
     """Read a world, or a file with models only.
 
-    ``<include>`` finds ``model://`` beside the file, in a folder ``models`` there or one
-    up, and in the folders of ``model_path``. Raises ``InputError`` with every fault.
+    ``<include>`` looks for ``model://`` beside the file, in the folders ``models`` there and one
+    level up, and in the folders of ``model_path``.
+
+    Raises:
+        InputError: A file has faults; lists all of them.
     """
     findings = _Findings()
     root = findings.read(path)
@@ -114,14 +122,14 @@ def _remarks(path: Path, findings: _Findings) -> List[str]:
     ]
     if findings.not_static:
         remarks.append(
-            f"{path}: not static in Gazebo, stands fixed here: {', '.join(findings.not_static)}"
+            f"{path}: not static in Gazebo, but fixed here: {', '.join(findings.not_static)}"
         )
     return remarks
 
 
 @dataclass(frozen=True)
 class _Walk:
-    """Through the models of one file; included files get a walk of their own."""
+    """Traversal of the models of one file; each included file gets its own."""
 
     reader: SdfReader
     findings: _Findings
@@ -131,7 +139,7 @@ class _Walk:
     def models(
         self, parent: Element, map_from_parent: Pose3D, prefix: str, state: Optional[Element]
     ) -> None:
-        """Everything in a world or model that is a model itself."""
+        """Read the models in a world or model, included ones too."""
         for child in parent.children:
             if child.tag not in ("model", "include"):
                 continue
@@ -179,7 +187,7 @@ class _Walk:
         if uri == "model://sun":
             return
         if self.depth >= MAX_INCLUDES:
-            self.reader.fault(include, f"more than {MAX_INCLUDES} files inside each other")
+            self.reader.fault(include, f"more than {MAX_INCLUDES} nested files")
             return
         path = find_model(uri, self.folders)
         if path is None:
@@ -227,7 +235,7 @@ class _Walk:
 
 
 def _state_of(state: Optional[Element], tag: str, name: str) -> Optional[Element]:
-    """What a saved state says on a model or link."""
+    """Return the element of a model or link in a saved state."""
     if state is None:
         return None
     return next((e for e in state.all(tag) if e.attributes.get("name") == name), None)
@@ -237,3 +245,44 @@ def _name_of(element: Element, default: str = "") -> str:
     given = element.text_of("name") if element.tag == "include" else element.attributes.get("name")
     name = given or default or element.text_of("uri").split("/")[-1] or element.tag
     return "".join(c if c.isprintable() else "?" for c in name[:_LONGEST_NAME])
+
+
+def find_model(uri: str, folders: Sequence[Path]) -> Optional[Path]:
+    """Return the SDF file of a model in the first folder that has it, None if none has.
+
+    ``model://name`` is a folder. Its ``model.config`` names the file, or several, of which the one
+    with the highest version counts. Without ``model.config`` it is ``model.sdf``. URIs that lead
+    out of the folders are not found.
+
+    Raises:
+        InputError: A link or a ``model.config`` leads out of the folders.
+    """
+    name = PurePosixPath(uri[len(_SCHEME) :] if uri.startswith(_SCHEME) else uri)
+    if "://" in str(uri[len(_SCHEME) :]) or name.is_absolute() or ".." in name.parts:
+        return None
+    if not name.parts:
+        return None
+    for folder in folders:
+        place = folder / name
+        if not os.path.exists(place):  # Path.exists raises where a name is too long
+            continue
+        referenced_file(folder, str(name), folders)
+        path = _sdf_in(place, folders) if place.is_dir() else place
+        if os.path.exists(path):
+            return path
+    return None
+
+
+def _sdf_in(folder: Path, folders: Sequence[Path]) -> Path:
+    config = folder / "model.config"
+    if not config.exists():
+        return folder / "model.sdf"
+    named = [
+        (_version(sdf.attributes.get("version", "")), sdf.text.strip())
+        for sdf in read_xml(config).all("sdf")
+    ]
+    return referenced_file(folder, max(named)[1] if named else "model.sdf", folders)
+
+
+def _version(text: str) -> Tuple[int, ...]:
+    return tuple(int(part) for part in text.split(".") if re.fullmatch("[0-9]{1,9}", part))

@@ -1,7 +1,7 @@
-"""XML files as trees whose elements know their line, the only file that imports defusedxml.
+"""XML files as trees of elements with line numbers; the only module that imports defusedxml.
 
-Entities and document type definitions are refused: they can make a small file fill
-the memory or read other files.
+Entities and document type definitions are refused: with them a small file can fill the memory or
+read other files.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MAX_ELEMENTS = 1_000_000
 
 @dataclass
 class Element:
-    """One element: its name, attributes, text, the elements in it and where it starts."""
+    """Element of an XML file; ``line`` is the one on which it starts."""
 
     tag: str
     attributes: Dict[str, str]
@@ -35,20 +35,25 @@ class Element:
     children: List[Element] = field(default_factory=list)
 
     def all(self, tag: str) -> Iterator[Element]:
-        """The elements directly in it that are called ``tag``."""
+        """Return the children with a tag."""
         return (child for child in self.children if child.tag == tag)
 
     def first(self, tag: str) -> Optional[Element]:
+        """Return the first child with a tag, None if there is none."""
         return next(self.all(tag), None)
 
     def text_of(self, tag: str, default: str = "") -> str:
-        """The text of the first such element in it."""
+        """Return the text of the first child with a tag."""
         child = self.first(tag)
         return default if child is None else child.text.strip()
 
 
 def read_xml(path: Path) -> Element:
-    """The root element of a file. Raises ``InputError`` with the line if it is not XML."""
+    """Read an XML file and return its root element.
+
+    Raises:
+        InputError: The file cannot be read, is not XML, or is too large; with the line.
+    """
     builder = _Builder(path)
     content = read_bytes(path, MAX_BYTES)
     try:
@@ -71,7 +76,7 @@ def read_xml(path: Path) -> Element:
 
 
 class _Builder(ContentHandler):
-    def __init__(self, path: Path):
+    def __init__(self, path: Path) -> None:
         super().__init__()
         self._path = path
         self._open: List[Element] = []

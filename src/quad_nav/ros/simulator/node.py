@@ -185,7 +185,7 @@ class SimulatorNode:
 
     def _advance(self) -> None:
         """Do the steps that are due, then sleep until the clock's next tick."""
-        for _ in range(self._pacer.take_due(time.monotonic())):
+        for _ in range(self._pacer.pop_due(time.monotonic())):
             self._step()
         steps = self._steps_per_clock - self._simulation.step_count % self._steps_per_clock
         time.sleep(self._pacer.wait_s(time.monotonic(), steps))
