@@ -1,4 +1,4 @@
-"""``quad check``: which files belong together, what is told about them, and the exit status."""
+"""``quad check``: sets of files, faults and remarks, exit status."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def sets(folder, number=None):
     return found
 
 
-# -- which files -------------------------------------------------------------------------
+# -- sets of files -----------------------------------------------------------------------
 
 
 def test_shipped_configurations_have_no_errors():
@@ -167,7 +167,7 @@ def test_where_a_file_is_loaded(tmp_path, name, text, namespaces):
         (".hidden/move_base.yaml", "controller_frequency: 5.0"),
     ],
 )
-def test_what_is_not_move_bases(tmp_path, name, text):
+def test_files_of_other_nodes_are_left_out(tmp_path, name, text):
     write(tmp_path, {name: text})
     assert file_sets(tmp_path) == ([], [] if "hidden" in name else [tmp_path / name])
     status, output = quad(tmp_path)
@@ -192,7 +192,7 @@ def test_a_costmaps_name_before_a_file(tmp_path):
     assert "local_costmap/widht" in output and "global_costmap/widht" not in output
 
 
-# -- what is told ------------------------------------------------------------------------
+# -- reports -----------------------------------------------------------------------------
 
 
 def test_table(tmp_path, monkeypatch):
@@ -268,7 +268,7 @@ def test_files_that_cannot_be_read_hide_no_other_errors(tmp_path):
     assert report.lines[1].place == "/global_costmap/width"
 
 
-def test_a_file_that_is_not_there(tmp_path):
+def test_missing_file(tmp_path):
     status, output = quad(tmp_path / "nowhere.yaml")
     assert status == 2
     assert "cannot be read" in output
@@ -315,7 +315,7 @@ def test_tables_keep_to_the_width(width):
     assert "recovery_behavior_enabled" in text
 
 
-def test_what_differs_between_the_costmaps_is_told_of_each(tmp_path):
+def test_remarks_that_differ_between_the_costmaps_are_not_merged(tmp_path):
     write(
         tmp_path,
         {

@@ -35,7 +35,7 @@ def test_nothing_set_gives_an_obstacle_and_an_inflation_layer():
     assert (costmap.robot_radius_m, costmap.width_m, costmap.resolution_m) == (0.46, 10.0, 0.05)
 
 
-def test_sizes_that_no_grid_can_have_are_all_told():
+def test_sizes_out_of_range_are_all_reported():
     with pytest.raises(InputError) as caught:
         load(
             {
@@ -77,7 +77,7 @@ def test_static_map_puts_a_static_layer_first_and_moves_its_parameters():
     assert costmap.layers[1][1].track_unknown_space is True
 
 
-def test_old_style_sources_move_below_the_obstacle_layer():
+def test_old_style_sources_move_into_the_obstacle_layer():
     tree = {
         "observation_sources": "front  rear",
         "max_obstacle_height": 0.25,
@@ -117,7 +117,7 @@ def test_plugins_give_order_names_and_namespaces():
     assert (obstacles.obstacle_range_m, obstacles.combination_method) == (4.0, 99)
 
 
-def test_parameters_of_the_costmap_replace_the_layers_even_with_plugins():
+def test_parameters_of_the_costmap_override_the_layers_even_with_plugins():
     tree = {
         "plugins": [OBSTACLE, INFLATION],
         "inflation_radius": 0.8,
@@ -190,7 +190,7 @@ def test_an_obstacle_layer_reads_no_voxels():
     ) in told
 
 
-def test_unsupported_layers_are_left_out_and_told():
+def test_unsupported_layers_are_skipped_with_a_remark():
     depth = {"name": "depth", "type": "costmap_2d::FetchDepthLayer"}
     configuration = load({"local_costmap": {"plugins": [depth, INFLATION], "depth": {"x": 1}}}, "")
     assert [name for name, _ in configuration.local_costmap.layers] == ["inflater"]
@@ -208,7 +208,7 @@ def test_a_layer_may_be_named_as_an_old_switch():
 @pytest.mark.parametrize(
     "footprint", [[[0.3, 0.2], [0.3, -0.2], [-0.25, 0]], "[[0.3,0.2], [0.3,-0.2], [-0.25,0]]"]
 )
-def test_footprint_is_a_list_or_a_text_of_float32(footprint):
+def test_footprint_is_a_list_or_a_string_of_float32(footprint):
     configuration = load({"local_costmap": {"footprint": footprint, "robot_radius": 0.4}}, "")
     expected = (
         (np.float32(0.3), np.float32(0.2)),
@@ -218,19 +218,19 @@ def test_footprint_is_a_list_or_a_text_of_float32(footprint):
     assert configuration.local_costmap.footprint == expected
 
 
-def test_list_footprint_is_left_as_a_text():
+def test_list_footprint_becomes_a_string():
     tree = load({"local_costmap": {"footprint": [[0.3, 0.2], [0.3, -0.2], [-1, 0]]}}, "").to_tree()
     assert tree["local_costmap"]["footprint"] == "[[0.3,0.2],[0.3,-0.2],[-1,0]]"
 
 
-def test_footprint_and_ranges_are_looked_for_upwards():
+def test_footprint_and_ranges_are_inherited():
     tree = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}}
     costmap = local_costmap(tree, robot_radius=0.2, obstacle_range=1.25)
     assert costmap.robot_radius_m == 0.2
     assert dict(costmap.layers)["obstacle_layer"].obstacle_range_m == 1.25
 
 
-def test_a_value_that_came_from_above_is_complained_about_there():
+def test_faults_of_inherited_values_name_their_origin():
     with pytest.raises(InputError) as caught:
         load({"obstacle_range": "far"}, "/nav")
     assert caught.value.problems == [

@@ -1,4 +1,4 @@
-"""What differs from the original's defaults, and how the report tells it."""
+"""Differences from move_base's defaults, and their rows in the report."""
 
 from __future__ import annotations
 
@@ -75,18 +75,18 @@ def test_costmaps_and_robots_share_rows():
     assert ParameterRow("*_costmap/robot_base_frame", "base_link{i}", "base_link", "") in rows
     assert ParameterRow("*_costmap/robot_radius", "0.35", "0.46", "metres") in rows
     assert ParameterRow("global_costmap/width", "12", "10", "metres") in rows
-    assert not any(row.who for row in rows)
+    assert not any(row.robots for row in rows)
     assert len(rows) == len(set(row.path for row in rows))
 
 
-def test_what_one_robot_alone_has_names_it():
+def test_rows_of_one_robot_name_it():
     rows = parameter_rows(
         flight(
             robot(0, (1.0, 1.0), parameters=tree_of(0)),
             robot(1, (2.0, 1.0), parameters=tree_of(1, controller_frequency=5.0)),
         )
     )
-    assert [(row.value, row.who) for row in rows if row.path == "controller_frequency"] == [
+    assert [(row.value, row.robots) for row in rows if row.path == "controller_frequency"] == [
         ("1", "quad0"),
         ("5", "quad1"),
     ]

@@ -1,4 +1,4 @@
-"""The tree of DWAPlannerROS: defaults, old names, and where the latch is looked for."""
+"""The namespace of DWAPlannerROS: defaults, old names, inherited latch."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_every_field_has_a_spelling_and_the_same_default():
     }
 
 
-def test_defaults_are_values_that_may_be_written():
+def test_defaults_are_valid():
     for parameter in DWA_TABLE.parameters:
         assert parameter.clamp(parameter.check(parameter.default)) == parameter.default
 
@@ -74,7 +74,7 @@ def test_values_reach_their_fields():
         ("rot_stopped_vel", "theta_stopped_vel"),
     ],
 )
-def test_old_names_change_nothing_and_are_told(old, new):
+def test_old_names_have_no_effect_and_a_remark(old, new):
     tree, notes = normalised({old: 0.7})
     assert dwa_params(tree) == DwaParams()
     assert [(remark.kind, remark.place) for remark in notes.remarks] == [
@@ -87,7 +87,7 @@ def test_old_names_change_nothing_and_are_told(old, new):
     "own, node_level, in_force",
     [(None, None, False), (True, None, True), (None, True, True), (False, True, False)],
 )
-def test_latch_is_looked_for_upwards(own, node_level, in_force):
+def test_latch_is_inherited(own, node_level, in_force):
     name = "latch_xy_goal_tolerance"
     tree, notes = normalised(
         {} if own is None else {name: own}, **({} if node_level is None else {name: node_level})
@@ -96,14 +96,14 @@ def test_latch_is_looked_for_upwards(own, node_level, in_force):
     assert dwa_params(tree).latch_xy_goal_tolerance == in_force
 
 
-def test_a_latch_that_is_no_flag():
+def test_latch_that_is_not_a_boolean():
     _, notes = normalised({}, latch_xy_goal_tolerance="yes")
     assert notes.problems == [
         "/move_base0/latch_xy_goal_tolerance: 'yes' is not a boolean; expected true or false"
     ]
 
 
-def test_what_cannot_be_is_a_problem_and_what_is_odd_a_remark():
+def test_faults_and_remarks():
     tree, notes = normalised(
         {
             "sim_time": 0.0,

@@ -1,4 +1,4 @@
-"""Values that cannot be used: each is an error with its place, all of them at once."""
+"""Faults: each has its place and what was expected; all are reported at once."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_fault_is_named_with_place_and_expectation(tree, complaint):
     assert problems(tree) == ["/move_base0/" + complaint]
 
 
-def test_all_faults_are_told_at_once():
+def test_all_faults_are_reported_at_once():
     told = problems(
         {
             "conservative_reset_dist": "far",
@@ -156,7 +156,7 @@ def test_all_faults_are_told_at_once():
     ]
 
 
-def test_a_tree_that_is_none():
+def test_tree_that_is_not_a_mapping():
     assert problems([1, 2]) == [
         "/move_base0: [1, 2] is not a parameter tree; expected names with values"
     ]

@@ -1,4 +1,4 @@
-"""YAML files: where each goes, the robot's number, and what is wrong with them."""
+"""YAML files: namespaces, the robot's number, and errors."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_every_broken_file_is_named_with_its_line(folder):
     )
 
 
-def test_tabs_are_told_as_yaml_tells_them(folder):
+def test_tabs_are_a_yaml_error(folder):
     (folder / "local_costmap_params.yaml").write_text("local_costmap:\n\twidth: 1\n")
     (told,) = problems(folder, {"i": "0"})
     assert told.startswith(f"{folder / 'local_costmap_params.yaml'}:2:1: not YAML: ")

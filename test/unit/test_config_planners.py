@@ -1,4 +1,4 @@
-"""Which planners fly, with which parameters, and what is said about the others."""
+"""Choice of planners: their parameters, and remarks on those that are not chosen."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SEARCH = {"base_global_planner": "global_planner/GlobalPlanner"}
 
 
 def told(tree):
-    """(kind, line) of each remark; costmaps that see, so that blindness is not among them."""
+    """(kind, line) of each remark; the costmaps have sources, so that none is on empty costmaps."""
     tree = {"global_costmap": dict(SEEING), "local_costmap": dict(SEEING), **tree}
     return [(remark.kind, str(remark)) for remark in load(tree, "/nav").remarks]
 
@@ -121,7 +121,7 @@ def test_carrot_has_the_footprint_in_force():
     ],
     ids=str,
 )
-def test_the_one_remark(tree, kind, line):
+def test_only_remark(tree, kind, line):
     assert told(tree) == [(kind, "/nav/" + line)]
 
 
@@ -146,7 +146,7 @@ def test_dwa_flies_with_its_own_parameters_and_those_at_the_nodes_level():
     assert list(reconfigurable(changed))[:2] == ["", "DWAPlannerROS"]
 
 
-def test_turns_take_their_limits_from_the_trajectory_planner_when_it_does_not_fly():
+def test_rotations_read_limits_of_the_trajectory_planner_when_it_is_not_chosen():
     tree = {**DWA, "TrajectoryPlannerROS": {"max_vel_theta": 0.4, "max_vel_x": "not read"}}
 
     configuration = load(tree, "/nav")
@@ -201,7 +201,7 @@ def test_planners_without_reconfigurable_parameters():
             updated(load({"base_global_planner": name}), name, {})
 
 
-def test_a_planner_cannot_be_exchanged_in_flight():
+def test_planners_cannot_change_in_flight():
     with pytest.raises(
         InputError,
         match="^base_global_planner: planners cannot change in flight, got 'navfn/NavfnROS';"
@@ -212,7 +212,7 @@ def test_a_planner_cannot_be_exchanged_in_flight():
     assert same.navigator.planner_frequency_hz == 1.0
 
 
-def test_a_choice_that_is_none():
+def test_invalid_choice():
     for value, expected in (
         (3, "3 is not a string; expected a plugin's name"),
         (None, "None is not a string; expected a plugin's name"),

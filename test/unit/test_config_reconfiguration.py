@@ -1,4 +1,4 @@
-"""Changes while a configuration is in force, and what dynamic_reconfigure is told about them."""
+"""Changes in flight, and the description for dynamic_reconfigure."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_values_are_clamped(configuration):
     assert planner.vx_samples == 300
 
 
-def test_first_change_of_move_base_brings_the_described_controller_patience(configuration):
+def test_first_change_of_move_base_sets_the_described_controller_patience(configuration):
     assert configuration.navigator.controller_patience_s == 15.0
     changed = updated(configuration, "", {"planner_frequency": 2.0})
     assert changed.navigator.planner_frequency_hz == 2.0
@@ -157,7 +157,7 @@ def test_restore_defaults_goes_back_to_what_was_loaded(configuration):
     assert restored.to_tree() == configuration.to_tree()
 
 
-def test_changes_that_cannot_be_made_are_all_told_and_none_is_made(configuration):
+def test_all_refused_changes_are_reported_and_none_is_made(configuration):
     with pytest.raises(InputError) as caught:
         updated(
             configuration,
@@ -180,7 +180,7 @@ def test_changes_that_cannot_be_made_are_all_told_and_none_is_made(configuration
     assert configuration.navigator.planner_frequency_hz == 0.0
 
 
-def test_size_that_no_grid_can_have_is_refused(configuration):
+def test_size_out_of_range_is_refused(configuration):
     with pytest.raises(InputError) as caught:
         updated(configuration, "global_costmap", {"width": 21474836})
     assert caught.value.problems == [
@@ -193,7 +193,7 @@ def test_size_that_no_grid_can_have_is_refused(configuration):
         updated(configuration, "local_costmap", {"resolution": 20.0})
 
 
-def test_more_trajectories_than_can_be_looked_at_are_refused(configuration):
+def test_too_many_trajectories_are_refused(configuration):
     with pytest.raises(InputError) as caught:
         updated(configuration, "TrajectoryPlannerROS", {"sim_granularity": 1e-8})
     # 20 x 20 samples, 0.3 m/s for 1.7 s
@@ -231,6 +231,6 @@ def test_names_and_namespaces_that_do_not_exist(configuration):
         updated(configuration, "NavfnROS", {})
 
 
-def test_dynamic_reconfigures_own_groups_are_passed_over(configuration):
+def test_groups_of_dynamic_reconfigure_are_ignored(configuration):
     changed = updated(configuration, "local_costmap", {"groups": {"id": 0}, "width": 4})
     assert changed.local_costmap.width_m == 4.0

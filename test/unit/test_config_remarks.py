@@ -1,4 +1,4 @@
-"""What is legal and yet worth a line: unknown, unsupported, ignored, clamped, renamed."""
+"""Remarks on legal parameters: unknown, unsupported, ignored, clamped, renamed, caution."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SEEING = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}}
 
 
 def remarks(tree):
-    """(kind, line) of each remark; costmaps that see, so that blindness is not among them."""
+    """(kind, line) of each remark; the costmaps have sources, so that none is on empty costmaps."""
     tree = {"global_costmap": dict(SEEING), "local_costmap": dict(SEEING), **tree}
     return [(remark.kind, str(remark)) for remark in load(tree, "/nav").remarks]
 
@@ -214,7 +214,7 @@ def test_ordinary_parameters_need_no_remark():
     assert remarks({"controller_frequency": 10.0, **planner(max_vel_x=0.5, dwa=True)}) == []
 
 
-def test_old_names_count_unless_the_new_one_is_there():
+def test_old_names_work_unless_the_new_one_is_set():
     alone = load(planner(gdist_scale=2.0, min_in_place_rotational_vel=0.3), "").local_planner
     assert (alone.goal_distance_bias, alone.min_in_place_vel_theta_radps) == (2.0, 0.3)
     both = load(planner(gdist_scale=2.0, goal_distance_bias=1.0), "").local_planner
@@ -228,7 +228,7 @@ def test_rollouts_assume_the_planners_own_rate_then_the_nodes():
     assert load(planner(controller_frequency=-1.0), "").local_planner_period_s == 0.05
 
 
-def test_listed_recoveries_are_flown_in_their_order_with_their_parameters():
+def test_listed_recoveries_keep_their_order_and_parameters():
     tree = {
         "recovery_behaviors": [
             {"name": "look", "type": "rotate_recovery/RotateRecovery"},
@@ -257,7 +257,7 @@ def test_listed_recoveries_are_flown_in_their_order_with_their_parameters():
     )
 
 
-def test_going_slowly_limits_every_speed_of_the_planner():
+def test_move_slow_limits_every_speed_of_the_planner():
     ((name, params),) = load(slow(limited_trans_speed=0.1, clearing_distance=1), "").recoveries
     assert name == "slow"
     assert params == MoveSlowAndClearParams(
@@ -273,7 +273,7 @@ def test_going_slowly_limits_every_speed_of_the_planner():
     )
 
 
-def test_going_slowly_limits_the_local_planner_that_flies():
+def test_move_slow_limits_the_chosen_local_planner():
     tree = {
         **slow(planner_namespace="DWAPlannerROS", max_trans_param_name="max_trans_vel"),
         "base_local_planner": "dwa_local_planner/DWAPlannerROS",
@@ -291,7 +291,7 @@ def test_going_slowly_limits_the_local_planner_that_flies():
     assert params.rotation_fields == ("max_vel_theta_radps", "min_vel_theta_radps")
 
 
-def test_the_names_of_speeds_may_be_the_originals_or_the_planners():
+def test_names_of_speeds_may_be_upstream_or_of_the_planner():
     names = {
         "planner_namespace": "TrajectoryPlannerROS",
         "max_trans_param_name": "max_vel_x",

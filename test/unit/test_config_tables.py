@@ -104,7 +104,7 @@ def test_every_switch_has_an_owner_with_the_same_default():
 
 
 @pytest.mark.parametrize("table", TABLES)
-def test_defaults_are_values_that_may_be_written(table):
+def test_defaults_are_valid(table):
     for parameter in table.parameters:
         for value in (parameter.default, parameter.in_force):
             assert parameter.clamp(parameter.check(value)) == value, parameter.name

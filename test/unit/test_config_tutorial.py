@@ -1,4 +1,4 @@
-"""The tutorial's files: exactly these values, and the tree that the original makes of them."""
+"""The tutorial's files: exactly these values, and the tree that move_base makes of them."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_there_are_no_other_files():
     assert {path.stem for path in (CONFIG / "tutorial").iterdir()} == set(WRITTEN)
 
 
-def test_tree_is_what_the_original_leaves_on_the_parameter_server():
+def test_tree_is_what_move_base_leaves_on_the_parameter_server():
     left = load(tutorial(), "/move_base0").to_tree()
     recorded = yaml.safe_load(RECORDED.read_text())
     del left["fixes"]  # not in the original
@@ -118,7 +118,7 @@ def test_a_restarted_node_finds_its_own_tree_and_flies_the_same():
     assert len(second.remarks) == len(first.remarks)
 
 
-def test_only_the_long_update_period_is_remarked_on():
+def test_only_remark_is_on_the_long_update_period():
     remarks = load(tutorial(), "/move_base0").remarks
     told = [(remark.kind, remark.text.split()[0]) for remark in remarks]
     assert told == [("caution", "21.0")] * 2  # once for each costmap
@@ -161,7 +161,7 @@ def test_costmaps():
     assert configuration.global_costmap.resolution_m == 0.05
 
 
-def test_planner_keeps_the_defaults_that_dynamic_reconfigure_puts_in_force():
+def test_planner_keeps_the_defaults_of_dynamic_reconfigure():
     configuration = load(tutorial(), "/move_base0")
     planner = configuration.local_planner
     assert (planner.min_vel_theta_radps, planner.max_vel_theta_radps) == (-1.0, 0.7)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from pathlib import Path
-from typing import Iterator, List, Set
+from typing import Dict, Iterator, List, Set
 
 import pytest
 
@@ -117,6 +117,50 @@ def test_rules_refuse(module, statement):
 def test_rules_allow(module, statement):
     path = SOURCES / PACKAGE / module
     assert forbidden_imports(path, imported_names(statement, package_of(path))) == []
+
+
+def test_no_module_imports_itself_through_others():
+    assert import_circles(module_imports()) == []
+
+
+def test_circles_are_found():
+    assert import_circles({"a": {"b"}, "b": {"c", "d"}, "c": {"b"}, "d": set()}) == [{"b", "c"}]
+
+
+def module_imports() -> Dict[str, Set[str]]:
+    """Module -> the modules that it imports anywhere, packages' own ``__init__`` apart."""
+    names = {dotted_name(path): path for path in modules() if path.stem != "__init__"}
+    return {
+        name: {
+            part
+            for imported in imported_names(path.read_text(), package_of(path))
+            for part in (imported, imported.rpartition(".")[0])
+            if part in names and part != name
+        }
+        for name, path in names.items()
+    }
+
+
+def dotted_name(path: Path) -> str:
+    return ".".join(path.relative_to(SOURCES).with_suffix("").parts)
+
+
+def import_circles(imports: Dict[str, Set[str]]) -> List[Set[str]]:
+    """Sets of modules that all reach each other."""
+    reached = {name: set(imported) for name, imported in imports.items()}
+    changed = True
+    while changed:
+        changed = False
+        for found in reached.values():
+            more = set().union(*(reached[name] for name in found)) - found
+            found |= more
+            changed = changed or bool(more)
+    circles: List[Set[str]] = []
+    for name, found in reached.items():
+        circle = {other for other in found if name in reached[other]}
+        if name in found and circle not in circles:
+            circles.append(circle)
+    return circles
 
 
 def modules() -> Iterator[Path]:

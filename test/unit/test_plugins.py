@@ -1,4 +1,4 @@
-"""Plugins of the user's own: the examples of docs/plugins.md fly, and what cannot is refused."""
+"""Plugins: the examples of docs/plugins.md fly, and unfit classes are refused."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HERE, GOAL = Pose2D(1.0, 2.0, 0.0), Pose2D(3.0, 5.0, 1.0)
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """Writes modules of a package that is there for one test."""
+    """Writes modules of a package that exists for one test."""
     folder = tmp_path / "my_package"
     folder.mkdir()
     (folder / "__init__.py").touch()
@@ -67,7 +67,7 @@ def problems(tree):
 
 
 def fly(navigator, pose: Pose2D, goal: Pose2D, end_s: float):
-    """Ticks of a robot that does as it is told, until the goal ends."""
+    """Ticks of a robot that follows its commands until the goal ends."""
     ticks = [navigator.tick(0.0, RobotPoses(pose, pose), Twist2D())]
     navigator.set_goal(goal, 0.0)
     command, now_s = Twist2D(), 0.0
@@ -84,7 +84,7 @@ def fly(navigator, pose: Pose2D, goal: Pose2D, end_s: float):
     return ticks, pose
 
 
-def test_examples_load_without_a_remark_beyond_blindness(tree):
+def test_examples_load_with_remarks_on_empty_costmaps_only(tree):
     configuration = config.load(tree, "/nav")
 
     assert [remark.place for remark in configuration.remarks] == ["/nav/local_costmap"]
@@ -176,7 +176,7 @@ def test_nothing_of_a_plugin_is_reconfigurable(tree):
     ]
 
 
-def test_missing_parameter_is_told_with_its_place(tree):
+def test_error_on_a_missing_parameter_names_its_place(tree):
     del tree["back_off"]
     tree["global_costmap"]["pond"] = {"x": 1.0}
     configuration = config.load(tree)
@@ -187,7 +187,7 @@ def test_missing_parameter_is_told_with_its_place(tree):
         build_navigator(config.load(tree))
 
 
-def test_layers_switch_has_to_be_one(tree):
+def test_enabled_of_a_layer_has_to_be_a_boolean(tree):
     tree["global_costmap"]["pond"] = {"enabled": "no"}
     assert problems(tree) == [
         "/nav/global_costmap/pond/enabled: 'no' is not a boolean; expected true or false"
@@ -207,7 +207,7 @@ def test_namespace_of_a_plugin(name, expected):
     assert plugin_name(name) == expected
 
 
-def test_what_is_not_there(package):
+def test_missing_module_or_class(package):
     package("planners.py", "limit = 3\n")
     assert problems(
         {
@@ -285,7 +285,7 @@ def test_planner_that_lacks_something(package):
     ]
 
 
-def test_method_inherited_from_the_interface_is_none(package):
+def test_method_inherited_from_the_interface_does_not_count(package):
     package(
         "planners.py",
         """

@@ -1,15 +1,16 @@
-"""move_base's parameters: the only place that knows how ROS spells them.
+"""move_base's YAML tree to parameters of the core; the only package with ROS spellings.
 
     tree = load_files("config/tutorial", {"i": "0"})   # or rospy.get_param("~")
-    configuration = load(tree, "/move_base0")          # InputError names every fault
+    configuration = load(tree, "/move_base0")          # InputError lists every fault
     configuration.local_costmap.resolution_m           # dataclasses of the core
-    configuration.remarks                              # what is odd, unknown or unsupported
+    configuration.remarks                              # unknown, unsupported and odd parameters
     updated(configuration, "TrajectoryPlannerROS", {"max_vel_x": 0.5})
 
-Read ``spec`` (what a parameter is), ``tables`` and ``costmap_tables`` (which there
-are), ``reader`` (how a namespace is checked), ``costmaps``, ``layers``,
-``planners`` and ``recoveries`` (what move_base makes of each), ``configuration``
-(the whole), ``reconfiguration`` (changes in flight) and ``files`` (YAML).
+Reading order: ``spec`` (parameters and tables), ``tables`` (the tables), ``reader`` (check of a
+namespace), ``costmaps``, ``layers``, ``planners``, ``local_planners``, ``recoveries`` and ``fixes``
+(namespaces to dataclasses), ``configuration`` (the whole), ``reconfiguration`` (changes in flight),
+``files`` and ``file_sets`` (YAML), ``check`` (the report of ``quad check``), ``plugins`` (classes of
+users), ``reference`` (generates ``docs/parameters.md``).
 """
 
 from __future__ import annotations
