@@ -18,6 +18,8 @@ from quad_nav.sim.flight import GRAVITY_MPS2, BodyState, FlightLaw
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
 
+Floats = NDArray[np.float64]
+
 _MARGIN_M = 0.03
 """More than two quadcopters approach in a step, plus the engine's collision margin."""
 
@@ -40,11 +42,7 @@ class FreeFlight:
         )  # radius around checked_m in which nothing is near; 0 is not known
 
     def advance(
-        self,
-        bodies: BodyState,
-        commands: NDArray[np.float64],
-        excluded: NDArray[np.bool_],
-        steps: int,
+        self, bodies: BodyState, commands: Floats, excluded: NDArray[np.bool_], steps: int
     ) -> Tuple[BodyState, int, List[int]]:
         """Move quadcopters until one may touch something.
 

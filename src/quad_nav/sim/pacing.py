@@ -27,7 +27,11 @@ class Pacer:
         self._next_step_s = wall_s + self._wall_per_step_s
 
     def pop_due(self, wall_s: float) -> int:
-        """Return the number of steps to run now, and count them as run."""
+        """Return the number of steps to run now, and count them as run.
+
+        There are at most ``_MAX_BURST``, and no more than ``_MAX_LAG_S`` of wall time is caught
+        up.
+        """
         self._next_step_s = max(self._next_step_s, wall_s - _MAX_LAG_S)
         if wall_s < self._next_step_s:
             return 0
