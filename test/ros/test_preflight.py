@@ -3,12 +3,15 @@
 
 import json
 import os
+import shutil
 import subprocess
 import tempfile
 import unittest
 
+import rospkg
 import rostest
 
+QUAD = rospkg.RosPack().get_path("quad")
 ARGUMENTS = ["--dump-params", "quad", "two_quads.launch", "rviz:=false"]
 
 
@@ -41,9 +44,24 @@ class Preflight(unittest.TestCase):
                 written = json.load(file)
         self.assertEqual(status, 2)
         self.assertIn("has no quad0_goals.json, quad1_goals.json", errors)
-        self.assertIn("simulator: rate: is -1, expected a number above 0", errors)
+        self.assertIn("simulator: rate: is -1; expected a number above 0", errors)
         self.assertEqual(written["exit_status"], 2)
         self.assertEqual(len(written["problems"]), 2)
+
+    def test_goals_off_the_global_costmap_are_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            config = os.path.join(folder, "config")
+            shutil.copytree(os.path.join(QUAD, "config", "default"), config)
+            path = os.path.join(config, "global_costmap_params.yaml")
+            with open(path, encoding="utf-8") as file:
+                text = file.read()
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(text.replace("height: 12.0", "height: 3.0"))
+            for nav in ("quad", "move_base"):
+                status, errors = preflight(f"config:={config}", f"nav:={nav}")
+                self.assertEqual(status, 2)
+                self.assertIn("quad0_goals.json: goals[0] (goal 1)", errors)
+                self.assertIn("is off the global costmap, x 0 to 12 m, y 0 to 3 m", errors)
 
 
 if __name__ == "__main__":

@@ -178,13 +178,13 @@ def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
         )
     start, sensor, goal = error.value.problems
     assert "world 1: a cylinder is 0.03 m from the start" in start
-    assert "data_type PointCloud2, expected LaserScan" in sensor
+    assert "data_type PointCloud2; expected LaserScan" in sensor
     assert "(-2.25, 13) is off the global costmap, x 0 to 12 m" in goal
 
 
 def test_maps_are_refused_because_nobody_knows_the_worlds(tmp_path):
     path = write_worlds(tmp_path / "w.npz", w1=free())
-    with pytest.raises(InputError, match="there is no map of these worlds"):
+    with pytest.raises(InputError, match="the worlds have no map"):
         setup_of(path, parameters=(("global_costmap/static_map", True),))
 
 

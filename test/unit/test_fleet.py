@@ -7,8 +7,9 @@ import pytest
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.ros.common.node_tools import in_fleet, own_node
-from quad_nav.scenario.fleet_setup import configurations, read_setup, scene_of
+from quad_nav.scenario.fleet_setup import read_setup
 from quad_nav.scenario.random_mission import random_mission
+from quad_nav.scenario.scenario import read_configurations, scene_of
 from quad_nav.sim.colours import ROBOT_COLOURS
 from quad_nav.topics.rviz_file import document
 
@@ -58,14 +59,14 @@ def test_hosts_share_the_robots():
 def test_global_costmaps_hold_the_random_arena():
     mission = random_mission(30, 4)
     assert mission.scene == scene_of({"robots": 30, "seed": 4, "size": 0.0, "scene": "random"})
-    costmap = configurations(CONFIG, 30, mission)[29].global_costmap
+    costmap = read_configurations(CONFIG, 30, mission)[29].global_costmap
     assert (costmap.width_m, costmap.height_m) == (33.0, 33.0)  # 30 x 36 m2
 
 
 def test_a_robots_own_file_goes_on_top(tmp_path):
     copy_config(tmp_path)
     (tmp_path / "robot1.yaml").write_text("controller_frequency: 5.0\n")
-    made = configurations(str(tmp_path), 3, None)
+    made = read_configurations(str(tmp_path), 3, numbered=True)
     assert [one.navigator.controller_frequency_hz for one in made] == [10.0, 5.0, 10.0]
 
 
@@ -74,7 +75,7 @@ def test_every_fault_is_told_once_with_its_place(tmp_path):
     (tmp_path / "move_base_params.yaml").write_text("planner_frequency: never\n")
     (tmp_path / "robot1.yaml").write_text("controller_frequency: often\n")
     with pytest.raises(InputError) as refused:
-        configurations(str(tmp_path), 3, None)
+        read_configurations(str(tmp_path), 3)
     assert len(refused.value.problems) == 2
     assert "move_base_params.yaml:1" in refused.value.problems[0]
     assert "robot1.yaml:1" in refused.value.problems[1]

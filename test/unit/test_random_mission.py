@@ -8,8 +8,8 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.mission.robot_goals import goal_paths, last_goal_conflicts, load_robot_goals
+from quad_nav.scenario.goal_checks import scene_check
 from quad_nav.scenario.random_mission import default_size_m, random_mission
-from quad_nav.scenario.scene_check import scene_check
 from quad_nav.sim.scene import BODY_RADIUS_M
 from quad_nav.sim.scene_file import load_scene
 
@@ -20,7 +20,9 @@ def test_the_files_are_read_back_as_the_mission_and_can_be_flown(tmp_path):
     scene = load_scene(tmp_path / "scene.yaml")
     assert scene == mission.scene
     paths, missing = goal_paths(tmp_path / "goals", 16)
-    robots, faults = load_robot_goals(paths, scene_check(scene, BODY_RADIUS_M))
+    robots, faults = load_robot_goals(
+        paths, dict.fromkeys(paths, scene_check(scene, BODY_RADIUS_M))
+    )
     assert missing == faults == last_goal_conflicts(robots, BODY_RADIUS_M) == []
     assert [
         tuple((goal.x_m, goal.y_m) for goal in robot.sequence.goals) for robot in robots

@@ -43,12 +43,12 @@ def test_the_tutorials_half_turn_is_one_argument_away():
 
 def test_every_fault_is_listed():
     assert faults_of(scene="", robot=3, rate=0, gui="yes", lidar_rate=7, jitter=float("nan")) == [
-        "simulator: robot: is not a parameter of the simulator, expected robots",
-        "simulator: scene: is '', expected a scene file such as scenes/arena.yaml, or random",
-        "simulator: rate: is 0, expected a number above 0",
-        "simulator: gui: is 'yes', expected true or false",
-        "simulator: lidar_rate: is 7, expected scans per second that divide 240, such as 10 or 20",
-        "simulator: jitter: is nan, expected a number, 0 or more",
+        "simulator: robot: is not a parameter of the simulator; expected robots",
+        "simulator: scene: is ''; expected a scene file such as scenes/arena.yaml, or random",
+        "simulator: rate: is 0; expected a number above 0",
+        "simulator: gui: is 'yes'; expected true or false",
+        "simulator: lidar_rate: is 7; expected scans per second that divide 240, such as 10 or 20",
+        "simulator: jitter: is nan; expected a number, 0 or more",
     ]
 
 
@@ -56,8 +56,8 @@ def test_every_fault_is_listed():
     "parameters, problem",
     [
         ({"robots": 9}, "simulator: robots: 9, expected 1 to 8, the start poses of scene arena"),
-        ({"robots": True}, "simulator: robots: is True, expected a whole number, 1 or more"),
-        ({"lidar": "gazebo"}, "simulator: lidar: is 'gazebo', expected kernel or bullet"),
+        ({"robots": True}, "simulator: robots: is True; expected a whole number, 1 or more"),
+        ({"lidar": "gazebo"}, "simulator: lidar: is 'gazebo'; expected kernel or bullet"),
         (
             {"scan_range": 3.0, "step_size": 4.0},
             "simulator: step_size: 4.0, expected an angle that divides scan_range, 3.0, into 2 or more",

@@ -7,11 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, List, Tuple
 
-from quad_nav import config
 from quad_nav.barn.protocol import GOAL_M, GOAL_TOLERANCE_M, SAMPLE_STEP, START, TIME_LIMIT_S
 from quad_nav.barn.worlds import BarnWorld, load_worlds
 from quad_nav.config import Configuration
-from quad_nav.config.files import set_value
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
@@ -20,10 +18,13 @@ from quad_nav.errors import InputError
 from quad_nav.files.shipped import config_folder
 from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, WatchedGoalFile
-from quad_nav.scenario.flight_setup import FlightSetup, goals_off_the_costmap
+from quad_nav.scenario.flight_setup import FlightSetup, sensor_faults
+from quad_nav.scenario.goal_checks import goals_off_the_costmap
+from quad_nav.scenario.rules import steps_per_scan
+from quad_nav.scenario.scenario import read_configurations
 from quad_nav.sim.flight import Airframe, FlightParams
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.simulation import STEPS_PER_S, SimulationParams
+from quad_nav.sim.simulation import SimulationParams
 
 LIDAR = LidarParams(
     math.radians(270.0),
@@ -122,7 +123,7 @@ def flight_setup(contestant: Contestant, world: BarnWorld, run: int) -> FlightSe
         (contestant.configuration,),
         contestant.name,
         contestant.simulation,
-        STEPS_PER_S // SCANS_PER_S,
+        steps_per_scan(SCANS_PER_S),
         contestant.seed + run,
     )
 
@@ -132,17 +133,18 @@ _GOALS = GoalSequence((Goal(*GOAL_M),), SequenceSettings(GOAL_TOLERANCE_M, TIME_
 
 def _contestant(options: BarnOptions) -> Contestant:
     folder = config_folder(options.config)
-    tree = config.load_files(folder, {"i": "0"})
-    for path, value in options.parameters:
-        set_value(tree, path, value, "the command line")
-    configuration = config.load(tree)
     goals = RobotGoals("quad0", WatchedGoalFile(folder), _GOALS)
-    problems = [
-        *_unusable_inputs(configuration, folder),
-        *goals_off_the_costmap([goals], [configuration]),
-    ]
-    if problems:
-        raise InputError(problems)
+
+    def faults(configuration: Configuration, _number: int) -> List[str]:
+        return [
+            *_static_layer_faults(configuration, folder),
+            *sensor_faults(configuration, str(folder)),
+            *goals_off_the_costmap([goals], [configuration]),
+        ]
+
+    (configuration,) = read_configurations(
+        options.config, 1, parameters=options.parameters, check=faults
+    )
     simulation = SimulationParams(
         LIDAR,
         _limits(configuration.local_planner),
@@ -173,23 +175,15 @@ def _limits(local_planner: Any) -> FlightParams:
     return replace(FlightParams(), max_speed_mps=speed_mps, max_yaw_rate_radps=yaw_rate_radps)
 
 
-def _unusable_inputs(configuration: Configuration, folder: Path) -> List[str]:
-    """Sensors that are not there, and maps: nobody knows these worlds beforehand."""
-    problems = []
-    for costmap in (configuration.global_costmap, configuration.local_costmap):
-        for name, layer in costmap.layers:
-            if isinstance(layer, StaticLayerParams):
-                problems.append(
-                    f"{folder}: {name}: there is no map of these worlds; expected "
-                    "static_map: false, or plugins without a static layer"
-                )
-            for source in layer.sources if isinstance(layer, ObstacleLayerParams) else ():
-                if source.data_type != "LaserScan":
-                    problems.append(
-                        f"{folder}: {name}/{source.name}: data_type {source.data_type}, expected "
-                        "LaserScan, the only sensor here"
-                    )
-    return list(dict.fromkeys(problems))
+def _static_layer_faults(configuration: Configuration, folder: Path) -> List[str]:
+    """A message for each static layer: robots do not know these worlds beforehand."""
+    return [
+        f"{folder}: {name}: the worlds have no map; expected static_map: false, or plugins "
+        "without a static layer"
+        for costmap in (configuration.global_costmap, configuration.local_costmap)
+        for name, layer in costmap.layers
+        if isinstance(layer, StaticLayerParams)
+    ]
 
 
 def _frames(configuration: Configuration) -> Tuple[str, ...]:

@@ -79,8 +79,9 @@ BOOLEAN = Rule(lambda value: isinstance(value, bool), "true or false")
 
 def value_faults(values: Mapping[str, Any], rules: Mapping[str, Rule], source: str) -> List[str]:
     """A message for each value that its rule does not accept, in the rules' order."""
+    place = f"{source}: " if source else ""
     return [
-        f"{source}: {name}: is {values[name]!r}; expected {rule.expected}"
+        f"{place}{name}: is {values[name]!r}; expected {rule.expected}"
         for name, rule in rules.items()
         if not rule.accepts(values[name])
     ]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import List, Optional, Sequence, Tuple, Union
+from types import MappingProxyType
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import read_bytes
@@ -70,19 +71,23 @@ class RobotGoals:
     sequence: GoalSequence
 
 
-def goal_paths(folder: Path, robots: int) -> Tuple[List[Path], List[str]]:
-    """Return the existing ones of ``quad0_goals.json`` and so on, and a fault for those missing."""
+def goal_paths(folder: Path, robots: int) -> Tuple[Dict[int, Path], List[str]]:
+    """Find ``quad0_goals.json`` and so on in a folder.
+
+    Returns:
+        The existing files, by the robots' numbers, and a fault for those missing.
+    """
     if not folder.is_dir():
-        return [], [
+        return {}, [
             f"goals: folder {folder} does not exist; expected one with quad0_goals.json and so on"
         ]
-    paths = [folder / f"quad{index}_goals.json" for index in range(robots)]
-    missing = [path.name for path in paths if not path.exists()]
+    paths = {number: folder / f"quad{number}_goals.json" for number in range(robots)}
+    missing = [path.name for path in paths.values() if not path.exists()]
     if not missing:
         return paths, []
     present = sorted(path.name for path in folder.glob("*.json")) or ["no JSON file"]
     return (
-        [path for path in paths if path.exists()],
+        {number: path for number, path in paths.items() if path.exists()},
         [
             f"{folder}: has no {_listed(missing)}; expected a goal file for each of {robots} "
             f"robots; the folder has {_listed(present)}"
@@ -91,21 +96,26 @@ def goal_paths(folder: Path, robots: int) -> Tuple[List[Path], List[str]]:
 
 
 def load_robot_goals(
-    paths: Sequence[Path],
-    check_place: Optional[PlaceCheck] = None,
+    paths: Mapping[int, Path],
+    checks: Mapping[int, PlaceCheck] = MappingProxyType({}),
     settings: SequenceSettings = DEFAULT_SETTINGS,
 ) -> Tuple[List[RobotGoals], List[str]]:
-    """Read the goal files of robots 0, 1, ...
+    """Read the goal files of several robots.
+
+    Args:
+        paths: The files, by the robots' numbers.
+        checks: Checks for the positions of goals, by the robots' numbers.
+        settings: Settings that a file does not give.
 
     Returns:
         The goals of each readable file, and all faults in the other files.
     """
     robots: List[RobotGoals] = []
     problems: List[str] = []
-    for index, path in enumerate(paths):
-        file = WatchedGoalFile(path, check_place, settings)
+    for number, path in paths.items():
+        file = WatchedGoalFile(path, checks.get(number), settings)
         try:
-            robots.append(RobotGoals(f"quad{index}", file, file.load()))
+            robots.append(RobotGoals(f"quad{number}", file, file.load()))
         except InputError as error:
             problems += error.problems
     return robots, problems

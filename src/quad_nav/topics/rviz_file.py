@@ -19,7 +19,8 @@ import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
-from quad_nav.scenario.fleet_setup import RANDOM, scene_of
+from quad_nav.scenario.rules import RANDOM
+from quad_nav.scenario.scenario import scene_of
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.scene import Scene
 

@@ -1,16 +1,17 @@
-"""Checks what a launch file would start, before anything is started.
+"""Check what a launch file would start, before it starts.
 
     roslaunch --dump-params quad two_quads.launch ... | python3 -m quad_nav.ros.common.preflight
 
-The nodes check the same when they start; here it is done without racing each other
-to be the first that refuses. Exit status 0, or 2 with every fault on stderr.
+The nodes check the same when they start, but the first that fails ends the launch, and the faults
+that the others would have reported are lost. Exit status 0, or 2 with every fault on stderr.
 """
 
 from __future__ import annotations
 
 import re
 import sys
-from typing import Any, Dict, List, Mapping
+from functools import partial
+from typing import Any, Callable, Dict, List, Mapping
 
 import yaml
 
@@ -24,7 +25,7 @@ _FLEET = re.compile(r"fleet\d*")
 
 
 def parameter_tree(flat: Mapping[str, Any]) -> Dict[str, Any]:
-    """``{"/a/b": 1}`` as ``{"a": {"b": 1}}``."""
+    """Return ``{"a": {"b": 1}}`` for ``{"/a/b": 1}``."""
     tree: Dict[str, Any] = {}
     for path, value in flat.items():
         *namespaces, name = path.strip("/").split("/")
@@ -36,28 +37,29 @@ def parameter_tree(flat: Mapping[str, Any]) -> Dict[str, Any]:
 
 
 def faults(tree: Mapping[str, Any]) -> List[str]:
-    """What simulator, sequencer and fleet would refuse, each fault once."""
+    """Return the faults that simulator, sequencer and fleet would report, each once."""
+    result = mission_setup.result_path(tree.get("sequencer", {}))
+    readers: Dict[str, Callable[[Mapping[str, Any], str], object]] = {
+        "simulator": simulator_setup.read_setup,
+        "sequencer": partial(mission_setup.read_setup, result=result, all_parameters=tree),
+    }
+    fleets = sorted(name for name in tree if _FLEET.fullmatch(name))
     found: List[str] = []
-    if "simulator" in tree:
+    for name, read in {**readers, **dict.fromkeys(fleets, fleet_setup.read_setup)}.items():
         try:
-            simulator_setup.read_setup(tree["simulator"], "simulator")
-        except InputError as error:
-            found += error.problems
-    if "sequencer" in tree:
-        result = mission_setup.result_path(tree["sequencer"])
-        try:
-            mission_setup.read_setup(tree["sequencer"], "sequencer", result, tree)
-        except InputError as error:
-            found += error.problems
-    for name in sorted(name for name in tree if _FLEET.fullmatch(name)):
-        try:
-            fleet_setup.read_setup(tree[name], name)
+            if name in tree:
+                read(tree[name], name)
         except InputError as error:
             found += error.problems
     return list(dict.fromkeys(found))
 
 
 def main() -> int:
+    """Check the parameters on standard input.
+
+    Returns:
+        Exit status: 0 if everything can be flown, 2 otherwise.
+    """
     tree = parameter_tree(yaml.safe_load(sys.stdin) or {})
     problems = faults(tree)
     if not problems:

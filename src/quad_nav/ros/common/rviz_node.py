@@ -10,7 +10,7 @@ import rospkg
 import yaml
 
 from quad_nav.errors import InputError
-from quad_nav.scenario.fleet_setup import scene_of
+from quad_nav.scenario.scenario import scene_of
 from quad_nav.topics.rviz_file import EXIT_BAD_INPUT, arguments, document
 
 

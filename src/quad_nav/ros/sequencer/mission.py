@@ -29,7 +29,7 @@ from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress_message
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.robot import MissionRobot
-from quad_nav.ros.sequencer.setup import MissionSetup
+from quad_nav.scenario.mission_setup import MissionSetup
 from quad_nav.topics.flight_info import CONTACT_STATUS, FLIGHT_TOPIC, mission_info, to_text
 from quad_nav.topics.markers import goal_markers
 

@@ -28,7 +28,8 @@ from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.node_tools import init_node
 from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
-from quad_nav.ros.sequencer.setup import MissionSetup, read_setup, result_path
+from quad_nav.ros.sequencer.setup import read_setup, result_path
+from quad_nav.scenario.mission_setup import MissionSetup
 
 DIAGNOSTICS_PERIOD_S = 1.0  # wall time, to show the state of a paused simulation
 

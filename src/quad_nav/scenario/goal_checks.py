@@ -1,0 +1,124 @@
+"""Check goals against the scene and against the robot's global costmap."""
+
+from __future__ import annotations
+
+from typing import Dict, List, Optional, Sequence, Tuple
+
+from quad_nav.config import Configuration
+from quad_nav.costmap.layered import CostmapParams
+from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.mission.goal_file import PlaceCheck, clearance_check
+from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.sim.scene import Scene
+
+Bounds = Tuple[float, float, float, float]
+"""low x, low y, high x, high y of an area, m in ``map``."""
+
+
+def scene_check(scene: Scene, robot_radius_m: float) -> PlaceCheck:
+    """Check for positions in the arena, at least ``robot_radius_m`` from walls and obstacles."""
+    return clearance_check(
+        scene.contains, scene.flight_surface_distance_m, robot_radius_m, arena_text(scene)
+    )
+
+
+def costmap_check(costmap: CostmapParams) -> Optional[PlaceCheck]:
+    """Check for positions on a global costmap; None if it has no fixed place (see ``_bounds``)."""
+    bounds = _bounds(costmap)
+    if bounds is None:
+        return None
+    low_x, low_y, high_x, high_y = bounds
+
+    def check(x_m: float, y_m: float) -> Optional[str]:
+        if low_x <= x_m < high_x and low_y <= y_m < high_y:
+            return None
+        return (
+            f"is off the global costmap, {_area_text(bounds)}; "
+            "expected a larger global_costmap/width and height"
+        )
+
+    return check
+
+
+def place_check(
+    scene: Optional[Scene], robot_radius_m: float, configuration: Optional[Configuration]
+) -> PlaceCheck:
+    """Check for positions of a robot's goals, as far as scene and configuration are known."""
+    checks = [
+        scene_check(scene, robot_radius_m) if scene else None,
+        costmap_check(configuration.global_costmap) if configuration else None,
+    ]
+
+    def check(x_m: float, y_m: float) -> Optional[str]:
+        faults = (one(x_m, y_m) for one in checks if one is not None)
+        return next((fault for fault in faults if fault), None)
+
+    return check
+
+
+def goals_off_the_costmap(
+    robots: Sequence[RobotGoals], configurations: Sequence[Optional[Configuration]]
+) -> List[str]:
+    """A message for each goal outside its robot's global costmap: no plan can lead to it.
+
+    For goals that no file gives; those of files are checked as they are read.
+    """
+    problems = []
+    for robot, configuration in zip(robots, configurations):
+        check = costmap_check(configuration.global_costmap) if configuration else None
+        for number, goal in enumerate(robot.sequence.goals, start=1):
+            fault = check(goal.x_m, goal.y_m) if check else None
+            if fault:
+                problems.append(
+                    f"{robot.file.path}: goals[{number - 1}] (goal {number}): "
+                    f"({goal.x_m:g}, {goal.y_m:g}) {fault}"
+                )
+    return problems
+
+
+def cover_warnings(scene: Scene, configurations: Sequence[Optional[Configuration]]) -> List[str]:
+    """A warning for each global costmap that ends within the arena, with the robots that use it.
+
+    It is no fault: the mission may stay in the part that is covered.
+    """
+    robots_of: Dict[Bounds, List[str]] = {}
+    for number, configuration in enumerate(configurations):
+        costmap = configuration.global_costmap if configuration else None
+        bounds = _bounds(costmap) if costmap else None
+        if costmap and bounds and not _covers(bounds, scene, costmap.resolution_m):
+            robots_of.setdefault(bounds, []).append(f"quad{number}")
+    return [
+        f"{', '.join(robots)}: global_costmap covers {_area_text(bounds)}, but the arena is "
+        f"{arena_text(scene)}: no plan leads beyond the costmap; expected origin_x, origin_y, "
+        "width and height that cover the arena"
+        for bounds, robots in robots_of.items()
+    ]
+
+
+def arena_text(scene: Scene) -> str:
+    """The arena's area, for messages."""
+    return _area_text((scene.origin_x_m, scene.origin_y_m, scene.end_x_m, scene.end_y_m))
+
+
+def _bounds(costmap: CostmapParams) -> Optional[Bounds]:
+    """The area that a costmap covers; None if it follows the robot or takes its map's size."""
+    has_map = any(isinstance(layer, StaticLayerParams) for _, layer in costmap.layers)
+    if costmap.rolling_window or has_map:
+        return None
+    x, y = costmap.origin_x_m, costmap.origin_y_m
+    return x, y, x + costmap.width_m, y + costmap.height_m
+
+
+def _covers(bounds: Bounds, scene: Scene, slack_m: float) -> bool:
+    low_x, low_y, high_x, high_y = bounds
+    return (
+        low_x <= scene.origin_x_m + slack_m
+        and low_y <= scene.origin_y_m + slack_m
+        and high_x >= scene.end_x_m - slack_m
+        and high_y >= scene.end_y_m - slack_m
+    )
+
+
+def _area_text(bounds: Bounds) -> str:
+    low_x, low_y, high_x, high_y = bounds
+    return f"x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m"

@@ -1,0 +1,195 @@
+"""Set-up of the sequencer's mission, from the node's private parameters.
+
+Everything is read before anything flies, and every fault is listed at once.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+
+from quad_nav import config
+from quad_nav.config import Configuration
+from quad_nav.errors import InputError
+from quad_nav.files.values import Rule, expected_name, value_faults
+from quad_nav.mission.distances import SurfaceDistance
+from quad_nav.mission.goal_file import SETTINGS, read_settings
+from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.scenario.random_mission import RandomMission
+from quad_nav.scenario.rules import RANDOM, RULES, optional
+from quad_nav.scenario.scenario import ScenarioRequest, read_configurations, read_scenario
+from quad_nav.sim.scene import BODY_RADIUS_M
+
+DEFAULTS: Dict[str, Any] = {
+    "robots": 2,
+    "goals": "",
+    "scene": "",  # file, or random; nothing when the arena is unknown
+    "seed": 0,  # of a random mission, as the next
+    "size": 0.0,
+    "config": "",  # folder of a fleet's navigators
+    "robot_radius": BODY_RADIUS_M,
+    "simulation": True,
+    "ready_timeout": 60.0,
+    "exit_when_done": False,
+    "result": "",
+    "resume": False,
+    "journal": "",
+}
+# ``read_scenario`` checks the others.
+_RULES: Dict[str, Rule] = {
+    "config": optional(RULES["config"]),
+    **{
+        name: RULES[name]
+        for name in (
+            "simulation",
+            "ready_timeout",
+            "exit_when_done",
+            "result",
+            "resume",
+            "journal",
+        )
+    },
+}
+
+
+@dataclass(frozen=True)
+class MissionSetup:
+    """A mission that can be flown.
+
+    ``surface_distance`` and ``altitude_m`` are None if the scene is unknown. ``parameters`` are
+    the navigators' trees, {} for one whose parameters are unknown.
+    """
+
+    robots: Tuple[RobotGoals, ...]
+    robot_radius_m: float
+    altitude_m: Optional[float]
+    surface_distance: Optional[SurfaceDistance]
+    simulation: bool
+    ready_timeout_s: float
+    exit_when_done: bool
+    warnings: Tuple[str, ...]
+    journal: Path
+    resume: bool
+    parameters: Tuple[Mapping[str, Any], ...] = ()
+
+
+def read_setup(
+    parameters: Mapping[str, Any],
+    name: str,
+    result: Path,
+    journals: Path,
+    all_parameters: Mapping[str, Any] = MappingProxyType({}),
+) -> MissionSetup:
+    """Read the mission that a node's private parameters describe.
+
+    The navigators' parameters are checked as well, because a navigator that does not start is
+    noticed late, and goals are checked against their global costmaps.
+
+    Args:
+        parameters: The node's private parameters.
+        name: The node's name, for messages.
+        result: File for the summary.
+        journals: Folder for journals without a name.
+        all_parameters: The whole parameter tree, with those of ``move_base{i}``. With the
+            parameter ``config`` the navigators are a fleet that reads its files itself.
+
+    Raises:
+        InputError: Every fault in the parameters, the scene, the goal files and the navigators'
+            parameters.
+    """
+    values = {**DEFAULTS, **parameters}
+    problems = value_faults(values, _RULES, name) + _result_faults(result, name)
+    given = {key: values[key] for key in SETTINGS if key in values}
+    settings, faults = read_settings(given, name)
+    problems += faults
+    request = ScenarioRequest(
+        **{key: values[key] for key in ("scene", "goals", "robots", "seed", "size")},
+        robot_radius=values["robot_radius"],
+        settings=settings,
+        simulated=values["simulation"] is not False,
+        source=name,
+    )
+    scenario, faults = read_scenario(request, _Navigators(values, all_parameters))
+    problems += faults
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+    scene = scenario.scene
+    return MissionSetup(
+        scenario.robots,
+        float(values["robot_radius"]),
+        scene.altitude_m if scene else None,
+        scene.flight_surface_distances_m if scene else None,
+        values["simulation"],
+        float(values["ready_timeout"]),
+        values["exit_when_done"],
+        (*_unknown_parameters(parameters, name), *scenario.warnings),
+        _journal_path(values, journals),
+        values["resume"],
+        tuple(one.to_tree() if one else {} for one in scenario.configurations),
+    )
+
+
+class _Navigators:
+    """Reads the navigators' configurations, from a fleet's files or from the parameter server."""
+
+    def __init__(self, values: Mapping[str, Any], all_parameters: Mapping[str, Any]):
+        self._folder = values["config"]
+        self._all_parameters = all_parameters
+
+    def __call__(
+        self, robots: int, mission: Optional[RandomMission]
+    ) -> Sequence[Optional[Configuration]]:
+        if self._folder and isinstance(self._folder, str):
+            return read_configurations(self._folder, robots, mission, numbered=True)
+        configurations: List[Optional[Configuration]] = []
+        problems: List[str] = []
+        for number in range(robots):
+            tree = self._all_parameters.get(f"move_base{number}")
+            try:
+                configurations.append(
+                    None if tree is None else config.load(tree, f"/move_base{number}")
+                )
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError(problems)
+        return configurations
+
+
+def _journal_path(values: Mapping[str, Any], journals: Path) -> Path:
+    """The journal's path; a journal without a name is named after the mission."""
+    if values["journal"]:
+        return Path(values["journal"]).expanduser()
+    goals = values["goals"] if isinstance(values["goals"], list) else [values["goals"]]
+    paths = [path if path == RANDOM else str(Path(path).expanduser().resolve()) for path in goals]
+    mission = [values["robots"], paths, values["scene"], values["seed"], values["size"]]
+    number = zlib.crc32(json.dumps(mission).encode())
+    return journals / f"journal-{number:08x}.jsonl"
+
+
+def _result_faults(result: Path, name: str) -> List[str]:
+    try:
+        result.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        expected = "a file in a folder that exists or can be made"
+        return [
+            f"{name}: result: {result} cannot be written: {error.strerror}; expected {expected}"
+        ]
+    if result.is_dir() or not os.access(result.parent, os.W_OK):
+        return [f"{name}: result: {result} cannot be written; expected a file to write"]
+    return []
+
+
+def _unknown_parameters(parameters: Mapping[str, Any], name: str) -> List[str]:
+    """Warnings, no faults: a parameter server keeps what earlier launches set."""
+    known = [*DEFAULTS, *SETTINGS]
+    return [
+        f"{name}: {key}: is not a parameter of the sequencer and has no effect; "
+        f"expected {expected_name(key, known)}"
+        for key in sorted(set(parameters) - set(known))
+    ]

@@ -1,0 +1,87 @@
+"""Rules for the values of a set-up: one for each name, the same in both shells."""
+
+from __future__ import annotations
+
+from typing import Any, Dict
+
+from quad_nav.files.values import (
+    BOOLEAN,
+    Rule,
+    choice,
+    is_number,
+    number,
+    optional_text,
+    text,
+    whole,
+)
+from quad_nav.sim.simulation import LIDAR_CASTERS, STEPS_PER_S
+
+RANDOM = "random"
+"""Value of ``scene`` and ``goals`` that asks for a random mission."""
+MAX_SIZE_M = 10_000
+
+
+def steps_per_scan(scans_per_s: float) -> int:
+    """Number of simulation steps between two scans, for a rate that ``lidar_rate`` accepts."""
+    return round(STEPS_PER_S / scans_per_s)
+
+
+def _divides(value: Any) -> bool:
+    """True if scans at this rate fall on whole steps of the simulation."""
+    if not is_number(value) or not 0 < value <= STEPS_PER_S:
+        return False
+    steps = STEPS_PER_S / value
+    return abs(steps - round(steps)) < 1e-9
+
+
+def _is_path_or_paths(value: Any) -> bool:
+    if isinstance(value, list):
+        return all(isinstance(path, str) for path in value)
+    return isinstance(value, str) and value != ""
+
+
+RULES: Dict[str, Rule] = {
+    # Scene, goals and configurations.
+    "scene": text(f"a scene file such as scenes/arena.yaml, or {RANDOM}"),
+    "goals": Rule(
+        _is_path_or_paths, "a folder with quad0_goals.json and so on, or a list of files"
+    ),
+    "config": text("a folder of YAML files, or the name of a shipped one"),
+    "robots": whole(at_least=1),
+    "seed": whole(at_least=0),
+    "size": Rule(
+        number(at_least=0, at_most=MAX_SIZE_M).accepts,
+        f"a number of metres, 0 to {MAX_SIZE_M}; 0 has room for all robots",
+    ),
+    "robot_radius": number(above=0, unit="metres"),
+    # The simulation.
+    "rate": number(above=0),
+    "jitter": number(at_least=0),
+    "lidar": choice(LIDAR_CASTERS),
+    "lidar_rate": Rule(_divides, f"scans per second that divide {STEPS_PER_S}, such as 10 or 20"),
+    "scan_range": number(at_least=0),
+    "step_size": number(at_least=0),
+    "range_noise": number(at_least=0),
+    "command_timeout": number(at_least=0),
+    "controller_period": number(at_least=0),
+    "gui": BOOLEAN,
+    "start_paused": BOOLEAN,
+    # The mission.
+    "time_limit": Rule(
+        lambda value: isinstance(value, (int, float)) and value > 0, "a number of seconds above 0"
+    ),
+    "simulation": BOOLEAN,
+    "ready_timeout": number(above=0, unit="seconds"),
+    "exit_when_done": BOOLEAN,
+    "resume": BOOLEAN,
+    "result": optional_text("a file to write"),
+    "journal": optional_text("a file to write"),
+    # A fleet's processes.
+    "hosts": whole(at_least=1),
+    "host": Rule(whole(at_least=0).accepts, "a whole number below hosts"),
+}
+
+
+def optional(rule: Rule) -> Rule:
+    """The same rule, which also accepts an empty text."""
+    return Rule(lambda value: value == "" or rule.accepts(value), f"{rule.expected}, or nothing")

@@ -1,0 +1,242 @@
+"""Read a scenario: scene, goals and configurations, with every fault listed at once.
+
+Both shells read their scenarios here, so that both refuse the same ones. Simulator, sequencer
+and the processes of a fleet each read it from the same few parameters: a random mission follows
+from its seed, so that no node waits for another one's files.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, TypeVar
+
+from quad_nav import config
+from quad_nav.config import Configuration
+from quad_nav.config.files import set_value
+from quad_nav.errors import InputError
+from quad_nav.files.shipped import config_folder
+from quad_nav.files.values import value_faults
+from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, SequenceSettings
+from quad_nav.mission.robot_goals import (
+    RobotGoals,
+    goal_paths,
+    last_goal_conflicts,
+    load_robot_goals,
+)
+from quad_nav.scenario.goal_checks import cover_warnings, goals_off_the_costmap, place_check
+from quad_nav.scenario.random_mission import RandomMission, random_mission
+from quad_nav.scenario.rules import RANDOM, RULES, optional
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene
+from quad_nav.sim.scene_file import load_scene
+
+T = TypeVar("T")
+Parameters = Sequence[Tuple[str, Any]]
+"""Parameters on top of a configuration's files: (path, value), as ("global_costmap/width", 60.0)."""
+Configure = Callable[[int, Optional[RandomMission]], Sequence[Optional[Configuration]]]
+"""Reads the configurations of so many robots; None for a robot whose parameters are unknown."""
+
+
+@dataclass(frozen=True)
+class ScenarioRequest:
+    """Where scene and goals come from; values as a person gave them, not yet checked.
+
+    ``scene`` is a file, ``RANDOM``, or "" if the arena is unknown. ``goals`` is a folder, a list
+    of files, or ``RANDOM``. ``seed`` and ``size`` are those of a random mission; size 0 has room
+    for all. ``simulated`` robots have exact odometry, so that every frame of a costmap is ``map``;
+    in other frames of real robots, a costmap's place is unknown. ``source`` is the request's name
+    in messages.
+    """
+
+    scene: Any
+    goals: Any
+    robots: Any
+    seed: Any = 0
+    size: Any = 0.0
+    robot_radius: Any = BODY_RADIUS_M
+    settings: SequenceSettings = DEFAULT_SETTINGS
+    simulated: bool = True
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What could be read of a scenario; complete if there were no faults."""
+
+    scene: Optional[Scene]
+    robots: Tuple[RobotGoals, ...] = ()
+    configurations: Tuple[Optional[Configuration], ...] = ()
+    warnings: Tuple[str, ...] = ()
+
+
+def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scenario, List[str]]:
+    """Read and check scene, configurations and goals.
+
+    Args:
+        request: Where they come from.
+        configure: Reads the configurations; raises ``InputError`` with every fault in them.
+
+    Returns:
+        The scenario as far as it could be read, and every fault in it, each once.
+    """
+    values = vars(request)
+    rules = {name: RULES[name] for name in ("goals", "robots", "seed", "size", "robot_radius")}
+    problems = value_faults(values, {"scene": optional(RULES["scene"]), **rules}, request.source)
+    if problems:
+        return Scenario(None), problems
+    mission, scene = _tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
+    configurations = _tried(lambda: tuple(configure(request.robots, mission)), problems) or ()
+    located = [one if _is_located(one, request.simulated) else None for one in configurations]
+    if request.goals == RANDOM:
+        robots, faults = _random_goals(request, mission, located)
+    else:
+        robots, faults = _read_goals(request, scene, located)
+    problems += faults
+    warnings = [
+        *last_goal_conflicts(robots, request.robot_radius),
+        *(cover_warnings(scene, located) if scene else ()),
+    ]
+    scenario = Scenario(scene, tuple(robots), configurations, tuple(warnings))
+    return scenario, list(dict.fromkeys(problems))
+
+
+def mission_of(values: Mapping[str, Any]) -> Optional[RandomMission]:
+    """Return the random mission of ``robots``, ``seed`` and ``size`` if ``scene`` is ``RANDOM``.
+
+    Raises:
+        InputError: An arena of that size has no room for so many robots.
+    """
+    if values["scene"] != RANDOM:
+        return None
+    return _cached_mission(values["robots"], values["seed"], float(values["size"]))
+
+
+def scene_of(values: Mapping[str, Any]) -> Scene:
+    """Return the scene of a file, or of the random mission, that ``scene`` asks for.
+
+    Raises:
+        InputError: The file cannot be read or has faults, or a random arena is too small.
+    """
+    mission = mission_of(values)
+    return load_scene(values["scene"]) if mission is None else mission.scene
+
+
+def read_configurations(
+    folder: str,
+    robots: int,
+    mission: Optional[RandomMission] = None,
+    parameters: Parameters = (),
+    check: Callable[[Configuration, int], List[str]] = lambda *_: [],
+    numbered: bool = False,
+) -> List[Configuration]:
+    """Read every robot's configuration from the files of a folder.
+
+    Args:
+        folder: Path, or name of a shipped configuration.
+        robots: Number of robots.
+        mission: A random mission, whose arena the global costmaps cover.
+        parameters: Parameters on top of the files, from the command line.
+        check: Returns further faults of a robot's configuration.
+        numbered: Set the parameters ``robot`` and ``robots``, as the launch files do.
+
+    Raises:
+        InputError: Every fault in any robot's files; a fault in a shared file is listed once.
+    """
+    path = config_folder(folder)
+    configurations: List[Configuration] = []
+    problems: List[str] = []
+    for number in range(robots):
+        try:
+            tree = config.load_files(path, {"i": str(number)})
+            numbers = (("robot", number), ("robots", robots)) if numbered else ()
+            for name, value in (*numbers, *_arena_size(mission)):
+                set_value(tree, name, value, "the fleet")
+            for name, value in parameters:
+                set_value(tree, name, value, "the command line")
+            configuration = config.load(tree)
+        except InputError as error:
+            problems += error.problems
+            continue
+        problems += check(configuration, number)
+        configurations.append(configuration)
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+    return configurations
+
+
+def _scene(values: Mapping[str, Any]) -> Optional[Scene]:
+    return scene_of(values) if values["scene"] else None
+
+
+@functools.lru_cache(maxsize=1)
+def _cached_mission(robots: int, seed: int, size_m: float) -> RandomMission:
+    return random_mission(robots, seed, size_m)
+
+
+def _arena_size(mission: Optional[RandomMission]) -> Parameters:
+    if mission is None:
+        return ()
+    return (
+        ("global_costmap/width", mission.scene.size_x_m),
+        ("global_costmap/height", mission.scene.size_y_m),
+    )
+
+
+def _is_located(configuration: Optional[Configuration], simulated: bool) -> bool:
+    """True if the place of the global costmap in the map is known."""
+    if configuration is None or simulated:
+        return configuration is not None
+    return configuration.global_costmap.global_frame.lstrip("/") == "map"
+
+
+def _random_goals(
+    request: ScenarioRequest,
+    mission: Optional[RandomMission],
+    configurations: Sequence[Optional[Configuration]],
+) -> Tuple[List[RobotGoals], List[str]]:
+    if request.scene != RANDOM:
+        place = f"{request.source}: goals" if request.source else "goals"
+        return [], [
+            f"{place}: {RANDOM} with scene {request.scene!r}; expected a folder of goal files, "
+            f"or scene {RANDOM}"
+        ]
+    if mission is None:
+        return [], []
+    robots = mission.robot_goals(request.settings)
+    return robots, goals_off_the_costmap(robots, configurations)
+
+
+def _read_goals(
+    request: ScenarioRequest,
+    scene: Optional[Scene],
+    configurations: Sequence[Optional[Configuration]],
+) -> Tuple[List[RobotGoals], List[str]]:
+    paths, missing = _goal_files(request)
+    known = dict(enumerate(configurations))
+    checks = {
+        number: place_check(scene, request.robot_radius, known.get(number)) for number in paths
+    }
+    robots, faults = load_robot_goals(paths, checks, request.settings)
+    return robots, missing + faults
+
+
+def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, Path], List[str]]:
+    """Return the existing goal files, by the robots' numbers, and a fault for those missing."""
+    goals, count = request.goals, request.robots
+    if isinstance(goals, str):
+        return goal_paths(Path(goals).expanduser(), count)
+    problems = []
+    if len(goals) != count:
+        place = f"{request.source}: goals" if request.source else "goals"
+        problems = [f"{place}: lists {len(goals)} files; expected one for each of {count} robots"]
+    return {number: Path(path).expanduser() for number, path in enumerate(goals)}, problems
+
+
+def _tried(read: Callable[[], T], problems: List[str]) -> Optional[T]:
+    """Return what ``read`` returns, or None with its faults added to ``problems``."""
+    try:
+        return read()
+    except InputError as error:
+        problems += error.problems
+        return None

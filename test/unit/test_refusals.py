@@ -1,0 +1,235 @@
+"""The same scenarios are refused offline and under ROS, with the same messages."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any, Dict, List, NamedTuple, Sequence
+
+import pytest
+
+from quad_nav import config
+from quad_nav.errors import InputError
+from quad_nav.files.shipped import shipped
+from quad_nav.scenario import flight_setup, mission_setup, simulator_setup
+from quad_nav.scenario.flight_setup import FlightOptions
+from quad_nav.scenario.goal_checks import cover_warnings
+from quad_nav.sim.scene import Scene, Walls
+
+ARENA = shipped("scenes", "arena.yaml")
+GOAL = [1.5, 6.0]
+GLOBAL = "global_costmap:\n"
+LOW = GLOBAL + "  height: 3.0\n"
+OFF = "(1.5, 6) is off the global costmap, x 0 to 12 m, y 0 to 3 m; expected a larger"
+
+
+class Case(NamedTuple):
+    """A goal file's content for each robot, the robots' number, parameters on top, and faults."""
+
+    goals: Sequence[Any]
+    robots: int = 1
+    parameters: str = ""
+    faults: Sequence[str] = ()
+    scene: str = str(ARENA)
+
+
+CASES = {
+    "flyable": Case([{"goals": [GOAL]}]),
+    "off the global costmap": Case([{"goals": [GOAL]}], 1, LOW, [f"goals[0] (goal 1): {OFF}"]),
+    "second robot off the global costmap": Case(
+        [{"goals": [[1.5, 2.0]]}, {"goals": [[1.5, 2.0], GOAL]}],
+        2,
+        LOW,
+        [f"quad1_goals.json: goals[1] (goal 2): {OFF}"],
+    ),
+    "west of the global costmap": Case(
+        [{"goals": [GOAL]}],
+        1,
+        GLOBAL + "  origin_x: 2.0\n",
+        ["off the global costmap, x 2 to 14 m"],
+    ),
+    "a costmap that follows the robot": Case(
+        [{"goals": [GOAL]}], 1, LOW + "  rolling_window: true\n"
+    ),
+    "a costmap with its map's size": Case([{"goals": [GOAL]}], 1, LOW + "  static_map: true\n"),
+    "in an obstacle": Case([{"goals": [[2.2, 4.0]]}], faults=["is inside an obstacle"]),
+    "outside the arena": Case([{"goals": [[20.0, 4.0]]}], faults=["is outside the arena"]),
+    "close to a wall": Case([{"goals": [[0.1, 4.0]]}], faults=["robot's radius, 0.30 m"]),
+    "two faulty files": Case(
+        [{"goals": [[20.0, 4.0]]}, {"gaols": [GOAL]}],
+        2,
+        faults=["is outside the arena", "gaols: is not a key", "has no goals"],
+    ),
+    "no file for a robot": Case([{"goals": [GOAL]}], 2, faults=["has no quad1_goals.json"]),
+    "no scene file": Case(
+        [{"goals": [GOAL]}], faults=["nowhere.yaml: cannot be read"], scene="/nowhere.yaml"
+    ),
+}
+
+
+def write(folder: Path, case: Case) -> None:
+    """Write goal files and a configuration with the case's parameters on top."""
+    (folder / "goals").mkdir()
+    for number, goals in enumerate(case.goals):
+        (folder / "goals" / f"quad{number}_goals.json").write_text(json.dumps(goals))
+    (folder / "config").mkdir()
+    for path in shipped("config", "default").glob("*.yaml"):
+        (folder / "config" / path.name).write_text(path.read_text())
+    for number in range(case.robots):
+        (folder / "config" / f"robot{number}.yaml").write_text(case.parameters)
+
+
+def problems_of(read, *arguments) -> List[str]:
+    try:
+        read(*arguments)
+    except InputError as error:
+        return error.problems
+    return []
+
+
+def offline(folder: Path, case: Case) -> List[str]:
+    return problems_of(
+        flight_setup.read_setup,
+        FlightOptions(
+            Path(case.scene), folder / "goals", str(folder / "config"), robots=case.robots
+        ),
+    )
+
+
+def under_ros(folder: Path, case: Case, fleet: bool) -> List[str]:
+    """Problems of the sequencer's set-up, for a fleet or for navigators on the server."""
+    parameters: Dict[str, Any] = {
+        "scene": case.scene,
+        "goals": str(folder / "goals"),
+        "robots": case.robots,
+        "config": str(folder / "config") if fleet else "",
+    }
+    server = {
+        f"move_base{number}": dict(config.load_files(folder / "config", {"i": str(number)}))
+        for number in range(0 if fleet else case.robots)
+    }
+    return problems_of(
+        mission_setup.read_setup, parameters, "sequencer", folder / "result.json", folder, server
+    )
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_both_shells_refuse_the_same_with_the_same_words(tmp_path, case):
+    write(tmp_path, case)
+    problems = offline(tmp_path, case)
+    assert len(problems) == len(case.faults)
+    assert all(fault in problem for fault, problem in zip(case.faults, problems))
+    assert under_ros(tmp_path, case, fleet=True) == problems
+    assert under_ros(tmp_path, case, fleet=False) == problems
+
+
+def test_navigators_without_parameters_on_the_server_are_not_checked(tmp_path):
+    case = CASES["off the global costmap"]
+    write(tmp_path, case)
+    parameters = {"scene": case.scene, "goals": str(tmp_path / "goals"), "robots": 1}
+    setup = mission_setup.read_setup(
+        parameters, "sequencer", tmp_path / "result.json", tmp_path, {"move_base7": {}}
+    )
+    assert setup.parameters == ({},)
+
+
+@pytest.mark.parametrize("frame, problems", [("map", 1), ("odom0", 0)])
+def test_without_a_simulation_only_costmaps_in_the_map_have_a_known_place(
+    tmp_path, frame, problems
+):
+    write(tmp_path, Case([{"goals": [GOAL]}], 1, LOW + f"  global_frame: {frame}\n"))
+    parameters = {"goals": str(tmp_path / "goals"), "robots": 1, "simulation": False}
+    tree = dict(config.load_files(tmp_path / "config", {"i": "0"}))
+    found = problems_of(
+        mission_setup.read_setup,
+        parameters,
+        "sequencer",
+        tmp_path / "result.json",
+        tmp_path,
+        {"move_base0": tree},
+    )
+    assert len(found) == problems
+
+
+def test_an_edited_goal_file_is_checked_against_the_global_costmap(tmp_path):
+    case = Case([{"goals": [[1.5, 2.0]]}], 1, LOW)
+    write(tmp_path, case)
+    options = FlightOptions(ARENA, tmp_path / "goals", str(tmp_path / "config"))
+    (robot,) = flight_setup.read_setup(options).robots
+    robot.file.path.write_text(json.dumps({"goals": [GOAL]}))
+    assert robot.file.poll() is None  # the content has to be the same twice
+    with pytest.raises(InputError, match="is off the global costmap"):
+        robot.file.poll()
+
+
+@pytest.mark.parametrize(
+    "robots, size, fault", [(50, 8.0, "no room for"), (2, -1.0, "size: is -1.0")]
+)
+def test_both_shells_refuse_the_same_random_missions(tmp_path, robots, size, fault):
+    (problem,) = problems_of(
+        flight_setup.read_setup, FlightOptions(None, None, robots=robots, size_m=size)
+    )
+    assert fault in problem
+    parameters = {"scene": "random", "goals": "random", "robots": robots, "size": size}
+    (same,) = problems_of(
+        mission_setup.read_setup, parameters, "sequencer", tmp_path / "result.json", tmp_path
+    )
+    assert same.replace("sequencer: ", "") == problem
+
+
+@pytest.mark.parametrize("rate", [0.0, -20.0, 7.0, 480.0, math.nan, math.inf])
+def test_both_shells_refuse_the_same_scan_rates(rate):
+    (problem,) = problems_of(
+        flight_setup.read_setup, FlightOptions(None, None, robots=1, scans_per_s=rate)
+    )
+    parameters = {"scene": str(ARENA), "lidar_rate": rate}
+    (same,) = problems_of(simulator_setup.read_setup, parameters, "simulator")
+    assert same == f"simulator: {problem}"
+    assert "expected scans per second that divide 240" in problem
+
+
+# Global costmaps that end within the arena are allowed, with a warning.
+
+SCENE = Scene("s", 12.0, 8.0, 1.0, Walls(), (), (), origin_x_m=-6.0)
+HELD = {"origin_x": -6.0, "origin_y": 0.0, "width": 12.0, "height": 8.0, "static_map": False}
+
+
+def warnings(**changes) -> list:
+    tree = {"global_costmap": {**HELD, **changes}, "local_costmap": {"rolling_window": True}}
+    return cover_warnings(SCENE, [config.load(tree), None])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"origin_x": -7.0, "width": 14.0},
+        {"origin_x": -5.96, "width": 13.0},
+        {"rolling_window": True, "width": 3.0},
+        {"static_map": True, "width": 3.0},
+    ],
+)
+def test_costmaps_that_cover_the_arena_or_follow(changes):
+    assert warnings(**changes) == []
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"origin_x": 0.0},
+        {"origin_y": 0.2},
+        {"width": 11.0},
+        {"height": 7.0},
+    ],
+)
+def test_costmaps_that_end_within_the_arena(changes):
+    assert len(warnings(**changes)) == 1
+
+
+def test_the_warning_names_both_areas():
+    assert warnings(origin_x=0.0) == [
+        "quad0: global_costmap covers x 0 to 12 m, y 0 to 8 m, but the arena is "
+        "x -6 to 6 m, y 0 to 8 m: no plan leads beyond the costmap; "
+        "expected origin_x, origin_y, width and height that cover the arena"
+    ]
