@@ -2,9 +2,9 @@
 
     python -m quad_nav.topics.rviz_file --robots 8 > fleet.rviz
 
-The group of quadcopter 0 is the template for all. With more than `MAX_WITH_ALL_DISPLAYS` quadcopters only plans and
-trails are enabled at first. The other displays stay disabled until the user enables them; a
-disabled display does not subscribe and costs nothing.
+The group of quadcopter 0 is the template for all. With more than `MAX_WITH_ALL_DISPLAYS`
+quadcopters, only plans and flown paths are enabled at first. The other displays stay disabled
+until the user enables them; a disabled display does not subscribe and costs nothing.
 """
 
 from __future__ import annotations
