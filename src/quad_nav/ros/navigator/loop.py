@@ -100,8 +100,8 @@ class NavigatorLoop:
         if late_s > LATE_S:
             rospy.logwarn_throttle(
                 WARN_AGAIN_S,
-                f"{self._name}: control loop {late_s:.2f} s behind, skipping cycles (use fewer"
-                " robots in this process, a lower rate of the simulation, or a faster machine)",
+                f"{self._name}: control loop {late_s:.2f} s behind, skipping cycles (use a"
+                " lower rate:=, fewer robots or more hosts:=)",
             )
         for robot in self._robots:
             if robot.due_s <= now_s + 1e-9:
