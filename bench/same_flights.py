@@ -28,8 +28,8 @@ ROOT = Path(__file__).resolve().parents[1]
 JITTER_M = 0.3
 TIME_LIMIT_S = 600
 BARN_WORLDS = "0,60,120,180,240"
-NOT_COMPARED = {"wall_time_s", "real_time_factor", "versions", "per_minute", "flights_per_minute"}
-RENAMED: Dict[str, str] = {}  # key of a recorded summary -> key of today's
+NOT_COMPARED = {"wall_time_s", "real_time_factor", "versions", "differences"}  # times and prose
+RENAMED: Dict[str, str] = {"params": "config"}  # key of a recorded summary -> key of today's
 
 Summary = Dict[str, Any]
 
