@@ -1,7 +1,7 @@
-"""Every error that this package raises on purpose, and what it means to a goal.
+"""Errors that this package raises on purpose, and their effect on a goal.
 
-A planner's failure is an exception, so that no caller can mistake it for a
-plan. A goal that ends in one of them is aborted, with its words.
+The failure of a planner is an exception, so that no caller can mistake it for a plan. A goal
+that ends in one of them is aborted, with its message.
 """
 
 from __future__ import annotations
@@ -9,29 +9,33 @@ from __future__ import annotations
 from typing import List, Sequence
 
 MAX_PROBLEMS = 100
-_LONGEST_LINE = 2000
+_MAX_LENGTH = 2000
 
 
 class QuadError(Exception):
-    """Root of the tree."""
+    """Base class of all errors."""
 
 
 class InputError(QuadError):
-    """Something that a person wrote cannot be used: file, place, what was expected.
+    """Invalid user input: file, place, what was expected.
 
-    ``problems`` holds one line per fault; nothing is reported one at a time. What a
-    terminal would take for a command is written as an escape, and lists without an end end.
+    The message has one line for each problem, all at once. Control characters are escaped, and
+    long lists and lines are cut, because the input may come from others.
+
+    Attributes:
+        problems: One line for each problem.
     """
 
-    def __init__(self, problems: Sequence[str]):
+    def __init__(self, problems: Sequence[str]) -> None:
+        """Create an error from one line for each problem."""
         self.problems: List[str] = [_line(problem) for problem in problems[:MAX_PROBLEMS]]
         if len(problems) > MAX_PROBLEMS:
-            self.problems.append(f"... and {len(problems) - MAX_PROBLEMS} faults more")
+            self.problems.append(f"... and {len(problems) - MAX_PROBLEMS} more problems")
         super().__init__("\n".join(self.problems))
 
 
 class NavigationError(QuadError):
-    """Something that happens while navigating."""
+    """Failure while navigating."""
 
 
 class PlanningError(NavigationError):
@@ -39,15 +43,15 @@ class PlanningError(NavigationError):
 
 
 class StartOutsideMap(PlanningError):
-    """The robot is not on the global costmap."""
+    """The robot is outside of the global costmap."""
 
 
 class GoalOutsideMap(PlanningError):
-    """The goal is not on the global costmap."""
+    """The goal is outside of the global costmap."""
 
 
 class NoPath(PlanningError):
-    """The goal cannot be reached from the robot's cell."""
+    """No path leads from the robot's cell to the goal."""
 
 
 class ControlError(NavigationError):
@@ -59,16 +63,17 @@ class NoValidTrajectory(ControlError):
 
 
 class NoLocalPlan(ControlError):
-    """The global plan has no part in the local window, or there is none."""
+    """No part of the global plan is inside the local costmap, or there is no plan."""
 
 
 class InvalidGoal(NavigationError):
-    """The goal's pose cannot be used: not a rotation, not finite, unknown frame."""
+    """The pose of a goal is invalid: no rotation, not finite, or in an unknown frame."""
 
 
 def _line(problem: str) -> str:
-    if len(problem) > _LONGEST_LINE:
-        problem = problem[:_LONGEST_LINE] + " ..."
+    """Cut a long problem and escape its control characters."""
+    if len(problem) > _MAX_LENGTH:
+        problem = problem[:_MAX_LENGTH] + " ..."
     return "".join(
         c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in problem
     )

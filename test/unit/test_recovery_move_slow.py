@@ -79,11 +79,11 @@ def test_costmaps_that_cannot_be_cleared_are_told():
     step = MoveSlowAndClear(MoveSlowAndClearParams(translation_fields=("max_vel_x_mps",))).step(
         RecoveryContext(0.0, small, blind, Pose2D(2.75, 1.0), Pose2D(0.5, 0.5))
     )
-    why = "it has no obstacle layer, or ends within 0.5 m of the robot"
+    why = "it has no obstacle layer or ends within 0.5 m of the robot"
     assert step.message.split("; ") == [
         f"global costmap not cleared: {why}",
         f"local costmap not cleared: {why}",
-        "not above 0.25 m/s and 0.45 rad/s for the next 0.3 m",
+        "limiting speed to 0.25 m/s and 0.45 rad/s for the next 0.3 m",
     ]
     assert (small.layers["laser"].grid.costs == 254).all()
 
@@ -94,7 +94,7 @@ def test_at_an_unknown_pose_nothing_is_done():
         RecoveryContext(0.0, costmap, costmap, None, None)
     )
     assert step.done and step.limit is None
-    assert step.message.count("the robot's pose is unknown") == 2
+    assert step.message.count("robot pose unknown") == 2
     assert (costmap.layers["laser"].grid.costs == 254).all()
 
 
@@ -200,7 +200,7 @@ def stuck():
 
 def test_the_navigator_limits_its_controller_and_lifts_the_limit(stuck):
     assert [tick.recovery.name for tick in stuck.ticks if tick.recovery] == ["slow"]
-    assert "not above 0.25 m/s and 0.45 rad/s for the next 0.3 m" in [
+    assert "limiting speed to 0.25 m/s and 0.45 rad/s for the next 0.3 m" in [
         warning for tick in stuck.ticks for warning in tick.warnings
     ]
     assert stuck.max_vel_x_mps == 0.25

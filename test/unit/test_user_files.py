@@ -113,7 +113,7 @@ def test_a_watched_file_that_becomes_a_pipe_is_a_changed_file(tmp_path):
 
 def test_many_faults_are_counted_and_no_terminal_is_commanded():
     error = InputError([f"fault {k}" for k in range(MAX_PROBLEMS + 5)])
-    assert error.problems[-1] == "... and 5 faults more"
+    assert error.problems[-1] == "... and 5 more problems"
     assert InputError(["a\x1b[2Jb\ud800"]).problems == ["a\\x1b[2Jb\\ud800"]
     assert len(InputError(["x" * 10**6]).problems[0]) < 3000
 

@@ -14,7 +14,6 @@ from quad_nav.costmap.cost_grid import Window
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.peers.right_of_way import YieldDecision
 
-
 STOPPING = "stopping: "  # begins the warnings of a robot that stops for lack of data
 
 

@@ -1,7 +1,9 @@
-"""What the navigator tries when it is stuck: forget obstacles, look around, go slowly.
+"""Recovery behaviours: what the navigator runs when it is stuck.
 
-A recovery is started once and then stepped in every cycle until it says that it
-is done; it never blocks, so a goal can be cancelled in the middle of a turn.
+A behaviour is started once and then stepped until it is done; it never blocks, so a goal can
+be cancelled in the middle of a turn.
+
+Reading order: ``recovery`` (the interface), ``clear_costmap``, ``rotate``, ``move_slow``.
 """
 
 from __future__ import annotations
@@ -17,10 +19,10 @@ __all__ = [
     "FootprintCost",
     "MoveSlowAndClear",
     "MoveSlowAndClearParams",
+    "ParameterLimit",
     "Recovery",
+    "RecoveryContext",
     "Rotate",
     "RotateParams",
-    "ParameterLimit",
     "Step",
-    "RecoveryContext",
 ]

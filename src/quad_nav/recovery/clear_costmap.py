@@ -1,4 +1,4 @@
-"""The recovery ``clear_costmap_recovery/ClearCostmapRecovery``: forget obstacles."""
+"""Recovery ``clear_costmap_recovery/ClearCostmapRecovery``: clear obstacle layers."""
 
 from __future__ import annotations
 
@@ -33,21 +33,22 @@ class ClearCostmapParams:
 
 
 class ClearCostmap:
-    """Forgets the obstacles beyond a square around the robot.
+    """Clears obstacles outside of a square around the robot.
 
-    Everything outside the square with sides of ``reset_distance_m`` goes, or
-    everything inside it with ``invert_area_to_clear``.
+    The square has sides of ``reset_distance_m``; ``invert_area_to_clear`` clears its inside.
     """
 
     period_s = 0.0
 
-    def __init__(self, params: ClearCostmapParams):
+    def __init__(self, params: ClearCostmapParams) -> None:
+        """Create the behaviour."""
         self.params = params
 
     def start(self, context: RecoveryContext) -> None:
-        pass
+        """Start the behaviour; it has no state."""
 
     def step(self, context: RecoveryContext) -> Step:
+        """Clear the costmaps in one step, and update them if ``force_updating`` is set."""
         params = self.params
         skipped = []
         for name, costmap, pose in context.costmaps:
@@ -67,7 +68,7 @@ class ClearCostmap:
                 costmap.update(context.now_s, pose)
         message = ""
         if skipped:
-            message = "not cleared, the robot's pose is unknown: " + ", ".join(skipped)
+            message = f"{' and '.join(skipped)} costmap not cleared: robot pose unknown"
         return Step(done=True, message=message)
 
     def _names(self, costmap: LayeredCostmap) -> Iterable[str]:

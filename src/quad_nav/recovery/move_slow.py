@@ -1,7 +1,7 @@
-"""The recovery ``move_slow_and_clear/MoveSlowAndClear``: forget what is near, then go slowly.
+"""Recovery ``move_slow_and_clear/MoveSlowAndClear``: clear nearby obstacles, then fly slowly.
 
-The obstacles that are forgotten may be there: the robot can hit them, but not fast. They
-come back with the next observation that shows them.
+Cleared obstacles may be real: the robot can hit them, but only at low speed. The next
+observation that shows them marks them again.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from quad_nav.recovery.recovery import ParameterLimit, RecoveryContext, Step
 class MoveSlowAndClearParams:
     """Parameters of ``move_slow_and_clear/MoveSlowAndClear``.
 
-    ``translation_fields`` and ``rotation_fields`` are the fields of the controller's
-    parameters that the two speeds limit.
+    Attributes:
+        translation_fields: Fields of the local planner's parameters that
+            ``limited_trans_speed_mps`` limits.
+        rotation_fields: Fields that ``limited_rot_speed_radps`` limits.
     """
 
     clearing_distance_m: float = 0.5
@@ -29,39 +31,45 @@ class MoveSlowAndClearParams:
 
     @property
     def limit(self) -> ParameterLimit:
+        """The limit of both speeds."""
         greatest = [(field, self.limited_trans_speed_mps) for field in self.translation_fields]
         greatest += [(field, self.limited_rot_speed_radps) for field in self.rotation_fields]
         return ParameterLimit(tuple(greatest), self.limited_distance_m)
 
 
 class MoveSlowAndClear:
-    """Frees the square of ``clearing_distance_m`` on each side of the robot in the obstacle
-    layers, and limits the speed until the robot has moved ``limited_distance_m``."""
+    """Clears obstacles around the robot and limits its speed.
+
+    The cleared square reaches ``clearing_distance_m`` to each side of the robot. The limit ends
+    when the robot has moved ``limited_distance_m``.
+    """
 
     period_s = 0.0
 
-    def __init__(self, params: MoveSlowAndClearParams):
+    def __init__(self, params: MoveSlowAndClearParams) -> None:
+        """Create the behaviour."""
         self.params = params
 
     def start(self, context: RecoveryContext) -> None:
-        pass
+        """Start the behaviour; it has no state."""
 
     def step(self, context: RecoveryContext) -> Step:
+        """Clear the costmaps and limit the speed in one step."""
         params = self.params
         messages = []
         for name, costmap, pose in context.costmaps:
             if pose is None:
-                messages.append(f"{name} costmap not cleared: the robot's pose is unknown")
+                messages.append(f"{name} costmap not cleared: robot pose unknown")
             elif not costmap.free_obstacles(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m):
                 messages.append(
-                    f"{name} costmap not cleared: it has no obstacle layer, or"
+                    f"{name} costmap not cleared: it has no obstacle layer or"
                     f" ends within {params.clearing_distance_m:g} m of the robot"
                 )
         limit = params.limit
         if context.pose_in_global is None or not limit.greatest:
             return Step(done=True, message="; ".join(messages))
         messages.append(
-            f"not above {params.limited_trans_speed_mps:g} m/s and"
+            f"limiting speed to {params.limited_trans_speed_mps:g} m/s and"
             f" {params.limited_rot_speed_radps:g} rad/s for the next"
             f" {params.limited_distance_m:g} m"
         )

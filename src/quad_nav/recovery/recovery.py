@@ -1,4 +1,4 @@
-"""What a recovery behaviour is, and what it may look at, change and ask for."""
+"""Interface of recovery behaviours: context, step and parameter limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from quad_nav.geometry import Pose2D, Twist2D
 
 @dataclass(frozen=True)
 class RecoveryContext:
-    """What a recovery may look at and change. Poses are None when unknown."""
+    """What a behaviour may look at and change; poses are None if unknown."""
 
     now_s: float
     global_costmap: LayeredCostmap
@@ -21,7 +21,7 @@ class RecoveryContext:
 
     @property
     def costmaps(self) -> Tuple[Tuple[str, LayeredCostmap, Optional[Pose2D]], ...]:
-        """(name, costmap, the robot's pose on it): global, local."""
+        """Name, costmap and robot pose in it: first the global one, then the local one."""
         return (
             ("global", self.global_costmap, self.pose_in_global),
             ("local", self.local_costmap, self.pose_in_local),
@@ -30,9 +30,11 @@ class RecoveryContext:
 
 @dataclass(frozen=True)
 class ParameterLimit:
-    """What a controller's parameters may be at most until the robot has moved ``distance_m``.
+    """Temporary limit of a local planner's parameters.
 
-    ``greatest``: (field of the controller's parameters, greatest magnitude).
+    Attributes:
+        greatest: (field of the local planner's parameters, greatest magnitude) for each.
+        distance_m: The limit ends when the robot has moved so far.
     """
 
     greatest: Tuple[Tuple[str, float], ...]
@@ -41,9 +43,13 @@ class ParameterLimit:
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a recovery: a command to send, if any, and whether it is over.
+    """Result of one step of a recovery behaviour.
 
-    ``limit`` holds after the recovery, from where the robot is now.
+    Attributes:
+        command: Command to publish, if any.
+        done: The behaviour has ended.
+        message: Warning for the log, "" for none.
+        limit: Limit that holds after the behaviour, from the robot's present pose on.
     """
 
     command: Optional[Twist2D] = None
@@ -53,10 +59,18 @@ class Step:
 
 
 class Recovery(Protocol):
-    """What the navigator asks of a recovery behaviour."""
+    """Recovery behaviour, as the navigator uses it.
+
+    Attributes:
+        period_s: Time between two steps; 0 for a step in every cycle.
+    """
 
     period_s: float
 
-    def start(self, context: RecoveryContext) -> None: ...
+    def start(self, context: RecoveryContext) -> None:
+        """Start the behaviour, also after an earlier run that was stopped."""
+        ...
 
-    def step(self, context: RecoveryContext) -> Step: ...
+    def step(self, context: RecoveryContext) -> Step:
+        """Do the next step."""
+        ...

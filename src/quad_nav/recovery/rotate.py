@@ -1,4 +1,4 @@
-"""The recovery ``rotate_recovery/RotateRecovery``: look around."""
+"""Recovery ``rotate_recovery/RotateRecovery``: turn once in place."""
 
 from __future__ import annotations
 
@@ -15,7 +15,12 @@ from quad_nav.recovery.recovery import RecoveryContext, Step
 
 @dataclass(frozen=True)
 class RotateParams:
-    """Parameters of ``rotate_recovery/RotateRecovery``."""
+    """Parameters of ``rotate_recovery/RotateRecovery``.
+
+    Attributes:
+        sim_granularity_rad: Step of the collision check along the turn.
+        stop_after_rotation: Publish a stop after the turn; False restores upstream behaviour.
+    """
 
     frequency_hz: float = 20.0
     sim_granularity_rad: float = 0.017
@@ -23,20 +28,26 @@ class RotateParams:
     acc_lim_theta_radps2: float = 3.2
     max_vel_theta_radps: float = 1.0
     min_in_place_vel_theta_radps: float = 0.4
-    stop_after_rotation: bool = True  # False restores upstream behaviour
+    stop_after_rotation: bool = True
 
 
 FootprintCost = Callable[[LayeredCostmap, Pose2D], float]
 
 
 class Rotate:
-    """Turns once around on the spot, as long as the footprint stays free.
+    """Turns the robot once in place, as long as its footprint stays free.
 
-    The speed follows the braking curve sqrt(2 * acceleration * angle left),
-    between the in-place minimum and the maximum (the maximum wins).
+    The speed follows the braking curve sqrt(2 * acceleration * remaining angle), between the
+    in-place minimum and the maximum; the maximum takes precedence.
     """
 
-    def __init__(self, params: RotateParams, footprint_cost: FootprintCost):
+    def __init__(self, params: RotateParams, footprint_cost: FootprintCost) -> None:
+        """Create the behaviour.
+
+        Args:
+            params: The parameters.
+            footprint_cost: Cost of the footprint at a pose in a costmap, negative in collision.
+        """
         self.params = params
         self.period_s = 1.0 / params.frequency_hz
         self._footprint_cost = footprint_cost
@@ -44,43 +55,45 @@ class Rotate:
         self._past_half_turn = False
 
     def start(self, context: RecoveryContext) -> None:
+        """Start a turn from the pose of the first step."""
         self._start_yaw_rad = None
         self._past_half_turn = False
 
     def step(self, context: RecoveryContext) -> Step:
+        """Turn on; stop if the pose is unknown or the rest of the turn would collide."""
         pose = context.pose_in_local
         if pose is None:
-            return self._end("rotation ended: the robot's pose is unknown", stop=True)
+            return self._end("rotation stopped: robot pose unknown", stop=True)
         if self._start_yaw_rad is None:
             self._start_yaw_rad = pose.yaw_rad
-        left_rad = self._angle_left(pose.yaw_rad)
-        if left_rad is None:
+        remaining_rad = self._remaining_angle(pose.yaw_rad)
+        if remaining_rad is None:
             return self._end("", stop=self.params.stop_after_rotation)
-        if not self._is_free(context.local_costmap, pose, left_rad):
-            return self._end("rotation ended: the footprint would touch an obstacle", stop=True)
-        return Step(command=Twist2D(vyaw_radps=self._speed(left_rad)))
+        if not self._is_free(context.local_costmap, pose, remaining_rad):
+            return self._end("rotation stopped: the footprint would touch an obstacle", stop=True)
+        return Step(command=Twist2D(vyaw_radps=self._speed(remaining_rad)))
 
     def _end(self, message: str, stop: bool) -> Step:
         return Step(command=Twist2D() if stop else None, done=True, message=message)
 
-    def _angle_left(self, yaw_rad: float) -> Optional[float]:
-        """Radians until the turn is full, None when it is."""
+    def _remaining_angle(self, yaw_rad: float) -> Optional[float]:
+        """Return the remaining angle, None if the turn is complete."""
         assert self._start_yaw_rad is not None
         tolerance = self.params.yaw_goal_tolerance_rad
         to_half_turn = abs(angle_difference(self._start_yaw_rad + math.pi, yaw_rad))
         if not self._past_half_turn:
             self._past_half_turn = to_half_turn < tolerance
             return math.pi + to_half_turn
-        left_rad = abs(angle_difference(self._start_yaw_rad, yaw_rad))
-        return None if left_rad <= tolerance else left_rad
+        remaining_rad = abs(angle_difference(self._start_yaw_rad, yaw_rad))
+        return None if remaining_rad <= tolerance else remaining_rad
 
-    def _is_free(self, costmap: LayeredCostmap, pose: Pose2D, left_rad: float) -> bool:
+    def _is_free(self, costmap: LayeredCostmap, pose: Pose2D, remaining_rad: float) -> bool:
         return all(
             self._footprint_cost(costmap, Pose2D(pose.x_m, pose.y_m, pose.yaw_rad + turn)) >= 0.0
-            for turn in np.arange(0.0, left_rad, self.params.sim_granularity_rad)
+            for turn in np.arange(0.0, remaining_rad, self.params.sim_granularity_rad)
         )
 
-    def _speed(self, left_rad: float) -> float:
+    def _speed(self, remaining_rad: float) -> float:
         params = self.params
-        speed = math.sqrt(2.0 * params.acc_lim_theta_radps2 * left_rad)
+        speed = math.sqrt(2.0 * params.acc_lim_theta_radps2 * remaining_rad)
         return min(max(speed, params.min_in_place_vel_theta_radps), params.max_vel_theta_radps)
