@@ -9,7 +9,7 @@ import pytest
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.kernels.rigid_body import step_freely
 from quad_nav.sim.body import World
-from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState, FlightLaw, FlightParams
+from quad_nav.sim.flight import Airframe, BodyState, FlightLaw, FlightParams
 from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.scene import Cylinder, Scene, Walls
 from quad_nav.sim.simulation import STEP_S, Simulation, SimulationParams
@@ -34,8 +34,7 @@ def free_step(bodies, forces, torques, airframe, step_s):
         np.zeros(len(rows), bool),
         forces,
         torques,
-        FlightLaw(airframe, FlightParams()).airframe,
-        GRAVITY_MPS2,
+        FlightLaw(airframe, FlightParams()).constants,
         step_s,
     )
     return BodyState(rows)

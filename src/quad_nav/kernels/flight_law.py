@@ -1,16 +1,48 @@
-"""The flight law's loop over quadcopters; ``sim/flight.py`` has the formulas and their reasons."""
+"""Flight law: from commanded velocities to forces and torques.
+
+``sim/flight.py`` has the formulas and their reasons. Bodies are rows of float64[n, 13] as in
+``sim.flight.BodyState``: position (3) in m, quaternion (x, y, z, w), velocity (3) in m/s and
+angular velocity (3) in rad/s, all in ``map``.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
 
 
+class BodyConstants(NamedTuple):
+    """Mass properties and limits of every quadcopter, and gravity."""
+
+    mass_kg: float
+    gravity_mps2: float
+    max_thrust_n: float
+    inertia_kgm2: Tuple[float, float, float]  # about the body's axes, which are principal
+    max_torques_nm: Tuple[float, float, float]  # about the body's axes
+
+
+class FlightGains(NamedTuple):
+    """Gains and limits of the flight law, as in ``sim.flight``."""
+
+    velocity_gain_per_s: float
+    attitude_bandwidth_radps: float
+    altitude_bandwidth_radps: float
+    yaw_rate_gain_per_s: float
+    max_acceleration_mps2: float  # horizontal
+    max_yaw_acceleration_radps2: float
+
+
 @njit(cache=True, nogil=True)
 def rotation_from_quaternion(quaternion, rotation):
-    """Fill rotation float64[3, 3], body axes as columns, from quaternion float64[4]."""
+    """Fill a rotation matrix from a unit quaternion.
+
+    Args:
+        quaternion: float64[4], (x, y, z, w).
+        rotation: float64[3, 3], filled with the body's axes in ``map`` as columns.
+    """
     x, y, z, w = quaternion
     rotation[0, 0] = 1 - 2 * (y * y + z * z)
     rotation[0, 1] = 2 * (x * y - w * z)
@@ -24,16 +56,21 @@ def rotation_from_quaternion(quaternion, rotation):
 
 
 @njit(cache=True, nogil=True)
-def fly(rows, commands, altitude, gravity, airframe, law, forces, torques):
-    """Fill forces and torques float64[n, 3], in the frame of the bodies.
+def fly(rows, commands, altitude_m, constants, gains, forces, torques):
+    """Compute the forces and torques that track commands.
 
-    rows: float64[n, 13] as in ``BodyState``; commands: float64[n, 3], (vx, vy, vyaw).
-    airframe: mass, largest thrust, inertia (3), largest torques (3). law: velocity gain,
-    attitude bandwidth, altitude bandwidth, yaw rate gain, limits of the horizontal and
-    the yaw acceleration.
+    Args:
+        rows: float64[n, 13], bodies in ``map``.
+        commands: float64[n, 3], (vx, vy, vyaw): m/s ahead and to the left of the heading,
+            rad/s.
+        altitude_m: Altitude to hold, z in ``map``.
+        constants: Mass properties and limits.
+        gains: Gains and limits of the law.
+        forces: float64[n, 3], filled, N in ``map``.
+        torques: float64[n, 3], filled, N m in ``map``.
     """
-    mass, max_thrust = airframe[0], airframe[1]
-    gain, attitude, lift, yaw_gain, max_acceleration, max_yaw_acceleration = law
+    mass, gravity, max_thrust = constants.mass_kg, constants.gravity_mps2, constants.max_thrust_n
+    gain, attitude, lift, yaw_gain, max_acceleration, max_yaw_acceleration = gains
     r = np.empty((3, 3))
     omega = np.empty(3)
     body_torque = np.empty(3)
@@ -46,7 +83,7 @@ def fly(rows, commands, altitude, gravity, airframe, law, forces, torques):
         length = math.sqrt(ax * ax + ay * ay + gravity * gravity)
         up_x, up_y, up_z = ax / length, ay / length, gravity / length
 
-        az = lift * lift * (altitude - height) - 2 * lift * velocity[2]
+        az = lift * lift * (altitude_m - height) - 2 * lift * velocity[2]
         thrust = mass * (gravity + az) / max(r[2, 2], 0.5)
         thrust = min(max(thrust, 0.0), max_thrust)
         for axis in range(3):
@@ -61,7 +98,9 @@ def fly(rows, commands, altitude, gravity, airframe, law, forces, torques):
         body_torque[1] = attitude * attitude * goal_x - 2 * attitude * omega[1]
         body_torque[2] = _limited(yaw_gain * (commands[k, 2] - omega[2]), max_yaw_acceleration)
         for axis in range(3):
-            body_torque[axis] = _limited(body_torque[axis] * airframe[2 + axis], airframe[5 + axis])
+            body_torque[axis] = _limited(
+                body_torque[axis] * constants.inertia_kgm2[axis], constants.max_torques_nm[axis]
+            )
         for axis in range(3):
             torques[k, axis] = (
                 r[axis, 0] * body_torque[0]
@@ -72,6 +111,7 @@ def fly(rows, commands, altitude, gravity, airframe, law, forces, torques):
 
 @njit(cache=True, nogil=True)
 def _horizontal_acceleration(rotation, velocity, yaw_rate, command, gain, limit):
+    """Acceleration (ax, ay) in ``map``, m/s^2, that tracks a command; no longer than the limit."""
     forward_x, forward_y = rotation[0, 0], rotation[1, 0]
     length = math.hypot(forward_x, forward_y)
     forward_x, forward_y = forward_x / length, forward_y / length

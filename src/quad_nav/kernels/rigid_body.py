@@ -1,61 +1,81 @@
-"""Loops over quadcopters that touch nothing: how they move, until one may touch something."""
+"""Rigid bodies that touch nothing: move them until one may touch something.
+
+Bodies are rows of float64[n, 13] as in ``flight_law``.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.kernels.flight_law import fly, rotation_from_quaternion
 
 NOBODY = -1
 
 
-@njit(cache=True, nogil=True)
-def fly_freely(
-    rows,
-    commands,
-    held,
-    steps,
-    step_s,
-    altitude,
-    gravity,
-    airframe,
-    law,
-    mount_m,
-    pair_m,
-    known_m,
-    rooms_m,
-    centres_m,
-):
-    """Up to so many steps, in place, as long as nothing may be touched.
+class FreeSpace(NamedTuple):
+    """Space around each quadcopter in which it touches nothing.
 
-    Those that are held, bool[n], stand still: something else moves them. The other arguments
-    are those of ``flight_law.fly``, ``step_freely`` and ``find_near``. Returns the steps done
-    and what ``find_near`` found before the next one.
+    Known points and rooms are valid until the caller replaces them. All positions are in
+    ``map``, lengths in metres.
+    """
+
+    mount_m: float  # height of a hull's centre above the body's origin, along the body's z axis
+    pair_m: float  # two quadcopters with centres nearer than this may touch
+    checked_m: NDArray[np.float64]  # [n, 3], points whose clearance is known
+    free_m: NDArray[np.float64]  # [n], how far a centre may be from its known point
+    centres_m: NDArray[np.float64]  # [n, 3], the hulls' centres, filled by ``find_near``
+
+
+@njit(cache=True, nogil=True)
+def fly_freely(rows, commands, held, steps, step_s, altitude_m, constants, gains, space):
+    """Fly as long as nothing may be touched.
+
+    Args:
+        rows: float64[n, 13], bodies in ``map``, moved in place.
+        commands: float64[n, 3], as for ``flight_law.fly``.
+        held: bool[n], bodies that something else moves; they stay where they are.
+        steps: Most steps to fly.
+        step_s: Length of a step.
+        altitude_m: Altitude to hold, z in ``map``.
+        constants: Mass properties and limits.
+        gains: Gains and limits of the flight law.
+        space: Space in which nothing is touched.
+
+    Returns:
+        The steps flown, and the two numbers that ``find_near`` returned before the next one.
     """
     forces, torques = np.empty_like(commands), np.empty_like(commands)
     for done in range(steps):
-        found, other = find_near(rows, held, mount_m, pair_m, known_m, rooms_m, centres_m)
+        found, other = find_near(rows, held, space)
         if found != NOBODY:
             return done, found, other
-        fly(rows, commands, altitude, gravity, airframe, law, forces, torques)
-        step_freely(rows, held, forces, torques, airframe, gravity, step_s)
+        fly(rows, commands, altitude_m, constants, gains, forces, torques)
+        step_freely(rows, held, forces, torques, constants, step_s)
     return steps, NOBODY, NOBODY
 
 
 @njit(cache=True, nogil=True)
-def step_freely(rows, held, forces, torques, airframe, gravity, step_s):
-    """One time step of the bodies that are not held, in place, as the physics engine makes it.
+def step_freely(rows, held, forces, torques, constants, step_s):
+    """Move bodies by one time step, as the physics engine does.
 
-    rows: float64[n, 13] as in ``BodyState``; held: bool[n]; forces and torques: float64[n, 3]
-    in the frame of the bodies; airframe: as in ``flight_law.fly``. Velocities go first (Newton,
-    and Euler's equations with the gyroscopic term), then positions with the new velocities; a
-    body turns about its angular velocity (Grassia, Practical Parameterization of Rotations
-    Using the Exponential Map, 1998).
+    Velocities go first (Newton, and Euler's equations with the gyroscopic term), then
+    positions with the new velocities. A body turns about its angular velocity (F. Grassia,
+    "Practical Parameterization of Rotations Using the Exponential Map", 1998).
+
+    Args:
+        rows: float64[n, 13], bodies in ``map``, moved in place.
+        held: bool[n], bodies that stay where they are.
+        forces: float64[n, 3], N in ``map``.
+        torques: float64[n, 3], N m in ``map``.
+        constants: Mass properties and gravity.
+        step_s: Length of the step.
     """
-    mass, inertia = airframe[0], airframe[2:5]
+    mass, gravity, inertia = constants.mass_kg, constants.gravity_mps2, constants.inertia_kgm2
     r = np.empty((3, 3))
     omega, torque = np.empty(3), np.empty(3)
     for k in range(rows.shape[0]):
@@ -84,7 +104,7 @@ def step_freely(rows, held, forces, torques, airframe, gravity, step_s):
 
 @njit(cache=True, nogil=True)
 def _turn(quaternion, omega, step_s):
-    """Turn a quaternion for a time at an angular velocity given in the outer frame."""
+    """Turn a quaternion, float64[4], in place, at float64[3], rad/s in ``map``."""
     rate = math.sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2])
     half = 0.5 * rate * step_s
     # sin(x) / x is 1 - x^2 / 6 to the last digit at such rates.
@@ -104,22 +124,28 @@ def _turn(quaternion, omega, step_s):
 
 
 @njit(cache=True, nogil=True)
-def find_near(rows, held, mount_m, pair_m, known_m, rooms_m, centres_m):
-    """A quadcopter that is not held, bool[n], and that may touch something; or ``NOBODY``.
+def find_near(rows, held, space):
+    """Find a quadcopter that is not held and that may touch something.
 
-    Returns its number, and that of another one with its centre nearer than ``pair_m``; the
-    second is ``NOBODY`` if it is further than rooms_m, float64[n], from its known_m,
-    float64[n, 3], so that it may be near to something else. centres_m, float64[n, 3], is
-    filled: points ``mount_m`` above the origins of rows, float64[n, 13] as in ``BodyState``,
-    along the bodies' own axes.
+    Args:
+        rows: float64[n, 13], bodies in ``map``.
+        held: bool[n], bodies that something else moves.
+        space: Space in which nothing is touched; its ``centres_m`` are filled.
+
+    Returns:
+        The quadcopter's number and that of another one with its centre nearer than
+        ``space.pair_m``. The second is ``NOBODY`` if the first has left its room, so that it
+        may be near to something else. Both are ``NOBODY`` if nothing may be touched.
     """
+    mount_m, pair_m, centres_m = space.mount_m, space.pair_m, space.centres_m
     for k in range(rows.shape[0]):
         x, y, z, w = rows[k, 3:7]
         centres_m[k, 0] = rows[k, 0] + mount_m * 2 * (x * z + w * y)
         centres_m[k, 1] = rows[k, 1] + mount_m * 2 * (y * z - w * x)
         centres_m[k, 2] = rows[k, 2] + mount_m * (1 - 2 * (x * x + y * y))
     for k in range(rows.shape[0]):
-        if not held[k] and _square_m2(centres_m[k], known_m[k]) >= rooms_m[k] * rooms_m[k]:
+        room_m = space.free_m[k]
+        if not held[k] and _square_m2(centres_m[k], space.checked_m[k]) >= room_m * room_m:
             return k, NOBODY
     for k in range(rows.shape[0]):
         for other in range(k):
@@ -132,5 +158,6 @@ def find_near(rows, held, mount_m, pair_m, known_m, rooms_m, centres_m):
 
 @njit(cache=True, nogil=True)
 def _square_m2(a, b):
+    """Squared distance of two points, float64[3]."""
     dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return dx * dx + dy * dy + dz * dz

@@ -146,27 +146,28 @@ class FlightLaw:
     """Controller for quadcopters of one airframe; it has no state.
 
     Attributes:
-        law: Gains and limits, as ``kernels.flight_law.fly`` takes them.
-        airframe: Mass properties and limits, as ``kernels.flight_law.fly`` takes them.
+        constants: Mass properties, limits and gravity, as the kernels take them.
+        gains: Gains and limits of the law, as the kernels take them.
     """
 
     def __init__(self, airframe: Airframe, params: FlightParams) -> None:
         limit_mps2 = min(params.max_acceleration_mps2, GRAVITY_MPS2 * math.tan(params.max_tilt_rad))
-        self.law = (
-            params.velocity_gain_per_s,
-            params.attitude_bandwidth_radps,
-            params.altitude_bandwidth_radps,
-            params.yaw_rate_gain_per_s,
-            limit_mps2,
-            params.max_yaw_acceleration_radps2,
+        ixx, iyy, izz = airframe.inertia_kgm2
+        tx, ty, tz = airframe.max_torques_nm
+        self.constants = flight_law.BodyConstants(
+            mass_kg=float(airframe.mass_kg),
+            gravity_mps2=GRAVITY_MPS2,
+            max_thrust_n=float(airframe.max_thrust_n),
+            inertia_kgm2=(float(ixx), float(iyy), float(izz)),
+            max_torques_nm=(float(tx), float(ty), float(tz)),
         )
-        self.airframe = np.array(
-            [
-                airframe.mass_kg,
-                airframe.max_thrust_n,
-                *airframe.inertia_kgm2,
-                *airframe.max_torques_nm,
-            ]
+        self.gains = flight_law.FlightGains(
+            velocity_gain_per_s=float(params.velocity_gain_per_s),
+            attitude_bandwidth_radps=float(params.attitude_bandwidth_radps),
+            altitude_bandwidth_radps=float(params.altitude_bandwidth_radps),
+            yaw_rate_gain_per_s=float(params.yaw_rate_gain_per_s),
+            max_acceleration_mps2=float(limit_mps2),
+            max_yaw_acceleration_radps2=float(params.max_yaw_acceleration_radps2),
         )
 
     def thrust_and_torque(
@@ -185,6 +186,6 @@ class FlightLaw:
         """
         forces, torques = np.empty_like(commands), np.empty_like(commands)
         flight_law.fly(
-            state.rows, commands, altitude_m, GRAVITY_MPS2, self.airframe, self.law, forces, torques
+            state.rows, commands, altitude_m, self.constants, self.gains, forces, torques
         )
         return forces, torques

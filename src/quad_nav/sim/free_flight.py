@@ -13,8 +13,8 @@ from typing import List, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.rigid_body import NOBODY, fly_freely
-from quad_nav.sim.flight import GRAVITY_MPS2, BodyState, FlightLaw
+from quad_nav.kernels.rigid_body import NOBODY, FreeSpace, fly_freely
+from quad_nav.sim.flight import BodyState, FlightLaw
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
 
@@ -35,11 +35,13 @@ class FreeFlight:
         self._step_s = step_s
         # Radius of a sphere that contains the guard at any tilt.
         self._reach_m = math.hypot(radius_m, GUARD_HEIGHT_M / 2) + _MARGIN_M
-        self._centres_m = np.empty((n_robots, 3))
-        self._checked_m = np.zeros((n_robots, 3))
-        self._free_m = np.zeros(
-            n_robots
-        )  # radius around checked_m in which nothing is near; 0 is not known
+        self._space = FreeSpace(
+            mount_m=MOUNT_HEIGHT_M,
+            pair_m=2 * self._reach_m,
+            checked_m=np.zeros((n_robots, 3)),
+            free_m=np.zeros(n_robots),  # not known yet
+            centres_m=np.empty((n_robots, 3)),
+        )
 
     def advance(
         self, bodies: BodyState, commands: Floats, excluded: NDArray[np.bool_], steps: int
@@ -64,14 +66,9 @@ class FreeFlight:
                 steps - done,
                 self._step_s,
                 self._scene.altitude_m,
-                GRAVITY_MPS2,
-                self._law.airframe,
-                self._law.law,
-                MOUNT_HEIGHT_M,
-                2 * self._reach_m,
-                self._checked_m,
-                self._free_m,
-                self._centres_m,
+                self._law.constants,
+                self._law.gains,
+                self._space,
             )
             done += more
             if other != NOBODY:
@@ -82,8 +79,8 @@ class FreeFlight:
 
     def _is_far(self, robot: int) -> bool:
         """Compute a robot's distance to the nearest surface; return whether it is far from it."""
-        x_m, y_m, z_m = self._centres_m[robot].tolist()
+        x_m, y_m, z_m = self._space.centres_m[robot].tolist()
         distance_m = min(self._scene.surface_distance_m(x_m, y_m, z_m), z_m)
-        self._checked_m[robot] = x_m, y_m, z_m
-        self._free_m[robot] = max(0.0, distance_m - self._reach_m)
-        return bool(self._free_m[robot] > 0.0)
+        self._space.checked_m[robot] = x_m, y_m, z_m
+        self._space.free_m[robot] = max(0.0, distance_m - self._reach_m)
+        return bool(self._space.free_m[robot] > 0.0)
