@@ -13,7 +13,7 @@ from quad_nav.control.goal import is_stopped, stopping_command, turning_command
 from quad_nav.control.map_grid import distance_grids
 from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.plan_window import count_passed, plan_in_window
-from quad_nav.control.rollout import Rollout, footprint_cost, kernel_window
+from quad_nav.control.rollout import Rollout, costmap_view, footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.control.velocity_search import spaced, velocity_window
 from quad_nav.errors import NoLocalPlan, NoValidTrajectory
@@ -78,7 +78,7 @@ def test_distances_go_round_obstacles_and_mark_what_they_touch():
     spec = GridSpec(5, 3, 1.0)
     plan = np.array([[0.5, 2.5], [3.5, 2.5]])
 
-    grids = distance_grids(kernel_window(spec, costs), plan, SQUARE, Pose2D(0.5, 0.5))
+    grids = distance_grids(costmap_view(spec, costs), plan, SQUARE, Pose2D(0.5, 0.5))
 
     assert grids.path.tolist() == [[2, 3, 3, 2, 3], [1, 15, 15, 1, 2], [0, 0, 0, 0, 1]]
     assert grids.goal.tolist() == [[5, 4, 3, 2, 3], [4, 15, 15, 1, 2], [3, 2, 1, 0, 1]]
@@ -90,7 +90,7 @@ def test_path_distance_forgives_obstacles_under_the_robot():
         ###
         ...
     """)
-    window = kernel_window(GridSpec(3, 3, 1.0), costs)
+    window = costmap_view(GridSpec(3, 3, 1.0), costs)
     plan = np.array([[0.5, 2.5], [2.5, 2.5]])
 
     grids = distance_grids(window, plan, SQUARE, Pose2D(1.5, 1.5))
@@ -101,7 +101,7 @@ def test_path_distance_forgives_obstacles_under_the_robot():
 
 
 def test_nothing_is_reached_from_a_plan_off_the_map():
-    window = kernel_window(GridSpec(3, 3, 1.0), np.zeros((3, 3), dtype=np.uint8))
+    window = costmap_view(GridSpec(3, 3, 1.0), np.zeros((3, 3), dtype=np.uint8))
 
     grids = distance_grids(window, np.array([[5.0, 5.0]]), SQUARE, Pose2D(1.5, 1.5))
 
@@ -109,7 +109,7 @@ def test_nothing_is_reached_from_a_plan_off_the_map():
 
 
 def test_local_goal_is_the_end_of_the_first_stretch_inside():
-    window = kernel_window(GridSpec(4, 1, 1.0), np.zeros((1, 4), dtype=np.uint8))
+    window = costmap_view(GridSpec(4, 1, 1.0), np.zeros((1, 4), dtype=np.uint8))
     plan = np.array([[-0.5, 0.5], [0.5, 0.5], [1.5, 0.5], [1.5, 1.5], [3.5, 1.5], [3.5, 0.5]])
 
     grids = distance_grids(window, plan, SQUARE, Pose2D(0.5, 0.5))

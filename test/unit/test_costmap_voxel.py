@@ -14,7 +14,7 @@ from quad_nav.costmap.observation import SourceParams
 from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import UNKNOWN, GridSpec
-from quad_nav.kernels.voxels import clear_voxel_line
+from quad_nav.kernels.voxels import VoxelGrid, clear_voxel_line
 
 ROW = 2  # everything happens in the row with y from 2 to 3 m
 SOURCE = SourceParams(
@@ -27,6 +27,10 @@ SOURCE = SourceParams(
 )
 EYE = (0.5, 2.5, 0.5)
 ROBOT = Pose2D(0.5, 2.5)
+
+
+def grid_of(voxels, costs):
+    return VoxelGrid(voxels, costs, np.zeros(3), np.ones(3), unknown_threshold=15, mark_threshold=0)
 
 
 def layer_of(source=SOURCE, rolling=False, **params):
@@ -86,7 +90,7 @@ def test_a_ray_through_an_obstacle_clears_it():
 
 def test_a_slanting_line():
     voxels, costs = np.full((1, 6, 3), UNKNOWN, np.uint8), np.full((1, 6), UNKNOWN, np.uint8)
-    clear_voxel_line(voxels, costs, 0.5, 0.5, 0.5, 4.5, 0.5, 2.5, 10.0, 15, 0)
+    clear_voxel_line(grid_of(voxels, costs), (0.5, 0.5, 0.5), (4.5, 0.5, 2.5), 10.0)
     assert picture(voxels[0].T) == drawn("""???..?
                                             ?..???
                                             .?????""")
@@ -96,7 +100,7 @@ def test_a_slanting_line():
 def test_a_line_is_cut_to_its_range_along_the_slope():
     voxels, costs = np.full((1, 6, 3), UNKNOWN, np.uint8), np.full((1, 6), UNKNOWN, np.uint8)
     # 4 steps for a length of 4.47 voxels: 2 / 4.47 of them is one and the end of it.
-    clear_voxel_line(voxels, costs, 0.5, 0.5, 0.5, 4.5, 0.5, 2.5, 2.0, 15, 0)
+    clear_voxel_line(grid_of(voxels, costs), (0.5, 0.5, 0.5), (4.5, 0.5, 2.5), 2.0)
     assert picture(voxels[0].T) == drawn("""??????
                                             ?.????
                                             .?????""")
@@ -104,7 +108,7 @@ def test_a_line_is_cut_to_its_range_along_the_slope():
 
 def test_a_steep_line_steps_downwards():
     voxels, costs = np.full((1, 2, 4), UNKNOWN, np.uint8), np.full((1, 2), UNKNOWN, np.uint8)
-    clear_voxel_line(voxels, costs, 0.9, 0.5, 3.1, 1.1, 0.5, 0.2, 10.0, 15, 0)
+    clear_voxel_line(grid_of(voxels, costs), (0.9, 0.5, 3.1), (1.1, 0.5, 0.2), 10.0)
     assert picture(voxels[0].T) == drawn(""".?
                                             .?
                                             ?.

@@ -92,7 +92,7 @@ def test_module_imports_only_what_it_may(path):
         ("costmap/layered.py", "from ..sim.scene import Scene"),
         ("navigator/navigator.py", "def tick():\n    from quad_nav.sim import scene"),
         ("offline/run.py", "from quad_nav.ros import topics"),
-        ("kernels/navfn.py", "from quad_nav.costmap.layered import LayeredCostmap"),
+        ("kernels/wave.py", "from quad_nav.costmap.layered import LayeredCostmap"),
         ("navigator/navigator.py", "import rospy"),
         ("mission/summary.py", "from geometry_msgs.msg import Pose"),
         ("sim/lidar.py", "import pybullet as p"),
@@ -111,7 +111,7 @@ def test_rules_refuse(module, statement):
         ("navigator/navigator.py", "import numpy\nfrom quad_nav.plan.navfn import Navfn"),
         ("ros/navigator/nodes.py", "import rospy\nfrom nav_msgs.msg import Path"),
         ("sim/body.py", "import pybullet"),
-        ("kernels/navfn.py", "from numba import njit"),
+        ("kernels/wave.py", "from numba import njit"),
     ],
 )
 def test_rules_allow(module, statement):

@@ -11,7 +11,7 @@ from quad_nav.costmap.cost_grid import NOWHERE, CostGrid
 from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.discs import nearest_cell, raise_discs
+from quad_nav.kernels.peers import nearest_cell, raise_discs
 from quad_nav.peers.holding_point import COMFORTABLE, find_holding_point, is_reachable
 from quad_nav.peers.peer import (
     HIGHEST_PRIORITY,

@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from quad_nav.kernels.cost_grid import CostmapView
 from quad_nav.kernels.raytrace import (
     MAX_OBSTRUCTED,
     SECTORS,
+    ObservationStack,
     clear_all_rays,
     clear_rays,
     find_obstructed,
@@ -40,10 +42,7 @@ def cleared_by_all_lines(costs, sensors, points, per_scan, range_m):
     bounds = np.array(NOWHERE)
     for k, sensor in enumerate(sensors):
         clear_rays(
-            costs,
-            -1.0,
-            2.0,
-            RESOLUTION_M,
+            CostmapView(costs, -1.0, 2.0, RESOLUTION_M),
             sensor[0],
             sensor[1],
             points[k * per_scan : (k + 1) * per_scan],
@@ -71,9 +70,8 @@ def test_the_outcome_is_that_of_all_lines(obstructed, range_m):
         ends = per_scan * np.arange(1, len(sensors) + 1)
         bounds = np.array(NOWHERE)
         before = np.count_nonzero(costs)
-        clear_all_rays(
-            costs, -1.0, 2.0, RESOLUTION_M, sensors, points, ends - per_scan, ends, range_m, bounds
-        )
+        seen = ObservationStack(sensors, points, ends - per_scan, ends)
+        clear_all_rays(CostmapView(costs, -1.0, 2.0, RESOLUTION_M), seen, range_m, bounds)
         np.testing.assert_array_equal(costs, expected)
         # The last millimetre before the grid's border is in the same cell.
         np.testing.assert_allclose(bounds, expected_bounds, atol=1.01e-3)

@@ -37,9 +37,9 @@ from quad_nav.control.dwa_samples import acceleration_limits, velocity_samples
 from quad_nav.control.rollout import (
     Trajectory,
     Triple,
+    costmap_view,
     footprint_reach_m,
     highest_near,
-    kernel_window,
     single,
 )
 from quad_nav.geometry import Pose2D, Twist2D
@@ -82,7 +82,7 @@ class Critics:
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
         self.velocity = single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)
         self.goal = Pose2D(*plan[-1].tolist())
-        self.window = kernel_window(spec, costs)
+        self.costmap = costmap_view(spec, costs)
         self.footprint = footprint
         self.grids = self._measure(plan) if grids is None else grids
         self.path_scale = params.path_distance_bias * spec.resolution_m  # per cell
@@ -142,11 +142,11 @@ class Critics:
         ahead_rad = math.atan2(self.goal.y_m - self.pose.y_m, self.goal.x_m - self.pose.x_m)
         forward_m = self.params.forward_point_distance_m
         front_xy[-1] += Pose2D(0.0, 0.0, ahead_rad).rotate(forward_m, 0.0)
-        nowhere = np.zeros(self.window.costs.shape, dtype=np.bool_)
-        cells = cells_on_plan(self.window, plan_xy)
-        front_cells = cells_on_plan(self.window, front_xy)
+        nowhere = np.zeros(self.costmap.costs.shape, dtype=np.bool_)
+        cells = cells_on_plan(self.costmap, plan_xy)
+        front_cells = cells_on_plan(self.costmap, front_xy)
         path, goal, goal_front = (
-            spread(self.window.costs, nowhere, sources)
+            spread(self.costmap.costs, nowhere, sources)
             for sources in (cells, cells[-1:], front_cells[-1:])
         )
         return DwaGrids(path, goal, goal_front)
@@ -156,7 +156,7 @@ class Critics:
         near_m2 = self.params.forward_point_distance_m**2 * self.params.cheat_factor
         to_goal_m2 = (self.pose.x_m - self.goal.x_m) ** 2 + (self.pose.y_m - self.goal.y_m) ** 2
         return kernel.MapGrids(
-            self.window,
+            self.costmap,
             *self.grids,
             float(self.params.forward_point_distance_m),
             follows_path=follows_path,
@@ -177,8 +177,8 @@ class Critics:
         largest = float(np.max(np.abs(scales[np.isfinite(scales)]), initial=1.0))
         reach_m = footprint_reach_m(self.footprint) * largest
         return kernel.Obstacles(
-            self.window,
-            highest_near(self.window, reach_m),
+            self.costmap,
+            highest_near(self.costmap, reach_m),
             self.footprint,
             scale=float(self.params.occdist_scale),
             sums=bool(self.params.sum_scores),

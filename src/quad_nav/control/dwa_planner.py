@@ -91,7 +91,7 @@ class DwaPlanner(PlanFollower):
         """
         if self.best is None or self.critics is None:
             return np.zeros((0, 7), dtype=np.float32)
-        critics, costs = self.critics, self.critics.window.costs
+        critics, costs = self.critics, self.critics.costmap.costs
         usable = (critics.grids.path < costs.size) & (costs < INSCRIBED)
         return cost_cloud(
             critics.spec,

@@ -1,7 +1,7 @@
 """Distances over the local costmap: to the global plan, and to the local goal.
 
 Both count steps between the four neighbours of a cell, around obstacles. The
-local goal is the last cell of the plan's first stretch inside the window.
+local goal is the last cell of the plan's first stretch inside the costmap.
 Cells under the robot's footprint count as free for the path distance, so that
 a robot at an obstacle still finds its way to the plan; not so for the goal
 distance.
@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.collision import Window, mark_footprint
+from quad_nav.kernels.collision import mark_footprint
+from quad_nav.kernels.cost_grid import CostmapView
 from quad_nav.kernels.map_grid import cells_on_plan, spread
 
 
@@ -32,18 +33,18 @@ class DistanceGrids:
 
 
 def distance_grids(
-    window: Window, plan_xy: np.ndarray, footprint: np.ndarray, pose: Pose2D
+    costmap: CostmapView, plan_xy: np.ndarray, footprint: np.ndarray, pose: Pose2D
 ) -> DistanceGrids:
     """Distance grids of a plan, float64[m, 2], for a robot at a pose.
 
     Without a point of the plan on known ground, nothing is reached.
     """
-    nowhere = np.zeros(window.costs.shape, dtype=np.bool_)
+    nowhere = np.zeros(costmap.costs.shape, dtype=np.bool_)
     within_robot = nowhere.copy()
-    mark_footprint(window, footprint, pose.x_m, pose.y_m, pose.yaw_rad, within_robot)
-    cells = cells_on_plan(window, plan_xy)
+    mark_footprint(costmap, footprint, pose.x_m, pose.y_m, pose.yaw_rad, within_robot)
+    cells = cells_on_plan(costmap, plan_xy)
     return DistanceGrids(
-        path=spread(window.costs, within_robot, cells),
-        goal=spread(window.costs, nowhere, cells[-1:]),
+        path=spread(costmap.costs, within_robot, cells),
+        goal=spread(costmap.costs, nowhere, cells[-1:]),
         within_robot=within_robot,
     )

@@ -9,7 +9,7 @@ With the last pose's distances to path and goal, in cells,
          + occdist_scale * highest cell cost under the footprint on the way
 
 A trajectory is worth nothing (negative cost) when the footprint touches a
-lethal or unknown cell or leaves the window (-1), or when a pose lies where
+lethal or unknown cell or leaves the costmap (-1), or when a pose lies where
 neither path nor goal can be reached from (-2). With ``heading_scoring``, path
 and goal distances are those of one early pose only, and the angle to the
 farthest visible plan point counts as well; with ``simple_attractor``, only the
@@ -32,6 +32,7 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels import collision
 from quad_nav.kernels import rollout as kernel
+from quad_nav.kernels.cost_grid import CostmapView
 
 Triple = Tuple[float, float, float]
 
@@ -65,19 +66,19 @@ class Rollout:
         # The original keeps the robot's state in single precision.
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
         self.velocity = single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)
-        window = kernel_window(spec, costs)
+        costmap = costmap_view(spec, costs)
         plan_xy = np.ascontiguousarray(plan[:, :2])
         self.goal_x_m, self.goal_y_m = plan_xy[-1]
-        self.grids = distance_grids(window, plan_xy, footprint, self.pose)
-        self.scene = kernel.Scene(
-            window,
-            highest_near(window, footprint_reach_m(footprint)),
+        self.grids = distance_grids(costmap, plan_xy, footprint, self.pose)
+        self.inputs = kernel.RolloutInputs(
+            costmap,
+            highest_near(costmap, footprint_reach_m(footprint)),
             footprint,
             self.grids.path,
             self.grids.goal,
             plan_xy,
         )
-        self.rules = _rules(params, spec.resolution_m)
+        self.kernel_params = _kernel_params(params, spec.resolution_m)
 
     def score(self, samples: np.ndarray, limit: float = math.inf) -> Tuple[np.ndarray, np.ndarray]:
         """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3].
@@ -85,13 +86,13 @@ class Rollout:
         A cost may be infinite if it is above ``limit``.
         """
         return kernel.score(
-            self.scene, self.rules, _triple(self.pose), self.velocity, samples, limit
+            self.inputs, self.kernel_params, _triple(self.pose), self.velocity, samples, limit
         )
 
     def cheapest(self, samples: np.ndarray) -> Optional[Tuple[int, float]]:
         """Index and cost of the cheapest legal sample, the first of equals; None if none is."""
         k, cost = kernel.cheapest(
-            self.scene, self.rules, _triple(self.pose), self.velocity, samples
+            self.inputs, self.kernel_params, _triple(self.pose), self.velocity, samples
         )
         return (k, cost) if k >= 0 else None
 
@@ -107,20 +108,22 @@ class Rollout:
 
     def is_free(self, pose: Pose2D) -> bool:
         """Whether nothing is under the footprint at a pose, within its outline neither."""
-        window, footprint = self.scene.window, self.scene.footprint
-        if collision.footprint_cost(window, footprint, *_triple(pose)) < 0.0:
+        costmap, footprint = self.inputs.costmap, self.inputs.footprint
+        if collision.footprint_cost(costmap, footprint, *_triple(pose)) < 0.0:
             return False
-        inside = np.zeros(window.costs.shape, dtype=np.bool_)
+        inside = np.zeros(costmap.costs.shape, dtype=np.bool_)
         if len(footprint) > 2:
-            collision.mark_footprint(window, footprint, *_triple(pose), inside)
-        return not bool((window.costs[inside] >= LETHAL).any())
+            collision.mark_footprint(costmap, footprint, *_triple(pose), inside)
+        return not bool((costmap.costs[inside] >= LETHAL).any())
 
     def _simulate(self, pose: Triple, velocity: Triple, sample: Triple) -> Trajectory:
         row = np.array(sample)
-        headings = np.empty((kernel.step_count(self.rules, row), 3))
-        kernel.turn(self.rules, pose[2], velocity[2], sample[2], headings)
+        headings = np.empty((kernel.step_count(self.kernel_params, row), 3))
+        kernel.turn(self.kernel_params, pose[2], velocity[2], sample[2], headings)
         points = np.empty_like(headings)
-        cost, count = kernel.simulate(self.scene, self.rules, pose, velocity, row, headings, points)
+        cost, count = kernel.simulate(
+            self.inputs, self.kernel_params, pose, velocity, row, headings, points
+        )
         return Trajectory(sample, cost, points[:count])
 
     def goal_distance_at(self, x_m: float, y_m: float) -> Optional[int]:
@@ -135,7 +138,7 @@ class Rollout:
         of the point cloud ``cost_cloud``. Distances are in cells; cells in or
         behind obstacles and under the robot are left out.
         """
-        costs, path = self.scene.window.costs, self.grids.path
+        costs, path = self.inputs.costmap.costs, self.grids.path
         usable = (path < costs.size) & (costs < INSCRIBED) & ~self.grids.within_robot
         return cost_cloud(
             self.spec,
@@ -143,15 +146,15 @@ class Rollout:
             path,
             self.grids.goal,
             usable,
-            self.rules.path_scale,
-            self.rules.goal_scale,
-            self.rules.occupancy_scale,
+            self.kernel_params.path_scale,
+            self.kernel_params.goal_scale,
+            self.kernel_params.occupancy_scale,
         )
 
 
-def kernel_window(spec: GridSpec, costs: np.ndarray) -> collision.Window:
+def costmap_view(spec: GridSpec, costs: np.ndarray) -> CostmapView:
     """A costmap, uint8[H, W] on ``spec``, as the kernels take it."""
-    return collision.Window(
+    return CostmapView(
         costs=np.ascontiguousarray(costs),
         origin_x_m=float(spec.origin_x_m),
         origin_y_m=float(spec.origin_y_m),
@@ -165,7 +168,7 @@ def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray, pos
     Negative where it cannot be: -1 on a lethal cell, -2 on an unknown one, -3
     off the map.
     """
-    return collision.footprint_cost(kernel_window(spec, costs), footprint, *_triple(pose))
+    return collision.footprint_cost(costmap_view(spec, costs), footprint, *_triple(pose))
 
 
 def footprint_reach_m(footprint: np.ndarray) -> float:
@@ -173,16 +176,16 @@ def footprint_reach_m(footprint: np.ndarray) -> float:
     return float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
 
 
-def highest_near(window: collision.Window, reach_m: float) -> np.ndarray:
+def highest_near(costmap: CostmapView, reach_m: float) -> np.ndarray:
     """The highest cost in a square around each cell that holds a footprint of that reach.
 
     uint8[H, W]; off the map counts as UNKNOWN. Where it is low the outline need
     not be drawn. The square is built up from maxima over two, four, ... cells.
     """
-    reach = int(min(reach_m / window.resolution_m, max(window.costs.shape))) + 1
-    size_y, size_x = window.costs.shape
+    reach = int(min(reach_m / costmap.resolution_m, max(costmap.costs.shape))) + 1
+    size_y, size_x = costmap.costs.shape
     highest = np.full((size_y + 2 * reach, size_x + 2 * reach), UNKNOWN, dtype=np.uint8)
-    highest[reach:-reach, reach:-reach] = window.costs
+    highest[reach:-reach, reach:-reach] = costmap.costs
     side, covered = 2 * reach + 1, 1
     while covered < side:
         shift = min(covered, side - covered)
@@ -192,10 +195,10 @@ def highest_near(window: collision.Window, reach_m: float) -> np.ndarray:
     return highest
 
 
-def _rules(params: TrajectoryPlannerParams, resolution_m: float) -> kernel.Rules:
+def _kernel_params(params: TrajectoryPlannerParams, resolution_m: float) -> kernel.RolloutParams:
     # Biases are per metre with meter scoring, distances are in cells.
     per_cell = resolution_m if params.scores_in_metres else 1.0
-    return kernel.Rules(
+    return kernel.RolloutParams(
         sim_time_s=float(params.sim_time_s),
         sim_granularity_m=float(params.sim_granularity_m),
         angular_sim_granularity_rad=float(params.angular_sim_granularity_rad),

@@ -22,7 +22,7 @@ from quad_nav.control.velocity_search import choose_trajectory
 from quad_nav.errors import NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.rollout import NO_WAY
+from quad_nav.kernels.rollout import OUT_OF_REACH
 
 __all__ = ["TrajectoryPlanner", "TrajectoryPlannerParams"]
 
@@ -68,7 +68,7 @@ class TrajectoryPlanner(PlanFollower):
         if best.cost < 0.0:
             reason = (
                 "the global plan or its end in the local costmap is out of reach"
-                if best.cost == NO_WAY
+                if best.cost == OUT_OF_REACH
                 else "every trajectory hits something"
             )
             raise NoValidTrajectory(f"{reason} from ({pose.x_m:.2f}, {pose.y_m:.2f}) m")

@@ -25,7 +25,7 @@ from quad_nav.control.rollout import Rollout, Trajectory, Triple
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.kernels.collision import COLLIDES
-from quad_nav.kernels.rollout import NO_WAY
+from quad_nav.kernels.rollout import OUT_OF_REACH
 
 _DIAGONALS = ((0.1, 0.1, 0.0), (0.1, -0.1, 0.0))
 _ESCAPE_COST = 1.0
@@ -198,7 +198,7 @@ def _escape(
         and trajectory.cost == COLLIDES
         and not _leads_out(rollout, params)
     )
-    if trajectory.cost > NO_WAY and not is_refused:
+    if trajectory.cost > OUT_OF_REACH and not is_refused:
         oscillation.begin_escape(rollout.pose)
     _end_escape(rollout, params, oscillation)
     if trajectory.cost == COLLIDES and not is_refused:

@@ -8,8 +8,7 @@ from typing import Optional, Tuple
 import numpy as np
 
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
-from quad_nav.kernels.merging import raise_to
-from quad_nav.kernels.polygon import fill_convex_polygon
+from quad_nav.kernels.cost_grid import CostmapView, fill_convex_polygon, raise_to
 
 
 @dataclass(frozen=True)
@@ -89,6 +88,12 @@ class CostGrid:
     def __init__(self, spec: GridSpec, default_cost: int = FREE):
         self.default_cost = default_cost
         self.resize(spec)
+
+    @property
+    def view(self) -> CostmapView:
+        """The grid as kernels take it; ``costs`` is shared."""
+        spec = self.spec
+        return CostmapView(self.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m)
 
     def resize(self, spec: GridSpec) -> None:
         """Take another size, resolution or place; forgets all costs."""

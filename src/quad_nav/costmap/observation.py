@@ -7,6 +7,8 @@ from typing import List, Optional
 
 import numpy as np
 
+from quad_nav.kernels.raytrace import ObservationStack
+
 
 @dataclass(frozen=True)
 class SourceParams:
@@ -43,19 +45,6 @@ class Observation:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stamp_ns", _nanoseconds(self.stamp_s))
-
-
-@dataclass(frozen=True)
-class ObservationStack:
-    """Observations for kernels: sensors float64[k, 3], points float32[n, 3].
-
-    Observation i has the points from ``begins[i]`` to ``ends[i]``, int64[k]; others are old.
-    """
-
-    sensors: np.ndarray
-    points: np.ndarray
-    begins: np.ndarray
-    ends: np.ndarray
 
 
 class ObservationBuffer:

@@ -212,35 +212,11 @@ class ObstacleLayer(GridLayer):
         self.grid.centre_on(robot.x_m, robot.y_m)
 
     def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
-        spec, seen = self.grid.spec, buffer.stack
-        clear_all_rays(
-            self.grid.costs,
-            spec.origin_x_m,
-            spec.origin_y_m,
-            spec.resolution_m,
-            seen.sensors,
-            seen.points,
-            seen.begins,
-            seen.ends,
-            range_m,
-            touched,
-        )
+        clear_all_rays(self.grid.view, buffer.stack, range_m, touched)
 
     def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
-        spec, seen = self.grid.spec, buffer.stack
-        mark_all_points(
-            self.grid.costs,
-            spec.origin_x_m,
-            spec.origin_y_m,
-            spec.resolution_m,
-            seen.sensors,
-            seen.points,
-            seen.begins,
-            seen.ends,
-            range_m,
-            self.params.max_obstacle_height_m,
-            touched,
-        )
+        max_height_m = self.params.max_obstacle_height_m
+        mark_all_points(self.grid.view, buffer.stack, range_m, max_height_m, touched)
 
     def _raytrace_range(self, source: SourceParams) -> float:
         range_m = source.raytrace_range_m

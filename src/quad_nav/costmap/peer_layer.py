@@ -17,7 +17,7 @@ from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
 from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.discs import raise_discs
+from quad_nav.kernels.peers import raise_discs
 
 
 @dataclass(frozen=True)

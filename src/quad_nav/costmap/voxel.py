@@ -24,7 +24,7 @@ from quad_nav.costmap.observation import ObservationBuffer
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.voxels import clear_voxel_rays, mark_voxels
+from quad_nav.kernels.voxels import VoxelGrid, clear_voxel_rays, mark_voxels
 
 
 @dataclass(frozen=True)
@@ -100,34 +100,21 @@ class VoxelLayer(ObstacleLayer):
             shift(self.voxels, move_x, move_y, UNKNOWN)
 
     def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
-        params = self.params
-        for observation in buffer.observations:
-            clear_voxel_rays(
-                self.voxels,
-                self.grid.costs,
-                self._origin,
-                self._voxel_size,
-                observation.sensor,
-                observation.points,
-                range_m,
-                params.max_obstacle_height_m,
-                params.unknown_threshold,
-                params.mark_threshold,
-                touched,
-            )
+        grid, max_height_m = self._voxel_grid(), self.params.max_obstacle_height_m
+        for seen in buffer.observations:
+            clear_voxel_rays(grid, seen.sensor, seen.points, range_m, max_height_m, touched)
 
     def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
-        params = self.params
-        for observation in buffer.observations:
-            mark_voxels(
-                self.voxels,
-                self.grid.costs,
-                self._origin,
-                self._voxel_size,
-                observation.sensor,
-                observation.points,
-                range_m,
-                params.max_obstacle_height_m,
-                params.mark_threshold,
-                touched,
-            )
+        grid, max_height_m = self._voxel_grid(), self.params.max_obstacle_height_m
+        for seen in buffer.observations:
+            mark_voxels(grid, seen.sensor, seen.points, range_m, max_height_m, touched)
+
+    def _voxel_grid(self) -> VoxelGrid:
+        return VoxelGrid(
+            self.voxels,
+            self.grid.costs,
+            self._origin,
+            self._voxel_size,
+            self.params.unknown_threshold,
+            self.params.mark_threshold,
+        )

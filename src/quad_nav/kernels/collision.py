@@ -3,37 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN
-from quad_nav.kernels.cells import cell_index
-from quad_nav.kernels.polygon import fill_convex_polygon
+from quad_nav.kernels.cost_grid import cell_of, fill_convex_polygon
 
 COLLIDES = -1.0
 IN_UNKNOWN = -2.0
 OFF_THE_MAP = -3.0
-
-
-class Window(NamedTuple):
-    """A costmap as kernels take it."""
-
-    costs: np.ndarray  # uint8[H, W]
-    origin_x_m: float
-    origin_y_m: float
-    resolution_m: float
-
-
-@njit(cache=True, nogil=True)
-def cell_of(window, x, y):
-    """Cell (x, y) of a world point; an index is negative where the point is off the map."""
-    size_y, size_x = window.costs.shape
-    return (
-        cell_index(x, window.origin_x_m, window.resolution_m, size_x),
-        cell_index(y, window.origin_y_m, window.resolution_m, size_y),
-    )
 
 
 @njit(cache=True, nogil=True)
@@ -76,7 +55,7 @@ def line_cost(costs, x0, y0, x1, y1, forbidden_from):
 
 
 @njit(cache=True, nogil=True)
-def footprint_cost(window, footprint, x, y, theta):
+def footprint_cost(costmap, footprint, x, y, theta):
     """The highest cost under a footprint's outline at a pose, or what forbids it.
 
     ``footprint`` is float64[n, 2] in the robot's frame. Negative where the
@@ -84,13 +63,13 @@ def footprint_cost(window, footprint, x, y, theta):
     leaves the map (OFF_THE_MAP). Fewer than three points stand for a circle:
     only the centre's cell counts, and inscribed cost collides.
     """
-    cell_x, cell_y = cell_of(window, x, y)
+    cell_x, cell_y = cell_of(costmap, x, y)
     if cell_x < 0 or cell_y < 0:
         return OFF_THE_MAP
     if footprint.shape[0] < 3:
-        return line_cost(window.costs, cell_x, cell_y, cell_x, cell_y, INSCRIBED)
+        return line_cost(costmap.costs, cell_x, cell_y, cell_x, cell_y, INSCRIBED)
     cos_theta, sin_theta = math.cos(theta), math.sin(theta)
-    first_x, first_y = _vertex_cell(window, footprint, 0, x, y, cos_theta, sin_theta)
+    first_x, first_y = _vertex_cell(costmap, footprint, 0, x, y, cos_theta, sin_theta)
     if first_x < 0 or first_y < 0:
         return OFF_THE_MAP
     from_x, from_y = first_x, first_y
@@ -98,10 +77,10 @@ def footprint_cost(window, footprint, x, y, theta):
     for k in range(1, footprint.shape[0] + 1):
         to_x, to_y = first_x, first_y
         if k < footprint.shape[0]:
-            to_x, to_y = _vertex_cell(window, footprint, k, x, y, cos_theta, sin_theta)
+            to_x, to_y = _vertex_cell(costmap, footprint, k, x, y, cos_theta, sin_theta)
             if to_x < 0 or to_y < 0:
                 return OFF_THE_MAP
-        cost = line_cost(window.costs, from_x, from_y, to_x, to_y, LETHAL)
+        cost = line_cost(costmap.costs, from_x, from_y, to_x, to_y, LETHAL)
         if cost < 0.0:
             return cost
         highest = max(highest, cost)
@@ -110,17 +89,17 @@ def footprint_cost(window, footprint, x, y, theta):
 
 
 @njit(cache=True, nogil=True)
-def _vertex_cell(window, footprint, k, x, y, cos_theta, sin_theta):
+def _vertex_cell(costmap, footprint, k, x, y, cos_theta, sin_theta):
     vertex_x, vertex_y = footprint[k, 0], footprint[k, 1]
     return cell_of(
-        window,
+        costmap,
         x + (vertex_x * cos_theta - vertex_y * sin_theta),
         y + (vertex_x * sin_theta + vertex_y * cos_theta),
     )
 
 
 @njit(cache=True, nogil=True)
-def mark_footprint(window, footprint, x, y, theta, mask):
+def mark_footprint(costmap, footprint, x, y, theta, mask):
     """Set the cells inside a footprint in ``mask``, bool[H, W].
 
     Where a vertex is off the map only the outline before it is set.
@@ -128,7 +107,7 @@ def mark_footprint(window, footprint, x, y, theta, mask):
     cos_theta, sin_theta = math.cos(theta), math.sin(theta)
     vertices = np.empty((footprint.shape[0], 2), np.int64)
     for k in range(footprint.shape[0]):
-        vertices[k] = _vertex_cell(window, footprint, k, x, y, cos_theta, sin_theta)
+        vertices[k] = _vertex_cell(costmap, footprint, k, x, y, cos_theta, sin_theta)
         if vertices[k, 0] < 0 or vertices[k, 1] < 0:
             for j in range(k - 1):
                 _mark_line(

@@ -1,7 +1,7 @@
-"""Loops that descend a potential, half a cell a step.
+"""Descent of a potential, half a cell a step, for NavFn and the global planner.
 
-Grids are flat arrays, cell = y * size_x + x. A position is a cell and an offset
-from its centre, in cells, right (dx) and up (dy).
+Grids are flat arrays, cell = y * size_x + x. A position is a flat cell and an offset from its
+centre, float32, in cells to the right (dx) and up (dy).
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ from numba import njit
 
 from quad_nav.kernels.wave import NOT_REACHED
 
+OBSTACLE = 254  # NavFn never enters cells of this cost
+NEUTRAL = 50  # NavFn's cost of a free cell
 _OBSTACLE_SLOPE = 254  # of cells inside an obstacle, beside a reached one
 _STEP_CELLS = 0.5
 
 
 @njit(cache=True, nogil=True)
 def _gradient(potential, size_x, cell) -> Tuple[float, float]:
-    """Vector down the potential at a cell, (0, 0) where there is none."""
+    """Return the vector down float32[n] at a cell, (0, 0) where there is none."""
     if cell < size_x or cell > potential.size - size_x - 1:
         return 0.0, 0.0
     return _slope(potential, cell, 1), _slope(potential, cell, size_x)
@@ -65,7 +67,7 @@ def _interpolated_gradient(potential, size_x, cell, dx, dy):
 
 @njit(cache=True, nogil=True)
 def _lowest_around(potential, size_x, cell):
-    """The lowest of a cell and its eight neighbours, and whether all nine are reached."""
+    """Return the lowest of a cell and its eight neighbours; True if all nine are reached."""
     lowest, all_reached = cell, True
     for offset_y in (-size_x, 0, size_x):
         for offset_x in (-1, 0, 1):
@@ -89,17 +91,28 @@ def _carry(cell, offset, stride):
 
 @njit(cache=True, nogil=True)
 def leaves_map(potential, size_x, cell):
-    """Whether a cell lies in the lowest or highest row, where no descent goes on."""
+    """Tell whether a cell of float32[n] is in the lowest or highest row, where descents end."""
     return cell < size_x or cell > potential.size - size_x
 
 
 @njit(cache=True, nogil=True)
 def step_down(potential, size_x, cell, dx, dy, path, last):
-    """The next position: whether there is one, its cell and its offset.
+    """Return the next position of a descent.
 
-    Half a cell along the gradient where all cells around are reached, otherwise
-    to the centre of the lowest of them; so too when ``path[last]`` is where the
-    path was two points ago.
+    The step is half a cell along the gradient where all cells around are reached, otherwise
+    to the centre of the lowest of them; so too when the path is where it was two points ago.
+
+    Args:
+        potential: float32[n].
+        size_x: Cells in a row.
+        cell: Flat cell of the position.
+        dx: Offset from the cell's centre to the right, float32, in cells.
+        dy: Offset upwards.
+        path: float32[k, 2], the path so far, cells (x, y).
+        last: Row of the path's last point.
+
+    Returns:
+        False if there is no next position, the flat cell and its offset dx, dy.
     """
     oscillates = (
         last > 1 and path[last, 0] == path[last - 2, 0] and path[last, 1] == path[last - 2, 1]
@@ -114,3 +127,39 @@ def step_down(potential, size_x, cell, dx, dy, path, last):
     cell, dx = _carry(cell, np.float32(dx + gx * scale), 1)
     cell, dy = _carry(cell, np.float32(dy + gy * scale), size_x)
     return True, cell, dx, dy
+
+
+@njit(cache=True, nogil=True)
+def _nearest(cell, dx, dy, size_x, size):
+    """Return the flat cell nearest to a point, halves rounded away from zero."""
+    step_x = int(math.copysign(math.floor(abs(dx) + 0.5), dx))
+    step_y = int(math.copysign(math.floor(abs(dy) + 0.5), dy))
+    return max(0, min(size - 1, cell + step_x + size_x * step_y))
+
+
+@njit(cache=True, nogil=True)
+def descend(potential, size_x, start, source, path):
+    """Follow NavFn's potential down in half-cell steps.
+
+    Args:
+        potential: float32[n].
+        size_x: Cells in a row.
+        start: Flat cell where the descent begins.
+        source: Flat cell where the wave began.
+        path: float32[k, 2], filled with cells (x, y).
+
+    Returns:
+        The number of points written, and True if the source was reached.
+    """
+    cell, dx, dy = start, np.float32(0.0), np.float32(0.0)
+    for k in range(path.shape[0]):
+        if potential[_nearest(cell, dx, dy, size_x, potential.size)] < NEUTRAL:
+            path[k, 0], path[k, 1] = source % size_x, source // size_x
+            return k + 1, True
+        if leaves_map(potential, size_x, cell):
+            return k, False
+        path[k, 0], path[k, 1] = cell % size_x + dx, cell // size_x + dy
+        goes_on, cell, dx, dy = step_down(potential, size_x, cell, dx, dy, path, k)
+        if not goes_on:
+            return k + 1, False
+    return path.shape[0], False

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from quad_nav.kernels.collision import Window, cell_of, footprint_cost
+from quad_nav.kernels.collision import footprint_cost
+from quad_nav.kernels.cost_grid import CostmapView, cell_of
 
 _TOLERANCE = 1e-4
 # Columns of the distances
@@ -35,7 +36,7 @@ class Motion(NamedTuple):
 class MapGrids(NamedTuple):
     """The distance grids, int32[H, W], and which of them count."""
 
-    window: Window
+    costmap: CostmapView
     path: np.ndarray
     goal: np.ndarray
     goal_front: np.ndarray
@@ -48,7 +49,7 @@ class MapGrids(NamedTuple):
 class Obstacles(NamedTuple):
     """What the obstacle critic looks at."""
 
-    window: Window
+    costmap: CostmapView
     highest_near: np.ndarray  # uint8[H, W], no less than the highest cost under any footprint
     footprint: np.ndarray  # float64[n, 2], robot frame, not scaled
     scale: float  # 0: obstacles are not looked at
@@ -146,7 +147,7 @@ def is_within_reach(grids, points, count, distances):
     """
     if grids.follows_path or grids.follows_goal:
         for k in range(count):
-            cell_x, cell_y = cell_of(grids.window, points[k, 0], points[k, 1])
+            cell_x, cell_y = cell_of(grids.costmap, points[k, 0], points[k, 1])
             if cell_x < 0 or cell_y < 0:
                 return False
             if grids.follows_path:
@@ -164,16 +165,18 @@ def is_within_reach(grids, points, count, distances):
 def _has_nose_on_map(grids, points, count, distances):
     size_y, size_x = grids.path.shape
     forward = grids.forward_point_distance_m
-    border = abs(forward) + grids.window.resolution_m
-    min_x, min_y = grids.window.origin_x_m + border, grids.window.origin_y_m + border
-    max_x = grids.window.origin_x_m + size_x * grids.window.resolution_m - border
-    max_y = grids.window.origin_y_m + size_y * grids.window.resolution_m - border
+    border = abs(forward) + grids.costmap.resolution_m
+    min_x, min_y = grids.costmap.origin_x_m + border, grids.costmap.origin_y_m + border
+    max_x = grids.costmap.origin_x_m + size_x * grids.costmap.resolution_m - border
+    max_y = grids.costmap.origin_y_m + size_y * grids.costmap.resolution_m - border
     for k in range(count):
         x, y = points[k, 0], points[k, 1]
         if k < count - 1 and min_x < x < max_x and min_y < y < max_y:
             continue  # too far inside for any heading to matter
         cell_x, cell_y = cell_of(
-            grids.window, x + forward * math.cos(points[k, 2]), y + forward * math.sin(points[k, 2])
+            grids.costmap,
+            x + forward * math.cos(points[k, 2]),
+            y + forward * math.sin(points[k, 2]),
         )
         if cell_x < 0 or cell_y < 0:
             return False
@@ -220,15 +223,15 @@ def obstacle_cost(obstacles, footprint_scale, points, count):
     total = 0.0
     for k in range(count):
         x, y, theta = points[k, 0], points[k, 1], points[k, 2]
-        cell_x, cell_y = cell_of(obstacles.window, x, y)
+        cell_x, cell_y = cell_of(obstacles.costmap, x, y)
         if cell_x < 0 or cell_y < 0:
             return -1.0
         if obstacles.highest_near[cell_y, cell_x] <= (0.0 if obstacles.sums else total):
             continue  # the footprint changes nothing
-        cost = footprint_cost(obstacles.window, footprint, x, y, theta)
+        cost = footprint_cost(obstacles.costmap, footprint, x, y, theta)
         if cost < 0.0:
             return -1.0
-        cost = max(cost, float(obstacles.window.costs[cell_y, cell_x]))
+        cost = max(cost, float(obstacles.costmap.costs[cell_y, cell_x]))
         total = total + cost if obstacles.sums else max(total, cost)
     return total
 

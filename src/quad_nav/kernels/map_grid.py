@@ -8,11 +8,11 @@ import numpy as np
 from numba import njit
 
 from quad_nav.grid import INSCRIBED, UNKNOWN
-from quad_nav.kernels.collision import cell_of
+from quad_nav.kernels.cost_grid import cell_of
 
 
 @njit(cache=True, nogil=True)
-def cells_on_plan(window, points):
+def cells_on_plan(costmap, points):
     """Cells that a plan passes in its first stretch over known ground, int64[n].
 
     ``points`` is float64[m, 2]; gaps wider than a cell are filled by
@@ -20,7 +20,7 @@ def cells_on_plan(window, points):
     dense. Points before the stretch are skipped; it ends at the first point off
     the map or on an unknown cell.
     """
-    resolution = window.resolution_m
+    resolution = costmap.resolution_m
     steps = np.ones(points.shape[0], np.int64)
     for k in range(1, points.shape[0]):
         dx, dy = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
@@ -37,9 +37,9 @@ def cells_on_plan(window, points):
             x, y = points[k, 0], points[k, 1]
             if j < steps[k]:
                 x, y = points[last, 0] + j * step_x, points[last, 1] + j * step_y
-            cell_x, cell_y = cell_of(window, x, y)
-            if cell_x >= 0 and cell_y >= 0 and window.costs[cell_y, cell_x] != UNKNOWN:
-                cells[count] = cell_y * window.costs.shape[1] + cell_x
+            cell_x, cell_y = cell_of(costmap, x, y)
+            if cell_x >= 0 and cell_y >= 0 and costmap.costs[cell_y, cell_x] != UNKNOWN:
+                cells[count] = cell_y * costmap.costs.shape[1] + cell_x
                 count += 1
             elif count > 0:
                 return cells[:count]

@@ -1,26 +1,49 @@
-"""Loops of the obstacle layer: Bresenham rays that clear, points that mark."""
+"""Obstacle layer: Bresenham rays that clear, points that mark.
+
+Mirrors ``costmap/obstacle.py``.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL
-from quad_nav.kernels.cells import cell_index
+from quad_nav.kernels.cost_grid import cell_index
 
 SECTORS = 1024
-MAX_OBSTRUCTED = 512  # cells that are worth looking for lines towards them
-MAX_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
+MOST_OBSTRUCTED = 512  # cells that are worth looking for lines towards them
+MOST_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
+
+
+class ObservationStack(NamedTuple):
+    """Observations of one source, newest first, metres in the frame of the costmap.
+
+    Observation k has the points from ``begins[k]`` to ``ends[k]``; other points are old.
+    """
+
+    sensors: NDArray[np.float64]  # [k, 3], where the rays start
+    points: NDArray[np.float32]  # [n, 3]
+    begins: NDArray[np.int64]  # [k]
+    ends: NDArray[np.int64]  # [k]
 
 
 @njit(cache=True, nogil=True)
 def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
-    """Free the cells from (x0, y0) towards (x1, y1), both inside the grid.
+    """Free the cells of Bresenham's line, both of its ends included.
 
-    flat_costs: uint8[H * W], rows of ``size_x`` cells. The line is cut to about
-    ``max_cells``, measured along it; both of its ends are freed.
+    Args:
+        flat_costs: uint8[H * W], changed in place.
+        size_x: Cells in a row.
+        x0: Column of the first cell, inside the grid.
+        y0: Row of the first cell.
+        x1: Column of the cell that the line leads to, inside the grid.
+        y1: Row of that cell.
+        max_cells: Length, measured along the line, to which it is cut.
     """
     dx, dy = x1 - x0, y1 - y0
     scale = 1.0
@@ -46,9 +69,10 @@ def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
 
 @njit(cache=True, nogil=True)
 def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
-    """The ray's end pulled back along the ray to the grid's border.
+    """Pull the end (x, y) of a ray back along the ray to the grid's border.
 
-    Ends beyond the high borders land 1 mm inside, so that they fall into a cell.
+    Ends beyond the high borders land 1 mm inside, so that they fall into a cell. All
+    numbers are metres in the frame of the grid.
     """
     dx, dy = x - sensor_x, y - sensor_y
     if x < low_x:
@@ -67,28 +91,25 @@ def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
 
 
 @njit(cache=True, nogil=True)
-def clear_rays(
-    costs,
-    origin_x,
-    origin_y,
-    resolution,
-    sensor_x,
-    sensor_y,
-    points,
-    range_m,
-    sectors,
-    cleared,
-    bounds,
-):
-    """Free the cells between the sensor and each point, up to ``range_m``.
+def clear_rays(costmap, sensor_x, sensor_y, points, range_m, sectors, cleared, bounds):
+    """Free the cells between a sensor and each of its points.
 
-    points: float32[n, 3] in the frame of the grid. Lines into sectors, bool[SECTORS], that
-    are False are passed over, all of them if there is none. ``cleared``, int64[2 ** b], -1
-    at first, remembers the last line that was cleared to each cell, of large grids to one
-    of several cells: a slow robot's scans have most lines in common; it may be empty.
-    ``bounds``, float64[4] (min x, min y, max x, max y in metres), grows by what rays reach. A
-    sensor outside the grid clears nothing: returns False.
+    Args:
+        costmap: The costmap, changed in place.
+        sensor_x: x of the sensor in the frame of the costmap, metres.
+        sensor_y: y of the sensor.
+        points: float32[n, 3], metres in the frame of the costmap.
+        range_m: Length to which rays are cleared.
+        sectors: bool[SECTORS]; lines into sectors that are False are skipped. Empty skips all.
+        cleared: int64[2 ** b], -1 at first; remembers the last line that was cleared to each
+            cell, or to one of several cells of a large grid. A slow robot's scans have most
+            lines in common. May be empty.
+        bounds: float64[4], min x, min y, max x, max y in metres, grown by what rays reach.
+
+    Returns:
+        False if the sensor is off the costmap and nothing was cleared.
     """
+    costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
     x0 = cell_index(sensor_x, origin_x, resolution, size_x)
     y0 = cell_index(sensor_y, origin_y, resolution, size_y)
@@ -143,7 +164,7 @@ def clear_rays(
 
 @njit(cache=True, nogil=True)
 def _range_ends_inside(bounds, x, y, dx, dy, square_m2):
-    """Whether the point of a ray in direction (dx, dy) is inside the bounds, as (x, y) is.
+    """Tell whether the point of a ray in direction (dx, dy) is inside the bounds, as (x, y) is.
 
     ``square_m2`` is the square of its distance.
     """
@@ -156,85 +177,52 @@ def _range_ends_inside(bounds, x, y, dx, dy, square_m2):
 
 
 @njit(cache=True, nogil=True)
-def clear_all_rays(
-    costs, origin_x, origin_y, resolution, sensors, points, begins, ends, range_m, bounds
-):
-    """``clear_rays`` of several observations, in order.
-
-    Observation k has sensors[k], float64[3], and points from begins[k] to ends[k].
+def clear_all_rays(costmap, seen, range_m, bounds):
+    """Apply ``clear_rays`` to several observations, in order.
 
     A line through nothing but free cells changes nothing. Mostly the first observation
     leaves few cells that are not free; from then on only lines towards those are cleared.
+
+    Args:
+        costmap: The costmap, changed in place.
+        seen: The observations.
+        range_m: Length to which rays are cleared.
+        bounds: float64[4], as for ``clear_rays``.
     """
     no_lines = np.empty(0, dtype=np.int64)
     lines = no_lines
     everywhere = np.ones(SECTORS, dtype=np.bool_)
     sectors = np.empty(SECTORS, dtype=np.bool_)
-    obstructed = np.empty(MAX_OBSTRUCTED, dtype=np.int64)
-    window = _reached(costs, origin_x, origin_y, resolution, sensors, range_m)
+    obstructed = np.empty(MOST_OBSTRUCTED, dtype=np.int64)
+    costs, resolution = costmap.costs, costmap.resolution_m
+    window = _reached(costmap, seen.sensors, range_m)
     count = find_obstructed(costs, window, obstructed)
-    for k in range(len(ends)):
-        seen = points[begins[k] : ends[k]]
-        x, y = sensors[k, 0], sensors[k, 1]
+    for k in range(len(seen.ends)):
+        points = seen.points[seen.begins[k] : seen.ends[k]]
+        x, y = seen.sensors[k, 0], seen.sensors[k, 1]
         if count == 0:
-            clear_rays(
-                costs,
-                origin_x,
-                origin_y,
-                resolution,
-                x,
-                y,
-                seen,
-                range_m,
-                everywhere[:0],
-                no_lines,
-                bounds,
-            )
-        elif count <= MAX_OBSTRUCTED:
+            clear_rays(costmap, x, y, points, range_m, everywhere[:0], no_lines, bounds)
+        elif count <= MOST_OBSTRUCTED:
             _find_sectors(
                 obstructed[:count],
                 costs.shape[1],
-                (x - origin_x) / resolution,
-                (y - origin_y) / resolution,
+                (x - costmap.origin_x_m) / resolution,
+                (y - costmap.origin_y_m) / resolution,
                 sectors,
             )
-            clear_rays(
-                costs,
-                origin_x,
-                origin_y,
-                resolution,
-                x,
-                y,
-                seen,
-                range_m,
-                sectors,
-                no_lines,
-                bounds,
-            )
+            clear_rays(costmap, x, y, points, range_m, sectors, no_lines, bounds)
             count = _keep_obstructed(costs.reshape(-1), obstructed, count)
         else:
             if lines.size == 0:
                 lines = np.full(_power_of_two(costs.size), -1, dtype=np.int64)
-            clear_rays(
-                costs,
-                origin_x,
-                origin_y,
-                resolution,
-                x,
-                y,
-                seen,
-                range_m,
-                everywhere,
-                lines,
-                bounds,
-            )
+            clear_rays(costmap, x, y, points, range_m, everywhere, lines, bounds)
             if k == 0:  # what is still much after the first mostly stays so
                 count = find_obstructed(costs, window, obstructed)
 
 
 @njit(cache=True, nogil=True)
 def sector_of(dx, dy):
-    """Number of the sector, counterclockwise from +x, that a direction points into.
+    """Return the number of the sector, counterclockwise from +x, that a direction points into.
 
     Sectors are equal steps along the sides of a square that stands on its corner, which
     needs no arc tangent.
@@ -242,17 +230,23 @@ def sector_of(dx, dy):
     around = abs(dx) + abs(dy)
     if not 0.0 < around < np.inf:
         return 0
-    way = dy / around if dx >= 0.0 else 2.0 - dy / around
-    if way < 0.0:
-        way += 4.0
-    return min(int(way * (SECTORS / 4)), SECTORS - 1)
+    along = dy / around if dx >= 0.0 else 2.0 - dy / around
+    if along < 0.0:
+        along += 4.0
+    return min(int(along * (SECTORS / 4)), SECTORS - 1)
 
 
 @njit(cache=True, nogil=True)
 def find_obstructed(costs, window, obstructed):
-    """Fill int64[m] with the flat indices of a window's cells that are not free.
+    """Find the cells of a window that are not free.
 
-    window: columns x0..xn-1 and rows y0..yn-1. Returns their number, m + 1 if there are more.
+    Args:
+        costs: uint8[H, W].
+        window: (x0, xn, y0, yn): columns x0..xn-1 and rows y0..yn-1.
+        obstructed: int64[m], filled with flat indices of cells.
+
+    Returns:
+        The number of such cells; m + 1 if there are more than m.
     """
     x0, xn, y0, yn = window
     size_x = costs.shape[1]
@@ -274,8 +268,9 @@ def find_obstructed(costs, window, obstructed):
 
 
 @njit(cache=True, nogil=True)
-def _reached(costs, origin_x, origin_y, resolution, sensors, range_m):
-    """The window of the cells that rays of a length from any of the sensors can reach."""
+def _reached(costmap, sensors, range_m):
+    """Window of the cells that rays of a length from any of float64[k, 3] sensors reach."""
+    costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
     reach = range_m + 2 * resolution
     low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
@@ -291,10 +286,11 @@ def _reached(costs, origin_x, origin_y, resolution, sensors, range_m):
 
 @njit(cache=True, nogil=True)
 def _find_sectors(obstructed, size_x, sensor_x, sensor_y, sectors):
-    """Make True the sectors of the lines from a sensor that may pass a cell.
+    """Make True, in bool[SECTORS], the sectors of lines from a sensor that may pass a cell.
 
-    sensor_x, sensor_y: in cells, from the grid's corner. A line's cells are within
-    sqrt(1/2) + 1/2 of the ray: half a cell for each rounding of its ends and of the line.
+    The cells are flat indices, int64[m]; the sensor is in cells, from the grid's corner. A
+    line's cells are within sqrt(1/2) + 1/2 of the ray: half a cell for each rounding of its
+    ends and of the line.
     """
     sectors[:] = False
     for k in range(obstructed.size):
@@ -315,7 +311,7 @@ def _find_sectors(obstructed, size_x, sensor_x, sensor_y, sectors):
 
 @njit(cache=True, nogil=True)
 def _keep_obstructed(flat_costs, obstructed, count):
-    """Move those that are still not free to the front; returns their number."""
+    """Move the cells that are still not free to the front; return their number."""
     kept = 0
     for k in range(count):
         if flat_costs[obstructed[k]] != FREE:
@@ -326,51 +322,42 @@ def _keep_obstructed(flat_costs, obstructed, count):
 
 @njit(cache=True, nogil=True)
 def _power_of_two(cells):
-    """The first power of two that is not below ``cells``, but ``MAX_LINES`` at most."""
+    """Return the first power of two not below ``cells``, but ``MOST_LINES`` at most."""
     size = 1
-    while size < cells and size < MAX_LINES:
+    while size < cells and size < MOST_LINES:
         size *= 2
     return size
 
 
 @njit(cache=True, nogil=True)
-def mark_all_points(
-    costs,
-    origin_x,
-    origin_y,
-    resolution,
-    sensors,
-    points,
-    begins,
-    ends,
-    range_m,
-    max_height_m,
-    bounds,
-):
-    """``mark_points`` of several observations, as in ``clear_all_rays``."""
-    for k in range(len(ends)):
-        mark_points(
-            costs,
-            origin_x,
-            origin_y,
-            resolution,
-            sensors[k],
-            points[begins[k] : ends[k]],
-            range_m,
-            max_height_m,
-            bounds,
-        )
+def mark_all_points(costmap, seen, range_m, max_height_m, bounds):
+    """Apply ``mark_points`` to several observations, in order.
+
+    Args:
+        costmap: The costmap, changed in place.
+        seen: The observations.
+        range_m: As for ``mark_points``.
+        max_height_m: As for ``mark_points``.
+        bounds: float64[4], as for ``clear_rays``.
+    """
+    for k in range(len(seen.ends)):
+        points = seen.points[seen.begins[k] : seen.ends[k]]
+        mark_points(costmap, seen.sensors[k], points, range_m, max_height_m, bounds)
 
 
 @njit(cache=True, nogil=True)
-def mark_points(
-    costs, origin_x, origin_y, resolution, sensor, points, range_m, max_height_m, bounds
-):
-    """Make lethal the cell of each point nearer than ``range_m`` and not too high.
+def mark_points(costmap, sensor, points, range_m, max_height_m, bounds):
+    """Make the cells of points lethal.
 
-    sensor: float64[3], points: float32[n, 3], in the frame of the grid. ``bounds`` as
-    in ``clear_rays``.
+    Args:
+        costmap: The costmap, changed in place.
+        sensor: float64[3], position of the sensor in the frame of the costmap, metres.
+        points: float32[n, 3], metres in the frame of the costmap.
+        range_m: Points at this distance from the sensor, or farther, are ignored.
+        max_height_m: Points with a higher z are ignored.
+        bounds: float64[4], as for ``clear_rays``, grown by the marked points.
     """
+    costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
     for k in range(points.shape[0]):
         x, y, z = float(points[k, 0]), float(points[k, 1]), float(points[k, 2])
@@ -389,7 +376,7 @@ def mark_points(
 
 @njit(cache=True, nogil=True)
 def include(bounds, x, y):
-    """Grow float64[4] (min x, min y, max x, max y) to hold a point."""
+    """Grow bounds, float64[4] min x, min y, max x, max y in metres, to hold a point."""
     bounds[0] = min(bounds[0], x)
     bounds[1] = min(bounds[1], y)
     bounds[2] = max(bounds[2], x)

@@ -12,17 +12,18 @@ import numpy as np
 from numba import njit
 
 from quad_nav.grid import INSCRIBED
-from quad_nav.kernels.collision import COLLIDES, Window, cell_of, footprint_cost, line_cost
+from quad_nav.kernels.collision import COLLIDES, footprint_cost, line_cost
+from quad_nav.kernels.cost_grid import CostmapView, cell_of
 
-NO_WAY = -2.0  # the cost of a trajectory that leaves the reach of path or goal
+OUT_OF_REACH = -2.0  # the cost of a trajectory that leaves the reach of path or goal
 _NO_LINE_OF_SIGHT = 1.7976931348623157e308
 _HEADING_SCALE = 0.3
 
 
-class Scene(NamedTuple):
+class RolloutInputs(NamedTuple):
     """What trajectories are scored against."""
 
-    window: Window
+    costmap: CostmapView
     highest_near: np.ndarray  # uint8[H, W], no less than the highest cost under the footprint
     footprint: np.ndarray  # float64[n, 2], robot frame
     path_distance: np.ndarray  # int32[H, W]
@@ -30,7 +31,7 @@ class Scene(NamedTuple):
     plan: np.ndarray  # float64[m, 2], m >= 1
 
 
-class Rules(NamedTuple):
+class RolloutParams(NamedTuple):
     """How they are simulated and scored."""
 
     sim_time_s: float
@@ -48,16 +49,16 @@ class Rules(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def step_count(rules, sample):
+def step_count(params, sample):
     """Into how many steps the simulation of a sample (vx, vy, vtheta) is cut."""
-    if rules.heading_scoring:
-        steps = int(rules.sim_time_s / rules.sim_granularity_m + 0.5)
+    if params.heading_scoring:
+        steps = int(params.sim_time_s / params.sim_granularity_m + 0.5)
     else:
         speed = math.hypot(sample[0], sample[1])
         steps = int(
             max(
-                speed * rules.sim_time_s / rules.sim_granularity_m,
-                abs(sample[2]) / rules.angular_sim_granularity_rad,
+                speed * params.sim_time_s / params.sim_granularity_m,
+                abs(sample[2]) / params.angular_sim_granularity_rad,
             )
             + 0.5
         )
@@ -65,53 +66,53 @@ def step_count(rules, sample):
 
 
 @njit(cache=True, nogil=True)
-def turn(rules, theta, vtheta, wanted, headings):
+def turn(params, theta, vtheta, wanted, headings):
     """Fill float64[steps, 3] with the yaw at each step, its cosine and its sine."""
     steps = headings.shape[0]
-    dt = rules.sim_time_s / steps
+    dt = params.sim_time_s / steps
     for k in range(steps):
         headings[k, 0], headings[k, 1], headings[k, 2] = theta, math.cos(theta), math.sin(theta)
-        vtheta = _approach(wanted, vtheta, rules.acc_lim_theta_radps2 * dt)
+        vtheta = _approach(wanted, vtheta, params.acc_lim_theta_radps2 * dt)
         theta += vtheta * dt
 
 
 @njit(cache=True, nogil=True)
-def simulate(scene, rules, pose, velocity, sample, headings, points, with_footprint=True):
+def simulate(inputs, params, pose, velocity, sample, headings, points, with_footprint=True):
     """Cost of one sample and the number of poses written to ``points``, float64[k, 3].
 
     ``headings``, float64[steps, 3], is what ``turn`` gives for the sample. Without the
     footprint it is what the sample costs if no cell under the footprint does. Negative
-    cost: COLLIDES (or off the map) and NO_WAY; ``points`` then ends before the pose that
+    cost: COLLIDES (or off the map) and OUT_OF_REACH; ``points`` then ends before the pose that
     failed.
     """
     steps = headings.shape[0]
-    dt = rules.sim_time_s / steps
+    dt = params.sim_time_s / steps
     x, y = pose[0], pose[1]
     vx, vy = velocity[0], velocity[1]
     path_distance, goal_distance, occupancy, heading, time = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(steps):
         theta, cos, sin = headings[k]
-        cell_x, cell_y = cell_of(scene.window, x, y)
+        cell_x, cell_y = cell_of(inputs.costmap, x, y)
         if cell_x < 0 or cell_y < 0:
             return COLLIDES, k
         # Where nothing near costs more than what is known the footprint changes nothing.
-        if with_footprint and scene.highest_near[cell_y, cell_x] > occupancy:
-            cost = footprint_cost(scene.window, scene.footprint, x, y, theta)
+        if with_footprint and inputs.highest_near[cell_y, cell_x] > occupancy:
+            cost = footprint_cost(inputs.costmap, inputs.footprint, x, y, theta)
             if cost < 0.0:
                 return COLLIDES, k
-            occupancy = max(occupancy, cost, float(scene.window.costs[cell_y, cell_x]))
-        if rules.simple_attractor:
-            goal_distance = (x - scene.plan[-1, 0]) ** 2 + (y - scene.plan[-1, 1]) ** 2
-        elif not rules.heading_scoring or _is_heading_step(rules, time, dt):
-            if rules.heading_scoring:
-                heading = _heading_difference(scene, cell_x, cell_y, x, y, theta)
-            path_distance = float(scene.path_distance[cell_y, cell_x])
-            goal_distance = float(scene.goal_distance[cell_y, cell_x])
-            if max(path_distance, goal_distance) >= scene.path_distance.size:
-                return NO_WAY, k
+            occupancy = max(occupancy, cost, float(inputs.costmap.costs[cell_y, cell_x]))
+        if params.simple_attractor:
+            goal_distance = (x - inputs.plan[-1, 0]) ** 2 + (y - inputs.plan[-1, 1]) ** 2
+        elif not params.heading_scoring or _is_heading_step(params, time, dt):
+            if params.heading_scoring:
+                heading = _heading_difference(inputs, cell_x, cell_y, x, y, theta)
+            path_distance = float(inputs.path_distance[cell_y, cell_x])
+            goal_distance = float(inputs.goal_distance[cell_y, cell_x])
+            if max(path_distance, goal_distance) >= inputs.path_distance.size:
+                return OUT_OF_REACH, k
         points[k, 0], points[k, 1], points[k, 2] = x, y, theta
-        vx = _approach(sample[0], vx, rules.acc_lim_x_mps2 * dt)
-        vy = _approach(sample[1], vy, rules.acc_lim_y_mps2 * dt)
+        vx = _approach(sample[0], vx, params.acc_lim_x_mps2 * dt)
+        vy = _approach(sample[1], vy, params.acc_lim_y_mps2 * dt)
         speed_x, speed_y = vx * cos, vx * sin
         if vy != 0.0:
             side = math.pi / 2 + theta
@@ -120,17 +121,17 @@ def simulate(scene, rules, pose, velocity, sample, headings, points, with_footpr
         x += speed_x * dt
         y += speed_y * dt
         time += dt
-    if rules.heading_scoring:
+    if params.heading_scoring:
         return (
-            rules.occupancy_scale * occupancy
-            + rules.path_scale * path_distance
+            params.occupancy_scale * occupancy
+            + params.path_scale * path_distance
             + _HEADING_SCALE * heading
-            + goal_distance * rules.goal_scale
+            + goal_distance * params.goal_scale
         ), steps
     return (
-        rules.path_scale * path_distance
-        + goal_distance * rules.goal_scale
-        + rules.occupancy_scale * occupancy
+        params.path_scale * path_distance
+        + goal_distance * params.goal_scale
+        + params.occupancy_scale * occupancy
     ), steps
 
 
@@ -142,98 +143,100 @@ def _approach(wanted, current, max_change):
 
 
 @njit(cache=True, nogil=True)
-def _is_heading_step(rules, time, dt):
-    start = rules.heading_scoring_timestep_s
+def _is_heading_step(params, time, dt):
+    start = params.heading_scoring_timestep_s
     return start <= time < start + dt
 
 
 @njit(cache=True, nogil=True)
-def _heading_difference(scene, cell_x, cell_y, x, y, theta):
+def _heading_difference(inputs, cell_x, cell_y, x, y, theta):
     """Angle to the farthest plan point in sight of a cell; huge when there is none."""
-    window = scene.window
-    for k in range(scene.plan.shape[0] - 1, -1, -1):
-        to_x, to_y = cell_of(window, scene.plan[k, 0], scene.plan[k, 1])
+    costmap = inputs.costmap
+    for k in range(inputs.plan.shape[0] - 1, -1, -1):
+        to_x, to_y = cell_of(costmap, inputs.plan[k, 0], inputs.plan[k, 1])
         if to_x < 0 or to_y < 0:
             continue
-        if line_cost(window.costs, cell_x, cell_y, to_x, to_y, INSCRIBED) >= 0.0:
-            centre_x = window.origin_x_m + (to_x + 0.5) * window.resolution_m
-            centre_y = window.origin_y_m + (to_y + 0.5) * window.resolution_m
+        if line_cost(costmap.costs, cell_x, cell_y, to_x, to_y, INSCRIBED) >= 0.0:
+            centre_x = costmap.origin_x_m + (to_x + 0.5) * costmap.resolution_m
+            centre_y = costmap.origin_y_m + (to_y + 0.5) * costmap.resolution_m
             turn = math.atan2(centre_y - y, centre_x - x) - theta
             return abs(math.atan2(math.sin(turn), math.cos(turn)))
     return _NO_LINE_OF_SIGHT
 
 
 @njit(cache=True, nogil=True)
-def score(scene, rules, pose, velocity, samples, limit):
+def score(inputs, params, pose, velocity, samples, limit):
     """Cost float64[n] and last pose float64[n, 3] of each sample, float64[n, 3].
 
     Infinite for a sample that is known to cost more than ``limit``. The last pose is nan for
     a sample whose first pose fails.
     """
-    headings, places = _all_turns(rules, pose, velocity, samples)
+    headings, places = _all_turns(params, pose, velocity, samples)
     points = np.empty((headings.shape[1], 3))
-    bounds = _lower_bounds(scene, rules, pose, velocity, samples, headings, places, points)
+    bounds = _lower_bounds(inputs, params, pose, velocity, samples, headings, places, points)
     costs = np.empty(samples.shape[0])
     ends = np.full((samples.shape[0], 3), np.nan)
     for k in range(samples.shape[0]):
         if bounds[k] > limit:
             costs[k] = np.inf
             continue
-        turned = headings[places[k], : step_count(rules, samples[k])]
-        costs[k], count = simulate(scene, rules, pose, velocity, samples[k], turned, points)
+        turned = headings[places[k], : step_count(params, samples[k])]
+        costs[k], count = simulate(inputs, params, pose, velocity, samples[k], turned, points)
         if count > 0:
             ends[k] = points[count - 1]
     return costs, ends
 
 
 @njit(cache=True, nogil=True)
-def cheapest(scene, rules, pose, velocity, samples):
+def cheapest(inputs, params, pose, velocity, samples):
     """Index and cost of the legal sample of lowest cost, the first of equals; -1 if none is.
 
     samples: float64[n, 3]. They are tried in the order of what they cost without the
     footprint, which is the slow part, until that is more than the best one's cost.
     """
-    headings, places = _all_turns(rules, pose, velocity, samples)
+    headings, places = _all_turns(params, pose, velocity, samples)
     points = np.empty((headings.shape[1], 3))
-    bounds = _lower_bounds(scene, rules, pose, velocity, samples, headings, places, points)
+    bounds = _lower_bounds(inputs, params, pose, velocity, samples, headings, places, points)
     best, best_cost = -1, np.inf
     for k in np.argsort(bounds, kind="mergesort"):
         if bounds[k] > best_cost:
             break
-        if bounds[k] == COLLIDES or bounds[k] == NO_WAY:
+        if bounds[k] == COLLIDES or bounds[k] == OUT_OF_REACH:
             continue
-        turned = headings[places[k], : step_count(rules, samples[k])]
-        cost, _ = simulate(scene, rules, pose, velocity, samples[k], turned, points)
+        turned = headings[places[k], : step_count(params, samples[k])]
+        cost, _ = simulate(inputs, params, pose, velocity, samples[k], turned, points)
         if cost >= 0.0 and (cost < best_cost or (cost == best_cost and k < best)):
             best, best_cost = k, cost
     return best, best_cost
 
 
 @njit(cache=True, nogil=True)
-def _lower_bounds(scene, rules, pose, velocity, samples, headings, places, points):
+def _lower_bounds(inputs, params, pose, velocity, samples, headings, places, points):
     """What samples cost at least, float64[n]: without the footprint, if that can only add."""
     bounds = np.full(samples.shape[0], -np.inf)
-    if rules.occupancy_scale >= 0.0:
+    if params.occupancy_scale >= 0.0:
         for k in range(samples.shape[0]):
-            turned = headings[places[k], : step_count(rules, samples[k])]
-            bounds[k], _ = simulate(scene, rules, pose, velocity, samples[k], turned, points, False)
+            turned = headings[places[k], : step_count(params, samples[k])]
+            bounds[k], _ = simulate(
+                inputs, params, pose, velocity, samples[k], turned, points, False
+            )
     return bounds
 
 
 @njit(cache=True, nogil=True)
-def _all_turns(rules, pose, velocity, samples):
+def _all_turns(params, pose, velocity, samples):
     """``turn`` for all samples: float64[m, longest, 3], and which one is whose, int64[n].
 
     Many samples turn in the same way, with as many steps.
     """
     longest = 1
     for k in range(samples.shape[0]):
-        longest = max(longest, step_count(rules, samples[k]))
+        longest = max(longest, step_count(params, samples[k]))
     turns = np.empty((samples.shape[0], 2))
     places = np.empty(samples.shape[0], dtype=np.int64)
     known = 0
     for k in range(samples.shape[0]):
-        steps, vtheta = step_count(rules, samples[k]), samples[k, 2]
+        steps, vtheta = step_count(params, samples[k]), samples[k, 2]
         places[k] = -1
         for place in range(known):
             if turns[place, 0] == steps and turns[place, 1] == vtheta:
@@ -245,5 +248,5 @@ def _all_turns(rules, pose, velocity, samples):
             known += 1
     headings = np.empty((known, longest, 3))
     for place in range(known):
-        turn(rules, pose[2], velocity[2], turns[place, 1], headings[place, : int(turns[place, 0])])
+        turn(params, pose[2], velocity[2], turns[place, 1], headings[place, : int(turns[place, 0])])
     return headings, places

@@ -1,42 +1,50 @@
-"""Loops of the voxel layer: rays in three dimensions that clear, points that mark.
+"""Voxel layer: rays in three dimensions that clear, points that mark.
 
-``voxels``, uint8[H, W, Z], are FREE, LETHAL or UNKNOWN; ``costs``, uint8[H, W], is what
-their columns come to. ``origin`` and ``size``, float64[3], are the corner of voxel
-(0, 0, 0) and the edges of one voxel, x, y, z in metres.
+Mirrors ``costmap/voxel.py``.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL, UNKNOWN
-from quad_nav.kernels.cells import cell_index
+from quad_nav.kernels.cost_grid import cell_index
 from quad_nav.kernels.raytrace import include
 
 
-@njit(cache=True, nogil=True)
-def clear_voxel_rays(
-    voxels,
-    costs,
-    origin,
-    size,
-    sensor,
-    points,
-    range_m,
-    max_height_m,
-    unknown_threshold,
-    mark_threshold,
-    bounds,
-):
-    """Free the voxels from the sensor towards each point, and their columns' costs.
+class VoxelGrid(NamedTuple):
+    """Voxels and the costs of their columns."""
 
-    sensor: float64[3], points: float32[n, 3], in the frame of the grid. ``bounds``,
-    float64[4] (min x, min y, max x, max y in metres), grows by what was touched. A sensor
-    outside the voxels clears nothing: returns False.
+    voxels: NDArray[np.uint8]  # [H, W, Z], FREE, LETHAL or UNKNOWN
+    costs: NDArray[np.uint8]  # [H, W]
+    origin: NDArray[np.float64]  # [3], corner of voxel (0, 0, 0) in the global frame, metres
+    size: NDArray[np.float64]  # [3], edges of a voxel along x, y, z, metres
+    unknown_threshold: int  # a column with more unknown voxels is unknown
+    mark_threshold: int  # a column with more marked voxels is lethal
+
+
+@njit(cache=True, nogil=True)
+def clear_voxel_rays(grid, sensor, points, range_m, max_height_m, bounds):
+    """Free the voxels from a sensor towards each of its points, and their columns' costs.
+
+    Args:
+        grid: The voxels, changed in place.
+        sensor: float64[3], where the rays start, metres in the global frame.
+        points: float32[n, 3], metres in the global frame.
+        range_m: Length to which rays are cleared.
+        max_height_m: Height at which rays are cut.
+        bounds: float64[4], min x, min y, max x, max y in metres, grown by what rays reach.
+
+    Returns:
+        False if the sensor is outside of the voxels and nothing was cleared.
     """
-    size_y, size_x, size_z = voxels.shape
+    origin, size = grid.origin, grid.size
+    size_y, size_x, size_z = grid.voxels.shape
     if (
         cell_index(sensor[0], origin[0], size[0], size_x) < 0
         or cell_index(sensor[1], origin[1], size[1], size_y) < 0
@@ -45,27 +53,21 @@ def clear_voxel_rays(
         return False
     include(bounds, sensor[0], sensor[1])
     max_voxels = max(0.0, math.ceil(range_m / size[0]))
+    begin = (
+        (sensor[0] - origin[0]) / size[0],
+        (sensor[1] - origin[1]) / size[1],
+        (sensor[2] - origin[2]) / size[2],
+    )
     for k in range(points.shape[0]):
-        x, y, z = ray_end(origin, size, size_x, size_y, sensor, points[k], max_height_m)
+        x, y, z = ray_end(grid, sensor, points[k], max_height_m)
         if (
             cell_index(x, origin[0], size[0], size_x) < 0
             or cell_index(y, origin[1], size[1], size_y) < 0
             or cell_index(z, origin[2], size[2], size_z) < 0
         ):
             continue
-        clear_voxel_line(
-            voxels,
-            costs,
-            (sensor[0] - origin[0]) / size[0],
-            (sensor[1] - origin[1]) / size[1],
-            (sensor[2] - origin[2]) / size[2],
-            (x - origin[0]) / size[0],
-            (y - origin[1]) / size[1],
-            (z - origin[2]) / size[2],
-            max_voxels,
-            unknown_threshold,
-            mark_threshold,
-        )
+        end = (x - origin[0]) / size[0], (y - origin[1]) / size[1], (z - origin[2]) / size[2]
+        clear_voxel_line(grid, begin, end, max_voxels)
         dx, dy = x - sensor[0], y - sensor[1]
         length = math.hypot(dx, dy)
         scale = range_m / length if length > range_m else 1.0
@@ -74,11 +76,20 @@ def clear_voxel_rays(
 
 
 @njit(cache=True, nogil=True)
-def ray_end(origin, size, size_x, size_y, sensor, point, max_height_m):
-    """Where the ray to a point stops: two cells short of it, and inside the voxels.
+def ray_end(grid, sensor, point, max_height_m):
+    """Return the point (x, y, z) where the ray to a point ends.
 
-    Two cells, so that a ray does not clear the obstacle that it has met.
+    It is two cells short of the point, so that a ray does not clear the obstacle that it
+    met, and inside of the voxels. All numbers are metres in the global frame.
+
+    Args:
+        grid: The voxels.
+        sensor: float64[3], where the ray starts.
+        point: float32[3], what the sensor saw.
+        max_height_m: Height at which the ray is cut.
     """
+    origin, size = grid.origin, grid.size
+    size_y, size_x = grid.costs.shape
     dx, dy, dz = point[0] - sensor[0], point[1] - sensor[1], point[2] - sensor[2]
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     short = 0.0 if length <= 2.0 * size[0] else (length - 2.0 * size[0]) / length
@@ -109,20 +120,24 @@ def ray_end(origin, size, size_x, size_y, sensor, point, max_height_m):
 
 @njit(cache=True, nogil=True)
 def _cut(t, to_border, step):
-    """The part of a ray up to a border, if that is less than ``t``; never backwards."""
+    """Return the part of a ray up to a border, if less than ``t``; never backwards."""
     if step == 0.0:
         return 0.0
     return max(0.0, min(t, to_border / step))
 
 
 @njit(cache=True, nogil=True)
-def clear_voxel_line(
-    voxels, costs, x0, y0, z0, x1, y1, z1, max_voxels, unknown_threshold, mark_threshold
-):
-    """Free the voxels between two points, in voxels from the corner, both ends included.
+def clear_voxel_line(grid, begin, end, max_voxels):
+    """Free the voxels of Bresenham's line in three dimensions, both of its ends included.
 
-    Bresenham's line in three dimensions, cut to about ``max_voxels`` along it.
+    Args:
+        grid: The voxels, changed in place.
+        begin: (x, y, z) in voxels from the corner.
+        end: (x, y, z) in voxels from the corner.
+        max_voxels: Length, measured along the line, to which it is cut.
     """
+    x0, y0, z0 = begin
+    x1, y1, z1 = end
     length = math.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2 + (z1 - z0) ** 2)
     scale = max_voxels / length if length > max_voxels else 1.0
     x, y, z = int(x0), int(y0), int(z0)
@@ -130,7 +145,7 @@ def clear_voxel_line(
     steps = max(abs(dx), abs(dy), abs(dz))
     error_x = error_y = error_z = steps // 2
     for _ in range(int(scale * steps)):
-        clear_voxel(voxels, costs, x, y, z, unknown_threshold, mark_threshold)
+        clear_voxel(grid, x, y, z)
         error_x += abs(dx)
         error_y += abs(dy)
         error_z += abs(dz)
@@ -143,34 +158,40 @@ def clear_voxel_line(
         if error_z >= steps:
             z += 1 if dz > 0 else -1
             error_z -= steps
-    clear_voxel(voxels, costs, x, y, z, unknown_threshold, mark_threshold)
+    clear_voxel(grid, x, y, z)
 
 
 @njit(cache=True, nogil=True)
-def clear_voxel(voxels, costs, x, y, z, unknown_threshold, mark_threshold):
-    """Free one voxel, and its column's cost unless the column still holds an obstacle.
+def clear_voxel(grid, x, y, z):
+    """Free a voxel, and its column's cost unless the column still holds an obstacle.
 
-    A column with more than ``unknown_threshold`` unknown voxels is unknown.
+    A column with more unknown voxels than the threshold becomes unknown.
     """
+    voxels = grid.voxels
     voxels[y, x, z] = FREE
     marked = unknown = 0
     for k in range(voxels.shape[2]):
         marked += voxels[y, x, k] == LETHAL
         unknown += voxels[y, x, k] == UNKNOWN
-    if marked <= mark_threshold:
-        costs[y, x] = FREE if unknown <= unknown_threshold else UNKNOWN
+    if marked <= grid.mark_threshold:
+        grid.costs[y, x] = FREE if unknown <= grid.unknown_threshold else UNKNOWN
 
 
 @njit(cache=True, nogil=True)
-def mark_voxels(
-    voxels, costs, origin, size, sensor, points, range_m, max_height_m, mark_threshold, bounds
-):
-    """Mark the voxel of each point nearer than ``range_m`` and not too high.
+def mark_voxels(grid, sensor, points, range_m, max_height_m, bounds):
+    """Mark the voxels of points, and make lethal the columns with enough marked voxels.
 
-    The cost is lethal in columns with more than ``mark_threshold`` marked voxels. What is
-    below the voxels goes into the lowest one, what is above them nowhere. Arguments as in
-    ``clear_voxel_rays``.
+    Points below the voxels go into the lowest one; points above them are ignored.
+
+    Args:
+        grid: The voxels, changed in place.
+        sensor: float64[3], position of the sensor, metres in the global frame.
+        points: float32[n, 3], metres in the global frame.
+        range_m: Points at this distance from the sensor, or farther, are ignored.
+        max_height_m: Points with a higher z are ignored.
+        bounds: float64[4], min x, min y, max x, max y in metres, grown by lethal columns.
     """
+    voxels, origin, size = grid.voxels, grid.origin, grid.size
     size_y, size_x, size_z = voxels.shape
     for i in range(points.shape[0]):
         x, y, z = float(points[i, 0]), float(points[i, 1]), float(points[i, 2])
@@ -188,6 +209,6 @@ def mark_voxels(
         marked = 0
         for k in range(size_z):
             marked += voxels[cell_y, cell_x, k] == LETHAL
-        if marked > mark_threshold:
-            costs[cell_y, cell_x] = LETHAL
+        if marked > grid.mark_threshold:
+            grid.costs[cell_y, cell_x] = LETHAL
             include(bounds, x, y)

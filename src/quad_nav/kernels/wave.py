@@ -1,9 +1,8 @@
-"""Loops of a wavefront that spreads a potential over a grid.
+"""Wavefront that spreads a potential over a grid.
 
-Grids are flat arrays, cell = y * size_x + x; the outermost ring of cells must
-be obstacles, which keeps every neighbour inside. The maths is in
-``plan/navfn.py``. All sums are float32 in the order that the recorded
-potentials demand.
+Grids are flat arrays, cell = y * size_x + x. The outermost ring of cells must be obstacles,
+which keeps every neighbour inside. ``plan/navfn.py`` has the maths. All sums are float32 in
+the order of upstream's, so that potentials are equal to the bit.
 """
 
 from __future__ import annotations
@@ -20,20 +19,30 @@ BUCKET_SIZE = 10000  # cells that one bucket holds; further ones are dropped
 _INVERSE_SQRT2 = 0.707106781
 
 
-class Rules(NamedTuple):
-    """What a wave's potentials are made of."""
+class WaveParams(NamedTuple):
+    """Parameters of a wave."""
 
     obstacle: int  # cells of this cost are never entered
     neutral: int  # cost of a free cell
-    planar: bool  # as of a planar wave; else a step from the lowest neighbour
+    planar: bool  # potentials of a planar wave; else of a step from the lowest neighbour
+    stop_at_target: bool  # stop when the target has a potential
+    heuristic: bool  # take cells in A*'s order
 
 
 @njit(cache=True, nogil=True)
 def arrival(cost, left, right, below, above, planar):
-    """Potential of a cell of this cost, float32, by those of its neighbours.
+    """Return the potential, float32, of a cell from those of its neighbours.
 
-    That of a planar wave which arrives over the two lower ones, or else of a step
-    from the lowest.
+    It is that of a planar wave that arrives over the two lower neighbours, or else of a step
+    from the lowest one.
+
+    Args:
+        cost: float32, cost of the cell.
+        left: float32, potential of the left neighbour.
+        right: float32, potential of the right neighbour.
+        below: float32, potential of the lower neighbour.
+        above: float32, potential of the upper neighbour.
+        planar: True for a planar wave.
     """
     horizontal, vertical = min(left, right), min(below, above)
     lower = min(horizontal, vertical)
@@ -47,7 +56,7 @@ def arrival(cost, left, right, below, above, planar):
 
 @njit(cache=True, nogil=True)
 def arrival_at(potential, size_x, cell, cost, planar):
-    """``arrival`` at a cell that is not of the outermost ring."""
+    """Return the ``arrival`` at a flat cell of float32[n], not of the outermost ring."""
     return arrival(
         np.float32(cost),
         potential[cell - 1],
@@ -60,17 +69,27 @@ def arrival_at(potential, size_x, cell, cost, planar):
 
 @njit(cache=True, nogil=True)
 def start_at_cell(potential, source, size_x):
-    """Begin with 0 in one cell; returns the first front, int64[4]."""
+    """Begin with 0 in one flat cell of float32[n]; return the first front, int64[4]."""
     potential[source] = 0.0
     return np.array([source + 1, source - 1, source - size_x, source + size_x])
 
 
 @njit(cache=True, nogil=True)
 def start_between_cells(potential, source, size_x, dx, dy, neutral):
-    """Begin at a point ``dx``, ``dy`` cells right of and above a cell's centre.
+    """Begin at a point between the centres of four cells.
 
-    Both are float32. The four cells around the point share the cost of two free
-    cells by the areas opposite to them. Returns the first front, int64[8].
+    The four cells share the cost of two free cells by the areas opposite to them.
+
+    Args:
+        potential: float32[n], changed in place.
+        source: Flat cell left of and below the point.
+        size_x: Cells in a row.
+        dx: float32, cells by which the point is right of the source's centre.
+        dy: float32, cells by which the point is above the source's centre.
+        neutral: Cost of a free cell.
+
+    Returns:
+        The first front, int64[8] flat cells.
     """
     twice, one = np.float32(2 * neutral), np.float32(1.0)
     _seed(potential, source, twice * dx * dy)
@@ -106,7 +125,7 @@ def _distance_cost(cell, other, size_x, neutral):
 
 @njit(cache=True, nogil=True)
 def _enter_front(costs, pending, front, cells, obstacle):
-    """Put those of the cells that can be entered into a front; returns how many there are."""
+    """Put the cells, int64[k], that can be entered into a front; return their number."""
     count = 0
     for cell in cells:
         if 0 <= cell < costs.size and costs[cell] < obstacle and not pending[cell]:
@@ -117,26 +136,23 @@ def _enter_front(costs, pending, front, cells, obstacle):
 
 
 @njit(cache=True, nogil=True)
-def propagate(
-    costs,
-    potential,
-    first_front,
-    rules,
-    source,
-    target,
-    size_x,
-    max_fronts,
-    stop_at_target,
-    heuristic,
-):
-    """Spread a potential that has begun at ``source``, at most ``max_fronts`` fronts.
+def propagate(costs, potential, first_front, params, source, target, size_x, max_fronts):
+    """Spread a potential that has begun at a source.
 
-    ``costs`` uint8[n] or float32[n], at most ``rules.obstacle``; ``potential``
-    float32[n], NOT_REACHED but where the wave has begun, lowered in place. Stops
-    early when nothing is left, or, with ``stop_at_target``, when the target cell
-    has a potential; returns whether it stopped for that. ``heuristic`` makes it A*.
+    Args:
+        costs: uint8[n] or float32[n], at most ``params.obstacle``.
+        potential: float32[n], NOT_REACHED but where the wave has begun; lowered in place.
+        first_front: int64[k], flat cells, as ``start_at_cell`` returns them.
+        params: Parameters of the wave.
+        source: Flat cell where the wave has begun.
+        target: Flat cell that the wave is to reach.
+        size_x: Cells in a row.
+        max_fronts: Most fronts to spread; the wave also stops when nothing is left.
+
+    Returns:
+        True if the wave stopped at the target.
     """
-    obstacle, neutral, planar = rules
+    obstacle, neutral, planar, stop_at_target, heuristic = params
     pending = np.zeros(costs.size, dtype=np.bool_)  # cell is in a bucket
     front = np.empty(BUCKET_SIZE, dtype=np.uint32)
     ahead = np.empty(BUCKET_SIZE, dtype=np.uint32)  # for the next front

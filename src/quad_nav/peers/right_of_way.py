@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.paths import sample_path
+from quad_nav.kernels.peers import sample_path
 from quad_nav.peers.peer import Peer
 
 HORIZON_S = 7.0

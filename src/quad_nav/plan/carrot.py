@@ -16,6 +16,7 @@ from quad_nav.errors import NoPath
 from quad_nav.geometry import Pose2D, angle_difference, normalize_angle
 from quad_nav.grid import GridSpec
 from quad_nav.kernels import collision
+from quad_nav.kernels.cost_grid import CostmapView
 
 _SHARE_STEP = 0.01
 _CORNERS_NEEDED = 3
@@ -45,7 +46,7 @@ class Carrot:
         nowhere on the line, not even where it stands.
         """
         if len(self.footprint) >= _CORNERS_NEEDED:
-            window = collision.Window(
+            costmap = CostmapView(
                 np.ascontiguousarray(costs),
                 float(spec.origin_x_m),
                 float(spec.origin_y_m),
@@ -59,7 +60,7 @@ class Carrot:
                     start.y_m + share * (goal.y_m - start.y_m),
                     normalize_angle(start.yaw_rad + share * turn_rad),
                 )
-                if collision.footprint_cost(window, self.footprint, *pose) >= 0.0:
+                if collision.footprint_cost(costmap, self.footprint, *pose) >= 0.0:
                     return np.array([(start.x_m, start.y_m, start.yaw_rad), pose])
                 share -= _SHARE_STEP
         raise NoPath(

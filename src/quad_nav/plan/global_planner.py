@@ -198,18 +198,22 @@ class SearchPlanner:
                 _hundredths(start[1]),
                 params.neutral_cost,
             )
-        rules = wavefront.Rules(params.lethal_cost, params.neutral_cost, params.use_quadratic)
+        wave = wavefront.WaveParams(
+            obstacle=params.lethal_cost,
+            neutral=params.neutral_cost,
+            planar=params.use_quadratic,
+            stop_at_target=True,
+            heuristic=False,
+        )
         arrived = wavefront.propagate(
             wave_costs(costs, params).ravel(),
             potential,
             front,
-            rules,
+            wave,
             source,
             _flat(goal, size_x),
             size_x,
             2 * costs.size,
-            stop_at_target=True,
-            heuristic=False,
         )
         return potential, arrived
 

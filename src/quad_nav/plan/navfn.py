@@ -29,12 +29,11 @@ import numpy as np
 from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, INSCRIBED, UNKNOWN, GridSpec
-from quad_nav.kernels import navfn as kernel
+from quad_nav.kernels import descent as kernel
 from quad_nav.kernels import wave as wavefront
 
 Cell = Tuple[int, int]
 NOT_REACHED = float(wavefront.NOT_REACHED)  # where the wave did not come
-_RULES = wavefront.Rules(kernel.OBSTACLE, kernel.NEUTRAL, planar=True)
 
 
 @dataclass(frozen=True)
@@ -170,13 +169,13 @@ def potential_from(
         nav_costs.ravel(),
         potential,
         first_front,
-        _RULES,
+        wavefront.WaveParams(
+            kernel.OBSTACLE, kernel.NEUTRAL, True, bool(stop_at_target), bool(heuristic)
+        ),
         source_cell,
         target_cell,
         size_x,
         max(cells // 20, size_x + size_y),
-        stop_at_target,
-        heuristic,
     )
     return potential.reshape(nav_costs.shape)
 

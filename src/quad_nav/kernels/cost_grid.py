@@ -1,0 +1,120 @@
+"""Grids of costs: cells of points, polygons, and one grid merged into another.
+
+Mirrors ``costmap/cost_grid.py``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from quad_nav.grid import UNKNOWN
+
+
+class CostmapView(NamedTuple):
+    """A costmap as kernels take it."""
+
+    costs: NDArray[np.uint8]  # [H, W], row 0 at the lower border
+    origin_x_m: float  # corner of cell (0, 0) in the costmap's frame
+    origin_y_m: float
+    resolution_m: float
+
+
+@njit(cache=True, nogil=True)
+def cell_index(world_m, origin_m, resolution_m, size):
+    """Return the index along one axis of the cell that holds a coordinate.
+
+    Args:
+        world_m: Coordinate in the grid's frame.
+        origin_m: Lower border of the grid.
+        resolution_m: Size of a cell.
+        size: Number of cells along the axis.
+
+    Returns:
+        The index; -1 outside of the grid and for NaN.
+    """
+    cell = (world_m - origin_m) / resolution_m
+    if not 0.0 <= cell < size:
+        return -1
+    return int(cell)
+
+
+@njit(cache=True, nogil=True)
+def cell_of(window, x, y):
+    """Return the cell (x, y) of a point in the costmap's frame, metres.
+
+    An index is negative where the point is off the map.
+    """
+    size_y, size_x = window.costs.shape
+    return (
+        cell_index(x, window.origin_x_m, window.resolution_m, size_x),
+        cell_index(y, window.origin_y_m, window.resolution_m, size_y),
+    )
+
+
+@njit(cache=True, nogil=True)
+def fill_convex_polygon(costs, vertices, value):
+    """Set every cell of a convex polygon, outline included.
+
+    The outline is drawn with Bresenham's lines in the order of the vertices. Each column is
+    filled from its lowest to its highest outline cell, as costmap_2d does.
+
+    Args:
+        costs: uint8[H, W], or bool[H, W] for a mask.
+        vertices: int64[n, 2], cells (x, y) inside the grid, n >= 3.
+        value: What the cells get.
+    """
+    size_y, size_x = costs.shape
+    lowest = np.full(size_x, size_y, np.int64)
+    highest = np.full(size_x, -1, np.int64)
+    n = vertices.shape[0]
+    for k in range(n):
+        after = (k + 1) % n
+        _span_line(
+            lowest, highest, vertices[k, 0], vertices[k, 1], vertices[after, 0], vertices[after, 1]
+        )
+    for x in range(size_x):
+        for y in range(lowest[x], highest[x] + 1):
+            costs[y, x] = value
+
+
+@njit(cache=True, nogil=True)
+def _span_line(lowest, highest, x0, y0, x1, y1):
+    """Widen each column's span, lowest and highest int64[W], by the cells of one line."""
+    dx, dy = x1 - x0, y1 - y0
+    step_x = 1 if dx > 0 else -1
+    step_y = 1 if dy > 0 else -1
+    steps_x, steps_y = abs(dx), abs(dy)
+    along_x = steps_x >= steps_y
+    steps = max(steps_x, steps_y)
+    error = steps // 2
+    x, y = x0, y0
+    for _ in range(steps + 1):
+        lowest[x] = min(lowest[x], y)
+        highest[x] = max(highest[x], y)
+        error += steps_y if along_x else steps_x
+        carry = error >= steps
+        if carry:
+            error -= steps
+        if along_x or carry:
+            x += step_x
+        if carry or not along_x:
+            y += step_y
+
+
+@njit(cache=True, nogil=True)
+def raise_to(below, above):
+    """Keep the higher cost of each cell; unknown is the lowest.
+
+    Args:
+        below: uint8[H, W], raised in place.
+        above: uint8[H, W].
+    """
+    for y in range(below.shape[0]):
+        for x in range(below.shape[1]):
+            cost, other = below[y, x], above[y, x]
+            if cost == UNKNOWN or (other != UNKNOWN and other > cost):
+                below[y, x] = other

@@ -1,0 +1,113 @@
+"""Peers: points along paths, discs on a grid, and the nearest cell outside of them.
+
+Mirrors ``peers/`` and ``costmap/peer_layer.py``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def sample_path(start, path, travelled):
+    """Return the points of a path after distances travelled from a start.
+
+    The path joins at the point after the nearest one. Beyond its end every point is the end.
+
+    Args:
+        start: float64[2], metres in the frame of the path.
+        path: float64[n, 2], n >= 1, metres.
+        travelled: float64[k], metres.
+
+    Returns:
+        float64[k, 2], metres.
+    """
+    nearest, nearest2 = 0, np.inf
+    for k in range(path.shape[0]):
+        distance2 = (path[k, 0] - start[0]) ** 2 + (path[k, 1] - start[1]) ** 2
+        if distance2 < nearest2:
+            nearest, nearest2 = k, distance2
+    first = min(nearest + 1, path.shape[0] - 1)
+    points = np.empty((travelled.shape[0], 2))
+    for i in range(travelled.shape[0]):
+        left = travelled[i]
+        x, y = start[0], start[1]
+        for k in range(first, path.shape[0]):
+            dx, dy = path[k, 0] - x, path[k, 1] - y
+            length = math.sqrt(dx * dx + dy * dy)
+            if left < length:
+                x += dx * (left / length)
+                y += dy * (left / length)
+                break
+            left -= length
+            x, y = path[k, 0], path[k, 1]
+        points[i, 0], points[i, 1] = x, y
+    return points
+
+
+@njit(cache=True, nogil=True)
+def raise_discs(cells, origin_x_m, origin_y_m, resolution_m, centres, radius_m, value):
+    """Raise the cells whose centres lie in discs; cells that are higher stay.
+
+    Args:
+        cells: uint8[H, W], changed in place.
+        origin_x_m: Corner of cell (0, 0) in the grid's frame.
+        origin_y_m: Corner of cell (0, 0) in the grid's frame.
+        resolution_m: Size of a cell.
+        centres: float64[n, 2], metres in the grid's frame.
+        radius_m: Radius of the discs.
+        value: What the cells are raised to.
+    """
+    size_y, size_x = cells.shape
+    for k in range(centres.shape[0]):
+        x = (centres[k, 0] - origin_x_m) / resolution_m - 0.5
+        y = (centres[k, 1] - origin_y_m) / resolution_m - 0.5
+        reach = radius_m / resolution_m
+        for row in range(max(0, math.ceil(y - reach)), min(size_y - 1, math.floor(y + reach)) + 1):
+            half = math.sqrt(max(reach * reach - (row - y) * (row - y), 0.0))
+            for column in range(
+                max(0, math.ceil(x - half)), min(size_x - 1, math.floor(x + half)) + 1
+            ):
+                if cells[row, column] < value:
+                    cells[row, column] = value
+
+
+@njit(cache=True, nogil=True)
+def nearest_cell(blocked, unwanted, start_x, start_y):
+    """Find the nearest cell, in steps to four neighbours, that is neither blocked nor unwanted.
+
+    Args:
+        blocked: uint8[H, W], not 0 for cells that cannot be entered; the start may be one.
+        unwanted: uint8[H, W], not 0 for cells that can be crossed and are no result.
+        start_x: Column of the start.
+        start_y: Row of the start.
+
+    Returns:
+        The cell (x, y), or (-1, -1) if there is none.
+    """
+    size_y, size_x = blocked.shape
+    seen = np.zeros((size_y, size_x), np.bool_)
+    queue = np.empty((blocked.size, 2), np.int32)
+    queue[0, 0], queue[0, 1] = start_x, start_y
+    seen[start_y, start_x] = True
+    head, tail = 0, 1
+    while head < tail:
+        x, y = queue[head]
+        head += 1
+        if not unwanted[y, x] and not blocked[y, x]:
+            return x, y
+        for dx, dy in ((1, 0), (0, 1), (-1, 0), (0, -1)):
+            to_x, to_y = x + dx, y + dy
+            if (
+                0 <= to_x < size_x
+                and 0 <= to_y < size_y
+                and not seen[to_y, to_x]
+                and not blocked[to_y, to_x]
+            ):
+                seen[to_y, to_x] = True
+                queue[tail, 0], queue[tail, 1] = to_x, to_y
+                tail += 1
+    return -1, -1
