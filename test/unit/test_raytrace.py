@@ -8,15 +8,8 @@ import numpy as np
 import pytest
 
 from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.raytrace import (
-    MAX_OBSTRUCTED,
-    SECTORS,
-    ObservationStack,
-    clear_all_rays,
-    clear_rays,
-    find_obstructed,
-    sector_of,
-)
+from quad_nav.kernels.obstructed_cells import MAX_OBSTRUCTED, SECTORS, find_obstructed, sector_of
+from quad_nav.kernels.raytrace import ObservationStack, clear_all_rays, clear_rays
 
 RESOLUTION_M = 0.05
 NOWHERE = (1e30, 1e30, -1e30, -1e30)

@@ -1,14 +1,18 @@
-"""Loops over the cells that a footprint covers."""
+"""Cells and costs under a footprint."""
 
 from __future__ import annotations
 
 import math
+from typing import Tuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN
-from quad_nav.kernels.cost_grid import cell_of, fill_convex_polygon
+from quad_nav.kernels.cost_grid import CostmapView, cell_of, fill_convex_polygon
+
+Triple = Tuple[float, float, float]
 
 COLLIDES = -1.0
 IN_UNKNOWN = -2.0
@@ -16,8 +20,8 @@ OFF_THE_MAP = -3.0
 
 
 @njit(cache=True, nogil=True)
-def _bresenham(x0, y0, x1, y1):
-    """Steps of a line: their number, the share of side steps, each step, each side step."""
+def _bresenham(x0: int, y0: int, x1: int, y1: int) -> Tuple[int, int, int, int, int, int]:
+    """Return a line's number of steps, number of side steps, step (x, y), side step (x, y)."""
     dx, dy = abs(x1 - x0), abs(y1 - y0)
     step_x = 1 if x1 >= x0 else -1
     step_y = 1 if y1 >= y0 else -1
@@ -27,11 +31,21 @@ def _bresenham(x0, y0, x1, y1):
 
 
 @njit(cache=True, nogil=True)
-def line_cost(costs, x0, y0, x1, y1, forbidden_from):
-    """The highest cost on a line of cells, ends included.
+def line_cost(
+    costs: NDArray[np.uint8], x0: int, y0: int, x1: int, y1: int, forbidden_from: int
+) -> float:
+    """Return the highest cost on a line of cells, ends included.
 
-    Negative at the first unknown cell (IN_UNKNOWN) or cell of at least
-    ``forbidden_from`` (COLLIDES).
+    Args:
+        costs: uint8[H, W].
+        x0: Column of the first cell, inside the grid.
+        y0: Row of the first cell.
+        x1: Column of the last cell, inside the grid.
+        y1: Row of the last cell.
+        forbidden_from: Lowest cost that collides.
+
+    Returns:
+        The cost, or COLLIDES or IN_UNKNOWN at the first forbidden or unknown cell.
     """
     length, side, step_x, step_y, side_x, side_y = _bresenham(x0, y0, x1, y1)
     x, y, error = x0, y0, length // 2
@@ -55,13 +69,22 @@ def line_cost(costs, x0, y0, x1, y1, forbidden_from):
 
 
 @njit(cache=True, nogil=True)
-def footprint_cost(costmap, footprint, x, y, theta):
-    """The highest cost under a footprint's outline at a pose, or what forbids it.
+def footprint_cost(
+    costmap: CostmapView, footprint: NDArray[np.float64], x: float, y: float, theta: float
+) -> float:
+    """Return the highest cost under a footprint's outline at a pose.
 
-    ``footprint`` is float64[n, 2] in the robot's frame. Negative where the
-    outline meets a lethal cell (COLLIDES) or an unknown one (IN_UNKNOWN), or
-    leaves the map (OFF_THE_MAP). Fewer than three points stand for a circle:
-    only the centre's cell counts, and inscribed cost collides.
+    Args:
+        costmap: The costmap.
+        footprint: float64[n, 2], metres in the robot's frame. Fewer than three points stand
+            for a circle: only the centre's cell counts, and inscribed cost collides.
+        x: x of the robot in the costmap's frame, metres.
+        y: y of the robot.
+        theta: Heading of the robot, radians.
+
+    Returns:
+        The cost; COLLIDES if the outline meets a lethal cell, IN_UNKNOWN if it meets an
+        unknown one, OFF_THE_MAP if it leaves the map.
     """
     cell_x, cell_y = cell_of(costmap, x, y)
     if cell_x < 0 or cell_y < 0:
@@ -89,7 +112,15 @@ def footprint_cost(costmap, footprint, x, y, theta):
 
 
 @njit(cache=True, nogil=True)
-def _vertex_cell(costmap, footprint, k, x, y, cos_theta, sin_theta):
+def _vertex_cell(
+    costmap: CostmapView,
+    footprint: NDArray[np.float64],
+    k: int,
+    x: float,
+    y: float,
+    cos_theta: float,
+    sin_theta: float,
+) -> Tuple[int, int]:
     vertex_x, vertex_y = footprint[k, 0], footprint[k, 1]
     return cell_of(
         costmap,
@@ -99,10 +130,25 @@ def _vertex_cell(costmap, footprint, k, x, y, cos_theta, sin_theta):
 
 
 @njit(cache=True, nogil=True)
-def mark_footprint(costmap, footprint, x, y, theta, mask):
-    """Set the cells inside a footprint in ``mask``, bool[H, W].
+def mark_footprint(
+    costmap: CostmapView,
+    footprint: NDArray[np.float64],
+    x: float,
+    y: float,
+    theta: float,
+    mask: NDArray[np.bool_],
+) -> None:
+    """Set the cells inside a footprint.
 
     Where a vertex is off the map only the outline before it is set.
+
+    Args:
+        costmap: The costmap.
+        footprint: float64[n, 2], metres in the robot's frame.
+        x: x of the robot in the costmap's frame, metres.
+        y: y of the robot.
+        theta: Heading of the robot, radians.
+        mask: bool[H, W], changed in place.
     """
     cos_theta, sin_theta = math.cos(theta), math.sin(theta)
     vertices = np.empty((footprint.shape[0], 2), np.int64)
@@ -118,7 +164,7 @@ def mark_footprint(costmap, footprint, x, y, theta, mask):
 
 
 @njit(cache=True, nogil=True)
-def _mark_line(mask, x0, y0, x1, y1):
+def _mark_line(mask: NDArray[np.bool_], x0: int, y0: int, x1: int, y1: int) -> None:
     length, side, step_x, step_y, side_x, side_y = _bresenham(x0, y0, x1, y1)
     x, y, error = x0, y0, length // 2
     for _ in range(length + 1):

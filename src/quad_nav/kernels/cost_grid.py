@@ -5,7 +5,7 @@ Mirrors ``costmap/cost_grid.py``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
@@ -24,7 +24,7 @@ class CostmapView(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def cell_index(world_m, origin_m, resolution_m, size):
+def cell_index(world_m: float, origin_m: float, resolution_m: float, size: int) -> int:
     """Return the index along one axis of the cell that holds a coordinate.
 
     Args:
@@ -43,20 +43,20 @@ def cell_index(world_m, origin_m, resolution_m, size):
 
 
 @njit(cache=True, nogil=True)
-def cell_of(window, x, y):
+def cell_of(costmap: CostmapView, x: float, y: float) -> Tuple[int, int]:
     """Return the cell (x, y) of a point in the costmap's frame, metres.
 
     An index is negative where the point is off the map.
     """
-    size_y, size_x = window.costs.shape
+    size_y, size_x = costmap.costs.shape
     return (
-        cell_index(x, window.origin_x_m, window.resolution_m, size_x),
-        cell_index(y, window.origin_y_m, window.resolution_m, size_y),
+        cell_index(x, costmap.origin_x_m, costmap.resolution_m, size_x),
+        cell_index(y, costmap.origin_y_m, costmap.resolution_m, size_y),
     )
 
 
 @njit(cache=True, nogil=True)
-def fill_convex_polygon(costs, vertices, value):
+def fill_convex_polygon(costs: NDArray[Any], vertices: NDArray[np.int64], value: int) -> None:
     """Set every cell of a convex polygon, outline included.
 
     The outline is drawn with Bresenham's lines in the order of the vertices. Each column is
@@ -82,7 +82,9 @@ def fill_convex_polygon(costs, vertices, value):
 
 
 @njit(cache=True, nogil=True)
-def _span_line(lowest, highest, x0, y0, x1, y1):
+def _span_line(
+    lowest: NDArray[np.int64], highest: NDArray[np.int64], x0: int, y0: int, x1: int, y1: int
+) -> None:
     """Widen each column's span, lowest and highest int64[W], by the cells of one line."""
     dx, dy = x1 - x0, y1 - y0
     step_x = 1 if dx > 0 else -1
@@ -106,7 +108,7 @@ def _span_line(lowest, highest, x0, y0, x1, y1):
 
 
 @njit(cache=True, nogil=True)
-def raise_to(below, above):
+def raise_to(below: NDArray[np.uint8], above: NDArray[np.uint8]) -> None:
     """Keep the higher cost of each cell; unknown is the lowest.
 
     Args:

@@ -7,10 +7,11 @@ centre, float32, in cells to the right (dx) and up (dy).
 from __future__ import annotations
 
 import math
-from typing import Tuple
+from typing import Any, Tuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.kernels.wave import NOT_REACHED
 
@@ -21,7 +22,7 @@ _STEP_CELLS = 0.5
 
 
 @njit(cache=True, nogil=True)
-def _gradient(potential, size_x, cell) -> Tuple[float, float]:
+def _gradient(potential: NDArray[np.float32], size_x: int, cell: int) -> Tuple[Any, Any]:
     """Return the vector down float32[n] at a cell, (0, 0) where there is none."""
     if cell < size_x or cell > potential.size - size_x - 1:
         return 0.0, 0.0
@@ -29,7 +30,7 @@ def _gradient(potential, size_x, cell) -> Tuple[float, float]:
 
 
 @njit(cache=True, nogil=True)
-def _slope(potential, cell, stride):
+def _slope(potential: NDArray[np.float32], cell: int, stride: int) -> np.float32:
     before, here, after = potential[cell - stride], potential[cell], potential[cell + stride]
     slope = np.float32(0.0)
     if here >= NOT_REACHED:  # inside an obstacle: towards the reached side
@@ -46,7 +47,9 @@ def _slope(potential, cell, stride):
 
 
 @njit(cache=True, nogil=True)
-def _unit_gradient(potential, size_x, cell):
+def _unit_gradient(
+    potential: NDArray[np.float32], size_x: int, cell: int
+) -> Tuple[np.float32, np.float32]:
     gx, gy = _gradient(potential, size_x, cell)
     norm = math.hypot(gx, gy)
     if norm > 0.0:
@@ -55,7 +58,9 @@ def _unit_gradient(potential, size_x, cell):
 
 
 @njit(cache=True, nogil=True)
-def _interpolated_gradient(potential, size_x, cell, dx, dy):
+def _interpolated_gradient(
+    potential: NDArray[np.float32], size_x: int, cell: int, dx: np.float32, dy: np.float32
+) -> Tuple[np.float32, np.float32]:
     x00, y00 = _unit_gradient(potential, size_x, cell)
     x10, y10 = _unit_gradient(potential, size_x, cell + 1)
     x01, y01 = _unit_gradient(potential, size_x, cell + size_x)
@@ -66,7 +71,7 @@ def _interpolated_gradient(potential, size_x, cell, dx, dy):
 
 
 @njit(cache=True, nogil=True)
-def _lowest_around(potential, size_x, cell):
+def _lowest_around(potential: NDArray[np.float32], size_x: int, cell: int) -> Tuple[int, bool]:
     """Return the lowest of a cell and its eight neighbours; True if all nine are reached."""
     lowest, all_reached = cell, True
     for offset_y in (-size_x, 0, size_x):
@@ -80,7 +85,7 @@ def _lowest_around(potential, size_x, cell):
 
 
 @njit(cache=True, nogil=True)
-def _carry(cell, offset, stride):
+def _carry(cell: int, offset: np.float32, stride: int) -> Tuple[int, np.float32]:
     """Move whole cells of an offset into the cell index."""
     if offset > 1.0:
         cell, offset = cell + stride, np.float32(offset - 1.0)
@@ -90,13 +95,21 @@ def _carry(cell, offset, stride):
 
 
 @njit(cache=True, nogil=True)
-def leaves_map(potential, size_x, cell):
+def leaves_map(potential: NDArray[np.float32], size_x: int, cell: int) -> bool:
     """Tell whether a cell of float32[n] is in the lowest or highest row, where descents end."""
     return cell < size_x or cell > potential.size - size_x
 
 
 @njit(cache=True, nogil=True)
-def step_down(potential, size_x, cell, dx, dy, path, last):
+def step_down(
+    potential: NDArray[np.float32],
+    size_x: int,
+    cell: int,
+    dx: np.float32,
+    dy: np.float32,
+    path: NDArray[np.float32],
+    last: int,
+) -> Tuple[bool, int, np.float32, np.float32]:
     """Return the next position of a descent.
 
     The step is half a cell along the gradient where all cells around are reached, otherwise
@@ -130,7 +143,7 @@ def step_down(potential, size_x, cell, dx, dy, path, last):
 
 
 @njit(cache=True, nogil=True)
-def _nearest(cell, dx, dy, size_x, size):
+def _nearest(cell: int, dx: np.float32, dy: np.float32, size_x: int, size: int) -> int:
     """Return the flat cell nearest to a point, halves rounded away from zero."""
     step_x = int(math.copysign(math.floor(abs(dx) + 0.5), dx))
     step_y = int(math.copysign(math.floor(abs(dy) + 0.5), dy))
@@ -138,7 +151,9 @@ def _nearest(cell, dx, dy, size_x, size):
 
 
 @njit(cache=True, nogil=True)
-def descend(potential, size_x, start, source, path):
+def descend(
+    potential: NDArray[np.float32], size_x: int, start: int, source: int, path: NDArray[np.float32]
+) -> Tuple[int, bool]:
     """Follow NavFn's potential down in half-cell steps.
 
     Args:

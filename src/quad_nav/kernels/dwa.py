@@ -7,12 +7,13 @@ single precision at every step, as the original keeps them.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from quad_nav.kernels.collision import footprint_cost
+from quad_nav.kernels.collision import Triple, footprint_cost
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
 
 _TOLERANCE = 1e-4
@@ -66,7 +67,7 @@ class Candidates(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def step_count(motion, sample):
+def step_count(motion: Motion, sample: NDArray[np.float64]) -> int:
     """Into how many steps a sample's simulation is cut; 0 for one outside the speed limits."""
     speed, turn = math.hypot(sample[0], sample[1]), abs(sample[2])
     if (
@@ -89,7 +90,13 @@ def step_count(motion, sample):
 
 
 @njit(cache=True, nogil=True)
-def simulate(motion, pose, velocity, sample, points):
+def simulate(
+    motion: Motion,
+    pose: Triple,
+    velocity: Triple,
+    sample: NDArray[np.float64],
+    points: NDArray[np.float64],
+) -> Tuple[int, Triple]:
     """Moves along a sample: (number of poses in ``points`` float64[k, 3], command vx, vy, vtheta).
 
     The command is the sample, or what comes nearest to it after one step.
@@ -117,7 +124,9 @@ def simulate(motion, pose, velocity, sample, points):
 
 
 @njit(cache=True, nogil=True)
-def _accelerated(motion, sample, vx, vy, vtheta, dt):
+def _accelerated(
+    motion: Motion, sample: NDArray[np.float64], vx: float, vy: float, vtheta: float, dt: float
+) -> Triple:
     limit_x, limit_y, limit_theta = motion.acceleration_limits
     return (
         _approach(sample[0], vx, limit_x * dt),
@@ -127,19 +136,21 @@ def _accelerated(motion, sample, vx, vy, vtheta, dt):
 
 
 @njit(cache=True, nogil=True)
-def _approach(wanted, current, max_change):
+def _approach(wanted: float, current: float, max_change: float) -> float:
     if current < wanted:
         return _single(min(wanted, current + max_change))
     return _single(max(wanted, current - max_change))
 
 
 @njit(cache=True, nogil=True)
-def _single(value):
+def _single(value: float) -> Any:
     return np.float64(np.float32(value))
 
 
 @njit(cache=True, nogil=True)
-def is_within_reach(grids, points, count, distances):
+def is_within_reach(
+    grids: MapGrids, points: NDArray[np.float64], count: int, distances: NDArray[np.float64]
+) -> bool:
     """Whether path and goal are in reach from every pose, and neither it nor its nose off the map.
 
     Writes the last pose's distances to ``distances``, float64[4]; those that do
@@ -162,7 +173,9 @@ def is_within_reach(grids, points, count, distances):
 
 
 @njit(cache=True, nogil=True)
-def _has_nose_on_map(grids, points, count, distances):
+def _has_nose_on_map(
+    grids: MapGrids, points: NDArray[np.float64], count: int, distances: NDArray[np.float64]
+) -> bool:
     size_y, size_x = grids.path.shape
     forward = grids.forward_point_distance_m
     border = abs(forward) + grids.costmap.resolution_m
@@ -188,7 +201,9 @@ def _has_nose_on_map(grids, points, count, distances):
 
 
 @njit(cache=True, nogil=True)
-def travel(motion, grids, pose, velocity, samples):
+def travel(
+    motion: Motion, grids: MapGrids, pose: Triple, velocity: Triple, samples: NDArray[np.float64]
+) -> Tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Moves along samples, float64[n, 3], without looking at obstacles.
 
     Returns their commands, float64[n, 3], the distances at their ends,
@@ -206,7 +221,7 @@ def travel(motion, grids, pose, velocity, samples):
 
 
 @njit(cache=True, nogil=True)
-def longest(motion, samples):
+def longest(motion: Motion, samples: NDArray[np.float64]) -> int:
     """Room for the poses of any sample; at least 1."""
     steps = 1
     for k in range(samples.shape[0]):
@@ -215,7 +230,9 @@ def longest(motion, samples):
 
 
 @njit(cache=True, nogil=True)
-def obstacle_cost(obstacles, footprint_scale, points, count):
+def obstacle_cost(
+    obstacles: Obstacles, footprint_scale: float, points: NDArray[np.float64], count: int
+) -> float:
     """The highest cost under the scaled footprint on the way, or the sum; -1 on collision."""
     if count > 0 and not math.isfinite(footprint_scale):
         return -1.0
@@ -237,7 +254,7 @@ def obstacle_cost(obstacles, footprint_scale, points, count):
 
 
 @njit(cache=True, nogil=True)
-def total_cost(obstacle_term, terms):
+def total_cost(obstacle_term: float, terms: NDArray[np.float64]) -> float:
     """Summed in the critics' order: the last bit can decide between samples."""
     total = obstacle_term
     for term in terms:
@@ -246,7 +263,9 @@ def total_cost(obstacle_term, terms):
 
 
 @njit(cache=True, nogil=True)
-def cheapest(motion, obstacles, pose, velocity, candidates):
+def cheapest(
+    motion: Motion, obstacles: Obstacles, pose: Triple, velocity: Triple, candidates: Candidates
+) -> Tuple[int, float]:
     """(index, cost) of the legal sample of lowest cost, the first of equals; (-1, inf) if none.
 
     Samples are looked at in the order of what they cost without obstacles, and

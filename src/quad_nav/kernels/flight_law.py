@@ -12,6 +12,7 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 
 class BodyConstants(NamedTuple):
@@ -36,7 +37,9 @@ class FlightGains(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def rotation_from_quaternion(quaternion, rotation):
+def rotation_from_quaternion(
+    quaternion: NDArray[np.float64], rotation: NDArray[np.float64]
+) -> None:
     """Fill a rotation matrix from a unit quaternion.
 
     Args:
@@ -56,7 +59,15 @@ def rotation_from_quaternion(quaternion, rotation):
 
 
 @njit(cache=True, nogil=True)
-def fly(rows, commands, altitude_m, constants, gains, forces, torques):
+def fly(
+    rows: NDArray[np.float64],
+    commands: NDArray[np.float64],
+    altitude_m: float,
+    constants: BodyConstants,
+    gains: FlightGains,
+    forces: NDArray[np.float64],
+    torques: NDArray[np.float64],
+) -> None:
     """Compute the forces and torques that track commands.
 
     Args:
@@ -110,7 +121,14 @@ def fly(rows, commands, altitude_m, constants, gains, forces, torques):
 
 
 @njit(cache=True, nogil=True)
-def _horizontal_acceleration(rotation, velocity, yaw_rate, command, gain, limit):
+def _horizontal_acceleration(
+    rotation: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    yaw_rate: float,
+    command: NDArray[np.float64],
+    gain: float,
+    limit: float,
+) -> Tuple[float, float]:
     """Acceleration (ax, ay) in ``map``, m/s^2, that tracks a command; no longer than the limit."""
     forward_x, forward_y = rotation[0, 0], rotation[1, 0]
     length = math.hypot(forward_x, forward_y)
@@ -124,5 +142,5 @@ def _horizontal_acceleration(rotation, velocity, yaw_rate, command, gain, limit)
 
 
 @njit(cache=True, nogil=True)
-def _limited(value, limit):
+def _limited(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)

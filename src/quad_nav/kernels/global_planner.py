@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.kernels.descent import leaves_map, step_down
 from quad_nav.kernels.wave import NOT_REACHED, arrival_at
@@ -24,7 +25,7 @@ class Queue(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _sift_up(queue, hole, priority, cell):
+def _sift_up(queue: Queue, hole: int, priority: np.float32, cell: int) -> None:
     """Put an entry into a hole, or above it while the parent has a higher priority."""
     while hole > 0:
         parent = (hole - 1) // 2
@@ -36,7 +37,7 @@ def _sift_up(queue, hole, priority, cell):
 
 
 @njit(cache=True, nogil=True)
-def _pop(queue, count):
+def _pop(queue: Queue, count: int) -> int:
     """Take the top of ``count`` entries; the last one fills the hole from below.
 
     Of equal children the right one rises.
@@ -54,7 +55,17 @@ def _pop(queue, count):
 
 
 @njit(cache=True, nogil=True)
-def a_star(step_costs, enterable, potential, size_x, start, goal, neutral, planar, max_visits):
+def a_star(
+    step_costs: NDArray[np.uint8],
+    enterable: NDArray[np.bool_],
+    potential: NDArray[np.float32],
+    size_x: int,
+    start: int,
+    goal: int,
+    neutral: int,
+    planar: bool,
+    max_visits: int,
+) -> bool:
     """Spread the potential from ``start`` until ``goal`` is visited; whether it was.
 
     ``step_costs`` uint8[n]; ``enterable`` bool[n]; ``potential`` float32[n], all
@@ -95,7 +106,13 @@ def a_star(step_costs, enterable, potential, size_x, start, goal, neutral, plana
 
 
 @njit(cache=True, nogil=True)
-def fill_around(step_costs, potential, size_x, centre, planar):
+def fill_around(
+    step_costs: NDArray[np.uint8],
+    potential: NDArray[np.float32],
+    size_x: int,
+    centre: int,
+    planar: bool,
+) -> None:
     """Give the cells that were not reached around a cell, two cells wide, a potential too.
 
     Column by column, each from its neighbours as they then are.
@@ -108,7 +125,15 @@ def fill_around(step_costs, potential, size_x, centre, planar):
 
 
 @njit(cache=True, nogil=True)
-def gradient_path(potential, size_x, start_x, start_y, goal_x, goal_y, path):
+def gradient_path(
+    potential: NDArray[np.float32],
+    size_x: int,
+    start_x: float,
+    start_y: float,
+    goal_x: float,
+    goal_y: float,
+    path: NDArray[np.float32],
+) -> int:
     """Follow the gradient down from the goal to the start, cells (x, y) into ``path``.
 
     ``path`` is float32[n, 2]. Returns the number of points, 0 when the descent
@@ -131,7 +156,15 @@ def gradient_path(potential, size_x, start_x, start_y, goal_x, goal_y, path):
 
 
 @njit(cache=True, nogil=True)
-def grid_path(potential, size_x, start_x, start_y, goal_x, goal_y, path):
+def grid_path(
+    potential: NDArray[np.float32],
+    size_x: int,
+    start_x: float,
+    start_y: float,
+    goal_x: float,
+    goal_y: float,
+    path: NDArray[np.float32],
+) -> int:
     """Go from the goal to the lowest of eight neighbours until the start's cell.
 
     As ``gradient_path``; the first point is the goal, the others are cells.

@@ -1,9 +1,13 @@
-"""The wavefront of the inflation layer."""
+"""Wavefront of the inflation layer.
+
+Mirrors ``costmap/inflation.py``.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN
 
@@ -12,13 +16,17 @@ _NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))  # left, lower, right, upper
 
 
 @njit(cache=True, nogil=True)
-def inflate(costs, x0, xn, y0, yn, cost_table, rank_table, inflate_unknown):
-    """Spread costs from the lethal cells of a window, in place.
-
-    costs: uint8[H, W]. Lethal cells in columns x0..xn-1 and rows y0..yn-1, which must lie
-    inside the grid, are seeds in row order. cost_table (uint8) and rank_table (int32),
-    both [radius + 2, radius + 2], give for (|dx|, |dy|) to the seed the cost, and the rank
-    of that distance among all distances; all those beyond the radius have the highest rank.
+def inflate(
+    costs: NDArray[np.uint8],
+    x0: int,
+    xn: int,
+    y0: int,
+    yn: int,
+    cost_table: NDArray[np.uint8],
+    rank_table: NDArray[np.int32],
+    inflate_unknown: bool,
+) -> None:
+    """Spread costs from the lethal cells of a window.
 
     Cells are visited by rank, first in first out within one, and pass their seed on to
     their left, lower, right and upper neighbour. A cell keeps the first seed that reaches
@@ -26,6 +34,18 @@ def inflate(costs, x0, xn, y0, yn, cost_table, rank_table, inflate_unknown):
 
     A neighbour that already waits at the same or a lower rank is not queued again: it
     would find itself visited. This keeps queues short and changes nothing.
+
+    Args:
+        costs: uint8[H, W], changed in place.
+        x0: First column of the window, inside the grid. Its lethal cells are seeds, in row
+            order.
+        xn: Column after the last one.
+        y0: First row of the window.
+        yn: Row after the last one.
+        cost_table: uint8[radius + 2, radius + 2], cost at (abs(dx), abs(dy)) cells from a seed.
+        rank_table: int32[radius + 2, radius + 2], rank of that distance among all distances.
+            Distances beyond the radius have the highest rank.
+        inflate_unknown: Overwrite unknown cells with costs below INSCRIBED, too.
     """
     radius = rank_table.shape[0] - 2
     reach = radius + 1  # of the seeds in the window; costs beyond it stay as they are
@@ -68,8 +88,8 @@ def inflate(costs, x0, xn, y0, yn, cost_table, rank_table, inflate_unknown):
 
 
 @njit(cache=True, nogil=True)
-def _most_entries(costs, x0, xn, y0, yn, radius):
-    """How many entries the queue can get: each seed, and each visited cell's neighbours."""
+def _most_entries(costs: NDArray[np.uint8], x0: int, xn: int, y0: int, yn: int, radius: int) -> int:
+    """Return the most entries of the queue: the seeds and the neighbours of visited cells."""
     seeds = 0
     for y in range(y0, yn):
         for x in range(x0, xn):
@@ -78,7 +98,17 @@ def _most_entries(costs, x0, xn, y0, yn, radius):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _append(queue, first, last, entry, rank, x, y, dx, dy):
+def _append(
+    queue: NDArray[np.int32],
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+    entry: int,
+    rank: int,
+    x: int,
+    y: int,
+    dx: int,
+    dy: int,
+) -> None:
     queue[entry, 0] = -1
     queue[entry, 1] = x
     queue[entry, 2] = y
@@ -92,7 +122,7 @@ def _append(queue, first, last, entry, rank, x, y, dx, dy):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _raise_cost(costs, x, y, cost, inflate_unknown):
+def _raise_cost(costs: NDArray[np.uint8], x: int, y: int, cost: int, inflate_unknown: bool) -> None:
     old = costs[y, x]
     if old == UNKNOWN:
         if cost >= INSCRIBED or (inflate_unknown and cost > FREE):

@@ -9,12 +9,13 @@ walks from column to column until it has hit something: the quickest for thousan
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from quad_nav.kernels.rays import dot, enter_solid, through_slab, triple, turn
+from quad_nav.kernels.rays import Triple, dot, enter_solid, through_slab, triple, turn
 from quad_nav.kernels.sectors import sector_of
 
 _ROUNDING = 1e-6  # of a beam's number
@@ -65,7 +66,14 @@ class Beams(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def cast_scans(origins, rotations, beams, solids, grid, ranges):
+def cast_scans(
+    origins: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    beams: Beams,
+    solids: Solids,
+    grid: SolidGrid,
+    ranges: NDArray[np.float64],
+) -> None:
     """Fill ranges float64[n, m] with the distances to the first hits, inf for none.
 
     origins: float64[n, 3] and rotations: float64[n, 3, 3], the axes as columns, of the
@@ -89,7 +97,7 @@ def cast_scans(origins, rotations, beams, solids, grid, ranges):
 
 
 @njit(cache=True, nogil=True)
-def _in_map(rotation, direction):
+def _in_map(rotation: NDArray[np.float64], direction: NDArray[np.float64]) -> Triple:
     """A beam's direction in ``map``."""
     return (
         rotation[0, 0] * direction[0] + rotation[0, 1] * direction[1],
@@ -99,7 +107,9 @@ def _in_map(rotation, direction):
 
 
 @njit(cache=True, nogil=True)
-def _cast_at_floor(row, origin, rotation, beams):
+def _cast_at_floor(
+    row: NDArray[np.float64], origin: Triple, rotation: NDArray[np.float64], beams: Beams
+) -> None:
     """Those beams that look down meet z = 0, unless none is steep enough to be there in time."""
     if math.hypot(rotation[2, 0], rotation[2, 1]) * beams.far_m < origin[2]:
         return
@@ -114,7 +124,14 @@ def _cast_at_floor(row, origin, rotation, beams):
 
 
 @njit(cache=True, nogil=True)
-def _cast_at_solid(row, origin, rotation, beams, solids, solid):
+def _cast_at_solid(
+    row: NDArray[np.float64],
+    origin: Triple,
+    rotation: NDArray[np.float64],
+    beams: Beams,
+    solids: Solids,
+    solid: int,
+) -> None:
     """Shorten the beams of a solid's sector to where they enter it."""
     centre = solids.centres[solid]
     sizes = triple(solids.sizes[solid])
@@ -144,7 +161,7 @@ def _cast_at_solid(row, origin, rotation, beams, solids, solid):
 
 
 @njit(cache=True, nogil=True)
-def _beams_of(first_rad, width_rad, beams):
+def _beams_of(first_rad: float, width_rad: float, beams: Beams) -> Tuple[float, float]:
     """A sector in numbers of beams, with fractions; its end may be a turn further on."""
     offset_rad = first_rad - beams.first_rad  # within a turn and a half; a modulo is slow
     if offset_rad < 0.0:
@@ -156,7 +173,7 @@ def _beams_of(first_rad, width_rad, beams):
 
 
 @njit(cache=True, nogil=True)
-def _surrounds(sizes, eye, near):
+def _surrounds(sizes: Triple, eye: Triple, near: float) -> bool:
     """Whether a ball of radius ``near`` around the eye is well inside a solid of any kind.
 
     What a quadcopter's own guard is to its LIDAR: no beam begins outside.
@@ -166,7 +183,17 @@ def _surrounds(sizes, eye, near):
 
 
 @njit(cache=True, nogil=True)
-def _shorten(row, first, last, kind, eye, ahead, left, sizes, beams):
+def _shorten(
+    row: NDArray[np.float64],
+    first: int,
+    last: int,
+    kind: int,
+    eye: Triple,
+    ahead: Triple,
+    left: Triple,
+    sizes: Triple,
+    beams: Beams,
+) -> None:
     """Shorten the beams first .. last to where they enter the solid."""
     for beam in range(first, min(last + 1, row.shape[0])):
         cos, sin = beams.directions[beam, 0], beams.directions[beam, 1]
@@ -181,7 +208,9 @@ def _shorten(row, first, last, kind, eye, ahead, left, sizes, beams):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def cast_through_grid(grid, origin, direction, near, far, hit):
+def cast_through_grid(
+    grid: SolidGrid, origin: Triple, direction: Triple, near: float, far: float, hit: float
+) -> float:
     """The first hit from ``near`` on, or ``hit`` if that or ``far`` comes before.
 
     The columns are walked in the order that the ray crosses them (Amanatides and Woo, "A
@@ -216,7 +245,9 @@ def cast_through_grid(grid, origin, direction, near, far, hit):
 
 
 @njit(cache=True, nogil=True)
-def _walk(origin, direction, low, begin, cell, cells):
+def _walk(
+    origin: float, direction: float, low: float, begin: float, cell: float, cells: int
+) -> Tuple[int, int, float, float]:
     """One coordinate: the cell at ``begin``, its step, the t of the next border, t per cell."""
     index = min(max(int(math.floor((origin + begin * direction - low) / cell)), 0), cells - 1)
     if direction > 0.0:
@@ -227,7 +258,7 @@ def _walk(origin, direction, low, begin, cell, cells):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _enter_in_map(solids, solid, origin, direction):
+def _enter_in_map(solids: Solids, solid: int, origin: Triple, direction: Triple) -> float:
     """``enter_solid`` of a ray in ``map``."""
     centre, to_solid = solids.centres[solid], solids.rotations[solid]
     offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])

@@ -1,4 +1,7 @@
-"""Loops of the distance grids: the plan's cells, and steps from them."""
+"""Distance grids: cells of a plan, and steps from them.
+
+Mirrors ``control/map_grid.py``.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,25 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.grid import INSCRIBED, UNKNOWN
-from quad_nav.kernels.cost_grid import cell_of
+from quad_nav.kernels.cost_grid import CostmapView, cell_of
 
 
 @njit(cache=True, nogil=True)
-def cells_on_plan(costmap, points):
-    """Cells that a plan passes in its first stretch over known ground, int64[n].
+def cells_on_plan(costmap: CostmapView, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the cells that a plan passes in its first stretch over known ground.
 
-    ``points`` is float64[m, 2]; gaps wider than a cell are filled by
-    interpolation. Flat indices, in the plan's order, repeated where the plan is
-    dense. Points before the stretch are skipped; it ends at the first point off
-    the map or on an unknown cell.
+    Gaps wider than a cell are filled by interpolation. Points before the stretch are skipped;
+    it ends at the first point off the map or on an unknown cell.
+
+    Args:
+        costmap: The costmap.
+        points: float64[m, 2], the plan, metres in the costmap's frame.
+
+    Returns:
+        int64[n], flat cells in the plan's order, repeated where the plan is dense.
     """
     resolution = costmap.resolution_m
     steps = np.ones(points.shape[0], np.int64)
@@ -47,13 +56,19 @@ def cells_on_plan(costmap, points):
 
 
 @njit(cache=True, nogil=True)
-def spread(costs, passable, sources):
-    """Steps to the nearest source over free cells, 4-connected, int32[H, W].
+def spread(
+    costs: NDArray[np.uint8], passable: NDArray[np.bool_], sources: NDArray[np.int64]
+) -> NDArray[np.int32]:
+    """Count the steps from each cell to the nearest source over free cells, 4-connected.
 
-    ``sources`` are flat cells, themselves at 0 whatever their cost. Cells of at
-    least inscribed cost are entered only where ``passable``, bool[H, W];
-    otherwise they get H * W if the wave touches them. Cells that it does not
-    reach keep H * W + 1.
+    Args:
+        costs: uint8[H, W]. Cells of inscribed cost or more are obstacles.
+        passable: bool[H, W], obstacles that may be entered.
+        sources: int64[k], flat cells; they are at 0 whatever their cost.
+
+    Returns:
+        int32[H, W]; H * W for obstacles that the wave touches, H * W + 1 for cells that it
+        does not reach.
     """
     size_y, size_x = costs.shape
     obstacle, unreached, blocked = costs.size, costs.size + 1, costs.size + 2

@@ -6,13 +6,17 @@ Mirrors ``peers/`` and ``costmap/peer_layer.py``.
 from __future__ import annotations
 
 import math
+from typing import Tuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 
 @njit(cache=True, nogil=True)
-def sample_path(start, path, travelled):
+def sample_path(
+    start: NDArray[np.float64], path: NDArray[np.float64], travelled: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the points of a path after distances travelled from a start.
 
     The path joins at the point after the nearest one. Beyond its end every point is the end.
@@ -49,7 +53,15 @@ def sample_path(start, path, travelled):
 
 
 @njit(cache=True, nogil=True)
-def raise_discs(cells, origin_x_m, origin_y_m, resolution_m, centres, radius_m, value):
+def raise_discs(
+    cells: NDArray[np.uint8],
+    origin_x_m: float,
+    origin_y_m: float,
+    resolution_m: float,
+    centres: NDArray[np.float64],
+    radius_m: float,
+    value: int,
+) -> None:
     """Raise the cells whose centres lie in discs; cells that are higher stay.
 
     Args:
@@ -76,7 +88,9 @@ def raise_discs(cells, origin_x_m, origin_y_m, resolution_m, centres, radius_m, 
 
 
 @njit(cache=True, nogil=True)
-def nearest_cell(blocked, unwanted, start_x, start_y):
+def nearest_cell(
+    blocked: NDArray[np.uint8], unwanted: NDArray[np.uint8], start_x: int, start_y: int
+) -> Tuple[int, int]:
     """Find the nearest cell, in steps to four neighbours, that is neither blocked nor unwanted.
 
     Args:

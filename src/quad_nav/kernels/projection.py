@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Tuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 
 @njit(cache=True, nogil=True)
-def project_ranges(ranges, directions, range_min, range_max, inf_range):
+def project_ranges(
+    ranges: NDArray[np.float32],
+    directions: NDArray[np.float64],
+    range_min: np.float32,
+    range_max: np.float32,
+    inf_range: np.float32,
+) -> NDArray[np.float32]:
     """Points float32[m, 3] of the ranges in [range_min, range_max), in order.
 
     ranges: float32[n]; directions: float64[n, 2], cosine and sine of each beam.
@@ -25,7 +34,13 @@ def project_ranges(ranges, directions, range_min, range_max, inf_range):
 
 
 @njit(cache=True, nogil=True)
-def transform_between_heights(points, rotation, translation, min_z, max_z):
+def transform_between_heights(
+    points: NDArray[np.float32],
+    rotation: NDArray[np.float32],
+    translation: NDArray[np.float32],
+    min_z: float,
+    max_z: float,
+) -> NDArray[np.float32]:
     """Points float32[m, 3] in the new frame, those with min_z <= z <= max_z, in order.
 
     points: float32[n, 3]; rotation: float32[3, 3]; translation: float32[3]. The heights
@@ -48,7 +63,9 @@ def transform_between_heights(points, rotation, translation, min_z, max_z):
 
 
 @njit(cache=True, nogil=True)
-def outside_circles(points, circles):
+def outside_circles(
+    points: NDArray[np.float32], circles: NDArray[np.float64]
+) -> NDArray[np.float32]:
     """Points float32[m, 3] that lie in none of the circles, seen from above, in order.
 
     circles: float64[c, 3], rows x, y, radius; what is on a circle lies in it.
@@ -70,7 +87,9 @@ def outside_circles(points, circles):
 
 
 @njit(cache=True, nogil=True)
-def count_returns(ranges, range_min, range_max, near):
+def count_returns(
+    ranges: NDArray[np.float32], range_min: np.float32, range_max: np.float32, near: np.float32
+) -> Tuple[int, int]:
     """How many of float32[n] are in [range_min, range_max), and in [range_min, near)."""
     returns = nearer = 0
     for k in range(ranges.shape[0]):

@@ -15,15 +15,20 @@ tube). A ray is in all of them from its last entry to its first exit, if that is
 from __future__ import annotations
 
 import math
+from typing import Tuple
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Triple = Tuple[float, float, float]
 
 BOX, CYLINDER, SPHERE = 0, 1, 2
 _PARALLEL = 1e-12  # of a direction of length 1; it strays from the faces by less than 1 nm
 
 
 @njit(cache=True, nogil=True)
-def through_slab(origin, direction, low, high):
+def through_slab(origin: float, direction: float, low: float, high: float) -> Tuple[float, float]:
     """(entry, exit) of one coordinate's interval [low, high]; (inf, -inf) for a miss."""
     if abs(direction) < _PARALLEL:
         if low <= origin <= high:
@@ -35,7 +40,7 @@ def through_slab(origin, direction, low, high):
 
 
 @njit(cache=True, nogil=True)
-def enter_box(origin, direction, sizes):
+def enter_box(origin: Triple, direction: Triple, sizes: Triple) -> float:
     """Entry into the three slabs |x| <= sizes[0], |y| <= sizes[1], |z| <= sizes[2]."""
     in_x, out_x = through_slab(origin[0], direction[0], -sizes[0], sizes[0])
     in_y, out_y = through_slab(origin[1], direction[1], -sizes[1], sizes[1])
@@ -48,7 +53,7 @@ def enter_box(origin, direction, sizes):
 
 
 @njit(cache=True, nogil=True)
-def enter_ball(squared, along, excess):
+def enter_ball(squared: float, along: float, excess: float) -> Tuple[float, float]:
     """(entry, exit) where ``squared t^2 + 2 along t + excess <= 0``; (inf, -inf) for nowhere."""
     if squared == 0.0:
         return (-math.inf, math.inf) if excess <= 0.0 else (math.inf, -math.inf)
@@ -60,7 +65,7 @@ def enter_ball(squared, along, excess):
 
 
 @njit(cache=True, nogil=True)
-def enter_cylinder(origin, direction, sizes):
+def enter_cylinder(origin: Triple, direction: Triple, sizes: Triple) -> float:
     """Entry into the tube x^2 + y^2 <= sizes[0]^2 and the slab |z| <= sizes[2]."""
     x, y, dx, dy, radius = origin[0], origin[1], direction[0], direction[1], sizes[0]
     in_tube, out_tube = enter_ball(
@@ -72,7 +77,7 @@ def enter_cylinder(origin, direction, sizes):
 
 
 @njit(cache=True, nogil=True)
-def enter_sphere(origin, direction, sizes):
+def enter_sphere(origin: Triple, direction: Triple, sizes: Triple) -> float:
     """Entry into x^2 + y^2 + z^2 <= sizes[0]^2."""
     entry, _ = enter_ball(
         dot(direction, direction), dot(origin, direction), dot(origin, origin) - sizes[0] * sizes[0]
@@ -81,7 +86,7 @@ def enter_sphere(origin, direction, sizes):
 
 
 @njit(cache=True, nogil=True)
-def enter_solid(kind, origin, direction, sizes):
+def enter_solid(kind: int, origin: Triple, direction: Triple, sizes: Triple) -> float:
     """Entry into any of them; origin, direction and sizes are triples."""
     if kind == BOX:
         return enter_box(origin, direction, sizes)
@@ -91,13 +96,13 @@ def enter_solid(kind, origin, direction, sizes):
 
 
 @njit(cache=True, nogil=True)
-def dot(a, b):
+def dot(a: Triple, b: Triple) -> float:
     """Scalar product of two triples."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, nogil=True)
-def turn(rotation, vector):
+def turn(rotation: NDArray[np.float64], vector: Triple) -> Triple:
     """``rotation @ vector`` of float64[3, 3] and a triple."""
     return (
         rotation[0, 0] * vector[0] + rotation[0, 1] * vector[1] + rotation[0, 2] * vector[2],
@@ -107,6 +112,6 @@ def turn(rotation, vector):
 
 
 @njit(cache=True, nogil=True)
-def triple(row):
+def triple(row: NDArray[np.float64]) -> Triple:
     """The three numbers of float64[3]."""
     return row[0], row[1], row[2]

@@ -6,18 +6,24 @@ Mirrors ``costmap/obstacle.py``.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL
-from quad_nav.kernels.cost_grid import cell_index
+from quad_nav.kernels.cost_grid import CostmapView, cell_index
+from quad_nav.kernels.obstructed_cells import (
+    MAX_OBSTRUCTED,
+    SECTORS,
+    find_obstructed,
+    find_sectors,
+    keep_obstructed,
+    sector_of,
+)
 
-SECTORS = 1024
-MOST_OBSTRUCTED = 512  # cells that are worth looking for lines towards them
-MOST_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
+MAX_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
 
 
 class ObservationStack(NamedTuple):
@@ -33,7 +39,9 @@ class ObservationStack(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
+def clear_line(
+    flat_costs: NDArray[np.uint8], size_x: int, x0: int, y0: int, x1: int, y1: int, max_cells: float
+) -> None:
     """Free the cells of Bresenham's line, both of its ends included.
 
     Args:
@@ -68,7 +76,16 @@ def clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells):
 
 
 @njit(cache=True, nogil=True)
-def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
+def clip_to_grid(
+    sensor_x: float,
+    sensor_y: float,
+    x: float,
+    y: float,
+    low_x: float,
+    low_y: float,
+    high_x: float,
+    high_y: float,
+) -> Tuple[float, float]:
     """Pull the end (x, y) of a ray back along the ray to the grid's border.
 
     Ends beyond the high borders land 1 mm inside, so that they fall into a cell. All
@@ -91,7 +108,16 @@ def clip_to_grid(sensor_x, sensor_y, x, y, low_x, low_y, high_x, high_y):
 
 
 @njit(cache=True, nogil=True)
-def clear_rays(costmap, sensor_x, sensor_y, points, range_m, sectors, cleared, bounds):
+def clear_rays(
+    costmap: CostmapView,
+    sensor_x: float,
+    sensor_y: float,
+    points: NDArray[np.float32],
+    range_m: float,
+    sectors: NDArray[np.bool_],
+    cleared: NDArray[np.int64],
+    bounds: NDArray[np.float64],
+) -> bool:
     """Free the cells between a sensor and each of its points.
 
     Args:
@@ -163,7 +189,9 @@ def clear_rays(costmap, sensor_x, sensor_y, points, range_m, sectors, cleared, b
 
 
 @njit(cache=True, nogil=True)
-def _range_ends_inside(bounds, x, y, dx, dy, square_m2):
+def _range_ends_inside(
+    bounds: NDArray[np.float64], x: float, y: float, dx: float, dy: float, square_m2: float
+) -> bool:
     """Tell whether the point of a ray in direction (dx, dy) is inside the bounds, as (x, y) is.
 
     ``square_m2`` is the square of its distance.
@@ -177,7 +205,9 @@ def _range_ends_inside(bounds, x, y, dx, dy, square_m2):
 
 
 @njit(cache=True, nogil=True)
-def clear_all_rays(costmap, seen, range_m, bounds):
+def clear_all_rays(
+    costmap: CostmapView, seen: ObservationStack, range_m: float, bounds: NDArray[np.float64]
+) -> None:
     """Apply ``clear_rays`` to several observations, in order.
 
     A line through nothing but free cells changes nothing. Mostly the first observation
@@ -193,7 +223,7 @@ def clear_all_rays(costmap, seen, range_m, bounds):
     lines = no_lines
     everywhere = np.ones(SECTORS, dtype=np.bool_)
     sectors = np.empty(SECTORS, dtype=np.bool_)
-    obstructed = np.empty(MOST_OBSTRUCTED, dtype=np.int64)
+    obstructed = np.empty(MAX_OBSTRUCTED, dtype=np.int64)
     costs, resolution = costmap.costs, costmap.resolution_m
     window = _reached(costmap, seen.sensors, range_m)
     count = find_obstructed(costs, window, obstructed)
@@ -202,8 +232,8 @@ def clear_all_rays(costmap, seen, range_m, bounds):
         x, y = seen.sensors[k, 0], seen.sensors[k, 1]
         if count == 0:
             clear_rays(costmap, x, y, points, range_m, everywhere[:0], no_lines, bounds)
-        elif count <= MOST_OBSTRUCTED:
-            _find_sectors(
+        elif count <= MAX_OBSTRUCTED:
+            find_sectors(
                 obstructed[:count],
                 costs.shape[1],
                 (x - costmap.origin_x_m) / resolution,
@@ -211,7 +241,7 @@ def clear_all_rays(costmap, seen, range_m, bounds):
                 sectors,
             )
             clear_rays(costmap, x, y, points, range_m, sectors, no_lines, bounds)
-            count = _keep_obstructed(costs.reshape(-1), obstructed, count)
+            count = keep_obstructed(costs.reshape(-1), obstructed, count)
         else:
             if lines.size == 0:
                 lines = np.full(_power_of_two(costs.size), -1, dtype=np.int64)
@@ -221,54 +251,9 @@ def clear_all_rays(costmap, seen, range_m, bounds):
 
 
 @njit(cache=True, nogil=True)
-def sector_of(dx, dy):
-    """Return the number of the sector, counterclockwise from +x, that a direction points into.
-
-    Sectors are equal steps along the sides of a square that stands on its corner, which
-    needs no arc tangent.
-    """
-    around = abs(dx) + abs(dy)
-    if not 0.0 < around < np.inf:
-        return 0
-    along = dy / around if dx >= 0.0 else 2.0 - dy / around
-    if along < 0.0:
-        along += 4.0
-    return min(int(along * (SECTORS / 4)), SECTORS - 1)
-
-
-@njit(cache=True, nogil=True)
-def find_obstructed(costs, window, obstructed):
-    """Find the cells of a window that are not free.
-
-    Args:
-        costs: uint8[H, W].
-        window: (x0, xn, y0, yn): columns x0..xn-1 and rows y0..yn-1.
-        obstructed: int64[m], filled with flat indices of cells.
-
-    Returns:
-        The number of such cells; m + 1 if there are more than m.
-    """
-    x0, xn, y0, yn = window
-    size_x = costs.shape[1]
-    count = 0
-    for y in range(y0, yn):
-        row = costs[y]
-        any_cost = np.uint8(0)
-        for x in range(x0, xn):  # a loop that the compiler makes vectors of
-            any_cost |= row[x]
-        if any_cost == FREE:
-            continue
-        for x in range(x0, xn):
-            if row[x] != FREE:
-                if count == obstructed.size:
-                    return count + 1
-                obstructed[count] = y * size_x + x
-                count += 1
-    return count
-
-
-@njit(cache=True, nogil=True)
-def _reached(costmap, sensors, range_m):
+def _reached(
+    costmap: CostmapView, sensors: NDArray[np.float64], range_m: float
+) -> Tuple[int, int, int, int]:
     """Window of the cells that rays of a length from any of float64[k, 3] sensors reach."""
     costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
@@ -285,52 +270,22 @@ def _reached(costmap, sensors, range_m):
 
 
 @njit(cache=True, nogil=True)
-def _find_sectors(obstructed, size_x, sensor_x, sensor_y, sectors):
-    """Make True, in bool[SECTORS], the sectors of lines from a sensor that may pass a cell.
-
-    The cells are flat indices, int64[m]; the sensor is in cells, from the grid's corner. A
-    line's cells are within sqrt(1/2) + 1/2 of the ray: half a cell for each rounding of its
-    ends and of the line.
-    """
-    sectors[:] = False
-    for k in range(obstructed.size):
-        dx = obstructed[k] % size_x + 0.5 - sensor_x
-        dy = obstructed[k] // size_x + 0.5 - sensor_y
-        distance = math.sqrt(dx * dx + dy * dy)
-        if distance < 2.5:
-            sectors[:] = True
-            return
-        aside_x, aside_y = 1.5 * dy / distance, -1.5 * dx / distance
-        sector = sector_of(dx + aside_x, dy + aside_y)
-        last = sector_of(dx - aside_x, dy - aside_y)
-        sectors[sector] = True
-        while sector != last:
-            sector = (sector + 1) % SECTORS
-            sectors[sector] = True
-
-
-@njit(cache=True, nogil=True)
-def _keep_obstructed(flat_costs, obstructed, count):
-    """Move the cells that are still not free to the front; return their number."""
-    kept = 0
-    for k in range(count):
-        if flat_costs[obstructed[k]] != FREE:
-            obstructed[kept] = obstructed[k]
-            kept += 1
-    return kept
-
-
-@njit(cache=True, nogil=True)
-def _power_of_two(cells):
-    """Return the first power of two not below ``cells``, but ``MOST_LINES`` at most."""
+def _power_of_two(cells: int) -> int:
+    """Return the first power of two not below ``cells``, but ``MAX_LINES`` at most."""
     size = 1
-    while size < cells and size < MOST_LINES:
+    while size < cells and size < MAX_LINES:
         size *= 2
     return size
 
 
 @njit(cache=True, nogil=True)
-def mark_all_points(costmap, seen, range_m, max_height_m, bounds):
+def mark_all_points(
+    costmap: CostmapView,
+    seen: ObservationStack,
+    range_m: float,
+    max_height_m: float,
+    bounds: NDArray[np.float64],
+) -> None:
     """Apply ``mark_points`` to several observations, in order.
 
     Args:
@@ -346,7 +301,14 @@ def mark_all_points(costmap, seen, range_m, max_height_m, bounds):
 
 
 @njit(cache=True, nogil=True)
-def mark_points(costmap, sensor, points, range_m, max_height_m, bounds):
+def mark_points(
+    costmap: CostmapView,
+    sensor: NDArray[np.float64],
+    points: NDArray[np.float32],
+    range_m: float,
+    max_height_m: float,
+    bounds: NDArray[np.float64],
+) -> None:
     """Make the cells of points lethal.
 
     Args:
@@ -375,7 +337,7 @@ def mark_points(costmap, sensor, points, range_m, max_height_m, bounds):
 
 
 @njit(cache=True, nogil=True)
-def include(bounds, x, y):
+def include(bounds: NDArray[np.float64], x: float, y: float) -> None:
     """Grow bounds, float64[4] min x, min y, max x, max y in metres, to hold a point."""
     bounds[0] = min(bounds[0], x)
     bounds[1] = min(bounds[1], y)

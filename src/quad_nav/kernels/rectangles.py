@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Tuple
+
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 
 @njit(cache=True, nogil=True)
-def cover(left, rectangles, first_row):
+def cover(
+    left: NDArray[np.bool_], rectangles: NDArray[np.int64], first_row: int
+) -> Tuple[int, int]:
     """Cover marked cells with disjoint rectangles that hold no other cells.
 
     Greedy: from the first cell in row order that is not covered yet, a rectangle
@@ -15,11 +21,12 @@ def cover(left, rectangles, first_row):
 
     Args:
         left: bool[H, W], the cells to cover, none before ``first_row``;
-            covered ones become false.
-        rectangles: int64[n, 4], filled in with first column, first row, width, height.
+            covered ones become False.
+        rectangles: int64[n, 4], filled with first column, first row, width, height.
+        first_row: Row to start from.
 
     Returns:
-        How many rectangles were filled in, and the row to go on from with room for more;
+        The number of rectangles filled in, and the row to continue from with room for more;
         H when everything is covered.
     """
     count = 0
@@ -43,8 +50,8 @@ def cover(left, rectangles, first_row):
 
 
 @njit(cache=True, nogil=True)
-def _widest(left, row, column):
-    """Width and height of the rectangle that grows along the row first."""
+def _widest(left: NDArray[np.bool_], row: int, column: int) -> Tuple[int, int]:
+    """Return width and height of the rectangle that grows along the row first."""
     height, width = left.shape
     end = column + 1
     while end < width and left[row, end]:
@@ -56,8 +63,8 @@ def _widest(left, row, column):
 
 
 @njit(cache=True, nogil=True)
-def _highest(left, row, column):
-    """Width and height of the rectangle that grows along the column first."""
+def _highest(left: NDArray[np.bool_], row: int, column: int) -> Tuple[int, int]:
+    """Return width and height of the rectangle that grows along the column first."""
     height, width = left.shape
     below = row + 1
     while below < height and left[below, column]:
@@ -69,8 +76,8 @@ def _highest(left, row, column):
 
 
 @njit(cache=True, nogil=True)
-def _all(left, row, end_row, column, end_column):
-    """Whether every cell of a rectangle is still to be covered."""
+def _all(left: NDArray[np.bool_], row: int, end_row: int, column: int, end_column: int) -> bool:
+    """Tell whether every cell of a rectangle is still to be covered."""
     for y in range(row, end_row):
         for x in range(column, end_column):
             if not left[y, x]:

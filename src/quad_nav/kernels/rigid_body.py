@@ -6,13 +6,13 @@ Bodies are rows of float64[n, 13] as in ``flight_law``.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from quad_nav.kernels.flight_law import fly, rotation_from_quaternion
+from quad_nav.kernels.flight_law import BodyConstants, FlightGains, fly, rotation_from_quaternion
 
 NOBODY = -1
 
@@ -32,7 +32,17 @@ class FreeSpace(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def fly_freely(rows, commands, held, steps, step_s, altitude_m, constants, gains, space):
+def fly_freely(
+    rows: NDArray[np.float64],
+    commands: NDArray[np.float64],
+    held: NDArray[np.bool_],
+    steps: int,
+    step_s: float,
+    altitude_m: float,
+    constants: BodyConstants,
+    gains: FlightGains,
+    space: FreeSpace,
+) -> Tuple[int, int, int]:
     """Fly as long as nothing may be touched.
 
     Args:
@@ -60,7 +70,14 @@ def fly_freely(rows, commands, held, steps, step_s, altitude_m, constants, gains
 
 
 @njit(cache=True, nogil=True)
-def step_freely(rows, held, forces, torques, constants, step_s):
+def step_freely(
+    rows: NDArray[np.float64],
+    held: NDArray[np.bool_],
+    forces: NDArray[np.float64],
+    torques: NDArray[np.float64],
+    constants: BodyConstants,
+    step_s: float,
+) -> None:
     """Move bodies by one time step, as the physics engine does.
 
     Velocities go first (Newton, and Euler's equations with the gyroscopic term), then
@@ -103,7 +120,7 @@ def step_freely(rows, held, forces, torques, constants, step_s):
 
 
 @njit(cache=True, nogil=True)
-def _turn(quaternion, omega, step_s):
+def _turn(quaternion: NDArray[np.float64], omega: NDArray[np.float64], step_s: float) -> None:
     """Turn a quaternion, float64[4], in place, at float64[3], rad/s in ``map``."""
     rate = math.sqrt(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2])
     half = 0.5 * rate * step_s
@@ -124,7 +141,9 @@ def _turn(quaternion, omega, step_s):
 
 
 @njit(cache=True, nogil=True)
-def find_near(rows, held, space):
+def find_near(
+    rows: NDArray[np.float64], held: NDArray[np.bool_], space: FreeSpace
+) -> Tuple[int, int]:
     """Find a quadcopter that is not held and that may touch something.
 
     Args:
@@ -157,7 +176,7 @@ def find_near(rows, held, space):
 
 
 @njit(cache=True, nogil=True)
-def _square_m2(a, b):
+def _square_m2(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """Squared distance of two points, float64[3]."""
     dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return dx * dx + dy * dy + dz * dz

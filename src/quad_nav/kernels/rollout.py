@@ -6,13 +6,14 @@ The maths is in ``control/rollout.py``.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from quad_nav.grid import INSCRIBED
-from quad_nav.kernels.collision import COLLIDES, footprint_cost, line_cost
+from quad_nav.kernels.collision import COLLIDES, Triple, footprint_cost, line_cost
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
 
 OUT_OF_REACH = -2.0  # the cost of a trajectory that leaves the reach of path or goal
@@ -49,7 +50,7 @@ class RolloutParams(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def step_count(params, sample):
+def step_count(params: RolloutParams, sample: NDArray[np.float64]) -> int:
     """Into how many steps the simulation of a sample (vx, vy, vtheta) is cut."""
     if params.heading_scoring:
         steps = int(params.sim_time_s / params.sim_granularity_m + 0.5)
@@ -66,7 +67,9 @@ def step_count(params, sample):
 
 
 @njit(cache=True, nogil=True)
-def turn(params, theta, vtheta, wanted, headings):
+def turn(
+    params: RolloutParams, theta: float, vtheta: float, wanted: float, headings: NDArray[np.float64]
+) -> None:
     """Fill float64[steps, 3] with the yaw at each step, its cosine and its sine."""
     steps = headings.shape[0]
     dt = params.sim_time_s / steps
@@ -77,7 +80,16 @@ def turn(params, theta, vtheta, wanted, headings):
 
 
 @njit(cache=True, nogil=True)
-def simulate(inputs, params, pose, velocity, sample, headings, points, with_footprint=True):
+def simulate(
+    inputs: RolloutInputs,
+    params: RolloutParams,
+    pose: Triple,
+    velocity: Triple,
+    sample: NDArray[np.float64],
+    headings: NDArray[np.float64],
+    points: NDArray[np.float64],
+    with_footprint: bool = True,
+) -> Tuple[float, int]:
     """Cost of one sample and the number of poses written to ``points``, float64[k, 3].
 
     ``headings``, float64[steps, 3], is what ``turn`` gives for the sample. Without the
@@ -136,20 +148,22 @@ def simulate(inputs, params, pose, velocity, sample, headings, points, with_foot
 
 
 @njit(cache=True, nogil=True)
-def _approach(wanted, current, max_change):
+def _approach(wanted: float, current: float, max_change: float) -> float:
     if wanted >= current:
         return min(wanted, current + max_change)
     return max(wanted, current - max_change)
 
 
 @njit(cache=True, nogil=True)
-def _is_heading_step(params, time, dt):
+def _is_heading_step(params: RolloutParams, time: float, dt: float) -> bool:
     start = params.heading_scoring_timestep_s
     return start <= time < start + dt
 
 
 @njit(cache=True, nogil=True)
-def _heading_difference(inputs, cell_x, cell_y, x, y, theta):
+def _heading_difference(
+    inputs: RolloutInputs, cell_x: int, cell_y: int, x: float, y: float, theta: float
+) -> float:
     """Angle to the farthest plan point in sight of a cell; huge when there is none."""
     costmap = inputs.costmap
     for k in range(inputs.plan.shape[0] - 1, -1, -1):
@@ -165,7 +179,14 @@ def _heading_difference(inputs, cell_x, cell_y, x, y, theta):
 
 
 @njit(cache=True, nogil=True)
-def score(inputs, params, pose, velocity, samples, limit):
+def score(
+    inputs: RolloutInputs,
+    params: RolloutParams,
+    pose: Triple,
+    velocity: Triple,
+    samples: NDArray[np.float64],
+    limit: float,
+) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Cost float64[n] and last pose float64[n, 3] of each sample, float64[n, 3].
 
     Infinite for a sample that is known to cost more than ``limit``. The last pose is nan for
@@ -188,7 +209,13 @@ def score(inputs, params, pose, velocity, samples, limit):
 
 
 @njit(cache=True, nogil=True)
-def cheapest(inputs, params, pose, velocity, samples):
+def cheapest(
+    inputs: RolloutInputs,
+    params: RolloutParams,
+    pose: Triple,
+    velocity: Triple,
+    samples: NDArray[np.float64],
+) -> Tuple[int, float]:
     """Index and cost of the legal sample of lowest cost, the first of equals; -1 if none is.
 
     samples: float64[n, 3]. They are tried in the order of what they cost without the
@@ -211,7 +238,16 @@ def cheapest(inputs, params, pose, velocity, samples):
 
 
 @njit(cache=True, nogil=True)
-def _lower_bounds(inputs, params, pose, velocity, samples, headings, places, points):
+def _lower_bounds(
+    inputs: RolloutInputs,
+    params: RolloutParams,
+    pose: Triple,
+    velocity: Triple,
+    samples: NDArray[np.float64],
+    headings: NDArray[np.float64],
+    places: NDArray[np.int64],
+    points: NDArray[np.float64],
+) -> NDArray[np.float64]:
     """What samples cost at least, float64[n]: without the footprint, if that can only add."""
     bounds = np.full(samples.shape[0], -np.inf)
     if params.occupancy_scale >= 0.0:
@@ -224,7 +260,9 @@ def _lower_bounds(inputs, params, pose, velocity, samples, headings, places, poi
 
 
 @njit(cache=True, nogil=True)
-def _all_turns(params, pose, velocity, samples):
+def _all_turns(
+    params: RolloutParams, pose: Triple, velocity: Triple, samples: NDArray[np.float64]
+) -> Tuple[NDArray[np.float64], NDArray[np.int64]]:
     """``turn`` for all samples: float64[m, longest, 3], and which one is whose, int64[n].
 
     Many samples turn in the same way, with as many steps.

@@ -12,10 +12,11 @@ A view of a solid is given in the solid's own frame: ``eye``, the LIDAR's place,
 from __future__ import annotations
 
 import math
+from typing import Tuple
 
 from numba import njit
 
-from quad_nav.kernels.rays import BOX, CYLINDER, dot, enter_box
+from quad_nav.kernels.rays import BOX, CYLINDER, Triple, dot, enter_box
 
 EMPTY = (0.0, -1.0)
 FULL = (-math.pi, 2.0 * math.pi)
@@ -23,7 +24,9 @@ _STANDING = 0.5  # cosine of the angle between its axis and the plane's normal
 
 
 @njit(cache=True, nogil=True)
-def sector_of(kind, eye, ahead, left, up, sizes):
+def sector_of(
+    kind: int, eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
+) -> Tuple[float, float]:
     """The sector that a solid is seen in."""
     height = abs(dot(up, eye))
     if kind == BOX:
@@ -42,7 +45,9 @@ def sector_of(kind, eye, ahead, left, up, sizes):
 
 
 @njit(cache=True, nogil=True)
-def _box_sector(eye, ahead, left, up, sizes):
+def _box_sector(
+    eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
+) -> Tuple[float, float]:
     """Between the outermost corners, unless the eye is above or below the box.
 
     The shadow on the plane is convex: if the eye is outside it, all corners lie within
@@ -69,7 +74,9 @@ def _box_sector(eye, ahead, left, up, sizes):
 
 
 @njit(cache=True, nogil=True)
-def _cylinder_sector(eye, ahead, left, up, sizes):
+def _cylinder_sector(
+    eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
+) -> Tuple[float, float]:
     """A cylinder that stands on the plane is cut in an ellipse around its axis.
 
     The ellipse's long half is radius / cos(tilt). A lying one is taken for its bounding sphere.
@@ -83,7 +90,7 @@ def _cylinder_sector(eye, ahead, left, up, sizes):
 
 
 @njit(cache=True, nogil=True)
-def _disc_sector(x, y, radius):
+def _disc_sector(x: float, y: float, radius: float) -> Tuple[float, float]:
     """A disc around (x, y) seen from (0, 0)."""
     distance = math.sqrt(x * x + y * y)
     if distance <= radius:

@@ -13,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL, UNKNOWN
+from quad_nav.kernels.collision import Triple
 from quad_nav.kernels.cost_grid import cell_index
 from quad_nav.kernels.raytrace import include
 
@@ -29,7 +30,14 @@ class VoxelGrid(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def clear_voxel_rays(grid, sensor, points, range_m, max_height_m, bounds):
+def clear_voxel_rays(
+    grid: VoxelGrid,
+    sensor: NDArray[np.float64],
+    points: NDArray[np.float32],
+    range_m: float,
+    max_height_m: float,
+    bounds: NDArray[np.float64],
+) -> bool:
     """Free the voxels from a sensor towards each of its points, and their columns' costs.
 
     Args:
@@ -76,7 +84,9 @@ def clear_voxel_rays(grid, sensor, points, range_m, max_height_m, bounds):
 
 
 @njit(cache=True, nogil=True)
-def ray_end(grid, sensor, point, max_height_m):
+def ray_end(
+    grid: VoxelGrid, sensor: NDArray[np.float64], point: NDArray[np.float32], max_height_m: float
+) -> Triple:
     """Return the point (x, y, z) where the ray to a point ends.
 
     It is two cells short of the point, so that a ray does not clear the obstacle that it
@@ -119,7 +129,7 @@ def ray_end(grid, sensor, point, max_height_m):
 
 
 @njit(cache=True, nogil=True)
-def _cut(t, to_border, step):
+def _cut(t: float, to_border: float, step: float) -> float:
     """Return the part of a ray up to a border, if less than ``t``; never backwards."""
     if step == 0.0:
         return 0.0
@@ -127,7 +137,7 @@ def _cut(t, to_border, step):
 
 
 @njit(cache=True, nogil=True)
-def clear_voxel_line(grid, begin, end, max_voxels):
+def clear_voxel_line(grid: VoxelGrid, begin: Triple, end: Triple, max_voxels: float) -> None:
     """Free the voxels of Bresenham's line in three dimensions, both of its ends included.
 
     Args:
@@ -162,7 +172,7 @@ def clear_voxel_line(grid, begin, end, max_voxels):
 
 
 @njit(cache=True, nogil=True)
-def clear_voxel(grid, x, y, z):
+def clear_voxel(grid: VoxelGrid, x: int, y: int, z: int) -> None:
     """Free a voxel, and its column's cost unless the column still holds an obstacle.
 
     A column with more unknown voxels than the threshold becomes unknown.
@@ -178,7 +188,14 @@ def clear_voxel(grid, x, y, z):
 
 
 @njit(cache=True, nogil=True)
-def mark_voxels(grid, sensor, points, range_m, max_height_m, bounds):
+def mark_voxels(
+    grid: VoxelGrid,
+    sensor: NDArray[np.float64],
+    points: NDArray[np.float32],
+    range_m: float,
+    max_height_m: float,
+    bounds: NDArray[np.float64],
+) -> None:
     """Mark the voxels of points, and make lethal the columns with enough marked voxels.
 
     Points below the voxels go into the lowest one; points above them are ignored.

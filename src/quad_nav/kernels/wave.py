@@ -8,10 +8,11 @@ the order of upstream's, so that potentials are equal to the bit.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 NOT_REACHED = np.float32(1e10)
 BUCKET_SIZE = 10000  # cells that one bucket holds; further ones are dropped
@@ -30,7 +31,14 @@ class WaveParams(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def arrival(cost, left, right, below, above, planar):
+def arrival(
+    cost: np.float32,
+    left: np.float32,
+    right: np.float32,
+    below: np.float32,
+    above: np.float32,
+    planar: bool,
+) -> np.float32:
     """Return the potential, float32, of a cell from those of its neighbours.
 
     It is that of a planar wave that arrives over the two lower neighbours, or else of a step
@@ -55,7 +63,9 @@ def arrival(cost, left, right, below, above, planar):
 
 
 @njit(cache=True, nogil=True)
-def arrival_at(potential, size_x, cell, cost, planar):
+def arrival_at(
+    potential: NDArray[np.float32], size_x: int, cell: int, cost: float, planar: bool
+) -> np.float32:
     """Return the ``arrival`` at a flat cell of float32[n], not of the outermost ring."""
     return arrival(
         np.float32(cost),
@@ -68,14 +78,21 @@ def arrival_at(potential, size_x, cell, cost, planar):
 
 
 @njit(cache=True, nogil=True)
-def start_at_cell(potential, source, size_x):
+def start_at_cell(potential: NDArray[np.float32], source: int, size_x: int) -> NDArray[np.int64]:
     """Begin with 0 in one flat cell of float32[n]; return the first front, int64[4]."""
     potential[source] = 0.0
     return np.array([source + 1, source - 1, source - size_x, source + size_x])
 
 
 @njit(cache=True, nogil=True)
-def start_between_cells(potential, source, size_x, dx, dy, neutral):
+def start_between_cells(
+    potential: NDArray[np.float32],
+    source: int,
+    size_x: int,
+    dx: np.float32,
+    dy: np.float32,
+    neutral: int,
+) -> NDArray[np.int64]:
     """Begin at a point between the centres of four cells.
 
     The four cells share the cost of two free cells by the areas opposite to them.
@@ -111,20 +128,26 @@ def start_between_cells(potential, source, size_x, dx, dy, neutral):
 
 
 @njit(cache=True, nogil=True)
-def _seed(potential, cell, value):
+def _seed(potential: NDArray[np.float32], cell: int, value: np.float32) -> None:
     if 0 <= cell < potential.size:
         potential[cell] = value
 
 
 @njit(cache=True, nogil=True)
-def _distance_cost(cell, other, size_x, neutral):
+def _distance_cost(cell: Any, other: int, size_x: int, neutral: int) -> np.float32:
     return np.float32(
         math.hypot(cell % size_x - other % size_x, cell // size_x - other // size_x) * neutral
     )
 
 
 @njit(cache=True, nogil=True)
-def _enter_front(costs, pending, front, cells, obstacle):
+def _enter_front(
+    costs: NDArray[Any],
+    pending: NDArray[np.bool_],
+    front: NDArray[np.uint32],
+    cells: NDArray[np.int64],
+    obstacle: int,
+) -> int:
     """Put the cells, int64[k], that can be entered into a front; return their number."""
     count = 0
     for cell in cells:
@@ -136,7 +159,16 @@ def _enter_front(costs, pending, front, cells, obstacle):
 
 
 @njit(cache=True, nogil=True)
-def propagate(costs, potential, first_front, params, source, target, size_x, max_fronts):
+def propagate(
+    costs: NDArray[Any],
+    potential: NDArray[np.float32],
+    first_front: NDArray[np.int64],
+    params: WaveParams,
+    source: int,
+    target: int,
+    size_x: int,
+    max_fronts: int,
+) -> bool:
     """Spread a potential that has begun at a source.
 
     Args:
