@@ -53,7 +53,7 @@ def test_shipped_configurations_have_no_errors():
     status, output = quad(CONFIG)
     assert status == 0
     assert f"{CONFIG / 'default'}: no errors, " in output
-    assert f"{CONFIG / 'tutorial'}: no errors, 1 remark" in output
+    assert f"{CONFIG / 'tutorial'}: no errors, 1 warning" in output
     assert "\n3 configurations: no errors, " in output
 
 
@@ -213,7 +213,7 @@ def test_table(tmp_path, monkeypatch):
     assert (
         output.rstrip()
         == """\
-.: no errors, 4 remarks
+.: no errors, 4 warnings
   costmap_common_params.yaml, local_costmap_params.yaml, global_costmap_params.yaml,
   base_local_planner_params.yaml, move_base_params.yaml
 
@@ -243,7 +243,7 @@ def test_all_errors_at_once_and_remarks_after_them(tmp_path):
     )
     status, output = quad(tmp_path)
     assert status == 2
-    assert f"{tmp_path}: 2 errors, 1 remark\n" in output
+    assert f"{tmp_path}: 2 errors, 1 warning\n" in output
     places = [line.split()[:2] for line in output.splitlines() if line.startswith("local_costmap/")]
     assert places == [
         ["local_costmap/width", "error"],

@@ -1,4 +1,4 @@
-"""``quad check``: what is to be said about somebody's YAML."""
+"""``quad check``: errors and warnings in move_base's YAML."""
 
 from __future__ import annotations
 
@@ -25,19 +25,18 @@ _COSTMAPS = ("global_costmap", "local_costmap")
     "--robot",
     type=click.IntRange(min=0),
     metavar="N",
-    help="Check what robot N flies with: $(arg i) is N, and files with that number go"
-    " before those without. Otherwise every robot with files of its own.",
+    help="Check the configuration of robot N: $(arg i) is N, and files with this number replace"
+    " those without. Without the option every robot with its own files is checked.",
 )
-@click.option("--strict", is_flag=True, help="Remarks count: exit status 1.")
+@click.option("--strict", is_flag=True, help="Exit with status 1 if there are warnings.")
 def check(paths: Tuple[str, ...], robot: Optional[int], strict: bool) -> None:
     """Check move_base's YAML without flying.
 
-    A FOLDER may be laid out as this package's config/default or in any other way: files that
-    belong together are found by their names and contents, in the folders below it too. FILEs
-    are loaded in the order given, each where its name and content say, or below
-    local_costmap or global_costmap with local_costmap=FILE or global_costmap=FILE.
+    A FOLDER has the layout of this package's config/default or any other: names and contents tell
+    which files belong together, subfolders included. FILEs are loaded in the order given. Name and
+    content of a file decide its namespace; local_costmap=FILE and global_costmap=FILE set it.
 
-    Exit status: 0, or 1 for remarks with --strict, or 2 for errors.
+    Exit status: 0 without errors, 1 for warnings with --strict, 2 for errors.
     """
     number = None if robot is None else str(robot)
     folders = [Path(path) for path in paths if Path(path).is_dir()]
@@ -62,7 +61,7 @@ def _show(reports: Sequence[Report], unused: Sequence[Path], empty: Sequence[str
     width = max(_NARROWEST, min(terminal, _WIDEST))
     click.echo("\n\n".join(report_text(report, width) for report in reports))
     if unused:
-        click.echo("\nNot among them: " + ", ".join(map(str, unused)))
+        click.echo("\nNot checked, no move_base parameters in: " + ", ".join(map(str, unused)))
     if len(reports) > 1:
         click.echo(f"\n{len(reports)} configurations: {counts(reports)}")
     for line in empty:

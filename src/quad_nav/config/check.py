@@ -40,7 +40,7 @@ class Report:
 
     @property
     def warnings(self) -> int:
-        """Number of remarks."""
+        """Number of warnings."""
         return len(self.lines) - self.errors
 
 
@@ -121,11 +121,11 @@ def report_text(report: Report, width: int = 100) -> str:
 
 
 def counts(reports: Sequence[Report]) -> str:
-    """Format the counts of reports, such as "no errors, 1 remark"."""
-    errors, remarks = sum(r.errors for r in reports), sum(r.warnings for r in reports)
+    """Format the counts of reports, such as "no errors, 1 warning"."""
+    errors, warnings = sum(r.errors for r in reports), sum(r.warnings for r in reports)
     return ", ".join(
         f"{number or 'no'} {noun}{'s' * (number != 1)}"
-        for number, noun in ((errors, "error"), (remarks, "remark"))
+        for number, noun in ((errors, "error"), (warnings, "warning"))
     )
 
 
