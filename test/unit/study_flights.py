@@ -12,7 +12,7 @@ from quad_nav.errors import InputError
 from quad_nav.offline.workers import Workers
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import HELD_OUT_SEED, Case, Mission, MissionOptions
-from quad_nav.tuning.evaluation import Evaluation, Watcher
+from quad_nav.tuning.evaluation import Evaluation, StudyObserver
 from quad_nav.tuning.flight_result import FlightResult, FlightTask
 from quad_nav.tuning.search import SearchOptions, search
 from quad_nav.tuning.space import Assignments, Dimension, SearchSpace
@@ -84,7 +84,7 @@ def tune_setup(folder: Path, output: Path, candidates: int = 3, **given: Any) ->
     )
 
 
-def told(trials: Sequence[Any]) -> List[Tuple[Any, ...]]:
+def trials_as_data(trials: Sequence[Any]) -> List[Tuple[Any, ...]]:
     """What a study consists of, less the times of day."""
     return [
         (
@@ -102,13 +102,13 @@ def told(trials: Sequence[Any]) -> List[Tuple[Any, ...]]:
 def searched(setup: TuneSetup, workers: Workers) -> List[Tuple[Any, ...]]:
     """The trials of the search alone."""
     with open_study(setup.options.output, setup.identity) as study:
-        evaluation = Evaluation(setup.course, setup.space, workers, study.journal, Watcher())
+        evaluation = Evaluation(setup.course, setup.space, workers, study.journal, StudyObserver())
         search(evaluation, study, start_values(setup.space, setup.base), setup.options.search)
-        return told(study.trials)
+        return trials_as_data(study.trials)
 
 
 def mortal_tasks(marker: Path, deaths: int) -> List[Tuple[int, Any]]:
-    """Six flights on paper, one of which kills its worker so many times."""
+    """Six synthetic flights, one of which kills its worker so many times."""
 
     class Mortal:
         setup = None
@@ -128,10 +128,10 @@ def mortal_tasks(marker: Path, deaths: int) -> List[Tuple[int, Any]]:
     return [(number, Mortal(number == 3)) for number in range(6)]
 
 
-class PaperCourse:
-    """Flights on paper: how long one takes follows from its parameters and its seed.
+class SyntheticCourse:
+    """Synthetic flights: how long one takes follows from its parameters and its seed.
 
-    Its workers are ``PaperWorkers``. The best speed is 0.5; "idle" has no effect; a "bad" of
+    Its workers are ``SyntheticWorkers``. The best speed is 0.5; "idle" has no effect; a "bad" of
     more than 5 reaches no goal.
     """
 
@@ -140,21 +140,21 @@ class PaperCourse:
     ends_at_contact = False
 
     def search_cases(self, count: int) -> Tuple[Case, ...]:
-        return tuple(Case(0, "paper", seed) for seed in range(count))
+        return tuple(Case(0, "synthetic", seed) for seed in range(count))
 
     def held_out_cases(self, count: int) -> Tuple[Case, ...]:
-        return tuple(Case(0, "paper", HELD_OUT_SEED + seed) for seed in range(count))
+        return tuple(Case(0, "synthetic", HELD_OUT_SEED + seed) for seed in range(count))
 
     def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
-        """Nothing is flown on paper; why not says what would have been."""
+        """Synthetic flights have no set-up; the refusal holds their parameters."""
         raise InputError([json.dumps([dict(assignments), case.seed])])
 
     def identity(self) -> Dict[str, Any]:
-        return {"course": "paper"}
+        return {"course": "synthetic"}
 
 
-class PaperWorkers:
-    """Flies on paper, and counts."""
+class SyntheticWorkers:
+    """Flies synthetic flights and counts them."""
 
     count = 1
 
@@ -178,8 +178,8 @@ def paper_flight(parameters: Dict[str, Any], seed: int) -> FlightResult:
     return replace(FLOWN, time_s=time_s, reached=reached)
 
 
-PAPER_SPACE = SearchSpace(
-    "paper",
+SYNTHETIC_SPACE = SearchSpace(
+    "synthetic",
     (Dimension("speed", 0.0, 1.0), Dimension("idle", 0.0, 1.0), Dimension("bad", 0.0, 10.0)),
 )
-PAPER_BASE = {"speed": 0.1, "idle": 0.5, "bad": 0.0}
+SYNTHETIC_BASE = {"speed": 0.1, "idle": 0.5, "bad": 0.0}

@@ -45,10 +45,10 @@ def test_map_over_two_parameters():
     shown = panels(rows)
     numbers = {title: [text.get_text() for text in axes.texts] for title, axes in shown.items()}
     assert numbers == {
-        "Missions complete, %": ["100", "67", "100", "0"],
-        "Flights with contacts, %": ["0", "33", "0", "100"],
-        "Mean mission time, s": ["20.5", "31.0", "10.5", "–"],
-        "Smallest gap, m": ["0.13", "0.20", "0.05", "0.00"],
+        "Completed missions (%)": ["100", "67", "100", "0"],
+        "Flights with contacts (%)": ["0", "33", "0", "100"],
+        "Mean mission time (s)": ["20.5", "31.0", "10.5", "–"],
+        "Min gap (m)": ["0.13", "0.20", "0.05", "0.00"],
     }
     for axes in shown.values():
         (image,) = axes.images
@@ -62,7 +62,7 @@ def test_map_where_nothing_arrived():
         SweepRow({"a": a, "b": b}, (flown(60.0, 0.1, 0),))
         for a, b in itertools.product((1, 2), repeat=2)
     ]
-    assert [text.get_text() for text in panels(rows)["Mean mission time, s"].texts] == ["–"] * 4
+    assert [text.get_text() for text in panels(rows)["Mean mission time (s)"].texts] == ["–"] * 4
 
 
 def test_curve_over_one_parameter():
@@ -71,7 +71,7 @@ def test_curve_over_one_parameter():
         SweepRow({"a": 0.5}, (flown(20.0, 0.3), flown(22.0, 0.1))),
         SweepRow({"a": 2.0}, (flown(10.0, 0.2), flown(90.0, 0.2, 1))),
     ]
-    lines = panels(rows)["Mean mission time, s"].lines
+    lines = panels(rows)["Mean mission time (s)"].lines
     assert lines[0].get_xydata().tolist() == [[0.5, 21.0], [2.0, 10.0]]
     assert [line.get_xydata().tolist() for line in lines[1:]] == [
         [[0.5, 20.0], [0.5, 22.0]],
@@ -86,7 +86,7 @@ def test_bars_for_a_list_of_points():
         SweepRow({"a": 3, "b": "x"}, (flown(15.0, 0.1, 0),)),
     ]
     shown = panels(rows)
-    bars = shown["Mean mission time, s"].patches
+    bars = shown["Mean mission time (s)"].patches
     assert [bar.get_width() for bar in bars] == [20.0, 10.0, 0.0]
-    labels = shown["Missions complete, %"].get_yticklabels()  # the leftmost has them for all
+    labels = shown["Completed missions (%)"].get_yticklabels()  # the leftmost has them for all
     assert [label.get_text() for label in labels] == ["1, x", "2, y", "3, x"]

@@ -158,7 +158,7 @@ def test_shipped_parameters_are_those_of_their_study(name):
     tree = config.load_files(folder, {"i": "0"})
     rows = re.findall(
         r"^\| (\S+) +\| (\S+) +\| (\S+) +\| \S.*\|$",
-        (folder / "STUDY.md").read_text().partition("## What each change")[2],
+        (folder / "STUDY.md").read_text().partition("## Effect of each change")[2],
         re.M,
     )
     found = {path: value for path, _, value in rows if path != "parameter"}

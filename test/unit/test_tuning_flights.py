@@ -87,7 +87,7 @@ def test_what_is_held_out_is_never_searched(tmp_path):
     other = write_mission(tmp_path / "other")
     named = MissionCourse(replace(options, held_out=(other,)))
     assert {case.name for case in named.held_out_cases(5)} == {other.name}
-    with pytest.raises(InputError, match="is searched with too"):
+    with pytest.raises(InputError, match="is also a mission of the search"):
         check_missions(replace(options, held_out=(mission,)))
     with pytest.raises(InputError, match="expected less than 1000000"):
         check_missions(replace(options, seed=HELD_OUT_SEED))
@@ -242,15 +242,15 @@ def test_tune_from_the_command_line_and_again(tmp_path):
         (["--set", "a"], "expected PATH=VALUE"),
         (["--config", "nowhere"], "expected a folder or the name of a shipped one"),
         (["--worlds", "none.npz"], "none.npz"),
-        (["--worlds", "none.npz", "--robots", "2"], "goes without"),
+        (["--worlds", "none.npz", "--robots", "2"], "cannot be combined with"),
         (["--scene", "a.yaml", "--scene", "b.yaml", "--goals", "g"], "a folder of goals for each"),
         (["--space", "none.yaml"], "none.yaml: cannot be read"),
     ],
 )
 def test_tune_refuses_what_it_cannot_use(arguments, words, tmp_path):
-    told_ = CliRunner().invoke(tune, [*arguments, "--output", str(tmp_path / "out")])
-    assert told_.exit_code == 2
-    assert words in told_.output
+    result = CliRunner().invoke(tune, [*arguments, "--output", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert words in result.output
     assert not (tmp_path / "out").exists()
 
 
@@ -266,7 +266,7 @@ def test_sweep_from_the_command_line(tmp_path):
         "1",
         "--workers",
         "1",
-        "--journal",
+        "--cache",
         str(tmp_path / "flights.db"),
         "--csv",
         str(tmp_path / "s.csv"),
@@ -302,16 +302,16 @@ def test_sweep_from_the_command_line(tmp_path):
     [
         ([], "expected --over"),
         (["--over", "a"], "expected PATH=A,B"),
-        (["--over", "a=1,1"], "a value is there twice"),
-        (["--over", "a=1,2", "--over", "a=3"], "given twice"),
+        (["--over", "a=1,1"], "duplicate value"),
+        (["--over", "a=1,2", "--over", "a=3"], "duplicate path"),
         (["--over", "TrajectoryPlannerROS/max_vell_x=1,2"], "did you mean max_vel_x?"),
         (["--over", "TrajectoryPlannerROS/sim_time=1,-2"], "sim_time=-2"),
     ],
 )
 def test_sweep_refuses_what_it_cannot_use(arguments, words):
-    told_ = CliRunner().invoke(sweep, arguments)
-    assert told_.exit_code == 2
-    assert words in told_.output
+    result = CliRunner().invoke(sweep, arguments)
+    assert result.exit_code == 2
+    assert words in result.output
 
 
 def test_points_from_a_file(tmp_path):
@@ -322,7 +322,7 @@ def test_points_from_a_file(tmp_path):
     with pytest.raises(InputError, match="row 2: 1 values, expected 2"):
         read_points(path)
     path.write_text("a,b\n")
-    with pytest.raises(InputError, match="one for each point"):
+    with pytest.raises(InputError, match="a row for each point"):
         read_points(path)
 
 

@@ -1,4 +1,4 @@
-"""Searching and refining on paper, where the best is known."""
+"""Search and refinement with synthetic flights, where the best is known."""
 
 from __future__ import annotations
 
@@ -13,47 +13,53 @@ from typing import Optional
 import optuna
 import pytest
 from optuna.trial import TrialState
-from study_flights import PAPER_BASE, PAPER_SPACE, PaperCourse, PaperWorkers, told
+from study_flights import (
+    SYNTHETIC_BASE,
+    SYNTHETIC_SPACE,
+    SyntheticCourse,
+    SyntheticWorkers,
+    trials_as_data,
+)
 
 from quad_nav.errors import InputError
-from quad_nav.tuning.evaluation import Evaluation, Watcher
+from quad_nav.tuning.evaluation import Evaluation, StudyObserver
 from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.flight_result import FlightResult
-from quad_nav.tuning.proposals import is_hopeless, propose
+from quad_nav.tuning.proposals import propose, should_prune
 from quad_nav.tuning.refinement import refine
 from quad_nav.tuning.report.search_pictures import importances
 from quad_nav.tuning.search import SearchOptions, best_first, rounds, search
-from quad_nav.tuning.study import open_study, unlike
+from quad_nav.tuning.study import json_differences, open_study
 
 HERE = Path(__file__).resolve().parent
 OPTIONS = SearchOptions(candidates=32, flights=4, generation=8, seed=3)
-IDENTITY = {"course": "paper"}
+IDENTITY = {"course": "synthetic"}
 
 
-class StopsAfter(Watcher):
+class StopsAfter(StudyObserver):
     """Ctrl-C after so many flights."""
 
     def __init__(self, flights: int):
         self._left = flights
 
-    def flown(self, flight: FlightResult, kept: bool) -> None:
-        self._left -= not kept
+    def on_flight(self, flight: FlightResult, cached: bool) -> None:
+        self._left -= not cached
         if self._left == 0:
             raise KeyboardInterrupt
 
 
-def run(folder: Path, options: SearchOptions = OPTIONS, watcher: Optional[Watcher] = None):
+def run(folder: Path, options: SearchOptions = OPTIONS, observer: Optional[StudyObserver] = None):
     """The trials of a search, and the flights that it flew."""
-    workers = PaperWorkers()
+    workers = SyntheticWorkers()
     with open_study(folder, IDENTITY) as study:
         evaluation = Evaluation(
-            PaperCourse(), PAPER_SPACE, workers, study.journal, watcher or Watcher()
+            SyntheticCourse(), SYNTHETIC_SPACE, workers, study.journal, observer or StudyObserver()
         )
         try:
-            search(evaluation, study, PAPER_BASE, options)
+            search(evaluation, study, SYNTHETIC_BASE, options)
         except KeyboardInterrupt:
             pass
-        return told(study.trials), workers.flown
+        return trials_as_data(study.trials), workers.flown
 
 
 def test_flights_are_flown_in_rounds():
@@ -66,7 +72,7 @@ def test_flights_are_flown_in_rounds():
 def test_the_search_finds_what_is_best_and_drops_what_is_bad(tmp_path):
     trials, flown = run(tmp_path)
     assert len(trials) == 32
-    assert trials[0][3] == PAPER_BASE
+    assert trials[0][3] == SYNTHETIC_BASE
     best = min(trials, key=lambda trial: trial[2])
     assert abs(best[3]["speed"] - 0.5) < 0.05  # within a tenth of the range
     dropped = [trial for trial in trials if trial[1] is TrialState.PRUNED]
@@ -78,8 +84,8 @@ def test_no_candidate_of_a_generation_knows_of_another(tmp_path):
     trials, _ = run(tmp_path, SearchOptions(16, 2, 8, 3))
     with open_study(tmp_path, IDENTITY) as study:
         first = study.trials[:8]
-    assert propose(PAPER_SPACE, first, 1, 8, 3) == [trial[3] for trial in trials[8:]]
-    assert propose(PAPER_SPACE, first, 1, 8, 4) != [trial[3] for trial in trials[8:]]
+    assert propose(SYNTHETIC_SPACE, first, 1, 8, 3) == [trial[3] for trial in trials[8:]]
+    assert propose(SYNTHETIC_SPACE, first, 1, 8, 4) != [trial[3] for trial in trials[8:]]
 
 
 @pytest.mark.parametrize("flights", [5, 60])
@@ -87,7 +93,7 @@ def test_an_interrupted_search_ends_as_an_uninterrupted_one_and_flies_nothing_ag
     tmp_path, flights
 ):
     whole, all_flown = run(tmp_path / "whole")
-    _, before = run(tmp_path / "parts", watcher=StopsAfter(flights))
+    _, before = run(tmp_path / "parts", observer=StopsAfter(flights))
     assert len(before) == flights
     resumed, after = run(tmp_path / "parts")
     assert resumed == whole
@@ -107,13 +113,13 @@ import os, signal, sys
 from pathlib import Path
 from typing import Optional
 import test_tuning_search as t
-class Dies(t.Watcher):
+class Dies(t.StudyObserver):
     left = 23
-    def flown(self, flight, kept):
+    def on_flight(self, flight, cached):
         self.left -= 1
         if self.left == 0:
             os.kill(os.getpid(), signal.SIGKILL)
-t.run(Path(sys.argv[1]), watcher=Dies())
+t.run(Path(sys.argv[1]), observer=Dies())
 """
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*sys.path, str(HERE)])}
     died = subprocess.run([sys.executable, "-c", code, str(tmp_path / "parts")], env=environment)
@@ -138,9 +144,9 @@ def test_a_folder_keeps_to_its_study(tmp_path):
         "space[1] was 2 and is 3",
         'x was absent and is "y"',
     ]
-    assert unlike({"a": (1,)}, {"a": [2, 3]}) != []
+    assert json_differences({"a": (1,)}, {"a": [2, 3]}) != []
     (tmp_path / "study.db").write_text("no database, but long enough to be looked at" * 100)
-    with pytest.raises(InputError, match="cannot be read as a study"):
+    with pytest.raises(InputError, match="cannot read as a study"):
         with open_study(tmp_path, {}):
             pass
 
@@ -150,20 +156,20 @@ def test_a_candidate_is_dropped_above_the_median_of_those_that_flew_everything()
         optuna.create_trial(value=1.0, intermediate_values={2: float(mean), 4: 1.0})
         for mean in (1, 2, 3, 4, 5)
     ]
-    assert is_hopeless(trials, 2, 3.01)
-    assert not is_hopeless(trials, 2, 3.0)
-    assert not is_hopeless(trials[:4], 2, 99.0)  # too few to say
+    assert should_prune(trials, 2, 3.01)
+    assert not should_prune(trials, 2, 3.0)
+    assert not should_prune(trials[:4], 2, 99.0)  # too few to say
     pruned = optuna.create_trial(state=TrialState.PRUNED, value=0.0, intermediate_values={2: 0.0})
-    assert not is_hopeless([*trials, pruned, pruned], 2, 3.0)
+    assert not should_prune([*trials, pruned, pruned], 2, 3.0)
 
 
 def test_refining_keeps_what_helps_and_takes_back_what_does_not():
-    workers, course = PaperWorkers(), PaperCourse()
-    evaluation = Evaluation(course, PAPER_SPACE, workers, FlightCache(), Watcher())
+    workers, course = SyntheticWorkers(), SyntheticCourse()
+    evaluation = Evaluation(course, SYNTHETIC_SPACE, workers, FlightCache(), StudyObserver())
     refined = refine(
         evaluation,
         [{"speed": 0.5, "idle": 0.9, "bad": 0.0}, {"speed": 0.6, "idle": 0.2, "bad": 0.0}],
-        PAPER_BASE,
+        SYNTHETIC_BASE,
         course.search_cases(2),
         course.search_cases(3),
     )
@@ -176,12 +182,14 @@ def test_refining_keeps_what_helps_and_takes_back_what_does_not():
 
 
 def test_nothing_is_changed_when_nothing_beats_the_base():
-    course = PaperCourse()
-    evaluation = Evaluation(course, PAPER_SPACE, PaperWorkers(), FlightCache(), Watcher())
+    course = SyntheticCourse()
+    evaluation = Evaluation(
+        course, SYNTHETIC_SPACE, SyntheticWorkers(), FlightCache(), StudyObserver()
+    )
     refined = refine(
         evaluation,
         [{"speed": 0.99, "idle": 0.5, "bad": 0.0}, {"speed": 0.5, "idle": 0.5, "bad": 9.0}],
-        {**PAPER_BASE, "speed": 0.1},
+        {**SYNTHETIC_BASE, "speed": 0.1},
         course.search_cases(2),
         course.search_cases(2),
     )
@@ -198,13 +206,15 @@ def test_the_best_are_those_that_flew_everything():
 
 
 def test_a_flight_is_known_by_parameters_mission_and_seed(tmp_path):
-    course = PaperCourse()
-    workers = PaperWorkers()
+    course = SyntheticCourse()
+    workers = SyntheticWorkers()
     for _ in range(2):
         evaluation = Evaluation(
-            course, PAPER_SPACE, workers, FlightCache(tmp_path / "f.db"), Watcher()
+            course, SYNTHETIC_SPACE, workers, FlightCache(tmp_path / "f.db"), StudyObserver()
         )
-        evaluation.flown([{"speed": 0.5}, {"speed": 0.5}, {"speed": 0.25}], course.search_cases(2))
+        evaluation.evaluate(
+            [{"speed": 0.5}, {"speed": 0.5}, {"speed": 0.25}], course.search_cases(2)
+        )
     assert [json.loads(flown) for flown in workers.flown] == [
         [{"speed": 0.5}, 0],
         [{"speed": 0.25}, 0],
@@ -216,7 +226,7 @@ def test_a_flight_is_known_by_parameters_mission_and_seed(tmp_path):
 def test_the_parameter_that_counts_is_found(tmp_path):
     run(tmp_path)
     with open_study(tmp_path, IDENTITY) as study:
-        found = importances(study.trials, PAPER_SPACE)
-        assert importances(study.trials[:5], PAPER_SPACE) == {}  # too few to say
+        found = importances(study.trials, SYNTHETIC_SPACE)
+        assert importances(study.trials[:5], SYNTHETIC_SPACE) == {}  # too few to say
     assert next(iter(found)) == "speed"
     assert sum(found.values()) == pytest.approx(1.0)

@@ -40,7 +40,7 @@ c: {choices: [5.0, 10.0], follow: {d: -1}}
     )
 
 
-def test_every_fault_of_a_file_is_told_at_once(tmp_path):
+def test_every_fault_of_a_file_is_listed_at_once(tmp_path):
     path = write(
         tmp_path,
         """\
@@ -63,7 +63,7 @@ g: {range: [0, 1], follow: {global_costmap/h: 1}}
         f"{path}: d: range: [0.5, 3], expected whole numbers with integer: true",
         f"{path}: e: choices: [1], expected two values or more",
         f"{path}: f: unknown key ragne; expected choices, follow, integer, log, range",
-        f"{path}: *_costmap/h: global_costmap/h is set by g too; expected one entry for it",
+        f"{path}: *_costmap/h: global_costmap/h is also set by g; expected one entry for it",
     ]
 
 

@@ -1,6 +1,6 @@
-"""The command line ``quad``; one file for each command.
+"""Command line ``quad``, with one module for each command.
 
-A command is imported when it is called, so that none waits for what it does not need.
+A command's module is imported when the command runs, so none waits for unneeded imports.
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ class Commands(click.Group):
     """Finds the command ``name`` in the module of that name."""
 
     def list_commands(self, ctx: click.Context) -> List[str]:
+        """Return the names of all commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> Optional[click.Command]:
+        """Import a command; None if it is unknown."""
         if cmd_name not in COMMANDS:
             return None
         module = importlib.import_module(f"{__name__}.{cmd_name}")
@@ -35,4 +37,4 @@ class Commands(click.Group):
 @click.command(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(quad_nav.__version__, prog_name="quad")
 def main() -> None:
-    """Quadcopters on the ROS navigation stack."""
+    """Fly quadcopters with the ROS navigation stack."""

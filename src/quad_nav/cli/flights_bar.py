@@ -1,44 +1,37 @@
-"""The progress of many flights in the terminal."""
+"""Run the flights of a study or a sweep with a progress bar."""
 
 from __future__ import annotations
 
 import math
+import sys
 import time
+from typing import Callable, TypeVar
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+import click
 
-from quad_nav.tuning.evaluation import Watcher
+from quad_nav.cli import EXIT_INTERRUPTED
+from quad_nav.cli.options import raise_on_signals
+from quad_nav.cli.progress import flights_progress
+from quad_nav.files.shipped import config_folder
+from quad_nav.scenario.warm_up import simulate, warm_up
+from quad_nav.tuning.evaluation import Course, StudyObserver
 from quad_nav.tuning.flight_result import FlightResult
+from quad_nav.tuning.parameter_files import base_configuration
+
+T = TypeVar("T")
 
 
-class FlightsBar(Watcher):
-    """What is done, flights, rate and time left; on stderr, and only where that is a terminal.
-
-    It begins with the first flight that is over: until then the workers' libraries may say
-    something of their own.
-    """
+class FlightsBar(StudyObserver):
+    """Shows the stage, the flights, their rate and the time left."""
 
     def __init__(self, quiet: bool) -> None:
-        console = Console(stderr=True)
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=24),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[told]}"),
-            TimeRemainingColumn(elapsed_when_finished=True),
-            TextColumn("left"),
-            console=console,
-            transient=True,
-            speed_estimate_period=300.0,
-            disable=quiet or not console.is_terminal,
-        )
-        self._task = self._progress.add_task("starting", total=0.0, told="")
+        self._progress = flights_progress(quiet)
+        self._task = self._progress.add_task("starting", total=0.0, status="")
         self._best = math.inf
         self._candidates = 0
         self._start_s = time.monotonic()
         self._expected = 0
-        self.flights = self.kept = self.failed = 0
+        self.flights = self.cached = self.failed = 0
 
     def __enter__(self) -> FlightsBar:
         return self
@@ -47,48 +40,85 @@ class FlightsBar(Watcher):
         self._progress.stop()
 
     def start(self) -> None:
-        """The clock of the rate starts now."""
+        """Start the clock of the rate."""
         self._start_s = time.monotonic()
 
     @property
     def wall_time_s(self) -> float:
+        """Time since the start."""
         return time.monotonic() - self._start_s
 
     @property
     def per_minute(self) -> float:
-        """Flights flown now, not those kept from before."""
+        """Rate of new flights."""
         return 60.0 * self.flights / max(self.wall_time_s, 1e-3)
 
     @property
-    def words(self) -> str:
-        """What was flown, for the end."""
-        kept = f"; {self.kept} were there already" if self.kept else ""
+    def text(self) -> str:
+        """Summary of the flights."""
+        cached = f"; {self.cached} from earlier runs" if self.cached else ""
         return (
-            f"{self.flights} flights in {self.wall_time_s:.0f} s, {self.per_minute:.1f} a "
-            f"minute{kept}"
+            f"{self.flights} flights in {self.wall_time_s:.0f} s, {self.per_minute:.1f} per "
+            f"minute{cached}"
         )
 
-    def expect(self, flights: int) -> None:
+    def on_expected(self, flights: int) -> None:
+        """Update the number of expected flights."""
         self._expected += flights
         self._progress.update(self._task, total=self._expected)
 
-    def stage(self, name: str) -> None:
+    def on_stage(self, name: str) -> None:
+        """Show the stage."""
         self._progress.update(self._task, description=name)
 
-    def flown(self, flight: FlightResult, kept: bool) -> None:
-        self.kept += kept
-        self.flights += not kept
-        self.failed += not kept and not flight.succeeded
+    def on_flight(self, flight: FlightResult, cached: bool) -> None:
+        """Count a flight."""
+        self.cached += cached
+        self.flights += not cached
+        self.failed += not cached and not flight.succeeded
         self._show()
 
-    def told(self, candidates: int, best: float) -> None:
+    def on_candidates(self, candidates: int, best: float) -> None:
+        """Show the number of candidates and the lowest cost."""
         self._candidates, self._best = candidates, best
         self._show()
 
     def _show(self) -> None:
-        words = [f"{self.per_minute:.1f} a minute", f"{self.failed} failed"]
+        parts = [f"{self.per_minute:.1f} per minute", f"{self.failed} failed"]
         if self._candidates:
-            words.insert(0, f"{self._candidates} candidates, best {self._best:.3f}")
-        self._progress.update(self._task, completed=self.flights + self.kept, told="; ".join(words))
+            parts.insert(0, f"{self._candidates} candidates, best cost {self._best:.3f}")
+        self._progress.update(
+            self._task, completed=self.flights + self.cached, status="; ".join(parts)
+        )
         if self.flights:
             self._progress.start()
+
+
+def run_with_bar(
+    course: Course,
+    run: Callable[[FlightsBar], T],
+    interrupted: Callable[[FlightsBar], str],
+    quiet: bool,
+) -> T:
+    """Compile the kernels, run the flights, and exit with 130 on Ctrl-C.
+
+    Args:
+        course: Course whose kernels are compiled once, instead of in every worker.
+        run: Runs the flights and reports to the bar.
+        interrupted: Returns the message after Ctrl-C.
+        quiet: Show neither bar nor summary.
+    """
+    raise_on_signals()
+    with FlightsBar(quiet) as bar:
+        try:
+            warm_up(base_configuration(config_folder(course.config), course.fixed))
+            simulate()
+            bar.start()
+            result = run(bar)
+        except KeyboardInterrupt:
+            bar.__exit__()
+            click.echo(f"interrupted; {interrupted(bar)}", err=True)
+            sys.exit(EXIT_INTERRUPTED)
+    if not quiet:
+        click.echo(bar.text, err=True)
+    return result

@@ -1,4 +1,4 @@
-"""Report and animation of a flight that is flown now."""
+"""Report and animation of a flight that ``quad fly`` flies."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from quad_nav.scenario.flight_setup import FlightSetup
 
 
 class FlightPictures:
-    """What ``--report`` and ``--animate`` ask for; nothing is imported or traced for None.
+    """Writes the report and the animation that were requested, if any.
+
+    Nothing is traced, and no plotting library imported, if neither is requested.
 
     Raises:
-        InputError: the animation could not be written.
+        InputError: The animation cannot be written.
     """
 
     def __init__(
@@ -36,10 +38,11 @@ class FlightPictures:
 
     @property
     def observers(self) -> Tuple[FlightObserver, ...]:
+        """Observer of the flight; empty if nothing is requested."""
         return (self._observer,) if self._report or self._animation else ()
 
     def write(self, summary: MissionSummary) -> Iterator[str]:
-        """Writes what was asked for; yields a line for each file that is there now."""
+        """Write the requested files and yield a line for each."""
         if not self.observers:
             return
         trace = self._observer.trace(summary.contacts, summary.reason)

@@ -46,7 +46,7 @@ def flights_progress(quiet: bool) -> Progress:
 
 
 class ProgressBar(FlightObserver):
-    """Goals, simulated time and speed; on stderr, and only where that is a terminal."""
+    """Shows the goals, the simulated time and the speed of a flight."""
 
     def __init__(self) -> None:
         console = Console(stderr=True)
@@ -66,6 +66,7 @@ class ProgressBar(FlightObserver):
         self._start_s = self._shown_s = 0.0
 
     def on_start(self, flight: Flight) -> None:
+        """Show the bar."""
         self._start_s = time.monotonic()
         goals = sum(len(robot.sequencer.sequence.goals) for robot in flight.robots)
         self._task = self._progress.add_task("", total=goals, sim=_STARTING)
@@ -73,9 +74,11 @@ class ProgressBar(FlightObserver):
         self._progress.refresh()
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
+        """Count goals that ended."""
         self._ended += isinstance(action, GoalEnded)
 
     def on_move(self, flight: Flight) -> None:
+        """Update the bar ten times a second."""
         wall_s = time.monotonic()
         if wall_s - self._shown_s < _PERIOD_S:
             return
@@ -90,4 +93,5 @@ class ProgressBar(FlightObserver):
         )
 
     def on_end(self, flight: Flight) -> None:
+        """Hide the bar."""
         self._progress.stop()

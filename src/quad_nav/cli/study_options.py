@@ -1,36 +1,25 @@
-"""What `quad tune` and `quad sweep` have in common on the command line."""
+"""Options that ``quad tune`` and ``quad sweep`` share."""
 
 from __future__ import annotations
 
 import math
-import sys
-from contextlib import contextmanager
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Callable, Iterator, Optional, Sequence, Tuple, TypeVar, Union
+from typing import Any, Callable, Optional, Sequence, Tuple, TypeVar, Union
 
 import click
 
 from quad_nav.barn.setup import BarnOptions
-from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
-from quad_nav.cli.options import parameter
-from quad_nav.errors import InputError, QuadError
-from quad_nav.files.shipped import config_folder, shipped
+from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, COUNT, POSITIVE, parameter
+from quad_nav.errors import InputError
+from quad_nav.files.shipped import shipped
 from quad_nav.offline.workers import LocalWorkers, RayWorkers, Workers
-from quad_nav.scenario.warm_up import simulate, warm_up
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.simulation import SimulationParams
 from quad_nav.tuning.courses import Mission, MissionOptions
-from quad_nav.tuning.evaluation import Course
-from quad_nav.tuning.parameter_files import base_configuration
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-A_FILE = click.Path(dir_okay=False, path_type=Path)
-A_FOLDER = click.Path(file_okay=False, path_type=Path)
-POSITIVE = click.FloatRange(min=0.0, min_open=True)
-AMOUNT = click.FloatRange(min=0.0)
-COUNT = click.IntRange(min=1)
 
 _FLOWN = (
     click.option(
@@ -38,43 +27,42 @@ _FLOWN = (
         "scenes",
         type=A_FILE,
         multiple=True,
-        help="Walls, obstacles and start"
-        " poses; repeatable, each with its --goals. [default: the arena that comes with"
-        " quad]",
+        help="Scene with walls, obstacles and start poses; repeatable, each with its --goals."
+        " [default: the shipped arena]",
     ),
     click.option(
         "--goals",
         type=A_FOLDER,
         multiple=True,
-        help="The folder with quad0_goals.json"
-        " and so on; repeatable. [default: the one that comes with quad]",
+        help="Folder with quad0_goals.json, ...; repeatable. [default: the shipped goals]",
     ),
     click.option(
         "--random",
         "is_random",
         is_flag=True,
-        help="Missions at random too, another one for each seed.",
+        help="Also fly random missions, another one for each seed.",
     ),
     click.option(
-        "--worlds", type=A_FILE, help="Fly through BARN's worlds instead, from this .npz."
+        "--worlds", type=A_FILE, help="Fly through BARN's worlds from this .npz file instead."
     ),
     click.option(
         "--config",
         metavar="NAME|FOLDER",
-        help="The base: move_base's parameters. [default: 'default', with --worlds 'barn']",
+        help="Base configuration: move_base's parameters. [default: 'default', with --worlds"
+        " 'barn']",
     ),
     click.option(
         "--set",
         "parameters",
         multiple=True,
         metavar="PATH=VALUE",
-        help="A parameter on top of the base, which stays as it is; repeatable.",
+        help="Override a parameter of the base; it is not searched; repeatable.",
     ),
     click.option(
         "--robots",
         type=COUNT,
         metavar="N",
-        help="How many quadcopters. [default: as many as there are goal files]",
+        help="Number of quadcopters. [default: number of goal files]",
     ),
     click.option(
         "--size",
@@ -82,7 +70,7 @@ _FLOWN = (
         type=AMOUNT,
         default=0.0,
         metavar="M",
-        help="The side of a random mission's arena. [default: with room for all]",
+        help="Side of a random mission's arena. [default: chosen by the number of robots]",
     ),
     click.option(
         "--jitter",
@@ -90,7 +78,7 @@ _FLOWN = (
         default=0.3,
         show_default=True,
         metavar="M",
-        help="How far the start positions are displaced at random.",
+        help="Maximum random displacement of the start positions.",
     ),
     click.option(
         "--time-limit",
@@ -99,21 +87,21 @@ _FLOWN = (
         default=300.0,
         show_default=True,
         metavar="S",
-        help="A mission that takes longer has failed.",
+        help="Simulated time after which a mission fails.",
     ),
     click.option(
         "--scan-range",
         type=POSITIVE,
         default=2 * math.pi,
         metavar="RAD",
-        help="The LIDAR's field of view. [default: all around]",
+        help="Field of view of the LIDAR. [default: 2 pi]",
     ),
     click.option(
         "--beams",
         type=click.IntRange(min=2),
         default=512,
         show_default=True,
-        help="Beams of a scan.",
+        help="Number of beams of a scan.",
     ),
     click.option(
         "--lidar-rate",
@@ -129,7 +117,7 @@ _FLOWN = (
         type=AMOUNT,
         default=0.0,
         metavar="M",
-        help="Standard deviation of the LIDAR's ranges.",
+        help="Standard deviation of the LIDAR's noise.",
     ),
     click.option(
         "--body-radius",
@@ -138,14 +126,14 @@ _FLOWN = (
         show_default=True,
         metavar="M",
         type=POSITIVE,
-        help="The quadcopter's in BARN's worlds.",
+        help="Radius of the quadcopter in BARN's worlds.",
     ),
     click.option(
         "--seed",
         type=click.IntRange(min=0),
         default=0,
         show_default=True,
-        help="The same seed gives the same figures.",
+        help="Random seed; equal seeds give equal results.",
     ),
 )
 _WORKERS = (
@@ -153,27 +141,27 @@ _WORKERS = (
         "--workers",
         type=COUNT,
         metavar="N",
-        help="Flights at the same time. [default: as many as there are cores]",
+        help="Flights at the same time. [default: number of cores]",
     ),
     click.option(
         "--ray",
         "ray_address",
         metavar="ADDRESS",
-        help="Fly on the Ray cluster there:"
-        " needs pip install 'quad-nav[ray]', here and on the cluster.",
+        help="Fly on the Ray cluster at this address. Needs pip install 'quad-nav[ray]' here and"
+        " on the cluster.",
     ),
 )
 
 
 def flown_options(command: F) -> F:
-    """Adds the options that say what is flown; ``course_of`` reads them."""
+    """Add the options of the flights to a command; ``course_of`` reads them."""
     for option in reversed(_FLOWN):
         command = option(command)
     return command
 
 
 def worker_options(command: F) -> F:
-    """Adds the options that say who flies; ``workers_of`` reads them."""
+    """Add the options of the workers to a command; ``workers_of`` reads them."""
     for option in reversed(_WORKERS):
         command = option(command)
     return command
@@ -191,18 +179,18 @@ def course_of(
     held_out: Tuple[Mission, ...] = (),
     **given: Any,
 ) -> Union[MissionOptions, BarnOptions]:
-    """What is flown, not yet read.
+    """Convert the options to a course, without reading its files.
 
     Raises:
-        InputError: options that do not go together.
+        InputError: The options cannot be combined.
     """
     fixed = tuple(map(parameter, parameters))
     if worlds is not None:
         if scenes or goals or is_random or held_out or given["robots"]:
             raise InputError(
                 [
-                    "--worlds: goes without --scene, --goals, --random, --robots and "
-                    "what is held out by name"
+                    "--worlds: cannot be combined with --scene, --goals, --random, --robots and "
+                    "held-out missions"
                 ]
             )
         return BarnOptions(worlds, config or "barn", fixed, seed=seed, body_radius_m=body_radius_m)
@@ -215,16 +203,16 @@ def course_of(
 
 
 def missions_of(scenes: Sequence[Path], goals: Sequence[Path], prefix: str) -> Tuple[Mission, ...]:
-    """Scenes and goals in pairs; one alone goes with what comes with quad.
+    """Pair scenes and goals; a single one is paired with the shipped counterpart.
 
     Raises:
-        InputError: there are several, and not as many of both.
+        InputError: The numbers of scenes and goals differ.
     """
     if len(scenes) != len(goals) and min(len(scenes), len(goals)) > 0:
         raise InputError(
             [
-                f"--{prefix}scene, --{prefix}goals: {len(scenes)} and {len(goals)} of "
-                "them; expected a folder of goals for each scene"
+                f"--{prefix}scene, --{prefix}goals: {len(scenes)} scenes and {len(goals)} "
+                "folders of goals; expected a folder of goals for each scene"
             ]
         )
     return tuple(
@@ -233,31 +221,12 @@ def missions_of(scenes: Sequence[Path], goals: Sequence[Path], prefix: str) -> T
 
 
 def workers_of(workers: Optional[int], ray_address: Optional[str]) -> Workers:
-    """Who flies.
+    """Create the workers.
 
     Raises:
-        InputError: there is no such cluster.
+        InputError: The Ray cluster does not exist.
     """
     return LocalWorkers(workers) if ray_address is None else RayWorkers(ray_address, workers)
-
-
-def compile_kernels(course: Course) -> None:
-    """Once, and not in every worker at once."""
-    warm_up(base_configuration(config_folder(course.config), course.fixed))
-    simulate()
-
-
-@contextmanager
-def faults_told() -> Iterator[None]:
-    """Ends the command with the right status for what went wrong, each fault on a line."""
-    try:
-        yield
-    except InputError as error:
-        click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
-        sys.exit(EXIT_BAD_INPUT)
-    except QuadError as error:
-        click.echo(str(error), err=True)
-        sys.exit(EXIT_FAILURE)
 
 
 def _mission_options(

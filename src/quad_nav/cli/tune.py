@@ -1,24 +1,19 @@
-"""``quad tune``: better parameters by many flights, offline."""
+"""``quad tune``: search for better parameters by many flights, offline."""
 
 from __future__ import annotations
 
 import shlex
-import signal
 import sys
 from pathlib import Path
 from typing import Any, Optional, Tuple
 
 import click
 
-from quad_nav.cli import EXIT_INTERRUPTED, EXIT_SUCCESS
-from quad_nav.cli.flights_bar import FlightsBar
+from quad_nav.cli import EXIT_SUCCESS
+from quad_nav.cli.flights_bar import run_with_bar
+from quad_nav.cli.options import A_FILE, A_FOLDER, COUNT, exit_on_faults
 from quad_nav.cli.study_options import (
-    A_FILE,
-    A_FOLDER,
-    COUNT,
-    compile_kernels,
     course_of,
-    faults_told,
     flown_options,
     missions_of,
     worker_options,
@@ -28,7 +23,7 @@ from quad_nav.offline.workers import Workers
 from quad_nav.tuning.search import SearchOptions
 from quad_nav.tuning.study_files import write_result
 from quad_nav.tuning.study_text import text
-from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_setup, run_tune
+from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup, run_tune
 
 
 @click.command()
@@ -38,15 +33,15 @@ from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_s
     "held_out_scenes",
     type=A_FILE,
     multiple=True,
-    help="A scene that the search never sees; repeatable, each with its goals. [default:"
-    " the search's scenes with other seeds; of BARN the official sample]",
+    help="Held-out scene, never flown by the search; repeatable, each with its goals."
+    " [default: the search's scenes with other seeds; for BARN the official sample]",
 )
-@click.option("--held-out-goals", type=A_FOLDER, multiple=True, help="The goals for it.")
+@click.option("--held-out-goals", type=A_FOLDER, multiple=True, help="Goals for a held-out scene.")
 @click.option(
     "--space",
     type=A_FILE,
-    help="Which parameters are searched, and between what."
-    " [default: spaces/default.yaml of quad, or barn.yaml, or dwa.yaml]",
+    help="Searched parameters with their ranges. [default: the shipped spaces/default.yaml,"
+    " barn.yaml or dwa.yaml]",
 )
 @click.option(
     "--candidates",
@@ -54,7 +49,7 @@ from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_s
     default=60,
     show_default=True,
     metavar="N",
-    help="Sets of parameters to try. A study can be continued with more.",
+    help="Number of parameter sets to try. A study can be resumed with more.",
 )
 @click.option(
     "--flights",
@@ -62,7 +57,7 @@ from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_s
     default=8,
     show_default=True,
     metavar="N",
-    help="Flights of each that is not dropped before.",
+    help="Flights of each candidate that is not pruned.",
 )
 @click.option(
     "--finalists",
@@ -70,7 +65,7 @@ from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_s
     default=4,
     show_default=True,
     metavar="N",
-    help="The best so many fly --final-flights.",
+    help="Number of best candidates that fly --final-flights.",
 )
 @click.option(
     "--final-flights",
@@ -78,20 +73,19 @@ from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_s
     default=16,
     show_default=True,
     metavar="N",
-    help="Flights that decide between them.",
+    help="Flights that select the best finalist.",
 )
 @click.option(
     "--held-out",
     type=COUNT,
     metavar="N",
-    help="Flights with seeds that the search never"
-    " sees, for the figures. [default: 20, of BARN 50]",
+    help="Held-out flights that compare base and tuned parameters. [default: 20, for BARN 50]",
 )
 @click.option(
     "--against",
     multiple=True,
     metavar="NAME|FOLDER",
-    help="Fly these parameters too, as they are, where the search never was; repeatable.",
+    help="Also fly the held-out flights with this configuration, unchanged; repeatable.",
 )
 @click.option(
     "--generation",
@@ -99,7 +93,7 @@ from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_s
     default=8,
     show_default=True,
     metavar="N",
-    help="Candidates at a time. It changes what is found; --workers does not.",
+    help="Candidates per generation. Changes the result; --workers does not.",
 )
 @worker_options
 @click.option(
@@ -109,27 +103,33 @@ from quad_nav.tuning.tune import TuneOptions, TuneResult, TuneSetup, read_tune_s
     default=Path("tuned"),
     show_default=True,
     metavar="FOLDER",
-    help="For the parameters, the study and the report.",
+    help="Folder of the parameters, the study and the report.",
 )
-@click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
+@click.option("--quiet", "-q", is_flag=True, help="Show neither progress bar nor table.")
 def tune(
     workers: Optional[int], ray_address: Optional[str], output: Path, quiet: bool, **given: Any
 ) -> None:
     """Search for parameters that fly better, without ROS.
 
-    Every candidate flies the same flights. What is found is written to --output as move_base's
-    files, with the study and a report. The same command again goes on where it ended, also after
-    Ctrl-C or a crash; no flight is flown twice.
+    Every candidate flies the same flights. The best parameters are written to --output as
+    move_base's files, with the study and a report. The same command resumes an interrupted study;
+    no flight is flown twice.
 
-    Exit status: 0, 1 when workers die again and again, 2 for input that cannot be used, 130 after
-    Ctrl-C.
+    Exit status: 0, 1 if workers die repeatedly, 2 for invalid input, 130 after Ctrl-C.
     """
-    with faults_told():
+    with exit_on_faults():
         setup = read_tune_setup(_options(output, **given))
-        processes = workers_of(workers, ray_address)
+        pool = workers_of(workers, ray_address)
         if not quiet:
-            _announce(setup, processes)
-        result = _run(setup, processes, quiet)
+            _announce(setup, pool)
+        result = run_with_bar(
+            setup.course,
+            lambda bar: run_tune(setup, pool, bar),
+            lambda bar: (
+                f"{bar.flights + bar.cached} flights are stored, the same command resumes the study"
+            ),
+            quiet,
+        )
         for path in write_result(result, shlex.join(["quad", *sys.argv[1:]])):
             if not quiet:
                 click.echo(f"written: {path}", err=True)
@@ -172,27 +172,6 @@ def _announce(setup: TuneSetup, workers: Workers) -> None:
     search = setup.options.search
     click.echo(
         f"{search.candidates} candidates of up to {search.flights} flights, "
-        f"{len(setup.space.dimensions)} parameters, {workers.count} flights at a time",
+        f"{len(setup.space.dimensions)} parameters, {workers.count} flights at the same time",
         err=True,
     )
-
-
-def _run(setup: TuneSetup, workers: Workers, quiet: bool) -> TuneResult:
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-    with FlightsBar(quiet) as bar:
-        try:
-            compile_kernels(setup.course)
-            bar.start()
-            result = run_tune(setup, workers, bar)
-        except KeyboardInterrupt:
-            bar.__exit__()
-            click.echo(
-                f"interrupted; {bar.flights + bar.kept} flights are kept, the same command "
-                "goes on from here",
-                err=True,
-            )
-            sys.exit(EXIT_INTERRUPTED)
-    if not quiet:
-        click.echo(bar.words, err=True)
-    return result

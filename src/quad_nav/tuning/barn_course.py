@@ -1,4 +1,4 @@
-"""BARN's worlds as a course: searched on worlds that are not in the official sample."""
+"""BARN's worlds as a course; the search flies worlds outside of the official sample."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from quad_nav.tuning.space import Assignments
 class BarnCourse:
     """One flight through each world, with the same seed for every candidate.
 
-    The search flies through worlds spread evenly over those outside of the official sample;
-    the sample's are held out.
+    The search flies through worlds spread evenly over those outside of the official sample. The
+    sample's worlds are held out.
 
     Raises:
-        InputError: the worlds or the parameters cannot be used.
+        InputError: The worlds or the parameters are invalid.
     """
 
     ends_at_contact = True
@@ -54,29 +54,36 @@ class BarnCourse:
 
     @property
     def config(self) -> str:
+        """Name or folder of the base configuration."""
         return self.options.config
 
     @property
     def fixed(self) -> Tuple[Tuple[str, Any], ...]:
+        """Parameters on top of the base."""
         return self.options.parameters
 
     def search_cases(self, count: int) -> Tuple[Case, ...]:
-        """So many flights, through worlds outside of the sample."""
+        """Return this many flights through worlds outside of the sample."""
         return self._cases(self._rest, self.options.seed, count)
 
     def held_out_cases(self, count: int) -> Tuple[Case, ...]:
-        """So many flights through worlds of the sample; 50 are one through each."""
+        """Return this many flights through the sample; 50 fly each world once."""
         return self._cases(self._sample, self.options.seed + HELD_OUT_SEED, count)
 
     def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
-        """A flight; the parameters are checked once for all worlds.
+        """Build a flight; the parameters are checked once for all worlds.
 
         Raises:
-            InputError: they cannot be flown with.
+            InputError: The parameters are invalid.
         """
         of_world = [path for path, _ in assignments if path.startswith(f"{LIDAR}/")]
         if of_world:
-            raise InputError([f"{path}: the LIDAR is the benchmark's own" for path in of_world])
+            raise InputError(
+                [
+                    f"{path}: the benchmark defines the LIDAR; expected a parameter of move_base"
+                    for path in of_world
+                ]
+            )
         if assignments not in self._contestants:
             options = replace(
                 self.options,
@@ -88,7 +95,7 @@ class BarnCourse:
         return flight_setup(contestant, self._worlds[case.course], 0)
 
     def identity(self) -> Dict[str, Any]:
-        """What flights depend on besides candidate and case; plain JSON."""
+        """Return what flights depend on besides candidate and case, as plain JSON."""
         given = self.options
         return {
             "config": {"name": given.config, "files": files_digest(config_folder(given.config))},
@@ -98,7 +105,7 @@ class BarnCourse:
         }
 
     def statistics(self, cases: Sequence[Case], flights: Sequence[FlightResult]) -> BarnStatistics:
-        """The benchmark's own figures of flights."""
+        """Compute the benchmark's statistics of flights."""
         return barn_statistics(
             [
                 run_of(self._worlds[case.course], case, flight)
@@ -114,7 +121,7 @@ class BarnCourse:
 
 
 def run_of(world: BarnWorld, case: Case, flight: FlightResult) -> Run:
-    """A flight as the benchmark judges it: see ``offline.barn.runs.judge``."""
+    """Score a flight by the benchmark's protocol, as ``barn.runs.judge`` does."""
     outcome = (
         Outcome.COLLISION
         if flight.contacts
@@ -137,11 +144,11 @@ def run_of(world: BarnWorld, case: Case, flight: FlightResult) -> Run:
 
 
 def _spread(numbers: Sequence[int]) -> List[int]:
-    """The same numbers, such that any first few of them lie evenly among all."""
+    """Reorder numbers so that any first few of them are spread evenly."""
     order = sorted(range(len(numbers)), key=_reversed_bits)
     return [numbers[k] for k in order]
 
 
 def _reversed_bits(number: int) -> int:
-    """The base-2 van der Corput sequence: the bits of a number in reverse."""
+    """Reverse the bits of a number: the base-2 van der Corput sequence."""
     return int(f"{number:016b}"[::-1], 2)

@@ -1,4 +1,4 @@
-"""What candidates fly: missions in scenes, for the search and held out from it."""
+"""Missions that candidates fly, in the search and held out from it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from quad_nav.sim.simulation import SimulationParams
 from quad_nav.tuning.space import Assignments, costmap_paths
 
 HELD_OUT_SEED = 1_000_000
-"""Added to the seeds of flights that no search ever sees."""
+"""Offset of the seeds of held-out flights."""
 RANDOM = "random"
 LIDAR = "lidar"
 _LIDAR_FIELDS = {"range": "range_max_m", "noise": "noise_std_m"}
@@ -25,7 +25,7 @@ _LIDAR_FIELDS = {"range": "range_max_m", "noise": "noise_std_m"}
 
 @dataclass(frozen=True)
 class Case:
-    """One flight for every candidate: a mission, by its number and name, and a seed."""
+    """Flight that every candidate flies: a mission, by number and name, and a seed."""
 
     course: int
     name: str
@@ -34,17 +34,19 @@ class Case:
 
 @dataclass(frozen=True)
 class Mission:
-    """A scene with goals. Without both, one at random, another for each seed."""
+    """Scene with goals. Without both, a random mission, another one for each seed."""
 
     scene: Optional[Path] = None
     goals: Optional[Path] = None
 
     @property
     def is_random(self) -> bool:
+        """True for random missions."""
         return self.scene is None and self.goals is None
 
     @property
     def name(self) -> str:
+        """Files of the mission, or "random"."""
         if self.is_random:
             return RANDOM
         return " + ".join(str(path) for path in (self.scene, self.goals) if path is not None)
@@ -52,9 +54,20 @@ class Mission:
 
 @dataclass(frozen=True)
 class MissionOptions:
-    """What a person asks for; ``held_out`` empty: the missions of the search, other seeds.
+    """Options of a course of missions.
 
-    ``parameters``: (path, value) on top of the folder's, not searched.
+    Attributes:
+        missions: Missions of the search.
+        held_out: Missions that the search never flies; if empty, those of the search, with other
+            seeds.
+        config: Name or folder of the base configuration.
+        parameters: (path, value) pairs on top of the base, not searched.
+        robots: Number of robots, or None for as many as there are goal files.
+        size_m: Side of a random mission's arena, 0 for automatic.
+        seed: First seed.
+        time_limit_s: Time limit of a flight.
+        scans_per_s: Scans per simulated second.
+        simulation: Parameters of the simulation.
     """
 
     missions: Tuple[Mission, ...]
@@ -70,7 +83,7 @@ class MissionOptions:
 
 
 class MissionCourse:
-    """Missions with displaced starts and noise from the seed, the same for every candidate."""
+    """Missions with start positions and noise from the seed, equal for every candidate."""
 
     ends_at_contact = False
 
@@ -80,27 +93,29 @@ class MissionCourse:
 
     @property
     def config(self) -> str:
+        """Name or folder of the base configuration."""
         return self.options.config
 
     @property
     def fixed(self) -> Tuple[Tuple[str, Any], ...]:
+        """Parameters on top of the base."""
         return self.options.parameters
 
     def search_cases(self, count: int) -> Tuple[Case, ...]:
-        """So many flights, in turn through the missions of the search."""
+        """Return this many flights, in turn through the missions of the search."""
         return _cases(self._missions, range(len(self.options.missions)), self.options.seed, count)
 
     def held_out_cases(self, count: int) -> Tuple[Case, ...]:
-        """So many flights with seeds, and missions where there are such, that no search sees."""
+        """Return this many flights with seeds, and missions if given, held out."""
         first = len(self.options.missions) if self.options.held_out else 0
         last = len(self._missions)
         return _cases(self._missions, range(first, last), self.options.seed + HELD_OUT_SEED, count)
 
     def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
-        """A flight, read from its files.
+        """Read a flight from its files.
 
         Raises:
-            InputError: the parameters cannot be flown with, or the files cannot be read.
+            InputError: The parameters are invalid, or the files cannot be read.
         """
         mission, given = self._missions[case.course], self.options
         world, parameters = _split(assignments)
@@ -119,7 +134,7 @@ class MissionCourse:
         return _without_files(read_setup(options))
 
     def identity(self) -> Dict[str, Any]:
-        """What flights depend on besides candidate and case; plain JSON."""
+        """Return what flights depend on besides candidate and case, as plain JSON."""
         given = self.options
         return {
             "config": {"name": given.config, "files": files_digest(config_folder(given.config))},
@@ -135,24 +150,23 @@ class MissionCourse:
 
 
 def check_missions(options: MissionOptions) -> List[str]:
-    """Every fault in files and parameters, and the warnings about them.
+    """Check the files and parameters of all missions and return the warnings.
 
     Raises:
-        InputError: every fault.
+        InputError: Lists every fault.
     """
     course = MissionCourse(options)
     problems: List[str] = []
     warnings: List[str] = []
     twice = set(options.missions) & set(options.held_out)
     problems += [
-        f"held out: {mission.name} is searched with too; expected another mission"
+        f"held out: {mission.name} is also a mission of the search; expected another mission"
         for mission in twice
         if not mission.is_random
     ]
     if options.seed >= HELD_OUT_SEED:
         problems.append(
-            f"seed: {options.seed}, expected less than {HELD_OUT_SEED}, where seeds "
-            "that are held out begin"
+            f"seed: {options.seed}, expected less than {HELD_OUT_SEED}, the first held-out seed"
         )
     cases = [
         *course.search_cases(len(options.missions)),
@@ -169,7 +183,7 @@ def check_missions(options: MissionOptions) -> List[str]:
 
 
 def files_digest(*paths: Path) -> str:
-    """A digest of files, or of the YAML and JSON files in folders, with their names."""
+    """Return a digest of files, or of the YAML and JSON files in folders, with names."""
     digest = hashlib.sha256()
     for path in paths:
         files = (
@@ -198,7 +212,7 @@ def _described(mission: Mission) -> Dict[str, str]:
 
 
 def _split(assignments: Assignments) -> Tuple[Dict[str, Any], Assignments]:
-    """Values of the LIDAR by name, and parameters of move_base."""
+    """Split assignments into values of the LIDAR, by name, and parameters of move_base."""
     world = {
         path.split("/", 1)[1]: value for path, value in assignments if path.startswith(f"{LIDAR}/")
     }
@@ -210,7 +224,10 @@ def _single(parameters: Sequence[Tuple[str, Any]]) -> Assignments:
 
 
 def _simulation(simulation: SimulationParams, world: Mapping[str, Any]) -> SimulationParams:
-    """With another LIDAR: lidar/range and lidar/noise in metres, lidar/scan_range in radians."""
+    """Replace the LIDAR's values.
+
+    ``lidar/range`` and ``lidar/noise`` are in metres, ``lidar/scan_range`` in radians.
+    """
     lidar = simulation.lidar
     for name, value in world.items():
         if name not in (*_LIDAR_FIELDS, "scan_range", "beams"):
@@ -235,7 +252,7 @@ def _simulation(simulation: SimulationParams, world: Mapping[str, Any]) -> Simul
 
 
 def _without_files(setup: FlightSetup) -> FlightSetup:
-    """Goals that need no file any more: it may not be where they are flown."""
+    """Detach the goals from their files, which may not exist on the worker's machine."""
     robots = tuple(
         replace(robot, file=WatchedGoalFile(Path(robot.file.path).name)) for robot in setup.robots
     )
@@ -243,4 +260,5 @@ def _without_files(setup: FlightSetup) -> FlightSetup:
 
 
 def identity_text(identity: Mapping[str, Any]) -> str:
+    """Serialize an identity with sorted keys."""
     return json.dumps(identity, sort_keys=True, default=str)

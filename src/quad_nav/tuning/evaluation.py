@@ -1,4 +1,4 @@
-"""Candidates times flights: each flown once, whoever asks for it and however often."""
+"""Fly candidates, each flight only once."""
 
 from __future__ import annotations
 
@@ -14,61 +14,65 @@ from quad_nav.tuning.space import Assignments, SearchSpace, Values
 
 
 class Course(Protocol):
-    """What candidates fly; see ``courses`` and ``barn_course``."""
+    """Set of flights that every candidate flies; see ``courses`` and ``barn_course``."""
 
     @property
     def ends_at_contact(self) -> bool:
-        """Whether a flight is over when something is touched."""
+        """True if a flight ends at its first contact."""
 
     @property
     def config(self) -> str:
-        """The base: a shipped folder's name or a folder."""
+        """Name or folder of the base configuration."""
 
     @property
     def fixed(self) -> Tuple[Tuple[str, Any], ...]:
         """Parameters on top of the base."""
 
     def search_cases(self, count: int) -> Tuple[Case, ...]:
-        """The first flights of the search."""
+        """Return the first flights of the search."""
 
     def held_out_cases(self, count: int) -> Tuple[Case, ...]:
-        """Flights that the search never sees."""
+        """Return flights that the search never flies."""
 
     def setup(self, case: Case, assignments: Assignments) -> FlightSetup:
-        """One flight with parameters on top of the base; InputError if it cannot be."""
+        """Build a flight with parameters on top of the base.
+
+        Raises:
+            InputError: The parameters are invalid.
+        """
 
     def identity(self) -> Dict[str, Any]:
-        """What else flights depend on."""
+        """Return what flights depend on besides candidate and case."""
 
 
 def task_of(course: Course, case: Case, assignments: Assignments) -> FlightTask:
-    """A flight that can be sent anywhere; it says if the parameters cannot be used."""
+    """Build a flight for a worker process; invalid parameters are noted in the task."""
     try:
         return FlightTask(course.setup(case, assignments), course.ends_at_contact)
     except InputError as error:
         return FlightTask(None, refused="; ".join(error.problems))
 
 
-class Watcher:
-    """Is told how the work goes on; every method may do nothing."""
+class StudyObserver:
+    """Base class of progress displays; every method may do nothing."""
 
-    def expect(self, flights: int) -> None:
-        """So many flights more will come, or less."""
+    def on_expected(self, flights: int) -> None:
+        """Handle a change of the number of expected flights."""
 
-    def stage(self, name: str) -> None:
-        """What is flown for now."""
+    def on_stage(self, name: str) -> None:
+        """Handle the start of a stage of the study."""
 
-    def flown(self, flight: FlightResult, kept: bool) -> None:
-        """A flight is over, or was flown before and ``kept``."""
+    def on_flight(self, flight: FlightResult, cached: bool) -> None:
+        """Handle a result, of a new flight or from the cache."""
 
-    def told(self, candidates: int, best: float) -> None:
-        """So many candidates are through; ``best`` is the least cost so far."""
+    def on_candidates(self, candidates: int, best: float) -> None:
+        """Handle completed candidates; ``best`` is the lowest cost so far."""
 
 
 class Evaluation:
-    """Flies what is not in the journal yet, and keeps it there as it comes.
+    """Flies what is not in the cache, and caches each result at once.
 
-    ``context``: what else tells flights apart in a journal of several studies.
+    ``context`` distinguishes the flights of several studies in one cache.
     """
 
     def __init__(
@@ -77,23 +81,23 @@ class Evaluation:
         space: SearchSpace,
         workers: Workers,
         journal: FlightCache,
-        watcher: Watcher,
+        observer: StudyObserver,
         context: Optional[Mapping[str, Any]] = None,
     ) -> None:
         self.course = course
         self.space = space
-        self.watcher = watcher
+        self.observer = observer
         self._workers = workers
         self._cache = journal
         self._context = {} if context is None else dict(context)
         self._counted: Set[Key] = set()
 
     def of(self, course: Course, context: Mapping[str, Any]) -> Evaluation:
-        """The same workers and journal for another course."""
-        return Evaluation(course, self.space, self._workers, self._cache, self.watcher, context)
+        """Return an evaluation of another course with the same workers and cache."""
+        return Evaluation(course, self.space, self._workers, self._cache, self.observer, context)
 
     def fly(self, wanted: Iterable[Tuple[Values, Case]]) -> None:
-        """Afterwards all of them are in the journal."""
+        """Fly all cases that are not in the cache."""
         missing: Dict[Key, Tuple[Values, Case]] = {}
         for values, case in wanted:
             key = self._key(values, case)
@@ -101,7 +105,7 @@ class Evaluation:
                 missing[key] = (values, case)
             elif key not in self._counted:
                 self._counted.add(key)
-                self.watcher.flown(self._cache[key], True)
+                self.observer.on_flight(self._cache[key], True)
         keys = list(missing)
         tasks = [
             (number, task_of(self.course, case, self.space.assignments(values)))
@@ -110,16 +114,16 @@ class Evaluation:
         for number, flight in fly_all(self._workers, fly_task, tasks):
             self._cache.add(keys[number], flight)
             self._counted.add(keys[number])
-            self.watcher.flown(flight, False)
+            self.observer.on_flight(flight, False)
 
     def flights(self, values: Values, cases: Sequence[Case]) -> List[FlightResult]:
-        """Results of flights that were flown, in the cases' order."""
+        """Return the cached results of a candidate, in the order of the cases."""
         return [self._cache[self._key(values, case)] for case in cases]
 
-    def flown(
+    def evaluate(
         self, candidates: Sequence[Values], cases: Sequence[Case]
     ) -> List[List[FlightResult]]:
-        """Flies them and returns each candidate's results."""
+        """Fly all candidates and return each candidate's results."""
         self.fly((values, case) for case in cases for values in candidates)
         return [self.flights(values, cases) for values in candidates]
 

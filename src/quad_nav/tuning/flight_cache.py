@@ -1,7 +1,7 @@
-"""Flights that were flown, in an SQLite file, so that none is flown twice.
+"""Cache of flight results in an SQLite file, so that no flight is flown twice.
 
-Each is committed as soon as it is over: what is there survives Ctrl-C, a crash and kill -9.
-Only the process that hands out the flights writes.
+Each result is committed when the flight ends: it survives Ctrl-C, a crash and kill -9. Only the
+process that distributes the flights writes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _TABLE = (
 
 
 class FlightCache:
-    """``path`` None keeps flights for as long as the object lives."""
+    """Results of flights by key; ``path`` None keeps them in memory only."""
 
     def __init__(self, path: Optional[Path] = None) -> None:
         self._path = path
@@ -49,7 +49,7 @@ class FlightCache:
         return len(self._flights)
 
     def add(self, key: Key, flight: FlightResult) -> None:
-        """Keeps a flight; it is on the disk when this returns."""
+        """Add a result; it is on disk when the method returns."""
         if self._path is not None:
             with closing(sqlite3.connect(self._path, timeout=60.0)) as file, file:
                 file.execute("INSERT INTO flights VALUES (?, ?, ?, ?)", (*key, flight.to_json()))
@@ -57,5 +57,5 @@ class FlightCache:
 
 
 def key_text(parameters: Dict[str, object]) -> str:
-    """The parameters of a ``Key``."""
+    """Serialize the parameters of a ``Key``."""
     return json.dumps(parameters, sort_keys=True)

@@ -1,4 +1,4 @@
-"""What one flight comes to, and flying it."""
+"""Fly one flight of a study, and its result."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightSetup
 
 _TURN_ARM_M = 0.3
-"""A change of the turn rate counts as that of the speed so far from the middle: at the hull."""
+"""Distance of the hull from the centre, at which a change of turn rate counts as speed."""
 
 
 @dataclass(frozen=True)
 class FlightTask:
-    """A flight with everything that it needs, so that another machine can fly it.
+    """Flight that any machine can fly, with everything it needs.
 
-    ``refused`` says why it cannot be flown; then ``setup`` is None.
+    ``refused`` is the reason why the parameters are invalid; ``setup`` is None then.
     """
 
     setup: Optional[FlightSetup]
@@ -32,12 +32,20 @@ class FlightTask:
 
 @dataclass(frozen=True)
 class FlightResult:
-    """One flight. Gaps are between hulls, None where nothing was near.
+    """Result of a flight. Distances are between hulls, None if nothing was near.
 
-    ``time_s``: from the first goal to the last one's end, of the quadcopter that took longest.
-    ``straight_m``: the longest way of a quadcopter, straight from its start through its goals.
-    ``roughness_mps2``: how much commands change in a second, see ``Roughness``.
-    ``reason``: why it ended early or could not be flown.
+    Attributes:
+        goals: Number of goals.
+        reached: Number of reached goals.
+        contacts: Number of contacts.
+        time_s: Time from the first goal to the last one's end, of the slowest robot.
+        straight_m: Length of the straight path from the start through the goals, of the robot for
+            which it is longest.
+        clearance_m: Smallest clearance.
+        separation_m: Smallest separation.
+        roughness_mps2: Mean change of the commands per second, see ``Roughness``.
+        recoveries: Number of recovery behaviours.
+        reason: Reason why the flight ended early or did not start.
     """
 
     goals: int
@@ -53,30 +61,32 @@ class FlightResult:
 
     @property
     def completed(self) -> bool:
-        """Every goal was reached."""
+        """True if every goal was reached."""
         return self.goals > 0 and self.reached == self.goals
 
     @property
     def succeeded(self) -> bool:
-        """Every goal was reached and nothing touched."""
+        """True if every goal was reached without contact."""
         return self.completed and self.contacts == 0
 
     @property
     def gap_m(self) -> Optional[float]:
-        """To whatever came nearest."""
+        """Smaller of clearance and separation."""
         gaps = [gap for gap in (self.clearance_m, self.separation_m) if gap is not None]
         return min(gaps, default=None)
 
     def to_json(self) -> str:
+        """Serialize the result."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> FlightResult:
+        """Parse a serialized result."""
         return cls(**json.loads(text))
 
 
 def fly_task(task: FlightTask) -> FlightResult:
-    """Flies it; parameters that cannot be flown with reach no goal."""
+    """Fly a task; invalid parameters reach no goal."""
     if task.setup is None:
         return FlightResult(1, 0, 0, 0.0, 1.0, reason=task.refused)
     roughness = Roughness()
@@ -86,7 +96,7 @@ def fly_task(task: FlightTask) -> FlightResult:
 
 
 def result_of(summary: MissionSummary, setup: FlightSetup, roughness_mps2: float) -> FlightResult:
-    """What counts of a flight's summary."""
+    """Extract the result from a flight's summary."""
     legs = [leg for robot in summary.robots for leg in robot.legs]
     return FlightResult(
         goals=len(legs),
@@ -106,10 +116,10 @@ def result_of(summary: MissionSummary, setup: FlightSetup, roughness_mps2: float
 
 
 class Roughness(FlightObserver):
-    """The sum of all changes of commands, by the time and the number of quadcopters.
+    """Measures the mean change of the commands per second and robot.
 
-    A command is (vx, vy, turn rate); a change of the turn rate counts 0.3 m times it, what it
-    is at the hull. A command that is not followed by another one changes nothing.
+    A command is (vx, vy, turn rate). A change of the turn rate counts as the change of speed that
+    it causes at the hull, 0.3 m from the centre. A command without a successor changes nothing.
     """
 
     def __init__(self) -> None:
@@ -118,9 +128,11 @@ class Roughness(FlightObserver):
         self._time_s = 0.0
 
     def on_start(self, flight: Flight) -> None:
+        """Reset the last commands."""
         self._last = [None] * len(flight.robots)
 
     def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+        """Add the change from the last command."""
         new, old = tick.command, self._last[robot]
         if new is None:
             return
@@ -130,11 +142,12 @@ class Roughness(FlightObserver):
         self._last[robot] = new
 
     def on_end(self, flight: Flight) -> None:
+        """Store the flight's duration."""
         self._time_s = flight.now_s
 
     @property
     def mean_mps2(self) -> float:
-        """Per second and quadcopter."""
+        """Mean change of the commands per second and robot."""
         robot_s = self._time_s * len(self._last)
         return self._total_mps / robot_s if robot_s > 0.0 else 0.0
 

@@ -1,4 +1,4 @@
-"""Tuned parameters as move_base's files: the base's own, with other values in some places."""
+"""Write tuned parameters as move_base's files, edited copies of the base's files."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _OF_PLANNERS = re.compile(r"[A-Z]\w*")  # namespaces of planners are their class
 
 
 class FilesDiffer(QuadError):
-    """What was written does not load as what was meant; the base is written too oddly."""
+    """The edited files do not load as intended; the base's YAML cannot be edited."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """A parameter's new value with the remark beside it; ``path`` may be of both costmaps."""
+    """New value of a parameter with its remark; ``path`` may name both costmaps."""
 
     path: str
     value: Any
@@ -35,16 +35,16 @@ class Change:
 def base_configuration(
     folder: Path, fixed: Sequence[Tuple[str, Any]], robot: int = 0
 ) -> config.Configuration:
-    """What flies with the base.
+    """Load the configuration of the base.
 
     Raises:
-        InputError: it cannot be flown with.
+        InputError: The configuration is invalid.
     """
     return config.load(_tree(folder, fixed, robot))
 
 
 def base_value(tree: Mapping[str, Any], path: str) -> Any:
-    """The value in force in a normalised tree, None when there is none.
+    """Return the effective value in a loaded tree, None if there is none.
 
     A costmap's own key may have moved into the layer that reads it.
     """
@@ -59,10 +59,10 @@ def base_value(tree: Mapping[str, Any], path: str) -> Any:
 
 
 def write_parameters(base: Path, target: Path, changes: Sequence[Change]) -> None:
-    """Writes the base's files with ``changes`` into a folder.
+    """Write the base's files with ``changes`` into a folder.
 
     Raises:
-        FilesDiffer: they would not load as the base with these changes; nothing is written.
+        FilesDiffer: The files would not load as the base with these changes. Nothing is written.
     """
     files = {
         path.name: path.read_text(encoding="utf-8")
@@ -89,7 +89,7 @@ def _write(files: Mapping[str, str], folder: Path) -> None:
 
 
 def _change(files: Dict[str, str], change: Change) -> None:
-    """Replaces the value wherever it stands; where it belongs it is put if it does not."""
+    """Replace the value everywhere it is set, or insert it where it belongs."""
     home, home_path = _home(change.path)
     if not any(_stem(name) == home for name in files):
         files[f"{home}.yaml"] = ""
@@ -109,7 +109,7 @@ def _change(files: Dict[str, str], change: Change) -> None:
 
 
 def _home(path: str) -> Tuple[str, str]:
-    """The file that a parameter belongs to, and its path there."""
+    """Return the file that a parameter belongs to, and its path there."""
     first, _, rest = path.partition("/")
     if first == BOTH:
         return COMMON, rest
@@ -124,7 +124,7 @@ def _stem(name: str) -> str:
 
 
 def _check(base: Path, written: Path, changes: Sequence[Change]) -> None:
-    """Loads both, for every robot that has files of its own and for one without."""
+    """Load base and result, for every robot with files of its own and for one without."""
     numbers = {
         int(match.group(2))
         for match in map(_FILE.fullmatch, (path.name for path in base.glob("*.yaml")))
@@ -136,8 +136,8 @@ def _check(base: Path, written: Path, changes: Sequence[Change]) -> None:
         found = config.load(_tree(written, (), robot)).to_tree()
         if meant != found:
             raise FilesDiffer(
-                f"{base}: its files cannot be edited, robot {robot} would fly with "
-                f"something else: {', '.join(_unlike(meant, found))}"
+                f"{base}: cannot edit its files: robot {robot} would "
+                f"get other parameters: {', '.join(_unlike(meant, found))}"
             )
 
 

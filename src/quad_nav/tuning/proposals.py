@@ -1,9 +1,10 @@
-"""What to fly next: candidates from those that were told, by Optuna's TPE sampler.
+"""Propose candidates from earlier trials with Optuna's TPE sampler, and prune candidates.
 
-Bergstra et al., "Algorithms for Hyper-Parameter Optimization", 2011. Candidates come in
-generations of a fixed size. A generation depends on the seed, its number and the trials of the
-generations before it and on nothing else, so that neither the number of workers nor an
-interruption changes the study.
+Candidates come in generations of a fixed size. A generation depends only on the seed, its number
+and the trials of earlier generations. So neither the number of workers nor an interruption
+changes the study.
+
+Source: J. Bergstra et al., "Algorithms for Hyper-Parameter Optimization", NIPS 2011.
 """
 
 from __future__ import annotations
@@ -24,24 +25,24 @@ from optuna.trial import FrozenTrial, TrialState
 
 from quad_nav.tuning.space import Dimension, SearchSpace
 
-RANDOM_TRIALS = 16
-"""So many candidates are drawn at random before there is anything to learn from."""
-JUDGED_FROM_TRIALS = 5
-"""Nobody is dropped before so many candidates have flown everything."""
+STARTUP_TRIALS = 16
+"""Number of candidates that are drawn at random before the sampler learns from trials."""
+PRUNING_FROM_TRIALS = 5
+"""No pruning before this many candidates have completed."""
 
 optuna.logging.set_verbosity(logging.WARNING)
 
 
 def distributions(space: SearchSpace) -> Dict[str, BaseDistribution]:
-    """The space in Optuna's words."""
+    """Convert the space to Optuna's distributions."""
     return {one.path: _distribution(one) for one in space.dimensions}
 
 
 def propose(
-    space: SearchSpace, told: Sequence[FrozenTrial], generation: int, size: int, seed: int
+    space: SearchSpace, history: Sequence[FrozenTrial], generation: int, size: int, seed: int
 ) -> List[Dict[str, Any]]:
-    """The candidates of a generation; ``told`` are all trials of those before it."""
-    study = _study(told, seed, generation)
+    """Return the candidates of a generation; ``history`` holds all earlier trials."""
+    study = _study(history, seed, generation)
     wanted = distributions(space)
     trials = [study.ask(wanted) for _ in range(size)]
     return [
@@ -50,32 +51,37 @@ def propose(
     ]
 
 
-def is_hopeless(told: Sequence[FrozenTrial], flights: int, running_mean: float) -> bool:
-    """Whether a candidate with this mean cost after so many flights is dropped.
+def should_prune(history: Sequence[FrozenTrial], flights: int, running_mean: float) -> bool:
+    """Return true if a candidate is worse than the median at the same flight.
 
-    It is when it is worse than the median of those that have flown everything was at the same
-    flight; all fly the same ones. Optuna's own pruner would take a candidate's best mean so far,
-    its luck at the first flights, so it is shown the newest alone.
+    The median is that of the trials that completed all flights; all fly the same cases. Optuna's
+    pruner would compare a candidate's best mean so far, which rewards luck in the first flights.
+    It gets only the newest mean here.
+
+    Args:
+        history: Earlier trials.
+        flights: Flights that the candidate has flown.
+        running_mean: Its mean cost over them.
     """
     pruner = optuna.pruners.MedianPruner(
-        n_startup_trials=JUDGED_FROM_TRIALS, n_min_trials=JUDGED_FROM_TRIALS
+        n_startup_trials=PRUNING_FROM_TRIALS, n_min_trials=PRUNING_FROM_TRIALS
     )
     trial = optuna.create_trial(
         state=TrialState.RUNNING, intermediate_values={flights: running_mean}
     )
-    return pruner.prune(_study(told, 0, 0), trial)
+    return pruner.prune(_study(history, 0, 0), trial)
 
 
-def _study(told: Sequence[FrozenTrial], seed: int, generation: int) -> optuna.Study:
-    """The trials in memory, with the sampler of a generation."""
+def _study(history: Sequence[FrozenTrial], seed: int, generation: int) -> optuna.Study:
+    """Create a study in memory with the sampler of a generation."""
     number = int(np.random.SeedSequence([seed, generation]).generate_state(1)[0])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
         sampler = optuna.samplers.TPESampler(
-            n_startup_trials=RANDOM_TRIALS, multivariate=True, constant_liar=True, seed=number
+            n_startup_trials=STARTUP_TRIALS, multivariate=True, constant_liar=True, seed=number
         )
     study = optuna.create_study(sampler=sampler)
-    study.add_trials(told)
+    study.add_trials(history)
     return study
 
 

@@ -1,8 +1,8 @@
-"""The best candidate: found among the best few with more flights, then made as small as it can be.
+"""Select the best candidate, and take needless changes back.
 
-A candidate that was the best of many in few flights was lucky too. So the best few fly more,
-and so does the base. Then every change that does no good is taken back, and what each of the
-others gains is measured: flights without it beside flights with it.
+The best of many candidates in few flights was lucky, too. So the best few fly more, and so does
+the base. Then every change without a benefit is taken back, and the gain of each remaining
+change is measured: flights without it beside flights with it.
 """
 
 from __future__ import annotations
@@ -17,15 +17,20 @@ from quad_nav.tuning.space import Values
 from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
 
 BASE: Values = {}
-TRIFLE = 0.02
-"""Cost that no parameter is changed for: a second in 50 m of flight."""
+NEGLIGIBLE_COST = 0.02
+"""Smallest cost that justifies a change: one second in 50 m of flight."""
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What a changed parameter does: figures with it and without it, in the same flights.
+    """Effect of one changed parameter in the same flights.
 
-    ``base``: the value that it had, None where the base does not know it.
+    Attributes:
+        path: Path of the parameter.
+        value: Tuned value.
+        base: Base's value, None if the base does not set it.
+        with_it: Statistics with the change.
+        without_it: Statistics without the change.
     """
 
     path: str
@@ -36,19 +41,19 @@ class Gain:
 
     @property
     def cost(self) -> float:
-        """What it saves."""
+        """Cost that the change saves."""
         return self.without_it.cost - self.with_it.cost
 
     @property
     def time_s(self) -> Optional[float]:
-        """Seconds that a mission takes less with it; None where one of both never flew one."""
+        """Time that the change saves per mission; None if one set completed no mission."""
         before, after = self.without_it.mean_time_s, self.with_it.mean_time_s
         return None if before is None or after is None else before - after
 
 
 @dataclass(frozen=True)
-class Refined:
-    """The winner: what it changes, and what that gains; empty when nothing beats the base."""
+class Refinement:
+    """Changes of the winner and their gains; empty if no candidate is better than the base."""
 
     values: Dict[str, Any]
     gains: Tuple[Gain, ...]
@@ -60,27 +65,29 @@ def refine(
     base: Mapping[str, Any],
     few: Sequence[Case],
     many: Sequence[Case],
-) -> Refined:
-    """The best of ``finalists`` and the base.
+) -> Refinement:
+    """Select the best of ``finalists`` and the base, and simplify it.
 
     Args:
-        base: the base's own value of each parameter of the space.
-        few: flights that are enough to see what does no good.
-        many: flights that decide, ``few`` among them.
+        evaluation: Flies the candidates.
+        finalists: Best candidates of the search.
+        base: Base's value of each searched parameter.
+        few: Cases that screen for changes without benefit.
+        many: Cases that decide; they include ``few``.
     """
     candidates = [BASE, *(_changed(values, base) for values in finalists)]
-    evaluation.watcher.stage("choosing among the best")
-    evaluation.watcher.expect(len(candidates) * len(many))
-    flights = evaluation.flown(candidates, many)
+    evaluation.observer.on_stage("finalists")
+    evaluation.observer.on_expected(len(candidates) * len(many))
+    flights = evaluation.evaluate(candidates, many)
     costs = list(map(mean_cost, flights))
     best = candidates[costs.index(min(costs))]
     values = _simplified(evaluation, best, few, many)
-    evaluation.watcher.stage("measuring what each change gains")
-    return Refined(values, _gains(evaluation, values, base, many))
+    evaluation.observer.on_stage("gain of each change")
+    return Refinement(values, _gains(evaluation, values, base, many))
 
 
 def _changed(values: Values, base: Mapping[str, Any]) -> Dict[str, Any]:
-    """Without values that are the base's own and that nothing follows."""
+    """Drop values that equal the base's."""
     return {path: value for path, value in values.items() if base.get(path) != value}
 
 
@@ -91,22 +98,26 @@ def _without(values: Values, paths: Sequence[str]) -> Dict[str, Any]:
 def _simplified(
     evaluation: Evaluation, best: Values, few: Sequence[Case], many: Sequence[Case]
 ) -> Dict[str, Any]:
-    """Without changes that do no good, if it is no worse without all of them."""
-    evaluation.watcher.stage("taking back what does no good")
-    evaluation.watcher.expect(len(best) * len(few))
+    """Take changes without benefit back, if all of them together are no benefit either."""
+    evaluation.observer.on_stage("simplification")
+    evaluation.observer.on_expected(len(best) * len(few))
     savings = [
         (path, cost - mean_cost(evaluation.flights(best, few)))
         for path, cost in zip(best, _costs_without(evaluation, best, few))
     ]
-    idle = [path for path, saving in sorted(savings, key=lambda pair: pair[1]) if saving <= TRIFLE]
-    limit = mean_cost(evaluation.flights(best, many)) + TRIFLE
+    idle = [
+        path
+        for path, saving in sorted(savings, key=lambda pair: pair[1])
+        if saving <= NEGLIGIBLE_COST
+    ]
+    limit = mean_cost(evaluation.flights(best, many)) + NEGLIGIBLE_COST
     simplest = dict(best)
     waiting = [idle] if idle else []
-    while waiting:  # all at once, then in halves: together they may matter
+    while waiting:  # all at once, then halves: they may matter together
         paths = waiting.pop(0)
         simpler = _without(simplest, paths)
-        evaluation.watcher.expect(len(many))
-        (flights,) = evaluation.flown([simpler], many)
+        evaluation.observer.on_expected(len(many))
+        (flights,) = evaluation.evaluate([simpler], many)
         if mean_cost(flights) <= limit:
             simplest = simpler
         elif len(paths) > 1:
@@ -117,16 +128,16 @@ def _simplified(
 
 def _costs_without(evaluation: Evaluation, values: Values, cases: Sequence[Case]) -> List[float]:
     return list(
-        map(mean_cost, evaluation.flown([_without(values, [path]) for path in values], cases))
+        map(mean_cost, evaluation.evaluate([_without(values, [path]) for path in values], cases))
     )
 
 
 def _gains(
     evaluation: Evaluation, values: Values, base: Mapping[str, Any], cases: Sequence[Case]
 ) -> Tuple[Gain, ...]:
-    """Of every change, the largest first."""
-    evaluation.watcher.expect(len(values) * len(cases))
-    without = evaluation.flown([_without(values, [path]) for path in values], cases)
+    """Measure the gain of every change, largest first."""
+    evaluation.observer.on_expected(len(values) * len(cases))
+    without = evaluation.evaluate([_without(values, [path]) for path in values], cases)
     with_it = flight_statistics(evaluation.flights(values, cases))
     gains = [
         Gain(path, value, base.get(path), with_it, flight_statistics(flights))

@@ -1,8 +1,8 @@
-"""How good a flight is: one number, lower is better.
+"""Score of a flight: one number, lower is better.
 
-``TERMS`` is the whole of it. Their weights are so far apart that within one flight the first
-term outweighs all below it, and the second all below that: a goal that was not reached costs
-at least 5000, a contact 50 to 100, everything else less than 50 together.
+``TERMS`` defines it. The weights are so far apart that within one flight the first term outweighs
+all others, and the second all below it: a goal that was not reached costs at least 5000, a
+contact 50 to 100, everything else less than 50 in total.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ ROUGHEST_MPS2 = 10.0
 
 @dataclass(frozen=True)
 class Term:
-    """``value`` of a flight times ``weight`` is what the term costs."""
+    """Term of the score: the value of a flight times ``weight`` is its cost."""
 
     name: str
     weight: float
-    what: str
+    description: str
     value: Callable[[FlightResult], float]
 
 
@@ -55,34 +55,39 @@ TERMS: Tuple[Term, ...] = (
     Term(
         "goals",
         10000.0,
-        "0 when every goal was reached, else from 0.5 (all but few) to 1 (none)",
+        "0 if every goal was reached, otherwise from 0.5 (almost all) to 1 (none)",
         _failure,
     ),
-    Term("contacts", 100.0, "0 for none, 0.5 for one, 0.75 for two, ... towards 1", _contact),
+    Term("contacts", 100.0, "0 for none, 0.5 for one, 0.75 for two, approaching 1", _contact),
     Term(
         "time",
         1.0,
-        f"seconds for each metre of the longest straight way, at most {SLOWEST_S_PER_M:g}",
+        f"seconds per metre of the longest straight path, at most {SLOWEST_S_PER_M:g}",
         _pace_s_per_m,
     ),
     Term(
         "clearance",
         1.0,
-        f"0 when nothing came nearer than {COMFORTABLE_GAP_M:g} m, hull to "
-        "hull, up to 1 for a touch",
+        f"0 for gaps of {COMFORTABLE_GAP_M:g} m or more, rising to 1 for a contact",
         _tightness,
     ),
     Term(
-        "smoothness", 0.5, f"change of commands, m/s^2, at most {ROUGHEST_MPS2:g}", _roughness_mps2
+        "smoothness",
+        0.5,
+        f"change of commands in m/s^2, at most {ROUGHEST_MPS2:g}",
+        _roughness_mps2,
     ),
 )
 
 
 def cost(flight: FlightResult) -> float:
-    """The sum of all terms."""
+    """Sum all terms of a flight."""
     return sum(term.weight * term.value(flight) for term in TERMS)
 
 
 def mean_cost(flights: Sequence[FlightResult]) -> float:
-    """Of at least one flight; summed in their order, so that equal flights cost the same."""
+    """Return the mean cost of at least one flight.
+
+    It is summed in the flights' order, so equal flights have equal costs.
+    """
     return sum(map(cost, flights)) / len(flights)

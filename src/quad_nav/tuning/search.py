@@ -1,4 +1,4 @@
-"""The search: generations of candidates, each flown in rounds that the bad ones do not survive."""
+"""Search: generations of candidates, flown in rounds after which bad candidates are pruned."""
 
 from __future__ import annotations
 
@@ -10,21 +10,25 @@ from optuna.trial import FrozenTrial, TrialState
 
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Evaluation
-from quad_nav.tuning.proposals import distributions, is_hopeless, propose
+from quad_nav.tuning.proposals import distributions, propose, should_prune
 from quad_nav.tuning.score import mean_cost
 from quad_nav.tuning.space import Values
 from quad_nav.tuning.statistics import flight_statistics
 from quad_nav.tuning.study import TuneStudy
 
 FIRST_ROUND = 2
-FIGURES = "figures"
+STATISTICS = "statistics"
 
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """``flights`` of each candidate that is not dropped; ``generation``: its size.
+    """Size of the search.
 
-    ``candidates`` may grow when a study is taken up again; everything else must not change.
+    Attributes:
+        candidates: Number of candidates; it may grow when a study is resumed, all else is fixed.
+        flights: Flights of a candidate that is not pruned.
+        generation: Candidates of a generation.
+        seed: Seed of the sampler.
     """
 
     candidates: int = 60
@@ -34,7 +38,7 @@ class SearchOptions:
 
 
 def rounds(flights: int) -> Tuple[int, ...]:
-    """How many flights have been flown after each round: 2, 4, 8, ... and all."""
+    """Return the number of flights flown after each round: 2, 4, 8, ... and all."""
     counts = []
     count = FIRST_ROUND
     while count < flights:
@@ -44,9 +48,9 @@ def rounds(flights: int) -> Tuple[int, ...]:
 
 
 def search(evaluation: Evaluation, study: TuneStudy, start: Values, options: SearchOptions) -> None:
-    """Until there are ``candidates`` trials. ``start`` is the very first candidate."""
-    evaluation.watcher.expect(options.candidates * options.flights)
-    evaluation.watcher.stage("searching")
+    """Fly generations until there are ``candidates`` trials; ``start`` is the first candidate."""
+    evaluation.observer.on_expected(options.candidates * options.flights)
+    evaluation.observer.on_stage("search")
     for generation in range(-(-options.candidates // options.generation)):
         _fly_generation(evaluation, study, start, options, generation)
 
@@ -55,20 +59,20 @@ def _fly_generation(
     evaluation: Evaluation, study: TuneStudy, start: Values, options: SearchOptions, generation: int
 ) -> None:
     first = generation * options.generation
-    told = study.trials
+    history = study.trials
     candidates: List[Dict[str, Any]] = propose(
-        evaluation.space, told[:first], generation, options.generation, options.seed
+        evaluation.space, history[:first], generation, options.generation, options.seed
     )
     if generation == 0:
         candidates[0] = dict(start)
     candidates = candidates[: options.candidates - first]
     cases = evaluation.course.search_cases(options.flights)
-    means = _fly_rounds(evaluation, told[:first], candidates, cases)
+    means = _fly_rounds(evaluation, history[:first], candidates, cases)
     for number, (values, steps) in enumerate(zip(candidates, means), start=first):
-        if number >= len(told):
-            study.tell(_trial(evaluation, values, steps, cases))
+        if number >= len(history):
+            study.add(_trial(evaluation, values, steps, cases))
         done = study.trials[: number + 1]
-        evaluation.watcher.told(
+        evaluation.observer.on_candidates(
             number + 1,
             min(
                 (trial.value for trial in done if trial.value is not None and is_complete(trial)),
@@ -79,11 +83,11 @@ def _fly_generation(
 
 def _fly_rounds(
     evaluation: Evaluation,
-    told: Sequence[FrozenTrial],
+    history: Sequence[FrozenTrial],
     candidates: Sequence[Values],
     cases: Sequence[Case],
 ) -> List[Dict[int, float]]:
-    """For each candidate: flights -> mean cost of so many, as far as it came."""
+    """Return for each candidate its mean cost after each round that it survived."""
     means: List[Dict[int, float]] = [{} for _ in candidates]
     flying = list(range(len(candidates)))
     for count in rounds(len(cases)):
@@ -91,8 +95,8 @@ def _fly_rounds(
         for k in flying:
             means[k][count] = mean_cost(evaluation.flights(candidates[k], cases[:count]))
         if count < len(cases):
-            hopeless = {k for k in flying if is_hopeless(told, count, means[k][count])}
-            evaluation.watcher.expect(-len(hopeless) * (len(cases) - count))
+            hopeless = {k for k in flying if should_prune(history, count, means[k][count])}
+            evaluation.observer.on_expected(-len(hopeless) * (len(cases) - count))
             flying = [k for k in flying if k not in hopeless]
     return means
 
@@ -101,7 +105,7 @@ def _trial(
     evaluation: Evaluation, values: Values, means: Mapping[int, float], cases: Sequence[Case]
 ) -> FrozenTrial:
     flown = max(means)
-    attributes = {FIGURES: asdict(flight_statistics(evaluation.flights(values, cases[:flown])))}
+    attributes = {STATISTICS: asdict(flight_statistics(evaluation.flights(values, cases[:flown])))}
     return optuna.create_trial(
         state=TrialState.COMPLETE if flown == len(cases) else TrialState.PRUNED,
         value=means[flown],
@@ -113,10 +117,10 @@ def _trial(
 
 
 def is_complete(trial: FrozenTrial) -> bool:
-    """Whether it has flown everything."""
+    """Return true if a trial completed all flights."""
     return trial.state is TrialState.COMPLETE
 
 
 def best_first(trials: Sequence[FrozenTrial]) -> List[FrozenTrial]:
-    """Those that have flown everything, the best first, the older of equal ones."""
+    """Return the complete trials, the best first; of equal ones the older first."""
     return sorted(filter(is_complete, trials), key=lambda trial: (trial.value, trial.number))

@@ -39,9 +39,9 @@ Assignments = Tuple[Tuple[str, Any], ...]
 
 @dataclass(frozen=True)
 class Dimension:
-    """One parameter. It has ``choices``, or lies from ``low`` to ``high``.
+    """Searched parameter: one of ``choices``, or a number from ``low`` to ``high``.
 
-    ``follow``: (path, factor) of parameters that are this one's value times the factor.
+    ``follow`` holds (path, factor) pairs of parameters whose value is this one's times the factor.
     """
 
     path: str
@@ -53,7 +53,7 @@ class Dimension:
     follow: Tuple[Tuple[str, float], ...] = ()
 
     def rounded(self, value: Any) -> Any:
-        """As a person would write it: three digits, and still in the range."""
+        """Round to three digits within the range."""
         if self.choices:
             return value
         if self.integer:
@@ -62,7 +62,7 @@ class Dimension:
         return float(min(max(round(float(value), digits), self.low), self.high))
 
     def nearest(self, value: Any) -> Any:
-        """The value of this dimension that is most like one that may be outside of it."""
+        """Return the value of this dimension closest to ``value``."""
         if self.choices:
             return value if value in self.choices else self.choices[0]
         return self.rounded(value)
@@ -70,17 +70,18 @@ class Dimension:
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """``name`` is the file's; it says where a fault is."""
+    """Searched parameters; ``name`` is the file's, for error messages."""
 
     name: str
     dimensions: Tuple[Dimension, ...]
 
     @property
     def paths(self) -> Tuple[str, ...]:
+        """Paths of the parameters."""
         return tuple(one.path for one in self.dimensions)
 
     def without(self, fixed: Sequence[str]) -> SearchSpace:
-        """Without the parameters that somebody has fixed, and nothing follows onto them."""
+        """Return the space without fixed parameters; followers among them are dropped."""
         names = {path for given in fixed for path in costmap_paths(given)}
         kept = []
         for one in self.dimensions:
@@ -90,7 +91,7 @@ class SearchSpace:
         return replace(self, dimensions=tuple(kept))
 
     def assignments(self, values: Values) -> Assignments:
-        """The values with what follows from them, for each costmap by its own name."""
+        """Return the values and their followers, for each costmap by its own name."""
         found: Dict[str, Any] = {}
         for one in self.dimensions:
             if one.path in values:
@@ -101,7 +102,7 @@ class SearchSpace:
         return tuple(found.items())
 
     def corners(self) -> Tuple[Dict[str, Any], Dict[str, Any]]:
-        """The lowest values of all, and the highest."""
+        """Return the lowest and the highest values of all parameters."""
         low = {
             one.path: one.choices[0] if one.choices else one.rounded(one.low)
             for one in self.dimensions
@@ -114,22 +115,22 @@ class SearchSpace:
 
 
 def costmap_paths(path: str) -> Tuple[str, ...]:
-    """``*_costmap/x`` as the path in each costmap; any other path alone."""
+    """Expand ``*_costmap/x`` to the path in each costmap; other paths stay alone."""
     path = "/".join(word for word in path.split("/") if word)
     first, _, rest = path.partition("/")
     return tuple(f"{name}/{rest}" for name in COSTMAPS) if first == BOTH else (path,)
 
 
 def load_space(path: Path) -> SearchSpace:
-    """The space in a file.
+    """Read a space from a file.
 
     Raises:
-        InputError: every fault in it.
+        InputError: Lists every fault of the file.
     """
     try:
         entries = plain_yaml.load(read_text(path, plain_yaml.MAX_BYTES))
     except yaml.YAMLError as error:
-        raise InputError([f"{path}: cannot be read: {error}"]) from error
+        raise InputError([f"{path}: cannot read: {error}"]) from error
     if not isinstance(entries, dict) or not entries:
         raise InputError(
             [
@@ -212,7 +213,7 @@ def _choice_faults(entry: Mapping[str, Any], place: str) -> List[str]:
 
 
 def _set_twice(dimensions: Sequence[Dimension], path: Path) -> List[str]:
-    """Parameters that more than one entry sets."""
+    """Return a fault for every parameter that more than one entry sets."""
     places: Dict[str, str] = {}
     problems = []
     for one in dimensions:
@@ -220,8 +221,8 @@ def _set_twice(dimensions: Sequence[Dimension], path: Path) -> List[str]:
             for single in costmap_paths(name):
                 if single in places:
                     problems.append(
-                        f"{path}: {one.path}: {single} is set by {places[single]} "
-                        "too; expected one entry for it"
+                        f"{path}: {one.path}: {single} is also set by "
+                        f"{places[single]}; expected one entry for it"
                     )
                 places.setdefault(single, one.path)
     return problems

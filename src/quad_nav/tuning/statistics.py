@@ -1,4 +1,4 @@
-"""What many flights of one set of parameters come to."""
+"""Statistics of many flights of one set of parameters."""
 
 from __future__ import annotations
 
@@ -11,9 +11,20 @@ from quad_nav.tuning.score import mean_cost
 
 @dataclass(frozen=True)
 class FlightStatistics:
-    """``mean_time_s`` is of the flights that reached every goal, None without any.
+    """Counts and means of flights.
 
-    ``touched``: flights with a contact; ``least_gap_m``: the smallest of all, between hulls.
+    Attributes:
+        flights: Number of flights.
+        completed: Flights that reached every goal.
+        succeeded: Flights that reached every goal without contact.
+        contacts: Number of contacts.
+        touched: Flights with contacts.
+        mean_time_s: Mean time of the completed flights, None without any.
+        least_gap_m: Smallest gap of all flights. A gap is the smaller of clearance and separation.
+        mean_gap_m: Mean of the flights' gaps.
+        roughness_mps2: Mean roughness.
+        recoveries: Number of recovery behaviours.
+        cost: Mean cost.
     """
 
     flights: int
@@ -30,7 +41,11 @@ class FlightStatistics:
 
 
 def flight_statistics(flights: Sequence[FlightResult]) -> FlightStatistics:
-    """Raises ValueError without any flight."""
+    """Compute the statistics of flights.
+
+    Raises:
+        ValueError: There are no flights.
+    """
     if not flights:
         raise ValueError("no flights, no figures")
     gaps = [flight.gap_m for flight in flights if flight.gap_m is not None]

@@ -1,8 +1,7 @@
-"""The folder of a study: Optuna's study and the flights in one SQLite file, and what they are of.
+"""Folder of a study: Optuna's study and the flight cache in one SQLite file.
 
-A trial is written when its generation has been flown, finished, in one transaction. What is in
-the air or half a generation is known from the flights alone, so that there is nothing to mend
-after kill -9.
+A trial is written after its generation, in one transaction. An unfinished generation exists only
+as cached flights, so a study needs no repair after kill -9.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ _IDENTITY = "identity"
 
 
 class TuneStudy:
-    """Trials and flights. Open it with ``open_study``."""
+    """Trials and cached flights of a study; created by ``open_study``."""
 
     def __init__(self, study: optuna.Study, journal: FlightCache) -> None:
         self._study = study
@@ -41,18 +40,18 @@ class TuneStudy:
         """Finished trials in order."""
         return self._study.get_trials(deepcopy=False)
 
-    def tell(self, trial: FrozenTrial) -> None:
-        """Keeps a finished trial."""
+    def add(self, trial: FrozenTrial) -> None:
+        """Store a finished trial."""
         self._study.add_trial(trial)
 
 
 @contextmanager
 def open_study(folder: Path, identity: Mapping[str, Any]) -> Iterator[TuneStudy]:
-    """The study in a folder, or a new one.
+    """Open the study in a folder, or create one.
 
     Raises:
-        InputError: somebody else is working on it, it is of something else than ``identity``,
-            or the folder cannot be used.
+        InputError: Another process works on the study, the study has another identity, or the
+            folder cannot be used.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -67,14 +66,14 @@ def open_study(folder: Path, identity: Mapping[str, Any]) -> Iterator[TuneStudy]
 
 
 def _take(lock: int, folder: Path) -> None:
-    """The lock ends with the process, however that ends."""
+    """Lock the study; the lock ends with the process."""
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         raise InputError(
             [
-                f"{folder}: another quad tune works on this study; expected another "
-                "folder with --output"
+                f"{folder}: another quad tune works on this study; expected "
+                "another folder with --output"
             ]
         ) from error
 
@@ -87,7 +86,7 @@ def _read(folder: Path, identity: Mapping[str, Any]) -> TuneStudy:
         )
         journal = FlightCache(path)
     except (sqlite3.Error, sqlalchemy.exc.SQLAlchemyError, RuntimeError) as error:
-        raise InputError([f"{path}: cannot be read as a study: {error}"]) from error
+        raise InputError([f"{path}: cannot read as a study: {error}"]) from error
     # The identity as it comes back from JSON: tuples are lists there.
     wanted: Dict[str, Any] = json.loads(identity_text(identity))
     found = study.user_attrs.get(_IDENTITY)
@@ -96,30 +95,32 @@ def _read(folder: Path, identity: Mapping[str, Any]) -> TuneStudy:
     elif found != wanted:
         raise InputError(
             [
-                f"{folder}: the study there is another one: {line}; expected the same, "
-                "or another folder with --output"
-                for line in unlike(found, wanted)
+                f"{folder}: the folder holds another study: {line}; expected the same "
+                "options, or another folder with --output"
+                for line in json_differences(found, wanted)
             ]
         )
     return TuneStudy(study, journal)
 
 
-def unlike(there: Any, here: Any, place: str = "") -> Sequence[str]:
-    """Where two JSON values differ: "seed was 0 and is 1"."""
+def json_differences(there: Any, here: Any, place: str = "") -> Sequence[str]:
+    """Describe where two JSON values differ, for example "seed was 0 and is 1"."""
     if isinstance(there, dict) and isinstance(here, dict):
         return [
             line
             for key in sorted({*there, *here})
-            for line in unlike(there.get(key), here.get(key), f"{place}/{key}".lstrip("/"))
+            for line in json_differences(
+                there.get(key), here.get(key), f"{place}/{key}".lstrip("/")
+            )
         ]
     if isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
         return [
             line
             for k, (one, other) in enumerate(zip(there, here))
-            for line in unlike(one, other, f"{place}[{k}]")
+            for line in json_differences(one, other, f"{place}[{k}]")
         ]
-    return [] if there == here else [f"{place} was {_told(there)} and is {_told(here)}"]
+    return [] if there == here else [f"{place} was {_shown(there)} and is {_shown(here)}"]
 
 
-def _told(value: Any) -> str:
+def _shown(value: Any) -> str:
     return "absent" if value is None else json.dumps(value)

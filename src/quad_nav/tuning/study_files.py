@@ -1,4 +1,4 @@
-"""A study's outcome as files: parameters, record, figures and report."""
+"""Write the outputs of a study: parameters, description, results and report."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from quad_nav.tuning.tune import TuneResult
 
 PARAMETERS = "config"
 RECORD = "STUDY.md"
-FIGURES = "results.json"
+RESULTS = "results.json"
 REPORT = "report.html"
 
 
 def write_result(result: TuneResult, command: str) -> Iterator[Path]:
-    """Writes everything into the study's folder; yields what is there now."""
+    """Write everything into the study's folder; yield each path when it is written."""
     folder = result.setup.options.output
     parameters = folder / PARAMETERS
     write_parameters(result.setup.base_folder, parameters, changes(result))
     (parameters / RECORD).write_text(markdown(result, command), encoding="utf-8")
     yield parameters
     text = json.dumps(to_json(result, command), indent=2, allow_nan=False, default=str)
-    (folder / FIGURES).write_text(text + "\n", encoding="utf-8")
-    yield folder / FIGURES
+    (folder / RESULTS).write_text(text + "\n", encoding="utf-8")
+    yield folder / RESULTS
     yield _write_report(result, command)
 
 
 def _write_report(result: TuneResult, command: str) -> Path:
-    """Imported here: a study can be run without waiting for what draws."""
+    """Write the report; the import is local because matplotlib loads slowly."""
     from quad_nav.report.page import write_page
     from quad_nav.tuning.report.tune_page import tune_page
 
@@ -48,7 +48,7 @@ def _write_report(result: TuneResult, command: str) -> Path:
 
 
 def _traced(result: TuneResult, name: str, assignments: Assignments) -> FlightTrace:
-    """The first of the flights that were held out once more, to be drawn."""
+    """Fly the first held-out flight again and trace it."""
     course, case = result.setup.course, result.held_out.cases[0]
     setup = course.setup(case, assignments)
     observer = TraceObserver(f"{case.name}, seed {case.seed}, {name}")

@@ -1,4 +1,4 @@
-"""Which course the options ask for, read and checked."""
+"""Read and check what a study flies."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ CourseOptions = Union[MissionOptions, BarnOptions]
 
 
 def read_course(given: CourseOptions) -> Tuple[Course, Sequence[str]]:
-    """What is flown, and the warnings about it.
+    """Create the course of the options and return it with its warnings.
 
     Raises:
-        InputError: every fault.
+        InputError: Lists every fault.
     """
     if isinstance(given, BarnOptions):
         barn = BarnCourse(given)
@@ -34,16 +34,19 @@ def read_course(given: CourseOptions) -> Tuple[Course, Sequence[str]]:
 
 
 def with_config(given: CourseOptions, name: str) -> CourseOptions:
-    """The same flights with another folder of parameters as it is."""
+    """Return the same course with another base and no parameters on top."""
     if isinstance(given, BarnOptions):
         return replace(given, config=name, parameters=())
     return replace(given, config=name, parameters=())
 
 
 def parameter_faults(parameters: Sequence[Tuple[str, Any]], folder: Path, name: str) -> List[str]:
-    """Values that cannot be, and parameters that change nothing about what flies.
+    """Return invalid values, and parameters that have no effect.
 
-    ``parameters`` go on top of the ``folder``'s; ``name`` is where they are written.
+    Args:
+        parameters: (path, value) pairs on top of the folder's.
+        folder: Folder of the base configuration.
+        name: Origin of the parameters, for the messages.
     """
     tree = config.load_files(folder, {"i": "0"})
     paths = []
@@ -56,7 +59,7 @@ def parameter_faults(parameters: Sequence[Tuple[str, Any]], folder: Path, name: 
     except InputError as error:
         return list(error.problems)
     return [
-        f"{remark}; expected a parameter that counts in {folder}"
+        f"{remark}; expected a parameter that has an effect in {folder}"
         for remark in remarks
         if remark.kind in _NO_EFFECT
         and (remark.origin == name or any(path.startswith(f"{remark.place}/") for path in paths))

@@ -1,4 +1,4 @@
-"""A study's outcome in words, as JSON, and as remarks in the files that it writes."""
+"""Outcome of a study as text, as JSON and as remarks in tuned files."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ _HEADER = [
     "",
     "flights",
     "all goals\nreached",
-    "touched",
-    "mean\ntime, s",
-    "least\ngap, m",
-    "roughness\nm/s2",
+    "with\ncontacts",
+    "mean\ntime (s)",
+    "min\ngap (m)",
+    "roughness\n(m/s2)",
     "cost",
 ]
 _BARN_HEADER = [
     "",
     "flights",
-    "success\n%",
+    "success\n(%)",
     "95 %\ninterval",
-    "collision\n%",
-    "time-out\n%",
-    "mean\ntime, s",
+    "collision\n(%)",
+    "time-out\n(%)",
+    "mean\ntime (s)",
     "metric",
 ]
 
 
 def text(result: TuneResult) -> str:
-    """What the terminal shows at the end."""
+    """Format the outcome for the terminal."""
     parts = [held_out_table(result)]
     if result.refined.gains:
         parts.append(gain_table(result))
     else:
-        parts.append("Nothing that was tried beats the base: its parameters are written unchanged.")
+        parts.append("No candidate is better than the base; its parameters are written unchanged.")
     return "\n\n".join(parts)
 
 
 def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
-    """Return the statistics of flights that the search never saw."""
+    """Format the statistics of the held-out flights."""
     tables = [
         tabulate.tabulate(
-            [figure_row(name, one) for name, one in held_out_rows(result)],
+            [statistics_row(name, one) for name, one in held_out_rows(result)],
             _header(_HEADER, tablefmt),
             tablefmt=tablefmt,
             disable_numparse=True,
@@ -62,7 +62,7 @@ def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
     barn = barn_rows(result)
     if barn:
         tables.append(
-            "As the benchmark counts:\n\n"
+            "By the benchmark's protocol:\n\n"
             + tabulate.tabulate(
                 [barn_row(name, one) for name, one in barn],
                 _header(_BARN_HEADER, tablefmt),
@@ -75,7 +75,7 @@ def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
 
 
 def held_out_rows(result: TuneResult) -> Tuple[Tuple[str, FlightStatistics], ...]:
-    """Return the statistics of the base, of what it is compared with, and of the best."""
+    """Return the statistics of the compared folders, the base and the tuned parameters."""
     return tuple(
         (name, flight_statistics(flights))
         for name, flights in result.held_out.sets(result.setup.course.config)
@@ -83,7 +83,7 @@ def held_out_rows(result: TuneResult) -> Tuple[Tuple[str, FlightStatistics], ...
 
 
 def barn_rows(result: TuneResult) -> Tuple[Tuple[str, BarnStatistics], ...]:
-    """The same flights as the benchmark counts them; none of other courses."""
+    """Return the benchmark's statistics of the same flights; empty for other courses."""
     course, held_out = result.setup.course, result.held_out
     if not isinstance(course, BarnCourse):
         return ()
@@ -94,7 +94,7 @@ def barn_rows(result: TuneResult) -> Tuple[Tuple[str, BarnStatistics], ...]:
 
 
 def barn_row(name: str, one: BarnStatistics) -> List[str]:
-    """Cells of the benchmark's table."""
+    """Format a row of the benchmark's table."""
     low, high = one.success_interval
     rates = [
         f"{100 * count / one.runs:.1f}" for count in (one.successes, one.collisions, one.time_outs)
@@ -110,8 +110,8 @@ def barn_row(name: str, one: BarnStatistics) -> List[str]:
     ]
 
 
-def figure_row(name: str, one: FlightStatistics) -> List[str]:
-    """Cells of the table of figures."""
+def statistics_row(name: str, one: FlightStatistics) -> List[str]:
+    """Format a row of the table of statistics."""
     return [
         name,
         str(one.flights),
@@ -125,34 +125,34 @@ def figure_row(name: str, one: FlightStatistics) -> List[str]:
 
 
 def gain_table(result: TuneResult, tablefmt: str = "simple") -> str:
-    """Each changed parameter and what it does."""
+    """Format the changed parameters and their effects."""
     rows = [
-        [gain.path, value_words(gain.base), value_words(gain.value), gain_words(gain)]
+        [gain.path, format_value(gain.base), format_value(gain.value), gain_text(gain)]
         for gain in result.refined.gains
     ]
     return tabulate.tabulate(
         rows,
-        ["parameter", "base", "tuned", "does, in the flights of the search"],
+        ["parameter", "base", "tuned", "effect in the flights of the search"],
         tablefmt=tablefmt,
         disable_numparse=True,
     )
 
 
-def gain_words(gain: Gain) -> str:
-    """What a change does, the most important first: "3.4 s sooner, least gap 0.05 m wider"."""
+def gain_text(gain: Gain) -> str:
+    """Describe the effect of a change, most important first: "3.4 s faster"."""
     before, after = gain.without_it, gain.with_it
     words = []
     if after.completed != before.completed:
         words.append(
-            f"{after.completed} of {after.flights} missions complete, not {before.completed}"
+            f"{after.completed} of {after.flights} missions completed instead of {before.completed}"
         )
     if after.touched != before.touched:
         words.append(
-            f"{after.touched} of {after.flights} flights touch something, not {before.touched}"
+            f"{after.touched} of {after.flights} flights with contacts instead of {before.touched}"
         )
     time_s = gain.time_s
     if time_s is not None and abs(time_s) >= 0.05:
-        words.append(f"{abs(time_s):.1f} s {'sooner' if time_s > 0 else 'later'}")
+        words.append(f"{abs(time_s):.1f} s {'faster' if time_s > 0 else 'slower'}")
     if before.mean_gap_m is not None and after.mean_gap_m is not None:
         wider_m = after.mean_gap_m - before.mean_gap_m
         if abs(wider_m) >= 0.005:
@@ -160,15 +160,15 @@ def gain_words(gain: Gain) -> str:
     smoother = before.roughness_mps2 - after.roughness_mps2
     if abs(smoother) >= 0.05:
         words.append(f"{'smoother' if smoother > 0 else 'rougher'} by {abs(smoother):.2f} m/s2")
-    return ", ".join(words) or "hardly anything"
+    return ", ".join(words) or "no measurable effect"
 
 
 def changes(result: TuneResult) -> List[Change]:
-    """Everything that is not as in the base's files, each with its remark."""
+    """Return all changes of the base's files with their remarks."""
     gains = {gain.path: gain for gain in result.refined.gains}
     base = base_configuration(result.setup.base_folder, ()).to_tree()
     found = [
-        Change(path, value, "given with --set")
+        Change(path, value, "set with --set")
         for path, value in result.setup.course.fixed
         if base_value(base, path) != value
     ]
@@ -177,7 +177,7 @@ def changes(result: TuneResult) -> List[Change]:
         if gain is None:
             continue
         found.append(
-            Change(one.path, gain.value, f"tuned, was {value_words(gain.base)}: {gain_words(gain)}")
+            Change(one.path, gain.value, f"tuned, was {format_value(gain.base)}: {gain_text(gain)}")
         )
         followers = dict(result.setup.space.assignments({one.path: gain.value}))
         found += [
@@ -187,8 +187,8 @@ def changes(result: TuneResult) -> List[Change]:
     return found
 
 
-def value_words(value: Any) -> str:
-    """A value as people write it; "unset" for none."""
+def format_value(value: Any) -> str:
+    """Format a parameter's value; None is "unset"."""
     if value is None:
         return "unset"
     if isinstance(value, bool):
@@ -197,7 +197,7 @@ def value_words(value: Any) -> str:
 
 
 def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
-    """Statistics, parameters and what they depend on."""
+    """Convert the outcome to JSON data."""
     setup, held_out = result.setup, result.held_out
     found = {
         "command": command,
@@ -226,38 +226,38 @@ def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
 
 
 def markdown(result: TuneResult, command: str) -> str:
-    """STUDY.md: how the parameters beside it came about."""
+    """Format STUDY.md, which documents the origin of the parameters beside it."""
     search = result.setup.options.search
     with_versions = ", ".join(f"{name} {version}" for name, version in all_versions().items())
     gains = (
         gain_table(result, "github")
         if result.refined.gains
-        else "Nothing that was tried beats the base."
+        else "No candidate is better than the base."
     )
-    return f"""# How these parameters were found
+    return f"""# Tuning study of these parameters
 
 ```sh
 {command}
 ```
 
 Seed {search.seed}, {len(result.trials)} candidates of up to {search.flights} flights, from \
-`{result.setup.course.config}`; {with_versions}. The same command with these versions finds the \
-same again.
+`{result.setup.course.config}`; {with_versions}. The same command with these versions gives the \
+same result.
 
-## Flights that the search never saw
+## Held-out flights
 
 {held_out_table(result, "github")}
 
-Gaps are between hulls. Cost: lower is better.
+A gap is the smaller of clearance and separation. A lower cost is better.
 
-## What each change does
+## Effect of each change
 
 {gains}
 """
 
 
 def _header(header: Sequence[str], tablefmt: str) -> List[str]:
-    """Markdown's headers have one line."""
+    """Join the lines of headers for Markdown."""
     return [name.replace("\n", " ") if tablefmt == "github" else name for name in header]
 
 

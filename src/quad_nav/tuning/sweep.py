@@ -1,4 +1,4 @@
-"""Tables instead of a search: every combination of a few values, or a list of them."""
+"""Sweeps: fly every combination of a few values, or a list of points."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from quad_nav.files.shipped import config_folder
 from quad_nav.files.user_files import read_text
 from quad_nav.offline.workers import Workers
 from quad_nav.tuning.courses import LIDAR, Case, identity_text
-from quad_nav.tuning.evaluation import Course, Evaluation, Watcher, task_of
+from quad_nav.tuning.evaluation import Course, Evaluation, StudyObserver, task_of
 from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.space import Dimension, SearchSpace
@@ -35,7 +35,7 @@ Point = Dict[str, Any]
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """What a person asks for: ``points``, and how many ``flights`` each flies."""
+    """Options of a sweep: its points, and the number of flights of each."""
 
     course: CourseOptions
     points: Tuple[Point, ...]
@@ -44,7 +44,7 @@ class SweepOptions:
 
 @dataclass(frozen=True)
 class SweepSetup:
-    """A sweep that can be flown."""
+    """Checked sweep."""
 
     course: Course
     points: Tuple[Point, ...]
@@ -53,34 +53,36 @@ class SweepSetup:
 
     @property
     def paths(self) -> Tuple[str, ...]:
+        """Paths of the swept parameters."""
         return tuple(self.points[0])
 
     @property
     def cases(self) -> Tuple[Case, ...]:
-        """The flights of every point."""
+        """Flights of every point."""
         return self.course.search_cases(self.flights)
 
     @property
     def base(self) -> str:
-        """A digest of what flights depend on besides the point and the case."""
+        """Digest of what flights depend on besides point and case."""
         text = identity_text({**self.course.identity(), "versions": versions()})
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
 class SweepRow:
-    """A point and its flights."""
+    """Point and its flights."""
 
     point: Point
     flights: Tuple[FlightResult, ...]
 
     @property
     def statistics(self) -> FlightStatistics:
+        """Statistics of the flights."""
         return flight_statistics(self.flights)
 
 
 def grid(axes: Sequence[Tuple[str, Sequence[Any]]]) -> Tuple[Point, ...]:
-    """Every combination, the last axis first."""
+    """Return every combination; the last axis varies fastest."""
     names = [path for path, _ in axes]
     return tuple(
         dict(zip(names, values)) for values in itertools.product(*(values for _, values in axes))
@@ -88,18 +90,18 @@ def grid(axes: Sequence[Tuple[str, Sequence[Any]]]) -> Tuple[Point, ...]:
 
 
 def read_points(path: Path) -> Tuple[Point, ...]:
-    """Points from a CSV: paths in its first line, a point in each other one.
+    """Read points from a CSV file: paths in the first row, one point per further row.
 
     Raises:
-        InputError: it is not such a file.
+        InputError: Lists every fault of the file.
     """
     try:
         text = io.StringIO(read_text(path, plain_yaml.MAX_BYTES), newline="")
         lines = [line for line in csv.reader(text, skipinitialspace=True) if line]
     except csv.Error as error:
-        raise InputError([f"{path}: cannot be read: {error}"]) from error
+        raise InputError([f"{path}: cannot read: {error}"]) from error
     if len(lines) < 2:
-        raise InputError([f"{path}: expected a line of parameters' paths, and one for each point"])
+        raise InputError([f"{path}: expected a row of parameter paths, and a row for each point"])
     paths, *rows = lines
     problems = [
         f"{path}: row {number}: {len(row)} values, expected {len(paths)}"
@@ -107,7 +109,7 @@ def read_points(path: Path) -> Tuple[Point, ...]:
         if len(row) != len(paths)
     ]
     if len(set(paths)) < len(paths):
-        problems.append(f"{path}: a path is there twice, expected each once")
+        problems.append(f"{path}: duplicate path, expected each once")
     if problems:
         raise InputError(problems)
     try:
@@ -119,10 +121,10 @@ def read_points(path: Path) -> Tuple[Point, ...]:
 
 
 def read_sweep_setup(options: SweepOptions) -> SweepSetup:
-    """Reads and checks everything, every point included.
+    """Read and check a sweep, every point included.
 
     Raises:
-        InputError: every fault.
+        InputError: Lists every fault.
     """
     course, warnings = read_course(options.course)
     space = space_of(options.points)
@@ -133,7 +135,7 @@ def read_sweep_setup(options: SweepOptions) -> SweepSetup:
         assignments = space.assignments(point)
         refused = task_of(course, case, assignments).refused
         problems += (
-            [f"{_words(point)}: {refused}"]
+            [f"{_point_text(point)}: {refused}"]
             if refused
             else parameter_faults(
                 [pair for pair in assignments if not pair[0].startswith(f"{LIDAR}/")], folder, _NAME
@@ -145,22 +147,22 @@ def read_sweep_setup(options: SweepOptions) -> SweepSetup:
 
 
 def space_of(points: Sequence[Point]) -> SearchSpace:
-    """The points' paths."""
+    """Return the space of the points' paths."""
     return SearchSpace(_NAME, tuple(Dimension(path) for path in points[0]))
 
 
 def run_sweep(
-    setup: SweepSetup, workers: Workers, journal: FlightCache, watcher: Watcher
+    setup: SweepSetup, workers: Workers, journal: FlightCache, observer: StudyObserver
 ) -> List[SweepRow]:
-    """Flies all points, each flight of all before the next one of any."""
+    """Fly all points; each case of all points before the next case."""
     evaluation = Evaluation(
-        setup.course, space_of(setup.points), workers, journal, watcher, {_BASE: setup.base}
+        setup.course, space_of(setup.points), workers, journal, observer, {_BASE: setup.base}
     )
-    watcher.expect(len(setup.points) * setup.flights)
-    watcher.stage("sweeping")
-    flights = evaluation.flown(setup.points, setup.cases)
+    observer.on_expected(len(setup.points) * setup.flights)
+    observer.on_stage("sweep")
+    flights = evaluation.evaluate(setup.points, setup.cases)
     return [SweepRow(point, tuple(own)) for point, own in zip(setup.points, flights)]
 
 
-def _words(point: Point) -> str:
+def _point_text(point: Point) -> str:
     return ", ".join(f"{path}={value}" for path, value in point.items())

@@ -1,4 +1,4 @@
-"""A sweep's rows as a table, CSV and JSON."""
+"""Rows of a sweep as a table, CSV and JSON."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ from typing import Any, Dict, List, Optional, Sequence, TextIO
 import tabulate
 
 from quad_nav.tuning.statistics import FlightStatistics
-from quad_nav.tuning.study_text import value_words
+from quad_nav.tuning.study_text import format_value
 from quad_nav.tuning.sweep import SweepRow, SweepSetup
 from quad_nav.versions import versions
 
 _HEADER = [
     "flights",
-    "complete\n%",
-    "touched\n%",
-    "mean\ntime, s",
-    "least\ngap, m",
-    "roughness\nm/s2",
+    "complete\n(%)",
+    "with\ncontacts (%)",
+    "mean\ntime (s)",
+    "min\ngap (m)",
+    "roughness\n(m/s2)",
     "cost",
 ]
 
 
 def table(rows: Sequence[SweepRow]) -> str:
-    """What the terminal shows, one line for each point."""
+    """Format one line per point for the terminal."""
     paths = list(rows[0].point)
     shown = [
-        [*(value_words(row.point[path]) for path in paths), *_cells(row.statistics)] for row in rows
+        [*(format_value(row.point[path]) for path in paths), *_cells(row.statistics)]
+        for row in rows
     ]
     header = [path.replace("/", "/\n") for path in paths]
     return tabulate.tabulate(
@@ -41,7 +42,7 @@ def table(rows: Sequence[SweepRow]) -> str:
 
 
 def to_json(setup: SweepSetup, rows: Sequence[SweepRow]) -> Dict[str, Any]:
-    """Points with figures and flights."""
+    """Convert points, statistics and flights to JSON data."""
     return {
         "base": setup.course.config,
         "fixed": dict(setup.course.fixed),
@@ -61,13 +62,15 @@ def to_json(setup: SweepSetup, rows: Sequence[SweepRow]) -> Dict[str, Any]:
 
 
 def write_csv(rows: Sequence[SweepRow], file: TextIO) -> None:
-    """A line for each point."""
+    """Write one row per point."""
     names = [field.name for field in fields(FlightStatistics)]
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow([*rows[0].point, *names])
     for row in rows:
         figures = asdict(row.statistics)
-        writer.writerow([*map(value_words, row.point.values()), *(figures[name] for name in names)])
+        writer.writerow(
+            [*map(format_value, row.point.values()), *(figures[name] for name in names)]
+        )
 
 
 def _cells(one: FlightStatistics) -> List[str]:

@@ -1,4 +1,4 @@
-"""Tuning from end to end: search, refinement, and flights that the search never saw."""
+"""Whole study: search, refinement and held-out flights."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from quad_nav.errors import InputError
 from quad_nav.files.shipped import config_folder, shipped
 from quad_nav.offline.workers import Workers
 from quad_nav.tuning.courses import Case
-from quad_nav.tuning.evaluation import Course, Evaluation, Watcher
+from quad_nav.tuning.evaluation import Course, Evaluation, StudyObserver
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.parameter_files import base_configuration, base_value
-from quad_nav.tuning.refinement import BASE, Refined, refine
+from quad_nav.tuning.refinement import BASE, Refinement, refine
 from quad_nav.tuning.search import SearchOptions, best_first, search
 from quad_nav.tuning.space import Assignments, SearchSpace, load_space
 from quad_nav.tuning.study import TuneStudy, open_study
@@ -32,12 +32,17 @@ _DWA = "DWAPlannerROS"
 
 @dataclass(frozen=True)
 class TuneOptions:
-    """What a person asks for. ``space`` None: the shipped one for the
-    course and the base's local planner.
+    """Options of a study.
 
-    ``finalists``: the best candidates that fly ``final_flights`` each before one is chosen;
-    ``held_out``: flights that the search never sees, with the base and with the best, and with
-    the folders of parameters ``against`` as they are.
+    Attributes:
+        course: Flown missions or worlds.
+        output: Folder of the study.
+        space: Search space; None for the shipped one of the course and the local planner.
+        search: Size of the search.
+        finalists: Number of best candidates that fly ``final_flights`` each before one is selected.
+        final_flights: Flights of each finalist.
+        held_out: Flights that the search never flies, with base and tuned parameters.
+        against: Further configurations that fly the held-out flights unchanged.
     """
 
     course: CourseOptions
@@ -52,7 +57,7 @@ class TuneOptions:
 
 @dataclass(frozen=True)
 class TuneSetup:
-    """A study that can be flown; ``base`` is the base's own value of each parameter."""
+    """Checked study; ``base`` holds the base's value of each searched parameter."""
 
     options: TuneOptions
     course: Course
@@ -63,11 +68,12 @@ class TuneSetup:
 
     @property
     def base_folder(self) -> Path:
+        """Folder of the base configuration."""
         return config_folder(self.course.config)
 
     @property
     def identity(self) -> Dict[str, Any]:
-        """What the study depends on; with the same one it can be taken up again."""
+        """What the study depends on; a study resumes only with an equal identity."""
         search = self.options.search
         return {
             **self.course.identity(),
@@ -81,9 +87,9 @@ class TuneSetup:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Flights that the search never saw, with the base and with the best, case by case.
+    """Held-out flights of the base and of the tuned parameters, case by case.
 
-    ``others``: the same with other folders of parameters, by their names.
+    ``others`` holds those of further configurations, by name.
     """
 
     cases: Tuple[Case, ...]
@@ -92,31 +98,31 @@ class HeldOut:
     others: Tuple[Tuple[str, Tuple[FlightResult, ...]], ...] = ()
 
     def sets(self, base: str) -> Tuple[Tuple[str, Tuple[FlightResult, ...]], ...]:
-        """Everything by name, ``base`` being the base's."""
+        """Return all flights by name; ``base`` is the name of the base."""
         return (*self.others, (base, self.base), (TUNED, self.tuned))
 
 
 @dataclass(frozen=True)
 class TuneResult:
-    """What came of it. ``reference`` are the base's flights of the search."""
+    """Outcome of a study; ``reference`` holds the base's flights of the search."""
 
     setup: TuneSetup
     trials: Tuple[FrozenTrial, ...]
     reference: Tuple[FlightResult, ...]
-    refined: Refined
+    refined: Refinement
     held_out: HeldOut
 
     @property
     def assignments(self) -> Assignments:
-        """What the best one changes, as move_base has it."""
+        """Changes of the tuned parameters, with move_base's names."""
         return self.setup.space.assignments(self.refined.values)
 
 
 def read_tune_setup(options: TuneOptions) -> TuneSetup:
-    """Reads and checks everything that a study needs.
+    """Read and check everything that a study needs.
 
     Raises:
-        InputError: every fault.
+        InputError: Lists every fault.
     """
     course, warnings = read_course(options.course)
     against = tuple(
@@ -136,7 +142,7 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
     ]
     if not space.dimensions:
         problems.append(
-            f"{space.name}: every parameter in it is fixed by --set; expected one that is not"
+            f"{space.name}: every parameter is fixed by --set; expected at least one to search"
         )
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
@@ -146,19 +152,19 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
 
 
 def all_versions() -> Dict[str, str]:
-    """What a study depends on besides its options."""
+    """Return the versions of everything that computes a study."""
     return {**versions(), "optuna": optuna.__version__}
 
 
-def run_tune(setup: TuneSetup, workers: Workers, watcher: Watcher) -> TuneResult:
-    """Takes up the study where it was left, and brings it to its end.
+def run_tune(setup: TuneSetup, workers: Workers, observer: StudyObserver) -> TuneResult:
+    """Run or resume a study.
 
     Raises:
-        InputError: the folder holds another study, or somebody works on it.
-        WorkersLost: workers die again and again.
+        InputError: The folder holds another study, or another process works on it.
+        WorkersLost: Workers died repeatedly.
     """
     with open_study(setup.options.output, setup.identity) as study:
-        evaluation = Evaluation(setup.course, setup.space, workers, study.journal, watcher)
+        evaluation = Evaluation(setup.course, setup.space, workers, study.journal, observer)
         result = _run(setup, evaluation, study)
         others = tuple(
             (name, _fly_other(name, course, result, evaluation)) for name, course in setup.against
@@ -167,20 +173,20 @@ def run_tune(setup: TuneSetup, workers: Workers, watcher: Watcher) -> TuneResult
 
 
 def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResult:
-    options, course, watcher = setup.options, setup.course, evaluation.watcher
+    options, course, observer = setup.options, setup.course, evaluation.observer
     few = course.search_cases(options.search.flights)
-    watcher.expect(len(few))
-    watcher.stage("flying the base")
-    (reference,) = evaluation.flown([BASE], few)
+    observer.on_expected(len(few))
+    observer.on_stage("base")
+    (reference,) = evaluation.evaluate([BASE], few)
     search(evaluation, study, start_values(setup.space, setup.base), options.search)
     trials = study.trials[: options.search.candidates]
     finalists = [trial.params for trial in best_first(trials)[: options.finalists]]
     many = course.search_cases(max(options.final_flights, len(few)))
     refined = refine(evaluation, finalists, setup.base, few, many)
     held_out = course.held_out_cases(options.held_out)
-    watcher.expect(2 * len(held_out))
-    watcher.stage("flying what was held out")
-    base, tuned = evaluation.flown([BASE, refined.values], held_out)
+    observer.on_expected(2 * len(held_out))
+    observer.on_stage("held-out flights")
+    base, tuned = evaluation.evaluate([BASE, refined.values], held_out)
     return TuneResult(
         setup,
         tuple(trials),
@@ -193,16 +199,16 @@ def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResu
 def _fly_other(
     name: str, course: Course, result: TuneResult, evaluation: Evaluation
 ) -> Tuple[FlightResult, ...]:
-    """The flights that were held out with other parameters."""
-    evaluation.watcher.expect(len(result.held_out.cases))
-    evaluation.watcher.stage(f"flying {name}")
+    """Fly the held-out flights with another configuration."""
+    evaluation.observer.on_expected(len(result.held_out.cases))
+    evaluation.observer.on_stage(f"held-out flights of {name}")
     other = evaluation.of(course, {"config": name, **course.identity()["config"]})
-    (flights,) = other.flown([BASE], result.held_out.cases)
+    (flights,) = other.evaluate([BASE], result.held_out.cases)
     return tuple(flights)
 
 
 def start_values(space: SearchSpace, base: Mapping[str, Any]) -> Dict[str, Any]:
-    """The base's own values, as far as the space has them: the first candidate."""
+    """Return the base's values within the space: the first candidate."""
     low, _ = space.corners()
     return {
         one.path: low[one.path] if base[one.path] is None else one.nearest(base[one.path])

@@ -1,7 +1,7 @@
-"""Values put into the text of a YAML file, everything else left as it was written.
+"""Replace or insert values in the text of a YAML file and keep everything else.
 
-Comments and layout are for people, and a loader forgets them. So values are replaced where they
-stand, and the remark beside one that is replaced makes room for a new one.
+A YAML loader drops comments and layout. So values are replaced in place, and the remark beside a
+replaced value is replaced, too.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _REMARK = re.compile(r"\s*#.*$")
 
 
 def replaced(text: str, path: Sequence[str], value: Any, comment: str) -> Optional[str]:
-    """The text with another value at ``path``, None when nothing is there."""
+    """Return the text with another value at ``path``, None if nothing is there."""
     node = _node(yaml.compose(text, yaml.SafeLoader), path)
     if node is None or isinstance(node, yaml.MappingNode):
         return None
@@ -32,7 +32,7 @@ def replaced(text: str, path: Sequence[str], value: Any, comment: str) -> Option
 
 
 def inserted(text: str, path: Sequence[str], value: Any, comment: str) -> str:
-    """The text with a new entry at ``path``, as the last one of its namespace."""
+    """Return the text with a new entry at ``path``, as the last one of its namespace."""
     root = yaml.compose(text, yaml.SafeLoader)
     namespace, depth = root, 0
     while depth < len(path) - 1:
@@ -58,7 +58,7 @@ def inserted(text: str, path: Sequence[str], value: Any, comment: str) -> str:
 
 
 def value_text(value: Any) -> str:
-    """A number, truth value or text as YAML."""
+    """Format a number, boolean or text as YAML."""
     return str(yaml.safe_dump(value, default_flow_style=True, width=1000)).split("\n")[0]
 
 
@@ -93,9 +93,9 @@ def _inserted_in_braces(
 
 
 def _remarked(lines: List[str], number: int, end: int, comment: str, column: int) -> List[str]:
-    """With the comment behind the value that ends at ``end``, instead of the one there.
+    """Replace the comment behind the value that ends at ``end``.
 
-    That one stood at ``column`` before the value was changed, and so do its further lines.
+    The old comment was at ``column`` before the value changed, and so are its continuation lines.
     """
     line = lines[number]
     old = _REMARK.match(line, end)
@@ -109,19 +109,19 @@ def _remarked(lines: List[str], number: int, end: int, comment: str, column: int
 
 
 def _comment_column(line: str) -> int:
-    """Where the comment of a line begins that has nothing else, -1 without."""
+    """Return the column of the comment of a comment-only line, otherwise -1."""
     bare = line.lstrip()
     return len(line) - len(bare) if bare.startswith("#") else -1
 
 
 def _is_continued(lines: Sequence[str], number: int) -> bool:
-    """Whether a line is the rest of a remark that stands behind a value above it."""
+    """Return true if a line continues the remark of a value above it."""
     column = _comment_column(lines[number])
     return column > 0 and len(lines[number - 1]) > column and lines[number - 1][column] == "#"
 
 
 def _last_line(node: Any) -> int:
-    """The line on which a node ends; a block's own end is where the next thing begins."""
+    """Return the line on which a node ends; a block's end mark is the next token's start."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         return _last_line(last[1] if isinstance(last, tuple) else last)

@@ -1,5 +1,5 @@
-"""Pages and pictures of studies and sweeps, on the machinery of flights' reports.
+"""Reports of studies and sweeps, built on the reports of flights.
 
-Read ``search_pictures`` (history, importances, values), ``outcome_pictures`` (time against
-clearance, before and after), ``tune_page``, ``sweep_pictures`` and ``sweep_page``.
+Reading order: ``search_pictures`` (history, importances, values), ``outcome_pictures`` (time
+against gap, base against tuned), ``tune_page``, ``sweep_pictures``, ``sweep_page``.
 """

@@ -1,4 +1,4 @@
-"""What came of a search: time against clearance, and flights before and after."""
+"""Pictures of the outcome of a search: time against gap, and held-out flights."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ Place = Tuple[float, float]
 
 
 def place(one: FlightStatistics) -> Optional[Place]:
-    """None where nothing was flown to its end, or nothing was near."""
+    """Return (mean time, min gap); None if no mission was completed or nothing was near."""
     if one.mean_time_s is None or one.least_gap_m is None:
         return None
     return one.mean_time_s, one.least_gap_m
 
 
 def front(places: Sequence[Place]) -> List[Place]:
-    """Those that no other one beats in both time and gap, by time."""
+    """Return the places that no other place beats in both time and gap, by time."""
     kept: List[Place] = []
     for time_s, gap_m in sorted(places, key=lambda one: (one[0], -one[1])):
         if not kept or gap_m > kept[-1][1]:
@@ -36,7 +36,7 @@ def front(places: Sequence[Place]) -> List[Place]:
 def pareto_picture(
     candidates: Sequence[FlightStatistics], base: FlightStatistics, tuned: FlightStatistics
 ) -> Figure:
-    """Candidates that reached every goal and touched nothing; others are left out."""
+    """Draw the candidates that reached every goal without contact."""
     figure = new_figure(3.8)
     axes = figure.subplots()
     clean = [
@@ -56,7 +56,7 @@ def pareto_picture(
             axes.plot(
                 *found, marker, color=ink, ms=8 if marker == "s" else 14, mec="white", zorder=6
             )
-    axes.set(xlabel="mean mission time, s", ylabel="smallest gap, m")
+    axes.set(xlabel="mean mission time (s)", ylabel="min gap (m)")
     robot_legend(
         figure,
         (),
@@ -71,13 +71,13 @@ def pareto_picture(
 
 
 def held_out_picture(base: Sequence[FlightResult], tuned: Sequence[FlightResult]) -> Figure:
-    """Each flight of the base beside the tuned one of the same mission and seed."""
+    """Draw each flight of the base beside the tuned one of the same mission and seed."""
     figure = new_figure(3.4)
     left, right = figure.subplots(1, 2)
     _draw_pairs(
         left,
         [(one.time_s, other.time_s) for one, other in zip(base, tuned)],
-        "Mission time, s",
+        "Mission time (s)",
         base,
         tuned,
     )
@@ -85,7 +85,7 @@ def held_out_picture(base: Sequence[FlightResult], tuned: Sequence[FlightResult]
     _draw_pairs(
         right,
         [(np.nan if a is None else a, np.nan if b is None else b) for a, b in gaps],
-        "Smallest gap, m",
+        "Min gap (m)",
         base,
         tuned,
     )

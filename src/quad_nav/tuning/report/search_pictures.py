@@ -1,4 +1,4 @@
-"""How a search went: costs of candidates in order, which parameters counted, and their values."""
+"""Pictures of a search: costs of the candidates, importances and values of the parameters."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from quad_nav.tuning.space import Dimension, SearchSpace
 
 _COLUMNS = 3
 _LEAST_FOR_IMPORTANCES = 20
-_TOP = 1.15  # of the axis, in parts of what most candidates cost
+_TOP = 1.15  # upper end of the axis, in parts of the usual range of costs
 
 
 def history_picture(trials: Sequence[FrozenTrial], reference: float) -> Figure:
-    """Cost of each candidate in order, the best so far, and the base's."""
+    """Draw the cost of each candidate in order, the best so far, and the base's."""
     figure = new_figure(3.4)
     axes = figure.subplots()
     top = _top(trials, reference)
@@ -46,9 +46,12 @@ def history_picture(trials: Sequence[FrozenTrial], reference: float) -> Figure:
 
 
 def importances(trials: Sequence[FrozenTrial], space: SearchSpace) -> Dict[str, float]:
-    """How much each parameter tells good candidates from others, largest first; they add up to 1.
+    """Return how much each parameter separates good candidates, largest first, sum 1.
 
-    PED-ANOVA (Watanabe, Bansal and Hutter, 2023). Empty with too few candidates to say.
+    Empty if there are too few candidates.
+
+    Source: S. Watanabe, A. Bansal, F. Hutter, "PED-ANOVA: Efficiently Quantifying Hyperparameter
+    Importance in Arbitrary Subspaces", IJCAI 2023.
     """
     complete = [trial for trial in trials if is_complete(trial)]
     if len(complete) < _LEAST_FOR_IMPORTANCES or len(space.dimensions) < 2:
@@ -65,12 +68,12 @@ def importances(trials: Sequence[FrozenTrial], space: SearchSpace) -> Dict[str, 
 
 
 def importance_picture(found: Dict[str, float]) -> Figure:
-    """A bar for each parameter."""
+    """Draw a bar for each parameter."""
     figure = new_figure(0.9 + 0.24 * len(found))
     axes = figure.subplots()
     names = list(found)
     axes.barh(range(len(names)), list(found.values()), color=colour(0), height=0.65)
-    axes.set(xlabel="share", ylim=(len(names) - 0.4, -0.6), yticks=range(len(names)))
+    axes.set(xlabel="importance", ylim=(len(names) - 0.4, -0.6), yticks=range(len(names)))
     axes.set_yticklabels(names)
     axes.grid(axis="y", visible=False)
     return figure
@@ -84,7 +87,16 @@ def slice_picture(
     base: Dict[str, Any],
     reference: float,
 ) -> Figure:
-    """For each parameter: its value and the cost, each candidate a dot; those first that count."""
+    """Draw the cost of each candidate over the value of each parameter.
+
+    Args:
+        trials: Candidates.
+        space: Searched parameters.
+        order: Paths of the parameters, most important first.
+        chosen: Tuned values.
+        base: Values of the base.
+        reference: Cost of the base.
+    """
     rows = -(-len(order) // _COLUMNS)
     figure = new_figure(0.6 + 1.75 * rows)
     by_path = {one.path: one for one in space.dimensions}
@@ -112,7 +124,7 @@ def slice_picture(
 def _draw_costs(
     axes: Axes, places: Sequence[float], trials: Sequence[FrozenTrial], top: float
 ) -> None:
-    """What costs more than the axis shows lies on its upper end."""
+    """Draw the costs; costs beyond the axis are drawn at its upper end."""
     for is_through, marker, face in ((True, "o", colour(0)), (False, "x", QUIET)):
         points = [
             (place, min(_value(trial), top))
@@ -136,8 +148,8 @@ def _draw_costs(
 
 def _dots() -> List[Any]:
     return [
-        _line("", "flew everything", marker="o", color=colour(0)),
-        _line("", "dropped", marker="x", color=QUIET),
+        _line("", "completed all flights", marker="o", color=colour(0)),
+        _line("", "pruned", marker="x", color=QUIET),
         _line("", "off the scale", marker="o", color=ALARM),
     ]
 
@@ -147,12 +159,12 @@ def _line(style: str, name: str, **more: Any) -> Any:
 
 
 def _value(trial: FrozenTrial) -> float:
-    assert trial.value is not None  # every trial here has flown something
+    assert trial.value is not None  # every trial has flown at least one round
     return trial.value
 
 
 def _top(trials: Sequence[FrozenTrial], reference: float) -> float:
-    """So that failures, hundreds of times as expensive, do not flatten everything else."""
+    """Return the upper end of the axis; failures, hundreds of times as expensive, are beyond it."""
     costs = sorted([_value(trial) for trial in trials] + [reference])
     low = costs[0]
     usual = [cost for cost in costs if cost < 4.0 * low] or costs
@@ -165,7 +177,7 @@ def _bottom(trials: Sequence[FrozenTrial], reference: float) -> float:
 
 
 def _place(one: Dimension, value: Any) -> float:
-    """Where a value is on the axis; of choices their numbers."""
+    """Return the position of a value on the axis; choices are numbered."""
     if not one.choices:
         return float(value)
     return float(one.choices.index(value)) if value in one.choices else -0.5

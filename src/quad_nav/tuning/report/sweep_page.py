@@ -1,4 +1,4 @@
-"""The page of a sweep."""
+"""Report of a sweep."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Iterator, Optional, Sequence
 from quad_nav.report import style
 from quad_nav.report.page import Page, Section, picture, render, write_page
 from quad_nav.tuning.report.sweep_pictures import sweep_picture
-from quad_nav.tuning.study_text import value_words
+from quad_nav.tuning.study_text import format_value
 from quad_nav.tuning.sweep import SweepRow, SweepSetup
 from quad_nav.versions import versions
 
@@ -16,13 +16,13 @@ _FOLDER = Path(__file__).parent
 
 
 def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
-    """Pictures and the table."""
+    """Build the page with pictures and table."""
     with style.styled():
         section = Section(
             "sweep",
-            "Side by side",
-            f"{setup.flights} flights at each point, the same for all. "
-            "Gaps are between hulls; times are of missions that reached every goal.",
+            "Comparison",
+            f"Every point flies the same {setup.flights} flights. A gap is the smaller of "
+            "clearance and separation. Times are those of completed missions.",
             (picture("sweep", "Statistics over the values", sweep_picture(rows)),),
         )
     return render(
@@ -31,7 +31,7 @@ def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
         _FOLDER,
         setup=setup,
         rows=rows,
-        words=value_words,
+        words=format_value,
         versions=versions(),
     )
 
@@ -39,7 +39,7 @@ def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
 def write_sweep_report(
     setup: SweepSetup, rows: Sequence[SweepRow], path: Optional[Path], pictures: Optional[Path]
 ) -> Iterator[Path]:
-    """Writes the page, its pictures, or both; yields what is there now."""
+    """Write the page, its pictures, or both; yield each path when it is written."""
     page = sweep_page(setup, rows)
     if path is not None:
         write_page(page, path)

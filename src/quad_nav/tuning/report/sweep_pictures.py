@@ -1,4 +1,4 @@
-"""Statistics over the values of one parameter, of two, or over a list of points."""
+"""Pictures of a sweep over one parameter, two parameters, or a list of points."""
 
 from __future__ import annotations
 
@@ -7,35 +7,51 @@ from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure
 from quad_nav.tuning.statistics import FlightStatistics
-from quad_nav.tuning.study_text import value_words
+from quad_nav.tuning.study_text import format_value
 from quad_nav.tuning.sweep import SweepRow
 
 
 class Measure(NamedTuple):
-    """What a panel shows; ``decimals`` of numbers in a map."""
+    """Measure of a panel; ``decimals`` is that of the numbers in a map."""
 
     title: str
     more_is_better: bool
     decimals: int
     value: Callable[[FlightStatistics], Optional[float]]
 
+    @property
+    def is_percentage(self) -> bool:
+        """True if the values are percentages."""
+        return self.title.endswith("(%)")
+
 
 MEASURES: Tuple[Measure, ...] = (
-    Measure("Missions complete, %", True, 0, lambda one: 100.0 * one.completed / one.flights),
-    Measure("Flights with contacts, %", False, 0, lambda one: 100.0 * one.touched / one.flights),
-    Measure("Mean mission time, s", False, 1, lambda one: one.mean_time_s),
-    Measure("Smallest gap, m", True, 2, lambda one: one.least_gap_m),
+    Measure(
+        "Completed missions (%)",
+        True,
+        0,
+        lambda flights: 100.0 * flights.completed / flights.flights,
+    ),
+    Measure(
+        "Flights with contacts (%)",
+        False,
+        0,
+        lambda flights: 100.0 * flights.touched / flights.flights,
+    ),
+    Measure("Mean mission time (s)", False, 1, lambda flights: flights.mean_time_s),
+    Measure("Min gap (m)", True, 2, lambda flights: flights.least_gap_m),
 )
-_MOST_NUMBERS = 100  # cells of a map beyond which there are no numbers in them
-_MOST_LABELS = 30
-_MOST_LETTERS = 36  # of a point's label
+_MAX_NUMBERS = 100  # largest map with numbers in its cells
+_MAX_LABELS = 30
+_MAX_LETTERS = 36  # longest label of a point
 
 
 def sweep_picture(rows: Sequence[SweepRow]) -> Figure:
-    """One panel for each measure."""
+    """Draw one panel for each measure."""
     paths = list(rows[0].point)
     axis_values = [list(dict.fromkeys(row.point[path] for row in rows)) for path in paths]
     if len(paths) == 1:
@@ -60,7 +76,7 @@ def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measur
     places, labels = _places([row.point[path] for row in rows])
     found = [measure.value(row.statistics) for row in rows]
     axes.plot(places, [np.nan if one is None else one for one in found], "o-", color=colour(0))
-    if measure.title.startswith("Mean"):  # and each flight
+    if measure.title.startswith("Mean"):  # also each flight
         for place, row in zip(places, rows):
             times_s = [flight.time_s for flight in row.flights if flight.completed]
             axes.plot([place] * len(times_s), times_s, ".", ms=4, color=QUIET, alpha=0.6, zorder=1)
@@ -69,7 +85,7 @@ def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measur
     if labels:
         axes.set_xticks(places)
         axes.set_xticklabels(labels)
-    if measure.title.endswith("%"):
+    if measure.is_percentage:
         axes.set_ylim(-5, 105)
 
 
@@ -80,44 +96,46 @@ def _draw_map(
     values: Sequence[List[Any]],
     measure: Measure,
 ) -> None:
-    cells = np.full((len(values[0]), len(values[1])), np.nan)
-    first, second = list(rows[0].point)
-    for row in rows:
-        found = measure.value(row.statistics)
-        place = (values[0].index(row.point[first]), values[1].index(row.point[second]))
-        cells[place] = np.nan if found is None else found
-    limits = (0.0, 100.0) if measure.title.endswith("%") else (None, None)
+    cells = _cells(rows, values, measure)
+    low, high = (0.0, 100.0) if measure.is_percentage else (None, None)
     image = axes.imshow(
         cells,
         aspect="auto",
         origin="lower",
-        vmin=limits[0],
-        vmax=limits[1],
+        vmin=low,
+        vmax=high,
         cmap="RdYlGn" if measure.more_is_better else "RdYlGn_r",
         alpha=0.85,
     )
-    if cells.size <= _MOST_NUMBERS:
+    if cells.size <= _MAX_NUMBERS:
         for (i, j), number in np.ndenumerate(cells):
-            axes.text(
-                j,
-                i,
-                "–" if np.isnan(number) else f"{number:.{measure.decimals}f}",
-                color=_ink(image.to_rgba(number)),
-                ha="center",
-                va="center",
-                fontsize=8,
-            )
+            text = "–" if np.isnan(number) else f"{number:.{measure.decimals}f}"
+            ink = _ink(image.to_rgba(np.array(number)))
+            axes.text(j, i, text, color=ink, ha="center", va="center", fontsize=8)
     else:
         figure.colorbar(image, ax=axes)
     axes.set_title(measure.title)
     axes.grid(visible=False)
     axes.set(xticks=range(len(values[1])), yticks=range(len(values[0])))
-    axes.set_xticklabels(list(map(value_words, values[1])))
-    axes.set_yticklabels(list(map(value_words, values[0])))
+    axes.set_xticklabels(list(map(format_value, values[1])))
+    axes.set_yticklabels(list(map(format_value, values[0])))
 
 
-def _ink(rgba: np.ndarray) -> str:
-    """What can be read on a cell of this colour, by its luma (ITU-R BT.601)."""
+def _cells(
+    rows: Sequence[SweepRow], values: Sequence[List[Any]], measure: Measure
+) -> NDArray[np.float64]:
+    """Return the measure for each pair of values, NaN where it is unknown."""
+    cells = np.full((len(values[0]), len(values[1])), np.nan)
+    first, second = list(rows[0].point)
+    for row in rows:
+        value = measure.value(row.statistics)
+        place = (values[0].index(row.point[first]), values[1].index(row.point[second]))
+        cells[place] = np.nan if value is None else value
+    return cells
+
+
+def _ink(rgba: NDArray[Any]) -> str:
+    """Return black or white, whichever is readable on a colour, by its luma (ITU-R BT.601)."""
     luma = float(np.dot(rgba[:3], (0.299, 0.587, 0.114)))
     return "black" if luma > 0.5 or rgba[3] == 0.0 else "white"
 
@@ -133,15 +151,15 @@ def _draw_list(axes: Axes, rows: Sequence[SweepRow], measure: Measure) -> None:
     )
     axes.set_title(measure.title, fontsize=8)
     axes.set(ylim=(len(rows) - 0.4, -0.6), yticks=range(len(rows)))
-    labels = [", ".join(map(value_words, row.point.values()))[:_MOST_LETTERS] for row in rows]
-    axes.set_yticklabels(labels if len(rows) <= _MOST_LABELS else [""] * len(rows))
+    labels = [", ".join(map(format_value, row.point.values()))[:_MAX_LETTERS] for row in rows]
+    axes.set_yticklabels(labels if len(rows) <= _MAX_LABELS else [""] * len(rows))
     axes.grid(axis="y", visible=False)
-    if measure.title.endswith("%"):
+    if measure.is_percentage:
         axes.set_xlim(0, 105)
 
 
 def _places(values: Sequence[Any]) -> Tuple[List[float], List[str]]:
-    """Numbers are where they are; of anything else places with labels."""
+    """Return positions on the axis, and labels unless the values are numbers."""
     if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
         return [float(value) for value in values], []
-    return [float(k) for k in range(len(values))], list(map(value_words, values))
+    return [float(k) for k in range(len(values))], list(map(format_value, values))

@@ -1,9 +1,9 @@
-"""The page of a study: how the search went, what came of it, a flight before and after."""
+"""Report of a study."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import List
+from typing import Dict, List, Sequence
 
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
@@ -22,7 +22,7 @@ from quad_nav.tuning.report.search_pictures import (
     slice_picture,
 )
 from quad_nav.tuning.score import TERMS
-from quad_nav.tuning.search import FIGURES, is_complete
+from quad_nav.tuning.search import STATISTICS, is_complete
 from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
 from quad_nav.tuning.tune import TuneResult, all_versions
 
@@ -30,7 +30,7 @@ _FOLDER = Path(__file__).parent
 
 
 def tune_page(result: TuneResult, before: FlightTrace, after: FlightTrace, command: str) -> Page:
-    """``before`` and ``after``: one of the flights that were held out, base and tuned."""
+    """Build the report; ``before`` and ``after`` are a held-out flight, base and tuned."""
     with style.styled():
         sections = [_held_out(result), _flights(before, after), *_search(result)]
     return render(
@@ -45,9 +45,9 @@ def tune_page(result: TuneResult, before: FlightTrace, after: FlightTrace, comma
         gains=[
             (
                 gain,
-                study_text.value_words(gain.base),
-                study_text.value_words(gain.value),
-                study_text.gain_words(gain),
+                study_text.format_value(gain.base),
+                study_text.format_value(gain.value),
+                study_text.gain_text(gain),
             )
             for gain in result.refined.gains
         ],
@@ -60,9 +60,9 @@ def _held_out(result: TuneResult) -> Section:
     held_out = result.held_out
     return Section(
         "held-out",
-        "Flights that the search never saw",
-        f"{len(held_out.cases)} flights with each "
-        "set of parameters; a line joins those of the same mission and seed, thick bars are means.",
+        "Held-out flights",
+        f"{len(held_out.cases)} flights with each set of parameters. A line connects flights of "
+        "the same mission and seed, thick bars are means.",
         (
             picture(
                 "held_out",
@@ -75,94 +75,90 @@ def _held_out(result: TuneResult) -> Section:
 
 def _flights(before: FlightTrace, after: FlightTrace) -> Section:
     pictures, notes = [], []
-    for name, trace in (("before", before), ("after", after)):
+    for name, trace in (("base", before), ("tuned", after)):
         tracks = resampled_tracks(trace)
         shown = encounters(trace, tracks)[:MAX_STRIPS]
-        found = flight_metrics(trace, tracks)
-        words = f"{name.capitalize()}: {found.mission_s:.1f} s"
-        notes += [words, ""]
+        metrics = flight_metrics(trace, tracks)
+        notes += [f"{name.capitalize()}: {metrics.mission_s:.1f} s", ""]
         pictures += [
-            picture(f"paths_{name}", f"Paths {name}", paths_picture(trace, tracks, shown)),
-            picture(f"timeline_{name}", f"Goals {name}", timeline_picture(trace)),
+            picture(f"paths_{name}", f"Paths, {name}", paths_picture(trace, tracks, shown)),
+            picture(f"timeline_{name}", f"Goals, {name}", timeline_picture(trace)),
         ]
     return Section(
         "flights",
-        "One of these flights, before and after",
-        "The same mission and seed "
-        "with the base and with the tuned parameters. Letters are close encounters.",
+        "One held-out flight, base and tuned",
+        "The same mission and seed with the base and with the tuned parameters. Letters are close "
+        "encounters.",
         tuple(pictures),
         tuple(notes),
     )
 
 
 def _search(result: TuneResult) -> List[Section]:
-    trials, space = result.trials, result.setup.space
     reference = flight_statistics(result.reference)
-    found = importances(trials, space)
-    sections = [
-        Section(
-            "history",
-            "The search",
-            "Mean cost of each candidate, lower is better. Those that "
-            "were dropped did not fly everything.",
-            (
-                picture(
-                    "history", "Cost of each candidate", history_picture(trials, reference.cost)
-                ),
-            ),
-        ),
+    importance = importances(result.trials, result.setup.space)
+    return [
+        _history(result, reference),
         _pareto(result, reference),
+        *_importances(importance),
+        _slices(result, reference, list(importance) or list(result.setup.space.paths)),
     ]
-    if found:
-        sections.append(
-            Section(
-                "importances",
-                "What counted",
-                "How much each parameter tells the better candidates from the others (PED-ANOVA).",
-                (
-                    picture(
-                        "importances", "Importance of each parameter", importance_picture(found)
-                    ),
-                ),
-            )
-        )
-    order = list(found) or list(space.paths)
-    sections.append(
-        Section(
-            "slices",
-            "Values",
-            "Each candidate's value and cost, for every parameter that was "
-            "searched; the tuned value has no line where the base's was kept.",
-            (
-                picture(
-                    "slices",
-                    "Cost over the values of each parameter",
-                    slice_picture(
-                        trials,
-                        space,
-                        order,
-                        result.refined.values,
-                        dict(result.setup.base),
-                        reference.cost,
-                    ),
-                ),
-            ),
-        )
+
+
+def _history(result: TuneResult, reference: FlightStatistics) -> Section:
+    plot = history_picture(result.trials, reference.cost)
+    return Section(
+        "history",
+        "Search",
+        "Mean cost of each candidate; lower is better. Pruned candidates did not fly all flights.",
+        (picture("history", "Cost of each candidate", plot),),
     )
-    return sections
+
+
+def _importances(importance: Dict[str, float]) -> List[Section]:
+    """Return the section, or nothing if there are too few trials."""
+    if not importance:
+        return []
+    plot = importance_picture(importance)
+    return [
+        Section(
+            "importances",
+            "Importance of the parameters",
+            "How strongly each parameter separates good candidates from the others (PED-ANOVA).",
+            (picture("importances", "Importance of each parameter", plot),),
+        )
+    ]
+
+
+def _slices(result: TuneResult, reference: FlightStatistics, order: Sequence[str]) -> Section:
+    plot = slice_picture(
+        result.trials,
+        result.setup.space,
+        order,
+        result.refined.values,
+        dict(result.setup.base),
+        reference.cost,
+    )
+    return Section(
+        "slices",
+        "Values",
+        "Value and cost of each candidate, for each searched parameter. There is no line for the "
+        "tuned value where the base's value was kept.",
+        (picture("slices", "Cost over the values of each parameter", plot),),
+    )
 
 
 def _pareto(result: TuneResult, reference: FlightStatistics) -> Section:
     complete = [trial for trial in result.trials if is_complete(trial)]
-    candidates = [FlightStatistics(**trial.user_attrs[FIGURES]) for trial in complete]
+    candidates = [FlightStatistics(**trial.user_attrs[STATISTICS]) for trial in complete]
     gains = result.refined.gains
     tuned = gains[0].with_it if gains else reference
     return Section(
         "pareto",
         "Time against clearance",
-        f"{len(candidates)} candidates flew everything; those "
-        "that reached every goal and touched nothing are shown. No other one beats those of the "
-        "front in both. The tuned one has flown more than the others.",
+        f"{len(candidates)} candidates completed all flights. The plot shows those that reached "
+        "every goal without contact. No candidate beats one of the front in both time and gap. "
+        "The tuned parameters have flown more flights than the others.",
         (
             picture(
                 "pareto",
