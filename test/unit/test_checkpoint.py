@@ -1,4 +1,4 @@
-"""A mission that another sequencer goes on with, from what is in its journal."""
+"""Missions that another sequencer resumes from their journals."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def a_mission_on_its_second_goal():
     return mission
 
 
-def test_the_goal_in_flight_is_sent_again_uncounted_and_none_that_was_reached():
+def test_the_active_goal_is_sent_again_without_counting_an_attempt():
     mission = a_mission_on_its_second_goal()
     later = mission.taken_over()
     (sent,) = later.fly(120.0, Pose2D(2.9, 1.0))
@@ -86,14 +86,14 @@ def test_the_goal_in_flight_is_sent_again_uncounted_and_none_that_was_reached():
     assert ended == GoalEnded(1, 1, B, True, 15.0, 1) and after.index == 2
 
 
-def test_a_goal_that_was_reached_while_nobody_looked_is_not_flown_again():
+def test_a_goal_that_was_reached_without_a_sequencer_is_not_flown_again():
     later = a_mission_on_its_second_goal().taken_over()
     ended, sent = later.fly(150.0, Pose2D(3.0, 4.1))
     assert ended == GoalEnded(1, 1, B, True, 40.0, 1)
     assert (sent.index, sent.resend_reason) == (2, "")
 
 
-def test_a_new_clock_counts_on():
+def test_times_continue_on_a_new_clock():
     later = a_mission_on_its_second_goal().taken_over(start_s=-10.0)  # 10 s flown, now it is 0
     later.fly(0.5, START)
     ended, _ = later.fly(20.0, Pose2D(3.0, 4.0))
@@ -102,7 +102,7 @@ def test_a_new_clock_counts_on():
 
 def test_the_figures_add_up():
     later = a_mission_on_its_second_goal().taken_over()
-    later.fly(121.0, Pose2D(2.8, 2.0))  # straight there while nobody looked
+    later.fly(121.0, Pose2D(2.8, 2.0))  # straight there without a sequencer
     later.fly(122.0, Pose2D(2.8, 4.0))
     first, second = later.log.robots["quad0"].legs
     assert (first.goal, first.path_length_m, first.time_s) == (A, pytest.approx(2.8), 10.0)
@@ -111,7 +111,7 @@ def test_the_figures_add_up():
     assert later.log.robots["quad0"].path_length_m == pytest.approx(6.8)
 
 
-def test_smallest_distances_last():
+def test_smallest_distances_are_resumed():
     mission = a_mission_on_its_second_goal()
     mission.records[-1].update(clearance_m=0.25, separation_m=1.5)
     log = mission.taken_over().log
@@ -122,7 +122,7 @@ def test_smallest_distances_last():
     assert log.distances.min_clearance_m("quad1") is None
 
 
-def test_a_mission_that_was_flown_is_not_flown_again():
+def test_a_completed_mission_is_not_flown_again():
     mission = JournaledRobot(A)
     mission.fly(100.0, START)
     mission.fly(110.0, Pose2D(3.0, 0.0))
@@ -131,7 +131,7 @@ def test_a_mission_that_was_flown_is_not_flown_again():
     assert later.sequencer.done and len(later.log.robots["quad0"].legs) == 1
 
 
-def test_laps_and_attempts_go_on():
+def test_laps_and_attempts_continue():
     mission = JournaledRobot(A, B, loop=True, goal_timeout_s=5.0)
     for now_s, pose in ((100.0, START), (101.0, A.pose), (102.0, B.pose), (108.0, B.pose)):
         mission.fly(now_s, pose)
@@ -141,14 +141,14 @@ def test_laps_and_attempts_go_on():
     assert (sent.index, sent.lap, sent.attempt) == (0, 2, 2)
 
 
-def test_a_goal_file_that_was_edited_meanwhile_counts_from_the_goal_in_flight_on():
+def test_a_goal_file_edited_meanwhile_applies_from_the_active_goal():
     edited = Goal(5.0, 5.0)
     later = a_mission_on_its_second_goal().taken_over(START_S, A, edited, C)
     (sent,) = later.fly(120.0, Pose2D(2.8, 0.0))
     assert (sent.index, sent.resend_reason, sent.pose.x_m) == (1, "", 5.0)
 
 
-def test_contacts_and_times_are_kept():
+def test_contacts_and_times_are_resumed():
     mission = a_mission_on_its_second_goal()
     contact = Contact(103.5, "quad0", "box", 1.0, 2.0)
     mission.records.append({**contact_record(contact, START_S), "mission_s": 12.0, "wall_s": 8.0})
@@ -163,7 +163,7 @@ def test_contacts_and_times_are_kept():
     assert checkpoint.robots["quad1"].progress.index == 0
 
 
-def test_nothing_has_begun_in_an_empty_journal_or_with_its_head_alone():
+def test_a_journal_without_robots_has_no_checkpoint():
     assert read_checkpoint([], NAMES, "journal") is None
     assert read_checkpoint([head_record(NAMES, 0.0, 0.0)], NAMES, "journal") is None
 
@@ -180,7 +180,7 @@ def test_another_missions_journal_is_refused():
 @pytest.mark.parametrize(
     "change", [{"index": None}, {"log": {}}, {"active_goal": {"goal": 3}}, {"robot": "quad7"}]
 )
-def test_what_no_sequencer_writes_is_refused(change):
+def test_invalid_records_are_refused(change):
     mission = a_mission_on_its_second_goal()
     mission.records[-1].update(change)
     with pytest.raises(InputError, match="journal: cannot be read"):

@@ -1,4 +1,4 @@
-"""Colours of quadcopters: the same everywhere, and told apart."""
+"""Colours of quadcopters are distinct."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import math
 from quad_nav.sim.colours import ROBOT_COLOURS, robot_rgba
 
 
-def test_the_first_ones_are_the_listed_ones():
+def test_the_first_colours_are_the_listed_ones():
     assert robot_rgba(1, 0.5) == (230 / 255, 110 / 255, 20 / 255, 0.5)
 
 
-def test_sixteen_are_far_from_each_other():
+def test_sixteen_colours_are_distinct():
     assert len(ROBOT_COLOURS) == 16
     for a, b in itertools.combinations(ROBOT_COLOURS, 2):
         assert math.dist(a, b) > 50
 
 
-def test_further_ones_are_colours_that_differ_from_all_before():
+def test_further_colours_differ_from_all_before():
     hundred = [robot_rgba(robot)[:3] for robot in range(100)]
     assert len(set(hundred)) == 100
     assert all(0.0 <= part <= 1.0 for colour in hundred for part in colour)

@@ -16,7 +16,7 @@ def to_wall(positions_m):
 
 
 def logged(tracks, **options):
-    """Poses in the order of their stamps, as they come."""
+    """A log of poses in the order of their stamps."""
     log = DistanceLog(list(tracks), RADIUS_M, **options)
     for stamp_s, name, x_m, y_m in sorted(
         (sample[0], name, *sample[1:]) for name, track in tracks.items() for sample in track
@@ -32,7 +32,7 @@ def test_distances_are_between_hulls():
     log.add("quad0", 2.0, 4.0, 0.0)
     log.add("quad1", 1.0, 4.0, 4.0)
     assert log.min_clearance_m("quad0") == pytest.approx(0.7)
-    # 3-4-5 triangle at 1 s; at 2 s quad0 would be nearer, but quad1 has not told where it is.
+    # 3-4-5 triangle at 1 s; at 2 s quad0 would be nearer, but quad1 has no pose yet.
     assert log.min_separation_m("quad0") == pytest.approx(5.0 - 0.6)
     assert log.min_separation_m("quad1") == pytest.approx(5.0 - 0.6)
     log.add("quad1", 2.0, 4.0, 1.0)
@@ -40,19 +40,19 @@ def test_distances_are_between_hulls():
     assert log.min_separation_m("quad2") is None
 
 
-def test_between_two_poses_a_quadcopter_is_on_the_straight_line():
+def test_positions_between_two_poses_are_interpolated():
     log = logged({"quad0": [(0.0, 0.0, 0.0), (2.0, 4.0, 0.0)], "quad1": [(1.0, 2.0, 3.0)]})
     assert log.min_separation_m("quad0") == pytest.approx(3.0 - 0.6)
 
 
-def test_nothing_is_guessed_before_the_first_and_after_the_last_pose():
+def test_positions_are_not_extrapolated():
     log = logged({"quad0": [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0)], "quad1": [(1.5, 1.0, 0.1)]})
     assert log.min_separation_m("quad0") is None
     assert log.min_clearance_m("quad0") is None
 
 
-def test_blocks_miss_nothing():
-    """Two fly along lines 1 m apart and are side by side once, wherever a block ends."""
+def test_an_encounter_is_found_wherever_a_block_ends():
+    """Two robots fly along lines 1 m apart and meet once."""
     stamps_s = np.arange(0.0, 3.2 * BLOCK_S, 0.25)
     for meeting_s in (0.0, BLOCK_S, BLOCK_S + 0.25, 1.7 * BLOCK_S, 3.0 * BLOCK_S):
         log = logged(
@@ -65,7 +65,7 @@ def test_blocks_miss_nothing():
         assert log.min_separation_m("quad1") == pytest.approx(expected - 0.6, abs=1e-9)
 
 
-def test_a_pair_that_comes_near_last_is_found_after_others_were_nearer():
+def test_a_late_encounter_is_found_after_others_were_closer():
     log = logged(
         {
             "quad0": [(0.0, 0.0, 0.0), (20.0, 0.0, 0.0)],

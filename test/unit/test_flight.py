@@ -1,4 +1,4 @@
-"""The flight law: forces that can be worked out by hand, and the commands it is given."""
+"""Flight controller: forces that can be computed by hand, and limits of commands."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def forces_on(state: BodyState, *command: float, params: FlightParams = PARAMS):
     return forces[0], torques[0]
 
 
-def test_hovering_takes_the_weight_and_no_torque():
+def test_hovering_needs_the_weight_and_no_torque():
     force, torque = forces_on(body(), 0.0, 0.0, 0.0)
     assert force == pytest.approx([0.0, 0.0, 2.0 * GRAVITY_MPS2])
     assert torque == pytest.approx([0.0, 0.0, 0.0])
@@ -49,7 +49,7 @@ def test_a_step_ahead_pitches_first():
     assert torque == pytest.approx([0.0, 0.01 * 625.0 * sine, 0.0])
 
 
-def test_a_tilted_body_accelerates_the_way_it_leans_and_keeps_its_height():
+def test_a_tilted_body_accelerates_towards_its_tilt_and_keeps_its_altitude():
     force, torque = forces_on(body(pitch=0.2), 0.0, 0.0, 0.0)
     assert force == pytest.approx([2.0 * GRAVITY_MPS2 * math.tan(0.2), 0.0, 2.0 * GRAVITY_MPS2])
     assert torque == pytest.approx([0.0, -0.01 * 625.0 * math.sin(0.2), 0.0])
@@ -127,7 +127,7 @@ def test_rows_are_independent():
         assert both[1][k] == pytest.approx(alone[1][0])
 
 
-def test_rotations_of_many_bodies_are_those_of_each():
+def test_rotations_of_many_bodies_equal_those_of_each():
     quaternions = [quaternion_from_euler(0.1, -0.2, 0.3), quaternion_from_euler(0.0, 0.5, -2.0)]
     rows = np.zeros((2, 13))
     rows[:, 3:7] = quaternions

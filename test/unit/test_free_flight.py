@@ -1,4 +1,4 @@
-"""Quadcopters that touch nothing fly without the physics engine, and as they do with it."""
+"""Free flight: equal to the physics engine while nothing is near."""
 
 import math
 from dataclasses import replace
@@ -48,7 +48,7 @@ def random_commands(seed, count, speed_mps):
     ]
 
 
-def test_a_free_step_is_the_engines():
+def test_a_free_step_equals_the_engines_step():
     world = World(SKY, SKY.starts, Airframe(), STEP_S)
     random = np.random.default_rng(1)
     for _ in range(500):
@@ -64,11 +64,13 @@ def test_a_free_step_is_the_engines():
             atol=1e-13,
         )
         np.testing.assert_allclose(free.rotations, engine.rotations, atol=1e-13)
-    assert np.abs(world.state().angular_radps).max() > 1.0  # or the gyroscopic term was not tried
+    assert (
+        np.abs(world.state().angular_radps).max() > 1.0
+    )  # otherwise the gyroscopic term is not tested
     world.close()
 
 
-def test_falling_for_a_step():
+def test_free_fall_for_one_step():
     falling = free_step(
         BodyState(np.array([[0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0, 1.0] + 5 * [0.0]])),
         np.array([[4.0, 0.0, 0.0]]),
@@ -114,8 +116,8 @@ def test_the_same_flight_with_and_without_the_engine():
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_nothing_touches_that_was_not_near(seed):
-    """Two quadcopters bump about in a small room; each touch has been foreseen."""
+def test_every_touch_is_foreseen(seed):
+    """Two quadcopters collide in a small room; free flight never reaches a touch."""
     simulation = Simulation(ROOM, 2, replace(ENGINE, jitter_m=0.3), seed)
     free = FreeFlight(
         ROOM, 2, simulation.params.airframe.radius_m, FlightLaw(Airframe(), FlightParams()), STEP_S
@@ -135,8 +137,8 @@ def test_nothing_touches_that_was_not_near(seed):
     simulation.close()
 
 
-def test_the_engine_takes_over_where_the_free_flight_was():
-    """A wall ahead: the contact of the free flight is that of the engine alone."""
+def test_the_engine_continues_from_the_free_flight():
+    """A wall ahead: the contact is the same with and without free flight."""
     contacts = []
     for params in (SimulationParams(), ENGINE):
         simulation = Simulation(ROOM, 1, params)
@@ -151,8 +153,8 @@ def test_the_engine_takes_over_where_the_free_flight_was():
     assert (free.x_m, free.y_m) == pytest.approx((engine.x_m, engine.y_m), abs=1e-6)
 
 
-def test_only_who_is_near_is_in_the_engine():
-    """One bumps along a wall; the other, far away, flies as if it were alone."""
+def test_only_quadcopters_near_something_are_in_the_engine():
+    """One scrapes along a wall; the other, far away, flies as if it were alone."""
     starts = (Pose2D(2.0, 1.0), Pose2D(2.0, 6.0))
     alone = Simulation(replace(ROOM, starts=starts[1:]), 1)
     both = Simulation(replace(ROOM, starts=starts), 2)
@@ -171,8 +173,8 @@ def test_only_who_is_near_is_in_the_engine():
         simulation.close()
 
 
-def test_who_has_left_the_engine_is_not_in_the_way_there():
-    """One flies away from a post; then another one comes to where it was."""
+def test_a_quadcopter_that_left_the_engine_is_no_obstacle_there():
+    """One flies away from a post; then another one flies to its old position."""
     starts = (Pose2D(4.0, 4.56), Pose2D(4.0, 7.0, -math.pi / 2))
     simulation = Simulation(replace(ROOM, starts=starts), 2)
     for step in range(2880):

@@ -1,4 +1,4 @@
-"""Goal files: what loads, and how each fault in one is named."""
+"""Goal files: valid files, and the message of each fault."""
 
 import json
 import math
@@ -65,13 +65,13 @@ def test_every_key_is_read():
     assert isinstance(sequence.settings.retries, int)
 
 
-def test_a_file_overrides_the_defaults_it_names_and_no_others():
+def test_a_file_overrides_only_the_defaults_that_it_names():
     defaults = SequenceSettings(goal_tolerance_m=0.5, goal_timeout_s=30.0, retries=2)
     settings = parse_goals('{"goals": [[1, 2]], "retries": 0}', "f.json", None, defaults).settings
     assert settings == SequenceSettings(goal_tolerance_m=0.5, goal_timeout_s=30.0, retries=0)
 
 
-def test_a_byte_order_mark_is_no_fault():
+def test_a_byte_order_mark_is_ignored():
     assert parse_goals(b'\xef\xbb\xbf{"goals": [[1, 2]]}', "f.json").goals == (Goal(1.0, 2.0),)
 
 
@@ -114,7 +114,7 @@ def test_a_byte_order_mark_is_no_fault():
         ),
         (
             '{"goals": [[1, 2]], "zzz": 1}',
-            "f.json: zzz: is not a key of goal files; expected one of goals, $schema, goal_tolerance",
+            "f.json: zzz: is not a key of goal files; expected one of goals, $schema,",
         ),
         ('{"goals": [[1, 2]], "$schema": 1}', "f.json: $schema: is 1; expected a string"),
         ('{"goals": [[1, 2]], "loop": 1}', "f.json: loop: is 1; expected true or false"),
@@ -165,7 +165,7 @@ def test_all_faults_are_listed_at_once():
     ]
 
 
-def test_a_goal_just_outside_the_robots_radius_is_taken():
+def test_a_goal_just_outside_the_robots_radius_is_accepted():
     assert parse_goals('{"goals": [[5, 5.81]]}', "f.json", PILLAR).goals == (Goal(5.0, 5.81),)
 
 
@@ -189,21 +189,21 @@ def test_settings_outside_a_file():
     ]
 
 
-def test_an_edited_file_is_taken_once_it_has_settled(tmp_path):
+def test_an_edited_file_is_read_when_it_is_stable(tmp_path):
     path = tmp_path / "quad0_goals.json"
     path.write_text('{"goals": [[1, 2]]}')
     watched = WatchedGoalFile(path)
     assert watched.load().goals == (Goal(1.0, 2.0),)
     assert watched.poll() is None
     path.write_text('{"goals": [[1, 2], [3, ')
-    assert watched.poll() is None  # seen for the first time: perhaps half written
+    assert watched.poll() is None  # read for the first time: an editor may be writing it
     path.write_text('{"goals": [[1, 2], [3, 4]]}')
     assert watched.poll() is None
     assert watched.poll() == GoalSequence((Goal(1.0, 2.0), Goal(3.0, 4.0)))
     assert watched.poll() is None
 
 
-def test_a_bad_edit_is_reported_once_and_a_repaired_one_taken(tmp_path):
+def test_a_bad_edit_is_reported_once_and_a_repaired_one_accepted(tmp_path):
     path = tmp_path / "quad0_goals.json"
     path.write_text('{"goals": [[1, 2]]}')
     watched = WatchedGoalFile(path)
@@ -222,7 +222,7 @@ def test_a_bad_edit_is_reported_once_and_a_repaired_one_taken(tmp_path):
     assert watched.poll() == GoalSequence((Goal(9.0, 9.0),))
 
 
-def test_the_schema_says_the_same_as_the_code():
+def test_the_schema_agrees_with_the_code():
     schema = json.loads((GOALS / "schema.json").read_text())
     assert set(schema["properties"]) == set(KEYS)
     assert schema["required"] == ["goals"] and schema["additionalProperties"] is False

@@ -1,4 +1,4 @@
-"""The journal: what a sequencer that comes after another one reads in it."""
+"""Journal: records that a resumed sequencer reads."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def lines(path):
 
 
 def journal(path, *records):
-    """A journal with these records, as its writer leaves it when it is killed."""
+    """A journal with these records, as a killed writer leaves it."""
     written = Journal(path)
     written.start({"head": 1})
     for record in records:
@@ -27,7 +27,7 @@ def journal(path, *records):
 
 
 class FullDisk:
-    """os.pwrite on a disk with room for so many bytes more."""
+    """os.pwrite on a disk with space for ``room`` bytes."""
 
     def __init__(self, monkeypatch, room):
         self.room = room
@@ -42,7 +42,7 @@ class FullDisk:
         return done
 
 
-def test_what_is_kept_is_in_the_file_at_once_and_read_again(tmp_path):
+def test_records_are_in_the_file_at_once_and_read_again(tmp_path):
     path = tmp_path / "folder" / "journal.jsonl"
     kept = Journal(path)
     assert kept.start({"head": 1}) == "" and kept.append({"goal": 2}) == ""
@@ -50,13 +50,13 @@ def test_what_is_kept_is_in_the_file_at_once_and_read_again(tmp_path):
     assert Journal(path).resume() == [{"head": 1}, {"goal": 2}]
 
 
-def test_one_that_begins_forgets_what_was_there(tmp_path):
+def test_a_new_journal_discards_the_old_content(tmp_path):
     path = journal(tmp_path / "j", {"goal": 1}, {"goal": 2})
     Journal(path).start({"head": 2})
     assert lines(path) == [b'{"head": 2}']
 
 
-def test_one_that_goes_on_writes_behind_what_was_there(tmp_path):
+def test_a_resumed_journal_appends(tmp_path):
     path = journal(tmp_path / "j", {"goal": 1})
     later = Journal(path)
     later.resume()
@@ -64,12 +64,12 @@ def test_one_that_goes_on_writes_behind_what_was_there(tmp_path):
     assert lines(path) == [b'{"head": 1}', b'{"goal": 1}', b'{"goal": 2}']
 
 
-def test_there_need_be_none(tmp_path):
+def test_a_missing_journal_has_no_records(tmp_path):
     assert Journal(tmp_path / "none").resume() == []
 
 
 @pytest.mark.parametrize("torn", [b'{"goal', b'{"goal": 2}', b"\x00\x00\x00"])
-def test_a_line_that_was_never_finished_counts_for_nothing(tmp_path, torn):
+def test_an_unfinished_line_is_ignored(tmp_path, torn):
     path = journal(tmp_path / "j", {"goal": 1})
     with path.open("ab") as file:
         file.write(torn)
@@ -80,7 +80,7 @@ def test_a_line_that_was_never_finished_counts_for_nothing(tmp_path, torn):
 
 
 @pytest.mark.parametrize("line", [b"nonsense", b"[1, 2]", b"\xff\xfe", b""])
-def test_a_line_that_is_none_is_named(tmp_path, line):
+def test_a_line_that_is_not_a_record_is_named(tmp_path, line):
     path = tmp_path / "j"
     path.write_bytes(b'{"head": 1}\n' + line + b'\n{"goal": 1}\n')
     with pytest.raises(
@@ -89,12 +89,12 @@ def test_a_line_that_is_none_is_named(tmp_path, line):
         Journal(path).resume()
 
 
-def test_what_cannot_be_read_is_named(tmp_path):
+def test_an_unreadable_journal_is_named(tmp_path):
     with pytest.raises(InputError, match="cannot be read: Is a directory"):
         Journal(tmp_path).resume()
 
 
-def test_a_full_disk_is_told_once_and_the_journal_catches_up(tmp_path, monkeypatch):
+def test_a_full_disk_is_reported_once_and_the_journal_catches_up(tmp_path, monkeypatch):
     path = journal(tmp_path / "j", {"goal": 1})
     later = Journal(path)
     later.resume()
@@ -104,17 +104,17 @@ def test_a_full_disk_is_told_once_and_the_journal_catches_up(tmp_path, monkeypat
         f"{path}: cannot be written: No space left on device; the flight continues"
     )
     assert later.append({"goal": 3}) == "" and later.flush() == ""
-    assert lines(path) == [b'{"head": 1}', b'{"goal": 1}']  # and no half line
+    assert lines(path) == [b'{"head": 1}', b'{"goal": 1}']  # and no unfinished line
     disk.room = 1000
     assert later.flush() == f"{path}: can be written again, nothing is missing"
     assert lines(path)[2:] == [b'{"goal": 2}', b'{"goal": 3}']
     assert later.flush() == "" and later.append({"goal": 4}) == ""
     disk.room = 0
-    assert "cannot be written" in later.append({"goal": 5})  # the next time it is told again
+    assert "cannot be written" in later.append({"goal": 5})  # a new failure is reported again
 
 
-def test_a_file_that_may_grow_no_more_keeps_whole_lines(tmp_path):
-    """The operating system's own refusal, in the middle of a line."""
+def test_a_file_at_its_size_limit_keeps_whole_lines(tmp_path):
+    """The operating system refuses to write in the middle of a line."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     kept = Journal(tmp_path / "j")
     kept.start({"head": 1})
@@ -128,7 +128,7 @@ def test_a_file_that_may_grow_no_more_keeps_whole_lines(tmp_path):
     assert lines(tmp_path / "j") == [b'{"head": 1}', b'{"goal": 2}']
 
 
-def test_a_folder_that_cannot_be_made_is_a_full_disk(tmp_path):
+def test_a_folder_that_cannot_be_created_counts_as_a_full_disk(tmp_path):
     (tmp_path / "file").write_text("")
     kept = Journal(tmp_path / "file" / "j")
     assert "cannot be written: " in kept.start({"head": 1})
@@ -137,7 +137,7 @@ def test_a_folder_that_cannot_be_made_is_a_full_disk(tmp_path):
     assert lines(tmp_path / "file" / "j") == [b'{"head": 1}']
 
 
-def test_two_missions_do_not_write_one_journal(tmp_path):
+def test_two_missions_cannot_share_a_journal(tmp_path):
     first, second = Journal(tmp_path / "j"), Journal(tmp_path / "j")
     first.start({"head": 1})
     assert "another running mission writes it" in second.start({"head": 2})

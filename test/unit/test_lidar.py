@@ -1,4 +1,4 @@
-"""The LIDAR: its pattern, ranges against walls at known distances, noise."""
+"""LIDAR: beam pattern, ranges against walls at known distances, noise."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Plane:
 def look(
     params: LidarParams, map_from_lidar: Pose3D, plane: Plane, stamp_s: float = 0.0, random=None
 ):
-    """The scan of a LIDAR at a pose, on a quadcopter that hangs below it."""
+    """The scan of a LIDAR at a pose; the quadcopter is below it."""
     pose = map_from_lidar.compose(base_from_lidar.inverse())
     bodies = BodyState(np.array([[*pose.translation, *pose.quaternion, *np.zeros(6)]]))
     (distances,) = WorldCaster(params, plane).cast(bodies, [0])
@@ -53,7 +53,7 @@ def test_half_turn_as_in_the_tutorial():
     assert params.angle_max_rad == pytest.approx(math.pi / 2 - 0.006135923, abs=1e-6)
 
 
-def test_beams_look_along_their_angles():
+def test_beams_point_along_their_angles():
     """A wall at x = 3 seen from x = 1: beams at -180, -90, 0, 90 degrees."""
     wall = Plane([1.0, 0.0, 0.0], 3.0)
     scan = look(FOUR_BEAMS, Pose3D(1.0, 5.0, 1.0), wall, stamp_s=7.5)
@@ -72,13 +72,13 @@ def test_a_lidar_that_pitches_forward_sees_the_floor_ahead():
     assert np.isinf(ranges[0])
 
 
-def test_nothing_nearer_than_range_min_or_beyond_range_max():
+def test_no_hits_nearer_than_range_min_or_beyond_range_max():
     for offset in (1.05, 11.05):
         ranges = look(FOUR_BEAMS, Pose3D(1.0, 0.0, 1.0), Plane([1.0, 0.0, 0.0], offset)).ranges_m
         assert np.isinf(ranges).all()
 
 
-def test_noise_is_gaussian_repeatable_and_leaves_misses_alone():
+def test_noise_is_gaussian_repeatable_and_does_not_affect_misses():
     params = LidarParams(scan_range_rad=math.pi, step_size_rad=math.pi / 10000, noise_std_m=0.02)
     floor = Plane([0.0, 1.0, 0.0], 2.0)
 

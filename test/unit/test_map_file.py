@@ -26,7 +26,7 @@ YAML = {
 
 
 def written(folder: Path, pixels, name: str = "m.pgm", **changes) -> Path:
-    """A map's YAML, with its image from an array, or from bytes as they are."""
+    """A map's YAML, with its image from an array or from bytes."""
     if isinstance(pixels, bytes):
         (folder / name).write_bytes(pixels)
     else:
@@ -48,7 +48,7 @@ def faults(folder: Path, pixels=((0,),), **changes) -> list:
     return [problem.replace(f"{folder}/", "") for problem in caught.value.problems]
 
 
-def test_the_lowest_row_of_the_image_comes_first_and_thresholds_are_shares_of_black(tmp_path):
+def test_the_lowest_row_of_the_image_comes_first(tmp_path):
     # Black 0 is 1.0, 89 is 0.651, 90 is 0.647, 205 is 0.1961, 206 is 0.192.
     assert cells(tmp_path, [[0, 254, 205], [89, 90, 206]]) == [[100, -1, 0], [100, 0, -1]]
 
@@ -57,7 +57,7 @@ def test_negated_white_is_occupied(tmp_path):
     assert cells(tmp_path, [[0, 255, 100]], negate=1) == [[0, 100, -1]]
 
 
-def test_scale_has_degrees_of_which_none_is_an_obstacle(tmp_path):
+def test_intermediate_values_of_scale_are_no_obstacles(tmp_path):
     # 1 + 98 * (p - 0.2) / 0.4 with p 0.4 at 153 and 0.2 at 204.
     path = written(
         tmp_path, [[0, 153, 204, 255]], mode="scale", free_thresh=0.2, occupied_thresh=0.6
@@ -67,7 +67,7 @@ def test_scale_has_degrees_of_which_none_is_an_obstacle(tmp_path):
     assert occupancy.occupied(unknown_too=True).tolist() == [[True, False, False, False]]
 
 
-def test_scale_takes_transparent_pixels_for_unknown(tmp_path):
+def test_transparent_pixels_of_scale_are_unknown(tmp_path):
     pixels = [[[0, 0, 0, 0], [150, 150, 150, 255], [150, 150, 150, 0]]]
     assert cells(
         tmp_path, pixels, name="m.png", mode="scale", free_thresh=0.0, occupied_thresh=0.9
@@ -136,7 +136,7 @@ def test_boxes_stand_over_their_cells(tmp_path):
     assert (scene.origin_x_m, scene.origin_y_m, scene.end_x_m, scene.end_y_m) == (-5, -2, 10, 8)
 
 
-def test_a_turned_map(tmp_path):
+def test_a_rotated_map(tmp_path):
     """A quarter turn takes the image's right to +y and its upper edge to -x."""
     pixels = np.full((20, 30), 254)
     pixels[18:, :4] = 0
@@ -177,7 +177,7 @@ def test_starts_are_chosen_where_the_map_is_known_to_be_free(tmp_path):
         assert all(start.distance_to(other) >= 2.0 for other in scene.starts[:k])
 
 
-def test_a_map_without_room_is_refused(tmp_path):
+def test_a_map_without_free_starts_is_refused(tmp_path):
     assert faults(tmp_path, np.zeros((20, 20))) == [
         "map.yaml: starts: missing, and no free position was found; "
         "expected a scene with world or map, and starts"
@@ -210,7 +210,7 @@ def test_bad_images(tmp_path, pixels, problem):
     assert fault.startswith(problem)
 
 
-def test_keys_that_map_server_does_not_read_are_said(tmp_path):
+def test_keys_that_map_server_ignores_are_remarked(tmp_path):
     path = written(tmp_path, np.full((20, 20), 254), unknown_thresh=0.5)
     assert load_scene(path).remarks[0] == (
         f"{path}: unknown_thresh: ignored, map_server has no such key"

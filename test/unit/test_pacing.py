@@ -11,7 +11,7 @@ def run(pacer: Pacer, *wall_s: float) -> list:
     return [pacer.pop_due(t) for t in wall_s]
 
 
-def test_steps_come_at_the_rate():
+def test_steps_are_due_at_the_rate():
     pacer = Pacer(rate=2.0, step_s=0.25)  # a step each 0.125 s
     pacer.start(100.0)
     assert run(pacer, 100.0, 100.12, 100.125, 100.2, 100.25, 100.3) == [0, 0, 1, 0, 1, 0]
@@ -25,7 +25,7 @@ def test_wait_until_steps_are_due():
     assert pacer.wait_s(11.0, 1) == 0.0
 
 
-def test_a_slow_simulation_catches_up_a_tenth_of_a_second_and_no_more():
+def test_a_slow_simulation_catches_up_at_most_a_tenth_of_a_second():
     pacer = Pacer(rate=1.0, step_s=1.0 / 128)
     pacer.start(0.0)
     assert run(pacer, 5.0, 5.0, 5.005, 5.009) == [13, 0, 1, 0]
@@ -37,7 +37,7 @@ def test_bursts_are_bounded_at_high_rates():
     assert run(pacer, 1.0, 1.0) == [24, 24]
 
 
-def test_time_spent_paused_is_not_caught_up():
+def test_pauses_are_not_caught_up():
     pacer = Pacer(rate=1.0, step_s=0.01)
     pacer.start(0.0)
     pacer.pop_due(0.05)

@@ -1,4 +1,4 @@
-"""Scenes: distances by hand, the shipped arena, and what is said about faulty files."""
+"""Scenes: distances computed by hand, the shipped arena, and messages on faulty files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def small_document(**changes):
     return {"size": [4.0, 6.0], "starts": [[1.0, 1.0, 0.5]], **changes}
 
 
-def test_box_clearance_from_face_edge_corner_top_and_inside():
+def test_distance_to_a_box_from_face_edge_corner_top_and_inside():
     box = Box("b", 2.0, 1.0, 2.0, 1.0, 1.0)
     assert box.surface_distance_m(4.0, 1.0, 0.5) == pytest.approx(1.0)
     assert box.surface_distance_m(6.0, 5.5, 0.5) == pytest.approx(5.0)
@@ -37,13 +37,13 @@ def test_box_clearance_from_face_edge_corner_top_and_inside():
     assert box.surface_distance_m(2.0, 1.4, 0.5) == pytest.approx(-0.1)
 
 
-def test_turned_box_clearance():
+def test_distance_to_a_rotated_box():
     box = Box("b", 0.0, 0.0, 2.0, 2.0, 2.0, yaw_rad=math.pi / 4)
     assert box.surface_distance_m(math.sqrt(2.0) + 0.5, 0.0, 1.0) == pytest.approx(0.5)
     assert box.surface_distance_m(2.0, 2.0, 1.0) == pytest.approx(2.0 * math.sqrt(2.0) - 1.0)
 
 
-def test_cylinder_clearance_beside_above_and_below_a_lifted_one():
+def test_distance_to_a_lifted_cylinder_from_beside_above_and_below():
     cylinder = Cylinder("c", 1.0, 1.0, 0.5, 1.0, bottom_m=2.0)
     assert cylinder.surface_distance_m(4.0, 5.0, 2.5) == pytest.approx(4.5)
     assert cylinder.surface_distance_m(1.0, 1.0, 3.2) == pytest.approx(0.2)
@@ -51,14 +51,14 @@ def test_cylinder_clearance_beside_above_and_below_a_lifted_one():
     assert cylinder.surface_distance_m(1.1, 1.0, 2.5) == pytest.approx(-0.4)
 
 
-def test_sphere_clearance():
+def test_distance_to_a_sphere():
     sphere = Sphere("s", 1.0, 1.0, 2.0, 0.5)
     assert sphere.surface_distance_m(1.0, 4.0, 6.0) == pytest.approx(4.5)
     assert sphere.surface_distance_m(1.0, 1.2, 2.0) == pytest.approx(-0.3)
     assert (sphere.bottom_m, sphere.height_m) == (1.5, 1.0)
 
 
-def test_the_nearest_of_many_solids_is_the_one_with_the_least_clearance():
+def test_the_nearest_of_many_solids_has_the_smallest_distance():
     random = np.random.default_rng(0)
     boxes = [
         Box(
@@ -88,7 +88,7 @@ def test_the_nearest_of_many_solids_is_the_one_with_the_least_clearance():
         assert scene.surface_distance_m(x, y, z) == nearest.surface_distance_m(x, y, z)
 
 
-def test_clearances_of_many_points_are_those_of_each():
+def test_distances_of_many_points_equal_those_of_each():
     random = np.random.default_rng(2)
     boxes = tuple(Box(f"b{k}", *random.uniform(0.0, 40.0, 2), 0.5, 0.8, 2.0) for k in range(300))
     scene = Scene("s", 40.0, 40.0, 1.0, Walls(), (*boxes, Sphere("ball", 9.0, 9.0, 1.0, 0.5)), ())

@@ -1,4 +1,4 @@
-"""The sequencer's state machine: what it does about each thing that can happen."""
+"""Sequencer: the actions for each event."""
 
 import math
 
@@ -56,7 +56,7 @@ def test_a_goal_is_reached_at_the_tolerance_and_not_outside_it():
     assert isinstance(s.tick(2.0, at(A, 0.25))[0], GoalEnded)
 
 
-def test_a_given_yaw_is_sent_and_without_way_the_robots_own():
+def test_a_given_yaw_is_sent_and_without_distance_the_robots_own():
     assert sequencer(C).tick(0.0, START)[0].pose == Pose2D(0.0, 8.0, -1.0)
     assert sequencer(Goal(0.0, 0.0)).tick(0.0, START)[0].pose == START
 
@@ -79,7 +79,7 @@ def test_without_retries_the_first_failure_skips():
     ]
 
 
-def test_each_attempt_has_the_whole_time():
+def test_each_attempt_has_its_own_timeout():
     s = flying(A, goal_timeout_s=30.0, retries=1)
     assert s.tick(29.9, START) == []
     assert s.tick(30.0, START) == [SendGoal(0, 1, s.active_goal.pose, 2, "not reached in 30 s")]
@@ -87,7 +87,7 @@ def test_each_attempt_has_the_whole_time():
     assert s.tick(60.0, START)[0] == GoalEnded(0, 1, A, False, 60.0, 2, "not reached in 30 s")
 
 
-def test_a_goal_that_is_reached_counts_whatever_the_navigator_says():
+def test_a_reached_goal_counts_whatever_the_navigator_reports():
     s = flying(A)
     assert s.tick(500.0, at(A), [ABORTED])[0] == GoalEnded(0, 1, A, True, 500.0, 1)
 
@@ -100,7 +100,7 @@ def test_stopping_short_of_the_goal_is_a_failure():
     assert s.active_goal.attempt == 2
 
 
-def test_a_cancelled_goal_is_given_up():
+def test_a_cancelled_goal_is_skipped():
     s = flying(A, B)
     ended, following = s.tick(4.0, START, [NavigatorReport(Verdict.CANCELLED)])
     assert ended == GoalEnded(0, 1, A, False, 4.0, 1, "cancelled by another node")
@@ -108,7 +108,7 @@ def test_a_cancelled_goal_is_given_up():
 
 
 @pytest.mark.parametrize("outcome", [SUCCEEDED, ABORTED])
-def test_somebody_elses_goal_is_waited_for_and_costs_no_attempt(outcome):
+def test_another_nodes_goal_is_waited_for_and_costs_no_attempt(outcome):
     s = flying(A)
     assert s.tick(2.0, START, [NavigatorReport(Verdict.REPLACED)]) == []
     assert s.tick(20.0, START) == []
@@ -139,7 +139,7 @@ def test_looping_counts_laps():
     assert (s.index, s.lap, s.done) == (0, 2, False)
 
 
-def test_an_edit_leaves_the_goal_in_flight_alone_when_it_is_the_same():
+def test_an_edit_keeps_an_unchanged_active_goal():
     s = flying(A, B, C)
     s.tick(1.0, at(A))
     s.replace_sequence(GoalSequence((C, B, Goal(9.0, 9.0)), SequenceSettings(retries=0)))
@@ -148,7 +148,7 @@ def test_an_edit_leaves_the_goal_in_flight_alone_when_it_is_the_same():
     assert s.sequence.settings.retries == 0
 
 
-def test_an_edit_of_the_goal_in_flight_is_sent_as_a_new_goal():
+def test_an_edited_active_goal_is_sent_as_a_new_goal():
     s = flying(A, B)
     s.tick(5.0, START, [ABORTED])
     s.replace_sequence(GoalSequence((Goal(5.0, 0.0), B)))
@@ -156,7 +156,7 @@ def test_an_edit_of_the_goal_in_flight_is_sent_as_a_new_goal():
     assert s.tick(9.0, Pose2D(5.0, 0.0))[0].time_s == 3.0
 
 
-def test_an_edit_that_ends_the_list_here_ends_the_sequence():
+def test_an_edit_that_removes_the_rest_ends_the_sequence():
     s = flying(A, B, C)
     s.tick(1.0, at(A))
     s.replace_sequence(GoalSequence((A,)))

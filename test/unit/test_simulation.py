@@ -102,7 +102,7 @@ def test_accelerating_needs_tilt_and_is_limited(make):
     assert tilts[0] < 0.01
 
 
-def test_hovers_when_commands_stop(make):
+def test_hovers_when_commands_time_out(make):
     params = SimulationParams(command_timeout_s=0.5, controller_period_s=0.1)
     simulation = make(room(MIDDLE, Pose2D(5.0, 5.0)), 2, params)
     assert simulation.is_hovering.tolist() == [True, True]
@@ -177,7 +177,7 @@ def test_walls_touch(make):
     assert [c.other for c in simulation.contacts] == ["wall_west"]
 
 
-def test_contact_log_needs_separation_before_a_new_contact():
+def test_a_contact_ends_half_a_second_after_its_last_touch():
     log = ContactLog()
     touch = Touch(0, "pillar", (1.0, 2.0, 3.0))
     other = Touch(1, "pillar", (1.0, 2.0, 3.0))
@@ -213,15 +213,15 @@ def test_scan_sees_spheres_at_their_height(make, caster):
 
 
 def row_of_boxes(count: int) -> List[Box]:
-    """A wall along y at x = 14 with gaps that no beam of the test looks through."""
+    """A wall along y at x = 14 with gaps that no beam of the test passes."""
     return [
         Box(f"b{k}", 14.0, 20.0 * k / count, 0.4, 20.0 / count - 0.001, 2.0) for k in range(count)
     ]
 
 
 @pytest.mark.parametrize("caster", LIDAR_CASTERS)
-def test_thousands_of_boxes_are_seen_and_touched_like_single_ones(make, caster):
-    """They are in few bodies, but a contact still names the box."""
+def test_thousands_of_boxes_are_seen_and_touched_like_single_boxes(make, caster):
+    """The engine has them in few bodies; a contact still names the box."""
     scene = room(Pose2D(13.0, 10.0), obstacles=row_of_boxes(1000))
     params = SimulationParams(LidarParams(step_size_rad=math.pi / 2), lidar_caster=caster)
     simulation = make(scene, 1, params)
@@ -241,7 +241,7 @@ def test_scan_above_low_walls_returns_infinity(make):
 
 
 def test_lidar_tilts_with_the_body(make):
-    """Speeding up pitches the nose down: the floor comes into view ahead, not behind."""
+    """Acceleration pitches the nose down: the LIDAR sees the floor ahead, not behind."""
     simulation = make(room(MIDDLE, size_m=60.0), 1)
     simulation.set_command(0, Twist2D(2.0, 0.0, 0.0))
     for _ in range(60):
@@ -279,7 +279,7 @@ def test_same_seed_same_bits(make):
     assert not np.array_equal(flown, flight(make(scene, 2, params, seed=6))[0])
 
 
-def test_reset_goes_back_to_the_start_and_lets_the_clock_go_on(make):
+def test_reset_restores_the_start_and_the_clock_continues(make):
     simulation = make(room(MIDDLE), 1, start_step=240)
     fly(simulation, 1.0, Twist2D(0.3, 0.0, 0.5))
     assert simulation.now_s == pytest.approx(2.0)
@@ -345,7 +345,7 @@ def test_a_body_is_seen_with_its_own_radius(make, caster):
     assert simulation.scan(0).ranges_m[2] == pytest.approx(1.8, abs=0.01)  # the beam ahead
 
 
-def test_starts_are_as_far_from_things_as_the_body_is_wide():
+def test_starts_are_at_least_the_body_radius_from_obstacles():
     scene = room(MIDDLE, obstacles=[Cylinder("pillar", 10.6, 10.0, 0.35, 2.0)])
     for seed in range(20):
         for radius_m in (0.2, 0.5):

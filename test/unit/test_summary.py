@@ -1,4 +1,4 @@
-"""What was flown, as figures that can be worked out by hand."""
+"""Flight log and summary, with figures that can be computed by hand."""
 
 import json
 
@@ -52,7 +52,7 @@ def mission(*legs, **fields):
     return MissionSummary((RobotSummary("quad0", legs or (leg(),), 7.0),), **fields)
 
 
-def test_legs_measure_the_way_flown_and_the_straight_way():
+def test_legs_measure_the_path_and_the_straight_distance():
     log, sequencer = FlightLog(["quad0"], 0.3), Sequencer(GOALS)
     fly(log, "quad0", sequencer, [*DETOUR, (25.0, Pose2D(5, 4))])
     legs = log.robots["quad0"].all_legs(sequencer, 26.0)
@@ -64,7 +64,7 @@ def test_legs_measure_the_way_flown_and_the_straight_way():
     assert (robot.reached, robot.skipped) == (1, 0)
 
 
-def test_the_path_is_from_the_first_goal_to_the_last_and_by_newer_poses_only():
+def test_the_path_lasts_from_the_first_goal_to_the_last():
     log, sequencer = FlightLog(["quad0"], 0.3), Sequencer(GoalSequence((Goal(3.0, 4.0),)))
     log.add_pose("quad0", 0.0, Pose2D(-9, 0))
     fly(log, "quad0", sequencer, [(1.0, Pose2D(0, 0))])
@@ -133,7 +133,7 @@ SUMMARY = mission(
 )
 
 
-def test_the_table_says_what_was_flown_and_why_not():
+def test_the_table_has_figures_and_reasons():
     text = table(SUMMARY)
     assert max(map(len, text.splitlines())) <= 100
     assert f"quad0: goal 1: {LONG_REASON}" in text
@@ -224,7 +224,7 @@ def test_the_json_has_the_documented_keys(tmp_path):
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_a_mission_that_never_began_lists_its_goals():
+def test_a_mission_that_did_not_start_lists_its_goals():
     assert [(leg.index, leg.reached, leg.reason) for leg in unflown_legs(GOALS)] == [
         (0, False, "not sent"),
         (1, False, "not sent"),

@@ -1,4 +1,4 @@
-"""Gazebo worlds: poses by hand, what is left out and said, and what is refused."""
+"""Gazebo worlds: poses computed by hand, remarks, and faults."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def same(obstacle, other) -> None:
     assert values == pytest.approx(expected, abs=1e-9)
 
 
-def test_primitives_stand_where_they_stand_in_gazebo(tmp_path):
+def test_primitives_have_the_poses_that_they_have_in_gazebo(tmp_path):
     same(
         only(tmp_path, model(BOX, "4 5 1.5 0 0 0.3")),
         Box("m/l/c", 4.0, 5.0, 1.0, 2.0, 3.0, 0.3, 0.0),
@@ -77,7 +77,7 @@ def test_primitives_stand_where_they_stand_in_gazebo(tmp_path):
     same(only(tmp_path, model(SPHERE, "4 5 1.5 1 2 3")), Sphere("m/l/c", 4.0, 5.0, 1.5, 0.5))
 
 
-def test_what_is_below_the_floor_is_cut_off(tmp_path):
+def test_parts_below_the_floor_are_cut_off(tmp_path):
     same(only(tmp_path, model(BOX, "0 0 0.5 0 0 0")), Box("m/l/c", 0.0, 0.0, 1.0, 2.0, 2.0))
     same(only(tmp_path, model(CYLINDER, "0 0 0 0 0 0")), Cylinder("m/l/c", 0.0, 0.0, 0.5, 1.0))
     same(only(tmp_path, model(SPHERE)), Sphere("m/l/c", 0.0, 0.0, 0.0, 0.5))
@@ -90,7 +90,7 @@ def test_poses_are_composed_from_model_to_collision(tmp_path):
     same(box, Box("m/l/c", 8.0, 21.0, 1.0, 2.0, 3.0, -QUARTER, 0.5))
 
 
-def test_models_in_models(tmp_path):
+def test_nested_models(tmp_path):
     inner = model(SPHERE, "1 0 2 0 0 0", name="inner")
     sphere = only(
         tmp_path,
@@ -169,11 +169,11 @@ def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
         (model(BOX, static="false"), "not static in Gazebo, but fixed here: m"),
     ],
 )
-def test_what_is_left_out_is_named(tmp_path, content, remark):
+def test_a_remark_names_what_is_left_out(tmp_path, content, remark):
     assert remarks(tmp_path, content) == [remark]
 
 
-def test_a_saved_state_has_the_last_word(tmp_path):
+def test_a_saved_state_overrides_poses(tmp_path):
     state = (
         '<state world_name="w"><model name="m"><pose>1 2 3 0 0 0</pose><link name="l">'
         "<pose>7 8 9 0 0 0</pose></link></model></state>"
@@ -258,7 +258,7 @@ def test_other_xml_and_missing_files(tmp_path):
         load_world(tmp_path / "none.world")
 
 
-def test_a_bare_world_is_a_scene(tmp_path):
+def test_a_world_by_itself_is_a_scene(tmp_path):
     path = written(
         tmp_path,
         model(BOX, f"-3 -2 1.5 0 0 {QUARTER}", name="a"),
@@ -274,7 +274,7 @@ def test_a_bare_world_is_a_scene(tmp_path):
     )
 
 
-def test_an_empty_world_needs_a_scene_around_it(tmp_path):
+def test_an_empty_world_needs_a_scene_with_a_size(tmp_path):
     path = written(tmp_path)
     with pytest.raises(InputError, match="a.world: size: missing, and the world has no obstacles"):
         load_scene(path)
