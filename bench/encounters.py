@@ -60,7 +60,8 @@ HEADER = [
 @dataclass(frozen=True)
 class Flown:
     """One flight's figures: ``reached`` goals of each robot, of so many ``goals`` in all that
-    were tried; ``gap_m`` is the least between any two hulls."""
+    were tried; ``gap_m`` is the least between any two hulls.
+    """
 
     encounter: str
     seed: int

@@ -135,7 +135,7 @@ class Launch:
         port: Optional[int] = None,
         prefix: Tuple[str, ...] = (),
         ip: str = "localhost",
-    ):
+    ) -> None:
         self.folder, self.port = folder, port or free_port()
         core = ["-p", str(self.port)] if port is None else []
         master = f"http://{'localhost' if ip == 'localhost' else HERE_IP}:{self.port}"

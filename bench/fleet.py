@@ -91,7 +91,7 @@ def measure(robots: int, hosts: Optional[int], seconds: float, arguments: List[s
 class Clock:
     """The simulation's clock."""
 
-    def __init__(self, give_up_s: float):
+    def __init__(self, give_up_s: float) -> None:
         import rospy
         from rosgraph_msgs.msg import Clock as ClockMessage
 
@@ -117,7 +117,7 @@ class Clock:
 class Commands:
     """How many commands come for the first few quadcopters."""
 
-    def __init__(self, robots: int):
+    def __init__(self, robots: int) -> None:
         import rospy
 
         self.count = 0

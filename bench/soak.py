@@ -33,7 +33,7 @@ HEADER = "hours   memory MB   CPU s   cycles   median ms   99 % ms   reached   s
 class Stretches(FlightObserver):
     """Prints a row for every ``length_s`` of simulated time."""
 
-    def __init__(self, length_s: float):
+    def __init__(self, length_s: float) -> None:
         self._length_s = length_s
         self.memories_mb: List[float] = []
         self._begin()

@@ -94,7 +94,7 @@ def watch(robots: int, duration_s: float, stretch_s: float, port: int) -> bool:
 class SequenceCounter:
     """Counts the gaps in a topic's sequence numbers."""
 
-    def __init__(self, topic: str, message_type: type):
+    def __init__(self, topic: str, message_type: type) -> None:
         import rospy
 
         self.received = self.lost = 0

@@ -11,7 +11,7 @@ import numpy as np
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.offline.flight import Flight, FlightObserver
-from quad_nav.offline.offline_robot import OfflineRobot
+from quad_nav.offline.navigator_group import OfflineRobot
 
 Seen = Tuple[Scan, Pose3D]
 

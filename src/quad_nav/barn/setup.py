@@ -1,4 +1,4 @@
-"""What flies through BARN's worlds: parameters, body and LIDAR, all checked."""
+"""Set-up of flights through BARN's worlds: configuration, body and LIDAR."""
 
 from __future__ import annotations
 
@@ -41,9 +41,15 @@ SCANS_PER_S = 40
 class BarnOptions:
     """What a person asks for.
 
-    ``config``: the name of a shipped folder of parameters, or a folder's path;
-    ``parameters``: (path, value) on top of it. ``only``: numbers of worlds, all when empty;
-    ``sample``: those of the official sample. ``runs``: flights through each.
+    Attributes:
+        worlds: File of the worlds.
+        config: Name of a shipped configuration, or a folder's path.
+        parameters: (path, value) on top of it.
+        only: Numbers of worlds; () for all.
+        sample: Fly through the worlds of the official sample.
+        runs: Flights through each world.
+        seed: Seed of the first run.
+        body_radius_m: Radius of the robot's hull.
     """
 
     worlds: Path
@@ -58,9 +64,9 @@ class BarnOptions:
 
 @dataclass(frozen=True)
 class Contestant:
-    """What is the same in all flights. ``name`` is that of the parameters.
+    """The robot and its configuration, the same in all flights.
 
-    ``frames`` are the parameters' own names for our map, body and LIDAR.
+    ``name`` is the configuration's. ``frames`` are its names for the map, the body and the LIDAR.
     """
 
     name: str
@@ -72,7 +78,7 @@ class Contestant:
 
 @dataclass(frozen=True)
 class BarnSetup:
-    """All flights that are wanted."""
+    """A contestant, the worlds, and the number of runs through each."""
 
     contestant: Contestant
     worlds: Tuple[BarnWorld, ...]
@@ -80,19 +86,20 @@ class BarnSetup:
 
     @property
     def wanted(self) -> int:
-        """How many flights there are."""
+        """Number of flights."""
         return self.runs * len(self.worlds)
 
     @property
     def warnings(self) -> Tuple[str, ...]:
+        """Warnings about the configuration."""
         return self.contestant.configuration.warnings
 
 
 def read_barn_setup(options: BarnOptions) -> BarnSetup:
-    """Reads worlds and parameters.
+    """Read worlds and configuration.
 
     Raises:
-        InputError: every fault in them.
+        InputError: Every fault in them.
     """
     problems: List[str] = []
     worlds: Tuple[BarnWorld, ...] = ()
@@ -115,7 +122,7 @@ def read_barn_setup(options: BarnOptions) -> BarnSetup:
 
 
 def flight_setup(contestant: Contestant, world: BarnWorld, run: int) -> FlightSetup:
-    """One flight; run 0 has the contestant's seed, run 1 the next one, in every world."""
+    """Set up one flight; run 0 has the contestant's seed, run 1 the next one, in every world."""
     goals = RobotGoals("quad0", WatchedGoalFile("barn"), _GOALS)
     return FlightSetup(
         world.scene(),
@@ -157,9 +164,9 @@ def _contestant(options: BarnOptions) -> Contestant:
 
 
 def _limits(local_planner: Any) -> FlightParams:
-    """No command gets the quadcopter beyond the velocities that its parameters give.
+    """Limit the body to the velocities of the local planner's parameters.
 
-    A planner of the user's says nothing about them: then they are the quadcopter's own.
+    A user's planner has no known velocities; then the body's own limits apply.
     """
     if isinstance(local_planner, TrajectoryPlannerParams):
         speed_mps = max(local_planner.max_vel_x_mps, -local_planner.escape_vel_mps)
@@ -187,10 +194,10 @@ def _static_layer_faults(configuration: Configuration, folder: Path) -> List[str
 
 
 def _frames(configuration: Configuration) -> Tuple[str, ...]:
-    """Names of frames, in order: global ones, the body's, the sensors'.
+    """Names of the configuration's frames, in order: global ones, the body's, the sensors'.
 
-    Offline there are no frames to look up: odometry is exact, so that every global frame is
-    ``map``; the body's is ``base_link0``, and every LaserScan is the LIDAR's.
+    Offline no frame is looked up: odometry is exact, so that every global frame is ``map``; the
+    body's frame is ``base_link0``, and every LaserScan comes from the LIDAR.
     """
     costmaps = (configuration.global_costmap, configuration.local_costmap)
     names = [costmap.global_frame for costmap in costmaps]
@@ -208,10 +215,10 @@ def _frames(configuration: Configuration) -> Tuple[str, ...]:
 def _blocked_starts(worlds: Tuple[BarnWorld, ...], radius_m: float, path: Path) -> List[str]:
     problems = []
     for world in worlds:
-        clearance_m = world.scene().flight_surface_distance_m(START.x_m, START.y_m)
-        if clearance_m <= radius_m:
+        distance_m = world.scene().flight_surface_distance_m(START.x_m, START.y_m)
+        if distance_m <= radius_m:
             problems.append(
-                f"{path}: world {world.number}: a cylinder is {clearance_m:.2f} m from "
-                f"the start, expected more than the body's radius, {radius_m:g} m"
+                f"{path}: world {world.number}: a cylinder is {distance_m:.2f} m from "
+                f"the start; expected more than the body's radius, {radius_m:g} m"
             )
     return problems

@@ -39,7 +39,7 @@ class Checker:
         problems: A message for each fault.
     """
 
-    def __init__(self, source: str):
+    def __init__(self, source: str) -> None:
         self.source = source
         self.problems: List[str] = []
 

@@ -20,7 +20,7 @@ MAX_DIGITS = 100
 class PlainLoader(yaml.SafeLoader):
     """``yaml.SafeLoader`` within these limits; every fault is a ``yaml.YAMLError``."""
 
-    def __init__(self, stream: Any):
+    def __init__(self, stream: Any) -> None:
         super().__init__(stream)
         self._levels = self._nodes = 0
         self._extents: Dict[yaml.Node, Tuple[int, int]] = {}

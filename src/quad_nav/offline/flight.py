@@ -16,8 +16,7 @@ from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import Action, NavigatorReport, SendGoal, Sequencer, Verdict
 from quad_nav.navigator.tick import RobotPoses, State, Tick
-from quad_nav.offline.navigator_group import NavigatorGroup, NavigatorResult
-from quad_nav.offline.offline_robot import OfflineRobot
+from quad_nav.offline.navigator_group import NavigatorGroup, NavigatorResult, OfflineRobot
 from quad_nav.offline.worker_process import WorkerProcess
 from quad_nav.peers.peer import Intention
 from quad_nav.scenario.flight_setup import FlightSetup
@@ -88,7 +87,7 @@ class FlightRobot:
     ``goal_waits`` while the navigator has not taken the last goal that was sent.
     """
 
-    def __init__(self, goals: RobotGoals, configuration: Configuration, log: FlightLog):
+    def __init__(self, goals: RobotGoals, configuration: Configuration, log: FlightLog) -> None:
         self.name = goals.name
         self.configuration = configuration
         self.sequencer = Sequencer(goals.sequence)
@@ -133,7 +132,7 @@ class Flight:
 
     def __init__(
         self, setup: FlightSetup, observers: Sequence[FlightObserver] = (), processes: int = 1
-    ):
+    ) -> None:
         self.setup = setup
         self._observers = tuple(observers)
         if (

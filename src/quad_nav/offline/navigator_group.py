@@ -9,19 +9,21 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Dict, List, Mapping, Sequence, Tuple
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
+from quad_nav.config import Configuration
+from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, sinks_of
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.offline.offline_robot import OfflineRobot
 from quad_nav.peers.peer import Intention, Peer, peer_at
+from quad_nav.scenario.assembly import build_navigator
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.simulation import RobotStates
+from quad_nav.sim.simulation import RobotState, RobotStates
 
 LocatedScan = Tuple[Scan, Pose3D]
 """A scan and ``map_from_lidar``, the LIDAR's pose at its stamp."""
@@ -43,6 +45,43 @@ class NavigatorResult:
     intention: Intention
 
 
+class OfflineRobot:
+    """One robot's navigator in the loop: scans, poses and goals in, ticks out.
+
+    Attributes:
+        navigator: The navigator.
+        waiting_goal: The last goal that was sent, until the navigator takes it.
+    """
+
+    def __init__(self, configuration: Configuration, number: int) -> None:
+        """Build the navigator of robot ``number``."""
+        self.navigator = build_navigator(configuration, number)
+        self.waiting_goal: Optional[Pose2D] = None
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        self._intake = ScanIntake(sinks_of(costmaps), configuration.scan_validator)
+
+    def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> None:
+        """Hand a scan that arrives now to the costmaps, unless it is implausible."""
+        poses = [SensorPose(map_from_lidar, map_from_lidar)] * len(self._intake.sinks)
+        self._intake.add_scan(scan, poses, scan.stamp_s, now_s)
+
+    def is_due(self, now_s: float) -> bool:
+        """Set the waiting goal if the navigator accepts it; return True if a tick is due."""
+        navigator = self.navigator
+        if self.waiting_goal is not None and navigator.accepts_goal(now_s):
+            navigator.set_goal(self.waiting_goal, now_s)
+            self.waiting_goal = None
+        return navigator.next_due_s <= now_s + 1e-9 or navigator.has_work
+
+    def navigate(
+        self, now_s: float, state: RobotState, peers: Sequence[Peer]
+    ) -> Tuple[Tick, RobotPoses]:
+        """Tick the navigator; also return the poses that it was given."""
+        pose = state.map_from_base.to_2d()
+        located = RobotPoses(pose, pose)
+        return self.navigator.tick(now_s, located, state.twist, peers), located
+
+
 class NavigatorGroup:
     """The LIDARs and navigators of some of a set-up's robots.
 
@@ -50,7 +89,7 @@ class NavigatorGroup:
         robots: The group's robots, by number.
     """
 
-    def __init__(self, setup: FlightSetup, robots: Sequence[int], lidars: Lidars):
+    def __init__(self, setup: FlightSetup, robots: Sequence[int], lidars: Lidars) -> None:
         """Build the navigators of ``robots``; ``lidars`` are those of all robots."""
         self.robots = {robot: OfflineRobot(setup.configurations[robot], robot) for robot in robots}
         self._lidars = lidars

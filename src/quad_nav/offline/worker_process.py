@@ -42,7 +42,7 @@ class WorkerProcessError(RuntimeError):
 class WorkerProcess:
     """A navigator group in a process of its own."""
 
-    def __init__(self, setup: FlightSetup, robots: Sequence[int]):
+    def __init__(self, setup: FlightSetup, robots: Sequence[int]) -> None:
         """Start the process for the robots with these numbers."""
         self.robots = tuple(robots)
         context = multiprocessing.get_context(_START_METHOD)

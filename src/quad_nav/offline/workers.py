@@ -47,7 +47,7 @@ class Workers(Protocol):
 class LocalWorkers:
     """Processes on this machine, one per core by default; one worker is this process."""
 
-    def __init__(self, count: Optional[int] = None):
+    def __init__(self, count: Optional[int] = None) -> None:
         self.count = int(joblib.cpu_count()) if count is None else count
 
     def run(
@@ -75,7 +75,7 @@ class LocalWorkers:
 class RayWorkers:
     """Workers on a Ray cluster, one per core by default."""
 
-    def __init__(self, address: str, count: Optional[int] = None):
+    def __init__(self, address: str, count: Optional[int] = None) -> None:
         """Connect to the cluster.
 
         Raises:

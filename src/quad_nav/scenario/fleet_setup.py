@@ -26,7 +26,11 @@ _RULES = {**{name: RULES[name] for name in DEFAULTS}, "robots": whole(1, _MAX_RO
 
 @dataclass(frozen=True)
 class FleetSetup:
-    """The navigators of one process, by the robots' numbers."""
+    """The navigators of one process of a fleet.
+
+    Attributes:
+        configurations: Their configurations, by the robots' numbers.
+    """
 
     configurations: Mapping[int, Configuration]
 

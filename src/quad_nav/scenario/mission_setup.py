@@ -19,10 +19,11 @@ from quad_nav.errors import InputError
 from quad_nav.files.values import Rule, expected_name, value_faults
 from quad_nav.mission.distances import SurfaceDistance
 from quad_nav.mission.goal_file import SETTINGS, read_settings
+from quad_nav.mission.goal_sequence import SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.random_mission import RandomMission
 from quad_nav.scenario.rules import RANDOM, RULES, optional
-from quad_nav.scenario.scenario import ScenarioRequest, read_configurations, read_scenario
+from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
 from quad_nav.sim.scene import BODY_RADIUS_M
 
 DEFAULTS: Dict[str, Any] = {
@@ -103,21 +104,29 @@ def read_setup(
             parameters.
     """
     values = {**DEFAULTS, **parameters}
-    problems = value_faults(values, _RULES, name) + _result_faults(result, name)
-    given = {key: values[key] for key in SETTINGS if key in values}
-    settings, faults = read_settings(given, name)
-    problems += faults
-    request = ScenarioRequest(
+    settings, faults = read_settings({k: values[k] for k in SETTINGS if k in values}, name)
+    problems = value_faults(values, _RULES, name) + _result_faults(result, name) + faults
+    request = _request(values, settings, name)
+    scenario, faults = read_scenario(request, _Navigators(values, all_parameters))
+    if problems + faults:
+        raise InputError(list(dict.fromkeys(problems + faults)))
+    warnings = (*_unknown_parameters(parameters, name), *scenario.warnings)
+    return _mission_setup(values, scenario, warnings, journals)
+
+
+def _request(values: Mapping[str, Any], settings: SequenceSettings, name: str) -> ScenarioRequest:
+    return ScenarioRequest(
         **{key: values[key] for key in ("scene", "goals", "robots", "seed", "size")},
         robot_radius=values["robot_radius"],
         settings=settings,
         simulated=values["simulation"] is not False,
         source=name,
     )
-    scenario, faults = read_scenario(request, _Navigators(values, all_parameters))
-    problems += faults
-    if problems:
-        raise InputError(list(dict.fromkeys(problems)))
+
+
+def _mission_setup(
+    values: Mapping[str, Any], scenario: Scenario, warnings: Tuple[str, ...], journals: Path
+) -> MissionSetup:
     scene = scenario.scene
     return MissionSetup(
         scenario.robots,
@@ -127,7 +136,7 @@ def read_setup(
         values["simulation"],
         float(values["ready_timeout"]),
         values["exit_when_done"],
-        (*_unknown_parameters(parameters, name), *scenario.warnings),
+        warnings,
         _journal_path(values, journals),
         values["resume"],
         tuple(one.to_tree() if one else {} for one in scenario.configurations),
@@ -137,7 +146,7 @@ def read_setup(
 class _Navigators:
     """Reads the navigators' configurations, from a fleet's files or from the parameter server."""
 
-    def __init__(self, values: Mapping[str, Any], all_parameters: Mapping[str, Any]):
+    def __init__(self, values: Mapping[str, Any], all_parameters: Mapping[str, Any]) -> None:
         self._folder = values["config"]
         self._all_parameters = all_parameters
 

@@ -1,8 +1,8 @@
-"""A scene with start poses, and goals, for any number of quadcopters, from a seed.
+"""Random missions: a scene with start poses, and goals, for any number of robots, from a seed.
 
-Obstacles are as large and as frequent as in the tutorial's arena. Between any two of
-them, and between them and the walls, there is room to fly, so every goal can be
-reached. Equal arguments give equal missions.
+Obstacles are as large and as frequent as in the tutorial's arena. A robot fits between any two
+of them, and between them and the walls, so that it can reach every goal. Equal arguments give
+equal missions.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ AREA_PER_OBSTACLE_M2 = 18.0  # the tutorial's arena: 8 obstacles on 144 m2
 SMALLEST_SIZE_M = 12.0
 AREA_PER_ROBOT_M2 = 36.0  # 100 quadcopters on 60 m x 60 m
 _ALTITUDE_M = 1.0
-_PASSAGE_M = 1.6  # between obstacles: two hulls and half a metre
+_PASSAGE_M = 1.6  # between obstacles: two hulls (0.6 m each) and 0.4 m
 _HEIGHT_M = 2.0
 _ROOM_M = BODY_RADIUS_M + 0.4  # around starts and goals
 _APART_M = 1.5  # between the starts, and between the last goals, of two
@@ -38,13 +38,13 @@ Place = Tuple[float, float]
 
 @dataclass(frozen=True)
 class RandomMission:
-    """``goals[i]`` are quadcopter i's places in ``map``."""
+    """A scene, and the goals of each robot: ``goals[i]`` are robot i's (x, y) in ``map``, m."""
 
     scene: Scene
     goals: Tuple[Tuple[Place, ...], ...]
 
     def robot_goals(self, settings: SequenceSettings = DEFAULT_SETTINGS) -> List[RobotGoals]:
-        """As if they were read from files."""
+        """Return the goals as if they were read from files."""
         return [
             RobotGoals(
                 f"quad{index}",
@@ -55,7 +55,7 @@ class RandomMission:
         ]
 
     def write(self, scene_path: Path, goals_folder: Path) -> None:
-        """Writes the scene's file and a goal file for each quadcopter."""
+        """Write a scene file, and a goal file for each robot."""
         scene_path.parent.mkdir(parents=True, exist_ok=True)
         goals_folder.mkdir(parents=True, exist_ok=True)
         write_scene(self.scene, scene_path)
@@ -65,17 +65,23 @@ class RandomMission:
 
 
 def default_size_m(robots: int) -> float:
-    """Side of a square arena with room for so many, in whole metres."""
+    """Side of a square arena with room for so many robots, in whole metres."""
     return float(math.ceil(max(SMALLEST_SIZE_M, math.sqrt(AREA_PER_ROBOT_M2 * robots))))
 
 
 def random_mission(
     robots: int, seed: int, size_m: float = 0.0, goals_each: int = 3
 ) -> RandomMission:
-    """A mission in a square arena with sides of ``size_m``; 0: ``default_size_m``.
+    """Make a random mission in a square arena.
+
+    Args:
+        robots: Number of robots.
+        seed: Seed of obstacles, starts and goals.
+        size_m: Side of the arena; 0 for ``default_size_m``.
+        goals_each: Number of goals of each robot.
 
     Raises:
-        InputError: there is no room for so many.
+        InputError: The arena has no room for so many robots.
     """
     size_m = size_m or default_size_m(robots)
     ground = _Ground(size_m, np.random.default_rng([seed, 2]))
@@ -85,7 +91,7 @@ def random_mission(
     for robot in range(robots):
         starts.append(ground.place(f"start {robot}", lambda p: _is_apart(p, starts)))
     goals = [ground.legs(start, goals_each) for start in starts]
-    _part_last_goals(ground, starts, goals)
+    _separate_last_goals(ground, starts, goals)
     poses = [Pose2D(x, y, _heading((x, y), own[0])) for (x, y), own in zip(starts, goals)]
     scene = Scene(
         f"random {seed}",
@@ -100,9 +106,9 @@ def random_mission(
 
 
 class _Ground:
-    """What stands in the arena, each thing taken for a disc, and where there is room."""
+    """The arena's obstacles, each as a disc, and its free places."""
 
-    def __init__(self, size_m: float, random: np.random.Generator):
+    def __init__(self, size_m: float, random: np.random.Generator) -> None:
         self.obstacles: List[Obstacle] = []
         self._size_m = size_m
         self._random = random
@@ -115,7 +121,7 @@ class _Ground:
         return min(walls_m, float(np.min(gaps - self._discs[:, 2], initial=math.inf)))
 
     def add_obstacle(self, index: int) -> None:
-        """One more obstacle, if there is room for it."""
+        """Add an obstacle if there is room for it."""
         for _ in range(_TRIES):
             (x, y), round_ = self._anywhere(), self._random.random() < 0.5
             radius, (a, b), yaw = (
@@ -134,14 +140,14 @@ class _Ground:
                 return
 
     def place(self, what: str, accepts: Callable[[Place], bool]) -> Place:
-        """A random place with room for a quadcopter."""
+        """Return a random place with room for a robot; raise ``InputError`` if there is none."""
         for _ in range(_TRIES):
             place = self._anywhere()
             if accepts(place) and self.room_m(place) >= _ROOM_M:
                 return place
         raise InputError(
             [
-                f"no room for {what} in an arena of {self._size_m:g} m, expected a "
+                f"no room for {what} in an arena of {self._size_m:g} m; expected a "
                 "larger size or fewer robots"
             ]
         )
@@ -154,7 +160,7 @@ class _Ground:
         )
 
     def legs(self, start: Place, count: int) -> List[Place]:
-        """Goals, each some way from the one before."""
+        """Return goals, each within ``_LEG_M`` of the one before."""
         places = [start]
         for _ in range(count):
             places.append(self.next_goal(places[-1]))
@@ -164,12 +170,12 @@ class _Ground:
         return self._number(0.0, self._size_m), self._number(0.0, self._size_m)
 
     def _number(self, low: float, high: float) -> float:
-        """To the centimetre, as a person would write it."""
+        """Return a random number, rounded to centimetres as a person would write it."""
         return round(float(self._random.uniform(low, high)), 2)
 
 
-def _part_last_goals(ground: _Ground, starts: List[Place], goals: List[List[Place]]) -> None:
-    """Quadcopters stay at their last goals, so these are chosen apart from each other."""
+def _separate_last_goals(ground: _Ground, starts: List[Place], goals: List[List[Place]]) -> None:
+    """Replace last goals that are close to each other: robots stay there."""
     last: List[Place] = []
     for start, own in zip(starts, goals):
         if not _is_apart(own[-1], last):

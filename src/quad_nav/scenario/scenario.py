@@ -33,7 +33,7 @@ from quad_nav.sim.scene_file import load_scene
 
 T = TypeVar("T")
 Parameters = Sequence[Tuple[str, Any]]
-"""Parameters on top of a configuration's files: (path, value), as ("global_costmap/width", 60.0)."""
+"""Parameters on top of files: (path, value), as ("global_costmap/width", 60.0)."""
 Configure = Callable[[int, Optional[RandomMission]], Sequence[Optional[Configuration]]]
 """Reads the configurations of so many robots; None for a robot whose parameters are unknown."""
 
@@ -147,14 +147,11 @@ def read_configurations(
     configurations: List[Configuration] = []
     problems: List[str] = []
     for number in range(robots):
+        numbers = (("robot", number), ("robots", robots)) if numbered else ()
         try:
-            tree = config.load_files(path, {"i": str(number)})
-            numbers = (("robot", number), ("robots", robots)) if numbered else ()
-            for name, value in (*numbers, *_arena_size(mission)):
-                set_value(tree, name, value, "the fleet")
-            for name, value in parameters:
-                set_value(tree, name, value, "the command line")
-            configuration = config.load(tree)
+            configuration = _read_configuration(
+                path, number, (*numbers, *_arena_size(mission)), parameters
+            )
         except InputError as error:
             problems += error.problems
             continue
@@ -163,6 +160,18 @@ def read_configurations(
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
     return configurations
+
+
+def _read_configuration(
+    folder: Path, number: int, scenario: Parameters, command_line: Parameters
+) -> Configuration:
+    """Read a robot's files and set the scenario's parameters and the command line's on top."""
+    tree = config.load_files(folder, {"i": str(number)})
+    for name, value in scenario:
+        set_value(tree, name, value, "the scenario")
+    for name, value in command_line:
+        set_value(tree, name, value, "the command line")
+    return config.load(tree)
 
 
 def _scene(values: Mapping[str, Any]) -> Optional[Scene]:

@@ -1,4 +1,4 @@
-"""The map that a static layer gets offline: the scene, cut at the flying altitude."""
+"""Map of a scene at the flying altitude, for static layers offline."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from quad_nav.costmap.static import StaticLayer, StaticMap
 from quad_nav.grid import GridSpec
 from quad_nav.sim.scene import Scene
 
-_ROWS = 64  # of cells that are looked at in one go
+_ROWS = 64  # of cells per block: bounds the memory of one block's distances
 
 
 class SceneMaps:
-    """The maps of a scene, each resolution made once and only if it is wanted."""
+    """Maps of a scene; makes one for each resolution when it is first needed."""
 
-    def __init__(self, scene: Scene):
+    def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._maps: Dict[float, StaticMap] = {}
 
@@ -33,9 +33,9 @@ class SceneMaps:
 
 
 def scene_map(scene: Scene, resolution_m: float) -> StaticMap:
-    """Occupied are the cells whose centres are in a wall or an obstacle, free all others.
+    """Map a scene up to the outer faces of its walls.
 
-    The map reaches to the outer faces of the walls.
+    A cell is occupied if its centre is in a wall or an obstacle, else free.
     """
     margin_m = scene.walls.thickness_m
     low_x, low_y = scene.origin_x_m - margin_m, scene.origin_y_m - margin_m

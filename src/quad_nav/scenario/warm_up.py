@@ -1,9 +1,9 @@
-"""Compiles the kernels before anything flies.
+"""Compile the kernels before anything flies.
 
-numba compiles a kernel at its first call, which takes seconds, and keeps the
-result beside the source (or in the user's cache where that cannot be written).
-``python -m quad_nav.scenario.warm_up`` fills that cache at set-up; a node warms up its own
-configuration before it takes goals, which is quick when the cache is there.
+numba compiles a kernel at its first call, which takes seconds, and caches the result beside the
+source, or in the user's cache if that folder is not writable. ``python -m
+quad_nav.scenario.warm_up`` fills the cache at installation. A node warms up its own configuration
+before it accepts goals, which is quick with a filled cache.
 """
 
 from __future__ import annotations
@@ -53,30 +53,30 @@ _MISSIONS: Tuple[Tuple[Dict[str, Any], Dict[str, Any]], ...] = (  # costmap, the
 
 
 def warm_up(configuration: config.Configuration) -> None:
-    """Flies a second of a little mission with a navigator of its own."""
+    """Fly a second of a small mission with a navigator of this configuration."""
     navigator = build_navigator(configuration)
     spec = navigator.global_costmap.spec
     here = Pose2D(
         spec.origin_x_m + 0.5 * spec.size_x * spec.resolution_m,
         spec.origin_y_m + 0.5 * spec.size_y * spec.resolution_m,
     )
-    _look_around(navigator, here)
+    _add_scans(navigator, here)
     navigator.set_goal(Pose2D(here.x_m + _AHEAD_M, here.y_m), 0.0)
     for now_s in (0.0, 0.5):
         navigator.tick(now_s, RobotPoses(here, here), Twist2D(vx_mps=0.1))
-    navigator.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), [_coming(here, 1.0)])
-    _look_around(navigator, here)  # again, with a peer whose points are left out
+    navigator.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), [_oncoming_peer(here, 1.0)])
+    _add_scans(navigator, here)  # again, with the points of a peer to remove
 
 
-def _coming(here: Pose2D, now_s: float) -> Peer:
-    """A peer that goes first and for which the robot has to make room."""
+def _oncoming_peer(here: Pose2D, now_s: float) -> Peer:
+    """A peer with higher priority that the robot has to make room for."""
     path = np.array([[here.x_m + 2.0, here.y_m], [here.x_m, here.y_m]])
     intention = Intention(HIGHEST_PRIORITY + 1.0, path)
     return Peer("peer", here.x_m + 2.0, here.y_m, 0.0, 0.0, now_s, intention)
 
 
-def _look_around(navigator: Navigator, here: Pose2D) -> None:
-    """A scan with something 2 m behind the robot for every obstacle layer."""
+def _add_scans(navigator: Navigator, here: Pose2D) -> None:
+    """Add a scan with an obstacle 2 m behind the robot to every obstacle layer."""
     angles = np.linspace(-math.pi, math.pi, 64, endpoint=False)
     ranges = np.where(np.abs(angles) > 3.0, 2.0, np.inf).astype(np.float32)
     scan = Scan(0.0, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
@@ -89,7 +89,7 @@ def _look_around(navigator: Navigator, here: Pose2D) -> None:
 
 
 def simulate() -> None:
-    """A step and a scan of the simulator, which a navigator itself does not need."""
+    """Run a step and a scan of the simulator; imported here, because navigators do not need it."""
     from quad_nav.sim.scene import Scene, Walls
     from quad_nav.sim.simulation import Simulation
 
@@ -100,6 +100,7 @@ def simulate() -> None:
 
 
 def main() -> None:
+    """Compile every kernel that any configuration may call."""
     simulate()
     for costmap, node in _MISSIONS:
         warm_up(
