@@ -10,21 +10,22 @@ import math
 from typing import Sequence, Tuple, Union
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 
-Footprint = Union[np.ndarray, Sequence[Tuple[float, float]]]
+Footprint = Union["NDArray[np.float64]", Sequence[Tuple[float, float]]]
 
 CIRCLE_POINTS = 16
 
 
-def circle(radius_m: float) -> np.ndarray:
+def circle(radius_m: float) -> NDArray[np.float64]:
     """A circle as 16 points, the first on the x axis, counter-clockwise."""
     angles = [k * 2.0 * math.pi / CIRCLE_POINTS for k in range(CIRCLE_POINTS)]
     return np.array([(math.cos(a) * radius_m, math.sin(a) * radius_m) for a in angles])
 
 
-def pad(footprint: Footprint, padding_m: float) -> np.ndarray:
+def pad(footprint: Footprint, padding_m: float) -> NDArray[np.float64]:
     """Move every non-zero coordinate away from zero by the padding.
 
     costmap_2d keeps the padding as float32, so 0.01 m is 0.009999999776 m here too.
@@ -47,12 +48,12 @@ def radii(footprint: Footprint) -> Tuple[float, float]:
     return min(corners + edges), max(corners + edges)
 
 
-def oriented(footprint: Footprint, pose: Pose2D) -> np.ndarray:
+def oriented(footprint: Footprint, pose: Pose2D) -> NDArray[np.float64]:
     """The footprint of a robot at ``pose``, in the frame of the pose."""
     return pose.transform_points(_points(footprint))
 
 
-def _points(footprint: Footprint) -> np.ndarray:
+def _points(footprint: Footprint) -> NDArray[np.float64]:
     return np.asarray(footprint, dtype=np.float64).reshape(-1, 2)
 
 

@@ -12,7 +12,7 @@ from costmap_maps import costs_of
 from quad_nav.control.goal import is_stopped, stopping_command, turning_command
 from quad_nav.control.map_grid import distance_grids
 from quad_nav.control.oscillation import Oscillation
-from quad_nav.control.plan_window import count_passed, plan_in_window
+from quad_nav.control.plan_follower import count_passed, plan_in_window
 from quad_nav.control.rollout import Rollout, costmap_view, footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
 from quad_nav.control.velocity_search import spaced, velocity_window

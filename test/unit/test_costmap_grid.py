@@ -12,8 +12,8 @@ from quad_nav.costmap.cost_grid import (
     Window,
     merge_known,
     merge_maximum,
+    occupancy,
 )
-from quad_nav.costmap.occupancy import occupancy
 from quad_nav.grid import UNKNOWN, GridSpec
 
 

@@ -16,7 +16,7 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
 from quad_nav.navigator.tick import RobotPoses, State, Trigger
 from quad_nav.peers.coordinator import PeerCoordinator
-from quad_nav.plan.near import ring_offsets
+from quad_nav.plan.planner import ring_offsets
 from quad_nav.recovery import Step
 from quad_nav.timing import Schedule
 

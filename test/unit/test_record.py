@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from recorded_flight import flown, setup
 
 from quad_nav.cli import main
-from quad_nav.costmap.occupancy import occupancy
+from quad_nav.costmap.cost_grid import occupancy
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D

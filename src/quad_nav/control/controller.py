@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
@@ -25,26 +26,26 @@ class Control:
 
     command: Twist2D
     cost: float
-    local_plan: np.ndarray
-    global_plan: np.ndarray
+    local_plan: NDArray[np.float64]
+    global_plan: NDArray[np.float64]
     goal_mode: bool = False
 
 
 class LocalPlanner(Protocol):
     """Follows a global plan over the local costmap."""
 
-    def set_plan(self, plan: np.ndarray) -> None:
+    def set_plan(self, plan: NDArray[np.float64]) -> None:
         """A new global plan, float64[n, 3] rows x, y, yaw in its own frame."""
         ...
 
-    def set_footprint(self, footprint: np.ndarray) -> None:
+    def set_footprint(self, footprint: NDArray[np.float64]) -> None:
         """The padded footprint, float64[n, 2] in the robot's frame."""
         ...
 
     def compute_velocity(
         self,
         spec: GridSpec,
-        costs: np.ndarray,
+        costs: NDArray[np.uint8],
         pose: Pose2D,
         velocity: Twist2D,
         local_from_plan: Pose2D = IDENTITY,
@@ -56,7 +57,7 @@ class LocalPlanner(Protocol):
         """Whether the plan's end was reached, heading included."""
         ...
 
-    def cost_cloud(self) -> np.ndarray:
+    def cost_cloud(self) -> NDArray[np.float32]:
         """What each cell cost in the last call, float32[n, 7]: x, y, z, path, goal,
         obstacle and total; float32[0, 7] for a planner that scores no cells."""
         ...

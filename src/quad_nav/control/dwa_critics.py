@@ -30,6 +30,7 @@ import math
 from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
@@ -53,9 +54,9 @@ NO_LEGAL_TRAJECTORY = -7.0
 class DwaGrids(NamedTuple):
     """Distances in cells, int32[H, W], as in ``map_grid.DistanceGrids``."""
 
-    path: np.ndarray
-    goal: np.ndarray
-    goal_front: np.ndarray
+    path: NDArray[np.int32]
+    goal: NDArray[np.int32]
+    goal_front: NDArray[np.int32]
 
 
 class Critics:
@@ -69,13 +70,13 @@ class Critics:
         self,
         params: DwaParams,
         spec: GridSpec,
-        costs: np.ndarray,
-        footprint: np.ndarray,
-        plan: np.ndarray,
+        costs: NDArray[np.uint8],
+        footprint: NDArray[np.float64],
+        plan: NDArray[np.float64],
         pose: Pose2D,
         velocity: Twist2D,
         grids: Optional[DwaGrids] = None,
-    ):
+    ) -> None:
         self.params = params
         self.spec = spec
         # The original keeps the robot's state in single precision.
@@ -130,13 +131,13 @@ class Critics:
         """x, y, yaw"""
         return self.pose.x_m, self.pose.y_m, self.pose.yaw_rad
 
-    def simulate(self, sample: np.ndarray) -> Tuple[np.ndarray, Triple]:
+    def simulate(self, sample: NDArray[np.float64]) -> Tuple[NDArray[np.float64], Triple]:
         """Poses, float64[k, 3], and the command of a sample, float64[3]."""
         points = np.empty((kernel.step_count(self.motion, sample), 3))
         _, command = kernel.simulate(self.motion, self.start, self.velocity, sample, points)
         return points, command
 
-    def _measure(self, plan: np.ndarray) -> DwaGrids:
+    def _measure(self, plan: NDArray[np.float64]) -> DwaGrids:
         plan_xy = np.ascontiguousarray(plan[:, :2])
         front_xy = plan_xy.copy()
         ahead_rad = math.atan2(self.goal.y_m - self.pose.y_m, self.goal.x_m - self.pose.x_m)
@@ -164,7 +165,9 @@ class Critics:
             aligns=follows_path and to_goal_m2 > near_m2,
         )
 
-    def terms(self, commands: np.ndarray, distances: np.ndarray) -> np.ndarray:
+    def terms(
+        self, commands: NDArray[np.float64], distances: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         """float64[n, 5]: every critic's part of the cost but the obstacles', in their order."""
         scales = np.zeros(4)
         scales[[kernel.GOAL_FRONT, kernel.GOAL]] = self.goal_scale
@@ -172,7 +175,7 @@ class Critics:
         twirling = self.params.twirling_scale * np.abs(commands[:, 2])
         return np.column_stack((distances * scales, twirling))
 
-    def obstacles(self, scales: np.ndarray) -> kernel.Obstacles:
+    def obstacles(self, scales: NDArray[np.float64]) -> kernel.Obstacles:
         """For trajectories with these footprint scales."""
         largest = float(np.max(np.abs(scales[np.isfinite(scales)]), initial=1.0))
         reach_m = footprint_reach_m(self.footprint) * largest
@@ -185,7 +188,7 @@ class Critics:
         )
 
 
-def footprint_scales(params: DwaParams, commands: np.ndarray) -> np.ndarray:
+def footprint_scales(params: DwaParams, commands: NDArray[np.float64]) -> NDArray[np.float64]:
     """float64[n]: how much larger the footprint counts at commands, float64[n, 3]."""
     speeds = np.hypot(commands[:, 0], commands[:, 1])
     room_mps = params.max_vel_trans_mps - params.scaling_speed_mps

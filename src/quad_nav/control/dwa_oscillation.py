@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.control.rollout import Triple
 from quad_nav.geometry import Pose2D
@@ -40,7 +41,7 @@ class Axis:
     def is_restricted(self) -> bool:
         return self.positive_only or self.negative_only
 
-    def forbids(self, velocities: np.ndarray) -> np.ndarray:
+    def forbids(self, velocities: NDArray[np.float64]) -> NDArray[np.bool_]:
         return ((velocities < 0.0) & self.positive_only) | ((velocities > 0.0) & self.negative_only)
 
 
@@ -58,7 +59,7 @@ class OscillationCritic:
     def axes(self) -> Tuple[Axis, Axis, Axis]:
         return self.forward, self.strafe, self.turn
 
-    def forbids(self, commands: np.ndarray) -> np.ndarray:
+    def forbids(self, commands: NDArray[np.float64]) -> NDArray[np.bool_]:
         """bool[n]: which commands, float64[n, 3], go where they may not."""
         forbidden = [axis.forbids(commands[:, k]) for k, axis in enumerate(self.axes)]
         return np.logical_or.reduce(forbidden)

@@ -12,16 +12,16 @@ from dataclasses import replace
 from typing import Optional
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.control.controller import IDENTITY, Control
-from quad_nav.control.cost_cloud import cost_cloud
 from quad_nav.control.dwa_critics import Critics, DwaGrids
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.dwa_samples import acceleration_limits
 from quad_nav.control.goal import is_stopped, stopping_command, turning_command
-from quad_nav.control.plan_follower import NO_POSES, PlanFollower
-from quad_nav.control.plan_window import plan_end
+from quad_nav.control.map_grid import cost_cloud
+from quad_nav.control.plan_follower import NO_POSES, PlanFollower, plan_end
 from quad_nav.control.rollout import Trajectory
 from quad_nav.errors import NoValidTrajectory
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
@@ -38,14 +38,16 @@ class DwaPlanner(PlanFollower):
     The goal is reached when the last call found the robot standing there.
     """
 
-    def __init__(self, params: DwaParams, footprint: np.ndarray, control_period_s: float):
+    def __init__(
+        self, params: DwaParams, footprint: NDArray[np.float64], control_period_s: float
+    ) -> None:
         super().__init__(params, footprint, control_period_s)
         self.oscillation = OscillationCritic()
         self.best: Optional[Trajectory] = None
         self.critics: Optional[Critics] = None
         self._grids: Optional[DwaGrids] = None  # of the last search
 
-    def set_plan(self, plan: np.ndarray) -> None:
+    def set_plan(self, plan: NDArray[np.float64]) -> None:
         """As any plan follower; what was tried before is forgotten."""
         super().set_plan(plan)
         self.oscillation.reset()
@@ -53,7 +55,7 @@ class DwaPlanner(PlanFollower):
     def compute_velocity(
         self,
         spec: GridSpec,
-        costs: np.ndarray,
+        costs: NDArray[np.uint8],
         pose: Pose2D,
         velocity: Twist2D,
         local_from_plan: Pose2D = IDENTITY,
@@ -84,7 +86,7 @@ class DwaPlanner(PlanFollower):
             )
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
-    def cost_cloud(self) -> np.ndarray:
+    def cost_cloud(self) -> NDArray[np.float32]:
         """What each cell that a robot could be in cost in the last call, float32[n, 7].
 
         Rows as in ``cost_cloud.cost_cloud``; empty if the last call did not search.
@@ -109,7 +111,12 @@ class DwaPlanner(PlanFollower):
         return latched or pose.distance_to(goal) <= self.params.xy_goal_tolerance_m
 
     def _command_at_goal(
-        self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D, goal: Pose2D
+        self,
+        spec: GridSpec,
+        costs: NDArray[np.uint8],
+        pose: Pose2D,
+        velocity: Twist2D,
+        goal: Pose2D,
     ) -> Twist2D:
         turn_rad = angle_difference(goal.yaw_rad, pose.yaw_rad)
         if abs(turn_rad) <= self.params.yaw_goal_tolerance_rad:
@@ -136,7 +143,7 @@ class DwaPlanner(PlanFollower):
         return command
 
     def _search(
-        self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D
+        self, spec: GridSpec, costs: NDArray[np.uint8], pose: Pose2D, velocity: Twist2D
     ) -> Trajectory:
         self.critics = Critics(
             self.params, spec, costs, self.footprint, self.local_global_plan, pose, velocity

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import List, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.rollout import Triple, single
@@ -19,7 +20,7 @@ from quad_nav.geometry import Pose2D
 
 def velocity_samples(
     params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D, control_period_s: float
-) -> np.ndarray:
+) -> NDArray[np.float64]:
     """float64[n, 3] rows vx, vy, vtheta of single precision; vtheta varies fastest.
 
     ``goal`` is the end of the plan in the local window.

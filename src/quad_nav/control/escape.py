@@ -11,6 +11,7 @@ import math
 from typing import Optional
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.footprint import radii
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
@@ -24,7 +25,7 @@ _ROUND = 0.9  # inscribed by circumscribed radius
 
 
 def escape(
-    spec: GridSpec, costs: np.ndarray, footprint: np.ndarray, pose: Pose2D
+    spec: GridSpec, costs: NDArray[np.uint8], footprint: NDArray[np.float64], pose: Pose2D
 ) -> Optional[Twist2D]:
     """A command that leads to lower costs, uint8[H, W]; None when there is no such way.
 
@@ -52,13 +53,13 @@ def escape(
     return Twist2D(-SPEED_MPS if backwards else SPEED_MPS)
 
 
-def is_round(footprint: np.ndarray) -> bool:
+def is_round(footprint: NDArray[np.float64]) -> bool:
     """Whether a footprint, float64[n, 2], is nearly a circle around the robot's centre."""
     inscribed_m, circumscribed_m = radii(footprint)
     return inscribed_m >= _ROUND * circumscribed_m
 
 
-def _costs_around(spec: GridSpec, costs: np.ndarray, pose: Pose2D) -> np.ndarray:
+def _costs_around(spec: GridSpec, costs: NDArray[np.uint8], pose: Pose2D) -> NDArray[np.int_]:
     """Costs some steps along each bearing, int[bearings, steps]; off the map as in the way."""
     x = pose.x_m + np.outer(np.cos(_BEARINGS_RAD), _STEPS_M)
     y = pose.y_m + np.outer(np.sin(_BEARINGS_RAD), _STEPS_M)

@@ -12,8 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
+from quad_nav.grid import GridSpec
 from quad_nav.kernels.collision import mark_footprint
 from quad_nav.kernels.cost_grid import CostmapView
 from quad_nav.kernels.map_grid import cells_on_plan, spread
@@ -27,13 +29,13 @@ class DistanceGrids:
     reach. ``within_robot``, bool[H, W], are the cells inside the footprint.
     """
 
-    path: np.ndarray
-    goal: np.ndarray
-    within_robot: np.ndarray
+    path: NDArray[np.int32]
+    goal: NDArray[np.int32]
+    within_robot: NDArray[np.bool_]
 
 
 def distance_grids(
-    costmap: CostmapView, plan_xy: np.ndarray, footprint: np.ndarray, pose: Pose2D
+    costmap: CostmapView, plan_xy: NDArray[np.float64], footprint: NDArray[np.float64], pose: Pose2D
 ) -> DistanceGrids:
     """Distance grids of a plan, float64[m, 2], for a robot at a pose.
 
@@ -48,3 +50,26 @@ def distance_grids(
         goal=spread(costmap.costs, nowhere, cells[-1:]),
         within_robot=within_robot,
     )
+
+
+def cost_cloud(
+    spec: GridSpec,
+    costs: NDArray[np.uint8],
+    path: NDArray[np.int32],
+    goal: NDArray[np.int32],
+    usable: NDArray[np.bool_],
+    path_scale: float,
+    goal_scale: float,
+    occupancy_scale: float,
+) -> NDArray[np.float32]:
+    """The cells that are ``usable``, bool[H, W], as float32[n, 7], column by column.
+
+    Rows x, y, z = 0, path_cost, goal_cost, occ_cost, total_cost. ``path`` and
+    ``goal`` are distances in cells, int32[H, W]; scales are per cell.
+    """
+    x, y = np.nonzero(usable.T)
+    centre_x = spec.origin_x_m + (x + 0.5) * spec.resolution_m
+    centre_y = spec.origin_y_m + (y + 0.5) * spec.resolution_m
+    parts = path[y, x], goal[y, x], costs[y, x]
+    total = path_scale * parts[0] + goal_scale * parts[1] + occupancy_scale * parts[2]
+    return np.column_stack((centre_x, centre_y, np.zeros(len(x)), *parts, total)).astype(np.float32)

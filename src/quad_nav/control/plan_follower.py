@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from quad_nav.control.plan_window import count_passed, plan_in_window
 from quad_nav.errors import NoLocalPlan
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
 
 NO_POSES = np.zeros((0, 3))
+_PASSED_BEYOND_M = 1.0
 
 
 class PlanFollower:
@@ -22,7 +23,9 @@ class PlanFollower:
     the local frame, also after a failed call). ``params`` has a ``prune_plan``.
     """
 
-    def __init__(self, params: Any, footprint: np.ndarray, control_period_s: float):
+    def __init__(
+        self, params: Any, footprint: NDArray[np.float64], control_period_s: float
+    ) -> None:
         self.params = params
         self.control_period_s = control_period_s
         self.plan = NO_POSES
@@ -37,11 +40,11 @@ class PlanFollower:
         self.params = params
         self._goal_reached = False
 
-    def set_footprint(self, footprint: np.ndarray) -> None:
+    def set_footprint(self, footprint: NDArray[np.float64]) -> None:
         """The padded footprint, float64[n, 2] in the robot's frame."""
         self.footprint = np.array(footprint, dtype=np.float64)
 
-    def set_plan(self, plan: np.ndarray) -> None:
+    def set_plan(self, plan: NDArray[np.float64]) -> None:
         """A new global plan, float64[n, 3] rows x, y, yaw; the goal is to be reached anew."""
         self.plan = np.array(plan, dtype=np.float64).reshape(-1, 3)
         self.xy_tolerance_latch = False
@@ -51,7 +54,9 @@ class PlanFollower:
         """Whether the robot was found at the goal, heading included."""
         return self._goal_reached
 
-    def _cut_plan(self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D) -> np.ndarray:
+    def _cut_plan(
+        self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D
+    ) -> NDArray[np.float64]:
         """The plan's part in the window. Raises NoLocalPlan when there is none."""
         self.local_global_plan = NO_POSES
         if not len(self.plan):
@@ -67,3 +72,46 @@ class PlanFollower:
             )
         self.local_global_plan = plan
         return plan
+
+
+def plan_in_window(
+    plan: NDArray[np.float64], spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D
+) -> NDArray[np.float64]:
+    """The plan's first stretch near the robot, float64[m, 3] in the local frame.
+
+    Near is half the window's longer side. The stretch begins with the first
+    near pose and ends with the first far one after it. Empty when no pose of
+    the plan, float64[n, 3], is near.
+    """
+    radius_m = max(spec.size_x * spec.resolution_m / 2.0, spec.size_y * spec.resolution_m / 2.0)
+    robot = pose.relative_to(local_from_plan)
+    near = _distance2(plan, robot) <= radius_m * radius_m
+    if not near.any():
+        return np.zeros((0, 3))
+    first = int(np.argmax(near))
+    far_after = np.flatnonzero(~near[first:])
+    end = first + int(far_after[0]) + 1 if len(far_after) else len(plan)
+    return _transform(local_from_plan, plan[first:end])
+
+
+def plan_end(plan: NDArray[np.float64], local_from_plan: Pose2D) -> Pose2D:
+    """The last pose of a plan, float64[n, 3] with n >= 1, in the local frame."""
+    return Pose2D(*_transform(local_from_plan, plan[-1:])[0].tolist())
+
+
+def count_passed(plan: NDArray[np.float64], pose: Pose2D) -> int:
+    """How many poses at a plan's beginning are 1 m or more away from the robot."""
+    near = _distance2(plan, pose) < _PASSED_BEYOND_M
+    return int(np.argmax(near)) if near.any() else len(plan)
+
+
+def _distance2(plan: NDArray[np.float64], pose: Pose2D) -> NDArray[np.float64]:
+    dx, dy = pose.x_m - plan[:, 0], pose.y_m - plan[:, 1]
+    squared: NDArray[np.float64] = dx * dx + dy * dy
+    return squared
+
+
+def _transform(a_from_b: Pose2D, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.column_stack(
+        (a_from_b.transform_points(poses[:, :2]), poses[:, 2] + a_from_b.yaw_rad)
+    )

@@ -24,9 +24,9 @@ from dataclasses import dataclass
 from typing import Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from quad_nav.control.cost_cloud import cost_cloud
-from quad_nav.control.map_grid import distance_grids
+from quad_nav.control.map_grid import cost_cloud, distance_grids
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
@@ -43,7 +43,7 @@ class Trajectory:
 
     sample: Triple
     cost: float
-    points: np.ndarray
+    points: NDArray[np.float64]
 
 
 class Rollout:
@@ -56,12 +56,12 @@ class Rollout:
         self,
         params: TrajectoryPlannerParams,
         spec: GridSpec,
-        costs: np.ndarray,
-        footprint: np.ndarray,
-        plan: np.ndarray,
+        costs: NDArray[np.uint8],
+        footprint: NDArray[np.float64],
+        plan: NDArray[np.float64],
         pose: Pose2D,
         velocity: Twist2D,
-    ):
+    ) -> None:
         self.spec = spec
         # The original keeps the robot's state in single precision.
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
@@ -80,7 +80,9 @@ class Rollout:
         )
         self.kernel_params = _kernel_params(params, spec.resolution_m)
 
-    def score(self, samples: np.ndarray, limit: float = math.inf) -> Tuple[np.ndarray, np.ndarray]:
+    def score(
+        self, samples: NDArray[np.float64], limit: float = math.inf
+    ) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3].
 
         A cost may be infinite if it is above ``limit``.
@@ -89,7 +91,7 @@ class Rollout:
             self.inputs, self.kernel_params, _triple(self.pose), self.velocity, samples, limit
         )
 
-    def cheapest(self, samples: np.ndarray) -> Optional[Tuple[int, float]]:
+    def cheapest(self, samples: NDArray[np.float64]) -> Optional[Tuple[int, float]]:
         """Index and cost of the cheapest legal sample, the first of equals; None if none is."""
         k, cost = kernel.cheapest(
             self.inputs, self.kernel_params, _triple(self.pose), self.velocity, samples
@@ -131,7 +133,7 @@ class Rollout:
         cell = self.spec.cell_of(x_m, y_m)
         return None if cell is None else int(self.grids.goal[cell[1], cell[0]])
 
-    def cost_cloud(self) -> np.ndarray:
+    def cost_cloud(self) -> NDArray[np.float32]:
         """Every cell that a robot could be in, float32[n, 7], column by column.
 
         Rows x, y, z = 0, path_cost, goal_cost, occ_cost, total_cost: the fields
@@ -152,7 +154,7 @@ class Rollout:
         )
 
 
-def costmap_view(spec: GridSpec, costs: np.ndarray) -> CostmapView:
+def costmap_view(spec: GridSpec, costs: NDArray[np.uint8]) -> CostmapView:
     """A costmap, uint8[H, W] on ``spec``, as the kernels take it."""
     return CostmapView(
         costs=np.ascontiguousarray(costs),
@@ -162,7 +164,9 @@ def costmap_view(spec: GridSpec, costs: np.ndarray) -> CostmapView:
     )
 
 
-def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray, pose: Pose2D) -> float:
+def footprint_cost(
+    spec: GridSpec, costs: NDArray[np.uint8], footprint: NDArray[np.float64], pose: Pose2D
+) -> float:
     """The highest cost under the outline of a footprint, float64[n, 2], at a pose.
 
     Negative where it cannot be: -1 on a lethal cell, -2 on an unknown one, -3
@@ -171,12 +175,12 @@ def footprint_cost(spec: GridSpec, costs: np.ndarray, footprint: np.ndarray, pos
     return collision.footprint_cost(costmap_view(spec, costs), footprint, *_triple(pose))
 
 
-def footprint_reach_m(footprint: np.ndarray) -> float:
+def footprint_reach_m(footprint: NDArray[np.float64]) -> float:
     """The farthest vertex of a footprint, float64[n, 2]."""
     return float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
 
 
-def highest_near(costmap: CostmapView, reach_m: float) -> np.ndarray:
+def highest_near(costmap: CostmapView, reach_m: float) -> NDArray[np.uint8]:
     """The highest cost in a square around each cell that holds a footprint of that reach.
 
     uint8[H, W]; off the map counts as UNKNOWN. Where it is low the outline need

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Optional
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.control.controller import IDENTITY, Control
 from quad_nav.control.goal import is_stopped, stopping_command, turning_command
@@ -36,8 +37,11 @@ class TrajectoryPlanner(PlanFollower):
     """
 
     def __init__(
-        self, params: TrajectoryPlannerParams, footprint: np.ndarray, control_period_s: float
-    ):
+        self,
+        params: TrajectoryPlannerParams,
+        footprint: NDArray[np.float64],
+        control_period_s: float,
+    ) -> None:
         super().__init__(params, footprint, control_period_s)
         self.oscillation = Oscillation()
         self.best: Optional[Trajectory] = None
@@ -46,7 +50,7 @@ class TrajectoryPlanner(PlanFollower):
     def compute_velocity(
         self,
         spec: GridSpec,
-        costs: np.ndarray,
+        costs: NDArray[np.uint8],
         pose: Pose2D,
         velocity: Twist2D,
         local_from_plan: Pose2D = IDENTITY,
@@ -74,7 +78,7 @@ class TrajectoryPlanner(PlanFollower):
             raise NoValidTrajectory(f"{reason} from ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
-    def cost_cloud(self) -> np.ndarray:
+    def cost_cloud(self) -> NDArray[np.float32]:
         """What each cell of the window cost in the last call, float32[n, 7].
 
         Rows as in ``Rollout.cost_cloud``; empty if the last call did not simulate.
@@ -84,7 +88,12 @@ class TrajectoryPlanner(PlanFollower):
         return self.rollout.cost_cloud()
 
     def _command_at_goal(
-        self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D, goal: Pose2D
+        self,
+        spec: GridSpec,
+        costs: NDArray[np.uint8],
+        pose: Pose2D,
+        velocity: Twist2D,
+        goal: Pose2D,
     ) -> Twist2D:
         turn_rad = angle_difference(goal.yaw_rad, pose.yaw_rad)
         if abs(turn_rad) <= self.params.yaw_goal_tolerance_rad:
@@ -105,7 +114,7 @@ class TrajectoryPlanner(PlanFollower):
         return command
 
     def _search(
-        self, spec: GridSpec, costs: np.ndarray, pose: Pose2D, velocity: Twist2D
+        self, spec: GridSpec, costs: NDArray[np.uint8], pose: Pose2D, velocity: Twist2D
     ) -> Trajectory:
         self.rollout = Rollout(
             self.params, spec, costs, self.footprint, self.local_global_plan, pose, velocity

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.control.oscillation import Oscillation
 from quad_nav.control.rollout import Rollout, Trajectory, Triple
@@ -101,7 +102,7 @@ def velocity_window(
     )
 
 
-def spaced(start: float, end: float, count: int) -> Tuple[np.ndarray, float]:
+def spaced(start: float, end: float, count: int) -> Tuple[NDArray[np.float64], float]:
     """``count`` values from start to end and their distance, infinite for one value.
 
     Summed step by step, because equal costs are common and the last bit of a
@@ -117,8 +118,8 @@ def spaced(start: float, end: float, count: int) -> Tuple[np.ndarray, float]:
 
 
 def _forward_samples(
-    window: VelocityWindow, thetas: np.ndarray, params: TrajectoryPlannerParams
-) -> np.ndarray:
+    window: VelocityWindow, thetas: NDArray[np.float64], params: TrajectoryPlannerParams
+) -> NDArray[np.float64]:
     """float64[n, 3]: for each vx straight ahead, then all vtheta but the last."""
     speeds, _ = spaced(window.min_vx_mps, window.max_vx_mps, params.vx_samples)
     turns = np.concatenate(([0.0], thetas[:-1]))
@@ -128,7 +129,7 @@ def _forward_samples(
     return np.vstack((samples, _DIAGONALS)) if params.holonomic_robot else samples
 
 
-def _cheapest(rollout: Rollout, samples: np.ndarray) -> Optional[_Candidate]:
+def _cheapest(rollout: Rollout, samples: NDArray[np.float64]) -> Optional[_Candidate]:
     """The legal sample of lowest cost, the first of equals."""
     found = rollout.cheapest(samples)
     return _Candidate(_row(samples, found[0]), found[1]) if found is not None else None
@@ -138,7 +139,7 @@ def _turn_in_place(
     rollout: Rollout,
     params: TrajectoryPlannerParams,
     oscillation: Oscillation,
-    thetas: np.ndarray,
+    thetas: NDArray[np.float64],
     theta_step: float,
     best: Optional[_Candidate],
 ) -> Tuple[Optional[_Candidate], float]:
@@ -181,7 +182,7 @@ def _strafe(
 
 
 def _distance_ahead(
-    rollout: Rollout, params: TrajectoryPlannerParams, end: np.ndarray
+    rollout: Rollout, params: TrajectoryPlannerParams, end: NDArray[np.float64]
 ) -> Optional[int]:
     """Goal distance of the cell that a pose faces, None off the map."""
     pose = Pose2D(*(float(value) for value in end))
@@ -228,6 +229,6 @@ def _end_escape(
     )
 
 
-def _row(samples: np.ndarray, k: int) -> Triple:
+def _row(samples: NDArray[np.float64], k: int) -> Triple:
     vx, vy, vtheta = samples[k].tolist()
     return vx, vy, vtheta

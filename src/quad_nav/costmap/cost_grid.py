@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from quad_nav.grid import FREE, UNKNOWN, GridSpec
+from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels.cost_grid import CostmapView, fill_convex_polygon, raise_to
 
 
@@ -69,7 +70,7 @@ class Bounds:
             self.max_y_m + margin_m,
         )
 
-    def including(self, points: np.ndarray) -> Bounds:
+    def including(self, points: NDArray[np.float64]) -> Bounds:
         """points: float64[n, 2]"""
         return self.union(Bounds(*points.min(axis=0).tolist(), *points.max(axis=0).tolist()))
 
@@ -85,7 +86,7 @@ class CostGrid:
     ``costs`` stays the same array until ``resize``.
     """
 
-    def __init__(self, spec: GridSpec, default_cost: int = FREE):
+    def __init__(self, spec: GridSpec, default_cost: int = FREE) -> None:
         self.default_cost = default_cost
         self.resize(spec)
 
@@ -133,7 +134,7 @@ class CostGrid:
         yn = _clamped_cell(bounds.max_y_m, spec.origin_y_m, spec.resolution_m, spec.size_y)
         return Window(x0, min(spec.size_x, xn + 1), y0, min(spec.size_y, yn + 1))
 
-    def fill_polygon(self, vertices: np.ndarray, cost: int) -> bool:
+    def fill_polygon(self, vertices: NDArray[np.float64], cost: int) -> bool:
         """Set the cells of a convex polygon, float64[n, 2] in the grid's frame.
 
         Does nothing and returns False when a vertex is off the grid.
@@ -170,7 +171,7 @@ class CostGrid:
         self.costs[~inside if keep_inside else inside] = UNKNOWN
 
 
-def shift(cells: np.ndarray, move_x: int, move_y: int, empty: int) -> None:
+def shift(cells: NDArray[np.uint8], move_x: int, move_y: int, empty: int) -> None:
     """Move the grid below ``cells``, [y, x, ...], in place; cells that come in are ``empty``."""
     size_y, size_x = cells.shape[:2]
     kept = cells[_kept(move_y, size_y), _kept(move_x, size_x)].copy()
@@ -178,12 +179,12 @@ def shift(cells: np.ndarray, move_x: int, move_y: int, empty: int) -> None:
     cells[_kept(-move_y, size_y), _kept(-move_x, size_x)] = kept
 
 
-def merge_maximum(below: np.ndarray, above: np.ndarray) -> None:
+def merge_maximum(below: NDArray[np.uint8], above: NDArray[np.uint8]) -> None:
     """Keep the higher cost of each cell in ``below``; unknown is lower than free."""
     raise_to(below, above)
 
 
-def merge_known(below: np.ndarray, above: np.ndarray) -> None:
+def merge_known(below: NDArray[np.uint8], above: NDArray[np.uint8]) -> None:
     """Overwrite ``below`` wherever ``above`` is not unknown."""
     np.copyto(below, above, where=above != UNKNOWN)
 
@@ -203,3 +204,20 @@ def _clamped_cell(world_m: float, origin_m: float, resolution_m: float, size: in
     if world_m > resolution_m * size + origin_m:
         return size - 1
     return _cell(world_m, origin_m, resolution_m)
+
+
+def _occupancy_table() -> NDArray[np.int8]:
+    """Return int8[256]: free 0, inflated 1..98, inscribed 99, lethal 100, unknown -1."""
+    table = np.empty(256, dtype=np.int8)
+    inflated = np.arange(1, INSCRIBED)
+    table[1:INSCRIBED] = 1 + 97 * (inflated - 1) // 251
+    table[FREE], table[INSCRIBED], table[LETHAL], table[UNKNOWN] = 0, 99, 100, -1
+    return table
+
+
+OCCUPANCY_OF_COST = _occupancy_table()
+
+
+def occupancy(costs: NDArray[np.uint8]) -> NDArray[np.int8]:
+    """Convert costs, uint8 of any shape, to those of ``nav_msgs/OccupancyGrid``, int8."""
+    return OCCUPANCY_OF_COST[costs]

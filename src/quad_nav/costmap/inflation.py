@@ -14,6 +14,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import EVERYWHERE, Bounds, CostGrid, Window
 from quad_nav.costmap.layer import Layer, LayerParams
@@ -45,7 +46,7 @@ class InflationLayer(Layer):
 
     def __init__(
         self, params: InflationLayerParams, resolution_m: float, inscribed_radius_m: float = 0.0
-    ):
+    ) -> None:
         super().__init__(params)
         self._resolution_m = resolution_m
         self._inscribed_radius_m = inscribed_radius_m
@@ -61,7 +62,7 @@ class InflationLayer(Layer):
         self._resolution_m = spec.resolution_m
         self._make_tables()
 
-    def set_footprint(self, footprint: np.ndarray, inscribed_radius_m: float) -> None:
+    def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
         self._inscribed_radius_m = inscribed_radius_m
         self._make_tables()
 

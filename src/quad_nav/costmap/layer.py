@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, List, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
 from quad_nav.geometry import Pose2D
@@ -39,7 +40,7 @@ class Layer:
     enabled is passed over.
     """
 
-    def __init__(self, params: Any):
+    def __init__(self, params: Any) -> None:
         self.params = params
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
@@ -59,7 +60,7 @@ class Layer:
     def resize(self, spec: GridSpec) -> None:
         """The master grid has another size, resolution or place, and is empty."""
 
-    def set_footprint(self, footprint: np.ndarray, inscribed_radius_m: float) -> None:
+    def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
         """The padded footprint, float64[n, 2] in the robot's frame, has changed."""
 
     def reset(self, now_s: float) -> None:
@@ -87,7 +88,7 @@ class Layer:
 class GridLayer(Layer):
     """A layer with costs of its own, in ``grid``, kept between updates."""
 
-    def __init__(self, params: Any, spec: GridSpec, default_cost: int):
+    def __init__(self, params: Any, spec: GridSpec, default_cost: int) -> None:
         super().__init__(params)
         self.grid = CostGrid(spec, default_cost)
         self._cleared = NOWHERE

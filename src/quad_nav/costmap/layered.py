@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Dict, Iterable, List, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav import footprint as footprints
 from quad_nav.costmap.cost_grid import NO_CELLS, NOWHERE, CostGrid, Window
@@ -66,7 +67,7 @@ class CostmapParams:
         )
 
     @property
-    def unpadded_footprint(self) -> np.ndarray:
+    def unpadded_footprint(self) -> NDArray[np.float64]:
         """float64[n, 2]"""
         if self.footprint is None:
             return footprints.circle(self.robot_radius_m)
@@ -80,7 +81,7 @@ class LayeredCostmap:
     robot's frame. ``costs`` belongs to the costmap: copy what has to outlive an update.
     """
 
-    def __init__(self, params: CostmapParams, static_map: Optional[StaticMap] = None):
+    def __init__(self, params: CostmapParams, static_map: Optional[StaticMap] = None) -> None:
         self.params = params
         default_cost = UNKNOWN if params.track_unknown_space else FREE
         self._master = CostGrid(params.spec, default_cost)
@@ -98,7 +99,7 @@ class LayeredCostmap:
         return self._master.spec
 
     @property
-    def costs(self) -> np.ndarray:
+    def costs(self) -> NDArray[np.uint8]:
         """uint8[H, W], the master grid."""
         return self._master.costs
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import List, Optional
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.kernels.raytrace import ObservationStack
 
@@ -39,8 +40,8 @@ class Observation:
     """``points``: float32[n, 3], ``sensor``: float64[3], both in the global frame, metres."""
 
     stamp_s: float
-    sensor: np.ndarray
-    points: np.ndarray
+    sensor: NDArray[np.float64]
+    points: NDArray[np.float32]
     stamp_ns: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -54,7 +55,7 @@ class ObservationBuffer:
     if a sensor falls silent its last observations stay.
     """
 
-    def __init__(self, params: SourceParams):
+    def __init__(self, params: SourceParams) -> None:
         self.params = params
         self.observations: List[Observation] = []
         self._last_reception_s: Optional[float] = None
@@ -102,7 +103,7 @@ class ObservationBuffer:
         period_s = self.params.expected_update_period_s
         return period_s == 0.0 or _nanoseconds(self.silence_s(now_s)) <= _nanoseconds(period_s)
 
-    def _store(self, points: np.ndarray) -> None:
+    def _store(self, points: NDArray[np.float32]) -> None:
         """Behind the others' points; if there is no room, all move to an array with more."""
         if self._end + len(points) <= len(self._points):
             self._points[self._end : self._end + len(points)] = points

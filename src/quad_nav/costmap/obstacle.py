@@ -63,7 +63,7 @@ class ObstacleLayer(GridLayer):
 
     def __init__(
         self, params: ObstacleLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
-    ):
+    ) -> None:
         super().__init__(params, spec, default_cost)
         self.buffers: Dict[str, ObservationBuffer] = {
             source.name: ObservationBuffer(source) for source in params.sources
@@ -152,7 +152,7 @@ class ObstacleLayer(GridLayer):
         source = self.buffers[source_name].params
         return (source.inf_is_valid, source.min_obstacle_height_m, source.max_obstacle_height_m)
 
-    def set_footprint(self, footprint: np.ndarray, inscribed_radius_m: float) -> None:
+    def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
         self._footprint = footprint
 
     def reset(self, now_s: float) -> None:
@@ -211,10 +211,14 @@ class ObstacleLayer(GridLayer):
     def _centre_on(self, robot: Pose2D) -> None:
         self.grid.centre_on(robot.x_m, robot.y_m)
 
-    def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
+    def _clear(
+        self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
+    ) -> None:
         clear_all_rays(self.grid.view, buffer.stack, range_m, touched)
 
-    def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
+    def _mark(
+        self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
+    ) -> None:
         max_height_m = self.params.max_obstacle_height_m
         mark_all_points(self.grid.view, buffer.stack, range_m, max_height_m, touched)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Sequence, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
 from quad_nav.costmap.layer import Layer, LayerParams
@@ -24,7 +25,7 @@ from quad_nav.kernels.peers import raise_discs
 class PeerArea:
     """Discs around points, float64[n, 2] in the costmap's frame, that cost so much."""
 
-    points: np.ndarray
+    points: NDArray[np.float64]
     radius_m: float
     cost: int
 
@@ -40,7 +41,7 @@ class PeerLayerParams(LayerParams):
 class PeerLayer(Layer):
     """Writes the areas that it was told of last."""
 
-    def __init__(self, params: PeerLayerParams = PeerLayerParams()):
+    def __init__(self, params: PeerLayerParams = PeerLayerParams()) -> None:
         super().__init__(params)
         self._areas: Tuple[PeerArea, ...] = ()
         self._written = NOWHERE

@@ -11,12 +11,13 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose3D, Quaternion, Scan
 from quad_nav.kernels.projection import project_ranges, transform_between_heights
 
 
-def scan_points(scan: Scan, inf_is_valid: bool) -> np.ndarray:
+def scan_points(scan: Scan, inf_is_valid: bool) -> NDArray[np.float32]:
     """float32[m, 3] in the sensor's frame, in the order of the beams.
 
     A beam counts when ``range_min_m <= range < range_max_m``. With ``inf_is_valid`` a beam
@@ -34,8 +35,11 @@ def scan_points(scan: Scan, inf_is_valid: bool) -> np.ndarray:
 
 
 def transform_points(
-    points: np.ndarray, a_from_b: Pose3D, min_z_m: float = -math.inf, max_z_m: float = math.inf
-) -> np.ndarray:
+    points: NDArray[np.float32],
+    a_from_b: Pose3D,
+    min_z_m: float = -math.inf,
+    max_z_m: float = math.inf,
+) -> NDArray[np.float32]:
     """float32[n, 3] of frame b in frame a; only those whose height in a is within limits."""
     return transform_between_heights(
         np.ascontiguousarray(points, dtype=np.float32),
@@ -47,14 +51,14 @@ def transform_points(
 
 
 @lru_cache(maxsize=64)
-def _directions(angle_min_rad: float, angle_increment_rad: float, n: int) -> np.ndarray:
+def _directions(angle_min_rad: float, angle_increment_rad: float, n: int) -> NDArray[np.float64]:
     """float64[n, 2]: cosine and sine of each beam; Python's are the C library's."""
     angles = [angle_min_rad + k * angle_increment_rad for k in range(n)]
     return np.array([(math.cos(a), math.sin(a)) for a in angles]).reshape(n, 2)
 
 
 @lru_cache(maxsize=64)  # a scan goes into more than one costmap
-def _rotation_float32(quaternion: Quaternion) -> np.ndarray:
+def _rotation_float32(quaternion: Quaternion) -> NDArray[np.float32]:
     """float32[3, 3], every step rounded to float32."""
     x, y, z, w = np.array(quaternion, dtype=np.float32)
     two, one = np.float32(2.0), np.float32(1.0)

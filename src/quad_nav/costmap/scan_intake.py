@@ -64,7 +64,7 @@ class ScanIntake:
         sinks: Layers and sources that take the messages.
     """
 
-    def __init__(self, sinks: Sequence[Sink], params: ScanValidatorParams):
+    def __init__(self, sinks: Sequence[Sink], params: ScanValidatorParams) -> None:
         self.sinks = tuple(sinks)
         self._params = params
         self._validator = ScanValidator(sink.source for sink in self.sinks)

@@ -51,7 +51,7 @@ class ScanValidator:
             else 0. A scan of this age is late; with 0 none is.
     """
 
-    def __init__(self, sources: Iterable[SourceParams]):
+    def __init__(self, sources: Iterable[SourceParams]) -> None:
         periods_s = [source.expected_update_period_s for source in sources]
         self.expected_period_s = min((one for one in periods_s if one > 0.0), default=0.0)
         self.reset()

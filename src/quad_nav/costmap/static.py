@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import NO_CELLS, Bounds, CostGrid, Window, merge_maximum
 from quad_nav.costmap.layer import GridLayer, LayerParams
@@ -17,7 +18,7 @@ from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 class StaticMap:
     """``occupancy``, int8[H, W] at ``spec``: 0..100, -1 unknown, as in OccupancyGrid."""
 
-    occupancy: np.ndarray
+    occupancy: NDArray[np.int8]
     spec: GridSpec
 
 
@@ -50,7 +51,7 @@ class StaticLayer(GridLayer):
 
     def __init__(
         self, params: StaticLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
-    ):
+    ) -> None:
         super().__init__(params, spec, default_cost)
         self.map_from_global = Pose2D(0.0, 0.0)
         self._rolling_window = rolling_window
@@ -75,7 +76,7 @@ class StaticLayer(GridLayer):
         self.grid.costs[...] = self.costs_of(static_map.occupancy)
         self._mark_all_changed()
 
-    def update_map(self, occupancy: np.ndarray, cell_x: int, cell_y: int) -> None:
+    def update_map(self, occupancy: NDArray[np.int8], cell_x: int, cell_y: int) -> None:
         """Replace a rectangle, int8[h, w] with its lower left cell at (cell_x, cell_y).
 
         What lies outside the map is cut off. Nothing happens before the first map.
@@ -96,7 +97,7 @@ class StaticLayer(GridLayer):
         self.grid.costs[area.slices] = self.costs_of(part)
         self._changed = self._changed.union(area)
 
-    def costs_of(self, occupancy: np.ndarray) -> np.ndarray:
+    def costs_of(self, occupancy: NDArray[np.int8]) -> NDArray[np.uint8]:
         """Occupancies, int8 of any shape, as costs, uint8, by the layer's thresholds."""
         table = np.array([self._cost_of(value) for value in range(256)], dtype=np.uint8)
         return table[np.ascontiguousarray(occupancy, dtype=np.int8).view(np.uint8)]
@@ -165,7 +166,7 @@ class StaticLayer(GridLayer):
         self._changed = self._everything()
 
 
-def _centres(spec: GridSpec, window: Window) -> Tuple[np.ndarray, np.ndarray]:
+def _centres(spec: GridSpec, window: Window) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
     """World x, float64[1, n], and y, float64[m, 1], of a window's cell centres."""
     x = spec.origin_x_m + (np.arange(window.x0, window.xn) + 0.5) * spec.resolution_m
     y = spec.origin_y_m + (np.arange(window.y0, window.yn) + 0.5) * spec.resolution_m

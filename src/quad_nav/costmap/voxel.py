@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import shift
 from quad_nav.costmap.observation import ObservationBuffer
@@ -53,7 +54,7 @@ class VoxelLayer(ObstacleLayer):
 
     def __init__(
         self, params: VoxelLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
-    ):
+    ) -> None:
         super().__init__(params, spec, rolling_window, default_cost)
         self._make_voxels()
 
@@ -74,7 +75,7 @@ class VoxelLayer(ObstacleLayer):
         super().reset(now_s)
         self.voxels[...] = UNKNOWN
 
-    def marked_voxels(self) -> np.ndarray:
+    def marked_voxels(self) -> NDArray[np.float64]:
         """Centres of the marked voxels, float64[n, 3] in the global frame."""
         y, x, z = np.nonzero(self.voxels == LETHAL)
         return self._origin + (np.column_stack((x, y, z)) + 0.5) * self._voxel_size
@@ -85,12 +86,12 @@ class VoxelLayer(ObstacleLayer):
         )
 
     @property
-    def _origin(self) -> np.ndarray:
+    def _origin(self) -> NDArray[np.float64]:
         spec = self.grid.spec
         return np.array([spec.origin_x_m, spec.origin_y_m, self.params.origin_z_m])
 
     @property
-    def _voxel_size(self) -> np.ndarray:
+    def _voxel_size(self) -> NDArray[np.float64]:
         resolution_m = self.grid.spec.resolution_m
         return np.array([resolution_m, resolution_m, self.params.z_resolution_m])
 
@@ -99,12 +100,16 @@ class VoxelLayer(ObstacleLayer):
         if move_x or move_y:
             shift(self.voxels, move_x, move_y, UNKNOWN)
 
-    def _clear(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
+    def _clear(
+        self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
+    ) -> None:
         grid, max_height_m = self._voxel_grid(), self.params.max_obstacle_height_m
         for seen in buffer.observations:
             clear_voxel_rays(grid, seen.sensor, seen.points, range_m, max_height_m, touched)
 
-    def _mark(self, buffer: ObservationBuffer, range_m: float, touched: np.ndarray) -> None:
+    def _mark(
+        self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
+    ) -> None:
         grid, max_height_m = self._voxel_grid(), self.params.max_obstacle_height_m
         for seen in buffer.observations:
             mark_voxels(grid, seen.sensor, seen.points, range_m, max_height_m, touched)

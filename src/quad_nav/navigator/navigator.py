@@ -24,8 +24,7 @@ from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.peers.peer import Peer
 from quad_nav.peers.peer_tracker import CRUISE_MPS
-from quad_nav.plan.near import plan_near
-from quad_nav.plan.planner import GlobalPlanner
+from quad_nav.plan.planner import GlobalPlanner, plan_near
 from quad_nav.timing import Schedule
 
 _IDLE_CHECK_HZ = 4.0  # of whether an idle robot is on the path of a peer

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.errors import NoPath
 from quad_nav.geometry import Pose2D, angle_difference, normalize_angle
@@ -33,13 +34,13 @@ class Carrot:
     ``footprint`` is the padded one, float64[n, 2] in the robot's frame.
     """
 
-    def __init__(self, params: CarrotParams, footprint: np.ndarray):
+    def __init__(self, params: CarrotParams, footprint: NDArray[np.float64]) -> None:
         self.params = params
         self.footprint = np.array(footprint, dtype=np.float64)
 
     def make_plan(
-        self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D
-    ) -> np.ndarray:
+        self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
+    ) -> NDArray[np.float64]:
         """The start and the nearest pose to the goal that the robot fits in, float64[2, 3].
 
         ``costs`` is uint8[H, W] on ``spec``. Raises NoPath when the robot fits

@@ -25,9 +25,10 @@ potential, obstacles as well: so near the goal a path may cut a corner of one.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Any, Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
 from quad_nav.geometry import Pose2D
@@ -73,13 +74,13 @@ class SearchPlanner:
     not come; None before the first plan.
     """
 
-    def __init__(self, params: SearchPlannerParams = SearchPlannerParams()):
+    def __init__(self, params: SearchPlannerParams = SearchPlannerParams()) -> None:
         self.params = params
-        self.potential: Optional[np.ndarray] = None
+        self.potential: Optional[NDArray[np.float32]] = None
 
     def make_plan(
-        self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D
-    ) -> np.ndarray:
+        self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
+    ) -> NDArray[np.float64]:
         """A plan from start to goal, float64[n, 3] rows x, y, yaw; the last row is the goal.
 
         ``costs`` is uint8[H, W] on ``spec``; in place, the start's cell is set to
@@ -140,11 +141,11 @@ class SearchPlanner:
     def _path_to_the_border(
         self,
         spec: GridSpec,
-        costs: np.ndarray,
+        costs: NDArray[np.uint8],
         start: Pose2D,
         goal: Pose2D,
         goal_cell: Tuple[int, int],
-    ) -> np.ndarray:
+    ) -> NDArray[np.float32]:
         """The path on a map whose outermost cells may be used, with obstacles around them."""
         padded = np.pad(costs, _MARGIN, constant_values=LETHAL)
         start_x, start_y = self._point(spec, start)
@@ -160,8 +161,8 @@ class SearchPlanner:
         return path - _MARGIN
 
     def _path(
-        self, costs: np.ndarray, start: Point, goal: Point, goal_cell: Tuple[int, int]
-    ) -> np.ndarray:
+        self, costs: NDArray[np.uint8], start: Point, goal: Point, goal_cell: Tuple[int, int]
+    ) -> NDArray[np.float32]:
         """Points float32[n, 2] from goal to start in cell coordinates; none if there is no way."""
         params, size_x = self.params, costs.shape[1]
         if params.use_dijkstra:
@@ -183,7 +184,9 @@ class SearchPlanner:
         descend = kernel.grid_path if params.use_grid_path else kernel.gradient_path
         return path[: descend(potential, size_x, *start, *goal, path)]
 
-    def _dijkstra(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:
+    def _dijkstra(
+        self, costs: NDArray[np.uint8], start: Point, goal: Point
+    ) -> Tuple[NDArray[np.float32], bool]:
         params, size_x = self.params, costs.shape[1]
         source = _flat(start, size_x)
         potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
@@ -217,7 +220,9 @@ class SearchPlanner:
         )
         return potential, arrived
 
-    def _a_star(self, costs: np.ndarray, start: Point, goal: Point) -> Tuple[np.ndarray, bool]:
+    def _a_star(
+        self, costs: NDArray[np.uint8], start: Point, goal: Point
+    ) -> Tuple[NDArray[np.float32], bool]:
         params, size_x = self.params, costs.shape[1]
         potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
         arrived = kernel.a_star(
@@ -234,7 +239,7 @@ class SearchPlanner:
         return potential, arrived
 
 
-def wave_costs(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
+def wave_costs(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray[np.float32]:
     """What Dijkstra's search takes for the cost of each cell, float32[H, W]."""
     lethal = params.lethal_cost
     table = np.minimum(
@@ -247,12 +252,12 @@ def wave_costs(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
     return table
 
 
-def byte_costs(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
+def byte_costs(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray[np.uint8]:
     """What A* takes for the cost of a step to each cell, flat uint8[n]."""
     return (costs + np.uint8(params.neutral_cost)).ravel()
 
 
-def _enterable(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
+def _enterable(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray[np.bool_]:
     """Which cells A* may visit, flat bool[n]."""
     enterable = costs < params.lethal_cost
     if params.allow_unknown:
@@ -261,7 +266,7 @@ def _enterable(costs: np.ndarray, params: SearchPlannerParams) -> np.ndarray:
     return enterable.ravel()
 
 
-def _outline(grid: np.ndarray, value: int = LETHAL) -> None:
+def _outline(grid: NDArray[Any], value: int = LETHAL) -> None:
     """Sets the outermost ring of cells."""
     grid[[0, -1], :] = value
     grid[:, [0, -1]] = value

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from typing import Optional, Tuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
 from quad_nav.geometry import Pose2D
@@ -54,13 +55,13 @@ class Navfn:
     where the wave did not come; None before the first plan.
     """
 
-    def __init__(self, params: NavfnParams = NavfnParams()):
+    def __init__(self, params: NavfnParams = NavfnParams()) -> None:
         self.params = params
-        self.potential: Optional[np.ndarray] = None
+        self.potential: Optional[NDArray[np.float32]] = None
 
     def make_plan(
-        self, spec: GridSpec, costs: np.ndarray, start: Pose2D, goal: Pose2D
-    ) -> np.ndarray:
+        self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
+    ) -> NDArray[np.float64]:
         """A plan from start to goal, float64[n, 3] rows x, y, yaw.
 
         ``costs`` is uint8[H, W] on ``spec``; the start's cell is set to FREE in
@@ -120,7 +121,7 @@ class Navfn:
         assert self.potential is not None
         return cell is not None and bool(self.potential[cell[1], cell[0]] < NOT_REACHED)
 
-    def _plan_to(self, spec: GridSpec, start_cell: Cell, end: Pose2D) -> np.ndarray:
+    def _plan_to(self, spec: GridSpec, start_cell: Cell, end: Pose2D) -> NDArray[np.float64]:
         end_cell = spec.cell_of(end.x_m, end.y_m)
         assert self.potential is not None and end_cell is not None
         path, _ = path_from(self.potential, end_cell, start_cell)
@@ -136,7 +137,7 @@ class Navfn:
         return plan
 
 
-def navigation_costs(costs: np.ndarray, allow_unknown: bool) -> np.ndarray:
+def navigation_costs(costs: NDArray[np.uint8], allow_unknown: bool) -> NDArray[np.uint8]:
     """NavFn's own costs of a costmap, uint8[H, W]: 50 for free cells to 254 for obstacles.
 
     A cost below INSCRIBED becomes 50 + 0.8 cost, at most 253; unknown cells are
@@ -153,8 +154,12 @@ def navigation_costs(costs: np.ndarray, allow_unknown: bool) -> np.ndarray:
 
 
 def potential_from(
-    nav_costs: np.ndarray, source: Cell, target: Cell, stop_at_target: bool, heuristic: bool = False
-) -> np.ndarray:
+    nav_costs: NDArray[np.uint8],
+    source: Cell,
+    target: Cell,
+    stop_at_target: bool,
+    heuristic: bool = False,
+) -> NDArray[np.float32]:
     """Potential float32[H, W] of the wave from ``source``.
 
     With ``stop_at_target`` it stops at the front that reaches the target, and
@@ -180,7 +185,9 @@ def potential_from(
     return potential.reshape(nav_costs.shape)
 
 
-def path_from(potential: np.ndarray, start: Cell, source: Cell) -> Tuple[np.ndarray, bool]:
+def path_from(
+    potential: NDArray[np.float32], start: Cell, source: Cell
+) -> Tuple[NDArray[np.float32], bool]:
     """Descent from ``start`` to the wave's source: float32[n, 2] cells (x, y).
 
     The flag is False when the descent ended elsewhere: out of points, at the

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 
 import numpy as np
+from numpy.typing import NDArray
 
 # A turn of more than this between two points ends the last straight part of a path.
 _STRAIGHT_RAD = 0.35
@@ -32,7 +33,9 @@ _TURNED_RAD = {
 }
 
 
-def with_headings(plan: np.ndarray, start_yaw_rad: float, mode: int, window: int) -> np.ndarray:
+def with_headings(
+    plan: NDArray[np.float64], start_yaw_rad: float, mode: int, window: int
+) -> NDArray[np.float64]:
     """The plan, float64[n, 3] rows x, y, yaw, with new yaws in all rows but the last.
 
     ``window``: the direction at a point is that from the point so many before to
@@ -54,7 +57,7 @@ def with_headings(plan: np.ndarray, start_yaw_rad: float, mode: int, window: int
     return plan
 
 
-def directions(points: np.ndarray, window: int) -> np.ndarray:
+def directions(points: NDArray[np.float64], window: int) -> NDArray[np.float64]:
     """The path's direction at each of the points float64[n, 2], radians."""
     index = np.arange(len(points))
     before = points[np.maximum(index - window, 0)]
@@ -63,14 +66,14 @@ def directions(points: np.ndarray, window: int) -> np.ndarray:
     return np.arctan2(dy, dx)
 
 
-def _interpolate(yaws: np.ndarray) -> None:
+def _interpolate(yaws: NDArray[np.float64]) -> None:
     """Equal turns from the first yaw to the last, the short way, in place."""
     turn = np.arctan2(np.sin(yaws[-1] - yaws[0]), np.cos(yaws[-1] - yaws[0]))
     blended = yaws[0] + np.linspace(0.0, turn, len(yaws))
     yaws[1:-1] = np.arctan2(np.sin(blended), np.cos(blended))[1:-1]
 
 
-def _start_of_last_straight(yaws: np.ndarray) -> int:
+def _start_of_last_straight(yaws: NDArray[np.float64]) -> int:
     """The first point of the end of the path that keeps the direction of the last point but one."""
     k = len(yaws) - 2
     turns = yaws - yaws[k]

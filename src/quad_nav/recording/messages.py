@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from quad_nav.costmap.occupancy import occupancy
+from quad_nav.costmap.cost_grid import occupancy
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
 from quad_nav.topics.markers import Marker

@@ -11,8 +11,7 @@ import numpy as np
 from families.case import Case, load_case
 from families.comparison import Comparison, Difference
 from quad_nav import footprint as footprints
-from quad_nav.costmap.cost_grid import CostGrid
-from quad_nav.costmap.occupancy import occupancy
+from quad_nav.costmap.cost_grid import CostGrid, occupancy
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
 

@@ -11,7 +11,7 @@ from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid, Path
 from sensor_msgs.msg import PointCloud2, PointField
 
-from quad_nav.costmap.occupancy import occupancy
+from quad_nav.costmap.cost_grid import occupancy
 from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
