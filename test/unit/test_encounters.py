@@ -1,4 +1,4 @@
-"""The encounters that come with quad: everybody gets there, and nobody touches.
+"""The shipped encounters: every robot reaches its goals, without contacts.
 
 ``bench/encounters.py`` flies them with many seeds.
 """
@@ -44,14 +44,14 @@ def test_every_scene_has_goals_and_every_goal_a_scene():
 
 
 @pytest.mark.parametrize("name, seed", [(name, 50 + k) for k, name in enumerate(SCENES)])
-def test_everybody_gets_there_and_nobody_touches(name, seed):
+def test_every_robot_reaches_its_goals_without_contacts(name, seed):
     summary = fly(setup_of(name, seed))
     assert summary.success, [(robot.robot, robot.legs) for robot in summary.robots]
     assert summary.min_separation_m is not None and summary.min_separation_m > MARGIN_M
 
 
-def test_in_a_corridor_both_get_their_turns():
-    """Each way takes 8 m / 0.3 m/s = 27 s, and only one can fly it at a time."""
+def test_in_a_corridor_both_robots_take_turns():
+    """Each direction takes 8 m / 0.3 m/s = 27 s, and only one can fly it at a time."""
     summary = fly(setup_of("corridor_to_and_fro", time_limit_s=110.0))
     assert not summary.contacts
     for robot in summary.robots:

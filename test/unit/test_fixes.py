@@ -55,7 +55,7 @@ def test_fixes_are_on_by_default_and_each_can_be_switched_off():
 @pytest.mark.parametrize(
     "fixes, is_left", [({}, False), ({"clear_any_obstacle_layer": False}, True)]
 )
-def test_the_default_recovery_clears_the_layer_that_there_is(fixes, is_left):
+def test_the_default_recovery_clears_any_obstacle_layer(fixes, is_left):
     navigator = navigator_with(fixes)
     see_a_wall_three_metres_ahead(navigator)
     grid = navigator.global_costmap.layers["obstacle_layer"].grid.costs
@@ -69,7 +69,7 @@ def test_the_default_recovery_clears_the_layer_that_there_is(fixes, is_left):
     "fixes, stale_after_s",
     [({}, 1.0), ({"sensor_timeout": 0.0}, 21.0), ({"sensor_timeout": 3.0}, 3.0)],
 )
-def test_a_silent_sensor_is_missed_after_a_time_that_is_a_time(fixes, stale_after_s):
+def test_sensor_timeout_limits_the_expected_update_rate(fixes, stale_after_s):
     navigator = navigator_with(fixes)
     see_a_wall_three_metres_ahead(navigator, 10.0)
     assert navigator.local_costmap.is_current(10.0 + stale_after_s)
@@ -89,7 +89,7 @@ def test_switches_reach_planner_and_recoveries(fixes):
     assert dwa.controller.params.predict_goal_turn is on
 
 
-def test_switches_can_be_thrown_in_flight():
+def test_fixes_can_be_switched_in_flight():
     configuration = load(TREE)
     navigator = build_navigator(configuration)
     configuration = updated(
@@ -101,7 +101,7 @@ def test_switches_can_be_thrown_in_flight():
 
 
 @pytest.mark.parametrize("fixes, leaves", [({}, True), ({"escape_collision": False}, False)])
-def test_one_that_touches_a_wall_leaves_it(fixes, leaves):
+def test_a_robot_in_collision_escapes(fixes, leaves):
     """Its back is 0.36 m behind it, in the cell of the wall at 0.38 m."""
     away = Pose2D(5.0, 5.0, 3.14)
     node = {

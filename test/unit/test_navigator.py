@@ -1,4 +1,4 @@
-"""The state machine with planners that do as they are told."""
+"""The state machine with fake planners."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def test_a_goal_is_planned_once_and_commanded_in_every_cycle():
     np.testing.assert_array_equal(flight.controller.plans[0], [[1, 1, 0], [5, 1, 0]])
 
 
-def test_planner_frequency_plans_again_and_again():
+def test_planner_frequency_replans():
     flight = Flight(planner_frequency_hz=1.0)
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(3.05)
@@ -169,7 +169,7 @@ def test_planner_frequency_plans_again_and_again():
     )
 
 
-def test_reaching_the_goal_stops_and_succeeds_with_the_originals_words():
+def test_reaching_the_goal_stops_and_succeeds_with_move_bases_text():
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(1.0)
@@ -197,7 +197,7 @@ def test_no_plan_within_patience_runs_all_recoveries_and_aborts():
     assert ended == pytest.approx(3 * 2.0, abs=0.5)  # patience before each of three endings
 
 
-def test_a_goal_without_a_plan_stops_the_flight_to_the_one_before():
+def test_a_goal_without_a_plan_ends_the_command_of_the_previous_goal():
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(1.0)
@@ -233,7 +233,7 @@ def test_oscillation_timeout_aborts_when_the_robot_stays_within_its_distance():
     assert outcomes(flight.until(4.0)) == [(False, Trigger.OSCILLATION.value)]
 
 
-def test_standing_still_is_replanned_then_recovered_then_aborted():
+def test_a_robot_without_progress_replans_then_recovers_then_aborts():
     flight = Flight([NamedRecovery("r", FakeRecovery())], {"progress_timeout": 2.0})
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(12.0)
@@ -243,7 +243,7 @@ def test_standing_still_is_replanned_then_recovered_then_aborted():
     assert outcomes(ticks) == [(False, Trigger.OSCILLATION.value)]
 
 
-def test_obstacle_costs_weigh_less_from_the_new_plan_on_until_the_robot_gets_away():
+def test_a_robot_without_progress_relaxes_the_obstacle_weight_until_it_has_moved():
     flight = Flight(fixes={"progress_timeout": 2.0})
     weights = flight.controller
     weights.params = Weights(occdist_scale=0.01)
@@ -260,7 +260,7 @@ def test_obstacle_costs_weigh_less_from_the_new_plan_on_until_the_robot_gets_awa
     assert weights.params.occdist_scale == 0.01
 
 
-def test_with_the_originals_progress_timeout_it_spins_for_ever():
+def test_without_a_progress_timeout_a_robot_spins_for_ever_as_upstream():
     flight = Flight()
     flight.controller.command = Twist2D(vyaw_radps=1.0)
     flight.navigator.set_goal(GOAL, 0.0)
@@ -276,7 +276,7 @@ def test_a_new_goal_and_a_cancel_wait_for_the_next_cycle():
     assert flight.navigator.accepts_goal(1.0)
 
 
-def test_cancel_sends_one_stop():
+def test_cancel_publishes_one_stop():
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(0.5)
@@ -298,7 +298,7 @@ def test_a_rotation_can_be_cancelled_in_its_middle():
     assert [t.command for t in flight.until(3.0) if t.command] == [Twist2D()]
 
 
-def test_silent_sensor_stops_the_robot_and_says_which():
+def test_a_sensor_timeout_stops_the_robot_and_names_the_sensor():
     flight = Flight()
     flight.navigator.set_goal(GOAL, 0.0)
     flight.until(1.0)
@@ -311,7 +311,7 @@ def test_silent_sensor_stops_the_robot_and_says_which():
 
 
 @pytest.mark.parametrize("fixes, turns", [({"avoid_peers": False}, False), (UPSTREAM, True)])
-def test_a_rotation_waits_while_the_robot_is_blind(fixes, turns):
+def test_a_rotation_pauses_without_sensor_data(fixes, turns):
     recovery = FakeRecovery(steps=200)
     flight = Flight([NamedRecovery("rotate", recovery)], fixes, planner_patience_s=0.5)
     flight.planner.fails = True
@@ -324,7 +324,7 @@ def test_a_rotation_waits_while_the_robot_is_blind(fixes, turns):
     assert (recovery.left < left) is turns
 
 
-def test_standing_blind_is_no_lack_of_progress():
+def test_a_robot_that_stops_without_sensor_data_keeps_its_patience():
     flight = Flight(fixes={"progress_timeout": 1.0, "avoid_peers": False})
     flight.navigator.set_goal(GOAL, 0.0)
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
@@ -344,7 +344,7 @@ def test_unknown_pose_stops_the_robot():
     assert "stopping: robot pose unknown" in tick.warnings
 
 
-def test_schedule_drops_missed_turns():
+def test_schedule_skips_missed_due_times():
     schedule = Schedule(10.0)
     schedule.start(0.0)
     assert schedule.pop(0.0)
@@ -354,7 +354,7 @@ def test_schedule_drops_missed_turns():
     assert not Schedule(0.0).pop(1e9)
 
 
-def test_local_from_global_takes_the_global_pose_to_the_local_one():
+def test_local_from_global_transforms_the_global_pose_to_the_local_one():
     poses = RobotPoses(Pose2D(2.0, 1.0, np.pi / 2), Pose2D(0.0, 3.0, 0.0))
     transform = poses.local_from_global
     assert transform is not None
@@ -371,7 +371,7 @@ def test_rings_around_a_goal():
     assert list(ring_offsets(0.15, 0.1)) == []
 
 
-def test_shutdown_costmaps_rest_without_a_goal():
+def test_shutdown_costmaps_skips_updates_without_a_goal():
     flight = Flight(shutdown_costmaps=True)
     flight.until(2.0)
     assert flight.global_costmap.updates == []
@@ -380,7 +380,7 @@ def test_shutdown_costmaps_rest_without_a_goal():
     assert len(flight.global_costmap.updates) >= 5
 
 
-def test_changed_frequency_counts_at_once():
+def test_a_changed_frequency_takes_effect_at_once():
     flight = Flight()
     flight.until(1.0)
     flight.global_costmap.params.update_frequency_hz = 20.0

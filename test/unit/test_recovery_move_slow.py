@@ -1,4 +1,4 @@
-"""Going slowly after a recovery: what is cleared, what is limited and for how long."""
+"""Recovery MoveSlowAndClear: cleared area, limited parameters and duration of the limit."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def full(costmap):
     return costmap
 
 
-def test_the_square_around_the_robot_is_freed_and_reaches_the_master():
+def test_the_square_around_the_robot_is_cleared_in_layer_and_master():
     local = full(costmap_of())
     around = RecoveryContext(0.0, full(costmap_of()), local, HERE, HERE)
     step = MoveSlowAndClear(MoveSlowAndClearParams(clearing_distance_m=1.0)).step(around)
@@ -73,7 +73,7 @@ def test_the_square_around_the_robot_is_freed_and_reaches_the_master():
     assert around.global_costmap.layers["laser"].grid.costs[2, 2] == 0
 
 
-def test_costmaps_that_cannot_be_cleared_are_told():
+def test_costmaps_that_cannot_be_cleared_are_reported():
     blind = costmap_of(inflation=InflationLayerParams())
     small = full(costmap_of(size_m=3.0))
     step = MoveSlowAndClear(MoveSlowAndClearParams(translation_fields=("max_vel_x_mps",))).step(
@@ -88,7 +88,7 @@ def test_costmaps_that_cannot_be_cleared_are_told():
     assert (small.layers["laser"].grid.costs == 254).all()
 
 
-def test_at_an_unknown_pose_nothing_is_done():
+def test_at_an_unknown_pose_nothing_is_cleared_or_limited():
     costmap = full(costmap_of())
     step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
         RecoveryContext(0.0, costmap, costmap, None, None)
@@ -98,7 +98,7 @@ def test_at_an_unknown_pose_nothing_is_done():
     assert (costmap.layers["laser"].grid.costs == 254).all()
 
 
-def test_a_planner_without_speeds_is_not_said_to_be_slow():
+def test_a_planner_without_speeds_is_not_limited():
     step = MoveSlowAndClear(MoveSlowAndClearParams()).step(
         RecoveryContext(0.0, full(costmap_of()), full(costmap_of()), HERE, HERE)
     )
@@ -125,13 +125,13 @@ def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
     assert controller.params == usual
 
 
-def test_a_robot_that_is_slow_already_is_not_made_faster():
+def test_a_limit_never_raises_a_speed():
     controller = Controller(TrajectoryPlannerParams(max_vel_x_mps=0.1))
     ParameterLimiter(controller).impose(LIMIT, HERE)
     assert controller.params.max_vel_x_mps == 0.1
 
 
-def test_a_limit_of_the_same_parameters_replaces_the_first_and_counts_from_its_own_place():
+def test_a_limit_of_the_same_parameters_replaces_the_first():
     usual = TrajectoryPlannerParams()
     controller = Controller(usual)
     speed = ParameterLimiter(controller)
@@ -147,7 +147,7 @@ def test_a_limit_of_the_same_parameters_replaces_the_first_and_counts_from_its_o
     assert controller.params == TrajectoryPlannerParams()
 
 
-def test_parameters_that_change_under_a_limit_come_into_force_with_its_end():
+def test_parameters_that_change_under_a_limit_take_effect_with_its_end():
     controller = Controller(TrajectoryPlannerParams())
     speed = ParameterLimiter(controller)
     speed.impose(LIMIT, HERE)
@@ -170,7 +170,7 @@ TREE = {
 
 
 class Stuck:
-    """A navigator that has run its recovery: there was no plan, and now there is one."""
+    """A navigator that has run its recovery for lack of a plan, and has a plan now."""
 
     def __init__(self, tree=TREE):
         self.configuration = load(tree, "")
@@ -217,7 +217,7 @@ def test_commands_stay_below_the_limit(stuck):
     assert np.max(np.abs([tick.command.vyaw_radps for tick in ticks if tick.control])) <= 0.45
 
 
-def test_a_limit_outlives_a_cancelled_goal_and_not_the_way_to_the_next(stuck):
+def test_a_limit_outlives_a_cancelled_goal_and_ends_on_the_path_to_the_next(stuck):
     stuck.navigator.cancel()
     stuck.fly(HERE, 0.3)
     assert stuck.navigator.state is State.IDLE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Dict, List, Optional, Sequence
+from typing import Dict, List, Optional, Sequence, Set
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
@@ -73,14 +73,7 @@ class PeerTracker:
             peers = ()
         fresh = [peer for peer in peers if abs(now_s - peer.stamp_s) <= timeout_s]
         lost = [peer.name for peer in peers if abs(now_s - peer.stamp_s) > timeout_s]
-        messages = [
-            f"no data from {name} for {timeout_s:g} s, avoiding it by LIDAR only"
-            for name in lost
-            if name not in self._lost
-        ]
-        names = {peer.name for peer in fresh}
-        messages += [f"receiving data from {name} again" for name in self._lost if name in names]
-        self._lost = lost
+        messages = self._update_lost(lost, {peer.name for peer in fresh}, timeout_s)
         self.margin_m = margin_m
         reach_m = self.reach_m
         self.peers = [
@@ -89,6 +82,17 @@ class PeerTracker:
             if pose is not None and math.hypot(peer.x_m - pose.x_m, peer.y_m - pose.y_m) < reach_m
         ]
         self._update_stall_timers(now_s)
+        return messages
+
+    def _update_lost(self, lost: List[str], fresh: Set[str], timeout_s: float) -> List[str]:
+        """Keep the names of lost peers; return messages about changes."""
+        messages = [
+            f"no data from {name} for {timeout_s:g} s, avoiding it by LIDAR only"
+            for name in lost
+            if name not in self._lost
+        ]
+        messages += [f"receiving data from {name} again" for name in self._lost if name in fresh]
+        self._lost = lost
         return messages
 
     def _update_stall_timers(self, now_s: float) -> None:

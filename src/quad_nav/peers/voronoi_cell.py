@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Optional, Sequence
+from typing import Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,24 +76,13 @@ def limit_to_cell(
         return LimitedCommand(command)
     coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
     arc = np.column_stack(pose.rotate(*_arc(command, hold_s).T))
-    fraction = 1.0
-    nearest: Optional[Peer] = None
-    for peer in peers:
-        allowed = _allowed_fraction(
-            arc, coasting, peer.x_m - pose.x_m, peer.y_m - pose.y_m, safety_radius_m
-        )
-        if allowed < fraction:
-            fraction, nearest = allowed, peer
+    fraction, nearest = _allowed_by_all(arc, coasting, pose, peers, safety_radius_m)
     if nearest is None:
         return LimitedCommand(command)
     if fraction < _MIN_FRACTION:
         return LimitedCommand(_turn_in_place(pose, command, nearest), nearest.name)
-    return LimitedCommand(
-        Twist2D(
-            fraction * command.vx_mps, fraction * command.vy_mps, fraction * command.vyaw_radps
-        ),
-        nearest.name,
-    )
+    vx_mps, vy_mps = fraction * command.vx_mps, fraction * command.vy_mps
+    return LimitedCommand(Twist2D(vx_mps, vy_mps, fraction * command.vyaw_radps), nearest.name)
 
 
 def _turn_in_place(pose: Pose2D, command: Twist2D, peer: Peer) -> Twist2D:
@@ -117,6 +106,24 @@ def _room_towards(
         return 0.0
     approach_m = (coasting[0] * dx_m + coasting[1] * dy_m) / distance_m
     return float(max(0.5 * distance_m - safety_radius_m - max(approach_m, 0.0), 0.0))
+
+
+def _allowed_by_all(
+    arc: NDArray[np.float64],
+    coasting: NDArray[np.float64],
+    pose: Pose2D,
+    peers: Sequence[Peer],
+    safety_radius_m: float,
+) -> Tuple[float, Optional[Peer]]:
+    """Return the part of the arc inside the cell, and the peer that limits it, if any."""
+    fraction = 1.0
+    nearest: Optional[Peer] = None
+    for peer in peers:
+        dx_m, dy_m = peer.x_m - pose.x_m, peer.y_m - pose.y_m
+        allowed = _allowed_fraction(arc, coasting, dx_m, dy_m, safety_radius_m)
+        if allowed < fraction:
+            fraction, nearest = allowed, peer
+    return fraction, nearest
 
 
 def _allowed_fraction(
