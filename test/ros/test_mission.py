@@ -8,7 +8,7 @@ from flight_case import FlightCase
 GOALS = ([(3.0, 6.5), (9.0, 5.5), (1.5, 9.0)], [(4.0, 3.5), (2.0, 9.0), (8.5, 5.0)])
 
 
-class Mission(FlightCase):
+class TutorialMission(FlightCase):
     def test_both_quadcopters_reach_all_goals(self):
         result = self.read_result(rospy.get_param("~result"), patience_s=380.0)
         self.assertEqual(len(result["robots"]), 2)
@@ -21,4 +21,4 @@ class Mission(FlightCase):
 
 
 if __name__ == "__main__":
-    rostest.rosrun("quad", "mission", Mission)
+    rostest.rosrun("quad", "mission", TutorialMission)
