@@ -159,7 +159,8 @@ class SimulatorTopics:
         if self._lagging_reports >= _LAGGING_REPORTS:
             rospy.logwarn_throttle(
                 10.0 * rate,
-                "simulator: simulation lags: %.2f simulated seconds per second, expected %g",
+                "simulator: simulation lags: %.2f simulated seconds per second, expected %g (use a"
+                " lower rate:=)",
                 factor,
                 rate,
             )
