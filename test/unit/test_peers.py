@@ -24,7 +24,13 @@ from quad_nav.peers.peer import (
     priority_of,
     resample,
 )
-from quad_nav.peers.right_of_way import Yield, approaches, find_conflict, predict_positions
+from quad_nav.peers.right_of_way import (
+    Yield,
+    YieldDecision,
+    approaches,
+    find_conflict,
+    predict_positions,
+)
 from quad_nav.peers.voronoi_cell import COASTING_S, limit_to_cell
 
 SAFETY_RADIUS_M = 0.4
@@ -238,6 +244,20 @@ def test_a_robot_waits_beside_the_path_of_a_peer_and_makes_room_on_it():
     first = peer(1.0, 0.0, priority=HIGHEST_PRIORITY, path=[(1.0, 0.0), (6.0, 0.0)])
     assert decide([(2.5, -1.2), (2.5, 3.0)], -1.0, [first]) == ("other", Yield.WAIT)
     assert decide([(2.5, -0.5), (2.5, 3.0)], -1.0, [first]) == ("other", Yield.MAKE_ROOM)
+
+
+@pytest.mark.parametrize(
+    "decision, text",
+    [
+        (YieldDecision("quad1", Yield.WAIT), "waiting for quad1 (higher priority) to pass"),
+        (
+            YieldDecision("quad1", Yield.MAKE_ROOM, Pose2D(1.0, 2.5)),
+            "making room for quad1 (higher priority) at (1.00, 2.50)",
+        ),
+    ],
+)
+def test_log_lines_of_decisions(decision, text):
+    assert str(decision) == text
 
 
 def test_passing_at_another_time_is_no_conflict():

@@ -241,10 +241,10 @@ def test_intention_of_a_robot():
     here = Pose2D(2.0, 5.0)
     navigator.set_goal(Pose2D(4.0, 5.0), 7.0)
     navigator.tick(7.0, RobotPoses(here, here), Twist2D())
-    told: Intention = navigator.peers.intention
-    assert told.priority == pytest.approx(-7.03)
-    assert len(told.path) == pytest.approx(21, abs=2)  # 2 m, a point every 0.1 m
-    np.testing.assert_allclose(told.path[-1], [4.0, 5.0])
+    intention = navigator.peers.intention
+    assert intention.priority == pytest.approx(-7.03)
+    assert len(intention.path) == pytest.approx(21, abs=2)  # 2 m, a point every 0.1 m
+    np.testing.assert_allclose(intention.path[-1], [4.0, 5.0])
     navigator.cancel()
     assert not len(navigator.peers.intention.path)
 

@@ -32,7 +32,7 @@ _SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
             10.0,
             "timeout_s",
             "seconds",
-            "A robot that has not moved by progress_distance for so long plans anew, and after the"
+            "A robot that has not moved by progress_distance for so long replans, and after the"
             " same time again runs the recoveries; 0 disables the check.",
             low=0,
             high=100,

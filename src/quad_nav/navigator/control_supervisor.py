@@ -69,7 +69,7 @@ class ProgressChecker:
         self._has_replanned = False
 
     def check(self, now_s: float, pose: Pose2D, params: ProgressParams) -> StuckAction:
-        """Return the reaction that is due; the time counts anew after each."""
+        """Return the reaction that is due; the time restarts after each."""
         if self._stall_timer.has_moved(now_s, pose, params.distance_m):
             self._has_replanned = False
         if not self._stall_timer.exceeds(now_s, params.timeout_s):

@@ -227,7 +227,7 @@ class PeerCoordinator:
             now_s, pose, self._path, _straight_to(goal), self.priority, before
         )
         if self.decision != before:
-            messages += (str(self.decision or "path clear, resuming its goal"),)
+            messages += (str(self.decision or "path clear, resuming goal"),)
         replan = self.holding_point != (before.holding_point if before is not None else None)
         return PeerAdvice(messages, replan)
 
@@ -288,7 +288,7 @@ class PeerCoordinator:
         )
 
     def is_blocked(self, now_s: float, pose: Pose2D) -> bool:
-        """Return whether limited commands have kept the robot in place; then count anew.
+        """Return whether limited commands have kept the robot in place; then restart the count.
 
         To be called for each limited command.
         """

@@ -54,10 +54,10 @@ class YieldDecision:
     holding_point: Optional[Pose2D] = None
 
     def __str__(self) -> str:
-        text = f"{self.action.value} {self.peer} (higher priority) to pass"
-        if self.holding_point is not None:
-            text += f", at ({self.holding_point.x_m:.2f}, {self.holding_point.y_m:.2f})"
-        return text
+        text = f"{self.action.value} {self.peer} (higher priority)"
+        if self.holding_point is None:
+            return f"{text} to pass"
+        return f"{text} at ({self.holding_point.x_m:.2f}, {self.holding_point.y_m:.2f})"
 
 
 def find_conflict(

@@ -1,4 +1,4 @@
-"""Nothing that a stranger may send becomes code, and nothing of the user's leaves with a flight."""
+"""Untrusted input never becomes code, and recordings hold no personal data."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SAFE_LOAD_IN = ("ros/common/preflight.py", "topics/rviz_file.py")
 
 
 def dangers(source, name="x.py"):
-    """Calls that make code, or far too much, of data."""
+    """Calls that make code, or far too much memory, of data."""
     tree = ast.parse(source)
     imported = {
         alias.name.split(".")[0]
@@ -80,7 +80,7 @@ def _dotted(node):
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.name)
-def test_no_data_becomes_code(path):
+def test_sources_make_no_code_of_data(path):
     assert dangers(path.read_text(encoding="utf-8"), path.as_posix()) == []
 
 
@@ -102,12 +102,12 @@ def test_no_data_becomes_code(path):
         "os.system(x)",
     ],
 )
-def test_what_would_be_found(source):
+def test_dangerous_calls_are_found(source):
     assert dangers(source)
 
 
 def test_parameters_in_recordings_load_no_plugins(monkeypatch):
-    # They may name Python classes of the one who recorded; to show them is not to import them.
+    # They may name Python classes of the author; showing them must not import them.
     named = []
     monkeypatch.setattr("quad_nav.config.plugins.load_class", lambda name, _: named.append(name))
     checked_flight(
@@ -128,7 +128,7 @@ def test_parameters_in_recordings_load_no_plugins(monkeypatch):
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
-    """What a flight by the command line writes, for a user and a machine with telling names."""
+    """Files of a flight by the command line; user and machine have names that can be searched."""
     with pytest.MonkeyPatch.context() as patch:
         home = tmp_path_factory.mktemp("marker-home")
         for name in ("USER", "LOGNAME", "USERNAME"):
@@ -176,7 +176,7 @@ def _fly(home):
 
 
 @pytest.mark.parametrize("kind", ["bag", "mcap", "html", "json", "gif"])
-def test_a_flights_files_tell_nothing_of_user_machine_or_folders(flown, kind):
+def test_files_of_a_flight_hold_no_user_machine_or_folder_names(flown, kind):
     content = unpacked(flown[kind], kind)
     assert b"quad0" in content or kind == "gif"
     for secret in (
