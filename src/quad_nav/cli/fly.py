@@ -1,4 +1,4 @@
-"""``quad fly``: the mission offline."""
+"""``quad fly``: fly a mission offline."""
 
 from __future__ import annotations
 
@@ -40,33 +40,33 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option(
     "--scene",
     type=_A_FILE,
-    help="Walls, obstacles and start poses. [default: the arena that comes with quad]",
+    help="Scene file: walls, obstacles and start poses. [default: the shipped arena]",
 )
 @click.option(
     "--goals",
     type=click.Path(file_okay=False, path_type=Path),
-    help="The folder with quad0_goals.json and so on. [default: the one that comes with quad]",
+    help="Folder with quad0_goals.json and so on. [default: the shipped goals]",
 )
 @click.option(
     "--config",
     default="default",
     show_default=True,
     metavar="NAME|FOLDER",
-    help="move_base's parameters: 'default', 'tutorial' or a folder of yours.",
+    help="Configuration of move_base: 'default', 'tutorial' or a folder of YAML files.",
 )
 @click.option(
     "--set",
     "parameters",
     multiple=True,
     metavar="PATH=VALUE",
-    help="A parameter on top of the folder's, as global_costmap/width=60; repeatable.",
+    help="Set a parameter on top of --config, as global_costmap/width=60; repeatable.",
 )
 @click.option(
     "--robots",
     type=click.IntRange(min=1),
     metavar="N",
-    help="How many quadcopters. More than two, without --scene and --goals, get a mission"
-    " at random. [default: as many as there are goal files]",
+    help="Number of quadcopters. More than two without --scene and --goals fly a random mission."
+    " [default: one for each goal file]",
 )
 @click.option(
     "--size",
@@ -74,21 +74,21 @@ _AMOUNT = click.FloatRange(min=0.0)
     type=_AMOUNT,
     default=0.0,
     metavar="M",
-    help="The side of a random mission's arena. [default: with room for all]",
+    help="Side of a random mission's arena. [default: large enough for all quadcopters]",
 )
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="For the jitter and the noise; the same seed gives the same flight.",
+    help="Seed of jitter, noise and random missions; the same seed gives the same flight.",
 )
 @click.option(
     "--jitter",
     type=_AMOUNT,
     default=0.0,
     metavar="M",
-    help="How far the start positions are displaced at random.",
+    help="Displace each start position at random, by at most this distance.",
 )
 @click.option(
     "--time-limit",
@@ -96,17 +96,17 @@ _AMOUNT = click.FloatRange(min=0.0)
     type=_POSITIVE,
     default=math.inf,
     metavar="S",
-    help="End after so many simulated seconds.",
+    help="End the flight after this simulated time.",
 )
 @click.option(
     "--scan-range",
     type=_POSITIVE,
     default=2 * math.pi,
     metavar="RAD",
-    help="The LIDAR's field of view. [default: all around]",
+    help="Field of view of the LIDARs. [default: 2 pi]",
 )
 @click.option(
-    "--beams", type=click.IntRange(min=2), default=512, show_default=True, help="Beams of a scan."
+    "--beams", type=click.IntRange(min=2), default=512, show_default=True, help="Beams per scan."
 )
 @click.option(
     "--lidar-rate",
@@ -115,59 +115,59 @@ _AMOUNT = click.FloatRange(min=0.0)
     default=20.0,
     show_default=True,
     metavar="HZ",
-    help="Scans per simulated second.",
+    help="Scan rate, in simulated time.",
 )
 @click.option(
     "--range-noise",
     type=_AMOUNT,
     default=0.0,
     metavar="M",
-    help="Standard deviation of the LIDAR's ranges.",
+    help="Standard deviation of the LIDARs' range noise.",
 )
 @click.option(
     "--lidar",
     type=click.Choice(LIDAR_CASTERS),
     default="kernel",
     show_default=True,
-    help="Who casts the beams: our kernel, or the physics engine.",
+    help="Cast the beams with the numba kernel or with the physics engine.",
 )
 @click.option(
     "--processes",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Processes that share the navigators; the flight is the same. [default: one for"
-    " ten quadcopters, as many as there are cores]",
+    help="Processes that share the navigators; the flight does not depend on it. [default: one"
+    " for each ten quadcopters, at most one per core]",
 )
 @click.option(
     "--json",
     "json_path",
     type=click.Path(dir_okay=False, allow_dash=True),
     metavar="FILE",
-    help="Write the summary there; - is the terminal.",
+    help="Write the summary as JSON; - is standard output.",
 )
 @click.option(
     "--record",
     type=_A_FILE,
     metavar="FILE.bag|FILE.mcap",
-    help="Record the topics of the ROS face, for rosbag play and RViz.",
+    help="Record the ROS topics, for rosbag play and RViz.",
 )
 @click.option(
     "--view",
     is_flag=False,
     flag_value=_LIVE,
     metavar="[FILE.rrd]",
-    help="Show the flight in rerun's 3D viewer as it is flown, or save it for that.",
+    help="Show the flight live in rerun's 3D viewer, or save it for the viewer.",
 )
 @click.option(
-    "--report", type=_A_FILE, metavar="FILE.html", help="Write a page with pictures of the flight."
+    "--report", type=_A_FILE, metavar="FILE.html", help="Write a report with pictures of the flight."
 )
 @click.option(
     "--animate",
     type=_A_FILE,
     metavar="FILE",
-    help="Write an animation: .gif, or .mp4 where there is ffmpeg.",
+    help="Write an animation: .gif, or .mp4 if ffmpeg is installed.",
 )
-@click.option("--quiet", "-q", is_flag=True, help="No progress bar, no table.")
+@click.option("--quiet", "-q", is_flag=True, help="Show no progress bar and no table.")
 def fly(
     json_path: Optional[str],
     record: Optional[Path],
@@ -178,12 +178,12 @@ def fly(
     processes: Optional[int],
     **given: Any,
 ) -> None:
-    """Fly a mission without ROS, as fast as the machine can.
+    """Fly a mission without ROS, as fast as the machine allows.
 
-    Ctrl-C ends the flight and keeps what was flown.
+    Ctrl-C ends the flight; summary, recording and report cover the part that was flown.
 
-    Exit status: 0 when every goal was reached and nothing touched, 1 otherwise, 2 for input that
-    cannot be used, 130 after Ctrl-C.
+    Exit status: 0 if every goal was reached without a contact, 1 otherwise, 2 for faulty input,
+    130 after Ctrl-C.
     """
     try:
         setup = read_setup(_options(**given))
@@ -208,7 +208,7 @@ def _options(
     parameters: Tuple[str, ...],
     **given: Any,
 ) -> FlightOptions:
-    """The options as a person gives them."""
+    """Translate the command line's options."""
     beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
     options = FlightOptions(
         **given,
@@ -222,7 +222,7 @@ def _options(
 
 
 def _watchers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
-    """Imported here: who neither records nor looks need not wait for it."""
+    """Create recorder and viewer; imported here, because both load slowly."""
     watchers: List[FlightObserver] = []
     if record is not None:
         from quad_nav.recording.recorder import Recorder
