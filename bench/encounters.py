@@ -1,12 +1,12 @@
-"""Whether fleets get through without touching: encounters and random missions, many times.
+"""Fly encounters and random missions with many seeds, and count contacts.
 
     python bench/encounters.py                            # all of them, 20 seeds each
     python bench/encounters.py corridor 8in12 --seeds 100 --jobs 4
 
 ``mission`` is the tutorial's mission, ``8in12`` are eight quadcopters with a random mission in an
 arena of 12 m; the other names are those of ``goals/encounters``. Starts are displaced by up to
-0.3 m, but for random missions, which differ anyway. Goals that begin again after the last one are
-flown for ten minutes. The exit status is 1 when anything touched.
+0.3 m, except in random missions, which differ anyway. Missions that loop are flown for ten minutes.
+The exit status is 1 if there was a contact.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass
-from typing import Iterator, List, Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import click
-import joblib
 import tabulate
 from rich.progress import track
 
 from quad_nav.files.shipped import shipped
 from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.run import fly
+from quad_nav.offline.workers import LocalWorkers, fly_all
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.scenario.warm_up import simulate, warm_up
 from quad_nav.sim.simulation import SimulationParams
@@ -49,18 +49,23 @@ HEADER = [
     "flights",
     "complete",
     "goals\nreached",
-    "of one robot,\nleast : most",
+    "per robot,\nmin : max",
     "flights with\ncontacts",
-    "least gap\nm",
+    "min separation\nm",
     "mean time\ns",
-    "longest\ns",
+    "max time\ns",
 ]
 
 
 @dataclass(frozen=True)
-class Flown:
-    """One flight's figures: ``reached`` goals of each robot, of so many ``goals`` in all that
-    were tried; ``gap_m`` is the least between any two hulls.
+class EncounterResult:
+    """Result of one flight.
+
+    Attributes:
+        reached: Goals that each robot has reached.
+        goals: Goals that all robots together tried to reach.
+        gap_m: Smallest separation of any two hulls.
+        faults: A message for each goal that was not reached.
     """
 
     encounter: str
@@ -78,7 +83,7 @@ class Flown:
 
 
 def options_of(encounter: str, seed: int, config: str) -> FlightOptions:
-    """What is flown by that name."""
+    """Options of the flight with this name."""
     random = RANDOM.fullmatch(encounter)
     if random:
         return FlightOptions(
@@ -106,13 +111,14 @@ def options_of(encounter: str, seed: int, config: str) -> FlightOptions:
     )
 
 
-def flown(encounter: str, seed: int, config: str) -> Flown:
-    """One flight; a module's function, so that it can be sent to another process."""
+def fly_encounter(task: Tuple[str, int, str]) -> EncounterResult:
+    """Fly one encounter, given by its name, the seed and the configuration."""
+    encounter, seed, config = task
     setup = read_setup(options_of(encounter, seed, config))
     return figures(encounter, setup, fly(setup))
 
 
-def figures(encounter: str, setup: FlightSetup, summary: MissionSummary) -> Flown:
+def figures(encounter: str, setup: FlightSetup, summary: MissionSummary) -> EncounterResult:
     legs = [
         (robot.robot, leg)
         for robot in summary.robots
@@ -120,7 +126,7 @@ def figures(encounter: str, setup: FlightSetup, summary: MissionSummary) -> Flow
         if encounter not in LOOPS or leg.reached or leg.attempts > 1
     ]
     assert summary.min_separation_m is not None
-    return Flown(
+    return EncounterResult(
         encounter,
         setup.seed,
         tuple(robot.reached for robot in summary.robots),
@@ -137,7 +143,7 @@ def figures(encounter: str, setup: FlightSetup, summary: MissionSummary) -> Flow
     )
 
 
-def row(encounter: str, flights: Sequence[Flown]) -> List[str]:
+def row(encounter: str, flights: Sequence[EncounterResult]) -> List[str]:
     times = [one.time_s for one in flights]
     reached, goals = sum(sum(one.reached) for one in flights), sum(one.goals for one in flights)
     return [
@@ -156,23 +162,23 @@ def row(encounter: str, flights: Sequence[Flown]) -> List[str]:
 @click.command()
 @click.argument("encounters", nargs=-1)
 @click.option("--config", default="default", show_default=True)
-@click.option("--seeds", default=20, show_default=True, help="Flights of each.")
+@click.option("--seeds", default=20, show_default=True, help="Flights of each encounter.")
 @click.option("--first-seed", default=0, show_default=True)
 @click.option(
     "--jobs",
-    default=joblib.cpu_count,
-    help="Flights at the same time. [default: as many as there are cores]",
+    default=lambda: LocalWorkers().count,
+    help="Flights at the same time. [default: one per core]",
 )
 def main(encounters: Sequence[str], config: str, seeds: int, first_seed: int, jobs: int) -> None:
-    """Fly encounters with many seeds; a table of what became of them."""
+    """Fly encounters with many seeds and print a table of the results."""
     encounters = encounters or USUAL
     warm_up(read_setup(options_of(encounters[0], first_seed, config)).configurations[0])
-    simulate()  # compiled once, and not in every process
-    tasks = [(name, seed) for name in encounters for seed in range(first_seed, first_seed + seeds)]
-    flights: List[Flown] = []
-    for one in track(
-        _fly_all(tasks, config, jobs), "flights", total=len(tasks), disable=not sys.stderr.isatty()
-    ):
+    simulate()  # compile the kernels once, not in every process
+    seeds_flown = range(first_seed, first_seed + seeds)
+    tasks = list(enumerate((name, seed, config) for name in encounters for seed in seeds_flown))
+    flights: List[EncounterResult] = []
+    results = fly_all(LocalWorkers(jobs), fly_encounter, tasks)
+    for _, one in track(results, "flights", total=len(tasks), disable=not sys.stderr.isatty()):
         flights.append(one)
         if one.contacts or one.faults or not sys.stderr.isatty():
             print(one, file=sys.stderr, flush=True)
@@ -184,16 +190,6 @@ def main(encounters: Sequence[str], config: str, seeds: int, first_seed: int, jo
         )
     )
     sys.exit(any(one.contacts for one in flights))
-
-
-def _fly_all(tasks: Sequence[Tuple[str, int]], config: str, jobs: int) -> Iterator[Flown]:
-    if jobs == 1:
-        return (flown(name, seed, config) for name, seed in tasks)
-    parallel = joblib.Parallel(jobs, return_as="generator_unordered")
-    results: Iterator[Flown] = parallel(
-        joblib.delayed(flown)(name, seed, config) for name, seed in tasks
-    )
-    return results
 
 
 if __name__ == "__main__":

@@ -417,7 +417,7 @@ def test_a_bad_file_ends_with_status_2_before_anything_flies(monkeypatch, option
     monkeypatch.setitem(sys.modules, "rerun", types.ModuleType("rerun"))
     result = CliRunner().invoke(main, ["fly", "-q", *option])
     assert result.exit_code == 2
-    assert f"nothing is flown:\n  {problem}" in result.output
+    assert f"flight not started, invalid input:\n  {problem}" in result.output
 
 
 def test_the_command_records(tmp_path):

@@ -13,11 +13,10 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import click
 
-from quad_nav.cli import EXIT_BAD_INPUT, EXIT_INTERRUPTED
-from quad_nav.cli.options import parameter
+from quad_nav.cli import EXIT_INTERRUPTED
+from quad_nav.cli.options import exit_on_faults, parameter
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
-from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.mission.flight_log import INTERRUPTED
 from quad_nav.mission.summary import to_json, write_json
@@ -159,7 +158,10 @@ _AMOUNT = click.FloatRange(min=0.0)
     help="Show the flight live in rerun's 3D viewer, or save it for the viewer.",
 )
 @click.option(
-    "--report", type=_A_FILE, metavar="FILE.html", help="Write a report with pictures of the flight."
+    "--report",
+    type=_A_FILE,
+    metavar="FILE.html",
+    help="Write a report with pictures of the flight.",
 )
 @click.option(
     "--animate",
@@ -185,18 +187,15 @@ def fly(
     Exit status: 0 if every goal was reached without a contact, 1 otherwise, 2 for faulty input,
     130 after Ctrl-C.
     """
-    try:
+    with exit_on_faults():
         setup = read_setup(_options(**given))
         pictures = FlightPictures(setup, report, animate)
-        watchers = _watchers(record, view)
-    except InputError as error:
-        click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
-        sys.exit(EXIT_BAD_INPUT)
+        observers = _observers(record, view)
     if not quiet:
         for warning in setup.warnings:
             click.echo(warning, err=True)
     processes = processes or processes_for(len(setup.robots))
-    sys.exit(_fly(setup, watchers, json_path, pictures, quiet, processes))
+    sys.exit(_fly(setup, observers, json_path, pictures, quiet, processes))
 
 
 def _options(
@@ -221,33 +220,31 @@ def _options(
     return options
 
 
-def _watchers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
+def _observers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
     """Create recorder and viewer; imported here, because both load slowly."""
-    watchers: List[FlightObserver] = []
+    observers: List[FlightObserver] = []
     if record is not None:
         from quad_nav.recording.recorder import Recorder
 
-        watchers.append(Recorder(record))
+        observers.append(Recorder(record))
     if view is not None:
         from quad_nav.recording.viewer import View
 
-        watchers.append(View(None if view == _LIVE else Path(view)))
-    return watchers
+        observers.append(View(None if view == _LIVE else Path(view)))
+    return observers
 
 
 def _fly(
     setup: FlightSetup,
-    watchers: Sequence[FlightObserver],
+    observers: Sequence[FlightObserver],
     json_path: Optional[str],
     pictures: FlightPictures,
     quiet: bool,
     processes: int,
 ) -> int:
-    observers = [*watchers, *pictures.observers]
-    if not quiet:
-        observers.append(ProgressBar())
+    bar = [] if quiet else [ProgressBar()]
     with _StopOnSignal() as stop:
-        summary = fly_setup(setup, [*observers, stop], processes)
+        summary = fly_setup(setup, [*observers, *pictures.observers, *bar, stop], processes)
     to_terminal = json_path == "-"
     if not quiet:
         width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns

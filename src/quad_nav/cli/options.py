@@ -51,7 +51,7 @@ def exit_on_faults() -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        click.echo("nothing is flown:\n  " + "\n  ".join(error.problems), err=True)
+        click.echo("flight not started, invalid input:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
     except QuadError as error:
         click.echo(str(error), err=True)

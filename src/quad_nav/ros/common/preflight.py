@@ -64,7 +64,7 @@ def main() -> int:
     problems = faults(tree)
     if not problems:
         return 0
-    print("nothing is flown:\n  " + "\n  ".join(problems), file=sys.stderr)
+    print("mission not started, invalid input:\n  " + "\n  ".join(problems), file=sys.stderr)
     if tree.get("sequencer", {}).get("result"):
         write_json(
             MissionSummary((), reason="bad input", problems=tuple(problems)),
