@@ -20,25 +20,33 @@ CIRCLE_POINTS = 16
 
 
 def circle(radius_m: float) -> NDArray[np.float64]:
-    """A circle as 16 points, the first on the x axis, counter-clockwise."""
+    """Return a circle as 16 points, float64[16, 2], the first on the x axis, counter-clockwise."""
     angles = [k * 2.0 * math.pi / CIRCLE_POINTS for k in range(CIRCLE_POINTS)]
     return np.array([(math.cos(a) * radius_m, math.sin(a) * radius_m) for a in angles])
 
 
 def pad(footprint: Footprint, padding_m: float) -> NDArray[np.float64]:
-    """Move every non-zero coordinate away from zero by the padding.
+    """Move every non-zero coordinate of a footprint away from zero by the padding.
 
     costmap_2d keeps the padding as float32, so 0.01 m is 0.009999999776 m here too.
+
+    Args:
+        footprint: float64[n, 2], metres in the robot's frame.
+        padding_m: Distance to move coordinates by.
+
+    Returns:
+        float64[n, 2].
     """
     points = _points(footprint)
     return points + np.sign(points) * float(np.float32(padding_m))
 
 
 def radii(footprint: Footprint) -> Tuple[float, float]:
-    """(inscribed, circumscribed): least and greatest distance of the outline from (0, 0).
+    """Return the inscribed and the circumscribed radius of a footprint, in metres.
 
-    Both are 0 for fewer than three points. A footprint that does not hold the origin has
-    an inscribed radius as well: the distance to its nearest edge.
+    They are the least and greatest distance of the outline from (0, 0), and 0 for fewer than
+    three points. For a footprint that does not contain the origin the inscribed radius is the
+    distance to its nearest edge.
     """
     points = _points(footprint).tolist()
     if len(points) <= 2:
@@ -49,7 +57,7 @@ def radii(footprint: Footprint) -> Tuple[float, float]:
 
 
 def oriented(footprint: Footprint, pose: Pose2D) -> NDArray[np.float64]:
-    """The footprint of a robot at ``pose``, in the frame of the pose."""
+    """Return the footprint of a robot at a pose, float64[n, 2] in the frame of the pose."""
     return pose.transform_points(_points(footprint))
 
 
@@ -68,5 +76,5 @@ def _origin_to_segment(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def _length(x: float, y: float) -> float:
-    """The C library's hypot, as the original has it; Python's own rounds by version."""
+    """Return the C library's hypot, as costmap_2d has it; Python's own rounds by version."""
     return float(np.hypot(x, y))

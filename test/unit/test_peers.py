@@ -400,7 +400,7 @@ def test_without_room_there_is_no_holding_point():
 def test_the_layer_forgets_where_a_peer_was():
     layer, master = PeerLayer(), CostGrid(SPEC)
     for points in ([[1.05, 1.05]], [[3.05, 3.05]]):
-        layer.see([PeerArea(np.array(points), 0.2, 120)])
+        layer.set_areas([PeerArea(np.array(points), 0.2, 120)])
         bounds = layer.update_bounds(Pose2D(2.0, 2.0), 0.0, NOWHERE)
         window = master.window_of(bounds)
         master.reset(window)

@@ -47,7 +47,7 @@ def test_a_peer_is_left_out_of_the_last_scans(missions):
             for layer in navigator.local_costmap.layers.values()
             if isinstance(layer, ObstacleLayer)
         ]
-        assert layers and all(len(layer.left_out) == 1 for layer in layers)
+        assert layers and all(len(layer.excluded_circles) == 1 for layer in layers)
 
 
 def test_each_mission_makes_room_for_a_peer(missions):

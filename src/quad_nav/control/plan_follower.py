@@ -106,9 +106,10 @@ def count_passed(plan: NDArray[np.float64], pose: Pose2D) -> int:
 
 
 def _distance2(plan: NDArray[np.float64], pose: Pose2D) -> NDArray[np.float64]:
-    dx, dy = pose.x_m - plan[:, 0], pose.y_m - plan[:, 1]
-    squared: NDArray[np.float64] = dx * dx + dy * dy
-    return squared
+    """Return the squared distances of plan points from a pose, float64[n]."""
+    dx: NDArray[np.float64] = np.subtract(pose.x_m, plan[:, 0])
+    dy: NDArray[np.float64] = np.subtract(pose.y_m, plan[:, 1])
+    return dx * dx + dy * dy
 
 
 def _transform(a_from_b: Pose2D, poses: NDArray[np.float64]) -> NDArray[np.float64]:

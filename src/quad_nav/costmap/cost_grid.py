@@ -23,10 +23,11 @@ class Window:
 
     @property
     def is_empty(self) -> bool:
+        """True if the window has no cells."""
         return self.xn <= self.x0 or self.yn <= self.y0
 
     def union(self, other: Window) -> Window:
-        """The smallest window that holds both; an empty one adds nothing."""
+        """Return the smallest window that holds both; an empty one adds nothing."""
         if self.is_empty or other.is_empty:
             return other if self.is_empty else self
         return Window(
@@ -38,7 +39,7 @@ class Window:
 
     @property
     def slices(self) -> Tuple[slice, slice]:
-        """Index of ``[y, x]`` arrays."""
+        """Index of the window in ``[y, x]`` arrays."""
         return slice(self.y0, self.yn), slice(self.x0, self.xn)
 
 
@@ -47,7 +48,7 @@ NO_CELLS = Window(0, 0, 0, 0)
 
 @dataclass(frozen=True)
 class Bounds:
-    """A rectangle in metres, in the global frame; with min above max it holds nothing."""
+    """Rectangle in metres, in the global frame; empty with a minimum above its maximum."""
 
     min_x_m: float
     min_y_m: float
@@ -55,6 +56,7 @@ class Bounds:
     max_y_m: float
 
     def union(self, other: Bounds) -> Bounds:
+        """Return the smallest rectangle that holds both."""
         return Bounds(
             min(self.min_x_m, other.min_x_m),
             min(self.min_y_m, other.min_y_m),
@@ -63,6 +65,7 @@ class Bounds:
         )
 
     def grown(self, margin_m: float) -> Bounds:
+        """Return the rectangle with a margin on each side."""
         return Bounds(
             self.min_x_m - margin_m,
             self.min_y_m - margin_m,
@@ -71,7 +74,7 @@ class Bounds:
         )
 
     def including(self, points: NDArray[np.float64]) -> Bounds:
-        """points: float64[n, 2]"""
+        """Return the smallest rectangle that also holds points, float64[n, 2]."""
         return self.union(Bounds(*points.min(axis=0).tolist(), *points.max(axis=0).tolist()))
 
 
@@ -81,9 +84,12 @@ EVERYWHERE = Bounds(-_FLOAT_MAX, -_FLOAT_MAX, _FLOAT_MAX, _FLOAT_MAX)
 
 
 class CostGrid:
-    """``costs``, uint8[H, W], at ``spec``; new cells have ``default_cost``.
+    """Grid of costs that can move.
 
-    ``costs`` stays the same array until ``resize``.
+    Attributes:
+        spec: Size, resolution and position.
+        costs: uint8[H, W]; stays the same array until ``resize``.
+        default_cost: Cost of new cells.
     """
 
     def __init__(self, spec: GridSpec, default_cost: int = FREE) -> None:
@@ -97,7 +103,7 @@ class CostGrid:
         return CostmapView(self.costs, spec.origin_x_m, spec.origin_y_m, spec.resolution_m)
 
     def resize(self, spec: GridSpec) -> None:
-        """Take another size, resolution or place; forgets all costs."""
+        """Take another size, resolution or position, and forget all costs."""
         self.spec = spec
         self.costs = np.full(spec.shape, self.default_cost, dtype=np.uint8)
 
@@ -106,10 +112,13 @@ class CostGrid:
         self.costs[window.slices if window else ...] = self.default_cost
 
     def centre_on(self, x_m: float, y_m: float) -> Tuple[int, int]:
-        """Move by whole cells so that the point is in the middle; keep what still fits.
+        """Move the grid by whole cells so that a point is in its middle; keep what still fits.
 
-        As in costmap_2d, the middle is half of (size - 1/2) cells, and the number of
-        cells to move is cut towards zero. Returns that number in x and in y.
+        As in costmap_2d, the middle is half of (size - 1/2) cells, and the number of cells to
+        move is cut towards zero.
+
+        Returns:
+            The number of cells moved in x and in y.
         """
         spec = self.spec
         res = spec.resolution_m
@@ -126,7 +135,7 @@ class CostGrid:
         return move_x, move_y
 
     def window_of(self, bounds: Bounds) -> Window:
-        """The cells that the bounds touch; the cell of each border is inside."""
+        """Return the cells that bounds touch; the cell of each border is inside."""
         spec = self.spec
         x0 = _clamped_cell(bounds.min_x_m, spec.origin_x_m, spec.resolution_m, spec.size_x)
         xn = _clamped_cell(bounds.max_x_m, spec.origin_x_m, spec.resolution_m, spec.size_x)
@@ -135,9 +144,14 @@ class CostGrid:
         return Window(x0, min(spec.size_x, xn + 1), y0, min(spec.size_y, yn + 1))
 
     def fill_polygon(self, vertices: NDArray[np.float64], cost: int) -> bool:
-        """Set the cells of a convex polygon, float64[n, 2] in the grid's frame.
+        """Set the cells of a convex polygon.
 
-        Does nothing and returns False when a vertex is off the grid.
+        Args:
+            vertices: float64[n, 2], metres in the grid's frame.
+            cost: What the cells get.
+
+        Returns:
+            False if a vertex is off the grid and nothing was set.
         """
         cells = [self.spec.cell_of(x, y) for x, y in vertices.tolist()]
         if None in cells:
@@ -147,7 +161,7 @@ class CostGrid:
         return True
 
     def fill_square(self, centre_x_m: float, centre_y_m: float, size_m: float, cost: int) -> bool:
-        """Set the cells of a square; does nothing and returns False when it leaves the grid."""
+        """Set the cells of a square; return False, and set nothing, if it leaves the grid."""
         half_m = 0.5 * size_m
         corners = np.array(
             [[-half_m, -half_m], [-half_m, half_m], [half_m, half_m], [half_m, -half_m]]
@@ -157,7 +171,7 @@ class CostGrid:
     def forget_area(
         self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
     ) -> None:
-        """Make unknown all cells outside a square (``keep_inside``), or those inside.
+        """Make all cells outside a square unknown (``keep_inside``), or those inside.
 
         The cells of the square's border count as outside.
         """
@@ -172,7 +186,7 @@ class CostGrid:
 
 
 def shift(cells: NDArray[np.uint8], move_x: int, move_y: int, empty: int) -> None:
-    """Move the grid below ``cells``, [y, x, ...], in place; cells that come in are ``empty``."""
+    """Move the grid below ``cells``, [y, x, ...], in place; new cells are ``empty``."""
     size_y, size_x = cells.shape[:2]
     kept = cells[_kept(move_y, size_y), _kept(move_x, size_x)].copy()
     cells[...] = empty
@@ -190,7 +204,7 @@ def merge_known(below: NDArray[np.uint8], above: NDArray[np.uint8]) -> None:
 
 
 def _kept(move: int, size: int) -> slice:
-    """Cells of the old grid that are still inside after moving by ``move`` cells."""
+    """Return the cells of the old grid that are still inside after moving by ``move`` cells."""
     return slice(min(max(move, 0), size), min(max(move + size, 0), size))
 
 

@@ -1,11 +1,11 @@
-"""The inflation layer: costs that fall with the distance to the nearest obstacle.
+"""Inflation layer: costs that fall with the distance to the nearest obstacle.
 
-At distance d from a lethal cell the cost is 254 for d = 0, 253 up to the inscribed radius
-r (the robot's centre there means contact), and 252 exp(-k (d - r)) beyond it, with k the
-cost scaling factor, cut to a whole number; nothing beyond the inflation radius.
+At distance d from a lethal cell the cost is 254 for d = 0, 253 up to the inscribed radius r (a
+robot with its centre there touches the obstacle), and 252 exp(-k (d - r)) beyond it, with k the
+cost scaling factor, cut to a whole number. Beyond the inflation radius it is 0.
 
-Obstacles just outside a window reach into it, so seeds are taken from one inflation radius
-around the window, and cells up to two radii away can change.
+Obstacles just outside of a window reach into it. Seeds are therefore taken from one inflation
+radius around the window, and cells up to two radii away can change.
 """
 
 from __future__ import annotations
@@ -25,21 +25,27 @@ from quad_nav.kernels.inflation import inflate
 
 @dataclass(frozen=True)
 class InflationLayerParams(LayerParams):
-    """``cost_scaling_factor`` is the decay in 1/m beyond the inscribed radius."""
+    """Parameters of ``costmap_2d::InflationLayer``.
+
+    Attributes:
+        cost_scaling_factor: Decay in 1/m beyond the inscribed radius.
+    """
 
     inflation_radius_m: float = 0.55
     cost_scaling_factor: float = 10.0
     inflate_unknown: bool = False
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> InflationLayer:
+        """Make an inflation layer."""
         return InflationLayer(self, spec.resolution_m)
 
 
 class InflationLayer(Layer):
-    """Spreads the obstacles of the layers before it.
+    """Costs around the obstacles of the layers before it.
 
-    ``radius_cells`` and ``cost_table``, uint8[radius_cells + 2, radius_cells + 2] by
-    (|dx|, |dy|) in cells, follow from the parameters, the resolution and the footprint.
+    Attributes:
+        radius_cells: Inflation radius in cells, rounded up.
+        cost_table: uint8[radius_cells + 2, radius_cells + 2], cost at (abs(dx), abs(dy)) cells.
     """
 
     params: InflationLayerParams
@@ -54,24 +60,27 @@ class InflationLayer(Layer):
         self._make_tables()
 
     def reconfigure(self, params: InflationLayerParams) -> None:
+        """Take other parameters and write all costs again at the next update."""
         if params != self.params:
             self.params = params
             self._make_tables()
 
     def resize(self, spec: GridSpec) -> None:
+        """Follow the master grid, and write all costs again at the next update."""
         self._resolution_m = spec.resolution_m
         self._make_tables()
 
     def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
+        """Take another inscribed radius, and write all costs again at the next update."""
         self._inscribed_radius_m = inscribed_radius_m
         self._make_tables()
 
     def reset(self, now_s: float) -> None:
-        """Nothing is collected here, and a full update that was due no longer is."""
+        """Cancel a full update; the layer collects nothing."""
         self._redo_everything = False
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
-        """What changed now or changed in the last update, and one inflation radius around."""
+        """Return what changed now or in the last update, grown by the inflation radius."""
         last, self._last_bounds = self._last_bounds, bounds
         if self._redo_everything:
             self._redo_everything = False
@@ -79,6 +88,7 @@ class InflationLayer(Layer):
         return bounds.union(last).grown(self.params.inflation_radius_m)
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
+        """Spread costs from the lethal cells in and around the window."""
         if self.radius_cells == 0:
             return
         reach, spec = self.radius_cells, master.spec
@@ -108,7 +118,7 @@ class InflationLayer(Layer):
         self._rank_table = ranks.reshape(n, n).astype(np.int32)
 
     def cost_at(self, distance_cells: float) -> int:
-        """Cost of a cell this far from its obstacle."""
+        """Return the cost of a cell at a distance from its obstacle."""
         if distance_cells == 0.0:
             return LETHAL
         beyond_m = distance_cells * self._resolution_m - self._inscribed_radius_m

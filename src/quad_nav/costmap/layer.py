@@ -1,12 +1,12 @@
-"""What a costmap layer is.
+"""Interface of a costmap layer.
 
-A costmap is updated in two rounds. First every layer brings its own knowledge up to date
-and says where the master grid has to be made again (``update_bounds``); then, on that
-window, each one in turn writes into the master grid (``update_costs``).
+A costmap is updated in two rounds. First every layer updates its own knowledge and returns where
+the master grid has to be written again (``update_bounds``). Then each layer in turn writes into
+that window of the master grid (``update_costs``).
 
-A layer of your own: derive its parameters from ``LayerParams`` with a ``make_layer`` that
-returns your ``Layer`` (or ``GridLayer``, if it keeps costs of its own between updates),
-and name it in ``CostmapParams.layers``.
+To write a layer, derive its parameters from ``LayerParams`` with a ``make_layer`` that returns your
+``Layer`` (or ``GridLayer``, if it keeps costs of its own between updates), and name it in
+``CostmapParams.layers``.
 """
 
 from __future__ import annotations
@@ -24,29 +24,39 @@ from quad_nav.grid import GridSpec
 
 @dataclass(frozen=True)
 class LayerParams:
-    """Parameters that every layer has."""
+    """Parameters that every layer has.
+
+    Attributes:
+        enabled: False to skip the layer.
+    """
 
     enabled: bool = True
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> Layer:
-        """A layer for a master grid at ``spec`` whose empty cells have ``default_cost``."""
+        """Make a layer for a master grid at ``spec`` with empty cells of ``default_cost``."""
         raise NotImplementedError
 
 
 class Layer:
-    """Writes one kind of knowledge into a master grid.
+    """Writer of one kind of knowledge into a master grid.
 
-    ``params`` may be replaced at any time with ``reconfigure``; a layer that is not
-    enabled is passed over.
+    Attributes:
+        params: Parameters; ``reconfigure`` may replace them at any time.
     """
 
     def __init__(self, params: Any) -> None:
         self.params = params
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
-        """Get ready for an update; return ``bounds``, of the layers before, and one's own.
+        """Prepare an update.
 
-        ``robot`` is the robot's pose in the global frame.
+        Args:
+            robot: Pose of the robot in the global frame.
+            now_s: Current time.
+            bounds: Where the layers before write.
+
+        Returns:
+            Bounds that hold ``bounds`` and where this layer writes.
         """
         return bounds
 
@@ -58,35 +68,35 @@ class Layer:
         self.params = params
 
     def resize(self, spec: GridSpec) -> None:
-        """The master grid has another size, resolution or place, and is empty."""
+        """Follow the master grid to another size, resolution or position; it is empty."""
 
     def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
-        """The padded footprint, float64[n, 2] in the robot's frame, has changed."""
+        """Take another padded footprint, float64[n, 2] in the robot's frame."""
 
     def reset(self, now_s: float) -> None:
-        """Forget what was collected."""
+        """Forget collected knowledge."""
 
     def clear_area(
         self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
     ) -> bool:
-        """Forget a square's inside or its outside; False if there is nothing to forget."""
+        """Forget the outside of a square (``keep_inside``) or its inside; False if it cannot."""
         return False
 
     def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> bool:
-        """Take the obstacles in a square for gone; False if there is nothing to free."""
+        """Remove the obstacles in a square; False if there is nothing to free."""
         return False
 
     def is_current(self, now_s: float) -> bool:
-        """Whether what the layer knows is recent enough to drive by."""
+        """Tell whether the layer's knowledge is recent enough to drive by."""
         return True
 
     def stale_sources(self, now_s: float) -> List[Tuple[str, float]]:
-        """(name, seconds since its last message) of each sensor that is silent."""
+        """Return (name, seconds since its last message) of each silent sensor."""
         return []
 
 
 class GridLayer(Layer):
-    """A layer with costs of its own, in ``grid``, kept between updates."""
+    """Layer with costs of its own, in ``grid``, kept between updates."""
 
     def __init__(self, params: Any, spec: GridSpec, default_cost: int) -> None:
         super().__init__(params)
@@ -95,9 +105,11 @@ class GridLayer(Layer):
         self._awaits_update = False
 
     def resize(self, spec: GridSpec) -> None:
+        """Take the master grid's size, resolution and position, and forget all costs."""
         self.grid.resize(spec)
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
+        """Add the areas that were cleared since the last update."""
         bounds = bounds.union(self._cleared)
         self._cleared = NOWHERE
         self._awaits_update = False
@@ -106,19 +118,20 @@ class GridLayer(Layer):
     def clear_area(
         self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
     ) -> bool:
-        """As ``clear_costmap_recovery`` does: cells become unknown, which is "no opinion".
+        """Make cells unknown, as ``clear_costmap_recovery`` does.
 
-        The layer is not current until the next update has carried this to the master.
+        The layer is not current until the next update has written this to the master grid.
         """
         self.grid.forget_area(centre_x_m, centre_y_m, size_m, keep_inside)
         self._pass_on(self._whole_map())
         return True
 
     def is_current(self, now_s: float) -> bool:
+        """Tell whether the master grid has everything that was cleared."""
         return not self._awaits_update
 
     def _pass_on(self, bounds: Bounds) -> None:
-        """The next update makes the master grid there again; until then it is out of date."""
+        """Have the next update write the master grid there; until then the layer is not current."""
         self._cleared = self._cleared.union(bounds)
         self._awaits_update = True
 

@@ -1,10 +1,9 @@
-"""The layered costmap: layers write into one master grid, in order.
+"""Layered costmap: layers write into one master grid, in order.
 
     scans -> layers' own grids -> master grid -> planners
 
-An update moves the grid along with the robot if it is a rolling window, asks each layer
-what has to be made again, resets the smallest window that holds all of it, and lets the
-layers write into that window.
+An update moves a rolling window along with the robot, asks each layer where it writes, resets the
+smallest window that holds all of that, and lets the layers write into it.
 """
 
 from __future__ import annotations
@@ -29,10 +28,11 @@ NamedLayers = Tuple[Tuple[str, LayerParams], ...]
 
 @dataclass(frozen=True)
 class CostmapParams:
-    """One costmap: ``global_costmap`` or ``local_costmap``.
+    """Parameters of ``global_costmap`` or ``local_costmap``, as in costmap_2d.
 
-    ``footprint`` is unpadded, in the robot's frame; None means a circle of
-    ``robot_radius_m``. ``layers`` are (name, parameters) in the order of updates.
+    Attributes:
+        footprint: Unpadded, in the robot's frame; None for a circle of ``robot_radius_m``.
+        layers: (name, parameters) of the layers in the order of updates.
     """
 
     global_frame: str = "map"
@@ -58,6 +58,7 @@ class CostmapParams:
 
     @property
     def spec(self) -> GridSpec:
+        """Grid of these parameters."""
         return GridSpec(
             int(self.width_m / self.resolution_m),
             int(self.height_m / self.resolution_m),
@@ -68,7 +69,7 @@ class CostmapParams:
 
     @property
     def unpadded_footprint(self) -> NDArray[np.float64]:
-        """float64[n, 2]"""
+        """Footprint without padding, float64[n, 2] in the robot's frame."""
         if self.footprint is None:
             return footprints.circle(self.robot_radius_m)
         return np.array(self.footprint, dtype=np.float64)
@@ -77,8 +78,12 @@ class CostmapParams:
 class LayeredCostmap:
     """Costs around one robot.
 
-    ``layers``: name -> layer, in order. ``footprint``: padded, float64[n, 2] in the
-    robot's frame. ``costs`` belongs to the costmap: copy what has to outlive an update.
+    Attributes:
+        params: Parameters.
+        layers: Layers by name, in the order of updates.
+        footprint: Padded footprint, float64[n, 2] in the robot's frame.
+        inscribed_radius_m: Inscribed radius of the padded footprint.
+        circumscribed_radius_m: Circumscribed radius of the padded footprint.
     """
 
     def __init__(self, params: CostmapParams, static_map: Optional[StaticMap] = None) -> None:
@@ -96,18 +101,26 @@ class LayeredCostmap:
 
     @property
     def spec(self) -> GridSpec:
+        """Grid of the costs."""
         return self._master.spec
 
     @property
     def costs(self) -> NDArray[np.uint8]:
-        """uint8[H, W], the master grid."""
+        """Master grid, uint8[H, W]; copy what has to outlive an update."""
         return self._master.costs
 
     def update(self, now_s: float, robot: Pose2D) -> Window:
-        """Bring the master grid up to date; returns the cells that may have changed.
+        """Update the master grid.
 
-        ``robot`` is in the global frame. Inflation can change costs up to two inflation
-        radii outside the window, as in the original.
+        Inflation can change costs up to two inflation radii outside of the returned window,
+        as in costmap_2d.
+
+        Args:
+            now_s: Current time.
+            robot: Pose of the robot in the global frame.
+
+        Returns:
+            Cells that may have changed.
         """
         if self.params.rolling_window:
             self._master.centre_on(robot.x_m, robot.y_m)
@@ -124,11 +137,11 @@ class LayeredCostmap:
         return window
 
     def is_current(self, now_s: float) -> bool:
-        """Whether every enabled layer is recent enough to drive by."""
+        """Tell whether every enabled layer is recent enough to drive by."""
         return all(layer.is_current(now_s) for layer in self._enabled_layers())
 
     def stale_sources(self, now_s: float) -> List[Tuple[str, float]]:
-        """(layer/sensor, seconds since its last message) of each sensor that is silent."""
+        """Return (layer/sensor, seconds since its last message) of each silent sensor."""
         return [
             (f"{name}/{source}", age_s)
             for name, layer in self.layers.items()
@@ -150,9 +163,19 @@ class LayeredCostmap:
         size_m: float,
         keep_inside: bool,
     ) -> List[str]:
-        """Forget, in the named layers, everything outside a square around a point, or
-        with ``keep_inside`` False everything inside it. The master follows at the next
-        update. Returns the layers that were cleared: names can be wrong.
+        """Forget costs of layers outside or inside of a square.
+
+        The master grid follows at the next update.
+
+        Args:
+            layer_names: Names of the layers; unknown names are ignored.
+            centre_x_m: Centre of the square in the global frame.
+            centre_y_m: Centre of the square in the global frame.
+            size_m: Length of its sides.
+            keep_inside: True to forget everything outside, False everything inside.
+
+        Returns:
+            Names of the layers that were cleared.
         """
         wanted = set(layer_names)
         return [
@@ -162,14 +185,18 @@ class LayeredCostmap:
         ]
 
     def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> None:
-        """Make the master free in a square; layers that still know better put it right
-        at the next update. Nothing is done when the square leaves the map."""
+        """Make the master grid free in a square.
+
+        Layers with other knowledge overwrite it at the next update. A square that leaves the
+        map is ignored.
+        """
         self._master.fill_square(centre_x_m, centre_y_m, size_m, FREE)
 
     def free_obstacles(self, centre_x_m: float, centre_y_m: float, size_m: float) -> List[str]:
-        """Take what sensors saw in a square for gone; the master follows at the next update.
+        """Remove what sensors saw in a square; the master grid follows at the next update.
 
-        Returns the layers where that was done: none when the square leaves the map.
+        Returns:
+            Names of the layers that did so; none if the square leaves the map.
         """
         return [
             name
@@ -186,9 +213,9 @@ class LayeredCostmap:
             layer.set_footprint(self.footprint, self.inscribed_radius_m)
 
     def set_map(self, static_map: StaticMap, layer_name: Optional[str] = None) -> None:
-        """Give the static layers, or the one named, their map.
+        """Set the map of the static layers, or of the one named.
 
-        A costmap that does not roll takes the map's size and place and keeps them.
+        A costmap that is no rolling window takes the map's size and position and keeps them.
         """
         for name, layer in self.layers.items():
             if isinstance(layer, StaticLayer) and layer_name in (None, name):
@@ -198,7 +225,7 @@ class LayeredCostmap:
                 layer.set_map(static_map)
 
     def reconfigure(self, params: CostmapParams) -> None:
-        """Take other parameters; the list of layers and their sources must be the same.
+        """Take other parameters with the same list of layers and sources.
 
         Another size, resolution or origin empties the costmap, unless a map fixed them.
         """

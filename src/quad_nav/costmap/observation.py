@@ -1,4 +1,4 @@
-"""What one sensor saw lately: points in the global frame, and for how long they count."""
+"""Observations: points that one sensor saw lately, and how long they count."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from quad_nav.kernels.raytrace import ObservationStack
 
 @dataclass(frozen=True)
 class SourceParams:
-    """One entry of an obstacle layer's ``observation_sources``.
+    """Entry of an obstacle layer's ``observation_sources``.
 
-    ``expected_update_period_s`` is what YAML calls ``expected_update_rate``: a
-    period, 0 for "never stale". ``sensor_frame`` "" means the frame of the message.
-    Ranges that are None are those of the layer.
+    Attributes:
+        sensor_frame: Frame where rays start; "" for the frame of the message.
+        expected_update_period_s: ``expected_update_rate`` of the YAML, which is a period; 0 for
+            never stale.
+        obstacle_range_m: None for the layer's.
+        raytrace_range_m: None for the layer's.
     """
 
     name: str
@@ -37,7 +40,14 @@ class SourceParams:
 
 @dataclass(frozen=True)
 class Observation:
-    """``points``: float32[n, 3], ``sensor``: float64[3], both in the global frame, metres."""
+    """Points of one message, in the global frame.
+
+    Attributes:
+        stamp_s: When the sensor saw them.
+        sensor: float64[3], where the rays start, metres.
+        points: float32[n, 3], metres.
+        stamp_ns: The stamp in whole nanoseconds.
+    """
 
     stamp_s: float
     sensor: NDArray[np.float64]
@@ -49,10 +59,10 @@ class Observation:
 
 
 class ObservationBuffer:
-    """The observations of one source, newest first.
+    """Observations of one source, newest first.
 
-    Age is judged when a message arrives, against that moment, and never between messages:
-    if a sensor falls silent its last observations stay.
+    Observations expire when a message arrives, and never between messages: those of a silent
+    sensor stay.
     """
 
     def __init__(self, params: SourceParams) -> None:
@@ -66,7 +76,7 @@ class ObservationBuffer:
 
     @property
     def stack(self) -> ObservationStack:
-        """All that is kept, newest first."""
+        """All observations kept, newest first, for the kernels."""
         if self._stack is None:
             count = len(self.observations)
             begins = np.array(self._begins[:count], np.int64)
@@ -78,12 +88,12 @@ class ObservationBuffer:
         return self._stack
 
     def add(self, observation: Observation, now_s: float) -> None:
-        """Keep an observation that arrived now; drop those that are too old now."""
+        """Keep an observation that arrived now; drop those that have expired."""
         self.observations.insert(0, observation)
         self._begins.insert(0, self._end)
         self._stack = None
         self.restart_clock(now_s)
-        if self.observations:  # or it is too old itself
+        if self.observations:  # else it has expired itself
             self._store(observation.points)
 
     def start_clock(self, now_s: float) -> None:
@@ -97,14 +107,16 @@ class ObservationBuffer:
         self._drop_stale(now_s)
 
     def silence_s(self, now_s: float) -> float:
+        """Return the time since the last message, or since ``start_clock``."""
         return 0.0 if self._last_reception_s is None else now_s - self._last_reception_s
 
     def is_current(self, now_s: float) -> bool:
+        """Tell whether the source is within its expected update period."""
         period_s = self.params.expected_update_period_s
         return period_s == 0.0 or _nanoseconds(self.silence_s(now_s)) <= _nanoseconds(period_s)
 
     def _store(self, points: NDArray[np.float32]) -> None:
-        """Behind the others' points; if there is no room, all move to an array with more."""
+        """Append points to the array; if there is no room, move all to a larger one."""
         if self._end + len(points) <= len(self._points):
             self._points[self._end : self._end + len(points)] = points
             self._end += len(points)
@@ -133,5 +145,5 @@ class ObservationBuffer:
 
 
 def _nanoseconds(seconds: float) -> int:
-    """ROS compares times as whole nanoseconds; so 0.3 s is never above 0.3 s."""
+    """Return whole nanoseconds, which ROS compares; so 0.3 s is never above 0.3 s."""
     return round(seconds * 1e9)

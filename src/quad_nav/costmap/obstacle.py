@@ -1,7 +1,7 @@
-"""The obstacle layer: what the sensors see, marked and cleared by ray tracing.
+"""Obstacle layer: ray tracing clears, then points mark.
 
-At every update all kept observations are ray traced first, then all are marked. A point
-that a newer scan cleared therefore comes back until its own scan expires.
+At every update all kept observations are ray traced first, then all are marked. A point that a
+newer scan cleared therefore comes back until its own scan expires, as in costmap_2d.
 """
 
 from __future__ import annotations
@@ -28,10 +28,16 @@ COMBINE_MAXIMUM = 1
 
 @dataclass(frozen=True)
 class ObstacleLayerParams(LayerParams):
-    """``track_unknown_space`` None means as the costmap does. ``obstacle_range_m``
-    and ``raytrace_range_m`` count for the sources that set none of their own.
-    ``combination_method``: 0 overwrites what is known, 1 takes the maximum, all others
-    leave the master grid alone."""
+    """Parameters of ``costmap_2d::ObstacleLayer``.
+
+    Attributes:
+        combination_method: 0 overwrites known cells of the master grid, 1 takes the maximum, any
+            other value leaves the master grid alone.
+        obstacle_range_m: Counts for sources that set none of their own.
+        raytrace_range_m: Counts for sources that set none of their own.
+        track_unknown_space: None for the costmap's.
+        sources: Observation sources.
+    """
 
     footprint_clearing_enabled: bool = True
     max_obstacle_height_m: float = 2.0
@@ -42,21 +48,25 @@ class ObstacleLayerParams(LayerParams):
     sources: Tuple[SourceParams, ...] = ()
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> ObstacleLayer:
+        """Make an obstacle layer."""
         return ObstacleLayer(self, spec, rolling_window, self.cost_of_unseen(default_cost))
 
     def cost_of_unseen(self, default_cost: int) -> int:
-        """Cost of a cell that no sensor has seen, in a costmap with this default."""
+        """Return the cost of cells that no sensor has seen, in a costmap with this default."""
         if self.track_unknown_space is None:
             return default_cost
         return UNKNOWN if self.track_unknown_space else FREE
 
 
 class ObstacleLayer(GridLayer):
-    """Sensors write with ``add_scan`` and ``add_cloud``; ``grid`` holds the outcome.
+    """Layer of what sensors see; ``add_scan`` and ``add_cloud`` write to it.
 
     The sources are fixed at construction; ``reconfigure`` changes the other parameters.
-    Points within the circles ``left_out``, float64[n, 3] rows x, y, radius in the global
-    frame, are ignored: something else knows what is there.
+
+    Attributes:
+        buffers: Observations by source.
+        excluded_circles: float64[n, 3], rows x, y, radius in the global frame. Points within them
+            are ignored, because another layer knows what is there.
     """
 
     params: ObstacleLayerParams
@@ -71,7 +81,7 @@ class ObstacleLayer(GridLayer):
         self._rolling_window = rolling_window
         self._footprint = np.empty((0, 2))
         self._footprint_now = np.empty((0, 2))
-        self.left_out = np.empty((0, 3))
+        self.excluded_circles = np.empty((0, 3))
 
     def add_scan(
         self,
@@ -139,8 +149,8 @@ class ObstacleLayer(GridLayer):
         """Transform points, float32[n, 3] in the sensor's frame; see ``observe_scan``."""
         _, low_m, high_m = self.projection_key(source_name)
         points = transform_points(points, global_from_sensor, low_m, high_m)
-        if len(self.left_out):
-            points = outside_circles(points, self.left_out)
+        if len(self.excluded_circles):
+            points = outside_circles(points, self.excluded_circles)
         origin = global_from_origin or global_from_sensor
         return Observation(stamp_s, origin.translation, points)
 
@@ -153,25 +163,29 @@ class ObstacleLayer(GridLayer):
         return (source.inf_is_valid, source.min_obstacle_height_m, source.max_obstacle_height_m)
 
     def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
+        """Take another footprint, under which the layer clears."""
         self._footprint = footprint
 
     def reset(self, now_s: float) -> None:
-        """Forget the grid. Kept observations are used again by the next update."""
+        """Forget the grid; the next update uses the kept observations again."""
         self.grid.reset()
         self._awaits_update = False
         for buffer in self.buffers.values():
             buffer.restart_clock(now_s)
 
     def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> bool:
+        """Free a square of the layer; return False if it leaves the map."""
         if not self.grid.fill_square(centre_x_m, centre_y_m, size_m, FREE):
             return False
         self._pass_on(Bounds(centre_x_m, centre_y_m, centre_x_m, centre_y_m).grown(0.5 * size_m))
         return True
 
     def is_current(self, now_s: float) -> bool:
+        """Tell whether no source is stale and the master grid is up to date."""
         return super().is_current(now_s) and not self.stale_sources(now_s)
 
     def stale_sources(self, now_s: float) -> List[Tuple[str, float]]:
+        """Return (name, seconds since its last message) of each silent source."""
         return [
             (name, buffer.silence_s(now_s))
             for name, buffer in self.buffers.items()
@@ -179,13 +193,14 @@ class ObstacleLayer(GridLayer):
         ]
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
+        """Clear and mark with the kept observations."""
         if self._rolling_window:
             self._centre_on(robot)
         bounds = super().update_bounds(robot, now_s, bounds)
         for buffer in self.buffers.values():
             buffer.start_clock(now_s)
         marking = [b for b in self.buffers.values() if b.params.marking]
-        # The original does not clear while a source that marks is overdue.
+        # costmap_2d does not clear while a source that marks is overdue.
         overdue = not all(b.is_current(now_s) for b in marking)
         clearing = [] if overdue else [b for b in self.buffers.values() if b.params.clearing]
         touched = np.array([bounds.min_x_m, bounds.min_y_m, bounds.max_x_m, bounds.max_y_m])
@@ -200,6 +215,7 @@ class ObstacleLayer(GridLayer):
         return bounds
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
+        """Free the cells under the footprint and combine with the master grid."""
         if self.params.footprint_clearing_enabled:
             self.grid.fill_polygon(self._footprint_now, FREE)
         below, above = master.costs[window.slices], self.grid.costs[window.slices]

@@ -1,9 +1,9 @@
-"""The peer layer: where the other robots stand and where they will be.
+"""Peer layer: where the other robots stand and where they will be.
 
-In the global costmap these are places to go round if that is not too long a way, and
-not obstacles: a peer may have to make room. In the local costmap a peer that stays is
-an obstacle. The LIDAR's points on a known peer are left out of the obstacle layers
-(``ObstacleLayer.left_out``), so that it does not linger where it was.
+In the global costmap peers cost, and are no obstacles: a plan goes round them if that is not much
+longer, because a peer may have to make room. In the local costmap a parked peer is an obstacle. The
+obstacle layers ignore LIDAR points on known peers (``ObstacleLayer.excluded_circles``), so that no
+obstacle stays where a peer was.
 """
 
 from __future__ import annotations
@@ -23,7 +23,13 @@ from quad_nav.kernels.peers import raise_discs
 
 @dataclass(frozen=True)
 class PeerArea:
-    """Discs around points, float64[n, 2] in the costmap's frame, that cost so much."""
+    """Discs of equal cost.
+
+    Attributes:
+        points: float64[n, 2], their centres in the costmap's frame, metres.
+        radius_m: Their radius.
+        cost: Cost of cells in them.
+    """
 
     points: NDArray[np.float64]
     radius_m: float
@@ -32,28 +38,31 @@ class PeerArea:
 
 @dataclass(frozen=True)
 class PeerLayerParams(LayerParams):
-    """The layer has no parameters of its own; without peers it writes nothing."""
+    """Parameters of the peer layer: none of its own. Without peers it writes nothing."""
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> PeerLayer:
+        """Make a peer layer."""
         return PeerLayer(self)
 
 
 class PeerLayer(Layer):
-    """Writes the areas that it was told of last."""
+    """Writer of the areas of peers."""
 
     def __init__(self, params: PeerLayerParams = PeerLayerParams()) -> None:
         super().__init__(params)
         self._areas: Tuple[PeerArea, ...] = ()
         self._written = NOWHERE
 
-    def see(self, areas: Sequence[PeerArea]) -> None:
-        """Forget the areas before; these count from the next update on."""
+    def set_areas(self, areas: Sequence[PeerArea]) -> None:
+        """Replace all areas, from the next update on."""
         self._areas = tuple(areas)
 
     def reset(self, now_s: float) -> None:
+        """Forget all areas."""
         self._areas = ()
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
+        """Add the areas of now and those written last."""
         now = NOWHERE
         for area in self._areas:
             now = now.union(NOWHERE.including(area.points).grown(area.radius_m))
@@ -61,6 +70,7 @@ class PeerLayer(Layer):
         return bounds.union(before).union(now)
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
+        """Raise the cells of the areas."""
         spec = master.spec
         for area in self._areas:
             raise_discs(

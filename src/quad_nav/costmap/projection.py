@@ -1,6 +1,6 @@
-"""From a scan to points in the global frame, in float32 as laser_geometry and tf2 do.
+"""Projection of scans into the global frame, in float32 as laser_geometry and tf2 do.
 
-Costs depend on the cell a point falls into, so the arithmetic is the same to the last bit:
+Costs depend on the cell that a point falls into, so the arithmetic is the same to the last bit:
 beam angles and products in float64, points rounded to float32, and the transform
 ((r0 x + r1 y) + r2 z) + t in float32 with the rotation matrix made in float32.
 """
@@ -18,10 +18,14 @@ from quad_nav.kernels.projection import project_ranges, transform_between_height
 
 
 def scan_points(scan: Scan, inf_is_valid: bool) -> NDArray[np.float32]:
-    """float32[m, 3] in the sensor's frame, in the order of the beams.
+    """Convert a scan to points.
 
-    A beam counts when ``range_min_m <= range < range_max_m``. With ``inf_is_valid`` a beam
-    without return counts as ending 0.1 mm before ``range_max_m``.
+    Args:
+        scan: The scan. A beam counts when ``range_min_m <= range < range_max_m``.
+        inf_is_valid: Beams without a return count as ending 0.1 mm before ``range_max_m``.
+
+    Returns:
+        float32[m, 3], metres in the sensor's frame, in the order of the beams.
     """
     ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
     directions = _directions(
@@ -40,7 +44,17 @@ def transform_points(
     min_z_m: float = -math.inf,
     max_z_m: float = math.inf,
 ) -> NDArray[np.float32]:
-    """float32[n, 3] of frame b in frame a; only those whose height in a is within limits."""
+    """Transform points and keep those within heights.
+
+    Args:
+        points: float32[n, 3], metres in frame b.
+        a_from_b: Pose of frame b in frame a.
+        min_z_m: Lowest height in frame a.
+        max_z_m: Greatest height in frame a.
+
+    Returns:
+        float32[m, 3], metres in frame a.
+    """
     return transform_between_heights(
         np.ascontiguousarray(points, dtype=np.float32),
         _rotation_float32(a_from_b.quaternion),
@@ -52,14 +66,14 @@ def transform_points(
 
 @lru_cache(maxsize=64)
 def _directions(angle_min_rad: float, angle_increment_rad: float, n: int) -> NDArray[np.float64]:
-    """float64[n, 2]: cosine and sine of each beam; Python's are the C library's."""
+    """Return cosine and sine of each beam, float64[n, 2]; Python's are the C library's."""
     angles = [angle_min_rad + k * angle_increment_rad for k in range(n)]
     return np.array([(math.cos(a), math.sin(a)) for a in angles]).reshape(n, 2)
 
 
 @lru_cache(maxsize=64)  # a scan goes into more than one costmap
 def _rotation_float32(quaternion: Quaternion) -> NDArray[np.float32]:
-    """float32[3, 3], every step rounded to float32."""
+    """Return the rotation matrix, float32[3, 3], every step rounded to float32."""
     x, y, z, w = np.array(quaternion, dtype=np.float32)
     two, one = np.float32(2.0), np.float32(1.0)
     tx, ty, tz = two * x, two * y, two * z

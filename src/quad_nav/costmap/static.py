@@ -1,4 +1,4 @@
-"""The static layer: a map made beforehand."""
+"""Static layer: a map made beforehand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,12 @@ from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 
 @dataclass(frozen=True)
 class StaticMap:
-    """``occupancy``, int8[H, W] at ``spec``: 0..100, -1 unknown, as in OccupancyGrid."""
+    """Map as in ``nav_msgs/OccupancyGrid``.
+
+    Attributes:
+        occupancy: int8[H, W], 0..100, or -1 for unknown.
+        spec: Grid of the map.
+    """
 
     occupancy: NDArray[np.int8]
     spec: GridSpec
@@ -24,7 +29,12 @@ class StaticMap:
 
 @dataclass(frozen=True)
 class StaticLayerParams(LayerParams):
-    """``lethal_cost_threshold`` and ``unknown_cost_value`` are occupancies (-1..100)."""
+    """Parameters of ``costmap_2d::StaticLayer``.
+
+    Attributes:
+        lethal_cost_threshold: Occupancy, 0..100, from which on cells are lethal.
+        unknown_cost_value: Occupancy, -1..100, of unknown cells.
+    """
 
     map_topic: str = "map"
     first_map_only: bool = False
@@ -36,15 +46,18 @@ class StaticLayerParams(LayerParams):
     trinary_costmap: bool = True
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> StaticLayer:
+        """Make a static layer."""
         return StaticLayer(self, spec, rolling_window, default_cost)
 
 
 class StaticLayer(GridLayer):
-    """Copies a map into the master grid.
+    """Copy of a map in the master grid.
 
-    In a costmap that does not roll, the master takes the map's size and place (see
-    ``LayeredCostmap.set_map``). In one that rolls, ``map_from_global`` may turn and shift
-    the map against the costmap's global frame.
+    A costmap that is no rolling window takes the map's size and position (see
+    ``LayeredCostmap.set_map``).
+
+    Attributes:
+        map_from_global: Pose of the costmap's global frame in the map, for rolling windows.
     """
 
     params: StaticLayerParams
@@ -59,15 +72,17 @@ class StaticLayer(GridLayer):
         self._changed = NO_CELLS
 
     def resize(self, spec: GridSpec) -> None:
+        """Follow the master grid, in a costmap that is no rolling window."""
         if not self._rolling_window:
             super().resize(spec)
 
     @property
     def accepts_maps(self) -> bool:
+        """False if the layer has its first map and ignores others."""
         return self._map is None or not self.params.first_map_only
 
     def set_map(self, static_map: StaticMap) -> None:
-        """Take a whole map; with ``first_map_only`` later ones are ignored."""
+        """Take a map; with ``first_map_only`` later ones are ignored."""
         if not self.accepts_maps:
             return
         self._map = static_map
@@ -77,9 +92,12 @@ class StaticLayer(GridLayer):
         self._mark_all_changed()
 
     def update_map(self, occupancy: NDArray[np.int8], cell_x: int, cell_y: int) -> None:
-        """Replace a rectangle, int8[h, w] with its lower left cell at (cell_x, cell_y).
+        """Replace a rectangle of the map; before the first map it is ignored.
 
-        What lies outside the map is cut off. Nothing happens before the first map.
+        Args:
+            occupancy: int8[h, w]; what lies outside of the map is cut off.
+            cell_x: Column of its lower left cell.
+            cell_y: Row of its lower left cell.
         """
         if self._map is None:
             return
@@ -98,12 +116,12 @@ class StaticLayer(GridLayer):
         self._changed = self._changed.union(area)
 
     def costs_of(self, occupancy: NDArray[np.int8]) -> NDArray[np.uint8]:
-        """Occupancies, int8 of any shape, as costs, uint8, by the layer's thresholds."""
+        """Convert occupancies, int8 of any shape, to costs by the layer's thresholds."""
         table = np.array([self._cost_of(value) for value in range(256)], dtype=np.uint8)
         return table[np.ascontiguousarray(occupancy, dtype=np.int8).view(np.uint8)]
 
     def _cost_of(self, value: int) -> int:
-        """Cost of an occupancy read as a byte: unknown, -1, is 255."""
+        """Return the cost of an occupancy read as a byte: unknown, -1, is 255."""
         params = self.params
         threshold = max(min(params.lethal_cost_threshold, 100), 0)
         if value == params.unknown_cost_value % 256:
@@ -113,7 +131,7 @@ class StaticLayer(GridLayer):
         return FREE if params.trinary_costmap else int(value / threshold * LETHAL)
 
     def reset(self, now_s: float) -> None:
-        """Read the map again, without the updates that came later."""
+        """Restore the map, without the updates that came later."""
         self._awaits_update = False
         if self._map is None:
             return
@@ -122,9 +140,11 @@ class StaticLayer(GridLayer):
         self._mark_all_changed()
 
     def is_current(self, now_s: float) -> bool:
+        """Tell whether there is a map and the master grid has it."""
         return super().is_current(now_s) and self._map is not None
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
+        """Add the changed part of the map, or all of it in a rolling window."""
         bounds = super().update_bounds(robot, now_s, bounds)
         area, self._changed = self._changed, NO_CELLS
         if self._rolling_window and self._map is not None:
@@ -138,6 +158,7 @@ class StaticLayer(GridLayer):
         return bounds.including(self.map_from_global.inverse_transform_points(corners))
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
+        """Copy the map into the window."""
         if self._map is None:
             return
         if self._rolling_window:
@@ -148,7 +169,7 @@ class StaticLayer(GridLayer):
             master.costs[window.slices] = self.grid.costs[window.slices]
 
     def _copy_by_position(self, master: CostGrid, window: Window) -> None:
-        """Each master cell takes the map cell under its centre."""
+        """Copy to each master cell the map cell under its centre."""
         x, y = _centres(master.spec, window)
         spec = self.grid.spec
         x, y = self.map_from_global.transform(x, y)
@@ -167,7 +188,7 @@ class StaticLayer(GridLayer):
 
 
 def _centres(spec: GridSpec, window: Window) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """World x, float64[1, n], and y, float64[m, 1], of a window's cell centres."""
+    """Return world x, float64[1, n], and y, float64[m, 1], of a window's cell centres."""
     x = spec.origin_x_m + (np.arange(window.x0, window.xn) + 0.5) * spec.resolution_m
     y = spec.origin_y_m + (np.arange(window.y0, window.yn) + 0.5) * spec.resolution_m
     return x[None, :], y[:, None]

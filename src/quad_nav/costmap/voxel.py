@@ -1,4 +1,4 @@
-"""The voxel layer: an obstacle layer that keeps heights apart.
+"""Voxel layer: an obstacle layer with heights.
 
 Space is cut into voxels, each of them free, marked or unknown. Sensors mark the voxel of
 each point and clear those along the ray to it, in three dimensions: a beam that passes
@@ -9,8 +9,8 @@ changes, its column becomes one cost:
 * else, when it was cleared, unknown with more than ``unknown_threshold`` unknown voxels,
   and free otherwise.
 
-The robot's footprint and the clearing recoveries clear costs only, as in the original:
-the voxels stay, and count again when a sensor sees something in their column.
+The robot's footprint and the clearing recoveries clear costs only, as in costmap_2d: the voxels
+stay, and count again when a sensor sees something in their column.
 """
 
 from __future__ import annotations
@@ -30,10 +30,14 @@ from quad_nav.kernels.voxels import VoxelGrid, clear_voxel_rays, mark_voxels
 
 @dataclass(frozen=True)
 class VoxelLayerParams(ObstacleLayerParams):
-    """``z_voxels`` voxels of ``z_resolution_m`` stand on ``origin_z_m`` in each column.
+    """Parameters of ``costmap_2d::VoxelLayer``.
 
-    ``mark_threshold``: so many marked voxels in a column are not yet an obstacle.
-    ``unknown_threshold``: so many unknown ones do not yet make a column unknown.
+    Attributes:
+        origin_z_m: Lower border of the voxels.
+        z_resolution_m: Height of a voxel.
+        z_voxels: Voxels in a column.
+        unknown_threshold: Most unknown voxels of a column that is not unknown.
+        mark_threshold: Most marked voxels of a column that is no obstacle.
     """
 
     origin_z_m: float = 0.0
@@ -44,11 +48,16 @@ class VoxelLayerParams(ObstacleLayerParams):
     publish_voxel_map: bool = False
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> VoxelLayer:
+        """Make a voxel layer."""
         return VoxelLayer(self, spec, rolling_window, self.cost_of_unseen(default_cost))
 
 
 class VoxelLayer(ObstacleLayer):
-    """``voxels``, uint8[H, W, Z], are FREE, LETHAL or UNKNOWN; ``grid`` has the columns' costs."""
+    """Obstacle layer with voxels; ``grid`` has the costs of the columns.
+
+    Attributes:
+        voxels: uint8[H, W, Z], FREE, LETHAL or UNKNOWN.
+    """
 
     params: VoxelLayerParams
 
@@ -59,7 +68,7 @@ class VoxelLayer(ObstacleLayer):
         self._make_voxels()
 
     def reconfigure(self, params: VoxelLayerParams) -> None:
-        """Take other parameters; any change empties the layer, as in the original."""
+        """Take other parameters; any change empties the layer, as in costmap_2d."""
         if params == self.params:
             return
         self.params = params
@@ -68,15 +77,17 @@ class VoxelLayer(ObstacleLayer):
         self._pass_on(self._whole_map())
 
     def resize(self, spec: GridSpec) -> None:
+        """Follow the master grid, and forget all voxels."""
         super().resize(spec)
         self._make_voxels()
 
     def reset(self, now_s: float) -> None:
+        """Forget costs and voxels."""
         super().reset(now_s)
         self.voxels[...] = UNKNOWN
 
     def marked_voxels(self) -> NDArray[np.float64]:
-        """Centres of the marked voxels, float64[n, 3] in the global frame."""
+        """Return the centres of the marked voxels, float64[n, 3] in the global frame."""
         y, x, z = np.nonzero(self.voxels == LETHAL)
         return self._origin + (np.column_stack((x, y, z)) + 0.5) * self._voxel_size
 

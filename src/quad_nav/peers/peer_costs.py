@@ -62,9 +62,11 @@ class PeerCosts:
         ):
             for layer in costmap.layers.values():
                 if isinstance(layer, PeerLayer):
-                    layer.see(areas)
+                    layer.set_areas(areas)
                 elif isinstance(layer, ObstacleLayer):
-                    layer.left_out = np.column_stack((points, np.full(len(points), radius_m)))
+                    layer.excluded_circles = np.column_stack(
+                        (points, np.full(len(points), radius_m))
+                    )
                     for x_m, y_m in points[newcomers]:  # marked as obstacles until now
                         layer.free_square(float(x_m), float(y_m), 2.0 * radius_m)
 

@@ -1,9 +1,8 @@
-"""The planner ``carrot_planner/CarrotPlanner``: straight for the goal, as near as the robot fits.
+"""The planner ``carrot_planner/CarrotPlanner``: straight to the goal, as near as the robot fits.
 
-The goal is drawn back along the line to the robot, position and heading alike,
-a hundredth of the way at a time, until the footprint's outline at that pose
-touches neither lethal nor unknown cells. What lies between is left to the local
-planner.
+The goal is moved back along the line to the robot, position and heading alike, a hundredth of the
+distance at a time, until the footprint's outline at that pose touches neither lethal nor unknown
+cells. Obstacles between robot and goal are left to the local planner.
 """
 
 from __future__ import annotations
@@ -25,13 +24,15 @@ _CORNERS_NEEDED = 3
 
 @dataclass(frozen=True)
 class CarrotParams:
-    """``carrot_planner/CarrotPlanner`` has no parameter that changes anything."""
+    """Parameters of ``carrot_planner/CarrotPlanner``: none that changes anything."""
 
 
 class Carrot:
     """The planner ``carrot_planner/CarrotPlanner``.
 
-    ``footprint`` is the padded one, float64[n, 2] in the robot's frame.
+    Attributes:
+        params: Parameters.
+        footprint: Padded footprint, float64[n, 2] in the robot's frame.
     """
 
     def __init__(self, params: CarrotParams, footprint: NDArray[np.float64]) -> None:
@@ -41,10 +42,19 @@ class Carrot:
     def make_plan(
         self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
     ) -> NDArray[np.float64]:
-        """The start and the nearest pose to the goal that the robot fits in, float64[2, 3].
+        """Return the start and the nearest pose to the goal where the robot fits.
 
-        ``costs`` is uint8[H, W] on ``spec``. Raises NoPath when the robot fits
-        nowhere on the line, not even where it stands.
+        Args:
+            spec: Grid of the global costmap.
+            costs: uint8[H, W].
+            start: Pose of the robot.
+            goal: Pose of the goal.
+
+        Returns:
+            float64[2, 3], rows x, y, yaw.
+
+        Raises:
+            NoPath: The robot fits nowhere on the line, not even where it is.
         """
         if len(self.footprint) >= _CORNERS_NEEDED:
             costmap = CostmapView(

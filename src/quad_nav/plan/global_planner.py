@@ -1,25 +1,23 @@
 """The planner ``global_planner/GlobalPlanner``: NavFn's successor, with choices.
 
-Dijkstra's search spreads NavFn's wavefront (``navfn``) from the robot to the
-goal; A* instead visits cells in the order of potential + neutral cost * city
-block distance to the goal, and computes each cell's potential only once. A
-cell's potential is that of a planar wave (``use_quadratic``), or its cheapest
-neighbour's plus its own cost. The path follows the gradient down from the goal
-in half-cell steps, or goes from cell to lowest neighbour (``use_grid_path``).
+Dijkstra's search spreads NavFn's wavefront (``navfn``) from the robot to the goal. A* visits cells
+in the order of potential + neutral cost * city block distance to the goal, and computes each cell's
+potential only once. A cell's potential is that of a planar wave (``use_quadratic``), or its
+cheapest neighbour's plus its own cost. The path follows the gradient down from the goal in
+half-cell steps, or goes from cell to lowest neighbour (``use_grid_path``).
 
-What a cell costs:
+Costs of cells:
 
     Dijkstra    neutral + factor * cost, at most lethal - 1; an obstacle from lethal - 1 on
-    A*          (neutral + cost) mod 256, in one byte as the original reckons it;
+    A*          (neutral + cost) mod 256, in one byte as upstream computes it;
                 an obstacle from lethal on
 
-Unless ``old_navfn_behavior``, positions are real numbers: start and goal are
-half a cell less than cell coordinates, as cells' centres stand for cells.
-Dijkstra's wave then begins in the four cells around the robot, but A* and grid
-paths cut the coordinates to whole cells: what lies in the lower or left half of
-a cell belongs to the neighbour's, and when that is an obstacle there is no plan.
-For the gradient's sake every cell within two cells of the goal then gets a
-potential, obstacles as well: so near the goal a path may cut a corner of one.
+Unless ``old_navfn_behavior``, positions are real numbers: start and goal are half a cell less than
+cell coordinates, so that whole numbers are the centres of cells. Dijkstra's wave then begins in
+the four cells around the robot, but A* and grid paths cut the coordinates to whole cells: a point
+in the lower or left half of a cell belongs to the neighbour, and when that is an obstacle there is
+no plan. For the gradient every cell within two cells of the goal then gets a potential, obstacles included:
+near the goal a path may cut a corner of an obstacle.
 """
 
 from __future__ import annotations
@@ -30,12 +28,12 @@ from typing import Any, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.errors import GoalOutsideMap, NoPath, StartOutsideMap
+from quad_nav.errors import NoPath
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels import global_planner as kernel
 from quad_nav.kernels import wave as wavefront
-from quad_nav.plan.navfn import NOT_REACHED
+from quad_nav.plan.navfn import NOT_REACHED, goal_cell_of, start_cell_of
 from quad_nav.plan.orientations import OrientationMode, with_headings
 
 Point = Tuple[float, float]
@@ -46,10 +44,13 @@ _MARGIN = 1  # cells around a map that is not outlined, so that no search leaves
 class SearchPlannerParams:
     """Parameters of ``global_planner/GlobalPlanner``.
 
-    ``neutral_cost`` is the cost of a free cell, ``cost_factor`` multiplies costs
-    of the costmap, ``lethal_cost`` is an obstacle's. ``publish_scale`` is the highest
-    value of the potential as it is published. ``orientation_mode`` is one
-    of ``OrientationMode``. ``outline_map`` makes the outermost cells obstacles.
+    Attributes:
+        neutral_cost: Cost of a free cell.
+        cost_factor: Factor of costs of the costmap.
+        lethal_cost: Cost of an obstacle.
+        publish_scale: Highest value of the published potential.
+        orientation_mode: One of ``OrientationMode``.
+        outline_map: Make the outermost cells obstacles.
     """
 
     use_dijkstra: bool = True
@@ -70,8 +71,10 @@ class SearchPlannerParams:
 class SearchPlanner:
     """The planner ``global_planner/GlobalPlanner``.
 
-    ``potential`` is the last float32[H, W] computed, 1e10 where the search did
-    not come; None before the first plan.
+    Attributes:
+        params: Parameters.
+        potential: Potential of the last plan, float32[H, W], 1e10 where the search did not
+            come; None before the first plan.
     """
 
     def __init__(self, params: SearchPlannerParams = SearchPlannerParams()) -> None:
@@ -81,25 +84,18 @@ class SearchPlanner:
     def make_plan(
         self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
     ) -> NDArray[np.float64]:
-        """A plan from start to goal, float64[n, 3] rows x, y, yaw; the last row is the goal.
+        """Plan a path; see ``GlobalPlanner.make_plan``.
 
-        ``costs`` is uint8[H, W] on ``spec``; in place, the start's cell is set to
-        FREE and, with ``outline_map``, the outermost cells to LETHAL.
+        The start's cell of ``costs`` is set to FREE and, with ``outline_map``, the outermost
+        cells to LETHAL. The last row of the plan is the goal.
 
-        Raises StartOutsideMap, GoalOutsideMap and NoPath.
+        Raises:
+            StartOutsideMap: The robot is off the costmap.
+            GoalOutsideMap: The goal is off the costmap.
+            NoPath: The search does not reach the goal.
         """
-        start_cell = spec.cell_of(start.x_m, start.y_m)
-        if start_cell is None:
-            raise StartOutsideMap(
-                f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
-                f"the global costmap, {spec.extent}"
-            )
-        goal_cell = spec.cell_of(goal.x_m, goal.y_m)
-        if goal_cell is None:
-            raise GoalOutsideMap(
-                f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
-                f"the global costmap, {spec.extent}"
-            )
+        start_cell = start_cell_of(spec, start)
+        goal_cell = goal_cell_of(spec, goal)
         costs[start_cell[1], start_cell[0]] = FREE
         if self.params.outline_map:
             _outline(costs)
@@ -108,7 +104,7 @@ class SearchPlanner:
             path = self._path_to_the_border(spec, costs, start, goal, goal_cell)
         if not len(path):
             raise NoPath(
-                f"no way from ({start.x_m:.2f}, {start.y_m:.2f}) to "
+                f"no path from ({start.x_m:.2f}, {start.y_m:.2f}) to "
                 f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap"
             )
         plan = np.zeros((len(path) + self._goals_appended, 3))
@@ -122,16 +118,16 @@ class SearchPlanner:
 
     @property
     def _offset(self) -> float:
-        """From a path's cell coordinates to real ones, in cells."""
+        """Offset from a path's cell coordinates to real ones, in cells."""
         return 0.0 if self.params.old_navfn_behavior else 0.5
 
     @property
     def _goals_appended(self) -> int:
-        """How often the goal's pose follows the path; NavFn's way appends it on its own."""
+        """Number of times the goal's pose follows the path; NavFn appends it on its own."""
         return 2 if self.params.old_navfn_behavior else 1
 
     def _point(self, spec: GridSpec, pose: Pose2D) -> Point:
-        """A position in the path's cell coordinates."""
+        """Convert a position to the path's cell coordinates."""
         x = (pose.x_m - spec.origin_x_m) / spec.resolution_m
         y = (pose.y_m - spec.origin_y_m) / spec.resolution_m
         if self.params.old_navfn_behavior:
@@ -146,7 +142,7 @@ class SearchPlanner:
         goal: Pose2D,
         goal_cell: Tuple[int, int],
     ) -> NDArray[np.float32]:
-        """The path on a map whose outermost cells may be used, with obstacles around them."""
+        """Find a path on a map whose outermost cells may be used, with obstacles around them."""
         padded = np.pad(costs, _MARGIN, constant_values=LETHAL)
         start_x, start_y = self._point(spec, start)
         goal_x, goal_y = self._point(spec, goal)
@@ -163,7 +159,7 @@ class SearchPlanner:
     def _path(
         self, costs: NDArray[np.uint8], start: Point, goal: Point, goal_cell: Tuple[int, int]
     ) -> NDArray[np.float32]:
-        """Points float32[n, 2] from goal to start in cell coordinates; none if there is no way."""
+        """Return points float32[n, 2], goal to start, in cell coordinates; none without a path."""
         params, size_x = self.params, costs.shape[1]
         if params.use_dijkstra:
             potential, arrived = self._dijkstra(costs, start, goal)
@@ -240,7 +236,7 @@ class SearchPlanner:
 
 
 def wave_costs(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray[np.float32]:
-    """What Dijkstra's search takes for the cost of each cell, float32[H, W]."""
+    """Convert costs, uint8[H, W], to those of Dijkstra's search, float32[H, W]."""
     lethal = params.lethal_cost
     table = np.minimum(
         np.arange(256) * np.float32(params.cost_factor) + params.neutral_cost, lethal - 1
@@ -253,12 +249,12 @@ def wave_costs(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray
 
 
 def byte_costs(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray[np.uint8]:
-    """What A* takes for the cost of a step to each cell, flat uint8[n]."""
+    """Convert costs, uint8[H, W], to A*'s costs of a step to each cell, flat uint8[n]."""
     return (costs + np.uint8(params.neutral_cost)).ravel()
 
 
 def _enterable(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray[np.bool_]:
-    """Which cells A* may visit, flat bool[n]."""
+    """Return True for cells that A* may visit, flat bool[n]."""
     enterable = costs < params.lethal_cost
     if params.allow_unknown:
         enterable |= costs == UNKNOWN
@@ -267,13 +263,13 @@ def _enterable(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray
 
 
 def _outline(grid: NDArray[Any], value: int = LETHAL) -> None:
-    """Sets the outermost ring of cells."""
+    """Set the outermost ring of cells."""
     grid[[0, -1], :] = value
     grid[:, [0, -1]] = value
 
 
 def _hundredths(coordinate: float) -> np.float32:
-    """A coordinate's distance from its whole number, as exact as the original has it."""
+    """Return a coordinate's fraction, rounded as upstream does."""
     fraction = np.float32(coordinate - int(coordinate))
     return np.float32(np.floor(np.float32(fraction * 100 + 0.5)) / 100)
 

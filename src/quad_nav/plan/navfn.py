@@ -1,22 +1,20 @@
 """NavFn: a wavefront planner over the global costmap.
 
-The potential of a cell is the cost of the cheapest way to it from the robot's
-cell. It solves the eikonal equation |grad P| = cost in one upwind step per
-visit: with ``lower`` the lower and ``gap`` the difference of the two
-neighbours that a wave arrives over (one horizontal, one vertical),
+The potential of a cell is the cost of the cheapest path to it from the robot's cell. It solves the
+eikonal equation |grad P| = cost in one upwind step per visit: with ``lower`` the lower and ``gap``
+the difference of the two neighbours that a wave arrives over (one horizontal, one vertical),
 
     P = lower + cost                        where gap >= cost
     P = lower + cost * f(gap / cost)        else,  f(r) = -0.2301 r^2 + 0.5307 r + 0.7040
 
-where the quadratic f stands for the exact (r + sqrt(2 - r^2)) / 2. Cells wait
-in buckets by potential (100 wide), not in a sorted queue, so a cell may be
-visited again. The path is steepest descent from the goal, half a cell a step,
-turned round. Brock and Konolige's planner (Konolige 2000, "A gradient method
-for real-time robot navigation") as ROS navigation has it, limits included:
+where the quadratic f approximates the exact (r + sqrt(2 - r^2)) / 2. Cells wait in buckets by
+potential (100 wide), not in a sorted queue, so a cell may be visited again. The path is steepest
+descent from the goal, half a cell a step, reversed. Source: K. Konolige, "A gradient method for
+real-time robot navigation", IROS 2000, as ROS navigation implements it, limits included:
 
 * the wave stops after ``max(size_x * size_y / 20, size_x + size_y)`` fronts;
-* a path has at most ``4 * size_x`` points. A longer one is cut, and then begins
-  somewhere between robot and goal.
+* a path has at most ``4 * size_x`` points. A longer one is cut, and then begins somewhere between
+  robot and goal.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ from quad_nav.kernels import descent as kernel
 from quad_nav.kernels import wave as wavefront
 
 Cell = Tuple[int, int]
-NOT_REACHED = float(wavefront.NOT_REACHED)  # where the wave did not come
+NOT_REACHED = float(wavefront.NOT_REACHED)  # potential of cells that the wave did not reach
 
 
 @dataclass(frozen=True)
@@ -44,15 +42,17 @@ class NavfnParams:
     allow_unknown: bool = True
     default_tolerance_m: float = 0.0
     visualize_potential: bool = False
-    planner_window_x_m: float = 0.0  # read by the original as well, and never used
+    planner_window_x_m: float = 0.0  # upstream reads it and never uses it, either
     planner_window_y_m: float = 0.0
 
 
 class Navfn:
     """The planner ``navfn/NavfnROS``.
 
-    ``potential`` is the last float32[H, W] computed, ``NOT_REACHED`` (1e10)
-    where the wave did not come; None before the first plan.
+    Attributes:
+        params: Parameters.
+        potential: Potential of the last plan, float32[H, W], ``NOT_REACHED`` (1e10) where the
+            wave did not come; None before the first plan.
     """
 
     def __init__(self, params: NavfnParams = NavfnParams()) -> None:
@@ -62,32 +62,23 @@ class Navfn:
     def make_plan(
         self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
     ) -> NDArray[np.float64]:
-        """A plan from start to goal, float64[n, 3] rows x, y, yaw.
+        """Plan a path; see ``GlobalPlanner.make_plan``.
 
-        ``costs`` is uint8[H, W] on ``spec``; the start's cell is set to FREE in
-        place. Way points have yaw 0; the last row is the goal itself, or the
-        nearest reached point within ``default_tolerance_m`` of it, with the
-        goal's yaw. The rows before it (``plan[:-1]``) are the descended path,
-        which the original publishes on its own first.
+        The start's cell of ``costs`` is set to FREE. Points of the path have yaw 0. The last row
+        is the goal, or the nearest reached point within ``default_tolerance_m`` of it, with the
+        goal's yaw. The rows before it are the descended path, which upstream publishes first.
 
-        Raises StartOutsideMap, GoalOutsideMap (only without a tolerance) and
-        NoPath.
+        Raises:
+            StartOutsideMap: The robot is off the costmap.
+            GoalOutsideMap: The goal is off the costmap and there is no tolerance.
+            NoPath: The wave does not reach the goal.
         """
-        start_cell = spec.cell_of(start.x_m, start.y_m)
-        if start_cell is None:
-            raise StartOutsideMap(
-                f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
-                f"the global costmap, {spec.extent}"
-            )
+        start_cell = start_cell_of(spec, start)
         costs[start_cell[1], start_cell[0]] = FREE
-        goal_cell = spec.cell_of(goal.x_m, goal.y_m)
-        if goal_cell is None:
-            if self.params.default_tolerance_m <= 0.0:
-                raise GoalOutsideMap(
-                    f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
-                    f"the global costmap, {spec.extent}"
-                )
-            goal_cell = (0, 0)  # a border cell is never reached, so the wave covers the map
+        if self.params.default_tolerance_m <= 0.0:
+            goal_cell = goal_cell_of(spec, goal)
+        else:  # a border cell is never reached, so the wave covers the map
+            goal_cell = spec.cell_of(goal.x_m, goal.y_m) or (0, 0)
         self.potential = potential_from(
             navigation_costs(costs, self.params.allow_unknown),
             source=start_cell,
@@ -97,13 +88,13 @@ class Navfn:
         end = self._reached_pose_near(spec, goal)
         if end is None:
             raise NoPath(
-                f"no way from ({start.x_m:.2f}, {start.y_m:.2f}) to "
+                f"no path from ({start.x_m:.2f}, {start.y_m:.2f}) to "
                 f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap"
             )
         return self._plan_to(spec, start_cell, end)
 
     def _reached_pose_near(self, spec: GridSpec, goal: Pose2D) -> Optional[Pose2D]:
-        """The reached point nearest to the goal, on a square lattice around it."""
+        """Return the reached point nearest to the goal, on a square lattice around it."""
         tolerance_m = self.params.default_tolerance_m
         best, best_distance2 = None, float("inf")
         y_m = goal.y_m - tolerance_m
@@ -128,7 +119,7 @@ class Navfn:
         if not len(path):
             raise NoPath(f"the potential has no descent from ({end.x_m:.2f}, {end.y_m:.2f}) m")
         plan = np.zeros((len(path) + 1, 3))
-        # The original takes a path cell's lower left corner for its position, not its centre.
+        # Upstream takes a path cell's lower left corner for its position, not its centre.
         plan[:-1, :2] = path[::-1].astype(np.float64) * spec.resolution_m + (
             spec.origin_x_m,
             spec.origin_y_m,
@@ -138,7 +129,7 @@ class Navfn:
 
 
 def navigation_costs(costs: NDArray[np.uint8], allow_unknown: bool) -> NDArray[np.uint8]:
-    """NavFn's own costs of a costmap, uint8[H, W]: 50 for free cells to 254 for obstacles.
+    """Convert costs, uint8[H, W], to NavFn's own: 50 for free cells to 254 for obstacles.
 
     A cost below INSCRIBED becomes 50 + 0.8 cost, at most 253; unknown cells are
     253 or obstacles; the outermost ring of cells is always an obstacle.
@@ -160,10 +151,17 @@ def potential_from(
     stop_at_target: bool,
     heuristic: bool = False,
 ) -> NDArray[np.float32]:
-    """Potential float32[H, W] of the wave from ``source``.
+    """Spread a wave from a cell.
 
-    With ``stop_at_target`` it stops at the front that reaches the target, and
-    with ``heuristic`` cells are taken in A*'s order.
+    Args:
+        nav_costs: uint8[H, W], see ``navigation_costs``.
+        source: Cell (x, y) where the wave begins.
+        target: Cell (x, y) to reach.
+        stop_at_target: Stop at the front that reaches the target.
+        heuristic: Take cells in A*'s order.
+
+    Returns:
+        The potential, float32[H, W].
     """
     size_y, size_x = nav_costs.shape
     cells = size_x * size_y
@@ -188,10 +186,17 @@ def potential_from(
 def path_from(
     potential: NDArray[np.float32], start: Cell, source: Cell
 ) -> Tuple[NDArray[np.float32], bool]:
-    """Descent from ``start`` to the wave's source: float32[n, 2] cells (x, y).
+    """Descend from a cell to the wave's source.
 
-    The flag is False when the descent ended elsewhere: out of points, at the
-    map's border, or where the potential has no slope.
+    Args:
+        potential: float32[H, W].
+        start: Cell (x, y) where the descent begins.
+        source: Cell (x, y) where the wave began.
+
+    Returns:
+        The path, float32[n, 2] cells (x, y), and True if it reached the source. It ends
+        elsewhere when it has no more points, at the map's border, or where the potential
+        has no slope.
     """
     size_x = potential.shape[1]
     path = np.empty((4 * size_x, 2), dtype=np.float32)
@@ -203,3 +208,33 @@ def path_from(
 
 def _flat(cell: Cell, size_x: int) -> int:
     return cell[1] * size_x + cell[0]
+
+
+def start_cell_of(spec: GridSpec, start: Pose2D) -> Cell:
+    """Return the robot's cell (x, y).
+
+    Raises:
+        StartOutsideMap: The robot is off the costmap.
+    """
+    cell = spec.cell_of(start.x_m, start.y_m)
+    if cell is None:
+        raise StartOutsideMap(
+            f"the robot at ({start.x_m:.2f}, {start.y_m:.2f}) m is not on "
+            f"the global costmap, {spec.extent}"
+        )
+    return cell
+
+
+def goal_cell_of(spec: GridSpec, goal: Pose2D) -> Cell:
+    """Return the goal's cell (x, y).
+
+    Raises:
+        GoalOutsideMap: The goal is off the costmap.
+    """
+    cell = spec.cell_of(goal.x_m, goal.y_m)
+    if cell is None:
+        raise GoalOutsideMap(
+            f"the goal at ({goal.x_m:.2f}, {goal.y_m:.2f}) m is not on "
+            f"the global costmap, {spec.extent}"
+        )
+    return cell

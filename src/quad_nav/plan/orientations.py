@@ -12,7 +12,7 @@ _STRAIGHT_RAD = 0.35
 
 
 class OrientationMode(enum.IntEnum):
-    """Where the robot looks along a path. The last point keeps the goal's heading."""
+    """Headings along a path; the last point keeps the goal's heading."""
 
     NONE = 0
     FORWARD = 1
@@ -36,11 +36,17 @@ _TURNED_RAD = {
 def with_headings(
     plan: NDArray[np.float64], start_yaw_rad: float, mode: int, window: int
 ) -> NDArray[np.float64]:
-    """The plan, float64[n, 3] rows x, y, yaw, with new yaws in all rows but the last.
+    """Return a plan with new yaws in all rows but the last.
 
-    ``window``: the direction at a point is that from the point so many before to
-    the one so many after it. Modes that interpolate begin with the robot's own
-    heading.
+    Args:
+        plan: float64[n, 3], rows x, y, yaw.
+        start_yaw_rad: Heading of the robot, with which modes that interpolate begin.
+        mode: One of ``OrientationMode``.
+        window: The direction at a point is that from the point so many before to the point so
+            many after it.
+
+    Returns:
+        float64[n, 3].
     """
     plan = plan.copy()
     mode = OrientationMode(mode)
@@ -58,7 +64,7 @@ def with_headings(
 
 
 def directions(points: NDArray[np.float64], window: int) -> NDArray[np.float64]:
-    """The path's direction at each of the points float64[n, 2], radians."""
+    """Return the path's direction at each of its points, float64[n, 2]: float64[n], radians."""
     index = np.arange(len(points))
     before = points[np.maximum(index - window, 0)]
     after = points[np.minimum(index + window, len(points) - 1)]
@@ -67,14 +73,14 @@ def directions(points: NDArray[np.float64], window: int) -> NDArray[np.float64]:
 
 
 def _interpolate(yaws: NDArray[np.float64]) -> None:
-    """Equal turns from the first yaw to the last, the short way, in place."""
+    """Set equal turns from the first yaw to the last, the short way, in float64[n]."""
     turn = np.arctan2(np.sin(yaws[-1] - yaws[0]), np.cos(yaws[-1] - yaws[0]))
     blended = yaws[0] + np.linspace(0.0, turn, len(yaws))
     yaws[1:-1] = np.arctan2(np.sin(blended), np.cos(blended))[1:-1]
 
 
 def _start_of_last_straight(yaws: NDArray[np.float64]) -> int:
-    """The first point of the end of the path that keeps the direction of the last point but one."""
+    """Return the first point from which on the path keeps its last direction."""
     k = len(yaws) - 2
     turns = yaws - yaws[k]
     bends = np.abs(np.arctan2(np.sin(turns), np.cos(turns))) > _STRAIGHT_RAD

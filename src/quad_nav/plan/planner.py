@@ -1,4 +1,4 @@
-"""What the navigator asks of a global planner."""
+"""Interface of a global planner, and plans to points near the goal."""
 
 from __future__ import annotations
 
@@ -15,17 +15,25 @@ from quad_nav.grid import GridSpec
 
 
 class GlobalPlanner(Protocol):
-    """Makes a path over the global costmap."""
+    """Planner of paths over the global costmap."""
 
     def make_plan(
         self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
     ) -> NDArray[np.float64]:
-        """A plan from start to goal, float64[n, 3] rows x, y, yaw.
+        """Plan a path.
 
-        ``costs`` is the global costmap's own uint8[H, W] on ``spec``; start, goal
-        and plan are in its frame. The last row is where the robot is to end, and
-        which way it is to look there. Raises a ``PlanningError`` when there is no
-        plan; a plan returned is never empty.
+        Args:
+            spec: Grid of the global costmap.
+            costs: uint8[H, W], the costmap's own array; the planner may change it.
+            start: Pose of the robot in the costmap's frame.
+            goal: Pose of the goal in the costmap's frame.
+
+        Returns:
+            float64[n, 3], rows x, y, yaw in the costmap's frame, n >= 1. The last row is the
+            pose where the robot ends.
+
+        Raises:
+            PlanningError: There is no plan.
         """
         ...
 
@@ -39,13 +47,24 @@ def plan_near(
     tolerance_m: float,
     append_goal: bool,
 ) -> NDArray[np.float64]:
-    """The plan to the goal, or to the first point around it that has one.
+    """Plan to the goal, or to the first point around it that has a plan.
 
-    The points lie on square rings three cells apart (or one tolerance, if that is
-    less). ``append_goal`` ends such a plan at the goal all the same.
+    The points lie on square rings, three cells apart or one tolerance if that is less.
+
+    Args:
+        planner: The planner.
+        spec: Grid of the global costmap.
+        costs: uint8[H, W].
+        start: Pose of the robot.
+        goal: Pose of the goal.
+        tolerance_m: How far from the goal along x or y a point may be.
+        append_goal: End a plan to another point at the goal all the same.
+
+    Returns:
+        float64[n, 3], rows x, y, yaw.
 
     Raises:
-        PlanningError: as for the goal itself, when no point has a plan.
+        PlanningError: No point has a plan; the error is the goal's own.
     """
     try:
         return planner.make_plan(spec, costs, start, goal)
@@ -65,7 +84,7 @@ def plan_near(
 
 
 def ring_offsets(step_m: float, reach_m: float) -> Iterator[Tuple[float, float]]:
-    """Points on growing square rings around a centre, in the original's order."""
+    """Yield points (dx, dy) on growing square rings, in the order of upstream move_base."""
     for ring in range(1, int(math.floor(reach_m / step_m + 1e-9)) + 1):
         for y, x in itertools.product(range(ring + 1), repeat=2):
             if max(x, y) < ring:
