@@ -100,6 +100,30 @@ def test_fixes_can_be_switched_in_flight():
     assert not navigator.controller.params.predict_goal_turn
 
 
+@pytest.mark.parametrize(
+    "namespace, changes",
+    [("TrajectoryPlannerROS", {"sim_time": 1.0}), ("", {"controller_frequency": 5.0})],
+)
+def test_reconfiguring_another_namespace_keeps_the_fixes(namespace, changes):
+    before = load({"fixes": UPSTREAM})
+    after = updated(before, namespace, changes)
+    assert after != before
+    assert not after.local_planner.reject_colliding_escape
+    assert not after.local_planner.predict_goal_turn
+    assert after.navigator.progress == before.navigator.progress
+    assert not after.navigator.escape_collision and after.navigator.sensor_timeout_s == 0.0
+    assert after.peers == before.peers and after.scan_validator == before.scan_validator
+
+
+def test_switching_fixes_in_flight_changes_every_owner_but_the_recoveries():
+    upstream = load({"fixes": UPSTREAM})
+    switched = updated(load({}), "fixes", UPSTREAM)
+    assert switched.navigator == upstream.navigator
+    assert switched.local_planner == upstream.local_planner
+    assert (switched.peers, switched.scan_validator) == (upstream.peers, upstream.scan_validator)
+    assert switched.recoveries == load({}).recoveries != upstream.recoveries
+
+
 @pytest.mark.parametrize("fixes, leaves", [({}, True), ({"escape_collision": False}, False)])
 def test_a_robot_in_collision_escapes(fixes, leaves):
     """Its back is 0.36 m behind it, in the cell of the wall at 0.38 m."""
