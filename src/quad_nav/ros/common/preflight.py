@@ -8,17 +8,21 @@ that the others would have reported are lost. Exit status 0, or 2 with every fau
 
 from __future__ import annotations
 
+import os
 import re
 import sys
+import time
 from functools import partial
+from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping
 
+import rospkg
 import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import MissionSummary, write_json
-from quad_nav.ros.sequencer import setup as mission_setup
-from quad_nav.scenario import fleet_setup, simulator_setup
+from quad_nav.scenario import fleet_setup, mission_setup, simulator_setup
+from quad_nav.scenario.mission_setup import MissionSetup
 
 EXIT_BAD_INPUT = 2
 _FLEET = re.compile(r"fleet\d*")
@@ -38,10 +42,10 @@ def parameter_tree(flat: Mapping[str, Any]) -> Dict[str, Any]:
 
 def faults(tree: Mapping[str, Any]) -> List[str]:
     """Return the faults that simulator, sequencer and fleet would report, each once."""
-    result = mission_setup.result_path(tree.get("sequencer", {}))
+    result = result_path(tree.get("sequencer", {}))
     readers: Dict[str, Callable[[Mapping[str, Any], str], object]] = {
         "simulator": simulator_setup.read_setup,
-        "sequencer": partial(mission_setup.read_setup, result=result, all_parameters=tree),
+        "sequencer": partial(read_mission_setup, result=result, all_parameters=tree),
     }
     fleets = sorted(name for name in tree if _FLEET.fullmatch(name))
     found: List[str] = []
@@ -54,6 +58,28 @@ def faults(tree: Mapping[str, Any]) -> List[str]:
     return list(dict.fromkeys(found))
 
 
+def result_path(parameters: Mapping[str, Any]) -> Path:
+    """Return the summary's path, also for parameters that are otherwise not usable."""
+    given = parameters.get("result")
+    if isinstance(given, str) and given:
+        return Path(given).expanduser()
+    stamp = time.strftime("%Y%m%d-%H%M%S")
+    return Path(rospkg.get_log_dir()) / "quad" / f"mission-{stamp}-{os.getpid()}.json"
+
+
+def read_mission_setup(
+    parameters: Mapping[str, Any], name: str, result: Path, all_parameters: Mapping[str, Any]
+) -> MissionSetup:
+    """Read the mission of a node's private parameters; journals are in ROS's home.
+
+    Raises:
+        InputError: Every fault in the parameters, the scene, the goal files and the navigators'
+            parameters.
+    """
+    journals = Path(rospkg.get_ros_home()) / "quad"
+    return mission_setup.read_setup(parameters, name, result, journals, all_parameters)
+
+
 def main() -> int:
     """Check the parameters on standard input.
 
@@ -64,11 +90,11 @@ def main() -> int:
     problems = faults(tree)
     if not problems:
         return 0
-    print("mission not started, invalid input:\n  " + "\n  ".join(problems), file=sys.stderr)
+    print("flight not started, invalid input:\n  " + "\n  ".join(problems), file=sys.stderr)
     if tree.get("sequencer", {}).get("result"):
         write_json(
             MissionSummary((), reason="bad input", problems=tuple(problems)),
-            mission_setup.result_path(tree["sequencer"]),
+            result_path(tree["sequencer"]),
         )
     return EXIT_BAD_INPUT
 

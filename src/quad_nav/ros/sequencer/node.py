@@ -27,8 +27,8 @@ from quad_nav.mission.summary import (
 from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.node_tools import init_node
+from quad_nav.ros.common.preflight import read_mission_setup, result_path
 from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
-from quad_nav.ros.sequencer.setup import read_setup, result_path
 from quad_nav.scenario.mission_setup import MissionSetup
 
 DIAGNOSTICS_PERIOD_S = 1.0  # wall time, to show the state of a paused simulation
@@ -99,7 +99,7 @@ def fly(mission: MissionRunner, setup: MissionSetup, result: Path) -> int:
 
 
 def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:
-    rospy.logfatal("sequencer: mission not started, %s:\n  %s", reason, "\n  ".join(lines))
+    rospy.logfatal("sequencer: flight not started, %s:\n  %s", reason, "\n  ".join(lines))
     robots = tuple(
         RobotSummary(robot.name, tuple(unflown_legs(robot.sequence))) for robot in setup.robots
     )
@@ -127,11 +127,11 @@ def main() -> int:
     parameters = rospy.get_param("~", {})
     result = result_path(parameters)
     try:
-        setup = read_setup(parameters, name, result, rospy.get_param("/", {}))
+        setup = read_mission_setup(parameters, name, result, rospy.get_param("/", {}))
         mission = MissionRunner(setup, RESPAWNED in sys.argv)
     except InputError as error:
         rospy.logfatal(
-            "sequencer: mission not started, invalid input:\n  %s", "\n  ".join(error.problems)
+            "sequencer: flight not started, invalid input:\n  %s", "\n  ".join(error.problems)
         )
         _write(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)
         return EXIT_BAD_INPUT
