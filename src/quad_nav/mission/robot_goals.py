@@ -64,7 +64,7 @@ class WatchedGoalFile:
 
 @dataclass(frozen=True)
 class RobotGoals:
-    """A robot's name, its goal file and the goals in it at the start."""
+    """Name of a robot, its goal file and the goals in the file at the start."""
 
     name: str
     file: WatchedGoalFile

@@ -38,7 +38,7 @@ class Verdict(enum.Enum):
 
 @dataclass(frozen=True)
 class NavigatorReport:
-    """The navigator's result for the goal that was sent last, with its text."""
+    """Result that the navigator reports for the goal that was sent last, with its text."""
 
     verdict: Verdict
     text: str = ""
@@ -81,7 +81,7 @@ Action = Union[SendGoal, GoalEnded, SequenceDone]
 
 @dataclass(frozen=True)
 class ActiveGoal:
-    """The goal that the robot flies to.
+    """Goal that the robot flies to.
 
     Attributes:
         goal: The goal as in the goal file.

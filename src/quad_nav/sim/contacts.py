@@ -21,7 +21,7 @@ CONTACT_GAP_S = 0.5
 
 @dataclass(frozen=True)
 class Touch:
-    """A robot touches something in the present physics step.
+    """Touch of a robot in the present physics step.
 
     ``robot`` is the robot's number. ``other`` names the obstacle, the wall, the floor or the other
     robot, which then has a higher number. ``position_m`` is (x, y, z) in ``map``.
@@ -34,7 +34,7 @@ class Touch:
 
 @dataclass(frozen=True)
 class Contact:
-    """The begin of a contact between a robot and another robot, an obstacle, a wall or the floor.
+    """Begin of a contact between a robot and another robot, an obstacle, a wall or the floor.
 
     ``time_s`` and the position in ``map`` are those of the first touch.
     """

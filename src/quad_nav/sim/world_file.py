@@ -56,7 +56,11 @@ class _Findings:
     parts: int = 0
 
     def read(self, path: Path) -> Element:
-        """Return the root of a file; read a file once even if it is included repeatedly."""
+        """Return the root of a file; read a file once even if it is included repeatedly.
+
+        Raises:
+            InputError: The file cannot be read, or the files are too large together.
+        """
         if path not in self.files:
             self.files[path] = read_xml(path)
             self.bytes_read += path.stat().st_size
@@ -70,6 +74,11 @@ class _Findings:
         return self.files[path]
 
     def count_part(self, path: Path) -> None:
+        """Count a model, link or collision.
+
+        Raises:
+            InputError: There are more than ``MAX_PARTS``.
+        """
         self.parts += 1
         if self.parts > MAX_PARTS:
             raise InputError(
