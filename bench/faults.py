@@ -1,14 +1,14 @@
-"""Nodes killed and stopped at random moments of a flight, and a link cut: what becomes of it.
+"""Kill and stop nodes at random moments of a flight, cut a link, fill a disk.
 
     scripts/ros_env python3 bench/faults.py --each 20 --seed 1
     scripts/ros_env python3 bench/faults.py --kinds link --each 3        (as root)
 
 Each flight is that of test/ros/respawn_goals, two quadcopters with three goals, at three times
 real time. One fault is injected at a moment drawn evenly from the first ``MISSION_S`` simulated
-seconds. A flight that its fault has ended (simulator, roscore) is flown on with resume:=true. In
-the end every goal must have been reached, none in two flights, and nothing touched. Seconds of the
-table are simulated: until the last moving quadcopter hovered, and until all that had not arrived
-flew again; they count from the fault, for a stop or a cut from its beginning and its end.
+seconds. A flight that ends by its fault (simulator, roscore) is resumed with resume:=true. A flight
+passes if every goal is reached, none in two flights, without a contact. The table shows simulated
+seconds from the fault until the last moving quadcopter hovered, and until all that had goals left
+flew again. For a stop or a cut they count from its begin and from its end.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ import os
 import random
 import shutil
 import signal
-import socket
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Callable, Dict, Iterator, List, Optional, Set, Tuple
-from xmlrpc.client import ServerProxy
+from typing import Any, Dict, Iterator, List, Optional, Tuple
 
 import tabulate
+from launched import Launch, Watch, answers, wait_for
 from link import HERE_IP, THERE_IP, Link, why_no_links
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -41,14 +41,13 @@ GOALS = ROOT / "test" / "ros" / "respawn_goals"
 SCENE = ROOT / "scenes" / "arena.yaml"
 RATE = 3.0
 MISSION_S = 18.0
-PATIENCE_S = 150.0  # wall time
 STOPPED_S, CUT_S, FULL_S = 5.0, 10.0, 4.0  # wall time
 HOVERS_MPS, FLIES_MPS = 0.05, 0.12
 
 
 @dataclass(frozen=True)
 class Kind:
-    """``node`` dies by ``number``; ``flyers`` are the quadcopters that are then blind."""
+    """A fault: ``node`` gets the signal ``number``, and ``flyers`` lose their input."""
 
     name: str
     node: str
@@ -75,113 +74,13 @@ KINDS = {
 
 @dataclass
 class Outcome:
-    """Of one fault; ``problems`` is empty when all went as it must."""
+    """Result of one fault; a flight without ``problems`` has passed."""
 
     at_s: float
     hover_s: Optional[float] = None
     resume_s: Optional[float] = None
     reason: str = ""
     problems: List[str] = field(default_factory=list)
-
-
-class Watch:
-    """A node that looks on: speeds and what the sequencer does."""
-
-    def __init__(self) -> None:
-        import rospy
-        from nav_msgs.msg import Odometry
-        from std_msgs.msg import String
-
-        rospy.init_node("faults", anonymous=True, disable_signals=True)
-        self.events: List[dict] = []
-        self.now_s = 0.0
-        self.speeds_mps: List[Tuple[float, int, float]] = []  # when, who, how fast
-        self._subscribers = [rospy.Subscriber("/quad/events", String, self._on_event)] + [
-            rospy.Subscriber(f"/odom{i}", Odometry, self._on_odometry, i) for i in (0, 1)
-        ]
-
-    def _on_event(self, message) -> None:
-        self.events.append(json.loads(message.data))
-
-    def _on_odometry(self, message, robot: int) -> None:
-        v = message.twist.twist.linear
-        self.now_s = message.header.stamp.to_sec()
-        self.speeds_mps.append((self.now_s, robot, math.hypot(v.x, v.y)))
-
-    @property
-    def done(self) -> Set[int]:
-        """Quadcopters without further goals."""
-        return {event["robot"] for event in self.events if event["event"] == "done"}
-
-    def first(self, robot: int, after_s: float, holds: Callable[[float], bool]) -> float:
-        """When a quadcopter's speed was first so, inf for never."""
-        return next(
-            (
-                t
-                for t, who, v in list(self.speeds_mps)
-                if who == robot and t >= after_s and holds(v)
-            ),
-            math.inf,
-        )
-
-
-class Launch:
-    """A roslaunch with a roscore of its own, or, with ``port``, one beside it."""
-
-    def __init__(
-        self,
-        arguments: List[str],
-        folder: Path,
-        port: Optional[int] = None,
-        prefix: Tuple[str, ...] = (),
-        ip: str = "localhost",
-    ) -> None:
-        self.folder, self.port = folder, port or free_port()
-        core = ["-p", str(self.port)] if port is None else []
-        master = f"http://{'localhost' if ip == 'localhost' else HERE_IP}:{self.port}"
-        self.log = (folder / f"launch-{time.monotonic():.3f}.log").open("w")
-        self.process = subprocess.Popen(
-            [*prefix, "roslaunch", *core, "quad", *arguments],
-            stdout=self.log,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            env={
-                **os.environ,
-                "ROS_MASTER_URI": master,
-                "ROS_HOSTNAME": ip,
-                "ROS_HOME": str(folder),
-            },
-        )
-        os.environ.update(
-            ROS_MASTER_URI=master, ROS_HOSTNAME=("localhost" if ip == "localhost" else HERE_IP)
-        )
-
-    def pid_of(self, node: str) -> int:
-        """Of a node, or of the rosmaster for ""."""
-        if not node:
-            children = subprocess.run(
-                ["ps", "-o", "pid=,args=", "--ppid", str(self.process.pid)],
-                stdout=subprocess.PIPE,
-                text=True,
-                check=True,
-            ).stdout
-            return next(
-                int(line.split()[0]) for line in children.splitlines() if "rosmaster" in line
-            )
-        uri = ServerProxy(os.environ["ROS_MASTER_URI"]).lookupNode("/faults", node)[2]
-        return ServerProxy(uri).getPid("/faults")[2]
-
-    def end(self, patience_s: float = PATIENCE_S) -> bool:
-        """Whether it ended by itself."""
-        try:
-            self.process.wait(patience_s)
-            return True
-        except subprocess.TimeoutExpired:
-            os.killpg(self.process.pid, signal.SIGINT)
-            self.process.wait(60)
-            return False
-        finally:
-            self.log.close()
 
 
 def arguments_of(kind: Kind, result: Path, *more: str) -> List[str]:
@@ -197,34 +96,25 @@ def arguments_of(kind: Kind, result: Path, *more: str) -> List[str]:
     ]
 
 
-def fly(kind: Kind, at_s: float, folder: Path) -> Outcome:
-    """One flight with its fault, and a second one where that ends the first."""
-    outcome, result = Outcome(at_s), folder / "result.json"
+def start(kind: Kind, folder: Path, result: Path) -> Tuple[Launch, Optional[Launch]]:
+    """Start the flight, and for ``link`` the second host's part of it."""
     more = {"link": ["hosts:=2", "only_host:=0"], "disk": [f"journal:={folder}/disk/journal"]}.get(
         kind.name, []
     )
-    launch = Launch(
-        arguments_of(kind, result, *more),
-        folder,
-        ip=HERE_IP if kind.name == "link" else "localhost",
-    )
-    other = None
-    if kind.name == "link":
-        wait_for(lambda: answers(launch.port), "the roscore")
-        other = Launch(
-            arguments_of(
-                kind,
-                folder / "none",
-                "hosts:=2",
-                "only_host:=1",
-                "simulator:=false",
-                "sequencer:=false",
-            ),
-            folder,
-            launch.port,
-            Link.there,
-            THERE_IP,
-        )
+    ip = HERE_IP if kind.name == "link" else "localhost"
+    launch = Launch(arguments_of(kind, result, *more), folder, ip=ip)
+    if kind.name != "link":
+        return launch, None
+    wait_for(lambda: answers(launch.port), "the roscore")
+    there = ("hosts:=2", "only_host:=1", "simulator:=false", "sequencer:=false")
+    arguments = arguments_of(kind, folder / "none", *there)
+    return launch, Launch(arguments, folder, launch.port, Link.there, THERE_IP)
+
+
+def fly(kind: Kind, at_s: float, folder: Path) -> Outcome:
+    """Fly with a fault, and resume the flight if the fault ends it."""
+    outcome, result = Outcome(at_s), folder / "result.json"
+    launch, other = start(kind, folder, result)
     wait_for(lambda: answers(launch.port), "the roscore")
     watch = Watch()
     wait_for(lambda: watch.now_s >= 1.0 + at_s, "the moment of the fault")
@@ -278,8 +168,8 @@ def inject(kind: Kind, launch: Launch, watch: Watch, outcome: Outcome) -> None:
     outcome.resume_s = max((t for t in again_s if t < math.inf), default=over_s) - over_s
 
 
-def resume(kind: Kind, folder: Path, first: dict, outcome: Outcome) -> dict:
-    """Flies on; the figures are those of the whole mission."""
+def resume(kind: Kind, folder: Path, first: Dict[str, Any], outcome: Outcome) -> Dict[str, Any]:
+    """Resume the flight; the summary covers the whole mission."""
     if not outcome.reason:
         outcome.problems.append("ended without a reason")
     result = folder / "resumed.json"
@@ -306,7 +196,7 @@ def resume(kind: Kind, folder: Path, first: dict, outcome: Outcome) -> dict:
     return flown
 
 
-def judge(flown: dict, watch: Watch, kind: Kind, outcome: Outcome) -> None:
+def judge(flown: Dict[str, Any], watch: Watch, kind: Kind, outcome: Outcome) -> None:
     goals = [(robot["robot"], goal) for robot in flown.get("robots", []) for goal in robot["goals"]]
     outcome.problems += [
         f"{name} goal {goal['goal']} was not reached: {goal['reason']}"
@@ -328,7 +218,7 @@ def judge(flown: dict, watch: Watch, kind: Kind, outcome: Outcome) -> None:
 
 @contextlib.contextmanager
 def small_disk(folder: Path) -> Iterator[None]:
-    """A file system of 64 KiB."""
+    """Mount a file system of 64 KiB."""
     folder.mkdir()
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)], check=True)
     try:
@@ -338,7 +228,7 @@ def small_disk(folder: Path) -> Iterator[None]:
 
 
 def fill(disk: Path, watch: Watch, outcome: Outcome) -> None:
-    """Leaves no room, for a while; what the journal has then is complete."""
+    """Fill the disk for a while; afterwards the journal must be complete."""
     with (disk / "other").open("wb", buffering=0) as other, contextlib.suppress(OSError):
         while True:
             other.write(bytes(4096))
@@ -352,35 +242,15 @@ def fill(disk: Path, watch: Watch, outcome: Outcome) -> None:
         outcome.problems.append(f"{legs} goals in the journal, {ended} flown")
 
 
-def read(result: Path, outcome: Outcome) -> dict:
+def read(result: Path, outcome: Outcome) -> Dict[str, Any]:
     if result.exists():
         return json.loads(result.read_text())
     outcome.problems.append("no summary")
     return {}
 
 
-def wait_for(holds: Callable[[], bool], what: str) -> None:
-    end = time.monotonic() + PATIENCE_S
-    while not holds():
-        if time.monotonic() > end:
-            raise TimeoutError(what)
-        time.sleep(0.02)
-
-
-def answers(port: int) -> bool:
-    host = HERE_IP if os.environ["ROS_HOSTNAME"] == HERE_IP else "localhost"
-    with socket.socket() as probe:
-        return probe.connect_ex((host, port)) == 0
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("localhost", 0))
-        return probe.getsockname()[1]
-
-
-def flown_apart(kind: Kind, at_s: float, pipe) -> None:
-    """In a process of its own, because a process has one ROS node."""
+def fly_in_process(kind: Kind, at_s: float, pipe: Connection) -> None:
+    """Fly in a process of its own, because a process has one ROS node."""
     folder = Path(tempfile.mkdtemp(prefix="quad_faults_"))
     try:
         with {"link": Link, "disk": lambda: small_disk(folder / "disk")}.get(
@@ -400,7 +270,7 @@ def flown_apart(kind: Kind, at_s: float, pipe) -> None:
 def run(kind: Kind, at_s: float) -> Outcome:
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
-    process = context.Process(target=flown_apart, args=(kind, at_s, there))
+    process = context.Process(target=fly_in_process, args=(kind, at_s, there))
     process.start()
     outcome = here.recv()
     process.join()
@@ -408,7 +278,7 @@ def run(kind: Kind, at_s: float) -> Outcome:
 
 
 def why_not_here(name: str) -> str:
-    """Why this machine can't have such a fault, "" when it can."""
+    """Reason why this machine cannot inject a fault, "" if it can."""
     if name == "disk" and os.geteuid() != 0:
         return "a file system of its own needs root"
     return why_no_links() if name == "link" else ""
@@ -459,10 +329,10 @@ def main() -> int:
             rows,
             [
                 "fault",
-                "as it must",
-                "hover s, median / max",
-                "on again s, median / max",
-                "reason of the end",
+                "passed",
+                "hovers s, median / max",
+                "resumes s, median / max",
+                "stop reason",
             ],
             tablefmt="github",
             disable_numparse=True,

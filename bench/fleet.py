@@ -1,12 +1,11 @@
-"""What a fleet costs on ROS: processor time per node and memory, for several sizes.
+"""Measure a fleet on ROS: CPU time and memory of each node, for several sizes.
 
     scripts/ros_env python3 bench/fleet.py --robots 2 8 20
 
-Starts ``fleet.launch`` for each size, waits until all fly, and measures for some time of
-the simulation's clock. CPU is in seconds per simulated second: 1.0 keeps one core busy at
-real time. Commands per simulated second and quadcopter are as many as the navigators'
-control rate asks for, or the fleet lags behind the simulation. The load average counts
-other people's processes as well.
+Starts ``fleet.launch`` for each size, waits until all robots fly, and measures for some simulated
+time. CPU is in seconds per simulated second: 1.0 keeps one core busy at real time. If commands per
+simulated second and robot are fewer than the navigators' control rate, the fleet lags behind the
+simulation. The load average counts other users' processes, too.
 """
 
 from __future__ import annotations
@@ -19,19 +18,19 @@ import socket
 import subprocess
 import time
 from pathlib import Path
-from typing import Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
-SETTLE_S, PATIENCE_S = 5.0, 120.0
-SAMPLED = 5  # quadcopters whose commands are counted
+SETTLE_S, TIMEOUT_S = 5.0, 120.0
+SAMPLED = 5  # robots whose commands are counted
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, nargs="+", default=[2, 4, 8, 16, 20, 32, 50])
-    parser.add_argument("--hosts", type=int, help="as many as fleet.launch says")
-    parser.add_argument("--seconds", type=float, default=20.0, help="simulated, per size")
-    parser.add_argument("arguments", nargs="*", help="more for the launch file")
+    parser.add_argument("--hosts", type=int, help="default of fleet.launch if not given")
+    parser.add_argument("--seconds", type=float, default=20.0, help="simulated time for each size")
+    parser.add_argument("arguments", nargs="*", help="further arguments of the launch file")
     given = parser.parse_args()
     for robots in given.robots:
         context = multiprocessing.get_context("spawn")
@@ -43,27 +42,11 @@ def main() -> None:
 
 
 def measure(robots: int, hosts: Optional[int], seconds: float, arguments: List[str]) -> None:
-    """One line of the table."""
+    """Measure one size and print its line."""
     port = free_port()
-    os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
-    launch = subprocess.Popen(
-        [
-            "roslaunch",
-            "-p",
-            str(port),
-            "quad",
-            "fleet.launch",
-            f"robots:={robots}",
-            *([f"hosts:={hosts}"] if hosts else []),
-            "rviz:=false",
-            *arguments,
-        ],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    launch = launch_fleet(port, robots, *([f"hosts:={hosts}"] if hosts else []), *arguments)
     try:
-        clock = Clock(time.monotonic() + PATIENCE_S)
+        clock = Clock(time.monotonic() + TIMEOUT_S)
         clock.wait_until(1.0 + SETTLE_S)
         before, wall_s, begin_s = used(port), time.monotonic(), clock.now_s
         commands = Commands(min(robots, SAMPLED))
@@ -88,6 +71,26 @@ def measure(robots: int, hosts: Optional[int], seconds: float, arguments: List[s
     )
 
 
+def launch_fleet(port: int, robots: int, *arguments: str) -> subprocess.Popen[bytes]:
+    """Start ``fleet.launch`` under a roscore on this port."""
+    os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+    return subprocess.Popen(
+        [
+            "roslaunch",
+            "-p",
+            str(port),
+            "quad",
+            "fleet.launch",
+            f"robots:={robots}",
+            "rviz:=false",
+            *arguments,
+        ],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
 class Clock:
     """The simulation's clock."""
 
@@ -101,21 +104,22 @@ class Clock:
         rospy.Subscriber("/clock", ClockMessage, self._store, queue_size=1)
 
     def wait_until(self, now_s: float) -> None:
-        self._give_up_s = time.monotonic() + PATIENCE_S
+        """Wait until this simulated time; exit if it does not come."""
+        self._give_up_s = time.monotonic() + TIMEOUT_S
         self._wait(lambda: self.now_s >= now_s)
 
-    def _wait(self, condition) -> None:
+    def _wait(self, condition: Callable[[], bool]) -> None:
         while not condition():
             if time.monotonic() > self._give_up_s:
-                raise SystemExit("the fleet did not fly")
+                raise SystemExit("the fleet did not fly in time")
             time.sleep(0.02)
 
-    def _store(self, message) -> None:
+    def _store(self, message: Any) -> None:
         self.now_s = message.clock.to_sec()
 
 
 class Commands:
-    """How many commands come for the first few quadcopters."""
+    """Counts the commands for the first few robots."""
 
     def __init__(self, robots: int) -> None:
         import rospy
@@ -124,12 +128,12 @@ class Commands:
         for number in range(robots):
             rospy.Subscriber(f"/cmd_vel{number}", rospy.AnyMsg, self._add)
 
-    def _add(self, _) -> None:
+    def _add(self, _: Any) -> None:
         self.count += 1
 
 
 def used(port: int) -> Dict[str, Tuple[float, float]]:
-    """(CPU in s, memory in MB) of every node whose master listens on a port."""
+    """Return (CPU in s, memory in MB) of every node whose master listens on a port."""
     found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:

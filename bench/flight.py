@@ -1,4 +1,4 @@
-"""How many times faster than real time flights offline are, and where their time goes."""
+"""Measure the real-time factor of offline flights, and the share of each part."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from quad_nav.offline.run import fly
 from quad_nav.offline.worker_process import processes_for
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 
-# Quadcopters, simulated seconds, factor to reach, what a swarm simulator without navigation does.
+# Robots, simulated seconds, required factor, factor of a swarm simulator without navigation.
 MISSIONS: Tuple[Tuple[int, float, float, float], ...] = (
     (1, 80.0, 60.0, 100.0),
     (2, 80.0, 40.0, 60.0),
@@ -26,20 +26,20 @@ MISSIONS: Tuple[Tuple[int, float, float, float], ...] = (
     (100, 10.0, 1.0, 4.0),
 )
 HALL_M = 60.0
-# Functions that do a part of the work, by the last two parts of their place.
+# The functions of each part, as file:function.
 PARTS: Dict[str, Tuple[str, ...]] = {
     "bodies": ("simulation.py:step",),
-    "LIDAR": ("lidars.py:scan",),
-    "scans to points": ("offline_robot.py:see",),
+    "LIDAR": ("casters.py:scan",),
+    "scans to points": ("scan_intake.py:add_scan",),
     "costmaps": ("layered.py:update",),
-    "global plans": ("navigator.py:_plan",),
-    "control": ("navigator.py:_control_cycle",),
+    "global plans": ("state_machine.py:_search_plan",),
+    "control": ("state_machine.py:_run_control_cycle",),
     "goals": ("flight.py:tick_sequencer",),
 }
 
 
 def setup_of(robots: int, config: str) -> FlightSetup:
-    """The tutorial's mission for one or two; a random one; the hall for a hundred."""
+    """Set up the tutorial's mission for 1 or 2 robots, the hall for 100, else a random mission."""
     if robots <= 2:
         return read_setup(FlightOptions(None, shipped("goals"), config, robots=robots))
     if robots < 100:
@@ -53,13 +53,13 @@ def setup_of(robots: int, config: str) -> FlightSetup:
 
 
 def cpu_time_s() -> float:
-    """Of this process and of those that it has ended."""
+    """CPU time of this process and of its ended children."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 
 
 def shares(setup: FlightSetup) -> Dict[str, float]:
-    """The part of the time that each part takes."""
+    """Profile a flight and return each part's share of the time."""
     profile = cProfile.Profile()
     profile.runcall(fly, setup)
     stats = pstats.Stats(profile)
@@ -76,9 +76,14 @@ def shares(setup: FlightSetup) -> Dict[str, float]:
 
 @click.command()
 @click.option("--config", default="tutorial", show_default=True)
-@click.option("--robots", type=int, multiple=True, help="Only with so many; repeatable.")
+@click.option(
+    "--robots",
+    type=int,
+    multiple=True,
+    help="Fly only the mission with so many robots; repeatable.",
+)
 def main(config: str, robots: Tuple[int, ...]) -> None:
-    """Real-time factors with 512 beams at 20 Hz and full navigation, nothing recorded."""
+    """Print real-time factors with 512 beams at 20 Hz, full navigation and no recording."""
     rows = []
     for count, sim_s, wanted, beyond in MISSIONS:
         if robots and count not in robots:
@@ -108,8 +113,8 @@ def main(config: str, robots: Tuple[int, ...]) -> None:
         "robots",
         "processes",
         "real-time\nfactor",
-        "at\nleast",
-        "goal\nbeyond",
+        "required",
+        "swarm\nsimulator",
         "per CPU\nsecond",
         "memory\nMB",
         *(f"{part}\n%".replace(" ", "\n", 1) for part in PARTS),

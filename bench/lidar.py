@@ -1,8 +1,8 @@
-"""How long one scan of 512 beams takes, by the kernel and by the physics engine.
+"""Measure the time of a scan of 512 beams, with the kernel and with the physics engine.
 
     make bench
 
-Microseconds, medians; of several quadcopters in one call, the time for each.
+Medians in microseconds. Several robots scan in one call; the time is for each of them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RUNS = {"kernel": 50, "bullet": 5}
 
 
 def field(obstacles: int, robots: int, size_m: float = 60.0) -> Scene:
-    """Obstacles at random around a square pattern of start poses."""
+    """Make a scene with random obstacles and a square pattern of start poses."""
     random = np.random.default_rng(0)
     solids: List[Obstacle] = []
     for k in range(obstacles):
@@ -46,7 +46,7 @@ def field(obstacles: int, robots: int, size_m: float = 60.0) -> Scene:
 
 
 def scan_us(scene: Scene, robots: int, caster: str) -> float:
-    """For each robot, of all in one call."""
+    """Return the median time per robot of a call that scans all robots."""
     simulation = Simulation(scene, robots, SimulationParams(lidar_caster=caster))
     everyone = range(robots)
     simulation.scans(everyone)

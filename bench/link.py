@@ -1,4 +1,4 @@
-"""A second host on this machine: a network namespace at the other end of a cable, which can be cut.
+"""A second host on this machine: a network namespace behind a cable that can be cut.
 
 Needs root and the command ``ip`` of iproute2.
 """
@@ -20,22 +20,22 @@ def ip(*arguments: str) -> None:
 
 
 def why_no_links() -> str:
-    """Why this machine can't have one, "" when it can."""
+    """Reason why this machine cannot have such a link, "" if it can."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     if shutil.which("ip") is None:
-        return "there is no command ip; expected iproute2"
+        return "the command ip is missing; expected iproute2"
     made = subprocess.run(
         ["ip", "netns", "add", SPACE + "_try"], stderr=subprocess.PIPE, check=False
     )
     if made.returncode:
-        return f"no network namespace can be made: {made.stderr.decode().strip()}"
+        return f"cannot make a network namespace: {made.stderr.decode().strip()}"
     ip("netns", "delete", SPACE + "_try")
     return ""
 
 
 class Link:
-    """``there`` goes before a command that is to run on the other host."""
+    """The link; a command after the words ``there`` runs on the other host."""
 
     there: Tuple[str, ...] = ("ip", "netns", "exec", SPACE)
 
@@ -54,7 +54,7 @@ class Link:
 
     @staticmethod
     def cut(seconds: float) -> None:
-        """Nothing goes through for so long."""
+        """Cut the link for this wall time."""
         ip("link", "set", HERE, "down")
         time.sleep(seconds)
         ip("link", "set", HERE, "up")

@@ -1,9 +1,8 @@
-"""How long a large ``map_server`` map takes until a quadcopter could fly in it.
+"""Measure the time to load a large ``map_server`` map and to simulate in it.
 
     PYTHONPATH=src .venv/bin/python bench/map_scene.py [cells along an edge] [specks per cell]
 
-The map is a building: rooms with doors, ragged walls, columns, furniture, specks, and ground
-around it that nobody has seen.
+The map is a building with doors, ragged walls, furniture and specks, in unknown ground.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 
 
 def building(cells: int, specks: float, seed: int = 0) -> np.ndarray:
-    """The map's image, uint8[cells, cells]."""
+    """Return the map's image, uint8[cells, cells]."""
     random = np.random.default_rng(seed)
     image = np.full((cells, cells), UNKNOWN, np.uint8)
     edge, room, wall = cells // 20, 200, 4
@@ -42,7 +41,7 @@ def building(cells: int, specks: float, seed: int = 0) -> np.ndarray:
         row, column = random.integers(edge, cells - edge - 30, 2)
         high, wide = random.integers(4, 30, 2)
         image[row : row + high, column : column + wide] = OCCUPIED
-    ragged = image == OCCUPIED  # what a LIDAR has seen is a cell thicker here and there
+    ragged = image == OCCUPIED  # walls in a LIDAR's map are a cell thicker in places
     beside = (
         np.roll(ragged, 1, 0)
         | np.roll(ragged, -1, 0)

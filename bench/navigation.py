@@ -1,9 +1,8 @@
-"""How long the navigator's parts take, beside what the C++ original took in-process.
+"""Measure the navigator's parts and compare them with C++ move_base, called in-process.
 
     make bench
 
-The parameters and the arena are the tutorial's; the figures are medians in
-milliseconds. Compilation is not in them.
+Parameters and arena are the tutorial's. Times are medians in milliseconds without compilation.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from typing import Callable, List, Tuple
 from tabulate import tabulate
 
 from quad_nav import config
+from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.layered import LayeredCostmap
@@ -33,7 +33,7 @@ SCANS = 20  # kept by observation_persistence 1.0 at 20 Hz
 RUNS = 200
 
 # Milliseconds, navigation 1.17.3, release build, called in-process on two cores of a server.
-ORIGINAL = {
+CPP_MS = {
     "local costmap 120 x 120, 20 kept scans of 512 beams": 0.83,
     "global costmap 240 x 240, the same scans": 0.71,
     "NavfnROS, plan over 240 x 240": 1.0,
@@ -47,7 +47,7 @@ ORIGINAL = {
 def median_ms(
     call: Callable[[], object], prepare: Callable[[], object] = lambda: None, runs: int = RUNS
 ) -> float:
-    """The median of ``runs`` calls after a first one that compiles."""
+    """Return the median time of ``runs`` calls after a first one that compiles."""
     prepare()
     call()
     times = []
@@ -60,12 +60,12 @@ def median_ms(
 
 
 def tutorial_navigator() -> Tuple[Navigator, Pose2D]:
-    """A navigator of the tutorial in the arena, with a second's flight in its costmaps."""
+    """Build the tutorial's navigator, with a second of flight in its costmaps."""
     navigator = build_navigator(
         config.load(config.load_files(ROOT / "config" / "tutorial", {"i": "0"}))
     )
     simulation = Simulation(load_scene(ROOT / "scenes" / "arena.yaml"), 2)
-    for k in range(2 * SCANS):  # the first second is for taking up speed
+    for k in range(2 * SCANS):  # the robot accelerates in the first second
         simulation.set_command(0, Twist2D(vx_mps=0.3))
         for _ in range(STEPS_PER_S // 20):
             simulation.step()
@@ -82,7 +82,32 @@ def tutorial_navigator() -> Tuple[Navigator, Pose2D]:
     return navigator, pose.to_2d()
 
 
+def local_planners(tutorial: LocalPlanner) -> List[LocalPlanner]:
+    """Return the local planners to measure, the tutorial's first."""
+    assert isinstance(tutorial, TrajectoryPlanner)
+    short = replace(tutorial.params, vx_samples=6, sim_time_s=1.0)
+    window = replace(tutorial.params, dwa=True)
+    dwa = replace(
+        DwaParams(),
+        vx_samples=20,
+        vy_samples=1,
+        vth_samples=20,
+        max_vel_y_mps=0.0,
+        min_vel_y_mps=0.0,
+        max_vel_x_mps=0.3,
+        max_vel_trans_mps=0.3,
+    )
+    footprint, period_s = tutorial.footprint, tutorial.control_period_s
+    return [
+        tutorial,
+        TrajectoryPlanner(short, footprint, period_s),
+        TrajectoryPlanner(window, footprint, period_s),
+        DwaPlanner(dwa, footprint, period_s),
+    ]
+
+
 def rows() -> List[Tuple[str, float]]:
+    """Measure the parts; return their names and times in ms."""
     navigator, pose = tutorial_navigator()
     local, globe = navigator.local_costmap, navigator.global_costmap
     plan = navigator.make_plan(pose, GOAL)
@@ -91,57 +116,30 @@ def rows() -> List[Tuple[str, float]]:
     def update(costmap: LayeredCostmap) -> float:
         return median_ms(lambda: costmap.update(1.0, pose))
 
-    def control(controller) -> float:
+    def control(controller: LocalPlanner) -> float:
         return median_ms(
             lambda: controller.compute_velocity(local.spec, local.costs, pose, flying),
             prepare=lambda: controller.set_plan(plan),
         )
 
-    controller = navigator.controller
-    assert isinstance(controller, TrajectoryPlanner)
-    short = TrajectoryPlanner(
-        replace(controller.params, vx_samples=6, sim_time_s=1.0),
-        controller.footprint,
-        controller.control_period_s,
-    )
-    window = TrajectoryPlanner(
-        replace(controller.params, dwa=True), controller.footprint, controller.control_period_s
-    )
-    dwa = DwaPlanner(
-        replace(
-            DwaParams(),
-            vx_samples=20,
-            vy_samples=1,
-            vth_samples=20,
-            max_vel_y_mps=0.0,
-            min_vel_y_mps=0.0,
-            max_vel_x_mps=0.3,
-            max_vel_trans_mps=0.3,
-        ),
-        controller.footprint,
-        controller.control_period_s,
-    )
     measured = [
         update(local),
         update(globe),
         median_ms(lambda: navigator.make_plan(pose, GOAL)),
-        control(controller),
-        control(short),
-        control(window),
-        control(dwa),
+        *map(control, local_planners(navigator.controller)),
     ]
-    return list(zip(ORIGINAL, measured))
+    return list(zip(CPP_MS, measured))
 
 
 def main() -> None:
     table = [
-        (name, f"{ms:.2f}", f"{ORIGINAL[name]:.2f}", f"{ms / ORIGINAL[name]:.2f}")
+        (name, f"{ms:.2f}", f"{CPP_MS[name]:.2f}", f"{ms / CPP_MS[name]:.2f}")
         for name, ms in rows()
     ]
     print(
         tabulate(
             table,
-            ("", "ours, ms", "original, ms", "ratio"),
+            ("", "Python, ms", "C++, ms", "ratio"),
             disable_numparse=True,
             colalign=("left", "right", "right", "right"),
         )

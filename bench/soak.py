@@ -1,11 +1,10 @@
-"""Whether a long flight stays as it began: memory and control cycles over simulated hours.
+"""Fly offline for simulated hours and watch memory and control cycles.
 
     PYTHONPATH=src .venv/bin/python bench/soak.py --robots 10 --hours 8
 
-Goals at random in a random scene, again and again. Each row is a stretch of the flight.
-Memory is compared with that at the end of the first one, when everything has been used
-once; cycle times tell as much of the machine's other work as of the flight, seconds of processor
-time less.
+A random mission that loops. Each row covers a stretch of the flight. Memory is compared with that
+at the end of the first stretch. Cycle times depend on the machine's other load, CPU seconds depend
+on it less.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.contacts import Contact
 
-FLAT = 0.05  # that much growth is none
+FLAT = 0.05  # relative growth that passes
 HEADER = "hours   memory MB   CPU s   cycles   median ms   99 % ms   reached   skipped   contacts"
 
 
@@ -39,18 +38,22 @@ class Stretches(FlightObserver):
         self._begin()
 
     def on_contact(self, contact: Contact) -> None:
+        """Count a contact."""
         self._contacts += 1
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
+        """Count a goal that ends."""
         if isinstance(action, GoalEnded):
             self._reached += action.reached
             self._skipped += not action.reached
 
     def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
+        """Store a control cycle's wall time."""
         if tick.cycle:
             self._cycles_ms.append(1000 * wall_s)
 
     def on_move(self, flight: Flight) -> None:
+        """Print a row at the end of a stretch."""
         if flight.now_s < self._length_s * (len(self.memories_mb) + 1):
             return
         self.memories_mb.append(memory_mb())
@@ -70,7 +73,7 @@ class Stretches(FlightObserver):
 
 
 def memory_mb() -> float:
-    """What the process has in memory now."""
+    """Resident memory of this process."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 1e6
 
@@ -82,12 +85,12 @@ def looped(goals: RobotGoals) -> RobotGoals:
 
 @click.command()
 @click.option("--robots", default=10, show_default=True)
-@click.option("--hours", default=8.0, show_default=True, help="Simulated.")
-@click.option("--minutes", default=30.0, show_default=True, help="Simulated, per row.")
+@click.option("--hours", default=8.0, show_default=True, help="Simulated time.")
+@click.option("--minutes", default=30.0, show_default=True, help="Simulated time per row.")
 @click.option("--seed", default=0, show_default=True)
 @click.option("--config", default="default", show_default=True)
 def main(robots: int, hours: float, minutes: float, seed: int, config: str) -> None:
-    """A long flight; exit status 1 if memory grows or two quadcopters touch."""
+    """Fly for long; exit status 1 if memory grows or there is a contact."""
     setup = read_setup(
         FlightOptions(None, None, config, robots=robots, seed=seed, time_limit_s=3600 * hours)
     )

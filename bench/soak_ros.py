@@ -1,27 +1,24 @@
-"""Whether a long flight on ROS stays as it began: memory, commands and messages lost.
+"""Fly for long on ROS and watch memory, commands and lost messages.
 
     scripts/ros_env python3 bench/soak_ros.py --robots 10 --minutes 30
 
-Starts ``fleet.launch`` with goals that are flown again and again. Each row is a stretch of
-wall time: how fast the simulation went, commands per simulated second and quadcopter, how
-many messages of odometry and scans did not arrive by their sequence numbers, and the memory
-of each node. Exit status 1 if a node's memory grows by more than 5 % after the first row, or
-a message is lost.
+Starts ``fleet.launch`` with missions that loop. Each row covers a stretch of wall time: the
+real-time factor, commands per simulated second and robot, lost messages of odometry and scans by
+their sequence numbers, and the memory of each node. Exit status 1 if a node's memory grows by more
+than 5 % after the first row, or a message is lost.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import signal
-import subprocess
 import time
-from typing import Dict, List
+from typing import Any, Dict, List
 
-from fleet import Clock, Commands, free_port, used
+from fleet import Clock, Commands, free_port, launch_fleet, used
 
 FLAT = 0.05
-SAMPLED = 5  # quadcopters whose messages are counted
+SAMPLED = 5  # robots whose messages are counted
 QUEUE = 1000
 
 
@@ -31,26 +28,11 @@ def main() -> None:
     parser.add_argument("--hosts", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=30.0, help="wall time")
     parser.add_argument("--stretch", type=float, default=5.0, help="minutes per row")
-    parser.add_argument("arguments", nargs="*", help="more for the launch file")
+    parser.add_argument("arguments", nargs="*", help="further arguments of the launch file")
     given = parser.parse_args()
     port = free_port()
-    os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
-    launch = subprocess.Popen(
-        [
-            "roslaunch",
-            "-p",
-            str(port),
-            "quad",
-            "fleet.launch",
-            f"robots:={given.robots}",
-            f"hosts:={given.hosts}",
-            "rviz:=false",
-            "loop:=true",
-            *given.arguments,
-        ],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
+    launch = launch_fleet(
+        port, given.robots, f"hosts:={given.hosts}", "loop:=true", *given.arguments
     )
     try:
         is_steady = watch(given.robots, 60 * given.minutes, 60 * given.stretch, port)
@@ -61,7 +43,7 @@ def main() -> None:
 
 
 def watch(robots: int, duration_s: float, stretch_s: float, port: int) -> bool:
-    """Print the rows; whether all stayed as it began."""
+    """Print the rows; return True if no node's memory grew and no message was lost."""
     clock = Clock(time.monotonic() + 120.0)
     clock.wait_until(5.0)
     sampled = min(robots, SAMPLED)
@@ -99,9 +81,9 @@ class SequenceCounter:
 
         self.received = self.lost = 0
         self._last = -1
-        rospy.Subscriber(topic, message_type, self._take, queue_size=QUEUE)
+        rospy.Subscriber(topic, message_type, self._count, queue_size=QUEUE)
 
-    def _take(self, message) -> None:
+    def _count(self, message: Any) -> None:
         if self._last >= 0:
             self.lost += message.header.seq - self._last - 1
         self._last = message.header.seq
