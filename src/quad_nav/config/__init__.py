@@ -9,8 +9,8 @@
 Reading order: ``spec`` (parameters and tables), ``tables`` (the tables), ``reader`` (check of a
 namespace), ``costmaps``, ``layers``, ``planners``, ``local_planners``, ``recoveries`` and ``fixes``
 (namespaces to dataclasses), ``configuration`` (the whole), ``reconfiguration`` (changes in flight),
-``files`` and ``file_sets`` (YAML), ``check`` (the report of ``quad check``), ``plugins`` (classes of
-users), ``reference`` (generates ``docs/parameters.md``).
+``files`` and ``file_sets`` (YAML), ``check`` (the report of ``quad check``), ``plugins`` (classes
+of users), ``reference`` (generates ``docs/parameters.md``).
 """
 
 from __future__ import annotations

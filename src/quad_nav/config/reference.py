@@ -36,8 +36,8 @@ Look up the name, default, range and meaning of every parameter of the navigator
 
 Parameters have the names, places and meanings of ROS's `move_base` (navigation 1.17.3). A default
 is the value in force when nothing is set. Where the wiki differs from dynamic_reconfigure's
-description, the latter is used. Values outside a range are clamped, with a warning. Parameters
-marked (R) can change in flight, with dynamic_reconfigure.
+description, the latter is used. Ranges are in parentheses. Values outside a range are clamped,
+with a warning. Parameters marked (R) can change in flight, with dynamic_reconfigure.
 
 The navigator refuses wrong types and impossible values, such as a string for a number, NaN or a
 negative radius. It lists all errors before anything flies. It starts, with a warning for each, with
@@ -143,18 +143,18 @@ def reference() -> str:
 
 
 def _rows(table: Table) -> List[str]:
-    rows = ["| name | default | range | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+    rows = ["| name and default | meaning |", "| --- | --- |"]
     for parameter in table.parameters:
         mark = " (R)" if parameter in table.reconfigurable else ""
         unit = "" if parameter.kind == "str" else parameter.unit
-        rows.append(
-            f"| `{parameter.name}`{mark} | {_default(parameter)} | {_range(parameter)} |"
-            f" {unit} | {parameter.description} |"
-        )
+        values = f"{_default(parameter)} {unit}".strip()
+        if _range(parameter):
+            values += f" ({_range(parameter)})"
+        rows.append(f"| `{parameter.name}`{mark}<br>{values} | {parameter.description} |")
     for name, reason in table.unsupported:
-        rows.append(f"| `{name}` | | | | not supported: {reason} |")
+        rows.append(f"| `{name}` | not supported: {reason} |")
     for name, reason in table.ignored:
-        rows.append(f"| `{name}` | | | | ignored: {reason} |")
+        rows.append(f"| `{name}` | ignored: {reason} |")
     return rows
 
 
@@ -162,7 +162,8 @@ def _default(parameter: Parameter) -> str:
     if parameter.kind == "bool":
         return str(parameter.default).lower()
     if parameter.kind == "str":
-        return f'`"{parameter.default}"`'
+        breakable = str(parameter.default).replace("/", "/<wbr>")
+        return f"<code>{breakable}</code>" if "/" in breakable else f'`"{parameter.default}"`'
     return f"{parameter.in_force:g}"
 
 
@@ -171,8 +172,9 @@ def _range(parameter: Parameter) -> str:
         return ", ".join(f"{choice.value} {choice.name}" for choice in parameter.choices)
     if parameter.low is None and parameter.high is None:
         return ""
-    ends = ("" if end is None else f"{end:g}" for end in (parameter.low, parameter.high))
-    return " .. ".join(ends)
+    if parameter.high is None:
+        return f"{parameter.low:g} or more"
+    return f"{parameter.low:g} to {parameter.high:g}"
 
 
 if __name__ == "__main__":
