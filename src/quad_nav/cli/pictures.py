@@ -17,6 +17,11 @@ class FlightPictures:
 
     Nothing is traced, and no plotting library imported, if neither is requested.
 
+    Args:
+        setup: Flight that is going to be flown.
+        report: HTML file of the report, or None.
+        animation: GIF or MP4 file of the animation, or None.
+
     Raises:
         InputError: The animation cannot be written.
     """

@@ -41,6 +41,7 @@ def cycle_picture(trace: FlightTrace) -> Figure:
         xticks=[0.001, 0.01, 0.1, 1.0],
         xticklabels=["0.1 %", "1 %", "10 %", "100 %"],
     )
+    right.get_xticklabels()[0].set_horizontalalignment("left")
     time_axis(left)
     robot_legend(figure, [robot.name for robot in trace.robots])
     return figure

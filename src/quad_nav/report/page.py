@@ -156,7 +156,7 @@ def _curves(
         _distances(trace, tracks, shown),
         Section(
             "timeline",
-            "Goals",
+            "Timeline",
             "A bar is a goal with its number, from sending it to its end.",
             (picture("timeline", "Goals over time", timeline_picture(trace)),),
         ),

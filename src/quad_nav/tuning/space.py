@@ -1,4 +1,4 @@
-"""What is searched: parameters of move_base, and the values that each may have.
+"""Search space: parameters of move_base, and the values that each may have.
 
 A space is a YAML file, one entry for each parameter's path:
 

@@ -21,7 +21,15 @@ REPORT = "report.html"
 
 
 def write_result(result: TuneResult, command: str) -> Iterator[Path]:
-    """Write everything into the study's folder; yield each path when it is written."""
+    """Write the outputs of a study into its folder.
+
+    Args:
+        result: Outcome of the study.
+        command: Command line of the study, for the documentation.
+
+    Yields:
+        Each path when it is written: tuned parameters, results and report.
+    """
     folder = result.setup.options.output
     parameters = folder / PARAMETERS
     write_parameters(result.setup.base_folder, parameters, changes(result))

@@ -73,7 +73,7 @@ class TuneSetup:
 
     @property
     def identity(self) -> Dict[str, Any]:
-        """What the study depends on; a study resumes only with an equal identity."""
+        """Everything that the study depends on; a study resumes only if it is equal."""
         search = self.options.search
         return {
             **self.course.identity(),

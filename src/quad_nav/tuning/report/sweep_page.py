@@ -21,7 +21,7 @@ def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
         section = Section(
             "sweep",
             "Comparison",
-            f"Every point flies the same {setup.flights} flights. A gap is the smaller of "
+            f"Flights per point: {setup.flights}, equal for all points. A gap is the smaller of "
             "clearance and separation. Times are those of completed missions.",
             (picture("sweep", "Statistics over the values", sweep_picture(rows)),),
         )

@@ -110,7 +110,8 @@ def _draw_map(
     if cells.size <= _MAX_NUMBERS:
         for (i, j), number in np.ndenumerate(cells):
             text = "–" if np.isnan(number) else f"{number:.{measure.decimals}f}"
-            ink = _ink(image.to_rgba(np.array(number)))
+            # Unknown cells are transparent, so white text would be invisible.
+            ink = "black" if np.isnan(number) else _ink(image.to_rgba(np.array(number)))
             axes.text(j, i, text, color=ink, ha="center", va="center", fontsize=8)
     else:
         figure.colorbar(image, ax=axes)
@@ -137,7 +138,7 @@ def _cells(
 def _ink(rgba: NDArray[Any]) -> str:
     """Return black or white, whichever is readable on a colour, by its luma (ITU-R BT.601)."""
     luma = float(np.dot(rgba[:3], (0.299, 0.587, 0.114)))
-    return "black" if luma > 0.5 or rgba[3] == 0.0 else "white"
+    return "black" if luma > 0.5 else "white"
 
 
 def _draw_list(axes: Axes, rows: Sequence[SweepRow], measure: Measure) -> None:
