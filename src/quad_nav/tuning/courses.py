@@ -189,7 +189,7 @@ def files_digest(*paths: Path) -> str:
         files = (
             [path]
             if path.is_file()
-            else sorted(one for pattern in ("*.yaml", "*.json") for one in path.glob(pattern))
+            else sorted(entry for pattern in ("*.yaml", "*.json") for entry in path.glob(pattern))
         )
         for file in files:
             digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")

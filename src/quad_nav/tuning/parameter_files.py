@@ -158,9 +158,9 @@ def _below(tree: Any, path: Sequence[str]) -> Optional[Any]:
 def _unlike(meant: Mapping[str, Any], found: Mapping[str, Any], place: str = "") -> List[str]:
     lines: List[str] = []
     for key in sorted({*meant, *found}):
-        one, other = meant.get(key), found.get(key)
-        if isinstance(one, dict) and isinstance(other, dict):
-            lines += _unlike(one, other, f"{place}{key}/")
-        elif one != other:
-            lines.append(f"{place}{key} {other!r} and not {one!r}")
+        expected, actual = meant.get(key), found.get(key)
+        if isinstance(expected, dict) and isinstance(actual, dict):
+            lines += _unlike(expected, actual, f"{place}{key}/")
+        elif expected != actual:
+            lines.append(f"{place}{key} {actual!r} instead of {expected!r}")
     return lines

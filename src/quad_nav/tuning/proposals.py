@@ -35,7 +35,7 @@ optuna.logging.set_verbosity(logging.WARNING)
 
 def distributions(space: SearchSpace) -> Dict[str, BaseDistribution]:
     """Convert the space to Optuna's distributions."""
-    return {one.path: _distribution(one) for one in space.dimensions}
+    return {dimension.path: _distribution(dimension) for dimension in space.dimensions}
 
 
 def propose(
@@ -46,7 +46,10 @@ def propose(
     wanted = distributions(space)
     trials = [study.ask(wanted) for _ in range(size)]
     return [
-        {one.path: one.rounded(trial.params[one.path]) for one in space.dimensions}
+        {
+            dimension.path: dimension.rounded(trial.params[dimension.path])
+            for dimension in space.dimensions
+        }
         for trial in trials
     ]
 
@@ -85,9 +88,9 @@ def _study(history: Sequence[FrozenTrial], seed: int, generation: int) -> optuna
     return study
 
 
-def _distribution(one: Dimension) -> BaseDistribution:
-    if one.choices:
-        return CategoricalDistribution(one.choices)
-    if one.integer:
-        return IntDistribution(int(one.low), int(one.high), log=one.log)
-    return FloatDistribution(one.low, one.high, log=one.log)
+def _distribution(dimension: Dimension) -> BaseDistribution:
+    if dimension.choices:
+        return CategoricalDistribution(dimension.choices)
+    if dimension.integer:
+        return IntDistribution(int(dimension.low), int(dimension.high), log=dimension.log)
+    return FloatDistribution(dimension.low, dimension.high, log=dimension.log)

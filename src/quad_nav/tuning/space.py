@@ -78,38 +78,42 @@ class SearchSpace:
     @property
     def paths(self) -> Tuple[str, ...]:
         """Paths of the parameters."""
-        return tuple(one.path for one in self.dimensions)
+        return tuple(dimension.path for dimension in self.dimensions)
 
     def without(self, fixed: Sequence[str]) -> SearchSpace:
         """Return the space without fixed parameters; followers among them are dropped."""
         names = {path for given in fixed for path in costmap_paths(given)}
         kept = []
-        for one in self.dimensions:
-            if not names.issuperset(costmap_paths(one.path)):
-                follow = tuple(pair for pair in one.follow if pair[0] not in names)
-                kept.append(replace(one, follow=follow))
+        for dimension in self.dimensions:
+            if not names.issuperset(costmap_paths(dimension.path)):
+                follow = tuple(pair for pair in dimension.follow if pair[0] not in names)
+                kept.append(replace(dimension, follow=follow))
         return replace(self, dimensions=tuple(kept))
 
     def assignments(self, values: Values) -> Assignments:
         """Return the values and their followers, for each costmap by its own name."""
         found: Dict[str, Any] = {}
-        for one in self.dimensions:
-            if one.path in values:
-                value = values[one.path]
-                found.update(dict.fromkeys(costmap_paths(one.path), value))
-                for path, factor in one.follow:
+        for dimension in self.dimensions:
+            if dimension.path in values:
+                value = values[dimension.path]
+                found.update(dict.fromkeys(costmap_paths(dimension.path), value))
+                for path, factor in dimension.follow:
                     found.update(dict.fromkeys(costmap_paths(path), _times(value, factor)))
         return tuple(found.items())
 
     def corners(self) -> Tuple[Dict[str, Any], Dict[str, Any]]:
         """Return the lowest and the highest values of all parameters."""
         low = {
-            one.path: one.choices[0] if one.choices else one.rounded(one.low)
-            for one in self.dimensions
+            dimension.path: dimension.choices[0]
+            if dimension.choices
+            else dimension.rounded(dimension.low)
+            for dimension in self.dimensions
         }
         high = {
-            one.path: one.choices[-1] if one.choices else one.rounded(one.high)
-            for one in self.dimensions
+            dimension.path: dimension.choices[-1]
+            if dimension.choices
+            else dimension.rounded(dimension.high)
+            for dimension in self.dimensions
         }
         return low, high
 
@@ -140,7 +144,7 @@ def load_space(path: Path) -> SearchSpace:
         )
     problems: List[str] = []
     found = [_dimension(str(name), entry, path, problems) for name, entry in entries.items()]
-    dimensions = [one for one in found if one is not None]
+    dimensions = [dimension for dimension in found if dimension is not None]
     problems += _set_twice(dimensions, path)
     if problems:
         raise InputError(problems)
@@ -203,7 +207,7 @@ def _choice_faults(entry: Mapping[str, Any], place: str) -> List[str]:
     if not (
         isinstance(choices, list)
         and len(choices) > 1
-        and all(isinstance(one, (bool, int, float, str)) for one in choices)
+        and all(isinstance(choice, (bool, int, float, str)) for choice in choices)
     ):
         faults.append(f"{place}: choices: {choices!r}, expected two values or more")
     elif entry.get("follow") and not all(map(is_number, choices)):
@@ -216,15 +220,15 @@ def _set_twice(dimensions: Sequence[Dimension], path: Path) -> List[str]:
     """Return a fault for every parameter that more than one entry sets."""
     places: Dict[str, str] = {}
     problems = []
-    for one in dimensions:
-        for name in (one.path, *(other for other, _ in one.follow)):
+    for dimension in dimensions:
+        for name in (dimension.path, *(other for other, _ in dimension.follow)):
             for single in costmap_paths(name):
                 if single in places:
                     problems.append(
-                        f"{path}: {one.path}: {single} is also set by "
+                        f"{path}: {dimension.path}: {single} is also set by "
                         f"{places[single]}; expected one entry for it"
                     )
-                places.setdefault(single, one.path)
+                places.setdefault(single, dimension.path)
     return problems
 
 

@@ -52,7 +52,7 @@ def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
     """Format the statistics of the held-out flights."""
     tables = [
         tabulate.tabulate(
-            [statistics_row(name, one) for name, one in held_out_rows(result)],
+            [statistics_row(name, statistics) for name, statistics in held_out_rows(result)],
             _header(_HEADER, tablefmt),
             tablefmt=tablefmt,
             disable_numparse=True,
@@ -64,7 +64,7 @@ def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
         tables.append(
             "By the benchmark's protocol:\n\n"
             + tabulate.tabulate(
-                [barn_row(name, one) for name, one in barn],
+                [barn_row(name, statistics) for name, statistics in barn],
                 _header(_BARN_HEADER, tablefmt),
                 tablefmt=tablefmt,
                 disable_numparse=True,
@@ -93,34 +93,35 @@ def barn_rows(result: TuneResult) -> Tuple[Tuple[str, BarnStatistics], ...]:
     )
 
 
-def barn_row(name: str, one: BarnStatistics) -> List[str]:
+def barn_row(name: str, statistics: BarnStatistics) -> List[str]:
     """Format a row of the benchmark's table."""
-    low, high = one.success_interval
+    low, high = statistics.success_interval
     rates = [
-        f"{100 * count / one.runs:.1f}" for count in (one.successes, one.collisions, one.time_outs)
+        f"{100 * count / statistics.runs:.1f}"
+        for count in (statistics.successes, statistics.collisions, statistics.time_outs)
     ]
     return [
         name,
-        str(one.runs),
+        str(statistics.runs),
         rates[0],
         f"{100 * low:.1f}-{100 * high:.1f}",
         *rates[1:],
-        _figure(one.mean_time_s, 1),
-        f"{one.metric:.3f}",
+        _figure(statistics.mean_time_s, 1),
+        f"{statistics.metric:.3f}",
     ]
 
 
-def statistics_row(name: str, one: FlightStatistics) -> List[str]:
+def statistics_row(name: str, statistics: FlightStatistics) -> List[str]:
     """Format a row of the table of statistics."""
     return [
         name,
-        str(one.flights),
-        str(one.completed),
-        str(one.touched),
-        _figure(one.mean_time_s, 1),
-        _figure(one.least_gap_m, 2),
-        f"{one.roughness_mps2:.2f}",
-        f"{one.cost:.3f}",
+        str(statistics.flights),
+        str(statistics.completed),
+        str(statistics.touched),
+        _figure(statistics.mean_time_s, 1),
+        _figure(statistics.least_gap_m, 2),
+        f"{statistics.roughness_mps2:.2f}",
+        f"{statistics.cost:.3f}",
     ]
 
 
@@ -172,17 +173,21 @@ def changes(result: TuneResult) -> List[Change]:
         for path, value in result.setup.course.fixed
         if base_value(base, path) != value
     ]
-    for one in result.setup.space.dimensions:
-        gain = gains.get(one.path)
+    for dimension in result.setup.space.dimensions:
+        gain = gains.get(dimension.path)
         if gain is None:
             continue
         found.append(
-            Change(one.path, gain.value, f"tuned, was {format_value(gain.base)}: {gain_text(gain)}")
+            Change(
+                dimension.path,
+                gain.value,
+                f"tuned, was {format_value(gain.base)}: {gain_text(gain)}",
+            )
         )
-        followers = dict(result.setup.space.assignments({one.path: gain.value}))
+        followers = dict(result.setup.space.assignments({dimension.path: gain.value}))
         found += [
-            Change(path, followers[costmap_paths(path)[0]], f"follows {one.path}")
-            for path, _ in one.follow
+            Change(path, followers[costmap_paths(path)[0]], f"follows {dimension.path}")
+            for path, _ in dimension.follow
         ]
     return found
 
@@ -208,7 +213,7 @@ def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
         "score": {term.name: term.weight for term in TERMS},
         "parameters": dict(result.assignments),
         "gains": [{**asdict(gain), "cost": gain.cost} for gain in result.refined.gains],
-        "held_out": {name: asdict(one) for name, one in held_out_rows(result)},
+        "held_out": {name: asdict(statistics) for name, statistics in held_out_rows(result)},
         "held_out_flights": [
             {
                 "mission": case.name,
@@ -221,7 +226,7 @@ def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
         ],
     }
     if isinstance(setup.course, BarnCourse):
-        found["barn"] = {name: asdict(one) for name, one in barn_rows(result)}
+        found["barn"] = {name: asdict(statistics) for name, statistics in barn_rows(result)}
     return found
 
 

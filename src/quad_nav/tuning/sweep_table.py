@@ -73,20 +73,20 @@ def write_csv(rows: Sequence[SweepRow], file: TextIO) -> None:
         )
 
 
-def _cells(one: FlightStatistics) -> List[str]:
+def _cells(statistics: FlightStatistics) -> List[str]:
     return [
-        str(one.flights),
-        _percent(one.completed, one),
-        _percent(one.touched, one),
-        _figure(one.mean_time_s, 1),
-        _figure(one.least_gap_m, 2),
-        f"{one.roughness_mps2:.2f}",
-        f"{one.cost:.2f}",
+        str(statistics.flights),
+        _percent(statistics.completed, statistics),
+        _percent(statistics.touched, statistics),
+        _figure(statistics.mean_time_s, 1),
+        _figure(statistics.least_gap_m, 2),
+        f"{statistics.roughness_mps2:.2f}",
+        f"{statistics.cost:.2f}",
     ]
 
 
-def _percent(count: int, one: FlightStatistics) -> str:
-    return f"{100 * count / one.flights:.0f}"
+def _percent(count: int, statistics: FlightStatistics) -> str:
+    return f"{100 * count / statistics.flights:.0f}"
 
 
 def _figure(value: Optional[float], decimals: int) -> str:

@@ -211,8 +211,10 @@ def start_values(space: SearchSpace, base: Mapping[str, Any]) -> Dict[str, Any]:
     """Return the base's values within the space: the first candidate."""
     low, _ = space.corners()
     return {
-        one.path: low[one.path] if base[one.path] is None else one.nearest(base[one.path])
-        for one in space.dimensions
+        dimension.path: low[dimension.path]
+        if base[dimension.path] is None
+        else dimension.nearest(base[dimension.path])
+        for dimension in space.dimensions
     }
 
 

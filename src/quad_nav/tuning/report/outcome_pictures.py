@@ -17,17 +17,17 @@ Place = Tuple[float, float]
 """Mean time in seconds, smallest gap in metres."""
 
 
-def place(one: FlightStatistics) -> Optional[Place]:
+def place(statistics: FlightStatistics) -> Optional[Place]:
     """Return (mean time, min gap); None if no mission was completed or nothing was near."""
-    if one.mean_time_s is None or one.least_gap_m is None:
+    if statistics.mean_time_s is None or statistics.least_gap_m is None:
         return None
-    return one.mean_time_s, one.least_gap_m
+    return statistics.mean_time_s, statistics.least_gap_m
 
 
 def front(places: Sequence[Place]) -> List[Place]:
     """Return the places that no other place beats in both time and gap, by time."""
     kept: List[Place] = []
-    for time_s, gap_m in sorted(places, key=lambda one: (one[0], -one[1])):
+    for time_s, gap_m in sorted(places, key=lambda point: (point[0], -point[1])):
         if not kept or gap_m > kept[-1][1]:
             kept.append((time_s, gap_m))
     return kept
@@ -41,7 +41,11 @@ def pareto_picture(
     axes = figure.subplots()
     clean = [
         found
-        for found in (place(one) for one in candidates if one.succeeded == one.flights)
+        for found in (
+            place(statistics)
+            for statistics in candidates
+            if statistics.succeeded == statistics.flights
+        )
         if found is not None
     ]
     if clean:
@@ -50,8 +54,8 @@ def pareto_picture(
         times_s, gaps_m = zip(*front(clean))
         axes.step(times_s, gaps_m, where="post", color=QUIET, lw=1.2, zorder=2)
         axes.scatter(times_s, gaps_m, s=60, facecolor="none", edgecolor=QUIET, zorder=4)
-    for one, marker, ink in ((base, "s", "black"), (tuned, "*", ALARM)):
-        found = place(one)
+    for statistics, marker, ink in ((base, "s", "black"), (tuned, "*", ALARM)):
+        found = place(statistics)
         if found is not None:
             axes.plot(
                 *found, marker, color=ink, ms=8 if marker == "s" else 14, mec="white", zorder=6
@@ -76,12 +80,12 @@ def held_out_picture(base: Sequence[FlightResult], tuned: Sequence[FlightResult]
     left, right = figure.subplots(1, 2)
     _draw_pairs(
         left,
-        [(one.time_s, other.time_s) for one, other in zip(base, tuned)],
+        [(before.time_s, after.time_s) for before, after in zip(base, tuned)],
         "Mission time (s)",
         base,
         tuned,
     )
-    gaps = [(one.gap_m, other.gap_m) for one, other in zip(base, tuned)]
+    gaps = [(before.gap_m, after.gap_m) for before, after in zip(base, tuned)]
     _draw_pairs(
         right,
         [(np.nan if a is None else a, np.nan if b is None else b) for a, b in gaps],

@@ -99,18 +99,18 @@ def slice_picture(
     """
     rows = -(-len(order) // _COLUMNS)
     figure = new_figure(0.6 + 1.75 * rows)
-    by_path = {one.path: one for one in space.dimensions}
+    by_path = {dimension.path: dimension for dimension in space.dimensions}
     top, bottom = _top(trials, reference), _bottom(trials, reference)
     panels: List[Axes] = list(figure.subplots(rows, _COLUMNS, squeeze=False).flat)
     for axes, path in zip(panels, order):
-        one = by_path[path]
-        _draw_costs(axes, [_place(one, trial.params[path]) for trial in trials], trials, top)
+        dimension = by_path[path]
+        _draw_costs(axes, [_place(dimension, trial.params[path]) for trial in trials], trials, top)
         for value, style in ((base.get(path), "--"), (chosen.get(path), "-")):
             if value is not None:
-                axes.axvline(_place(one, value), color="black", ls=style, lw=1.0, zorder=1)
+                axes.axvline(_place(dimension, value), color="black", ls=style, lw=1.0, zorder=1)
         axes.set_title("\n".join(_two_lines(path)), fontsize=7.5)
         axes.set_ylim(bottom, top)
-        _scale(axes, one)
+        _scale(axes, dimension)
     for axes in panels[len(order) :]:
         axes.axis("off")
     robot_legend(
@@ -142,7 +142,7 @@ def _draw_costs(
                 zorder=3,
                 clip_on=False,
                 linewidths=1.0,
-                color=[ALARM if one else face for one in above],
+                color=[ALARM if is_above else face for is_above in above],
             )
 
 
@@ -176,20 +176,20 @@ def _bottom(trials: Sequence[FrozenTrial], reference: float) -> float:
     return low - 0.08 * (_top(trials, reference) - low)
 
 
-def _place(one: Dimension, value: Any) -> float:
+def _place(dimension: Dimension, value: Any) -> float:
     """Return the position of a value on the axis; choices are numbered."""
-    if not one.choices:
+    if not dimension.choices:
         return float(value)
-    return float(one.choices.index(value)) if value in one.choices else -0.5
+    return float(dimension.choices.index(value)) if value in dimension.choices else -0.5
 
 
-def _scale(axes: Axes, one: Dimension) -> None:
-    if one.log:
+def _scale(axes: Axes, dimension: Dimension) -> None:
+    if dimension.log:
         axes.set_xscale("log")
         label_log(axes.xaxis)
-    if one.choices:
-        axes.set_xticks(range(len(one.choices)))
-        axes.set_xticklabels(list(map(str, one.choices)))
+    if dimension.choices:
+        axes.set_xticks(range(len(dimension.choices)))
+        axes.set_xticklabels(list(map(str, dimension.choices)))
     axes.tick_params(labelsize=7.5)
 
 

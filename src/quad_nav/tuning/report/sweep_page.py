@@ -46,6 +46,6 @@ def write_sweep_report(
         yield path
     if pictures is not None:
         pictures.mkdir(parents=True, exist_ok=True)
-        for one in page.pictures:
-            (pictures / f"{one.name}.png").write_bytes(one.png)
+        for image in page.pictures:
+            (pictures / f"{image.name}.png").write_bytes(image.png)
         yield pictures

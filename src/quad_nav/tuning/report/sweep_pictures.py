@@ -75,7 +75,9 @@ def sweep_picture(rows: Sequence[SweepRow]) -> Figure:
 def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measure) -> None:
     places, labels = _places([row.point[path] for row in rows])
     found = [measure.value(row.statistics) for row in rows]
-    axes.plot(places, [np.nan if one is None else one for one in found], "o-", color=colour(0))
+    axes.plot(
+        places, [np.nan if value is None else value for value in found], "o-", color=colour(0)
+    )
     if measure.title.startswith("Mean"):  # also each flight
         for place, row in zip(places, rows):
             times_s = [flight.time_s for flight in row.flights if flight.completed]
@@ -146,7 +148,7 @@ def _draw_list(axes: Axes, rows: Sequence[SweepRow], measure: Measure) -> None:
     is_alarming = measure.title.startswith("Flights with")
     axes.barh(
         range(len(rows)),
-        [0.0 if one is None else one for one in found],
+        [0.0 if value is None else value for value in found],
         height=0.65,
         color=ALARM if is_alarming else colour(0),
     )
