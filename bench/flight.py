@@ -28,7 +28,7 @@ MISSIONS: Tuple[Tuple[int, float, float, float], ...] = (
 HALL_M = 60.0
 # The functions of each part, as file:function.
 PARTS: Dict[str, Tuple[str, ...]] = {
-    "bodies": ("simulation.py:step",),
+    "bodies": ("simulation.py:advance",),
     "LIDAR": ("casters.py:scan",),
     "scans to points": ("scan_intake.py:add_scan",),
     "costmaps": ("layered.py:update",),

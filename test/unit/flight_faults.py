@@ -1,19 +1,17 @@
-"""Faults of a quadcopter's sensor_faults, between an offline flight's simulation and its navigator."""
+"""Sensor faults, injected between an offline flight's simulation and its navigator."""
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
-from typing import Callable, Optional, Tuple
+from typing import Callable, Optional
 
 import numpy as np
 
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.offline.flight import Flight, FlightObserver
-from quad_nav.offline.navigator_group import OfflineRobot
-
-Seen = Tuple[Scan, Pose3D]
+from quad_nav.offline.navigator_group import LocatedScan, OfflineRobot
 
 
 def with_ranges(scan: Scan, change: Callable[[np.ndarray], None]) -> Scan:
@@ -22,49 +20,49 @@ def with_ranges(scan: Scan, change: Callable[[np.ndarray], None]) -> Scan:
     return replace(scan, ranges_m=ranges_m)
 
 
-class SenseFault(FlightObserver):
-    """Quadcopter 0's sensor_faults from ``begin_s`` to ``end_s``; the base class does no harm.
+class SensorFault(FlightObserver):
+    """A fault of robot 0 from ``begin_s`` to ``end_s``; the base class changes nothing.
 
-    ``hover_after_s`` is how long after the fault's begin the last command was sent that was
-    not to hover, as far as the fault lasts; ``away_s`` how long after its end it flew again.
+    ``hover_after_s``: time from the fault's begin to the last command during the fault that was
+    not zero. ``resume_after_s``: time from the fault's end to the next such command.
     """
 
     def __init__(self, begin_s: float, end_s: float):
         self.begin_s, self.end_s = begin_s, end_s
         self.hover_after_s = 0.0
-        self.away_s: Optional[float] = None
-        self._pilot: Optional[OfflineRobot] = None
+        self.resume_after_s: Optional[float] = None
+        self._robot: Optional[OfflineRobot] = None
 
     def on_start(self, flight: Flight) -> None:
-        self._pilot, self._configuration = flight.offline_robots[0], flight.robots[0].configuration
-        self._add_scan, self._navigate = self._pilot.add_scan, self._pilot.navigate
-        self._pilot.add_scan, self._pilot.navigate = self.add_scan, self.navigate
+        self._robot, self._configuration = flight.offline_robots[0], flight.robots[0].configuration
+        self._add_scan, self._navigate = self._robot.add_scan, self._robot.navigate
+        self._robot.add_scan, self._robot.navigate = self.add_scan, self.navigate
 
     def is_on(self, now_s: float) -> bool:
         return self.begin_s <= now_s < self.end_s
 
     def add_scan(self, scan, map_from_lidar, now_s):
-        seen = (
-            self.scanned_as(scan, map_from_lidar)
+        located_scan = (
+            self.faulty_scan(scan, map_from_lidar)
             if self.is_on(now_s)
-            else (self.not_scanned_as(scan, map_from_lidar))
+            else self.healthy_scan(scan, map_from_lidar)
         )
-        if seen is not None:
-            self._add_scan(*seen, now_s)
+        if located_scan is not None:
+            self._add_scan(*located_scan, now_s)
 
     def navigate(self, now_s, state, peers):
         if not self.is_on(now_s):
             return self._navigate(now_s, state, peers)
-        return self.located_as(now_s, state, peers)
+        return self.faulty_tick(now_s, state, peers)
 
-    def scanned_as(self, scan: Scan, map_from_lidar: Pose3D) -> Optional[Seen]:
+    def faulty_scan(self, scan: Scan, map_from_lidar: Pose3D) -> Optional[LocatedScan]:
         return scan, map_from_lidar
 
-    def not_scanned_as(self, scan: Scan, map_from_lidar: Pose3D) -> Optional[Seen]:
-        """While all is well."""
+    def healthy_scan(self, scan: Scan, map_from_lidar: Pose3D) -> Optional[LocatedScan]:
+        """Handle a scan while there is no fault."""
         return scan, map_from_lidar
 
-    def located_as(self, now_s, state, peers):
+    def faulty_tick(self, now_s, state, peers):
         return self._navigate(now_s, state, peers)
 
     def on_tick(self, robot, tick, located, wall_s):
@@ -72,90 +70,90 @@ class SenseFault(FlightObserver):
             return
         if self.is_on(tick.now_s):
             self.hover_after_s = tick.now_s - self.begin_s
-        elif tick.now_s >= self.end_s and self.away_s is None:
-            self.away_s = tick.now_s - self.end_s
+        elif tick.now_s >= self.end_s and self.resume_after_s is None:
+            self.resume_after_s = tick.now_s - self.end_s
 
 
-class NoScans(SenseFault):
-    def scanned_as(self, scan, map_from_lidar):
+class NoScans(SensorFault):
+    def faulty_scan(self, scan, map_from_lidar):
         return None
 
 
-class _Kept(SenseFault):
-    """Knows the scan before the fault."""
+class _StoredScan(SensorFault):
+    """Stores the last scan before the fault."""
 
-    kept: Scan
+    stored: Scan
 
-    def not_scanned_as(self, scan, map_from_lidar):
-        self.kept = scan
-        self.kept_pose = map_from_lidar
+    def healthy_scan(self, scan, map_from_lidar):
+        self.stored = scan
+        self.stored_pose = map_from_lidar
         return scan, map_from_lidar
 
 
-class FrozenScans(_Kept):
-    """The same scan with new stamps: what it shows flies along."""
+class FrozenScans(_StoredScan):
+    """The same scan with new stamps: its obstacles move with the robot."""
 
-    def scanned_as(self, scan, map_from_lidar):
-        return replace(self.kept, stamp_s=scan.stamp_s), map_from_lidar
+    def faulty_scan(self, scan, map_from_lidar):
+        return replace(self.stored, stamp_s=scan.stamp_s), map_from_lidar
 
 
-class OldScans(_Kept):
+class OldScans(_StoredScan):
     """The same scan with its old stamp."""
 
-    def scanned_as(self, scan, map_from_lidar):
-        return self.kept, self.kept_pose
+    def faulty_scan(self, scan, map_from_lidar):
+        return self.stored, self.stored_pose
 
 
-class LateScans(SenseFault):
-    """Half a second late: each at its own place."""
+class LateScans(SensorFault):
+    """Scans half a second late, each with the pose at its stamp."""
 
     def __init__(self, begin_s, end_s):
         super().__init__(begin_s, end_s)
         self._waiting = deque()
 
-    def scanned_as(self, scan, map_from_lidar):
+    def faulty_scan(self, scan, map_from_lidar):
         self._waiting.append((scan, map_from_lidar))
         if self._waiting[0][0].stamp_s <= scan.stamp_s - 0.5 + 1e-9:
             return self._waiting.popleft()
         return None
 
 
-class ScansOf(SenseFault):
-    """Ranges that are all, or the first half, of one value."""
+class ScansOf(SensorFault):
+    """Scans with one value in all ranges, or in the first half of them."""
 
     def __init__(self, begin_s, end_s, value, first_half=False):
         super().__init__(begin_s, end_s)
         self._value, self._first_half = value, first_half
 
-    def scanned_as(self, scan, map_from_lidar):
+    def faulty_scan(self, scan, map_from_lidar):
         def fill(ranges_m):
             ranges_m[: len(ranges_m) // 2 if self._first_half else None] = self._value
 
         return with_ranges(scan, fill), map_from_lidar
 
 
-class NoPose(SenseFault):
-    """tf is silent: the pose is unknown once the last one is older than the tolerance."""
+class NoPose(SensorFault):
+    """No tf: the pose is unknown when the last one is older than the tolerance."""
 
-    def located_as(self, now_s, state, peers):
+    def faulty_tick(self, now_s, state, peers):
         if now_s - self.begin_s <= self._configuration.local_costmap.transform_tolerance_s:
             return self._navigate(now_s, state, peers)
         located = RobotPoses(None, None)
-        return self._pilot.navigator.tick(now_s, located, state.twist, peers), located
+        return self._robot.navigator.tick(now_s, located, state.twist, peers), located
 
 
-class ShiftedPose(SenseFault):
-    """The odometry says that it is half a metre to the left, in ``map``."""
+class ShiftedPose(SensorFault):
+    """The odometry is off by half a metre in y of ``map``."""
 
     BY_M = 0.5
 
     def _shifted(self, pose: Pose3D) -> Pose3D:
         return replace(pose, y_m=pose.y_m + self.BY_M)
 
-    def scanned_as(self, scan, map_from_lidar):
+    def faulty_scan(self, scan, map_from_lidar):
         return scan, self._shifted(map_from_lidar)
 
-    def located_as(self, now_s, state, peers):
+    def faulty_tick(self, now_s, state, peers):
         return self._navigate(
             now_s, replace(state, map_from_base=self._shifted(state.map_from_base)), peers
         )

@@ -56,7 +56,7 @@ def test_hosts_share_the_robots():
     assert one.global_costmap.robot_base_frame == "base_link3"
 
 
-def test_global_costmaps_hold_the_random_arena():
+def test_global_costmaps_cover_the_random_arena():
     mission = random_mission(30, 4)
     assert mission.scene == scene_of({"robots": 30, "seed": 4, "size": 0.0, "scene": "random"})
     costmap = read_configurations(CONFIG, 30, mission)[29].global_costmap
@@ -70,7 +70,7 @@ def test_a_robots_own_file_goes_on_top(tmp_path):
     assert [one.navigator.controller_frequency_hz for one in made] == [10.0, 5.0, 10.0]
 
 
-def test_every_fault_is_told_once_with_its_place(tmp_path):
+def test_every_fault_is_reported_once_with_its_place(tmp_path):
     copy_config(tmp_path)
     (tmp_path / "move_base_params.yaml").write_text("planner_frequency: never\n")
     (tmp_path / "robot1.yaml").write_text("controller_frequency: often\n")

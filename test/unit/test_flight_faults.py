@@ -1,4 +1,4 @@
-"""Senses that fail in flight: the quadcopter hovers while it is blind, and then flies on."""
+"""Sensors that fail in flight: the robot hovers while it has no valid input, then resumes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flight_faults import (
     NoScans,
     OldScans,
     ScansOf,
-    SenseFault,
+    SensorFault,
     ShiftedPose,
 )
 
@@ -27,11 +27,11 @@ from quad_nav.sim.simulation import SimulationParams
 ROOT = Path(__file__).resolve().parents[2]
 FEW_BEAMS = LidarParams(step_size_rad=2 * np.pi / 128)
 BEGIN_S, END_S = 2.0, 4.0
-CONTROL_PERIOD_S, BLIND_S = 0.1, 0.5
+CONTROL_PERIOD_S, TIMEOUT_S = 0.1, 0.5
 
 
-def flown_with(fault, folder, config="default", time_limit_s=END_S + 0.5):
-    """One quadcopter that has three metres to fly, 10 s, and as long as it stands."""
+def fly_with(fault, folder, config="default", time_limit_s=END_S + 0.5):
+    """Fly one robot over three metres: 10 s, and as long as it hovers."""
     (folder / "quad0_goals.json").write_text(json.dumps({"goals": [[1.0, 4.5]]}))
     return fly(
         read_setup(
@@ -48,9 +48,9 @@ def flown_with(fault, folder, config="default", time_limit_s=END_S + 0.5):
     )
 
 
-def test_without_a_fault_it_flies_all_the_time(tmp_path):
-    harmless = SenseFault(BEGIN_S, END_S)
-    flown_with(harmless, tmp_path)
+def test_without_a_fault_the_robot_does_not_hover(tmp_path):
+    harmless = SensorFault(BEGIN_S, END_S)
+    fly_with(harmless, tmp_path)
     assert harmless.hover_after_s > END_S - BEGIN_S - 2 * CONTROL_PERIOD_S
 
 
@@ -70,25 +70,25 @@ def test_without_a_fault_it_flies_all_the_time(tmp_path):
     ],
     ids=["none", "frozen", "old", "late", "NaN", "zeros", "inf", "half NaN", "half inf", "no pose"],
 )
-def test_blind_it_hovers_and_then_goes_on(fault, tmp_path):
-    summary = flown_with(fault, tmp_path)
-    assert fault.hover_after_s <= CONTROL_PERIOD_S + BLIND_S
-    assert fault.away_s is not None and fault.away_s <= 2 * CONTROL_PERIOD_S + 0.1
+def test_the_robot_hovers_without_valid_input_and_then_resumes(fault, tmp_path):
+    summary = fly_with(fault, tmp_path)
+    assert fault.hover_after_s <= CONTROL_PERIOD_S + TIMEOUT_S
+    assert fault.resume_after_s is not None and fault.resume_after_s <= 2 * CONTROL_PERIOD_S + 0.1
     assert summary.contacts == () and summary.robots[0].recoveries == 0
 
 
 def test_a_mission_with_a_fault_in_it_succeeds_at_the_first_attempt(tmp_path):
-    summary = flown_with(FrozenScans(BEGIN_S, END_S), tmp_path, time_limit_s=40.0)
+    summary = fly_with(FrozenScans(BEGIN_S, END_S), tmp_path, time_limit_s=40.0)
     assert summary.success and summary.robots[0].legs[0].attempts == 1, summary
 
 
-def test_a_place_that_is_half_a_metre_off_is_flown_by_its_lidar(tmp_path):
-    summary = flown_with(ShiftedPose(BEGIN_S, END_S), tmp_path, time_limit_s=40.0)
+def test_a_shifted_pose_does_not_end_the_mission(tmp_path):
+    summary = fly_with(ShiftedPose(BEGIN_S, END_S), tmp_path, time_limit_s=40.0)
     assert summary.success, summary
 
 
-def test_the_original_flies_on_by_a_frozen_scan(tmp_path):
-    """What the doubt is for: without it the costmap is cleared by what is not there."""
+def test_without_scan_validation_the_robot_follows_a_frozen_scan(tmp_path):
+    """A frozen scan clears obstacles from the costmap that are there."""
     config = tmp_path / "config"
     config.mkdir()
     for file in (ROOT / "config" / "default").iterdir():
@@ -97,5 +97,5 @@ def test_the_original_flies_on_by_a_frozen_scan(tmp_path):
             text += "  reject_implausible_scans: false\n"
         (config / file.name).write_text(text)
     fault = FrozenScans(BEGIN_S, END_S)
-    flown_with(fault, tmp_path, str(config))
-    assert fault.hover_after_s > CONTROL_PERIOD_S + BLIND_S
+    fly_with(fault, tmp_path, str(config))
+    assert fault.hover_after_s > CONTROL_PERIOD_S + TIMEOUT_S

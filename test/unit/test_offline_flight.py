@@ -1,4 +1,4 @@
-"""Flights offline: the same twice, ended when they should be, refused when they can't be flown."""
+"""Offline flights: repeatable, stopped with a reason, refused with every fault."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def options(**changes) -> FlightOptions:
 
 
 def figures(summary) -> dict:
-    """What does not depend on the machine's speed."""
+    """Return the summary without values that depend on the machine's speed."""
     return {
         key: value
         for key, value in to_json(summary).items()
@@ -57,7 +57,7 @@ def write_goals(folder: Path, *robots) -> Path:
 
 
 def worker_processes() -> list:
-    """Worker processes that run."""
+    """Running worker processes."""
     return [
         process for process in multiprocessing.active_children() if process.name == PROCESS_NAME
     ]
@@ -73,7 +73,7 @@ class Stop(FlightObserver):
 
 
 class Track(FlightObserver):
-    """Every body at every period of odometry."""
+    """Stores the bodies' states at every period of odometry."""
 
     def __init__(self):
         self.rows = []
@@ -94,8 +94,8 @@ def test_the_same_seed_gives_the_same_flight_bit_for_bit_and_another_does_not():
 
 
 @pytest.mark.parametrize("processes", [2, 3])
-def test_navigators_in_several_processes_fly_the_same_bit_for_bit(processes):
-    """Four that meet, so that what they tell each other matters."""
+def test_worker_processes_fly_the_same_flight_bit_for_bit(processes):
+    """Four robots meet, so that their intentions matter."""
     meeting = read_setup(
         options(
             scene=ROOT / "scenes" / "encounters" / "four_ways.yaml",
@@ -111,7 +111,7 @@ def test_navigators_in_several_processes_fly_the_same_bit_for_bit(processes):
     assert worker_processes() == []
 
 
-def test_a_process_of_navigators_that_dies_ends_the_flight_with_the_reason():
+def test_a_worker_process_that_dies_ends_the_flight_with_the_reason():
     class Killer(FlightObserver):
         def on_move(self, flight):
             if flight.now_s > 0.5:
@@ -122,7 +122,7 @@ def test_a_process_of_navigators_that_dies_ends_the_flight_with_the_reason():
     assert worker_processes() == []
 
 
-def test_what_fails_in_a_process_of_navigators_is_told_with_its_place(monkeypatch):
+def test_an_exception_in_a_worker_process_is_raised_with_its_traceback(monkeypatch):
     monkeypatch.setattr(NavigatorGroup, "navigate", lambda *_: 1 / 0)
     flight = Flight(read_setup(options()), processes=2)
     flight._group.navigate = lambda *_: []
@@ -187,8 +187,8 @@ def test_a_short_mission_is_flown_to_its_end(tmp_path):
 
 
 @pytest.mark.parametrize("seed", [1, 3])
-def test_two_that_stand_before_each_other_turn_round_and_go_on(seed):
-    """Wide inflation, one command a second: they used to face each other for minutes."""
+def test_two_robots_that_face_each_other_turn_and_resume(seed):
+    """Wide inflation and one command per second: they once faced each other for minutes."""
     wide = tuple((f"{costmap}_costmap/inflation_radius", 1.2) for costmap in ("global", "local"))
     summary = fly(
         read_setup(
@@ -203,14 +203,14 @@ def test_two_that_stand_before_each_other_turn_round_and_go_on(seed):
     assert summary.reason == "" and summary.success
 
 
-def test_a_flight_that_is_out_of_time_or_stopped_says_so():
+def test_a_flight_out_of_time_or_stopped_reports_the_reason():
     assert fly(read_setup(options(time_limit_s=0.5))).reason == "time limit of 0.5 s"
     stopped = fly(read_setup(options()), [Stop()])
     assert stopped.reason == "interrupted" and stopped.sim_time_s == pytest.approx(0.025)
     assert [leg.reason for leg in stopped.robots[0].legs] == ["interrupted", "not sent", "not sent"]
 
 
-def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
+def test_every_fault_is_reported_at_once(tmp_path):
     goals = write_goals(tmp_path / "goals", [[5.9, 5.9]])
     with pytest.raises(InputError) as error:
         read_setup(options(goals=goals, config="tutrial", scans_per_s=7.0, robots=2))
@@ -221,7 +221,7 @@ def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
     assert "is inside an obstacle" in told
 
 
-def test_without_files_a_mission_is_made_for_so_many_and_the_costmaps_hold_it():
+def test_without_files_a_random_mission_is_made_and_the_costmaps_cover_it():
     setup = read_setup(options(scene=None, goals=None, robots=10))
     assert len(setup.robots) == len(setup.scene.starts) == 10
     assert setup.scene.size_x_m == 19.0
@@ -235,7 +235,7 @@ def test_frames_that_the_simulation_lacks_are_refused():
 
 
 def test_the_kernel_and_the_engine_see_the_same_flight():
-    """Ranges differ by parts of a millimetre, so the flights do not part in a few seconds."""
+    """Ranges differ by parts of a millimetre, so the flights do not diverge in a few seconds."""
     tracks = []
     for caster in ("kernel", "bullet"):
         params = dataclasses.replace(options().simulation, lidar_caster=caster)

@@ -16,14 +16,14 @@ def refusal(text):
 
 
 def bomb(open_, close, lines):
-    """Each line stands for nine of the line before."""
+    """Return YAML in which each line refers nine times to the line before."""
     text = f"a0: &a0 {open_}x{close}\n"
     for k in range(lines):
         text += f"a{k + 1}: &a{k + 1} [{','.join([f'*a{k}'] * 9)}]\n"
     return text
 
 
-def test_aliases_may_stand_for_what_was_there():
+def test_aliases_may_refer_to_earlier_anchors():
     assert load("a: &a [1, 2]\nb: *a\nc: {<<: &d {x: 1}, y: 2}\ne: *d") == {
         "a": [1, 2],
         "b": [1, 2],
@@ -45,7 +45,7 @@ def test_merges_count_too():
 
 
 @pytest.mark.parametrize("text", ["&a [*a]", "&a {b: *a}", "a: &a {<<: *a}", "&a [[[*a]]]"])
-def test_nothing_stands_in_itself(text):
+def test_an_alias_inside_its_own_anchor_is_refused(text):
     assert "an alias stands in what it stands for" in refusal(text)
 
 

@@ -70,12 +70,12 @@ def test_parameters_and_images_are_read_with_the_same_care(tmp_path):
     assert "is a pipe" in refusal(load_scene, tmp_path / "map.yaml")
 
 
-def test_what_grows_while_it_is_read_is_read_no_further(tmp_path):
+def test_a_file_that_grows_while_it_is_read_is_refused(tmp_path):
     # /proc's files tell a size of 0 and hold more.
     assert "has more than 10 bytes" in refusal(read_bytes, Path("/proc/self/status"), 10)
 
 
-def test_texts(tmp_path):
+def test_texts_are_utf_8(tmp_path):
     path = tmp_path / "text"
     path.write_bytes(b"\xef\xbb\xbfa\xc3\xa9")
     assert read_text(path, 10) == "a\u00e9"
@@ -111,7 +111,7 @@ def test_a_watched_file_that_becomes_a_pipe_is_a_changed_file(tmp_path):
     assert "is a pipe" in refusal(watched.poll)
 
 
-def test_many_faults_are_counted_and_no_terminal_is_commanded():
+def test_many_faults_are_counted_and_escape_sequences_are_escaped():
     error = InputError([f"fault {k}" for k in range(MAX_PROBLEMS + 5)])
     assert error.problems[-1] == "... and 5 more problems"
     assert InputError(["a\x1b[2Jb\ud800"]).problems == ["a\\x1b[2Jb\\ud800"]
@@ -149,7 +149,7 @@ def test_a_link_that_the_user_names_is_followed(folder):
     "way",
     ["../secret.world", "sub/../../secret.world", "{outside}", "link.world", "folder/secret.world"],
 )
-def test_a_scene_leads_nowhere_outside_its_folder(folder, way):
+def test_a_scene_refers_to_no_file_outside_its_folder(folder, way):
     (folder / "link.world").symlink_to(folder.parent / "secret.world")
     (folder / "folder").symlink_to(folder.parent)
     name = way.format(outside=folder.parent / "secret.world")
@@ -161,12 +161,12 @@ def test_a_scene_reaches_files_below_its_folder(folder):
     assert len(load_scene(scene(folder, "sub/own.world")).obstacles) == 1
 
 
-def test_what_the_user_allows_may_be_reached(folder, monkeypatch):
+def test_folders_that_the_user_allows_may_be_referred_to(folder, monkeypatch):
     monkeypatch.setenv("QUAD_FILES_PATH", f"/none{os.pathsep}{folder.parent}")
     assert len(load_scene(scene(folder, "../secret.world")).obstacles) == 1
 
 
-def test_an_image_leads_nowhere_outside_its_maps_folder(folder):
+def test_a_map_refers_to_no_image_outside_its_folder(folder):
     (folder / "map.yaml").write_text(
         "image: ../../etc/passwd\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
         "occupied_thresh: 0.65\nfree_thresh: 0.2\n"
@@ -175,7 +175,7 @@ def test_an_image_leads_nowhere_outside_its_maps_folder(folder):
 
 
 @pytest.mark.parametrize("named", ["../../../secret.world", "{outside}"])
-def test_a_models_config_leads_nowhere_outside(folder, named):
+def test_a_models_config_refers_to_no_file_outside(folder, named):
     model = folder / "models" / "crate"
     model.mkdir(parents=True)
     named = named.format(outside=folder.parent / "secret.world")
@@ -208,7 +208,7 @@ def recording(path, text):
     return path
 
 
-def test_a_recordings_scene_names_no_file(tmp_path):
+def test_a_recordings_scene_refers_to_no_file(tmp_path):
     path = recording(tmp_path / "flight.bag", '{"scene": {"map": "/etc/map.yaml"}}')
     assert "scene: refers to another file" in refusal(read_trace, path)
 

@@ -40,7 +40,7 @@ def test_every_kernel_of_a_cycle_has_run(missions):
         assert not ticks[0].windows["local"].is_empty
 
 
-def test_a_peer_is_left_out_of_the_last_scans(missions):
+def test_a_peers_points_are_removed_from_the_last_scans(missions):
     for navigator, _ in missions:
         layers = [
             layer
@@ -77,7 +77,7 @@ def test_any_configuration_can_be_warmed_up():
     warm_up.warm_up(load({"global_costmap": {"static_map": True}}))
 
 
-def test_a_scan_of_the_simulator_is_among_it(monkeypatch):
+def test_the_simulator_scans_once(monkeypatch):
     seen = []
     monkeypatch.setattr(casters, "cast_scans", lambda *arguments: seen.append(arguments))
     warm_up.simulate()
