@@ -1,4 +1,4 @@
-"""What the navigator asks of a local planner."""
+"""Interface of a local planner."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ IDENTITY = Pose2D(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Control:
-    """A velocity command and what it was chosen from.
+    """Velocity command and the trajectory that it was chosen for.
 
-    ``cost`` is the chosen trajectory's, nan while stopping or turning at the
-    goal (``goal_mode``). ``local_plan`` float64[k, 3] is that trajectory,
-    ``global_plan`` float64[m, 3] the part of the global plan that was followed;
-    both are rows x, y, yaw in the local costmap's frame.
+    Attributes:
+        command: The command, in the robot's frame.
+        cost: Cost of the trajectory; nan while stopping or turning at the goal.
+        local_plan: float64[k, 3], the trajectory, rows x, y, yaw in the local costmap's frame.
+        global_plan: float64[m, 3], the part of the global plan that is followed, as above.
+        goal_mode: True while stopping or turning at the goal.
     """
 
     command: Twist2D
@@ -32,14 +34,14 @@ class Control:
 
 
 class LocalPlanner(Protocol):
-    """Follows a global plan over the local costmap."""
+    """Planner that follows a global plan over the local costmap."""
 
     def set_plan(self, plan: NDArray[np.float64]) -> None:
-        """A new global plan, float64[n, 3] rows x, y, yaw in its own frame."""
+        """Take a new global plan, float64[n, 3] rows x, y, yaw in its own frame."""
         ...
 
     def set_footprint(self, footprint: NDArray[np.float64]) -> None:
-        """The padded footprint, float64[n, 2] in the robot's frame."""
+        """Take another padded footprint, float64[n, 2] in the robot's frame."""
         ...
 
     def compute_velocity(
@@ -50,14 +52,32 @@ class LocalPlanner(Protocol):
         velocity: Twist2D,
         local_from_plan: Pose2D = IDENTITY,
     ) -> Control:
-        """The command for now. Raises a ``ControlError`` when there is none."""
+        """Compute the command for now.
+
+        Args:
+            spec: Grid of the local costmap.
+            costs: uint8[H, W] on it.
+            pose: Pose of the robot in the local costmap's frame.
+            velocity: Velocity of the robot, in its own frame.
+            local_from_plan: Pose of the plan's frame in the local costmap's frame.
+
+        Returns:
+            The command and its trajectory.
+
+        Raises:
+            ControlError: There is no legal command.
+        """
         ...
 
     def is_goal_reached(self) -> bool:
-        """Whether the plan's end was reached, heading included."""
+        """Tell whether the robot has reached the plan's end, heading included."""
         ...
 
     def cost_cloud(self) -> NDArray[np.float32]:
-        """What each cell cost in the last call, float32[n, 7]: x, y, z, path, goal,
-        obstacle and total; float32[0, 7] for a planner that scores no cells."""
+        """Return the costs of cells in the last call, for the point cloud ``cost_cloud``.
+
+        Returns:
+            float32[n, 7]: x, y, z, path, goal, obstacle and total cost; float32[0, 7] for a
+            planner that scores no cells.
+        """
         ...

@@ -1,4 +1,4 @@
-"""The dynamic window controller's critics: what a velocity would lead to, and what that costs.
+"""Critics of the dynamic window controller: simulate velocity samples and score them.
 
 A sample (vx, vy, vtheta) is simulated for ``sim_time_s``; with ``use_dwa`` the
 robot has its velocity at once, otherwise it approaches it as the acceleration
@@ -6,7 +6,7 @@ limits allow, and is commanded what it has after the first step. The critics,
 in the order in which their costs are summed, weights in brackets:
 
 * oscillation: no cost; forbids directions given up before.
-* obstacle [occdist_scale]: the highest cell cost under the footprint on the way
+* obstacle [occdist_scale]: the highest cell cost under the footprint along the trajectory
   (their sum with ``sum_scores``). Above ``scaling_speed_mps`` the footprint
   grows, up to 1 + ``max_scaling_factor`` at ``max_vel_trans_mps``. Forbids
   trajectories on which it touches a lethal or unknown cell.
@@ -21,7 +21,7 @@ in the order in which their costs are summed, weights in brackets:
 Distances are those of the trajectory's last pose over the free cells, in metres
 (``map_grid``); unlike in trajectory rollout, obstacles under the robot are
 obstacles. No pose and no nose may be off the map. A critic of weight 0 is not
-asked at all, not even whether a trajectory is legal.
+used at all, not even to tell whether a trajectory is legal.
 """
 
 from __future__ import annotations
@@ -52,7 +52,13 @@ NO_LEGAL_TRAJECTORY = -7.0
 
 
 class DwaGrids(NamedTuple):
-    """Distances in cells, int32[H, W], as in ``map_grid.DistanceGrids``."""
+    """Distances in cells, as in ``map_grid.DistanceGrids``.
+
+    Attributes:
+        path: int32[H, W], to the plan.
+        goal: int32[H, W], to the local goal.
+        goal_front: int32[H, W], to the local goal moved ahead.
+    """
 
     path: NDArray[np.int32]
     goal: NDArray[np.int32]
@@ -60,10 +66,10 @@ class DwaGrids(NamedTuple):
 
 
 class Critics:
-    """The critics, for a robot in one state on one costmap.
+    """Critics for a robot in one state on one costmap.
 
-    ``plan`` is float64[m, 3], m >= 1, in the costmap's frame. ``grids`` are those
-    of an earlier call to go on with; without them they are measured.
+    ``grids`` are those of an earlier call to use again; without them they are measured on ``plan``,
+    float64[m, 3], m >= 1, in the costmap's frame.
     """
 
     def __init__(
@@ -79,7 +85,7 @@ class Critics:
     ) -> None:
         self.params = params
         self.spec = spec
-        # The original keeps the robot's state in single precision.
+        # Upstream keeps the robot's state in single precision.
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
         self.velocity = single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)
         self.goal = Pose2D(*plan[-1].tolist())
@@ -92,7 +98,7 @@ class Critics:
         self.map_grids = self._weighed_grids()
 
     def choose(self, oscillation: OscillationCritic, control_period_s: float) -> Trajectory:
-        """The cheapest of the sampled trajectories; NO_LEGAL_TRAJECTORY is its cost if none is."""
+        """Return the cheapest sampled trajectory, of cost NO_LEGAL_TRAJECTORY if none is legal."""
         goal = Pose2D(*single(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad))
         samples = velocity_samples(self.params, self.pose, self.velocity, goal, control_period_s)
         commands, distances, legal = kernel.travel(
@@ -113,9 +119,9 @@ class Critics:
         return Trajectory(command, float(cost), points)
 
     def is_legal(self, sample: Triple) -> bool:
-        """Whether one sample hits nothing and stays in reach of path and goal.
+        """Tell whether a sample hits nothing and stays in reach of path and goal.
 
-        One outside the speed limits is not simulated, and counts as legal.
+        A sample outside of the speed limits is not simulated, and counts as legal.
         """
         points, command = self.simulate(np.array(single(*sample)))
         scale = footprint_scales(self.params, np.array([command]))
@@ -128,11 +134,11 @@ class Critics:
 
     @property
     def start(self) -> Triple:
-        """x, y, yaw"""
+        """Pose of the robot: x, y, yaw."""
         return self.pose.x_m, self.pose.y_m, self.pose.yaw_rad
 
     def simulate(self, sample: NDArray[np.float64]) -> Tuple[NDArray[np.float64], Triple]:
-        """Poses, float64[k, 3], and the command of a sample, float64[3]."""
+        """Return poses, float64[k, 3], and the command of a sample, float64[3]."""
         points = np.empty((kernel.step_count(self.motion, sample), 3))
         _, command = kernel.simulate(self.motion, self.start, self.velocity, sample, points)
         return points, command
@@ -168,7 +174,7 @@ class Critics:
     def terms(
         self, commands: NDArray[np.float64], distances: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """float64[n, 5]: every critic's part of the cost but the obstacles', in their order."""
+        """Return the critics' costs but the obstacles', float64[n, 5], in their order."""
         scales = np.zeros(4)
         scales[[kernel.GOAL_FRONT, kernel.GOAL]] = self.goal_scale
         scales[[kernel.ALIGNMENT, kernel.PATH]] = self.path_scale
@@ -176,7 +182,7 @@ class Critics:
         return np.column_stack((distances * scales, twirling))
 
     def obstacles(self, scales: NDArray[np.float64]) -> kernel.Obstacles:
-        """For trajectories with these footprint scales."""
+        """Return the obstacle critic's input for trajectories with footprint scales, float64[n]."""
         largest = float(np.max(np.abs(scales[np.isfinite(scales)]), initial=1.0))
         reach_m = footprint_reach_m(self.footprint) * largest
         return kernel.Obstacles(
@@ -189,7 +195,7 @@ class Critics:
 
 
 def footprint_scales(params: DwaParams, commands: NDArray[np.float64]) -> NDArray[np.float64]:
-    """float64[n]: how much larger the footprint counts at commands, float64[n, 3]."""
+    """Return the factors, float64[n], of the footprint's size at commands, float64[n, 3]."""
     speeds = np.hypot(commands[:, 0], commands[:, 1])
     room_mps = params.max_vel_trans_mps - params.scaling_speed_mps
     if room_mps == 0.0:

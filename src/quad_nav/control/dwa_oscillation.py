@@ -1,8 +1,8 @@
-"""What keeps the dynamic window controller from going to and fro for ever.
+"""Oscillation critic: keeps the dynamic window controller from going back and forth.
 
-A command that reverses the direction of an earlier one forbids the direction
-given up, until the robot has moved or turned far enough. Sideways motion and
-turns count only while the robot hardly moves forward.
+A command that reverses the direction of an earlier one forbids the direction given up, until the
+robot has moved or turned far enough. Sideways motion and turns count only while the robot hardly
+moves forward.
 """
 
 from __future__ import annotations
@@ -19,15 +19,22 @@ from quad_nav.geometry import Pose2D
 
 @dataclass
 class Axis:
-    """One component of the velocity: where it last went, and where alone it may go."""
+    """Component of the velocity: its last direction, and the only direction allowed.
+
+    Attributes:
+        going_positive: The last command was positive.
+        going_negative: The last command was negative.
+        positive_only: Negative commands are forbidden.
+        negative_only: Positive commands are forbidden.
+    """
 
     going_positive: bool = False
     going_negative: bool = False
     positive_only: bool = False
     negative_only: bool = False
 
-    def note(self, velocity: float) -> bool:
-        """Remembers a command; whether it was a reversal."""
+    def record(self, velocity: float) -> bool:
+        """Record a command; return True if it was a reversal."""
         if velocity == 0.0:
             return False
         forwards = velocity > 0.0
@@ -39,32 +46,36 @@ class Axis:
 
     @property
     def is_restricted(self) -> bool:
+        """True if a direction is forbidden."""
         return self.positive_only or self.negative_only
 
     def forbids(self, velocities: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return True for forbidden velocities, float64[n]: bool[n]."""
         return ((velocities < 0.0) & self.positive_only) | ((velocities > 0.0) & self.negative_only)
 
 
 class OscillationCritic:
-    """Changed by every choice of a trajectory; a new plan and a stop at the goal reset it."""
+    """State of the critic; every chosen trajectory changes it, a new plan and a goal reset it."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
+        """Allow every direction."""
         self.forward, self.strafe, self.turn = Axis(), Axis(), Axis()
         self.reversed_at = Pose2D(0.0, 0.0, 0.0)
 
     @property
     def axes(self) -> Tuple[Axis, Axis, Axis]:
+        """Forward, sideways and turning axis."""
         return self.forward, self.strafe, self.turn
 
     def forbids(self, commands: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """bool[n]: which commands, float64[n, 3], go where they may not."""
+        """Return True for commands, float64[n, 3], in a forbidden direction: bool[n]."""
         forbidden = [axis.forbids(commands[:, k]) for k, axis in enumerate(self.axes)]
         return np.logical_or.reduce(forbidden)
 
-    def note(
+    def record(
         self,
         command: Triple,
         pose: Pose2D,
@@ -72,13 +83,21 @@ class OscillationCritic:
         reset_dist_m: float,
         reset_angle_rad: float,
     ) -> None:
-        """A chosen command; ``slow_mps`` is the forward speed up to which all axes count."""
-        reversals = [self.forward.note(command[0])]
+        """Record a chosen command.
+
+        Args:
+            command: (vx, vy, vtheta).
+            pose: Pose of the robot in the local costmap's frame.
+            slow_mps: Forward speed up to which sideways motion and turns count.
+            reset_dist_m: Distance from the last reversal after which all is allowed again.
+            reset_angle_rad: Turn since the last reversal after which all is allowed again.
+        """
+        reversals = [self.forward.record(command[0])]
         if abs(command[0]) <= slow_mps:
-            reversals += [self.strafe.note(command[1]), self.turn.note(command[2])]
+            reversals += [self.strafe.record(command[1]), self.turn.record(command[2])]
         if any(reversals):
             self.reversed_at = pose
         if any(axis.is_restricted for axis in self.axes):
-            turned_rad = abs(pose.yaw_rad - self.reversed_at.yaw_rad)  # the original does not wrap
+            turned_rad = abs(pose.yaw_rad - self.reversed_at.yaw_rad)  # upstream does not wrap
             if self.reversed_at.distance_to(pose) > reset_dist_m or turned_rad > reset_angle_rad:
                 self.reset()

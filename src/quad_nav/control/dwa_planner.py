@@ -1,9 +1,9 @@
 """The controller ``dwa_local_planner/DWAPlannerROS``: the dynamic window approach.
 
-Each call cuts the global plan to the local window, samples velocities
-(``dwa_samples``) and takes the one whose trajectory the critics like best
-(``dwa_critics``, ``dwa_oscillation``). Within ``xy_goal_tolerance_m`` of the
-global plan's end it stops and turns in place instead (``goal``).
+Each call cuts the global plan to the local costmap, samples velocities (``dwa_samples``) and
+takes the one with the cheapest trajectory for the critics (``dwa_critics``, ``dwa_oscillation``).
+Within ``xy_goal_tolerance_m`` of the global plan's end it stops and turns in place instead
+(``goal``).
 """
 
 from __future__ import annotations
@@ -31,11 +31,12 @@ __all__ = ["DwaParams", "DwaPlanner"]
 
 
 class DwaPlanner(PlanFollower):
-    """Follows a plan; remembers what it tried from call to call.
+    """Dynamic window approach; at the goal when the last call found the robot stopped there.
 
-    Readable besides a plan follower's: ``oscillation``, and of the last call
-    ``best`` (None if it did not search) and ``critics`` (None if it asked none).
-    The goal is reached when the last call found the robot standing there.
+    Attributes:
+        oscillation: State kept from call to call.
+        best: Trajectory chosen in the last call; None if it did not search.
+        critics: Critics of the last call; None if it used none.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class DwaPlanner(PlanFollower):
         self._grids: Optional[DwaGrids] = None  # of the last search
 
     def set_plan(self, plan: NDArray[np.float64]) -> None:
-        """As any plan follower; what was tried before is forgotten."""
+        """Take a new global plan, and forget oscillation."""
         super().set_plan(plan)
         self.oscillation.reset()
 
@@ -60,11 +61,12 @@ class DwaPlanner(PlanFollower):
         velocity: Twist2D,
         local_from_plan: Pose2D = IDENTITY,
     ) -> Control:
-        """The command for a robot at ``pose`` on ``costs``, uint8[H, W] on ``spec``.
+        """Compute the command for now; see ``LocalPlanner.compute_velocity``.
 
-        ``velocity`` is the odometry's, in the body frame. Raises NoLocalPlan
-        when no part of the plan is near, and NoValidTrajectory when no sampled
-        trajectory is legal or the command at the goal would hit something.
+        Raises:
+            NoLocalPlan: No part of the plan is near.
+            NoValidTrajectory: No sampled trajectory is legal, or the command at the goal would
+                collide.
         """
         self.best = self.critics = None
         self._goal_reached = False
@@ -82,15 +84,12 @@ class DwaPlanner(PlanFollower):
             raise NoValidTrajectory(
                 f"none of the sampled velocities is legal from "
                 f"({pose.x_m:.2f}, {pose.y_m:.2f}) m: all collide, are too "
-                f"slow or too fast, or lose the way to the path or its end"
+                f"slow or too fast, or leave the reach of the path or its end"
             )
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
     def cost_cloud(self) -> NDArray[np.float32]:
-        """What each cell that a robot could be in cost in the last call, float32[n, 7].
-
-        Rows as in ``cost_cloud.cost_cloud``; empty if the last call did not search.
-        """
+        """Return the cells' costs in the last call; empty if it did not search."""
         if self.best is None or self.critics is None:
             return np.zeros((0, 7), dtype=np.float32)
         critics, costs = self.critics, self.critics.costmap.costs
@@ -129,7 +128,7 @@ class DwaPlanner(PlanFollower):
             self.rotating_to_goal = True
             command = turning_command(turn_rad, velocity, params, self.control_period_s)
         self.oscillation.reset()
-        # The original measures no distances here: it goes on with those of the last search.
+        # Upstream measures no distances here: it keeps those of the last search.
         grids = self._grids
         if grids is None or grids.path.shape != costs.shape:
             grids = DwaGrids(*np.zeros((3, *costs.shape), dtype=np.int32))
@@ -151,7 +150,7 @@ class DwaPlanner(PlanFollower):
         self._grids = self.critics.grids
         self.best = self.critics.choose(self.oscillation, self.control_period_s)
         if self.best.cost >= 0.0:
-            self.oscillation.note(
+            self.oscillation.record(
                 self.best.sample,
                 self.critics.pose,
                 self.params.min_vel_trans_mps,
@@ -162,6 +161,6 @@ class DwaPlanner(PlanFollower):
 
 
 def _in_single_precision(params: DwaParams) -> DwaParams:
-    """With the acceleration limits as the original has them."""
+    """Return the parameters with the acceleration limits as upstream keeps them."""
     x, y, theta = acceleration_limits(params)
     return replace(params, acc_lim_x_mps2=x, acc_lim_y_mps2=y, acc_lim_theta_radps2=theta)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class DwaParams:
     """Parameters of ``dwa_local_planner/DWAPlannerROS``.
 
-    The defaults are those that dynamic reconfigure puts in force. A negative
+    The defaults are those that dynamic_reconfigure sets. A negative
     ``min_vel_trans_mps``, ``min_vel_theta_radps`` or ``max_vel_trans_mps`` is no limit.
     """
 
@@ -65,11 +65,13 @@ class DwaParams:
     # Fixed upstream bug; False restores upstream behaviour
     predict_goal_turn: bool = True  # turn no farther in one control period than is left
 
-    # The turn at the goal has the limits of every turn; ``goal`` has names of its own for them.
+    # The turn at the goal has the limits of every turn, by the names of ``goal.GoalLimits``.
     @property
     def max_rotational_vel_radps(self) -> float:
+        """Largest turn rate at the goal."""
         return self.max_vel_theta_radps
 
     @property
     def min_in_place_vel_theta_radps(self) -> float:
+        """Smallest turn rate at the goal."""
         return self.min_vel_theta_radps

@@ -1,9 +1,10 @@
-"""The velocities that the dynamic window controller tries.
+"""Velocity samples of the dynamic window controller.
 
-A grid over the velocities that can be reached and are allowed: in one control
-period with ``use_dwa`` (the dynamic window of D. Fox, W. Burgard and S. Thrun
-1997, "The dynamic window approach to collision avoidance"), else in
-``sim_time_s``, and then no faster than would overshoot the local goal.
+They form a grid over the velocities that are allowed and can be reached: in one control period with
+``use_dwa``, else in ``sim_time_s``, and then no faster than would overshoot the local goal.
+
+Source: D. Fox, W. Burgard, S. Thrun, "The dynamic window approach to collision avoidance", IEEE
+Robotics & Automation Magazine 4(1), 1997.
 """
 
 from __future__ import annotations
@@ -21,9 +22,17 @@ from quad_nav.geometry import Pose2D
 def velocity_samples(
     params: DwaParams, pose: Pose2D, velocity: Triple, goal: Pose2D, control_period_s: float
 ) -> NDArray[np.float64]:
-    """float64[n, 3] rows vx, vy, vtheta of single precision; vtheta varies fastest.
+    """Return the velocities to try.
 
-    ``goal`` is the end of the plan in the local window.
+    Args:
+        params: Parameters.
+        pose: Pose of the robot in the local costmap's frame.
+        velocity: (vx, vy, vtheta) of the robot, in its own frame.
+        goal: End of the plan in the local costmap.
+        control_period_s: Length of a control period.
+
+    Returns:
+        float64[n, 3], rows vx, vy, vtheta of single precision; vtheta varies fastest.
     """
     lowest, highest = _velocity_window(params, pose, velocity, goal, control_period_s)
     counts = params.vx_samples, params.vy_samples, params.vth_samples
@@ -33,7 +42,7 @@ def velocity_samples(
 
 
 def spaced(start: float, end: float, count: int) -> List[float]:
-    """``count`` values from start to end, at least both ends, and 0 if they step over it."""
+    """Return ``count`` values from start to end, at least both ends, and 0 if stepped over."""
     if start == end:
         return [start]
     count = max(count, 2)
@@ -48,7 +57,7 @@ def spaced(start: float, end: float, count: int) -> List[float]:
 
 
 def acceleration_limits(params: DwaParams) -> Triple:
-    """x, y and theta, in the single precision in which the original keeps them."""
+    """Return the limits of x, y and theta in single precision, as upstream keeps them."""
     return single(params.acc_lim_x_mps2, params.acc_lim_y_mps2, params.acc_lim_theta_radps2)
 
 

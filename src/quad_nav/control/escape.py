@@ -1,8 +1,8 @@
-"""The way out for a robot whose footprint touches something, so that no trajectory is legal.
+"""Escape of a robot whose footprint touches an obstacle, so that no trajectory is legal.
 
-Every trajectory begins where the robot is; when that collides none can be flown, not even
-the one that leads away. A round robot sweeps nothing new when it turns: it turns towards
-where costs are lowest near by, or its back if that is nearer, and goes there slowly.
+Every trajectory begins where the robot is. When that pose collides, all of them collide, also those
+that lead away. A round robot sweeps no new cells when it turns: it turns its front or its back,
+whichever is nearer, towards the lowest costs near by, and goes there slowly.
 """
 
 from __future__ import annotations
@@ -27,10 +27,17 @@ _ROUND = 0.9  # inscribed by circumscribed radius
 def escape(
     spec: GridSpec, costs: NDArray[np.uint8], footprint: NDArray[np.float64], pose: Pose2D
 ) -> Optional[Twist2D]:
-    """A command that leads to lower costs, uint8[H, W]; None when there is no such way.
+    """Return a command that leads to lower costs.
 
-    ``footprint`` is float64[n, 2] in the robot's frame; one that is not round has no way
-    out, for what it would sweep is not looked at.
+    Args:
+        spec: Grid of the local costmap.
+        costs: uint8[H, W] on it.
+        footprint: float64[n, 2], metres in the robot's frame.
+        pose: Pose of the robot in the costmap's frame.
+
+    Returns:
+        The command; None if no direction leads to lower costs, or the footprint is not round:
+        the cells that it would sweep are not examined.
     """
     here = spec.cell_of(pose.x_m, pose.y_m)
     if here is None or not is_round(footprint):
@@ -54,13 +61,13 @@ def escape(
 
 
 def is_round(footprint: NDArray[np.float64]) -> bool:
-    """Whether a footprint, float64[n, 2], is nearly a circle around the robot's centre."""
+    """Tell whether a footprint, float64[n, 2], is nearly a circle around the robot's centre."""
     inscribed_m, circumscribed_m = radii(footprint)
     return inscribed_m >= _ROUND * circumscribed_m
 
 
 def _costs_around(spec: GridSpec, costs: NDArray[np.uint8], pose: Pose2D) -> NDArray[np.int_]:
-    """Costs some steps along each bearing, int[bearings, steps]; off the map as in the way."""
+    """Return costs some steps along each bearing, int[bearings, steps]; UNKNOWN off the map."""
     x = pose.x_m + np.outer(np.cos(_BEARINGS_RAD), _STEPS_M)
     y = pose.y_m + np.outer(np.sin(_BEARINGS_RAD), _STEPS_M)
     columns = np.floor((x - spec.origin_x_m) / spec.resolution_m).astype(int)

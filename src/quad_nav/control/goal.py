@@ -1,4 +1,4 @@
-"""At the goal's position: stop, then turn to the goal's heading."""
+"""Commands at the goal's position: stop, then turn to the goal's heading."""
 
 from __future__ import annotations
 
@@ -9,34 +9,51 @@ from quad_nav.geometry import Twist2D
 
 
 class GoalLimits(Protocol):
-    """What both local planners' parameters say about stopping and turning."""
+    """Parameters of both local planners for stopping and turning."""
 
     @property
-    def acc_lim_x_mps2(self) -> float: ...
+    def acc_lim_x_mps2(self) -> float:
+        """Largest forward acceleration."""
+        ...
 
     @property
-    def acc_lim_y_mps2(self) -> float: ...
+    def acc_lim_y_mps2(self) -> float:
+        """Largest sideways acceleration."""
+        ...
 
     @property
-    def acc_lim_theta_radps2(self) -> float: ...
+    def acc_lim_theta_radps2(self) -> float:
+        """Largest angular acceleration."""
+        ...
 
     @property
-    def max_rotational_vel_radps(self) -> float: ...
+    def max_rotational_vel_radps(self) -> float:
+        """Largest turn rate at the goal."""
+        ...
 
     @property
-    def min_in_place_vel_theta_radps(self) -> float: ...
+    def min_in_place_vel_theta_radps(self) -> float:
+        """Smallest turn rate at the goal."""
+        ...
 
     @property
-    def trans_stopped_velocity_mps(self) -> float: ...
+    def trans_stopped_velocity_mps(self) -> float:
+        """Speed up to which the robot counts as stopped."""
+        ...
 
     @property
-    def rot_stopped_velocity_radps(self) -> float: ...
+    def rot_stopped_velocity_radps(self) -> float:
+        """Turn rate up to which the robot counts as stopped."""
+        ...
 
     @property
-    def predict_goal_turn(self) -> bool: ...
+    def predict_goal_turn(self) -> bool:
+        """Turn no farther in one control period than is left."""
+        ...
 
 
 def is_stopped(velocity: Twist2D, params: GoalLimits) -> bool:
+    """Tell whether a velocity counts as stopped."""
     return (
         abs(velocity.vyaw_radps) <= params.rot_stopped_velocity_radps
         and abs(velocity.vx_mps) <= params.trans_stopped_velocity_mps
@@ -45,7 +62,7 @@ def is_stopped(velocity: Twist2D, params: GoalLimits) -> bool:
 
 
 def stopping_command(velocity: Twist2D, params: GoalLimits, control_period_s: float) -> Twist2D:
-    """As slow as the acceleration limits allow to be in one control period."""
+    """Return the slowest command that the acceleration limits allow in one control period."""
     return Twist2D(
         _slowed(velocity.vx_mps, params.acc_lim_x_mps2 * control_period_s),
         _slowed(velocity.vy_mps, params.acc_lim_y_mps2 * control_period_s),
@@ -56,15 +73,19 @@ def stopping_command(velocity: Twist2D, params: GoalLimits, control_period_s: fl
 def turning_command(
     turn_rad: float, velocity: Twist2D, params: GoalLimits, control_period_s: float
 ) -> Twist2D:
-    """Turn in place by ``turn_rad``, fast enough for the base and slow enough to stop there.
+    """Return a turn in place that stops at the goal's heading.
 
-    In order of strength: at least ``min_in_place_vel_theta`` and at most
-    ``max_rotational_vel``; no faster than can be braked, sqrt(2 * acc * turn);
-    within the acceleration limit of the current speed.
+    Limits, the strongest first: with ``predict_goal_turn``, no farther than the turn in one
+    control period; at least ``min_in_place_vel_theta`` and at most ``max_rotational_vel``; no
+    faster than can be braked, sqrt(2 * acceleration * turn); within the acceleration limit of
+    the current speed. Without the first, at 1 Hz and 1 rad/s, upstream oversteps the goal's
+    heading for ever.
 
-    ``predict_goal_turn`` is stronger than all of these: the command counts for a
-    whole control period, so a turn that is shorter than that is made slower. At
-    1 Hz and 1 rad/s the original steps over the goal's heading for ever.
+    Args:
+        turn_rad: Turn that is left.
+        velocity: Velocity of the robot, in its own frame.
+        params: Limits.
+        control_period_s: How long the command stays in force.
     """
     acceleration = params.acc_lim_theta_radps2
     current, change = abs(velocity.vyaw_radps), acceleration * control_period_s

@@ -1,10 +1,9 @@
 """Distances over the local costmap: to the global plan, and to the local goal.
 
-Both count steps between the four neighbours of a cell, around obstacles. The
-local goal is the last cell of the plan's first stretch inside the costmap.
-Cells under the robot's footprint count as free for the path distance, so that
-a robot at an obstacle still finds its way to the plan; not so for the goal
-distance.
+Both count steps between the four neighbours of a cell, around obstacles. The local goal is the
+last cell of the plan's first stretch inside the local costmap. Cells under the robot's footprint
+count as free for the path distance, so that a robot at an obstacle still finds a path to the
+plan, but not for the goal distance.
 """
 
 from __future__ import annotations
@@ -23,10 +22,12 @@ from quad_nav.kernels.map_grid import cells_on_plan, spread
 
 @dataclass(frozen=True)
 class DistanceGrids:
-    """Distances in cells, int32[H, W].
+    """Distances in cells; H * W for obstacles that the wave touches, H * W + 1 for unreached cells.
 
-    H * W marks an obstacle that the wave touched, H * W + 1 what it did not
-    reach. ``within_robot``, bool[H, W], are the cells inside the footprint.
+    Attributes:
+        path: int32[H, W], to the plan.
+        goal: int32[H, W], to the local goal.
+        within_robot: bool[H, W], cells inside of the footprint.
     """
 
     path: NDArray[np.int32]
@@ -37,9 +38,15 @@ class DistanceGrids:
 def distance_grids(
     costmap: CostmapView, plan_xy: NDArray[np.float64], footprint: NDArray[np.float64], pose: Pose2D
 ) -> DistanceGrids:
-    """Distance grids of a plan, float64[m, 2], for a robot at a pose.
+    """Compute the distance grids of a plan.
 
-    Without a point of the plan on known ground, nothing is reached.
+    Without a point of the plan on known ground no cell is reached.
+
+    Args:
+        costmap: The local costmap.
+        plan_xy: float64[m, 2], the plan, metres in the costmap's frame.
+        footprint: float64[n, 2], metres in the robot's frame.
+        pose: Pose of the robot in the costmap's frame.
     """
     nowhere = np.zeros(costmap.costs.shape, dtype=np.bool_)
     within_robot = nowhere.copy()
@@ -62,10 +69,21 @@ def cost_cloud(
     goal_scale: float,
     occupancy_scale: float,
 ) -> NDArray[np.float32]:
-    """The cells that are ``usable``, bool[H, W], as float32[n, 7], column by column.
+    """Compute the costs of cells for the point cloud ``cost_cloud``.
 
-    Rows x, y, z = 0, path_cost, goal_cost, occ_cost, total_cost. ``path`` and
-    ``goal`` are distances in cells, int32[H, W]; scales are per cell.
+    Args:
+        spec: Grid of the local costmap.
+        costs: uint8[H, W].
+        path: int32[H, W], distance to the plan in cells.
+        goal: int32[H, W], distance to the local goal in cells.
+        usable: bool[H, W], cells to return.
+        path_scale: Weight of the path distance, per cell.
+        goal_scale: Weight of the goal distance, per cell.
+        occupancy_scale: Weight of the costs.
+
+    Returns:
+        float32[n, 7], column by column of the grid: x, y, z = 0, path_cost, goal_cost,
+        occ_cost, total_cost.
     """
     x, y = np.nonzero(usable.T)
     centre_x = spec.origin_x_m + (x + 0.5) * spec.resolution_m

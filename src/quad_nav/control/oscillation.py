@@ -1,8 +1,8 @@
-"""What keeps the controller from turning left and right for ever.
+"""Oscillation state of the trajectory planner: keeps it from turning left and right for ever.
 
-Turning or strafing without moving forward is remembered until the robot has
-moved; a direction that was already tried is then not taken again. Backing out
-("escaping") likewise lasts until the robot has moved or turned far enough.
+The planner remembers turning or strafing without moving forward until the robot has moved, and
+does not take again a direction that it has tried. Backing out ("escaping") likewise lasts until
+the robot has moved or turned far enough.
 """
 
 from __future__ import annotations
@@ -15,7 +15,12 @@ from quad_nav.geometry import Pose2D, angle_difference
 
 @dataclass
 class Oscillation:
-    """Changed by every choice of a trajectory, kept from plan to plan."""
+    """State that every chosen trajectory changes, kept from plan to plan.
+
+    Attributes:
+        since: Pose of the last turn or sideways motion.
+        escape_from: Pose where the robot last began to back out.
+    """
 
     rotating_left: bool = False
     rotating_right: bool = False
@@ -26,11 +31,11 @@ class Oscillation:
     stuck_left_strafe: bool = False
     stuck_right_strafe: bool = False
     escaping: bool = False
-    since: Pose2D = Pose2D(0.0, 0.0, 0.0)  # where it last turned or strafed
-    escape_from: Pose2D = Pose2D(0.0, 0.0, 0.0)  # where it last began to back out
+    since: Pose2D = Pose2D(0.0, 0.0, 0.0)
+    escape_from: Pose2D = Pose2D(0.0, 0.0, 0.0)
 
-    def note_turn(self, sample: Triple, pose: Pose2D) -> None:
-        """A trajectory chosen from the forward and in-place samples."""
+    def record_turn(self, sample: Triple, pose: Pose2D) -> None:
+        """Record a trajectory chosen from the forward and in-place samples."""
         vx, vy, vtheta = sample
         if vx > 0.0:
             return
@@ -48,8 +53,8 @@ class Oscillation:
             self.strafe_left = True
         self.since = pose
 
-    def note_strafe(self, sample: Triple, pose: Pose2D) -> None:
-        """A trajectory chosen from the sideways samples."""
+    def record_strafe(self, sample: Triple, pose: Pose2D) -> None:
+        """Record a trajectory chosen from the sideways samples."""
         vx, vy, _ = sample
         if vx > 0.0:
             return
@@ -62,11 +67,13 @@ class Oscillation:
         self.since = pose
 
     def begin_escape(self, pose: Pose2D) -> None:
+        """Start to back out, unless it has started."""
         if not self.escaping:
             self.escape_from = pose
             self.escaping = True
 
     def forget_if_moved(self, pose: Pose2D, reset_dist_m: float) -> None:
+        """Allow every direction again once the robot has moved."""
         if self.since.distance_to(pose) > reset_dist_m:
             self.rotating_left = self.rotating_right = False
             self.stuck_left = self.stuck_right = False
@@ -76,6 +83,7 @@ class Oscillation:
     def end_escape_if_moved(
         self, pose: Pose2D, reset_dist_m: float, reset_theta_rad: float
     ) -> None:
+        """Stop backing out once the robot has moved or turned."""
         turned_rad = abs(angle_difference(pose.yaw_rad, self.escape_from.yaw_rad))
         if self.escape_from.distance_to(pose) > reset_dist_m or turned_rad > reset_theta_rad:
             self.escaping = False

@@ -1,4 +1,4 @@
-"""What the local planners have in common: a plan that is cut and pruned, a goal, a footprint."""
+"""Common part of the local planners: a plan that is cut and pruned, a goal, a footprint."""
 
 from __future__ import annotations
 
@@ -16,11 +16,17 @@ _PASSED_BEYOND_M = 1.0
 
 
 class PlanFollower:
-    """Remembers a plan and whether its goal was reached.
+    """Base of the local planners; remembers a plan and whether its goal was reached.
 
-    Readable: ``plan`` float64[n, 3] (what is left of the global plan, in its
-    own frame) and ``local_global_plan`` float64[m, 3] (its part in the window, in
-    the local frame, also after a failed call). ``params`` has a ``prune_plan``.
+    Attributes:
+        params: Parameters, with a ``prune_plan``.
+        control_period_s: Length of a control period.
+        plan: float64[n, 3], the global plan that is left, rows x, y, yaw in its own frame.
+        local_global_plan: float64[m, 3], its part in the local costmap, in the local frame; also
+            after a failed call.
+        footprint: float64[n, 2], padded, in the robot's frame.
+        rotating_to_goal: The robot turns to the goal's heading.
+        xy_tolerance_latch: The robot has been at the goal's position.
     """
 
     def __init__(
@@ -36,28 +42,32 @@ class PlanFollower:
         self.set_footprint(footprint)
 
     def set_params(self, params: Any) -> None:
-        """Take new parameters; plan and state stay, but the goal is no longer reached."""
+        """Take other parameters; plan and state stay, but the goal is no longer reached."""
         self.params = params
         self._goal_reached = False
 
     def set_footprint(self, footprint: NDArray[np.float64]) -> None:
-        """The padded footprint, float64[n, 2] in the robot's frame."""
+        """Take another padded footprint, float64[n, 2] in the robot's frame."""
         self.footprint = np.array(footprint, dtype=np.float64)
 
     def set_plan(self, plan: NDArray[np.float64]) -> None:
-        """A new global plan, float64[n, 3] rows x, y, yaw; the goal is to be reached anew."""
+        """Take a new global plan, float64[n, 3] rows x, y, yaw; its goal is not reached."""
         self.plan = np.array(plan, dtype=np.float64).reshape(-1, 3)
         self.xy_tolerance_latch = False
         self._goal_reached = False
 
     def is_goal_reached(self) -> bool:
-        """Whether the robot was found at the goal, heading included."""
+        """Tell whether the robot has reached the goal, heading included."""
         return self._goal_reached
 
     def _cut_plan(
         self, spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D
     ) -> NDArray[np.float64]:
-        """The plan's part in the window. Raises NoLocalPlan when there is none."""
+        """Return the plan's part in the local costmap.
+
+        Raises:
+            NoLocalPlan: There is none.
+        """
         self.local_global_plan = NO_POSES
         if not len(self.plan):
             raise NoLocalPlan("there is no global plan to follow")
@@ -77,11 +87,19 @@ class PlanFollower:
 def plan_in_window(
     plan: NDArray[np.float64], spec: GridSpec, pose: Pose2D, local_from_plan: Pose2D
 ) -> NDArray[np.float64]:
-    """The plan's first stretch near the robot, float64[m, 3] in the local frame.
+    """Return a plan's first stretch near the robot.
 
-    Near is half the window's longer side. The stretch begins with the first
-    near pose and ends with the first far one after it. Empty when no pose of
-    the plan, float64[n, 3], is near.
+    Near is half of the costmap's longer side. The stretch begins with the first near pose and
+    ends with the first far one after it.
+
+    Args:
+        plan: float64[n, 3], rows x, y, yaw in its own frame.
+        spec: Grid of the local costmap.
+        pose: Pose of the robot in the local costmap's frame.
+        local_from_plan: Pose of the plan's frame in the local costmap's frame.
+
+    Returns:
+        float64[m, 3], in the local costmap's frame; empty if no pose is near.
     """
     radius_m = max(spec.size_x * spec.resolution_m / 2.0, spec.size_y * spec.resolution_m / 2.0)
     robot = pose.relative_to(local_from_plan)
@@ -95,12 +113,12 @@ def plan_in_window(
 
 
 def plan_end(plan: NDArray[np.float64], local_from_plan: Pose2D) -> Pose2D:
-    """The last pose of a plan, float64[n, 3] with n >= 1, in the local frame."""
+    """Return the last pose of a plan, float64[n, 3] with n >= 1, in the local frame."""
     return Pose2D(*_transform(local_from_plan, plan[-1:])[0].tolist())
 
 
 def count_passed(plan: NDArray[np.float64], pose: Pose2D) -> int:
-    """How many poses at a plan's beginning are 1 m or more away from the robot."""
+    """Count the poses at a plan's beginning that are 1 m or more away from the robot."""
     near = _distance2(plan, pose) < _PASSED_BEYOND_M
     return int(np.argmax(near)) if near.any() else len(plan)
 

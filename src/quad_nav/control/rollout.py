@@ -1,20 +1,20 @@
-"""Trajectory rollout: what a velocity would lead to, and what that costs.
+"""Trajectory rollout: simulate velocity samples and score them.
 
-A sample (vx, vy, vtheta) is simulated for ``sim_time_s`` in steps of about
-``sim_granularity_m`` or ``angular_sim_granularity_rad``, starting with the
-current velocity and approaching the sample as the acceleration limits allow.
-With the last pose's distances to path and goal, in cells,
+A sample (vx, vy, vtheta) is simulated for ``sim_time_s`` in steps of about ``sim_granularity_m``
+or ``angular_sim_granularity_rad``, starting with the current velocity and approaching the sample
+as the acceleration limits allow. With the last pose's distances to path and goal, in cells,
 
     cost = path_scale * path distance + goal_scale * goal distance
-         + occdist_scale * highest cell cost under the footprint on the way
+         + occdist_scale * highest cell cost under the footprint along the trajectory
 
-A trajectory is worth nothing (negative cost) when the footprint touches a
-lethal or unknown cell or leaves the costmap (-1), or when a pose lies where
-neither path nor goal can be reached from (-2). With ``heading_scoring``, path
-and goal distances are those of one early pose only, and the angle to the
-farthest visible plan point counts as well; with ``simple_attractor``, only the
-squared distance to the plan's end counts. B. Gerkey and K. Konolige 2008,
-"Planning and control in unstructured terrain".
+The cost is negative when the footprint touches a lethal or unknown cell or leaves the costmap
+(-1), or when a pose lies where neither path nor goal can be reached from (-2). With
+``heading_scoring``, path and goal distances are those of one early pose only, and the angle to
+the farthest visible plan point counts as well. With ``simple_attractor``, only the squared
+distance to the plan's end counts.
+
+Source: B. Gerkey, K. Konolige, "Planning and control in unstructured terrain", ICRA Workshop on
+Path Planning on Costmaps, 2008.
 """
 
 from __future__ import annotations
@@ -39,7 +39,13 @@ Triple = Tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A simulated sample: its cost and its poses, float64[k, 3] rows x, y, yaw."""
+    """Simulated sample.
+
+    Attributes:
+        sample: (vx, vy, vtheta).
+        cost: Its cost; negative if it is illegal.
+        points: float64[k, 3], poses, rows x, y, yaw in the costmap's frame.
+    """
 
     sample: Triple
     cost: float
@@ -47,9 +53,17 @@ class Trajectory:
 
 
 class Rollout:
-    """Simulates and scores samples from one robot state on one costmap.
+    """Simulation and scoring of samples from one robot state on one costmap.
 
-    ``plan`` is float64[m, 3], m >= 1, in the costmap's frame.
+    Attributes:
+        spec: Grid of the costmap.
+        pose: Pose of the robot, in single precision as upstream keeps it.
+        velocity: (vx, vy, vtheta) of the robot, likewise.
+        goal_x_m: End of the plan in the costmap.
+        goal_y_m: End of the plan in the costmap.
+        grids: Distances to plan and local goal.
+        inputs: What the kernels score against.
+        kernel_params: Parameters as the kernels take them.
     """
 
     def __init__(
@@ -63,7 +77,6 @@ class Rollout:
         velocity: Twist2D,
     ) -> None:
         self.spec = spec
-        # The original keeps the robot's state in single precision.
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
         self.velocity = single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)
         costmap = costmap_view(spec, costs)
@@ -83,33 +96,39 @@ class Rollout:
     def score(
         self, samples: NDArray[np.float64], limit: float = math.inf
     ) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Costs float64[n] and last poses float64[n, 3] of samples float64[n, 3].
+        """Score samples.
 
-        A cost may be infinite if it is above ``limit``.
+        Args:
+            samples: float64[n, 3], rows vx, vy, vtheta.
+            limit: Costs above it may be returned as infinite.
+
+        Returns:
+            Costs, float64[n], and last poses, float64[n, 3].
         """
         return kernel.score(
             self.inputs, self.kernel_params, _triple(self.pose), self.velocity, samples, limit
         )
 
     def cheapest(self, samples: NDArray[np.float64]) -> Optional[Tuple[int, float]]:
-        """Index and cost of the cheapest legal sample, the first of equals; None if none is."""
+        """Return index and cost of the cheapest legal sample, the first of equals, or None."""
         k, cost = kernel.cheapest(
             self.inputs, self.kernel_params, _triple(self.pose), self.velocity, samples
         )
         return (k, cost) if k >= 0 else None
 
     def trajectory(self, sample: Triple) -> Trajectory:
+        """Simulate a sample from the robot's state."""
         return self._simulate(_triple(self.pose), self.velocity, sample)
 
     def is_valid(self, pose: Pose2D, velocity: Twist2D, command: Twist2D) -> bool:
-        """Whether a command from the given state, in double precision, hits nothing."""
+        """Tell whether a command from a state, in double precision, is legal."""
         return (
             self._simulate(_triple(pose), _twist_triple(velocity), _twist_triple(command)).cost
             >= 0.0
         )
 
     def is_free(self, pose: Pose2D) -> bool:
-        """Whether nothing is under the footprint at a pose, within its outline neither."""
+        """Tell whether no obstacle is under or inside of the footprint at a pose."""
         costmap, footprint = self.inputs.costmap, self.inputs.footprint
         if collision.footprint_cost(costmap, footprint, *_triple(pose)) < 0.0:
             return False
@@ -129,16 +148,14 @@ class Rollout:
         return Trajectory(sample, cost, points[:count])
 
     def goal_distance_at(self, x_m: float, y_m: float) -> Optional[int]:
-        """Goal distance in cells, None off the map."""
+        """Return the goal distance of a point in cells, None off the map."""
         cell = self.spec.cell_of(x_m, y_m)
         return None if cell is None else int(self.grids.goal[cell[1], cell[0]])
 
     def cost_cloud(self) -> NDArray[np.float32]:
-        """Every cell that a robot could be in, float32[n, 7], column by column.
+        """Return the costs of every cell that the robot could be in; see ``map_grid.cost_cloud``.
 
-        Rows x, y, z = 0, path_cost, goal_cost, occ_cost, total_cost: the fields
-        of the point cloud ``cost_cloud``. Distances are in cells; cells in or
-        behind obstacles and under the robot are left out.
+        Cells in or behind obstacles and under the robot are left out.
         """
         costs, path = self.inputs.costmap.costs, self.grids.path
         usable = (path < costs.size) & (costs < INSCRIBED) & ~self.grids.within_robot
@@ -155,7 +172,7 @@ class Rollout:
 
 
 def costmap_view(spec: GridSpec, costs: NDArray[np.uint8]) -> CostmapView:
-    """A costmap, uint8[H, W] on ``spec``, as the kernels take it."""
+    """Return a costmap, uint8[H, W] on ``spec``, as the kernels take it."""
     return CostmapView(
         costs=np.ascontiguousarray(costs),
         origin_x_m=float(spec.origin_x_m),
@@ -167,24 +184,24 @@ def costmap_view(spec: GridSpec, costs: NDArray[np.uint8]) -> CostmapView:
 def footprint_cost(
     spec: GridSpec, costs: NDArray[np.uint8], footprint: NDArray[np.float64], pose: Pose2D
 ) -> float:
-    """The highest cost under the outline of a footprint, float64[n, 2], at a pose.
+    """Return the highest cost under the outline of a footprint, float64[n, 2], at a pose.
 
-    Negative where it cannot be: -1 on a lethal cell, -2 on an unknown one, -3
-    off the map.
+    It is -1 on a lethal cell, -2 on an unknown one and -3 off the map.
     """
     return collision.footprint_cost(costmap_view(spec, costs), footprint, *_triple(pose))
 
 
 def footprint_reach_m(footprint: NDArray[np.float64]) -> float:
-    """The farthest vertex of a footprint, float64[n, 2]."""
+    """Return the distance of a footprint's farthest vertex, float64[n, 2]."""
     return float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
 
 
 def highest_near(costmap: CostmapView, reach_m: float) -> NDArray[np.uint8]:
-    """The highest cost in a square around each cell that holds a footprint of that reach.
+    """Return the highest cost in a square around each cell, uint8[H, W].
 
-    uint8[H, W]; off the map counts as UNKNOWN. Where it is low the outline need
-    not be drawn. The square is built up from maxima over two, four, ... cells.
+    The square holds a footprint of a reach; cells off the map count as UNKNOWN. Where the
+    result is low the footprint's outline need not be drawn. The square is built up from maxima
+    over two, four, ... cells.
     """
     reach = int(min(reach_m / costmap.resolution_m, max(costmap.costs.shape))) + 1
     size_y, size_x = costmap.costs.shape
@@ -219,7 +236,7 @@ def _kernel_params(params: TrajectoryPlannerParams, resolution_m: float) -> kern
 
 
 def single(*values: float) -> Triple:
-    """Three numbers rounded to single precision."""
+    """Round three numbers to single precision."""
     x, y, z = (float(np.float32(value)) for value in values)
     return x, y, z
 

@@ -1,9 +1,9 @@
 """The controller ``base_local_planner/TrajectoryPlannerROS``: trajectory rollout.
 
-Each call cuts the global plan to the local window, measures distances to it
-(``map_grid``), simulates velocities (``rollout``) and takes the best one
-(``velocity_search``). Within ``xy_goal_tolerance_m`` of the plan's last pose in
-the window it stops and turns in place instead (``goal``).
+Each call cuts the global plan to the local costmap, measures distances to it (``map_grid``),
+simulates velocities (``rollout``) and takes the best one (``velocity_search``). Within
+``xy_goal_tolerance_m`` of the plan's last pose in the local costmap it stops and turns in place
+instead (``goal``).
 """
 
 from __future__ import annotations
@@ -29,11 +29,12 @@ __all__ = ["TrajectoryPlanner", "TrajectoryPlannerParams"]
 
 
 class TrajectoryPlanner(PlanFollower):
-    """Follows a plan; remembers what it tried from call to call.
+    """Trajectory rollout; at the goal when any call since ``set_plan`` found the robot there.
 
-    Readable besides a plan follower's: ``oscillation``, and of the last call
-    ``best`` and ``rollout`` (None if it did not simulate). The goal is reached when
-    any call since ``set_plan`` has found the robot there.
+    Attributes:
+        oscillation: State kept from call to call.
+        best: Trajectory chosen in the last call; None if it did not simulate.
+        rollout: Rollout of the last call; None if it did not simulate.
     """
 
     def __init__(
@@ -55,11 +56,12 @@ class TrajectoryPlanner(PlanFollower):
         velocity: Twist2D,
         local_from_plan: Pose2D = IDENTITY,
     ) -> Control:
-        """The command for a robot at ``pose`` on ``costs``, uint8[H, W] on ``spec``.
+        """Compute the command for now; see ``LocalPlanner.compute_velocity``.
 
-        ``velocity`` is the odometry's, in the body frame. Raises NoLocalPlan
-        when no part of the plan is near, and NoValidTrajectory when path or
-        goal are out of reach or the command at the goal would hit something.
+        Raises:
+            NoLocalPlan: No part of the plan is near.
+            NoValidTrajectory: Path or goal are out of reach, or the command at the goal would
+                collide.
         """
         self.best = self.rollout = None
         plan = self._cut_plan(spec, pose, local_from_plan)
@@ -73,16 +75,13 @@ class TrajectoryPlanner(PlanFollower):
             reason = (
                 "the global plan or its end in the local costmap is out of reach"
                 if best.cost == OUT_OF_REACH
-                else "every trajectory hits something"
+                else "every trajectory collides"
             )
             raise NoValidTrajectory(f"{reason} from ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
         return Control(Twist2D(*best.sample), best.cost, best.points, plan)
 
     def cost_cloud(self) -> NDArray[np.float32]:
-        """What each cell of the window cost in the last call, float32[n, 7].
-
-        Rows as in ``Rollout.cost_cloud``; empty if the last call did not simulate.
-        """
+        """Return the cells' costs in the last call; empty if it did not simulate."""
         if self.rollout is None:
             return np.zeros((0, 7), dtype=np.float32)
         return self.rollout.cost_cloud()
@@ -100,7 +99,7 @@ class TrajectoryPlanner(PlanFollower):
             self.rotating_to_goal = self.xy_tolerance_latch = False
             self._goal_reached = True
             return Twist2D()
-        self._search(spec, costs, pose, velocity)  # the oscillation state goes on at the goal
+        self._search(spec, costs, pose, velocity)  # updates the oscillation state
         if not self.rotating_to_goal and not is_stopped(velocity, self.params):
             command = stopping_command(velocity, self.params, self.control_period_s)
         else:

@@ -11,8 +11,8 @@ from typing import Tuple
 class TrajectoryPlannerParams:
     """Parameters of ``base_local_planner/TrajectoryPlannerROS``.
 
-    The defaults are those that dynamic reconfigure puts in force, which differ
-    from the ones in the original's documentation.
+    The defaults are those that dynamic_reconfigure sets, which differ from those in upstream's
+    documentation.
     """
 
     # Limits of the robot
@@ -71,5 +71,5 @@ class TrajectoryPlannerParams:
 
     @property
     def scores_in_metres(self) -> bool:
-        """Whether distances are scored in metres, otherwise in cells."""
+        """True if distances are scored in metres, False in cells."""
         return self.meter_scoring or not self.respect_meter_scoring

@@ -1,15 +1,13 @@
-"""Which velocities are tried, and which of them is taken.
+"""Search of the trajectory planner: the velocities to try, and the one to take.
 
-In order, the first stage that yields a legal trajectory wins:
+The first stage that yields a legal trajectory wins:
 
-1. forwards: a grid of vx and vtheta and, for a holonomic robot, two diagonals;
-   the cheapest wins, the first of equals. Turning in place then replaces it if
-   that costs no more, choosing the turn that ends facing the cell nearest to
-   the goal. While escaping only turns are tried.
+1. forwards: a grid of vx and vtheta and, for a holonomic robot, two diagonals; the cheapest wins,
+   the first of equals. Turning in place then replaces it if that costs no more; of the turns the
+   one wins that ends facing the cell nearest to the goal. While escaping only turns are tried.
 2. sideways, for a holonomic robot, by the same rule.
-3. backwards at ``escape_vel_mps``: taken even if it collides, unless path or
-   goal are out of reach. With ``reject_colliding_escape`` it must lead out of
-   the collision.
+3. backwards at ``escape_vel_mps``: taken even if it collides, unless path or goal are out of
+   reach. With ``reject_colliding_escape`` it must lead out of the collision.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ _ESCAPE_COST = 1.0
 
 @dataclass(frozen=True)
 class VelocityWindow:
-    """The velocities that can be reached."""
+    """Velocities that can be reached."""
 
     min_vx_mps: float
     max_vx_mps: float
@@ -54,9 +52,16 @@ def choose_trajectory(
     oscillation: Oscillation,
     control_period_s: float,
 ) -> Trajectory:
-    """The trajectory to follow; its cost is negative when there is none.
+    """Choose the trajectory to follow.
 
-    Changes ``oscillation``.
+    Args:
+        rollout: Simulation from the robot's state.
+        params: Parameters.
+        oscillation: State of earlier calls, changed.
+        control_period_s: Length of a control period.
+
+    Returns:
+        The trajectory; its cost is negative if none is legal.
     """
     window = velocity_window(rollout, params, control_period_s)
     thetas, theta_step = spaced(
@@ -67,20 +72,20 @@ def choose_trajectory(
         best = _cheapest(rollout, _forward_samples(window, thetas, params))
     best, facing = _turn_in_place(rollout, params, oscillation, thetas, theta_step, best)
     if best is not None:
-        oscillation.note_turn(best.sample, rollout.pose)
-        return _settle(rollout, params, oscillation, best)
+        oscillation.record_turn(best.sample, rollout.pose)
+        return _follow(rollout, params, oscillation, best)
     if params.holonomic_robot:
         best = _strafe(rollout, params, oscillation, facing)
         if best is not None:
-            oscillation.note_strafe(best.sample, rollout.pose)
-            return _settle(rollout, params, oscillation, best)
+            oscillation.record_strafe(best.sample, rollout.pose)
+            return _follow(rollout, params, oscillation, best)
     return _escape(rollout, params, oscillation)
 
 
 def velocity_window(
     rollout: Rollout, params: TrajectoryPlannerParams, control_period_s: float
 ) -> VelocityWindow:
-    """Velocities reachable in one control period with ``dwa``, else in ``sim_time_s``.
+    """Return the velocities reachable in one control period with ``dwa``, else in ``sim_time_s``.
 
     vx is also kept low enough not to overshoot the local goal.
     """
@@ -103,10 +108,10 @@ def velocity_window(
 
 
 def spaced(start: float, end: float, count: int) -> Tuple[NDArray[np.float64], float]:
-    """``count`` values from start to end and their distance, infinite for one value.
+    """Return ``count`` values from start to end, float64[n], and their step.
 
-    Summed step by step, because equal costs are common and the last bit of a
-    sample decides between them.
+    The step is infinite for one value. Values are summed step by step, because equal costs are
+    common and the last bit of a sample decides between them.
     """
     count = max(count, 1)
     if count == 1:
@@ -120,7 +125,7 @@ def spaced(start: float, end: float, count: int) -> Tuple[NDArray[np.float64], f
 def _forward_samples(
     window: VelocityWindow, thetas: NDArray[np.float64], params: TrajectoryPlannerParams
 ) -> NDArray[np.float64]:
-    """float64[n, 3]: for each vx straight ahead, then all vtheta but the last."""
+    """Return float64[n, 3]: for each vx straight ahead, then all vtheta but the last."""
     speeds, _ = spaced(window.min_vx_mps, window.max_vx_mps, params.vx_samples)
     turns = np.concatenate(([0.0], thetas[:-1]))
     samples = np.zeros((len(speeds) * len(turns), 3))
@@ -130,7 +135,7 @@ def _forward_samples(
 
 
 def _cheapest(rollout: Rollout, samples: NDArray[np.float64]) -> Optional[_Candidate]:
-    """The legal sample of lowest cost, the first of equals."""
+    """Return the legal sample of lowest cost, the first of equals."""
     found = rollout.cheapest(samples)
     return _Candidate(_row(samples, found[0]), found[1]) if found is not None else None
 
@@ -143,7 +148,7 @@ def _turn_in_place(
     theta_step: float,
     best: Optional[_Candidate],
 ) -> Tuple[Optional[_Candidate], float]:
-    """The best candidate so far or a turn, and the goal distance that the turn faces."""
+    """Return the best candidate so far or a turn, and the goal distance that it faces."""
     slowest = params.min_in_place_vel_theta_radps
     samples = np.zeros((len(thetas), 3))
     samples[:, 2] = np.where(
@@ -184,7 +189,7 @@ def _strafe(
 def _distance_ahead(
     rollout: Rollout, params: TrajectoryPlannerParams, end: NDArray[np.float64]
 ) -> Optional[int]:
-    """Goal distance of the cell that a pose faces, None off the map."""
+    """Return the goal distance of the cell that a pose faces, None off the map."""
     pose = Pose2D(*(float(value) for value in end))
     return rollout.goal_distance_at(*pose.transform(params.heading_lookahead_m, 0.0))
 
@@ -208,12 +213,12 @@ def _escape(
 
 
 def _leads_out(rollout: Rollout, params: TrajectoryPlannerParams) -> bool:
-    """Whether the robot is free where the escape ends. It may begin in contact."""
+    """Tell whether the robot is free where the escape ends. It may begin in contact."""
     back_m = math.copysign(params.escape_reset_dist_m, params.escape_vel_mps)
     return rollout.is_free(rollout.pose.compose(Pose2D(back_m, 0.0)))
 
 
-def _settle(
+def _follow(
     rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation, best: _Candidate
 ) -> Trajectory:
     oscillation.forget_if_moved(rollout.pose, params.oscillation_reset_dist_m)

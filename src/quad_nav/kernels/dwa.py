@@ -1,7 +1,8 @@
-"""Loops of the dynamic window controller: move along each sample, and take the cheapest.
+"""Dynamic window controller: simulate each sample, and take the cheapest.
 
-The maths is in ``control/dwa_critics.py``. Poses and velocities are rounded to
-single precision at every step, as the original keeps them.
+``control/dwa_critics.py`` has the maths. Poses and velocities are rounded to single precision at
+every step, as upstream keeps them. Poses and velocities of the robot are triples: x, y in metres
+and yaw in the costmap's frame; vx, vy in m/s and vtheta in rad/s in the robot's frame.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ GOAL_FRONT, ALIGNMENT, PATH, GOAL = 0, 1, 2, 3
 
 
 class Motion(NamedTuple):
-    """How samples are simulated."""
+    """Parameters of the simulation."""
 
     sim_time_s: float
     sim_granularity_m: float
@@ -31,16 +32,16 @@ class Motion(NamedTuple):
     min_vel_trans_mps: float
     max_vel_trans_mps: float
     min_vel_theta_radps: float
-    accelerates: bool  # approaches the sample as the limits allow; else has its velocity at once
+    accelerates: bool  # approach the sample as the limits allow; else have its velocity at once
 
 
 class MapGrids(NamedTuple):
-    """The distance grids, int32[H, W], and which of them count."""
+    """Distance grids, and which of them count."""
 
     costmap: CostmapView
-    path: np.ndarray
-    goal: np.ndarray
-    goal_front: np.ndarray
+    path: NDArray[np.int32]  # [H, W]
+    goal: NDArray[np.int32]  # [H, W]
+    goal_front: NDArray[np.int32]  # [H, W]
     forward_point_distance_m: float
     follows_path: bool
     follows_goal: bool
@@ -48,27 +49,27 @@ class MapGrids(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """What the obstacle critic looks at."""
+    """Input of the obstacle critic."""
 
     costmap: CostmapView
-    highest_near: np.ndarray  # uint8[H, W], no less than the highest cost under any footprint
-    footprint: np.ndarray  # float64[n, 2], robot frame, not scaled
-    scale: float  # 0: obstacles are not looked at
-    sums: bool  # along the trajectory; else the highest counts
+    highest_near: NDArray[np.uint8]  # [H, W], no less than the highest cost under any footprint
+    footprint: NDArray[np.float64]  # [n, 2], robot frame, not scaled
+    scale: float  # weight; 0 for no obstacle critic
+    sums: bool  # sum costs along the trajectory; else take the highest
 
 
 class Candidates(NamedTuple):
-    """Samples and what is known of them before obstacles are looked at."""
+    """Samples, and their costs without obstacles."""
 
-    samples: np.ndarray  # float64[n, 3]
-    terms: np.ndarray  # float64[n, 5], the other critics' parts of the cost
-    legal: np.ndarray  # bool[n]
-    footprint_scales: np.ndarray  # float64[n]
+    samples: NDArray[np.float64]  # [n, 3]
+    terms: NDArray[np.float64]  # [n, 5], the other critics' parts of the cost
+    legal: NDArray[np.bool_]  # [n]
+    footprint_scales: NDArray[np.float64]  # [n]
 
 
 @njit(cache=True, nogil=True)
 def step_count(motion: Motion, sample: NDArray[np.float64]) -> int:
-    """Into how many steps a sample's simulation is cut; 0 for one outside the speed limits."""
+    """Count the steps of a sample's simulation, float64[3]; 0 outside of the speed limits."""
     speed, turn = math.hypot(sample[0], sample[1]), abs(sample[2])
     if (
         0.0 <= motion.min_vel_trans_mps
@@ -97,9 +98,18 @@ def simulate(
     sample: NDArray[np.float64],
     points: NDArray[np.float64],
 ) -> Tuple[int, Triple]:
-    """Moves along a sample: (number of poses in ``points`` float64[k, 3], command vx, vy, vtheta).
+    """Simulate a sample.
 
-    The command is the sample, or what comes nearest to it after one step.
+    Args:
+        motion: Parameters of the simulation.
+        pose: Pose of the robot.
+        velocity: Velocity of the robot.
+        sample: float64[3], vx, vy, vtheta.
+        points: float64[k, 3], filled with poses.
+
+    Returns:
+        The number of poses, and the command: the sample, or what comes nearest to it after
+        one step.
     """
     steps = step_count(motion, sample)
     vx, vy, vtheta = sample[0], sample[1], sample[2]
@@ -151,10 +161,14 @@ def _single(value: float) -> Any:
 def is_within_reach(
     grids: MapGrids, points: NDArray[np.float64], count: int, distances: NDArray[np.float64]
 ) -> bool:
-    """Whether path and goal are in reach from every pose, and neither it nor its nose off the map.
+    """Tell whether path and goal are in reach from every pose, and it and its nose on the map.
 
-    Writes the last pose's distances to ``distances``, float64[4]; those that do
-    not count stay.
+    Args:
+        grids: Distance grids.
+        points: float64[k, 3], poses.
+        count: Number of poses.
+        distances: float64[4], filled with the last pose's distances; those that do not count
+            stay.
     """
     if grids.follows_path or grids.follows_goal:
         for k in range(count):
@@ -204,10 +218,17 @@ def _has_nose_on_map(
 def travel(
     motion: Motion, grids: MapGrids, pose: Triple, velocity: Triple, samples: NDArray[np.float64]
 ) -> Tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Moves along samples, float64[n, 3], without looking at obstacles.
+    """Simulate samples without the obstacle critic.
 
-    Returns their commands, float64[n, 3], the distances at their ends,
-    float64[n, 4], and whether they are legal, bool[n].
+    Args:
+        motion: Parameters of the simulation.
+        grids: Distance grids.
+        pose: Pose of the robot.
+        velocity: Velocity of the robot.
+        samples: float64[n, 3].
+
+    Returns:
+        Commands, float64[n, 3]; distances at the ends, float64[n, 4]; legal ones, bool[n].
     """
     points = np.empty((longest(motion, samples), 3))
     commands = np.empty((samples.shape[0], 3))
@@ -222,7 +243,7 @@ def travel(
 
 @njit(cache=True, nogil=True)
 def longest(motion: Motion, samples: NDArray[np.float64]) -> int:
-    """Room for the poses of any sample; at least 1."""
+    """Return the most poses of any sample, float64[n, 3]; at least 1."""
     steps = 1
     for k in range(samples.shape[0]):
         steps = max(steps, step_count(motion, samples[k]))
@@ -233,7 +254,7 @@ def longest(motion: Motion, samples: NDArray[np.float64]) -> int:
 def obstacle_cost(
     obstacles: Obstacles, footprint_scale: float, points: NDArray[np.float64], count: int
 ) -> float:
-    """The highest cost under the scaled footprint on the way, or the sum; -1 on collision."""
+    """Return the highest cost under the scaled footprint, or their sum; -1 on collision."""
     if count > 0 and not math.isfinite(footprint_scale):
         return -1.0
     footprint = obstacles.footprint * footprint_scale
@@ -255,7 +276,7 @@ def obstacle_cost(
 
 @njit(cache=True, nogil=True)
 def total_cost(obstacle_term: float, terms: NDArray[np.float64]) -> float:
-    """Summed in the critics' order: the last bit can decide between samples."""
+    """Add float64[n] in the critics' order: the last bit can decide between samples."""
     total = obstacle_term
     for term in terms:
         total += term
@@ -266,10 +287,13 @@ def total_cost(obstacle_term: float, terms: NDArray[np.float64]) -> float:
 def cheapest(
     motion: Motion, obstacles: Obstacles, pose: Triple, velocity: Triple, candidates: Candidates
 ) -> Tuple[int, float]:
-    """(index, cost) of the legal sample of lowest cost, the first of equals; (-1, inf) if none.
+    """Find the legal sample of lowest cost, the first of equals.
 
-    Samples are looked at in the order of what they cost without obstacles, and
-    no longer than one of them can win.
+    Samples are tried in the order of their costs without obstacles, as long as one of them can
+    win.
+
+    Returns:
+        Index and cost; (-1, inf) if no sample is legal.
     """
     samples, terms, legal = candidates.samples, candidates.terms, candidates.legal
     floors = np.empty(samples.shape[0])

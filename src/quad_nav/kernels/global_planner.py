@@ -1,8 +1,7 @@
-"""Loops of the global planner: A*, and two ways down a potential.
+"""Global planner: A*, and two descents of a potential.
 
-Grids are flat arrays, cell = y * size_x + x; no cell of the outermost ring may
-be entered. The maths is in ``plan/global_planner.py``, the wavefront of
-Dijkstra's search in ``wave.py``.
+Grids are flat arrays, cell = y * size_x + x; no cell of the outermost ring may be entered.
+``plan/global_planner.py`` has the maths, ``wave`` the wavefront of Dijkstra's search.
 """
 
 from __future__ import annotations
@@ -18,10 +17,10 @@ from quad_nav.kernels.wave import NOT_REACHED, arrival_at
 
 
 class Queue(NamedTuple):
-    """A binary heap of cells, the lowest priority on top, of equal ones as the original has it."""
+    """Binary heap of cells, the lowest priority on top; equal ones are ordered as upstream."""
 
-    priorities: np.ndarray  # float32[n]
-    cells: np.ndarray  # int64[n]
+    priorities: NDArray[np.float32]  # [n]
+    cells: NDArray[np.int64]  # [n]
 
 
 @njit(cache=True, nogil=True)
@@ -66,10 +65,23 @@ def a_star(
     planar: bool,
     max_visits: int,
 ) -> bool:
-    """Spread the potential from ``start`` until ``goal`` is visited; whether it was.
+    """Spread a potential from the start until the goal is visited.
 
-    ``step_costs`` uint8[n]; ``enterable`` bool[n]; ``potential`` float32[n], all
-    NOT_REACHED. A cell's potential is final when it is first touched.
+    A cell's potential is final when it is first touched.
+
+    Args:
+        step_costs: uint8[n], cost of a step to each cell.
+        enterable: bool[n].
+        potential: float32[n], all NOT_REACHED; filled.
+        size_x: Cells in a row.
+        start: Flat cell.
+        goal: Flat cell.
+        neutral: Cost of a free cell, weight of the heuristic.
+        planar: True for potentials of a planar wave.
+        max_visits: Most cells to visit.
+
+    Returns:
+        True if the goal was visited.
     """
     size = potential.size
     queue = Queue(np.empty(size, dtype=np.float32), np.empty(size, dtype=np.int64))
@@ -113,9 +125,9 @@ def fill_around(
     centre: int,
     planar: bool,
 ) -> None:
-    """Give the cells that were not reached around a cell, two cells wide, a potential too.
+    """Give unreached cells within two cells of a flat cell a potential, too.
 
-    Column by column, each from its neighbours as they then are.
+    Column by column, each from its neighbours as they then are. Arrays as for ``a_star``.
     """
     for dx in range(-2, 3):
         for dy in range(-2, 3):
@@ -134,10 +146,19 @@ def gradient_path(
     goal_y: float,
     path: NDArray[np.float32],
 ) -> int:
-    """Follow the gradient down from the goal to the start, cells (x, y) into ``path``.
+    """Follow the gradient down from the goal to the start.
 
-    ``path`` is float32[n, 2]. Returns the number of points, 0 when the descent
-    ends elsewhere.
+    Args:
+        potential: float32[n].
+        size_x: Cells in a row.
+        start_x: Start, in cells.
+        start_y: Start, in cells.
+        goal_x: Goal, in cells.
+        goal_y: Goal, in cells.
+        path: float32[k, 2], filled with cells (x, y).
+
+    Returns:
+        The number of points, 0 if the descent ends elsewhere.
     """
     cell = int(goal_y) * size_x + int(goal_x)
     dx, dy = np.float32(goal_x - int(goal_x)), np.float32(goal_y - int(goal_y))

@@ -1,9 +1,9 @@
 """Ranges of planar LIDARs among solids and over the floor.
 
-Two ways to find what a beam hits, which give the same ranges. A solid of ``Solids`` is
-projected: its sector says which beams can meet it, and only those are tried. That is the
-quickest for some hundreds. The solids of a ``SolidGrid`` lie in square columns, and each beam
-walks from column to column until it has hit something: the quickest for thousands.
+Two methods find what a beam hits and give the same ranges. A solid of ``Solids`` is projected:
+its sector says which beams can hit it, and only those are tried. That is the fastest for some
+hundreds of solids. The solids of a ``SolidGrid`` lie in square columns, and each beam walks from
+column to column until it hits something. That is the fastest for thousands.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _ROUNDING = 1e-6  # of a beam's number
 
 
 class Solids(NamedTuple):
-    """Kinds and sizes as in ``rays``, and where they are in ``map``, metres."""
+    """Solids: kinds and sizes as in ``rays``, positions in ``map``, metres."""
 
     kinds: np.ndarray
     """int64[s]"""
@@ -35,9 +35,9 @@ class Solids(NamedTuple):
 
 
 class SolidGrid(NamedTuple):
-    """Solids that rest, sorted into square columns of ``cell_m``.
+    """Solids at rest, sorted into square columns of ``cell_m``.
 
-    Column (x, y) of those from ``low`` on holds the solids
+    Column (x, y), counted from ``low``, holds the solids
     ``members[starts[y, x]:starts[y, x + 1]]``.
     """
 
@@ -54,14 +54,14 @@ class SolidGrid(NamedTuple):
 
 
 class Beams(NamedTuple):
-    """What a LIDAR's beams are; beam k is at ``first_rad + k * step_rad`` in its plane."""
+    """Beams of a LIDAR; beam k is at ``first_rad + k * step_rad`` in its plane."""
 
     directions: np.ndarray
-    """float64[m, 2], their cosines and sines"""
+    """float64[m, 2], cosines and sines of the beams"""
     first_rad: float
     step_rad: float
     near_m: float
-    """where they begin: a solid that holds this point of a beam is not seen by it"""
+    """where beams begin: a beam does not see a solid that holds this point of it"""
     far_m: float
 
 
@@ -74,10 +74,16 @@ def cast_scans(
     grid: SolidGrid,
     ranges: NDArray[np.float64],
 ) -> None:
-    """Fill ranges float64[n, m] with the distances to the first hits, inf for none.
+    """Compute the ranges of LIDARs. The floor is z = 0.
 
-    origins: float64[n, 3] and rotations: float64[n, 3, 3], the axes as columns, of the
-    LIDARs in ``map``. The floor is z = 0.
+    Args:
+        origins: float64[n, 3], positions of the LIDARs in ``map``, metres.
+        rotations: float64[n, 3, 3], axes of the LIDARs in ``map`` as columns.
+        beams: Beams of each LIDAR.
+        solids: Solids to project.
+        grid: Solids to walk to.
+        ranges: float64[n, m], filled with the distances to the first hits, metres; inf for
+            none.
     """
     for k in range(origins.shape[0]):
         row, origin, rotation = ranges[k], triple(origins[k]), rotations[k]
@@ -98,7 +104,7 @@ def cast_scans(
 
 @njit(cache=True, nogil=True)
 def _in_map(rotation: NDArray[np.float64], direction: NDArray[np.float64]) -> Triple:
-    """A beam's direction in ``map``."""
+    """Return the direction in ``map`` of a beam, float64[2]."""
     return (
         rotation[0, 0] * direction[0] + rotation[0, 1] * direction[1],
         rotation[1, 0] * direction[0] + rotation[1, 1] * direction[1],
@@ -110,7 +116,7 @@ def _in_map(rotation: NDArray[np.float64], direction: NDArray[np.float64]) -> Tr
 def _cast_at_floor(
     row: NDArray[np.float64], origin: Triple, rotation: NDArray[np.float64], beams: Beams
 ) -> None:
-    """Those beams that look down meet z = 0, unless none is steep enough to be there in time."""
+    """Shorten the beams, float64[m], that look down to where they meet z = 0."""
     if math.hypot(rotation[2, 0], rotation[2, 1]) * beams.far_m < origin[2]:
         return
     for beam in range(row.shape[0]):
@@ -132,7 +138,7 @@ def _cast_at_solid(
     solids: Solids,
     solid: int,
 ) -> None:
-    """Shorten the beams of a solid's sector to where they enter it."""
+    """Shorten the beams, float64[m], of a solid's sector to where they enter it."""
     centre = solids.centres[solid]
     sizes = triple(solids.sizes[solid])
     offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
@@ -162,7 +168,7 @@ def _cast_at_solid(
 
 @njit(cache=True, nogil=True)
 def _beams_of(first_rad: float, width_rad: float, beams: Beams) -> Tuple[float, float]:
-    """A sector in numbers of beams, with fractions; its end may be a turn further on."""
+    """Return a sector in numbers of beams, with fractions; its end may be a turn farther on."""
     offset_rad = first_rad - beams.first_rad  # within a turn and a half; a modulo is slow
     if offset_rad < 0.0:
         offset_rad += 2.0 * math.pi
@@ -174,9 +180,9 @@ def _beams_of(first_rad: float, width_rad: float, beams: Beams) -> Tuple[float, 
 
 @njit(cache=True, nogil=True)
 def _surrounds(sizes: Triple, eye: Triple, near: float) -> bool:
-    """Whether a ball of radius ``near`` around the eye is well inside a solid of any kind.
+    """Tell whether a ball of radius ``near`` around the eye is well inside of a solid.
 
-    What a quadcopter's own guard is to its LIDAR: no beam begins outside.
+    A quadcopter's own guard surrounds its LIDAR: no beam begins outside.
     """
     inscribed = min(sizes[0], sizes[1], sizes[2]) - near
     return inscribed > 0.0 and dot(eye, eye) < inscribed * inscribed
@@ -211,10 +217,11 @@ def _shorten(
 def cast_through_grid(
     grid: SolidGrid, origin: Triple, direction: Triple, near: float, far: float, hit: float
 ) -> float:
-    """The first hit from ``near`` on, or ``hit`` if that or ``far`` comes before.
+    """Return the first hit of a ray from ``near`` on, or ``hit`` if that or ``far`` is nearer.
 
-    The columns are walked in the order that the ray crosses them (Amanatides and Woo, "A
-    fast voxel traversal algorithm for ray tracing", 1987).
+    The ray walks the columns in the order in which it crosses them (J. Amanatides, A. Woo,
+    "A fast voxel traversal algorithm for ray tracing", Eurographics 1987). Origin and direction
+    are triples in ``map``, lengths in metres.
     """
     begin, end = near, far
     for axis in range(3):
@@ -248,7 +255,7 @@ def cast_through_grid(
 def _walk(
     origin: float, direction: float, low: float, begin: float, cell: float, cells: int
 ) -> Tuple[int, int, float, float]:
-    """One coordinate: the cell at ``begin``, its step, the t of the next border, t per cell."""
+    """Return, for an axis, the cell at ``begin``, its step, the next border's t, t per cell."""
     index = min(max(int(math.floor((origin + begin * direction - low) / cell)), 0), cells - 1)
     if direction > 0.0:
         return index, 1, (low + (index + 1) * cell - origin) / direction, cell / direction
@@ -259,7 +266,7 @@ def _walk(
 
 @njit(cache=True, nogil=True, inline="always")
 def _enter_in_map(solids: Solids, solid: int, origin: Triple, direction: Triple) -> float:
-    """``enter_solid`` of a ray in ``map``."""
+    """Return ``enter_solid`` of a ray in ``map``."""
     centre, to_solid = solids.centres[solid], solids.rotations[solid]
     offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
     return enter_solid(

@@ -1,4 +1,7 @@
-"""Scan to points, and points from frame to frame, in float32 (see costmap/projection.py)."""
+"""Scans to points, and points from frame to frame, in float32.
+
+``costmap/projection.py`` has the reasons.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +20,17 @@ def project_ranges(
     range_max: np.float32,
     inf_range: np.float32,
 ) -> NDArray[np.float32]:
-    """Points float32[m, 3] of the ranges in [range_min, range_max), in order.
+    """Convert ranges in [range_min, range_max) to points, in order.
 
-    ranges: float32[n]; directions: float64[n, 2], cosine and sine of each beam.
-    ``inf_range`` takes the place of +inf. All numbers are float32.
+    Args:
+        ranges: float32[n], metres.
+        directions: float64[n, 2], cosine and sine of each beam.
+        range_min: float32, metres.
+        range_max: float32, metres.
+        inf_range: float32, replaces +inf.
+
+    Returns:
+        float32[m, 3], metres in the sensor's frame.
     """
     points = np.zeros((len(ranges), 3), np.float32)
     m = 0
@@ -41,10 +51,17 @@ def transform_between_heights(
     min_z: float,
     max_z: float,
 ) -> NDArray[np.float32]:
-    """Points float32[m, 3] in the new frame, those with min_z <= z <= max_z, in order.
+    """Transform points and keep those with min_z <= z <= max_z, in order.
 
-    points: float32[n, 3]; rotation: float32[3, 3]; translation: float32[3]. The heights
-    are float64.
+    Args:
+        points: float32[n, 3], metres.
+        rotation: float32[3, 3], to the new frame.
+        translation: float32[3], to the new frame.
+        min_z: float64, height in the new frame.
+        max_z: float64, height in the new frame.
+
+    Returns:
+        float32[m, 3], metres in the new frame.
     """
     moved = np.empty_like(points)
     m = 0
@@ -66,9 +83,14 @@ def transform_between_heights(
 def outside_circles(
     points: NDArray[np.float32], circles: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """Points float32[m, 3] that lie in none of the circles, seen from above, in order.
+    """Keep the points, float32[n, 3], that lie in none of the circles, seen from above.
 
-    circles: float64[c, 3], rows x, y, radius; what is on a circle lies in it.
+    Args:
+        points: float32[n, 3], metres.
+        circles: float64[c, 3], rows x, y, radius; a point on a circle lies in it.
+
+    Returns:
+        float32[m, 3], in order.
     """
     kept = np.empty_like(points)
     m = 0
@@ -90,7 +112,7 @@ def outside_circles(
 def count_returns(
     ranges: NDArray[np.float32], range_min: np.float32, range_max: np.float32, near: np.float32
 ) -> Tuple[int, int]:
-    """How many of float32[n] are in [range_min, range_max), and in [range_min, near)."""
+    """Count the ranges, float32[n], in [range_min, range_max) and in [range_min, near)."""
     returns = nearer = 0
     for k in range(ranges.shape[0]):
         if ranges[k] >= range_min:

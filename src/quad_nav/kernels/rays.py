@@ -1,15 +1,15 @@
-"""Where rays enter solids.
+"""Entry of rays into solids.
 
-A ray is ``origin + t * direction``; each function takes it in the solid's own frame, with
-the origin in its centre, and returns the t at which it enters: negative when the ray begins
-inside or beyond, inf for a miss. A solid is a kind and three sizes:
+A ray is ``origin + t * direction``. Each function takes it in the solid's own frame, with the
+origin in its centre, as triples in metres, and returns the t at which it enters: negative when the
+ray begins inside or beyond, inf for a miss. A solid is a kind and three sizes in metres:
 
     BOX       half of its extent along x, y, z
     CYLINDER  radius, radius, half of its height; its axis is z
     SPHERE    radius, radius, radius
 
-A convex solid is what several pieces have in common (slabs between two parallel faces, a
-tube). A ray is in all of them from its last entry to its first exit, if that is later.
+A convex solid is the intersection of pieces (slabs between two parallel faces, a tube). A ray is in
+all of them from its last entry to its first exit, if that is later.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _PARALLEL = 1e-12  # of a direction of length 1; it strays from the faces by les
 
 @njit(cache=True, nogil=True)
 def through_slab(origin: float, direction: float, low: float, high: float) -> Tuple[float, float]:
-    """(entry, exit) of one coordinate's interval [low, high]; (inf, -inf) for a miss."""
+    """Return (entry, exit) of a coordinate's interval [low, high]; (inf, -inf) for a miss."""
     if abs(direction) < _PARALLEL:
         if low <= origin <= high:
             return -math.inf, math.inf
@@ -41,7 +41,7 @@ def through_slab(origin: float, direction: float, low: float, high: float) -> Tu
 
 @njit(cache=True, nogil=True)
 def enter_box(origin: Triple, direction: Triple, sizes: Triple) -> float:
-    """Entry into the three slabs |x| <= sizes[0], |y| <= sizes[1], |z| <= sizes[2]."""
+    """Return the entry into the slabs abs(x, y, z) <= sizes."""
     in_x, out_x = through_slab(origin[0], direction[0], -sizes[0], sizes[0])
     in_y, out_y = through_slab(origin[1], direction[1], -sizes[1], sizes[1])
     in_z, out_z = through_slab(origin[2], direction[2], -sizes[2], sizes[2])
@@ -54,7 +54,7 @@ def enter_box(origin: Triple, direction: Triple, sizes: Triple) -> float:
 
 @njit(cache=True, nogil=True)
 def enter_ball(squared: float, along: float, excess: float) -> Tuple[float, float]:
-    """(entry, exit) where ``squared t^2 + 2 along t + excess <= 0``; (inf, -inf) for nowhere."""
+    """Return (entry, exit) of ``squared t^2 + 2 along t + excess <= 0``; (inf, -inf) if none."""
     if squared == 0.0:
         return (-math.inf, math.inf) if excess <= 0.0 else (math.inf, -math.inf)
     discriminant = along * along - squared * excess
@@ -66,7 +66,7 @@ def enter_ball(squared: float, along: float, excess: float) -> Tuple[float, floa
 
 @njit(cache=True, nogil=True)
 def enter_cylinder(origin: Triple, direction: Triple, sizes: Triple) -> float:
-    """Entry into the tube x^2 + y^2 <= sizes[0]^2 and the slab |z| <= sizes[2]."""
+    """Return the entry into the tube x^2 + y^2 <= sizes[0]^2 and the slab abs(z) <= sizes[2]."""
     x, y, dx, dy, radius = origin[0], origin[1], direction[0], direction[1], sizes[0]
     in_tube, out_tube = enter_ball(
         dx * dx + dy * dy, x * dx + y * dy, x * x + y * y - radius * radius
@@ -78,7 +78,7 @@ def enter_cylinder(origin: Triple, direction: Triple, sizes: Triple) -> float:
 
 @njit(cache=True, nogil=True)
 def enter_sphere(origin: Triple, direction: Triple, sizes: Triple) -> float:
-    """Entry into x^2 + y^2 + z^2 <= sizes[0]^2."""
+    """Return the entry into x^2 + y^2 + z^2 <= sizes[0]^2."""
     entry, _ = enter_ball(
         dot(direction, direction), dot(origin, direction), dot(origin, origin) - sizes[0] * sizes[0]
     )
@@ -87,7 +87,7 @@ def enter_sphere(origin: Triple, direction: Triple, sizes: Triple) -> float:
 
 @njit(cache=True, nogil=True)
 def enter_solid(kind: int, origin: Triple, direction: Triple, sizes: Triple) -> float:
-    """Entry into any of them; origin, direction and sizes are triples."""
+    """Return the entry into a solid of any kind."""
     if kind == BOX:
         return enter_box(origin, direction, sizes)
     if kind == CYLINDER:
@@ -97,13 +97,13 @@ def enter_solid(kind: int, origin: Triple, direction: Triple, sizes: Triple) -> 
 
 @njit(cache=True, nogil=True)
 def dot(a: Triple, b: Triple) -> float:
-    """Scalar product of two triples."""
+    """Return the scalar product of two triples."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, nogil=True)
 def turn(rotation: NDArray[np.float64], vector: Triple) -> Triple:
-    """``rotation @ vector`` of float64[3, 3] and a triple."""
+    """Return ``rotation @ vector`` of float64[3, 3] and a triple."""
     return (
         rotation[0, 0] * vector[0] + rotation[0, 1] * vector[1] + rotation[0, 2] * vector[2],
         rotation[1, 0] * vector[0] + rotation[1, 1] * vector[1] + rotation[1, 2] * vector[2],
@@ -113,5 +113,5 @@ def turn(rotation: NDArray[np.float64], vector: Triple) -> Triple:
 
 @njit(cache=True, nogil=True)
 def triple(row: NDArray[np.float64]) -> Triple:
-    """The three numbers of float64[3]."""
+    """Return the three numbers of float64[3]."""
     return row[0], row[1], row[2]

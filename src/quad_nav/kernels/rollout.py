@@ -1,6 +1,7 @@
-"""Loops of the trajectory rollout: simulate a velocity sample and score it.
+"""Trajectory rollout: simulate velocity samples and score them.
 
-The maths is in ``control/rollout.py``.
+``control/rollout.py`` has the maths. Poses and velocities of the robot are triples: x, y in metres
+and yaw in the costmap's frame; vx, vy in m/s and vtheta in rad/s in the robot's frame.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ _HEADING_SCALE = 0.3
 
 
 class RolloutInputs(NamedTuple):
-    """What trajectories are scored against."""
+    """Costmap, footprint and plan that trajectories are scored against."""
 
     costmap: CostmapView
-    highest_near: np.ndarray  # uint8[H, W], no less than the highest cost under the footprint
-    footprint: np.ndarray  # float64[n, 2], robot frame
-    path_distance: np.ndarray  # int32[H, W]
-    goal_distance: np.ndarray  # int32[H, W]
-    plan: np.ndarray  # float64[m, 2], m >= 1
+    highest_near: NDArray[np.uint8]  # [H, W], no less than the highest cost under the footprint
+    footprint: NDArray[np.float64]  # [n, 2], robot frame
+    path_distance: NDArray[np.int32]  # [H, W]
+    goal_distance: NDArray[np.int32]  # [H, W]
+    plan: NDArray[np.float64]  # [m, 2], m >= 1
 
 
 class RolloutParams(NamedTuple):
-    """How they are simulated and scored."""
+    """Parameters of simulation and scoring."""
 
     sim_time_s: float
     sim_granularity_m: float
@@ -51,7 +52,7 @@ class RolloutParams(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def step_count(params: RolloutParams, sample: NDArray[np.float64]) -> int:
-    """Into how many steps the simulation of a sample (vx, vy, vtheta) is cut."""
+    """Count the steps of the simulation of a sample, float64[3]; at least 1."""
     if params.heading_scoring:
         steps = int(params.sim_time_s / params.sim_granularity_m + 0.5)
     else:
@@ -70,7 +71,7 @@ def step_count(params: RolloutParams, sample: NDArray[np.float64]) -> int:
 def turn(
     params: RolloutParams, theta: float, vtheta: float, wanted: float, headings: NDArray[np.float64]
 ) -> None:
-    """Fill float64[steps, 3] with the yaw at each step, its cosine and its sine."""
+    """Fill headings, float64[steps, 3], with the yaw at each step, its cosine and its sine."""
     steps = headings.shape[0]
     dt = params.sim_time_s / steps
     for k in range(steps):
@@ -90,12 +91,20 @@ def simulate(
     points: NDArray[np.float64],
     with_footprint: bool = True,
 ) -> Tuple[float, int]:
-    """Cost of one sample and the number of poses written to ``points``, float64[k, 3].
+    """Simulate and score a sample.
 
-    ``headings``, float64[steps, 3], is what ``turn`` gives for the sample. Without the
-    footprint it is what the sample costs if no cell under the footprint does. Negative
-    cost: COLLIDES (or off the map) and OUT_OF_REACH; ``points`` then ends before the pose that
-    failed.
+    Args:
+        inputs: Costmap, footprint and plan.
+        params: Parameters.
+        pose: Pose of the robot.
+        velocity: Velocity of the robot.
+        sample: float64[3], vx, vy, vtheta.
+        headings: float64[steps, 3], filled by ``turn`` for the sample.
+        points: float64[k, 3], filled with poses; ends before a pose that fails.
+        with_footprint: False to leave out the costs under the footprint.
+
+    Returns:
+        The cost, COLLIDES (also off the map) or OUT_OF_REACH, and the number of poses.
     """
     steps = headings.shape[0]
     dt = params.sim_time_s / steps
@@ -164,7 +173,7 @@ def _is_heading_step(params: RolloutParams, time: float, dt: float) -> bool:
 def _heading_difference(
     inputs: RolloutInputs, cell_x: int, cell_y: int, x: float, y: float, theta: float
 ) -> float:
-    """Angle to the farthest plan point in sight of a cell; huge when there is none."""
+    """Return the angle to the farthest plan point in sight of a cell; huge if there is none."""
     costmap = inputs.costmap
     for k in range(inputs.plan.shape[0] - 1, -1, -1):
         to_x, to_y = cell_of(costmap, inputs.plan[k, 0], inputs.plan[k, 1])
@@ -187,10 +196,18 @@ def score(
     samples: NDArray[np.float64],
     limit: float,
 ) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Cost float64[n] and last pose float64[n, 3] of each sample, float64[n, 3].
+    """Score samples.
 
-    Infinite for a sample that is known to cost more than ``limit``. The last pose is nan for
-    a sample whose first pose fails.
+    Args:
+        inputs: Costmap, footprint and plan.
+        params: Parameters.
+        pose: Pose of the robot.
+        velocity: Velocity of the robot.
+        samples: float64[n, 3].
+        limit: Samples known to cost more get an infinite cost.
+
+    Returns:
+        Costs, float64[n], and last poses, float64[n, 3], nan where the first pose fails.
     """
     headings, places = _all_turns(params, pose, velocity, samples)
     points = np.empty((headings.shape[1], 3))
@@ -216,10 +233,13 @@ def cheapest(
     velocity: Triple,
     samples: NDArray[np.float64],
 ) -> Tuple[int, float]:
-    """Index and cost of the legal sample of lowest cost, the first of equals; -1 if none is.
+    """Find the legal sample of lowest cost, the first of equals.
 
-    samples: float64[n, 3]. They are tried in the order of what they cost without the
-    footprint, which is the slow part, until that is more than the best one's cost.
+    Samples, float64[n, 3], are tried in the order of their costs without the footprint, which is
+    the slow part, until that is more than the best one's cost.
+
+    Returns:
+        Index and cost; the index is -1 if no sample is legal.
     """
     headings, places = _all_turns(params, pose, velocity, samples)
     points = np.empty((headings.shape[1], 3))
@@ -248,7 +268,7 @@ def _lower_bounds(
     places: NDArray[np.int64],
     points: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """What samples cost at least, float64[n]: without the footprint, if that can only add."""
+    """Return the least costs of samples, float64[n]: without the footprint, if that only adds."""
     bounds = np.full(samples.shape[0], -np.inf)
     if params.occupancy_scale >= 0.0:
         for k in range(samples.shape[0]):
@@ -263,7 +283,7 @@ def _lower_bounds(
 def _all_turns(
     params: RolloutParams, pose: Triple, velocity: Triple, samples: NDArray[np.float64]
 ) -> Tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """``turn`` for all samples: float64[m, longest, 3], and which one is whose, int64[n].
+    """Return ``turn`` of all samples, float64[m, longest, 3], and the row of each, int64[n].
 
     Many samples turn in the same way, with as many steps.
     """

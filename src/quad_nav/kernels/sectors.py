@@ -1,12 +1,12 @@
-"""Which bearings of a planar LIDAR a solid can be seen at.
+"""Sectors: the bearings of a planar LIDAR at which a solid can be seen.
 
 All beams lie in the LIDAR's plane, so a solid is seen between the bearings that bound its
 shadow on that plane. A sector is (first bearing, width), counter-clockwise, radians in the
 LIDAR's frame; a negative width is an empty one, 2 pi is all around. Sectors may be too wide
 but never too narrow.
 
-A view of a solid is given in the solid's own frame: ``eye``, the LIDAR's place, and its axes
-``ahead``, ``left`` and ``up``, as triples. Kinds and sizes as in ``rays``.
+A view of a solid is given in the solid's own frame: ``eye``, the LIDAR's position in metres, and its
+axes ``ahead``, ``left`` and ``up``, as triples. Kinds and sizes as in ``rays``.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _STANDING = 0.5  # cosine of the angle between its axis and the plane's normal
 def sector_of(
     kind: int, eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
 ) -> Tuple[float, float]:
-    """The sector that a solid is seen in."""
+    """Return the sector of a solid."""
     height = abs(dot(up, eye))
     if kind == BOX:
         if height > abs(up[0]) * sizes[0] + abs(up[1]) * sizes[1] + abs(up[2]) * sizes[2]:
@@ -48,7 +48,7 @@ def sector_of(
 def _box_sector(
     eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
 ) -> Tuple[float, float]:
-    """Between the outermost corners, unless the eye is above or below the box.
+    """Return the sector between the outermost corners, unless the eye is above or below the box.
 
     The shadow on the plane is convex: if the eye is outside it, all corners lie within
     half a turn and "further left" is the sign of a cross product.
@@ -77,9 +77,10 @@ def _box_sector(
 def _cylinder_sector(
     eye: Triple, ahead: Triple, left: Triple, up: Triple, sizes: Triple
 ) -> Tuple[float, float]:
-    """A cylinder that stands on the plane is cut in an ellipse around its axis.
+    """Return the sector of a cylinder.
 
-    The ellipse's long half is radius / cos(tilt). A lying one is taken for its bounding sphere.
+    The plane cuts a standing cylinder in an ellipse around its axis, with the long half
+    radius / cos(tilt). A lying one is replaced by its bounding sphere.
     """
     if abs(up[2]) > _STANDING:
         z = dot(up, eye) / up[2]  # where the axis meets the plane
@@ -91,7 +92,7 @@ def _cylinder_sector(
 
 @njit(cache=True, nogil=True)
 def _disc_sector(x: float, y: float, radius: float) -> Tuple[float, float]:
-    """A disc around (x, y) seen from (0, 0)."""
+    """Return the sector of a disc around (x, y) seen from (0, 0)."""
     distance = math.sqrt(x * x + y * y)
     if distance <= radius:
         return FULL

@@ -16,8 +16,8 @@ Unless ``old_navfn_behavior``, positions are real numbers: start and goal are ha
 cell coordinates, so that whole numbers are the centres of cells. Dijkstra's wave then begins in
 the four cells around the robot, but A* and grid paths cut the coordinates to whole cells: a point
 in the lower or left half of a cell belongs to the neighbour, and when that is an obstacle there is
-no plan. For the gradient every cell within two cells of the goal then gets a potential, obstacles included:
-near the goal a path may cut a corner of an obstacle.
+no plan. For the gradient every cell within two cells of the goal then gets a potential, obstacles
+included: near the goal a path may cut a corner of an obstacle.
 """
 
 from __future__ import annotations

@@ -52,16 +52,16 @@ def plan_near(
     The points lie on square rings, three cells apart or one tolerance if that is less.
 
     Args:
-        planner: The planner.
+        planner: The planner, called with the next four arguments.
         spec: Grid of the global costmap.
-        costs: uint8[H, W].
+        costs: uint8[H, W] on it.
         start: Pose of the robot.
-        goal: Pose of the goal.
+        goal: Its goal.
         tolerance_m: How far from the goal along x or y a point may be.
         append_goal: End a plan to another point at the goal all the same.
 
     Returns:
-        float64[n, 3], rows x, y, yaw.
+        The plan, as ``GlobalPlanner.make_plan``.
 
     Raises:
         PlanningError: No point has a plan; the error is the goal's own.
@@ -70,17 +70,20 @@ def plan_near(
         return planner.make_plan(spec, costs, start, goal)
     except PlanningError as error:
         unreachable = error
-    step_m = 3.0 * spec.resolution_m
-    if 0.0 < tolerance_m < step_m:
-        step_m = tolerance_m
+    step_m = _ring_step_m(spec.resolution_m, tolerance_m)
     for dx, dy in ring_offsets(step_m, tolerance_m):
         near = Pose2D(goal.x_m + dx, goal.y_m + dy, goal.yaw_rad)
         try:
             plan = planner.make_plan(spec, costs, start, near)
         except PlanningError:
-            continue  # the next point may do; the goal's own error is raised in the end
+            continue  # try the next point
         return np.vstack([plan, [goal.x_m, goal.y_m, goal.yaw_rad]]) if append_goal else plan
     raise unreachable
+
+
+def _ring_step_m(resolution_m: float, tolerance_m: float) -> float:
+    step_m = 3.0 * resolution_m
+    return tolerance_m if 0.0 < tolerance_m < step_m else step_m
 
 
 def ring_offsets(step_m: float, reach_m: float) -> Iterator[Tuple[float, float]]:
