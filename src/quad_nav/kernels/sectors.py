@@ -5,8 +5,8 @@ shadow on that plane. A sector is (first bearing, width), counter-clockwise, rad
 LIDAR's frame; a negative width is an empty one, 2 pi is all around. Sectors may be too wide
 but never too narrow.
 
-A view of a solid is given in the solid's own frame: ``eye``, the LIDAR's position in metres, and its
-axes ``ahead``, ``left`` and ``up``, as triples. Kinds and sizes as in ``rays``.
+A view of a solid is given in the solid's own frame: ``eye``, the LIDAR's position in metres, and
+its axes ``ahead``, ``left`` and ``up``, as triples. Kinds and sizes as in ``rays``.
 """
 
 from __future__ import annotations

@@ -47,16 +47,14 @@ def plan_near(
     tolerance_m: float,
     append_goal: bool,
 ) -> NDArray[np.float64]:
-    """Plan to the goal, or to the first point around it that has a plan.
-
-    The points lie on square rings, three cells apart or one tolerance if that is less.
+    """Plan to the goal, or to the first point on square rings around it that has a plan.
 
     Args:
         planner: The planner, called with the next four arguments.
         spec: Grid of the global costmap.
         costs: uint8[H, W] on it.
         start: Pose of the robot.
-        goal: Its goal.
+        goal: Pose of its goal.
         tolerance_m: How far from the goal along x or y a point may be.
         append_goal: End a plan to another point at the goal all the same.
 
@@ -76,7 +74,7 @@ def plan_near(
         try:
             plan = planner.make_plan(spec, costs, start, near)
         except PlanningError:
-            continue  # try the next point
+            continue
         return np.vstack([plan, [goal.x_m, goal.y_m, goal.yaw_rad]]) if append_goal else plan
     raise unreachable
 
