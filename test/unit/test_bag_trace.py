@@ -20,7 +20,7 @@ from quad_nav.recording.record_file import create
 from quad_nav.recording.recorder import Recorder
 from quad_nav.sim.contacts import Contact
 
-# Stamps are whole nanoseconds; contacts are told with six digits; a quaternion gives a yaw.
+# Stamps are whole nanoseconds; contacts are written with six digits; yaws come from quaternions.
 TIME_S, SIX_DIGITS, YAW_RAD = 1e-9, 1e-5, 1e-12
 
 TOUCH = Contact(0.125, "quad1", "quad0", 9.876543, 2.0)
@@ -185,7 +185,7 @@ def test_odometry_is_put_into_the_map(tmp_path):
 
 
 def test_a_wall_clock_of_the_recorder_is_ignored(tmp_path):
-    """Recorded at a wall time of 1e9 s, while the simulation's clock said 2 s."""
+    """Recorded at a wall time of 1e9 s, while the simulation's clock was at 2 s."""
     wall = 10**18
     path = bag(
         tmp_path / "flight.bag",

@@ -93,7 +93,7 @@ def test_wilsons_interval_has_the_values_of_the_textbook():
     assert wilson_interval(50, 50)[1] == 1.0
 
 
-def test_figures_are_means_over_worlds_of_the_successful_runs_times():
+def test_statistics_are_means_over_worlds_of_the_successful_runs_times():
     runs = [
         RUN,
         replace(RUN, run=1, time_s=30.0, metric=0.2),
@@ -139,7 +139,7 @@ def test_only_some_worlds_are_read_and_absent_ones_are_named(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "arrays, told",
+    "arrays, problem",
     [
         ({}, "no array index"),
         (
@@ -154,9 +154,9 @@ def test_only_some_worlds_are_read_and_absent_ones_are_named(tmp_path):
         ),
     ],
 )
-def test_files_that_are_no_worlds_are_refused(tmp_path, arrays, told):
+def test_files_that_are_no_worlds_are_refused(tmp_path, arrays, problem):
     np.savez(tmp_path / "w.npz", **arrays)
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=problem):
         load_worlds(tmp_path / "w.npz")
 
 
@@ -167,7 +167,7 @@ def test_a_file_that_is_no_archive_is_refused(tmp_path):
             load_worlds(tmp_path / "w.npz")
 
 
-def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
+def test_everything_that_cannot_be_flown_is_listed_at_once(tmp_path):
     cells = free()
     cells[20, 14] = 1  # its axis is 0.106 m from the start
     with pytest.raises(InputError) as error:
@@ -182,7 +182,7 @@ def test_everything_that_cannot_be_flown_is_told_at_once(tmp_path):
     assert "(-2.25, 13) is off the global costmap, x 0 to 12 m" in goal
 
 
-def test_maps_are_refused_because_nobody_knows_the_worlds(tmp_path):
+def test_static_maps_are_refused_because_the_worlds_are_unknown(tmp_path):
     path = write_worlds(tmp_path / "w.npz", w1=free())
     with pytest.raises(InputError, match="the worlds have no map"):
         setup_of(path, parameters=(("global_costmap/static_map", True),))

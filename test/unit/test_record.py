@@ -370,7 +370,7 @@ def test_as_many_chunks_stay_as_there_is_room_for(tmp_path):
     assert noise_bag(path, size - 1) == [1, 2]  # no room for the index of three
 
 
-def test_without_room_for_anything_the_flight_says_so(tmp_path):
+def test_a_flight_without_room_for_anything_gives_the_reason(tmp_path):
     path = tmp_path / "flight.bag"
     with SizeLimit(5_000):
         summary = fly(setup(tmp_path, time_limit_s=0.1), [Recorder(path)])

@@ -102,7 +102,7 @@ def test_straight_length_is_between_sending_and_end():
     assert straight_length_m(flown) == pytest.approx(1.5 + 3.0)
 
 
-def test_figures_of_a_flight():
+def test_metrics_of_a_flight():
     done = robot(
         0,
         (1.0, 2.0),

@@ -86,7 +86,7 @@ def test_page_of_so_many(count):
     assert "5.0 ×" in page.html  # ten seconds in two
 
 
-def test_figures_in_the_head():
+def test_metrics_in_the_head():
     html = page_of(2).html
     assert "Mission failed" in html
     assert "1 of 4 goals not reached; 1 contact" in html

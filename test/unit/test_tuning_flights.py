@@ -218,7 +218,7 @@ def test_tune_from_the_command_line_and_again(tmp_path):
     written = config.load(config.load_files(tmp_path / "out" / "config", {"i": "0"})).to_tree()
     speed = found["parameters"].get("TrajectoryPlannerROS/max_vel_x", 0.3)
     assert written["TrajectoryPlannerROS"]["max_vel_x"] == speed
-    assert written["TrajectoryPlannerROS"]["vtheta_samples"] == 8  # what --set said
+    assert written["TrajectoryPlannerROS"]["vtheta_samples"] == 8  # the value of --set
     assert "quad" in (tmp_path / "out" / "config" / "STUDY.md").read_text()
     page = (tmp_path / "out" / "report.html").read_text()
     assert page.count("data:image/png;base64,") >= 7

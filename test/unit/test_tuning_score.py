@@ -1,4 +1,4 @@
-"""The score of a flight, and figures of many, worked out by hand."""
+"""The score of a flight, and statistics of many, worked out by hand."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_what_comes_first_outweighs_everything_after_it():
     assert [term.name for term in TERMS] == ["goals", "contacts", "time", "clearance", "smoothness"]
 
 
-def test_figures_of_three_flights():
+def test_statistics_of_three_flights():
     flights = [
         FLOWN,
         replace(FLOWN, time_s=50.0, clearance_m=0.1, recoveries=2),
@@ -55,7 +55,7 @@ def test_figures_of_three_flights():
     assert found.cost == mean_cost(flights)
 
 
-def test_figures_without_a_mission_that_was_completed():
+def test_statistics_without_a_completed_mission():
     found = flight_statistics([replace(FLOWN, reached=0, clearance_m=None)])
     assert (found.mean_time_s, found.least_gap_m) == (None, None)
 

@@ -62,7 +62,8 @@ def _held_out(result: TuneResult) -> Section:
         "held-out",
         "Held-out flights",
         f"{len(held_out.cases)} flights with each set of parameters. A line connects flights of "
-        "the same mission and seed, thick bars are means.",
+        "the same mission and seed, thick bars are means. A gap is the smaller of clearance and "
+        "separation.",
         (
             picture(
                 "held_out",
@@ -155,7 +156,7 @@ def _pareto(result: TuneResult, reference: FlightStatistics) -> Section:
     tuned = gains[0].with_it if gains else reference
     return Section(
         "pareto",
-        "Time against clearance",
+        "Time against gap",
         f"{len(candidates)} candidates completed all flights. The plot shows those that reached "
         "every goal without contact. No candidate beats one of the front in both time and gap. "
         "The tuned parameters have flown more flights than the others.",
