@@ -210,7 +210,7 @@ def test_speed_limits(velocity, legal):
 
 def test_cost_is_the_weighted_sum_of_the_critics():
     costs = free()
-    costs[34, 28:33] = 50  # under the outline's left side all the way
+    costs[34, 28:33] = 50  # under the outline's left side along the whole path
     params = only(0.25, sim_time_s=1.0, sim_granularity_m=0.125)
 
     best = chosen(
@@ -386,7 +386,7 @@ def test_search_finds_what_scoring_every_sample_finds(seed, sum_scores):
 
 def noted(critic, *commands, pose=ORIGIN):
     for command in commands:
-        critic.note(command, pose, slow_mps=0.1, reset_dist_m=0.05, reset_angle_rad=0.2)
+        critic.record(command, pose, slow_mps=0.1, reset_dist_m=0.05, reset_angle_rad=0.2)
     return critic
 
 
@@ -490,7 +490,7 @@ def test_at_the_goal_it_stops_then_turns_then_is_done():
 
 
 def test_goal_is_the_end_of_the_whole_plan():
-    # It leaves the window and comes back: the local plan ends far away, the plan does not.
+    # It leaves the costmap and comes back: the local plan ends far away, the plan does not.
     out_and_back = np.vstack((line(0.0, 0.0, 4.0, 0.0), line(4.0, 0.0, 0.0, 0.05)))
     control = planner_at(out_and_back).compute_velocity(WINDOW, free(), ORIGIN, REST)
     assert control.goal_mode

@@ -1,4 +1,4 @@
-"""The way out of contact, on maps whose costs can be reckoned by hand."""
+"""Escape from a collision, on maps with costs computed by hand."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ def test_velocity_follows_the_acceleration_limit():
 
 def test_cost_is_the_weighted_sum_at_the_last_pose():
     costs = free()
-    costs[34, 28:33] = 50  # under the outline's left side all the way
+    costs[34, 28:33] = 50  # under the outline's left side along the whole path
     params = replace(
         PARAMS,
         sim_time_s=1.0,
@@ -330,9 +330,9 @@ def test_stopped_within_the_given_velocities():
 
 def test_second_turn_without_moving_is_stuck_until_the_robot_moves():
     oscillation = Oscillation()
-    oscillation.note_turn((0.0, 0.0, 0.5), Pose2D(1.0, 0.0))
+    oscillation.record_turn((0.0, 0.0, 0.5), Pose2D(1.0, 0.0))
     assert oscillation.rotating_left and not oscillation.stuck_left
-    oscillation.note_turn((0.0, 0.0, 0.5), Pose2D(1.0, 0.0))
+    oscillation.record_turn((0.0, 0.0, 0.5), Pose2D(1.0, 0.0))
     assert oscillation.stuck_left
 
     oscillation.forget_if_moved(Pose2D(1.04, 0.0), 0.05)
@@ -463,7 +463,7 @@ def test_an_escape_must_lead_out_of_the_collision():
     upstream = planner_at(plan, replace(params, reject_colliding_escape=False))
     assert upstream.compute_velocity(WINDOW, costs, ORIGIN, REST).command.vx_mps == -0.1
     fixed = planner_at(plan, params)
-    with pytest.raises(NoValidTrajectory, match="hits something"):
+    with pytest.raises(NoValidTrajectory, match="collides"):
         fixed.compute_velocity(WINDOW, costs, ORIGIN, REST)
     assert not fixed.oscillation.escaping
 

@@ -115,7 +115,7 @@ def test_clear_area_says_what_it_cleared():
     assert not costmap.is_current(0.0)
     costmap.update(0.0, Pose2D(-5.0, -5.0))
     # The square's border counts as outside: columns 1 and 5, and row 0, because its lower
-    # side at y = -0.5 is cut towards zero, as in the original.
+    # side at y = -0.5 is cut towards zero, as upstream.
     assert picture(costmap.costs) == drawn("..###.\n..###.\n......")
     assert costmap.is_current(0.0)
 

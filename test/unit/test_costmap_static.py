@@ -66,7 +66,7 @@ def test_use_maximum_keeps_higher_costs():
 
 def test_bounds_are_asked_for_once():
     layer = layer_of(map_of("...\n...", origin=(10.0, 20.0)))
-    # From the centre of the first cell to half a cell beyond the map, as in the original.
+    # From the centre of the first cell to half a cell beyond the map, as upstream.
     assert layer.update_bounds(ROBOT, 0.0, NOWHERE) == Bounds(10.5, 20.5, 13.5, 22.5)
     assert layer.update_bounds(ROBOT, 1.0, NOWHERE) == NOWHERE
 

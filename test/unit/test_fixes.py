@@ -150,5 +150,5 @@ def test_a_robot_in_collision_escapes(fixes, leaves):
         costmap.layers["obstacle_layer"].add_scan("scan", scan, Pose3D(5.0, 5.0, 1.0), 0.0)
     navigator.set_goal(Pose2D(2.0, 5.0, 3.14), 0.0)
     tick = navigator.tick(0.0, RobotPoses(away, away), Twist2D())
-    assert any("every trajectory hits something" in warning for warning in tick.warnings)
+    assert any("every trajectory collides" in warning for warning in tick.warnings)
     assert tick.command == (Twist2D(0.1) if leaves else Twist2D())

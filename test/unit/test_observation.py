@@ -1,4 +1,4 @@
-"""What a sensor saw lately, in one piece for the kernels."""
+"""Observations of one sensor, stacked for the kernels."""
 
 from __future__ import annotations
 

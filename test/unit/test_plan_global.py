@@ -162,7 +162,7 @@ def test_no_search_goes_through_a_wall(params):
 
 
 def test_obstacles_within_two_cells_of_the_goal_may_be_cut():
-    # As the original does, which gives every cell there a potential.
+    # As upstream, which gives every cell there a potential.
     costs = costs_of(WALL)
     plan = plan_of(costs, (2, 2), (6, 2), use_grid_path=True)
     assert LETHAL in costs[plan[:, 1].astype(int), plan[:, 0].astype(int)]

@@ -1,4 +1,4 @@
-"""Clearing passes over lines that have nothing to clear; the outcome is that of all lines."""
+"""Clearing skips lines that have nothing to clear; the outcome is that of all lines."""
 
 from __future__ import annotations
 

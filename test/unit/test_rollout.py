@@ -18,7 +18,7 @@ FOOTPRINT = np.array([[0.2, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.2, -0.15]])
 WINDOW = GridSpec(60, 60, 0.05, -1.5, -1.5)
 VARIANTS = {
     "defaults": PARAMS,
-    "costs outweigh the way": replace(PARAMS, occdist_scale=1.0),
+    "costs outweigh the path": replace(PARAMS, occdist_scale=1.0),
     "high costs are sought": replace(PARAMS, occdist_scale=-0.5),
     "heading": replace(PARAMS, heading_scoring=True),
     "a simple attractor": replace(PARAMS, simple_attractor=True),
