@@ -1,9 +1,9 @@
-"""Feed a target with bytes that atheris makes up: ``make fuzz TARGET=scene SECONDS=60``.
+"""Call a target with bytes that atheris generates: ``make fuzz TARGET=scene SECONDS=60``.
 
     run.py TARGET [SECONDS]
 
-Begins with the files of ``corpus/TARGET``; new ones stay in a folder of their own, so that
-the corpus stays small. Ends with 1 at the first fault, whose input is kept beside it.
+Starts with the files of ``corpus/TARGET``; new ones go into a temporary folder, so that the corpus
+stays small. Exits with status 1 at the first fault and keeps its input.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""What reads files and texts that somebody else may have written, each as a function of bytes.
+"""Fuzz targets: the readers of files and texts of unknown origin, as functions of bytes.
 
-A target returns for input that can be used, and for other input when it was refused with an
-``InputError``; everything else that it raises is a fault. ``make fuzz`` calls them with bytes
-that atheris makes up, the unit tests with the files below ``corpus`` and mutations of these.
+A target returns for valid input and for input that its reader refuses with ``InputError``. Any
+other exception is a fault. ``make fuzz`` calls the targets with bytes that atheris generates, the
+unit tests call them with the files below ``corpus`` and mutations of these.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from quad_nav.scenario.goal_checks import scene_check
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.topics.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC
 
-MOST_FUZZED_CELLS = 250_000
-"""Larger maps are read as well, but not a hundred times a second."""
+MAX_FUZZED_CELLS = 250_000
+"""Larger maps are valid, too, but too slow for a hundred calls per second."""
 _MAP = (
     "image: map.png\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n"
     "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
