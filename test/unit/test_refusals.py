@@ -124,6 +124,35 @@ def test_both_shells_refuse_the_same_with_the_same_words(tmp_path, case):
     assert under_ros(tmp_path, case, fleet=False) == problems
 
 
+def test_faulty_values_do_not_hide_faults_in_files(tmp_path):
+    case = CASES["off the global costmap"]
+    write(tmp_path, case)
+    parameters = {
+        "scene": "/nowhere.yaml",
+        "goals": str(tmp_path / "goals"),
+        "robots": 1,
+        "size": -1.0,
+        "config": str(tmp_path / "config"),
+    }
+    problems = problems_of(
+        mission_setup.read_setup, parameters, "sequencer", tmp_path / "result.json", tmp_path
+    )
+    expected = ("sequencer: size: is -1.0", "nowhere.yaml: cannot be read", OFF)
+    assert len(problems) == 3
+    assert all(fault in problem for fault, problem in zip(expected, problems))
+
+
+@pytest.mark.parametrize("robots", [0, -1, "two", True])
+def test_a_faulty_number_of_robots_is_the_only_fault(tmp_path, robots):
+    write(tmp_path, CASES["flyable"])
+    for goals, scene in ((str(tmp_path / "goals"), str(ARENA)), ("random", "random")):
+        parameters = {"scene": scene, "goals": goals, "robots": robots}
+        (problem,) = problems_of(
+            mission_setup.read_setup, parameters, "sequencer", tmp_path / "r.json", tmp_path
+        )
+        assert problem.startswith(f"sequencer: robots: is {robots!r}; expected a whole number")
+
+
 def test_navigators_without_parameters_on_the_server_are_not_checked(tmp_path):
     case = CASES["off the global costmap"]
     write(tmp_path, case)

@@ -8,7 +8,7 @@ from its seed, so that no node waits for another one's files.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, TypeVar
 
@@ -32,6 +32,18 @@ from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import load_scene
 
 T = TypeVar("T")
+_REQUEST_RULES = {
+    "scene": optional(RULES["scene"]),
+    **{name: RULES[name] for name in ("goals", "robots", "seed", "size", "robot_radius")},
+}
+_HARMLESS: Dict[str, Any] = {
+    "scene": "",
+    "goals": None,
+    "robots": 0,
+    "seed": 0,
+    "size": 0.0,
+    "robot_radius": BODY_RADIUS_M,
+}
 Parameters = Sequence[Tuple[str, Any]]
 """Parameters on top of files: (path, value), as ("global_costmap/width", 60.0)."""
 Configure = Callable[[int, Optional[RandomMission]], Sequence[Optional[Configuration]]]
@@ -80,11 +92,9 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
     Returns:
         The scenario as far as it could be read, and every fault in it, each once.
     """
+    problems = value_faults(vars(request), _REQUEST_RULES, request.source)
+    request = _without_faulty_values(request)
     values = vars(request)
-    rules = {name: RULES[name] for name in ("goals", "robots", "seed", "size", "robot_radius")}
-    problems = value_faults(values, {"scene": optional(RULES["scene"]), **rules}, request.source)
-    if problems:
-        return Scenario(None), problems
     mission, scene = _tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
     configurations = _tried(lambda: tuple(configure(request.robots, mission)), problems) or ()
     located = [one if _is_located(one, request.simulated) else None for one in configurations]
@@ -174,6 +184,18 @@ def _read_configuration(
     return config.load(tree)
 
 
+def _without_faulty_values(request: ScenarioRequest) -> ScenarioRequest:
+    """Replace values that their rules refuse, so that the faults in files are found, too.
+
+    A random mission is left out if one of its values is faulty.
+    """
+    values = vars(request)
+    faulty = {name for name, rule in _REQUEST_RULES.items() if not rule.accepts(values[name])}
+    if request.scene == RANDOM and faulty & {"robots", "seed", "size"}:
+        faulty |= {"scene", "goals"} if request.goals == RANDOM else {"scene"}
+    return replace(request, **{name: _HARMLESS[name] for name in faulty})
+
+
 def _scene(values: Mapping[str, Any]) -> Optional[Scene]:
     return scene_of(values) if values["scene"] else None
 
@@ -233,6 +255,8 @@ def _read_goals(
 def _goal_files(request: ScenarioRequest) -> Tuple[Dict[int, Path], List[str]]:
     """Return the existing goal files, by the robots' numbers, and a fault for those missing."""
     goals, count = request.goals, request.robots
+    if goals is None or not count:
+        return {}, []
     if isinstance(goals, str):
         return goal_paths(Path(goals).expanduser(), count)
     problems = []
