@@ -20,14 +20,16 @@ NOBODY = -1
 class FreeSpace(NamedTuple):
     """Space around each quadcopter in which it touches nothing.
 
-    Known points and rooms are valid until the caller replaces them. All positions are in
+    Checked points and free distances are valid until the caller replaces them. All positions are in
     ``map``, lengths in metres.
     """
 
     mount_m: float  # height of a hull's centre above the body's origin, along the body's z axis
     pair_m: float  # two quadcopters with centres nearer than this may touch
-    checked_m: NDArray[np.float64]  # [n, 3], points whose clearance is known
-    free_m: NDArray[np.float64]  # [n], how far a centre may be from its known point
+    checked_m: NDArray[
+        np.float64
+    ]  # [n, 3], points whose distance to the nearest surface was computed
+    free_m: NDArray[np.float64]  # [n], how far a centre may be from its checked point
     centres_m: NDArray[np.float64]  # [n, 3], the hulls' centres, filled by ``find_near``
 
 
@@ -35,7 +37,7 @@ class FreeSpace(NamedTuple):
 def fly_freely(
     rows: NDArray[np.float64],
     commands: NDArray[np.float64],
-    held: NDArray[np.bool_],
+    excluded: NDArray[np.bool_],
     steps: int,
     step_s: float,
     altitude_m: float,
@@ -48,7 +50,7 @@ def fly_freely(
     Args:
         rows: float64[n, 13], bodies in ``map``, moved in place.
         commands: float64[n, 3], as for ``flight_law.fly``.
-        held: bool[n], bodies that something else moves; they stay where they are.
+        excluded: bool[n], bodies that something else moves; they stay where they are.
         steps: Most steps to fly.
         step_s: Length of a step.
         altitude_m: Altitude to hold, z in ``map``.
@@ -61,18 +63,18 @@ def fly_freely(
     """
     forces, torques = np.empty_like(commands), np.empty_like(commands)
     for done in range(steps):
-        found, other = find_near(rows, held, space)
+        found, other = find_near(rows, excluded, space)
         if found != NOBODY:
             return done, found, other
         fly(rows, commands, altitude_m, constants, gains, forces, torques)
-        step_freely(rows, held, forces, torques, constants, step_s)
+        step_freely(rows, excluded, forces, torques, constants, step_s)
     return steps, NOBODY, NOBODY
 
 
 @njit(cache=True, nogil=True)
 def step_freely(
     rows: NDArray[np.float64],
-    held: NDArray[np.bool_],
+    excluded: NDArray[np.bool_],
     forces: NDArray[np.float64],
     torques: NDArray[np.float64],
     constants: BodyConstants,
@@ -86,7 +88,7 @@ def step_freely(
 
     Args:
         rows: float64[n, 13], bodies in ``map``, moved in place.
-        held: bool[n], bodies that stay where they are.
+        excluded: bool[n], bodies that stay where they are.
         forces: float64[n, 3], N in ``map``.
         torques: float64[n, 3], N m in ``map``.
         constants: Mass properties and gravity.
@@ -96,7 +98,7 @@ def step_freely(
     r = np.empty((3, 3))
     omega, torque = np.empty(3), np.empty(3)
     for k in range(rows.shape[0]):
-        if held[k]:
+        if excluded[k]:
             continue
         row = rows[k]
         for axis in range(3):
@@ -142,18 +144,18 @@ def _turn(quaternion: NDArray[np.float64], omega: NDArray[np.float64], step_s: f
 
 @njit(cache=True, nogil=True)
 def find_near(
-    rows: NDArray[np.float64], held: NDArray[np.bool_], space: FreeSpace
+    rows: NDArray[np.float64], excluded: NDArray[np.bool_], space: FreeSpace
 ) -> Tuple[int, int]:
-    """Find a quadcopter that is not held and that may touch something.
+    """Find a quadcopter that is not excluded and that may touch something.
 
     Args:
         rows: float64[n, 13], bodies in ``map``.
-        held: bool[n], bodies that something else moves.
+        excluded: bool[n], bodies that something else moves.
         space: Space in which nothing is touched; its ``centres_m`` are filled.
 
     Returns:
         The quadcopter's number and that of another one with its centre nearer than
-        ``space.pair_m``. The second is ``NOBODY`` if the first has left its room, so that it
+        ``space.pair_m``. The second is ``NOBODY`` if the first is beyond its free distance, so that it
         may be near to something else. Both are ``NOBODY`` if nothing may be touched.
     """
     mount_m, pair_m, centres_m = space.mount_m, space.pair_m, space.centres_m
@@ -164,14 +166,14 @@ def find_near(
         centres_m[k, 2] = rows[k, 2] + mount_m * (1 - 2 * (x * x + y * y))
     for k in range(rows.shape[0]):
         room_m = space.free_m[k]
-        if not held[k] and _square_m2(centres_m[k], space.checked_m[k]) >= room_m * room_m:
+        if not excluded[k] and _square_m2(centres_m[k], space.checked_m[k]) >= room_m * room_m:
             return k, NOBODY
     for k in range(rows.shape[0]):
         for other in range(k):
             if _square_m2(centres_m[k], centres_m[other]) < pair_m * pair_m and not (
-                held[k] and held[other]
+                excluded[k] and excluded[other]
             ):
-                return (other, k) if held[k] else (k, other)
+                return (other, k) if excluded[k] else (k, other)
     return NOBODY, NOBODY
 
 
