@@ -17,7 +17,7 @@ from quad_nav.mission.checkpoint import (
     shift_to_clock,
 )
 from quad_nav.mission.flight_log import FlightLog
-from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
+from quad_nav.mission.goal_file import Goal, GoalSequence, SequenceSettings
 from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import Contact
 

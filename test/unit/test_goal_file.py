@@ -10,12 +10,14 @@ from quad_nav.errors import InputError
 from quad_nav.mission.goal_file import (
     KEYS,
     SETTINGS,
+    Goal,
+    GoalSequence,
+    SequenceSettings,
     clearance_check,
     load_goals,
     parse_goals,
     read_settings,
 )
-from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import WatchedGoalFile
 
 GOALS = Path(__file__).parents[2] / "goals"

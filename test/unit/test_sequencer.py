@@ -5,7 +5,7 @@ import math
 import pytest
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal_sequence import Goal, GoalSequence, SequenceSettings
+from quad_nav.mission.goal_file import Goal, GoalSequence, SequenceSettings
 from quad_nav.mission.sequencer import (
     GoalEnded,
     NavigatorReport,

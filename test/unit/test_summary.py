@@ -6,7 +6,7 @@ import pytest
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.flight_log import FlightLog, Leg, unflown_legs
-from quad_nav.mission.goal_sequence import Goal, GoalSequence
+from quad_nav.mission.goal_file import Goal, GoalSequence
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.mission.summary import (
     MissionSummary,

@@ -9,7 +9,7 @@ import pytest
 
 from quad_nav.report.style import png, styled
 from quad_nav.tuning.flight_result import FlightResult
-from quad_nav.tuning.report.sweep_pictures import sweep_picture
+from quad_nav.tuning.report.sweep_page import sweep_picture
 from quad_nav.tuning.sweep import SweepRow
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -12,7 +12,7 @@ from quad_nav.costmap.cost_grid import NO_CELLS, Window
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D
-from quad_nav.mission.goal_sequence import Goal, GoalSequence
+from quad_nav.mission.goal_file import Goal, GoalSequence
 from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls

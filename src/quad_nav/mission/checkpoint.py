@@ -13,7 +13,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, TypeV
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.flight_log import FlightLog, Leg, RobotLogState
-from quad_nav.mission.goal_sequence import Goal
+from quad_nav.mission.goal_file import Goal
 from quad_nav.mission.sequencer import START, ActiveGoal, SequenceProgress, Sequencer
 from quad_nav.sim.contacts import Contact
 

@@ -11,7 +11,7 @@ from typing import Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D, angle_difference
 from quad_nav.mission.distances import DistanceLog, SurfaceDistance
-from quad_nav.mission.goal_sequence import Goal, GoalSequence
+from quad_nav.mission.goal_file import Goal, GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import CONTACT_GAP_S, Contact
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
 
@@ -18,7 +19,7 @@ import numpy as np
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import read_bytes
 from quad_nav.files.values import expected_name, is_number
-from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, Goal, GoalSequence, SequenceSettings
+from quad_nav.geometry import Pose2D
 
 MAX_BYTES = 4 * 1024 * 1024
 MAX_GOALS = 10_000
@@ -28,6 +29,48 @@ MAX_TIMEOUT_S = 1e9
 
 PlaceCheck = Callable[[float, float], Optional[str]]
 """Returns what is wrong with a position (x, y) in ``map``, or None if a robot fits there."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Position in ``map``; without a yaw the robot may face in the direction of its path."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: Optional[float] = None
+
+    @property
+    def pose(self) -> Pose2D:
+        """Pose in ``map``, with yaw 0 if the goal has none."""
+        return Pose2D(self.x_m, self.y_m, self.yaw_rad or 0.0)
+
+
+@dataclass(frozen=True)
+class SequenceSettings:
+    """Tolerance, retries and repetition; times are simulated if there is a simulation.
+
+    Attributes:
+        goal_tolerance_m: Distance from the goal within which it counts as reached.
+        goal_timeout_s: Time for one attempt.
+        retries: Further attempts before the goal is skipped.
+        loop: Start again with the first goal after the last one.
+    """
+
+    goal_tolerance_m: float = 0.4
+    goal_timeout_s: float = 120.0
+    retries: int = 1
+    loop: bool = False
+
+
+DEFAULT_SETTINGS = SequenceSettings()
+
+
+@dataclass(frozen=True)
+class GoalSequence:
+    """Content of a goal file."""
+
+    goals: Tuple[Goal, ...]
+    settings: SequenceSettings = DEFAULT_SETTINGS
 
 
 class _Setting(NamedTuple):

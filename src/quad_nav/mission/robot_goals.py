@@ -10,8 +10,14 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import read_bytes
-from quad_nav.mission.goal_file import MAX_BYTES, PlaceCheck, load_goals
-from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, GoalSequence, SequenceSettings
+from quad_nav.mission.goal_file import (
+    DEFAULT_SETTINGS,
+    MAX_BYTES,
+    GoalSequence,
+    PlaceCheck,
+    SequenceSettings,
+    load_goals,
+)
 
 
 class WatchedGoalFile:

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import List, Optional, Sequence, Union
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal_sequence import Goal, GoalSequence
+from quad_nav.mission.goal_file import Goal, GoalSequence
 
 GOAL_LOST_AFTER_S = 5.0
 """A navigator that is idle for so long has lost the goal: it restarted, or was not ready."""

@@ -14,15 +14,14 @@ from matplotlib.figure import Figure
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.comparison_picture import comparison_picture, grouped
-from quad_nav.report.cycle_picture import cycle_picture, has_wall_times
 from quad_nav.report.distance_picture import distance_picture
 from quad_nav.report.encounter_picture import encounter_picture
 from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, separation_text
 from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
 from quad_nav.report.measures import Tracks, resampled_tracks
-from quad_nav.report.motion_picture import motion_picture
 from quad_nav.report.parameter_table import parameter_rows
 from quad_nav.report.paths_picture import paths_picture
+from quad_nav.report.robot_picture import cycle_picture, has_wall_times, motion_picture
 from quad_nav.report.timeline_picture import timeline_picture
 
 MAX_STRIPS = 6

@@ -18,8 +18,7 @@ from quad_nav.config import Configuration
 from quad_nav.errors import InputError
 from quad_nav.files.values import Rule, expected_name, value_faults
 from quad_nav.mission.distances import SurfaceDistance
-from quad_nav.mission.goal_file import SETTINGS, read_settings
-from quad_nav.mission.goal_sequence import SequenceSettings
+from quad_nav.mission.goal_file import SETTINGS, SequenceSettings, read_settings
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.random_mission import RandomMission
 from quad_nav.scenario.rules import RANDOM, RULES, optional

@@ -18,7 +18,7 @@ from quad_nav.config.files import set_value
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import config_folder
 from quad_nav.files.values import value_faults
-from quad_nav.mission.goal_sequence import DEFAULT_SETTINGS, SequenceSettings
+from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings
 from quad_nav.mission.robot_goals import (
     RobotGoals,
     goal_paths,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 from typing import Any, Dict, Mapping, Optional, Sequence
 
-from quad_nav.mission.goal_sequence import GoalSequence
+from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
