@@ -21,12 +21,15 @@ ELSEWHERE = Pose3D(4.0, 2.0, 0.3)
 ACCEPT_ALL = ScanValidatorParams(reject_implausible_scans=False)
 
 
+DEFAULTS = ScanValidatorParams()
+
+
 def costmap_of(*sources):
     layer = ObstacleLayerParams(sources=sources)
     return LayeredCostmap(CostmapParams(layers=(("obstacle_layer", layer),)))
 
 
-def intake_of(*costmaps, params=ScanValidatorParams()):
+def intake_of(*costmaps, params=DEFAULTS):
     return ScanIntake(sinks_of(costmaps), params)
 
 

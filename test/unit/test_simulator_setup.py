@@ -60,7 +60,8 @@ def test_every_fault_is_listed():
         ({"lidar": "gazebo"}, "simulator: lidar: is 'gazebo'; expected kernel or bullet"),
         (
             {"scan_range": 3.0, "step_size": 4.0},
-            "simulator: step_size: 4.0, expected an angle that divides scan_range, 3.0, into 2 or more",
+            "simulator: step_size: 4.0, expected an angle that divides scan_range, 3.0, into 2 or"
+            " more",
         ),
         (
             {"scan_range": 7.0, "step_size": 0.1},
