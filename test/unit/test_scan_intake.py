@@ -18,6 +18,7 @@ from quad_nav.geometry import Pose3D, Scan
 SOURCE = SourceParams("laser", data_type="LaserScan", expected_update_period_s=0.5)
 LIDAR = Pose3D(1.0, 2.0, 0.3)
 ELSEWHERE = Pose3D(4.0, 2.0, 0.3)
+REJECT = ScanValidatorParams()
 ACCEPT_ALL = ScanValidatorParams(reject_implausible_scans=False)
 
 
@@ -83,7 +84,7 @@ def test_validation_is_switched_while_it_runs():
     intake = intake_of(costmap)
     intake.reconfigure(ACCEPT_ALL)
     assert intake.add_scan(scan(1.0), at(LIDAR, intake), 9.0, 9.0) == ""
-    intake.reconfigure(ScanValidatorParams())
+    intake.reconfigure(REJECT)
     assert intake.add_scan(scan(1.0), at(LIDAR, intake), 9.0, 9.0) != ""
 
 
@@ -98,7 +99,7 @@ def test_reset_forgets_earlier_scans():
     assert intake.add_scan(lost, at(LIDAR, intake), 0.1, 0.1) == ""
 
 
-@pytest.mark.parametrize("params, silence_s", [(ScanValidatorParams(), 0.4), (ACCEPT_ALL, 0.1)])
+@pytest.mark.parametrize("params, silence_s", [(REJECT, 0.4), (ACCEPT_ALL, 0.1)])
 def test_silence_counts_from_the_stamp_of_a_late_scan_only_with_validation(params, silence_s):
     costmap = costmap_of(SOURCE)
     intake = intake_of(costmap, params=params)
