@@ -78,8 +78,10 @@ class EncounterResult:
     faults: Tuple[str, ...]
 
     def __str__(self) -> str:
-        told = self.contacts + self.faults or (f"{sum(self.reached)} goals in {self.time_s:.0f} s",)
-        return f"{self.encounter} seed {self.seed}: " + "; ".join(told)
+        lines = self.contacts + self.faults or (
+            f"{sum(self.reached)} goals in {self.time_s:.0f} s",
+        )
+        return f"{self.encounter} seed {self.seed}: " + "; ".join(lines)
 
 
 def options_of(encounter: str, seed: int, config: str) -> FlightOptions:

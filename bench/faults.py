@@ -293,13 +293,13 @@ def row(kind: Kind, outcomes: List[Outcome]) -> List[str]:
     reasons: Dict[str, int] = {}
     for outcome in outcomes:
         reasons[outcome.reason] = reasons.get(outcome.reason, 0) + 1
-    told = "; ".join(f"{count} x {reason}" for reason, count in reasons.items() if reason)
+    reasons_text = "; ".join(f"{count} x {reason}" for reason, count in reasons.items() if reason)
     return [
         kind.name,
         f"{good} of {len(outcomes)}",
         figures([o.hover_s for o in outcomes]),
         figures([o.resume_s for o in outcomes]),
-        told or "-",
+        reasons_text or "-",
     ]
 
 

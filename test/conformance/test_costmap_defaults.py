@@ -1,4 +1,4 @@
-"""What an empty parameter tree means, against the original."""
+"""Values of an empty parameter tree, compared with upstream."""
 
 from __future__ import annotations
 

@@ -164,7 +164,7 @@ TARGETS: Dict[str, Callable[[bytes], None]] = {
 
 
 def run(name: str, data: bytes) -> bool:
-    """Whether the input can be used. Raises what is a fault."""
+    """Return whether the input is valid; raise what is a fault."""
     try:
         TARGETS[name](data)
     except InputError as error:

@@ -85,7 +85,7 @@ def tune_setup(folder: Path, output: Path, candidates: int = 3, **given: Any) ->
 
 
 def trials_as_data(trials: Sequence[Any]) -> List[Tuple[Any, ...]]:
-    """What a study consists of, less the times of day."""
+    """The contents of a study without the times of day."""
     return [
         (
             trial.number,

@@ -122,13 +122,13 @@ def test_every_touch_is_foreseen(seed):
     free = FreeFlight(
         ROOM, 2, simulation.params.airframe.radius_m, FlightLaw(Airframe(), FlightParams()), STEP_S
     )
-    hover, nobody = np.zeros((2, 3)), np.zeros(2, bool)
+    hover, none_free = np.zeros((2, 3)), np.zeros(2, bool)
     foreseen, free_steps = [], 0
     for one, other in zip(random_commands([seed, 0], 30, 1.5), random_commands([seed, 1], 30, 1.5)):
         simulation.set_command(0, one)
         simulation.set_command(1, other)
         for _ in range(120):
-            _, done, _ = free.advance(simulation.body_state, hover, nobody, 1)
+            _, done, _ = free.advance(simulation.body_state, hover, none_free, 1)
             near = done == 0
             free_steps += not near
             foreseen += [near for _ in simulation.step()]

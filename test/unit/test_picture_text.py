@@ -1,4 +1,4 @@
-"""What is written in pictures is what a person can read."""
+"""Texts in pictures are readable."""
 
 from __future__ import annotations
 

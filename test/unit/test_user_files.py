@@ -39,7 +39,7 @@ def refusal(function, *arguments):
 @pytest.mark.parametrize("name, read", READERS.items())
 def test_a_pipe_a_folder_and_a_device_are_refused_at_once(tmp_path, name, read):
     path = tmp_path / name
-    os.mkfifo(path)  # nobody writes to it: who waits for that waits for ever
+    os.mkfifo(path)  # without a writer: opening it for reading would block
     assert "is a pipe; expected a file" in refusal(read, path)
     path.unlink()
     path.mkdir()

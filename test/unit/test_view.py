@@ -136,7 +136,7 @@ def test_a_flight_is_saved_with_its_parts(rerun, tmp_path):
 
 
 class FakeViewer:
-    """What Popen starts; it listens at once, or it ends."""
+    """A process that listens at once, or ends."""
 
     returncode = None
 

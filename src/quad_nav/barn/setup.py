@@ -39,7 +39,7 @@ SCANS_PER_S = 40
 
 @dataclass(frozen=True)
 class BarnOptions:
-    """What a person asks for.
+    """Options of a run of the benchmark, not yet checked.
 
     Attributes:
         worlds: File of the worlds.

@@ -159,7 +159,7 @@ def _cast_at_solid(
     first, last = _beams_of(first_rad, width_rad, beams)
     first_beam = int(math.ceil(first))
     _shorten(row, first_beam, int(math.floor(last)), kind, eye, ahead, left, sizes, beams)
-    last -= 2.0 * math.pi / beams.step_rad  # what is left of it after a full turn
+    last -= 2.0 * math.pi / beams.step_rad  # the rest after a full turn
     if last >= 0.0:
         _shorten(
             row, 0, min(int(math.floor(last)), first_beam - 1), kind, eye, ahead, left, sizes, beams

@@ -23,7 +23,7 @@ negative inside."""
 BLOCK_S = 10.0
 """Poses are compared in blocks of this length: arrays cost about as much as two numbers."""
 MAX_DELAY_S = 1.0
-"""How much later than the others' a robot's poses may arrive."""
+"""Largest delay of a robot's poses relative to the other robots."""
 _ROUNDING_M = 1e-9
 
 

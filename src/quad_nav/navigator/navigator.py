@@ -1,6 +1,6 @@
 """The navigator: one robot's move_base without ROS.
 
-``Navigator.tick`` does whatever is due at a time: update a costmap, search for a plan, run a
+``Navigator.tick`` does what is due at a time: update a costmap, search for a plan, run a
 control cycle. It owns no clock and no thread; the caller ticks it at ``next_due_s`` or more
 often.
 """
@@ -159,7 +159,7 @@ class Navigator:
 
     @property
     def has_work(self) -> bool:
-        """Whether to tick at once: for the first time, or to publish a stop."""
+        """True if a tick is due at once: the first one, or one that publishes a stop."""
         return not self._started or self._stop_wanted
 
     def restart(self, now_s: float) -> None:

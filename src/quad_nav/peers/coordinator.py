@@ -131,7 +131,7 @@ class PeerCoordinator:
 
     @property
     def holding_point(self) -> Optional[Pose2D]:
-        """Where the robot makes room, None if it does not."""
+        """Pose at which the robot makes room, None if it does not yield that way."""
         return self.decision.holding_point if self.decision is not None else None
 
     # -- goals and plans -----------------------------------------------------------------

@@ -11,7 +11,7 @@ from quad_nav.geometry import Pose2D, Twist2D
 
 @dataclass(frozen=True)
 class RecoveryContext:
-    """What a behaviour may look at and change; poses are None if unknown."""
+    """Costmaps and poses that a behaviour may read and change; poses are None if unknown."""
 
     now_s: float
     global_costmap: LayeredCostmap

@@ -27,7 +27,7 @@ _RULES = {name: RULES[name] for name in ("lidar_rate", "jitter", "time_limit")}
 
 @dataclass(frozen=True)
 class FlightOptions:
-    """What a person asks for.
+    """Options of an offline flight, not yet checked.
 
     Attributes:
         scene: Scene file; None for the shipped arena, or a random mission if ``goals`` is None.

@@ -52,7 +52,7 @@ Configure = Callable[[int, Optional[RandomMission]], Sequence[Optional[Configura
 
 @dataclass(frozen=True)
 class ScenarioRequest:
-    """Where scene and goals come from; values as a person gave them, not yet checked.
+    """Sources of scene and goals; values as the user gave them, not yet checked.
 
     ``scene`` is a file, ``RANDOM``, or "" if the arena is unknown. ``goals`` is a folder, a list
     of files, or ``RANDOM``. ``seed`` and ``size`` are those of a random mission; size 0 has room
@@ -74,7 +74,7 @@ class ScenarioRequest:
 
 @dataclass(frozen=True)
 class Scenario:
-    """What could be read of a scenario; complete if there were no faults."""
+    """The readable parts of a scenario; complete if there were no faults."""
 
     scene: Optional[Scene]
     robots: Tuple[RobotGoals, ...] = ()

@@ -1,4 +1,4 @@
-"""What the original computed, family by family, and how ours is compared with it.
+"""Comparison with the recordings of upstream move_base, family by family.
 
 A family is a folder of recorded cases, all of one kind. Its module here has
 ``check(path)``: it computes a case anew and returns the differences, none of

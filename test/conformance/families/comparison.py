@@ -71,7 +71,7 @@ def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _place(flat_index: Any, found: np.ndarray, recorded: np.ndarray) -> Any:
-    """Where in the arrays, "" for single values, and the two values there."""
+    """Place in the arrays, "" for single values, and the two values there."""
     index = np.unravel_index(int(flat_index), found.shape)
     values = f"{found[index]}, recorded {recorded[index]}"
     return (f"at [{', '.join(map(str, index))}]: " if index else ""), values

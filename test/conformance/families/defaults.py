@@ -1,4 +1,4 @@
-"""What an empty parameter tree means: ``defaults.json``."""
+"""Values of an empty parameter tree: ``defaults.json``."""
 
 from __future__ import annotations
 
