@@ -107,3 +107,20 @@ def test_equal_stamps_and_interpolation_give_the_same_bits():
     )
     expected = nearest_separations_m(positions_m, RADIUS_M).min(axis=1)
     assert [log.min_separation_m(f"quad{k}") for k in range(3)] == expected.tolist()
+
+
+def test_minima_are_computed_once_for_all_robots():
+    calls = []
+
+    def counted(positions_m):
+        calls.append(len(positions_m))
+        return to_wall(positions_m)
+
+    names = [f"quad{k}" for k in range(20)]
+    log = DistanceLog(names, RADIUS_M, counted)
+    for name in names:
+        log.add(name, 0.0, 2.0, 0.0)
+    for name in names:
+        log.min_clearance_m(name)
+        log.min_separation_m(name)
+    assert len(calls) == len(names)

@@ -83,10 +83,12 @@ class DistanceLog:
         self._min_clearance_m = dict.fromkeys(names, math.inf)
         self._min_separation_m = dict.fromkeys(names, math.inf)
         self._next_block_s = -math.inf
+        self._is_compared = True
 
     def add(self, name: str, stamp_s: float, x_m: float, y_m: float) -> None:
         """Add a robot's position in ``map``; the stamps of one robot increase."""
         self._samples[name].append((stamp_s, x_m, y_m))
+        self._is_compared = False
         if stamp_s >= self._next_block_s:
             if self._next_block_s > -math.inf:
                 self._compare()
@@ -119,6 +121,9 @@ class DistanceLog:
 
     def _compare(self) -> None:
         """Compare all samples, then drop those that later samples do not need."""
+        if self._is_compared:
+            return
+        self._is_compared = True
         tracks = [(name, np.array(samples)) for name, samples in self._samples.items() if samples]
         if self._surface_distance is not None:
             for name, track in tracks:
