@@ -6,11 +6,11 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
-from quad_nav.ros.common.node_tools import in_fleet, own_node
 from quad_nav.scenario.fleet_setup import read_setup
 from quad_nav.scenario.random_mission import random_mission
 from quad_nav.scenario.scenario import read_configurations, scene_of
 from quad_nav.sim.colours import ROBOT_COLOURS
+from quad_nav.topics.publishing import in_fleet, own_node
 from quad_nav.topics.rviz_file import document
 
 CONFIG = str(shipped("config", "default"))

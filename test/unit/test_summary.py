@@ -162,6 +162,51 @@ def test_columns_that_matter_most_are_never_dropped():
     assert table(SUMMARY, 10).splitlines()[0].split() == "robot goal result time (s)".split()
 
 
+DOCUMENTED = {
+    "success": False,
+    "exit_status": 1,
+    "reason": "",
+    "problems": [],
+    "sim_time_s": 20.0,
+    "wall_time_s": 10.0,
+    "real_time_factor": 2.0,
+    "robot_radius_m": 0.3,
+    "robots": [
+        {
+            "robot": "quad0",
+            "goals": [
+                {
+                    "goal": 1,
+                    "lap": 1,
+                    "x_m": 3.0,
+                    "y_m": 4.0,
+                    "yaw_rad": None,
+                    "reached": True,
+                    "time_s": 10.0,
+                    "reason": "",
+                    "attempts": 1,
+                    "path_length_m": 7.0,
+                    "straight_length_m": 5.0,
+                }
+            ],
+            "path_length_m": 7.0,
+            "straight_length_m": 5.0,
+            "min_clearance_m": None,
+            "min_separation_m": None,
+            "recoveries": 0,
+            "contacts": 0,
+            "aborts": 0,
+            "spin_s": 0.0,
+        }
+    ],
+    "contacts": [{"time_s": 5.0, "robot": "quad0", "with": "pillar", "x_m": 1.0, "y_m": 2.0}],
+    "contacts_reported": True,
+    "min_separation_m": None,
+    "seed": None,
+    "versions": {},
+}
+
+
 def test_the_json_has_the_documented_keys(tmp_path):
     summary = mission(
         leg(time_s=10.00049),
@@ -172,55 +217,7 @@ def test_the_json_has_the_documented_keys(tmp_path):
     )
     path = tmp_path / "deep" / "result.json"
     write_json(summary, path)
-    assert (
-        json.loads(path.read_text())
-        == to_json(summary)
-        == {
-            "success": False,
-            "exit_status": 1,
-            "reason": "",
-            "problems": [],
-            "sim_time_s": 20.0,
-            "wall_time_s": 10.0,
-            "real_time_factor": 2.0,
-            "robot_radius_m": 0.3,
-            "robots": [
-                {
-                    "robot": "quad0",
-                    "goals": [
-                        {
-                            "goal": 1,
-                            "lap": 1,
-                            "x_m": 3.0,
-                            "y_m": 4.0,
-                            "yaw_rad": None,
-                            "reached": True,
-                            "time_s": 10.0,
-                            "reason": "",
-                            "attempts": 1,
-                            "path_length_m": 7.0,
-                            "straight_length_m": 5.0,
-                        }
-                    ],
-                    "path_length_m": 7.0,
-                    "straight_length_m": 5.0,
-                    "min_clearance_m": None,
-                    "min_separation_m": None,
-                    "recoveries": 0,
-                    "contacts": 0,
-                    "aborts": 0,
-                    "spin_s": 0.0,
-                }
-            ],
-            "contacts": [
-                {"time_s": 5.0, "robot": "quad0", "with": "pillar", "x_m": 1.0, "y_m": 2.0}
-            ],
-            "contacts_reported": True,
-            "min_separation_m": None,
-            "seed": None,
-            "versions": {},
-        }
-    )
+    assert json.loads(path.read_text()) == to_json(summary) == DOCUMENTED
     assert list(path.parent.iterdir()) == [path]
 
 

@@ -182,11 +182,12 @@ def test_the_front_holds_what_nothing_beats_in_both():
     assert front([]) == []
 
 
-def test_tune_from_the_command_line_and_again(tmp_path):
-    mission = write_mission(tmp_path)
-    space = tmp_path / "space.yaml"
+def tune_arguments(folder):
+    """A study of two candidates that flies in a few seconds."""
+    mission = write_mission(folder)
+    space = folder / "space.yaml"
     space.write_text(SPACE)
-    arguments = [
+    return [
         "--scene",
         str(mission.scene),
         "--goals",
@@ -209,8 +210,12 @@ def test_tune_from_the_command_line_and_again(tmp_path):
         "--workers",
         "1",
         "--output",
-        str(tmp_path / "out"),
+        str(folder / "out"),
     ]
+
+
+def test_tune_from_the_command_line_and_again(tmp_path):
+    arguments = tune_arguments(tmp_path)
     first = CliRunner().invoke(tune, arguments)
     assert first.exit_code == 0, first.output
     found = json.loads((tmp_path / "out" / "results.json").read_text())
@@ -254,9 +259,9 @@ def test_tune_refuses_what_it_cannot_use(arguments, words, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_sweep_from_the_command_line(tmp_path):
-    mission = write_mission(tmp_path)
-    arguments = [
+def sweep_arguments(folder):
+    mission = write_mission(folder)
+    return [
         "--scene",
         str(mission.scene),
         "--goals",
@@ -267,16 +272,20 @@ def test_sweep_from_the_command_line(tmp_path):
         "--workers",
         "1",
         "--cache",
-        str(tmp_path / "flights.db"),
+        str(folder / "flights.db"),
         "--csv",
-        str(tmp_path / "s.csv"),
+        str(folder / "s.csv"),
         "--json",
-        str(tmp_path / "s.json"),
+        str(folder / "s.json"),
         "--report",
-        str(tmp_path / "s.html"),
+        str(folder / "s.html"),
         "--png",
-        str(tmp_path / "png"),
+        str(folder / "png"),
     ]
+
+
+def test_sweep_from_the_command_line(tmp_path):
+    arguments = sweep_arguments(tmp_path)
     over = [
         "--over",
         "TrajectoryPlannerROS/max_vel_x=0.4,0.8",

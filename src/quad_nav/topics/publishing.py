@@ -1,4 +1,4 @@
-"""Publication schedules of costmaps and flown paths."""
+"""Names of topics, and publication schedules of costmaps and flown paths."""
 
 from __future__ import annotations
 
@@ -18,6 +18,37 @@ PATH_SPACING_M = 0.05
 PATH_POSES = 1000  # 50 m, about a megabyte of messages
 
 T = TypeVar("T")
+
+Names = Callable[[str], str]
+"""Maps the name that move_base uses for a topic, service or parameter to the actual one."""
+
+_ACTION = ("goal", "cancel", "status", "feedback", "result", "recovery_status")
+_NUMBERED = ("clicked_point", "cmd_vel", "initialpose", "odom", "scan", "move_base_simple/goal")
+
+
+def own_node(name: str) -> str:
+    """Return the name unchanged, for the only robot of a node: rospy resolves and remaps it."""
+    return name
+
+
+def in_fleet(number: int) -> Names:
+    """Return the names of a robot that shares its node with others.
+
+    A launch file cannot remap these, and the node has only one private namespace. The names are
+    those that the remaps of `launch/quad.launch` lead to.
+    """
+    node = f"/move_base{number}"
+    remaps = {f"/{name}": f"/{name}{number}" for name in _NUMBERED}
+    remaps.update({f"/move_base/{name}": f"{node}/{name}" for name in _ACTION})
+    remaps["/move_base"] = node
+
+    def resolved(name: str) -> str:
+        if name.startswith("~"):
+            return f"{node}/{name[1:]}".rstrip("/")
+        absolute = name if name.startswith("/") else f"/{name}"
+        return remaps.get(absolute, absolute)
+
+    return resolved
 
 
 class CostmapSchedule:

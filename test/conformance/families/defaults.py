@@ -35,12 +35,28 @@ def check(path: Path) -> List[Difference]:
 def _check_costmap(
     configuration: Configuration, recorded: Recorded, comparison: Comparison
 ) -> None:
-    params = configuration.local_costmap
-    costmap = LayeredCostmap(params)
-    spec = costmap.spec
-    obstacles, inflation = costmap.layers["obstacle_layer"], costmap.layers["inflation_layer"]
-    assert isinstance(obstacles, ObstacleLayer) and isinstance(inflation, InflationLayer)
-    found: Dict[str, Dict[str, Any]] = {
+    costmap = LayeredCostmap(configuration.local_costmap)
+    for part, fields in _costmap_fields(costmap).items():
+        _compare(comparison, f"costmap_defaults.{part}", fields, recorded[part])
+    _compare(
+        comparison,
+        "costmap_defaults.layers.inflation",
+        _inflation_fields(costmap),
+        recorded["layers"]["inflation"],
+    )
+    for name, radius_m in (
+        ("inscribed", costmap.inscribed_radius_m),
+        ("circumscribed", costmap.circumscribed_radius_m),
+    ):
+        place = f"costmap_defaults.info.{name}"
+        comparison.near(place, radius_m, recorded["info"][name], _METRES)
+
+
+def _costmap_fields(costmap: LayeredCostmap) -> Dict[str, Dict[str, Any]]:
+    params, spec = costmap.params, costmap.spec
+    obstacles = costmap.layers["obstacle_layer"]
+    assert isinstance(obstacles, ObstacleLayer)
+    return {
         "info": {
             "size_x": spec.size_x,
             "size_y": spec.size_y,
@@ -70,76 +86,68 @@ def _check_costmap(
             "sources": [source.name for source in obstacles.params.sources],
         },
     }
-    info = recorded["info"]
-    comparison.near(
-        "costmap_defaults.info.inscribed", costmap.inscribed_radius_m, info["inscribed"], _METRES
-    )
-    comparison.near(
-        "costmap_defaults.info.circumscribed",
-        costmap.circumscribed_radius_m,
-        info["circumscribed"],
-        _METRES,
-    )
-    for part, fields in found.items():
-        _compare(comparison, f"costmap_defaults.{part}", fields, recorded[part])
-    _compare(
-        comparison,
-        "costmap_defaults.layers.inflation",
-        {
-            "inflation_radius": inflation.params.inflation_radius_m,
-            "cost_scaling_factor": inflation.params.cost_scaling_factor,
-            "inflate_unknown": inflation.params.inflate_unknown,
-            "enabled": inflation.params.enabled,
-            "cell_inflation_radius": inflation.radius_cells,
-        },
-        recorded["layers"]["inflation"],
-    )
+
+
+def _inflation_fields(costmap: LayeredCostmap) -> Dict[str, Any]:
+    inflation = costmap.layers["inflation_layer"]
+    assert isinstance(inflation, InflationLayer)
+    return {
+        "inflation_radius": inflation.params.inflation_radius_m,
+        "cost_scaling_factor": inflation.params.cost_scaling_factor,
+        "inflate_unknown": inflation.params.inflate_unknown,
+        "enabled": inflation.params.enabled,
+        "cell_inflation_radius": inflation.radius_cells,
+    }
+
+
+_PLANNER = {
+    "acc_lim_x": "acc_lim_x_mps2",
+    "acc_lim_y": "acc_lim_y_mps2",
+    "acc_lim_theta": "acc_lim_theta_radps2",
+    "max_vel_x": "max_vel_x_mps",
+    "min_vel_x": "min_vel_x_mps",
+    "max_vel_th": "max_vel_theta_radps",
+    "min_vel_th": "min_vel_theta_radps",
+    "min_in_place_vel_th": "min_in_place_vel_theta_radps",
+    "sim_time": "sim_time_s",
+    "sim_granularity": "sim_granularity_m",
+    "angular_sim_granularity": "angular_sim_granularity_rad",
+    "path_distance_bias": "path_distance_bias",
+    "goal_distance_bias": "goal_distance_bias",
+    "occdist_scale": "occdist_scale",
+    "oscillation_reset_dist": "oscillation_reset_dist_m",
+    "escape_reset_dist": "escape_reset_dist_m",
+    "escape_reset_theta": "escape_reset_theta_rad",
+    "vx_samples": "vx_samples",
+    "vtheta_samples": "vtheta_samples",
+    "heading_lookahead": "heading_lookahead_m",
+    "holonomic_robot": "holonomic_robot",
+    "backup_vel": "escape_vel_mps",
+    "dwa": "dwa",
+    "heading_scoring": "heading_scoring",
+    "heading_scoring_timestep": "heading_scoring_timestep_s",
+    "simple_attractor": "simple_attractor",
+    "y_vels": "y_vels_mps",
+}
+"""Upstream's names of the trajectory planner's parameters, and ours."""
+_ROS = {
+    "rot_stopped_velocity": "rot_stopped_velocity_radps",
+    "trans_stopped_velocity": "trans_stopped_velocity_mps",
+    "xy_goal_tolerance": "xy_goal_tolerance_m",
+    "yaw_goal_tolerance": "yaw_goal_tolerance_rad",
+    "prune_plan": "prune_plan",
+    "max_vel_th": "max_rotational_vel_radps",
+    "latch_xy_goal_tolerance": "latch_xy_goal_tolerance",
+}
+"""The same for the ROS wrapper of the planner."""
 
 
 def _check_planner(
     params: TrajectoryPlannerParams, recorded: Recorded, comparison: Comparison
 ) -> None:
-    """By the original's names; what it shortens is under its short name there."""
-    planner = {
-        "acc_lim_x": params.acc_lim_x_mps2,
-        "acc_lim_y": params.acc_lim_y_mps2,
-        "acc_lim_theta": params.acc_lim_theta_radps2,
-        "max_vel_x": params.max_vel_x_mps,
-        "min_vel_x": params.min_vel_x_mps,
-        "max_vel_th": params.max_vel_theta_radps,
-        "min_vel_th": params.min_vel_theta_radps,
-        "min_in_place_vel_th": params.min_in_place_vel_theta_radps,
-        "sim_time": params.sim_time_s,
-        "sim_granularity": params.sim_granularity_m,
-        "angular_sim_granularity": params.angular_sim_granularity_rad,
-        "path_distance_bias": params.path_distance_bias,
-        "goal_distance_bias": params.goal_distance_bias,
-        "occdist_scale": params.occdist_scale,
-        "oscillation_reset_dist": params.oscillation_reset_dist_m,
-        "escape_reset_dist": params.escape_reset_dist_m,
-        "escape_reset_theta": params.escape_reset_theta_rad,
-        "vx_samples": params.vx_samples,
-        "vtheta_samples": params.vtheta_samples,
-        "heading_lookahead": params.heading_lookahead_m,
-        "holonomic_robot": params.holonomic_robot,
-        "backup_vel": params.escape_vel_mps,
-        "dwa": params.dwa,
-        "heading_scoring": params.heading_scoring,
-        "heading_scoring_timestep": params.heading_scoring_timestep_s,
-        "simple_attractor": params.simple_attractor,
-        "y_vels": params.y_vels_mps,
-    }
-    ros = {
-        "rot_stopped_velocity": params.rot_stopped_velocity_radps,
-        "trans_stopped_velocity": params.trans_stopped_velocity_mps,
-        "xy_goal_tolerance": params.xy_goal_tolerance_m,
-        "yaw_goal_tolerance": params.yaw_goal_tolerance_rad,
-        "prune_plan": params.prune_plan,
-        "max_vel_th": params.max_rotational_vel_radps,
-        "latch_xy_goal_tolerance": params.latch_xy_goal_tolerance,
-    }
-    _compare(comparison, "trajectory_planner_defaults.planner", planner, recorded["planner"])
-    _compare(comparison, "trajectory_planner_defaults.ros", ros, recorded["ros"])
+    for part, names in (("planner", _PLANNER), ("ros", _ROS)):
+        found = {name: getattr(params, field) for name, field in names.items()}
+        _compare(comparison, f"trajectory_planner_defaults.{part}", found, recorded[part])
 
 
 def _compare(comparison: Comparison, place: str, found: Dict[str, Any], recorded: Recorded) -> None:

@@ -138,15 +138,21 @@ def _check_call(
     exact(f"plan_lengths[{k}] (global)", len(planner.plan), recorded["plan_lengths"][k, 0])
     if control is not None:
         exact(f"goal_mode[{k}]", control.goal_mode, bool(recorded["goal_mode"][k]))
-    if recorded["goal_mode"][k]:
-        return
+    if not recorded["goal_mode"][k]:
+        _check_best(planner, control, recorded, k, comparison)
+
+
+def _check_best(
+    planner: TrajectoryPlanner,
+    control: Optional[Control],
+    recorded: Recorded,
+    k: int,
+    comparison: Comparison,
+) -> None:
+    exact, near = comparison.exact, comparison.near
     best = planner.best
-    near(
-        f"best_cost[{k}]",
-        np.nan if best is None else best.cost,
-        recorded["best_cost"][k],
-        _TOLERANCE,
-    )
+    cost = np.nan if best is None else best.cost
+    near(f"best_cost[{k}]", cost, recorded["best_cost"][k], _TOLERANCE)
     if control is not None and best is not None:
         exact(f"best_n_points[{k}]", len(control.local_plan), recorded["best_n_points"][k])
         near(f"best_vel[{k}]", best.sample, recorded["best_vel"][k], _TOLERANCE)

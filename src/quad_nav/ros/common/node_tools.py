@@ -1,4 +1,4 @@
-"""Tools of every node: shutdown on signals, names of topics, throttled warnings."""
+"""Tools of every node: shutdown on signals, throttled warnings."""
 
 from __future__ import annotations
 
@@ -7,15 +7,9 @@ import signal
 import threading
 import time
 from types import FrameType
-from typing import Callable, Dict, Optional
+from typing import Dict, Optional
 
 import rospy
-
-Names = Callable[[str], str]
-"""Maps the name that move_base uses for a topic, service or parameter to the actual one."""
-
-_ACTION = ("goal", "cancel", "status", "feedback", "result", "recovery_status")
-_NUMBERED = ("clicked_point", "cmd_vel", "initialpose", "odom", "scan", "move_base_simple/goal")
 
 REPEAT_S = 5.0  # wall time
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
@@ -35,31 +29,6 @@ def init_node(name: str) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, shut_down)
-
-
-def own_node(name: str) -> str:
-    """Return the name unchanged, for the only robot of a node: rospy resolves and remaps it."""
-    return name
-
-
-def in_fleet(number: int) -> Names:
-    """Return the names of a robot that shares its node with others.
-
-    A launch file cannot remap these, and the node has only one private namespace. The names are
-    those that the remaps of `launch/quad.launch` lead to.
-    """
-    node = f"/move_base{number}"
-    remaps = {f"/{name}": f"/{name}{number}" for name in _NUMBERED}
-    remaps.update({f"/move_base/{name}": f"{node}/{name}" for name in _ACTION})
-    remaps["/move_base"] = node
-
-    def resolved(name: str) -> str:
-        if name.startswith("~"):
-            return f"{node}/{name[1:]}".rstrip("/")
-        absolute = name if name.startswith("/") else f"/{name}"
-        return remaps.get(absolute, absolute)
-
-    return resolved
 
 
 class ThrottledWarnings:

@@ -22,8 +22,7 @@ from quad_nav.costmap.voxel import VoxelLayer
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
 from quad_nav.ros.common.nav_messages import grid_message, polygon_message, update_message
-from quad_nav.ros.common.node_tools import Names, own_node
-from quad_nav.topics.publishing import CostmapSchedule
+from quad_nav.topics.publishing import CostmapSchedule, Names, own_node
 
 _VOXEL_COLOUR = ColorRGBA(0.8, 0.3, 0.1, 0.6)
 

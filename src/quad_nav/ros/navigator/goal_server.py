@@ -19,9 +19,9 @@ from quad_nav.geometry import Pose3D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import Outcome
 from quad_nav.ros.common.nav_messages import goal_from_message, pose_stamped
-from quad_nav.ros.common.node_tools import Names, own_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.timing import Schedule
+from quad_nav.topics.publishing import Names, own_node
 
 
 class GoalServer:

@@ -15,13 +15,14 @@ import rospy
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
-from quad_nav.ros.common.node_tools import Names, in_fleet, init_node, own_node
+from quad_nav.ros.common.node_tools import init_node
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.loop import NavigatorLoop
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_navigator import RobotNavigator
 from quad_nav.scenario.fleet_setup import read_setup
 from quad_nav.scenario.warm_up import warm_up
+from quad_nav.topics.publishing import Names, in_fleet, own_node
 
 EXIT_BAD_INPUT = 2
 FLEET_PERIOD_S = 1.0 / 40.0  # as often as poses arrive

@@ -19,8 +19,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.peers.peer import Intention, Peer, assumed_intention, idle_priority, peer_at
 from quad_nav.ros.common.conversions import odometry_from_message, time_message
 from quad_nav.ros.common.nav_messages import path_message
-from quad_nav.ros.common.node_tools import Names
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.topics.publishing import Names
 from quad_nav.topics.validation import MAX_POSES, path_problem, pose_problem, twist_problem
 
 REPEAT_S = 0.25

@@ -15,8 +15,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses, State
 from quad_nav.ros.common.nav_messages import goal_from_message, path_message
-from quad_nav.ros.common.node_tools import Names
 from quad_nav.ros.navigator.plan_topics import PlanTopics
+from quad_nav.topics.publishing import Names
 
 
 class PlanServices:

@@ -26,7 +26,7 @@ from quad_nav.ros.common.nav_messages import (
     pose_stamped,
     potential_message,
 )
-from quad_nav.ros.common.node_tools import Names, own_node
+from quad_nav.topics.publishing import Names, own_node
 
 
 class PlanTopics:

@@ -14,7 +14,7 @@ from dynamic_reconfigure.server import Server
 
 from quad_nav import config
 from quad_nav.errors import InputError
-from quad_nav.ros.common.node_tools import Names, own_node
+from quad_nav.topics.publishing import Names, own_node
 
 OnReconfigure = Callable[[str, Dict[str, Any]], config.Configuration]
 

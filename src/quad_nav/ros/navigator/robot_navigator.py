@@ -17,7 +17,7 @@ from quad_nav import config
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.ros.common.conversions import twist_from_message
-from quad_nav.ros.common.node_tools import Names, ThrottledWarnings, own_node
+from quad_nav.ros.common.node_tools import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
@@ -28,6 +28,7 @@ from quad_nav.ros.navigator.plan_services import PlanServices
 from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.ros.navigator.reconfigure import serve_namespaces
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
+from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import twist_problem
 
 POLL_S = 0.05  # delay after which an idle navigator notices a goal

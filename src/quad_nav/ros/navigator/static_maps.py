@@ -13,7 +13,7 @@ from nav_msgs.msg import OccupancyGrid
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.static import StaticLayer, StaticMap
 from quad_nav.grid import GridSpec
-from quad_nav.ros.common.node_tools import Names, own_node
+from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import grid_problem
 
 

@@ -1,0 +1,199 @@
+"""Files of recordings: refused, interrupted, on a full disk, and from the command line."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import resource
+import sys
+import types
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from recorded_flight import setup
+
+from quad_nav.cli import main
+from quad_nav.errors import InputError
+from quad_nav.files.shipped import shipped
+from quad_nav.mission.flight_log import INTERRUPTED
+from quad_nav.offline.flight import Flight, FlightObserver
+from quad_nav.offline.run import fly
+from quad_nav.recording.bag_file import read_messages
+from quad_nav.recording.record_file import create
+from quad_nav.recording.recorder import Recorder
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
+from quad_nav.topics.flight_info import FLIGHT_TOPIC
+
+
+def read(path, *topics):
+    return list(read_messages(path, lambda topic, kind: topic in topics))
+
+
+@pytest.mark.parametrize(
+    "name, problem",
+    [
+        ("flight.txt", "expected a name that ends with .bag or .mcap"),
+        ("file/flight.bag", "cannot write the recording: "),
+        ("folder.bag", "is a folder"),
+    ],
+)
+def test_a_file_that_cannot_be_made_is_refused_at_once(tmp_path, name, problem):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    (tmp_path / "folder.bag").mkdir()
+    with pytest.raises(InputError, match=problem):
+        Recorder(tmp_path / name)
+
+
+def test_an_older_recording_stays_until_the_new_one_is_complete(tmp_path):
+    path = tmp_path / "flight.bag"
+    path.write_bytes(b"older")
+    flight = Flight(setup(tmp_path), [Recorder(path)])
+    flight.advance()
+    assert path.read_bytes() == b"older"
+    flight.end("enough")
+    assert len(read(path, "/odom0")) == 2
+    assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == "enough"
+    assert not path.with_name("flight.bag.active").exists()
+
+
+def test_an_interrupted_flight_leaves_a_recording(tmp_path):
+    path = tmp_path / "flight.bag"
+
+    class Stop(FlightObserver):
+        stop_reason = ""
+
+        def on_move(self, flight):
+            self.stop_reason = INTERRUPTED
+
+    summary = fly(setup(tmp_path), [Recorder(path), Stop()])
+    assert summary.reason == INTERRUPTED
+    assert json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"] == INTERRUPTED
+
+
+def test_a_flight_that_fails_leaves_a_recording(tmp_path):
+    class Faulty(FlightObserver):
+        def on_move(self, flight):
+            raise ZeroDivisionError
+
+    path = tmp_path / "flight.bag"
+    with pytest.raises(ZeroDivisionError):
+        fly(setup(tmp_path), [Recorder(path), Faulty()])
+    reason = json.loads(read(path, FLIGHT_TOPIC)[-1].content.data)["reason"]
+    assert reason == "ended by ZeroDivisionError"
+
+
+class SizeLimit:
+    """No file can grow beyond so many bytes, as if the disk were full."""
+
+    def __init__(self, size):
+        self._size = size
+
+    def __enter__(self):
+        self._before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (self._size, self._before[1]))
+
+    def __exit__(self, *_):
+        resource.setrlimit(resource.RLIMIT_FSIZE, self._before)
+
+
+def test_a_full_disk_ends_the_flight_and_what_was_recorded_is_readable(tmp_path):
+    path = tmp_path / "flight.bag"
+    long_flight = read_setup(FlightOptions(shipped("scenes", "arena.yaml"), shipped("goals")))
+    with SizeLimit(500_000):
+        summary = fly(long_flight, [Recorder(path)])
+    assert summary.reason == "cannot write the recording: File too large"
+    assert summary.exit_status == 1
+    assert path.stat().st_size <= 500_000
+    assert 40 < len(read(path, "/odom0")) < summary.sim_time_s * 40
+
+
+def test_a_disk_that_is_full_at_the_end_is_reported(tmp_path):
+    path = tmp_path / "flight.bag"
+    with SizeLimit(450_000):
+        summary = fly(setup(tmp_path), [Recorder(path)])
+    assert all(robot.reached == len(robot.legs) for robot in summary.robots)
+    assert summary.reason == "cannot write the recording: File too large"
+    assert len(read(path, "/odom0")) > 40
+
+
+def noise_bag(path, size):
+    """Writes until the limit is hit: a message of 1.05 MB that does not compress to a chunk."""
+    noise = np.random.default_rng(0).bytes(1_050_000)
+    data = len(noise).to_bytes(4, "little") + noise
+    file = create(path)
+    with SizeLimit(size):
+        topic = file.add_topic("/noise", "std_msgs/String", False, "/test")
+        with pytest.raises(OSError):
+            for k in range(1, 9):
+                file.write(topic, k * 10**9, data)
+        with pytest.raises(OSError):
+            file.close()
+    found = list(_raw(path))
+    assert all(content == data for _, content in found)
+    return [stamp // 10**9 for stamp, _ in found]
+
+
+def test_as_many_chunks_stay_as_there_is_room_for(tmp_path):
+    path = tmp_path / "flight.bag"
+    assert noise_bag(path, 3_300_000) == [1, 2, 3]
+    size = path.stat().st_size
+    assert noise_bag(path, size) == [1, 2, 3]
+    assert noise_bag(path, size - 1) == [1, 2]  # no room for the index of three
+
+
+def test_a_flight_without_room_for_anything_gives_the_reason(tmp_path):
+    path = tmp_path / "flight.bag"
+    with SizeLimit(5_000):
+        summary = fly(setup(tmp_path, time_limit_s=0.1), [Recorder(path)])
+    assert summary.reason == (
+        "time limit of 0.1 s; cannot write the recording: no room for a single chunk"
+    )
+    assert not path.exists()
+
+
+def _raw(path):
+    from rosbags.rosbag1 import Reader
+
+    with Reader(path) as reader:
+        for _, stamp, content in reader.messages():
+            yield stamp, bytes(content)
+
+
+def test_a_stop_reason_of_an_observer_ends_the_flight(tmp_path):
+    class Tired(FlightObserver):
+        stop_reason = "tired"
+
+    summary = fly(setup(tmp_path), [Tired()])
+    assert (summary.reason, summary.sim_time_s) == ("tired", 0.0)
+    assert dataclasses.replace(summary, reason="").success is False
+
+
+# The command line.
+
+
+@pytest.mark.parametrize(
+    "option, problem",
+    [
+        (
+            ["--record", "flight.txt"],
+            "flight.txt: unknown recording format; expected a name that ends",
+        ),
+        (
+            ["--view", "flight.bag"],
+            "flight.bag: unknown format of a view; expected a name that ends",
+        ),
+    ],
+)
+def test_a_bad_file_ends_with_status_2_before_anything_flies(monkeypatch, option, problem):
+    monkeypatch.setitem(sys.modules, "rerun", types.ModuleType("rerun"))
+    result = CliRunner().invoke(main, ["fly", "-q", *option])
+    assert result.exit_code == 2
+    assert f"flight not started, invalid input:\n  {problem}" in result.output
+
+
+def test_the_command_records(tmp_path):
+    path = tmp_path / "flights" / "flight.bag"
+    result = CliRunner().invoke(main, ["fly", "-q", "--time-limit", "0.5", "--record", str(path)])
+    assert result.exit_code == 1  # the time was not enough for the goals
+    assert len(read(path, "/odom0")) == 21
