@@ -1,5 +1,5 @@
-"""Parts that several nodes share: messages, transforms, names, diagnostics.
+"""Parts that several nodes share: start, messages, transforms, diagnostics.
 
-Reading order: `node_tools`, `conversions`, `nav_messages`, `transforms`,
-`readiness`, `diagnostics`, `preflight`, `rviz_node`.
+Reading order: `readiness`, `conversions`, `nav_messages`, `transforms`,
+`diagnostics`, `preflight`, `rviz_node`.
 """

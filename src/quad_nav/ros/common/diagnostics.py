@@ -1,4 +1,4 @@
-"""Publish statuses on `/diagnostics` and log every change of a level.
+"""Publish statuses on `/diagnostics`, log every change of a level, and throttle warnings.
 
 `diagnostic_updater` uses simulated time: it publishes nothing while the simulation is paused, and
 its rates divide by an elapsed time of 0. This module uses wall time.
@@ -6,7 +6,9 @@ its rates divide by an elapsed time of 0. This module uses wall time.
 
 from __future__ import annotations
 
+import re
 import threading
+import time
 from typing import Callable, Dict, Sequence
 
 import rospy
@@ -15,6 +17,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from quad_nav.topics.health import Health, Level
 
 PERIOD_S = 1.0  # wall time
+REPEAT_S = 5.0  # wall time
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 _LOG = {
     Level.OK: rospy.loginfo,
@@ -83,3 +87,21 @@ def publish_health(report: Callable[[], Sequence[Health]]) -> None:
                     raise
 
     threading.Thread(target=run, name="diagnostics", daemon=True).start()
+
+
+class ThrottledWarnings:
+    """Log a repeated warning at once and then every `REPEAT_S` of wall time.
+
+    Warnings that differ only in their numbers count as the same one.
+    """
+
+    def __init__(self) -> None:
+        """Start without logged warnings."""
+        self._logged_s: Dict[str, float] = {}
+
+    def warn(self, text: str) -> None:
+        """Log a warning unless the same one was logged a short time ago."""
+        kind, now_s = _NUMBER.sub("#", text), time.monotonic()
+        if now_s - self._logged_s.get(kind, -REPEAT_S) >= REPEAT_S:
+            self._logged_s[kind] = now_s
+            rospy.logwarn("%s", text)

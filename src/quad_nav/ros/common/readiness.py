@@ -1,11 +1,14 @@
-"""Wait for what a node needs, and name the topics and services that are missing."""
+"""Start a node: signals, and waiting for what it needs, with the names of what is missing."""
 
 from __future__ import annotations
 
+import signal
 import socket
+import threading
 import time
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Sequence
+from types import FrameType
+from typing import Callable, Dict, List, Optional, Sequence
 
 import rosgraph
 import rospy
@@ -15,6 +18,22 @@ POLL_S = 0.1
 ALIVE_WITHIN_S = 1.0
 SILENT_AFTER_S = 3.0
 REPEAT_S = 15.0
+
+
+def init_node(name: str) -> None:
+    """Call `rospy.init_node` and let Ctrl-C and SIGTERM shut down from another thread.
+
+    rospy's own handler closes the publishers in the thread that it interrupts. It deadlocks if
+    that thread is publishing and holds the lock.
+    """
+    rospy.init_node(name, disable_signals=True)
+
+    def shut_down(number: int, _frame: Optional[FrameType]) -> None:
+        reason = signal.Signals(number).name
+        threading.Thread(target=rospy.signal_shutdown, args=(reason,), daemon=True).start()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, shut_down)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import rospy
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
-from quad_nav.ros.common.node_tools import init_node
+from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.loop import NavigatorLoop
 from quad_nav.ros.navigator.peer_topics import PeerTopics

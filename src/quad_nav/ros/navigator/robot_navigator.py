@@ -17,7 +17,7 @@ from quad_nav import config
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.ros.common.conversions import twist_from_message
-from quad_nav.ros.common.node_tools import ThrottledWarnings
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator import sensors, static_maps
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher

@@ -22,7 +22,7 @@ from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, Sink, sinks_of
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
-from quad_nav.ros.common.node_tools import ThrottledWarnings
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import MAX_POINTS, scan_problem

@@ -26,8 +26,8 @@ from quad_nav.mission.summary import (
 )
 from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.ros.common import readiness
-from quad_nav.ros.common.node_tools import init_node
 from quad_nav.ros.common.preflight import read_mission_setup, result_path
+from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
 from quad_nav.scenario.mission_setup import MissionSetup
 
