@@ -113,15 +113,19 @@ class UpstreamBehaviour(UpstreamCase):
     def test_clear_costmaps_forgets_what_is_out_of_sight(self):
         """Marked within 2 m, cleared within 6: farther than 2 m only hidden obstacles are left.
 
-        Here it is the far side of a box. Beams that graze it clear most of it now and then, but
-        not what they hit themselves, and all of it is farther away than 2.3 m.
+        Here it is the far side of a box, farther away than 2.3 m. Beams that graze the box may
+        clear it on the way: then the robot flies past once more.
         """
         beyond_m = 2.3
-        place = self.far_place()  # on the other side of a box
-        self.send(0, goal_pose(*place))
-        self.wait(lambda: self.distance(0, *place) < 0.3, "robot 0 elsewhere")
-        self.rest(0)
-        self.assertTrue(self.obstacle_cells(beyond_m))
+        for _ in range(5):
+            place = self.far_place()  # on the other side of a box
+            self.send(0, goal_pose(*place))
+            self.wait(lambda at=place: self.distance(0, *at) < 0.3, "robot 0 elsewhere")
+            self.rest(0)
+            if self.obstacle_cells(beyond_m):
+                break
+        else:
+            self.fail("no hidden obstacle after 5 flights")
         rospy.wait_for_service("/move_base0/clear_costmaps", PATIENCE_S)
         rospy.ServiceProxy("/move_base0/clear_costmaps", Empty)()
         self.wait(lambda: not self.obstacle_cells(beyond_m), "nothing far away")
