@@ -8,7 +8,7 @@ decides whether a scan counts and lets layers that see a message alike share its
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, Dict, List, NamedTuple, Sequence, Tuple
+from typing import Callable, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,9 +135,13 @@ class ScanIntake:
     ) -> None:
         if self._params.reject_implausible_scans:
             received_s = min(received_s, stamp_s)
-        made: Dict[_Key, Observation] = {}
+        # Equal keys are found by comparison: mostly the poses are the same objects, and hashing
+        # them costs more than all other steps here.
+        made: List[Tuple[_Key, Observation]] = []
         for sink, pose in zip(self.sinks, poses):
             key = (pose, sink.layer.projection_key(sink.source.name))
-            if key not in made:
-                made[key] = make(sink, pose)
-            sink.layer.add_observation(sink.source.name, made[key], received_s)
+            observation = next((one for other, one in made if other == key), None)
+            if observation is None:
+                observation = make(sink, pose)
+                made.append((key, observation))
+            sink.layer.add_observation(sink.source.name, observation, received_s)

@@ -148,14 +148,10 @@ class Navigator:
         """Time at which the next tick has something to do; -inf before the first."""
         if not self._started:
             return -math.inf
-        due = [math.inf]
-        if not self._costmaps_rest:
-            due.append(self._updates.due_s)
-        if self.state is not State.IDLE:
-            due.append(self._machine.due_s)
-        elif self.peers.params.avoid_peers:
-            due.append(self._idle_check.due_s)
-        return min(due)
+        due_s = math.inf if self._costmaps_rest else self._updates.due_s
+        if self._machine.state is not State.IDLE:
+            return min(due_s, self._machine.due_s)
+        return min(due_s, self._idle_check.due_s) if self.peers.params.avoid_peers else due_s
 
     @property
     def has_work(self) -> bool:
