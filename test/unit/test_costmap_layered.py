@@ -194,3 +194,33 @@ def test_a_layer_of_ones_own():
     assert costmap.update(0.0, ROBOT) == Window(0, 2, 0, 1)
     assert costmap.costs[0].tolist() == [77, 77, 0, 0, 0, 0]
     assert not costmap.costs[1:].any()
+
+
+def test_a_map_in_another_frame_needs_its_transform():
+    static_map = StaticMap(np.full((2, 2), 100, np.int8), GridSpec(2, 2, 1.0), "map")
+    layers = (("static_layer", StaticLayerParams()),)
+    params = replace(SMALL, global_frame="odom", rolling_window=True, layers=layers)
+    costmap = LayeredCostmap(params, static_map)
+    assert costmap.map_frames == ("map",)
+    costmap.update(0.0, ROBOT)
+    assert picture(costmap.costs) == drawn("......\n......\n......")
+    costmap.set_map_poses({"map": Pose3D(-1.0, 0.0, 0.0)})  # the map begins at x = 1 m of odom
+    costmap.update(1.0, ROBOT)
+    assert costmap.spec == GridSpec(6, 3, 1.0, -2.0, 0.0)
+    assert picture(costmap.costs) == drawn("......\n...##.\n...##.")
+
+
+@pytest.mark.parametrize(
+    "rolling, frame, needed", [(True, "map", ()), (False, "world", ()), (True, "world", ("world",))]
+)
+def test_frames_of_maps_that_need_a_transform(rolling, frame, needed):
+    static_map = StaticMap(np.full((2, 2), 100, np.int8), GridSpec(2, 2, 1.0), frame)
+    params = replace(
+        SMALL, rolling_window=rolling, layers=(("static_layer", StaticLayerParams()), INFLATION)
+    )
+    costmap = LayeredCostmap(params)
+    assert costmap.map_frames == ()
+    costmap.set_map(static_map)
+    assert costmap.map_frames == needed
+    costmap.update(0.0, ROBOT)
+    assert costmap.costs.any() == (not needed)

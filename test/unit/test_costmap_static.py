@@ -8,7 +8,7 @@ from costmap_maps import costs_of, drawn, picture
 
 from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
 from quad_nav.costmap.static import StaticLayer, StaticLayerParams, StaticMap
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
 
 ROBOT = Pose2D(0.0, 0.0)
@@ -115,7 +115,9 @@ def test_rolling_window_looks_cells_up_by_position():
 
 def test_rolling_window_in_a_turned_frame():
     layer = layer_of(map_of("#..\n...\n..."), rolling_window=True)
-    layer.map_from_global = Pose2D(3.0, 0.0, math.pi / 2)  # global x is the map's y
+    layer.map_from_global = Pose3D(
+        3.0, 0.0, 0.0, quaternion_from_yaw(math.pi / 2)
+    )  # global x is the map's y
     master = CostGrid(GridSpec(3, 3, 1.0))
     layer.update_costs(master, Window(0, 3, 0, 3))
     assert picture(master.costs) == drawn("..#\n...\n...")

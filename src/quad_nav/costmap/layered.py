@@ -9,7 +9,7 @@ smallest window that holds all of that, and lets the layers write into it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Dict, Iterable, List, Optional, Tuple
+from typing import Dict, Iterable, List, Mapping, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayer, StaticMap
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
 
 NamedLayers = Tuple[Tuple[str, LayerParams], ...]
@@ -91,6 +91,7 @@ class LayeredCostmap:
         default_cost = UNKNOWN if params.track_unknown_space else FREE
         self._master = CostGrid(params.spec, default_cost)
         self._size_locked = False
+        self._map_poses: Mapping[str, Optional[Pose3D]] = {}
         self.layers: Dict[str, Layer] = {
             name: layer_params.make_layer(params.spec, params.rolling_window, default_cost)
             for name, layer_params in params.layers
@@ -223,6 +224,29 @@ class LayeredCostmap:
                     self._resize(static_map.spec)
                     self._size_locked = True
                 layer.set_map(static_map)
+        self.set_map_poses(self._map_poses)
+
+    @property
+    def map_frames(self) -> Tuple[str, ...]:
+        """Frames of the maps that need a transform: those of a rolling window in another frame."""
+        if not self.params.rolling_window:
+            return ()
+        frames = {layer.map_frame for layer in self._static_layers()}
+        return tuple(sorted(frames - {"", self.params.global_frame}))
+
+    def set_map_poses(self, map_from_global: Mapping[str, Optional[Pose3D]]) -> None:
+        """Set the latest transforms to the frames of maps, for the following updates.
+
+        A map whose frame has no pose is not drawn. A costmap that is no rolling window ignores
+        the frames of its maps.
+
+        Args:
+            map_from_global: Pose of the costmap's global frame in each of ``map_frames``; None
+                or missing if unknown.
+        """
+        self._map_poses = {**map_from_global, self.params.global_frame: Pose3D(0.0, 0.0, 0.0)}
+        for layer in self._static_layers():
+            layer.map_from_global = self._map_poses.get(layer.map_frame)
 
     def reconfigure(self, params: CostmapParams) -> None:
         """Take other parameters with the same list of layers and sources.
@@ -244,6 +268,9 @@ class LayeredCostmap:
             self._master.resize(spec)
             for layer in self.layers.values():
                 layer.resize(spec)
+
+    def _static_layers(self) -> List[StaticLayer]:
+        return [layer for layer in self.layers.values() if isinstance(layer, StaticLayer)]
 
     def _enabled_layers(self) -> List[Layer]:
         return [layer for layer in self.layers.values() if layer.params.enabled]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import NO_CELLS, Bounds, CostGrid, Window, merge_maximum
 from quad_nav.costmap.layer import GridLayer, LayerParams
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 
 
@@ -21,10 +21,12 @@ class StaticMap:
     Attributes:
         occupancy: int8[H, W], 0..100, or -1 for unknown.
         spec: Grid of the map.
+        frame: Frame of the map.
     """
 
     occupancy: NDArray[np.int8]
     spec: GridSpec
+    frame: str = "map"
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,8 @@ class StaticLayer(GridLayer):
     ``LayeredCostmap.set_map``).
 
     Attributes:
-        map_from_global: Pose of the costmap's global frame in the map, for rolling windows.
+        map_from_global: Latest pose of the costmap's global frame in the map's frame. It counts
+            in rolling windows only; None if unknown: then the layer draws nothing.
     """
 
     params: StaticLayerParams
@@ -66,7 +69,7 @@ class StaticLayer(GridLayer):
         self, params: StaticLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
     ) -> None:
         super().__init__(params, spec, default_cost)
-        self.map_from_global = Pose2D(0.0, 0.0)
+        self.map_from_global: Optional[Pose3D] = Pose3D(0.0, 0.0, 0.0)
         self._rolling_window = rolling_window
         self._map: Optional[StaticMap] = None
         self._changed = NO_CELLS
@@ -75,6 +78,11 @@ class StaticLayer(GridLayer):
         """Follow the master grid, in a costmap that is no rolling window."""
         if not self._rolling_window:
             super().resize(spec)
+
+    @property
+    def map_frame(self) -> str:
+        """Frame of the map, "" without a map."""
+        return self._map.frame if self._map else ""
 
     @property
     def accepts_maps(self) -> bool:
@@ -155,7 +163,12 @@ class StaticLayer(GridLayer):
         corners = np.array(
             [spec.centre_of(x, y) for x in (area.x0, area.xn) for y in (area.y0, area.yn)]
         )
-        return bounds.including(self.map_from_global.inverse_transform_points(corners))
+        if not self._rolling_window:
+            return bounds.including(corners)
+        if self.map_from_global is None:
+            return bounds
+        corners = np.column_stack((corners, np.zeros(len(corners))))
+        return bounds.including(self.map_from_global.inverse().transform_points(corners)[:, :2])
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
         """Copy the map into the window."""
@@ -170,9 +183,10 @@ class StaticLayer(GridLayer):
 
     def _copy_by_position(self, master: CostGrid, window: Window) -> None:
         """Copy to each master cell the map cell under its centre."""
-        x, y = _centres(master.spec, window)
+        if self.map_from_global is None:
+            return
+        x, y = _planar(self.map_from_global, *_centres(master.spec, window))
         spec = self.grid.spec
-        x, y = self.map_from_global.transform(x, y)
         column = (x - spec.origin_x_m) / spec.resolution_m
         row = (y - spec.origin_y_m) / spec.resolution_m
         inside = (column >= 0) & (column < spec.size_x) & (row >= 0) & (row < spec.size_y)
@@ -192,3 +206,17 @@ def _centres(spec: GridSpec, window: Window) -> Tuple[NDArray[np.float64], NDArr
     x = spec.origin_x_m + (np.arange(window.x0, window.xn) + 0.5) * spec.resolution_m
     y = spec.origin_y_m + (np.arange(window.y0, window.yn) + 0.5) * spec.resolution_m
     return x[None, :], y[:, None]
+
+
+def _planar(
+    a_from_b: Pose3D, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Transform points at z = 0, x float64[1, n] and y float64[m, 1], to the last bit as tf2."""
+    qx, qy, qz, qw = a_from_b.quaternion
+    scale = 2.0 / (qx * qx + qy * qy + qz * qz + qw * qw)
+    xx, xy, yy = qx * (qx * scale), qx * (qy * scale), qy * (qy * scale)
+    wz, zz = qw * (qz * scale), qz * (qz * scale)
+    return (
+        (1.0 - (yy + zz)) * x + (xy - wz) * y + a_from_b.x_m,
+        (xy + wz) * x + (1.0 - (xx + zz)) * y + a_from_b.y_m,
+    )

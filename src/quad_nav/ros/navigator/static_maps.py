@@ -67,7 +67,7 @@ class MapListener:
             )
         occupancy = np.array(message.data, dtype=np.int8).reshape(spec.shape)
         with self._lock:
-            self._costmap.set_map(StaticMap(occupancy, spec), self._name)
+            self._costmap.set_map(StaticMap(occupancy, spec, frame), self._name)
         if self._layer.params.first_map_only:
             self._grid.unregister()
 
