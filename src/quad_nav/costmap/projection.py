@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.geometry import Pose3D, Quaternion, Scan
+from quad_nav.geometry import Pose3D, Scan
 from quad_nav.kernels.projection import project_ranges, transform_between_heights
 
 
@@ -57,8 +57,8 @@ def transform_points(
     """
     return transform_between_heights(
         np.ascontiguousarray(points, dtype=np.float32),
-        _rotation_float32(a_from_b.quaternion),
-        np.array([a_from_b.x_m, a_from_b.y_m, a_from_b.z_m], dtype=np.float32),
+        a_from_b.quaternion,
+        (a_from_b.x_m, a_from_b.y_m, a_from_b.z_m),
         min_z_m,
         max_z_m,
     )
@@ -69,19 +69,3 @@ def _directions(angle_min_rad: float, angle_increment_rad: float, n: int) -> NDA
     """Return cosine and sine of each beam, float64[n, 2]; Python's are the C library's."""
     angles = [angle_min_rad + k * angle_increment_rad for k in range(n)]
     return np.array([(math.cos(a), math.sin(a)) for a in angles]).reshape(n, 2)
-
-
-@lru_cache(maxsize=64)  # a scan goes into more than one costmap
-def _rotation_float32(quaternion: Quaternion) -> NDArray[np.float32]:
-    """Return the rotation matrix, float32[3, 3], every step rounded to float32."""
-    x, y, z, w = np.array(quaternion, dtype=np.float32)
-    two, one = np.float32(2.0), np.float32(1.0)
-    tx, ty, tz = two * x, two * y, two * z
-    return np.array(
-        [
-            [one - (ty * y + tz * z), ty * x - tz * w, tz * x + ty * w],
-            [ty * x + tz * w, one - (tx * x + tz * z), tz * y - tx * w],
-            [tz * x - ty * w, tz * y + tx * w, one - (tx * x + ty * y)],
-        ],
-        dtype=np.float32,
-    )

@@ -102,6 +102,7 @@ class ScanValidator:
             or (previous is not None and _differ(here, previous, _CORRECTION_M, _CORRECTION_RAD))
         ):
             self._first_equal = content, here
+            return ""
         first = self._first_equal[1]
         if not returns or not _differ(here, first, _ELSEWHERE_M, _ELSEWHERE_RAD):
             return ""

@@ -59,6 +59,20 @@ def rotation_from_quaternion(
 
 
 @njit(cache=True, nogil=True)
+def rotations_from_quaternions(
+    quaternions: NDArray[np.float64], rotations: NDArray[np.float64]
+) -> None:
+    """Fill rotation matrices from unit quaternions.
+
+    Args:
+        quaternions: float64[n, 4], rows (x, y, z, w).
+        rotations: float64[n, 3, 3], filled with the bodies' axes in ``map`` as columns.
+    """
+    for k in range(quaternions.shape[0]):
+        rotation_from_quaternion(quaternions[k], rotations[k])
+
+
+@njit(cache=True, nogil=True)
 def fly(
     rows: NDArray[np.float64],
     commands: NDArray[np.float64],

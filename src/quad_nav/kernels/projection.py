@@ -44,10 +44,28 @@ def project_ranges(
 
 
 @njit(cache=True, nogil=True)
+def _rotation(x: np.float32, y: np.float32, z: np.float32, w: np.float32) -> NDArray[np.float32]:
+    """Return the rotation matrix, float32[3, 3], every step rounded to float32."""
+    one, two = np.float32(1.0), np.float32(2.0)
+    tx, ty, tz = two * x, two * y, two * z
+    rotation = np.empty((3, 3), np.float32)
+    rotation[0, 0] = one - (ty * y + tz * z)
+    rotation[0, 1] = ty * x - tz * w
+    rotation[0, 2] = tz * x + ty * w
+    rotation[1, 0] = ty * x + tz * w
+    rotation[1, 1] = one - (tx * x + tz * z)
+    rotation[1, 2] = tz * y - tx * w
+    rotation[2, 0] = tz * x - ty * w
+    rotation[2, 1] = tz * y + tx * w
+    rotation[2, 2] = one - (tx * x + ty * y)
+    return rotation
+
+
+@njit(cache=True, nogil=True)
 def transform_between_heights(
     points: NDArray[np.float32],
-    rotation: NDArray[np.float32],
-    translation: NDArray[np.float32],
+    quaternion: Tuple[float, float, float, float],
+    translation: Tuple[float, float, float],
     min_z: float,
     max_z: float,
 ) -> NDArray[np.float32]:
@@ -55,24 +73,29 @@ def transform_between_heights(
 
     Args:
         points: float32[n, 3], metres.
-        rotation: float32[3, 3], to the new frame.
-        translation: float32[3], to the new frame.
+        quaternion: (x, y, z, w) of the rotation to the new frame, rounded to float32 here.
+        translation: (x, y, z) to the new frame, metres, rounded to float32 here.
         min_z: float64, height in the new frame.
         max_z: float64, height in the new frame.
 
     Returns:
         float32[m, 3], metres in the new frame.
     """
+    rotation = _rotation(
+        np.float32(quaternion[0]),
+        np.float32(quaternion[1]),
+        np.float32(quaternion[2]),
+        np.float32(quaternion[3]),
+    )
+    tx, ty, tz = translation
+    shift = (np.float32(tx), np.float32(ty), np.float32(tz))
     moved = np.empty_like(points)
     m = 0
     for k in range(len(points)):
         x, y, z = points[k, 0], points[k, 1], points[k, 2]
         for row in range(3):
             moved[m, row] = (
-                rotation[row, 0] * x
-                + rotation[row, 1] * y
-                + rotation[row, 2] * z
-                + translation[row]
+                rotation[row, 0] * x + rotation[row, 1] * y + rotation[row, 2] * z + shift[row]
             )
         if min_z <= np.float64(moved[m, 2]) <= max_z:
             m += 1

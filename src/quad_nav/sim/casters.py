@@ -89,14 +89,14 @@ class KernelCaster:
         )
         resting, self._grid = split_scene(scene)
         self._solids = join(resting, _guards(n_robots, body_radius_m))
-        self._guards = slice(len(resting.kinds), None)
+        self._guard_centres = self._solids.centres[len(resting.kinds) :]
+        self._guard_rotations = self._solids.rotations[len(resting.kinds) :]
 
     def cast(self, bodies: BodyState, robots: Sequence[int]) -> Floats:
         """Cast the beams; see ``Caster.cast``."""
-        self._solids.centres[self._guards] = (
-            bodies.positions_m + MOUNT_HEIGHT_M * bodies.rotations[:, :, 2]
-        )
-        self._solids.rotations[self._guards] = np.swapaxes(bodies.rotations, 1, 2)
+        rotations = bodies.rotations
+        self._guard_centres[:] = bodies.positions_m + MOUNT_HEIGHT_M * rotations[:, :, 2]
+        self._guard_rotations[:] = rotations.transpose(0, 2, 1)
         origins, rotations = lidar_poses(bodies, robots)
         distances = np.empty((len(robots), len(self._beams.directions)))
         cast_scans(origins, rotations, self._beams, self._solids, self._grid, distances)

@@ -121,8 +121,7 @@ class BodyState:
     def rotations(self) -> Floats:
         """Rotation matrices float64[n, 3, 3] with the bodies' axes in ``map`` as columns."""
         rotations = np.empty((len(self.rows), 3, 3))
-        for row, rotation in zip(self.rows, rotations):
-            flight_law.rotation_from_quaternion(row[3:7], rotation)
+        flight_law.rotations_from_quaternions(self.rows[:, 3:7], rotations)
         return rotations
 
 

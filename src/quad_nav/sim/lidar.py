@@ -95,9 +95,10 @@ def lidar_poses(bodies: BodyState, robots: Sequence[int]) -> Tuple[Floats, Float
         bodies: State of all quadcopters.
         robots: Numbers of the robots, n of them.
     """
-    chosen = list(robots)
-    rotations = bodies.rotations[chosen]
-    return bodies.positions_m[chosen] + rotations @ base_from_lidar.translation, rotations
+    rotations, positions_m = bodies.rotations, bodies.positions_m
+    if list(robots) != list(range(len(positions_m))):
+        rotations, positions_m = rotations[list(robots)], positions_m[list(robots)]
+    return positions_m + rotations @ base_from_lidar.translation, rotations
 
 
 def make_scan(

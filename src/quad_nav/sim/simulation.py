@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -81,18 +82,30 @@ class RobotState:
 
     Attributes:
         map_from_base: Pose of ``base_link`` in ``map``.
-        linear_mps: Velocity (x, y, z) in ``base_link``.
-        angular_radps: Angular velocity (x, y, z) in ``base_link``.
+        map_velocities: Velocity (x, y, z) and angular velocity (x, y, z) in ``map``.
     """
 
     map_from_base: Pose3D
-    linear_mps: Tuple[float, float, float]
-    angular_radps: Tuple[float, float, float]
+    map_velocities: Sequence[float]
+
+    @cached_property
+    def linear_mps(self) -> Tuple[float, float, float]:
+        """Velocity (x, y, z) in ``base_link``."""
+        return self._in_base(self.map_velocities[:3])
+
+    @cached_property
+    def angular_radps(self) -> Tuple[float, float, float]:
+        """Angular velocity (x, y, z) in ``base_link``."""
+        return self._in_base(self.map_velocities[3:])
 
     @property
     def twist(self) -> Twist2D:
         """Planar velocity in ``base_link``."""
         return Twist2D(self.linear_mps[0], self.linear_mps[1], self.angular_radps[2])
+
+    def _in_base(self, vector: Sequence[float]) -> Tuple[float, float, float]:
+        qx, qy, qz, qw = self.map_from_base.quaternion
+        return rotate((-qx, -qy, -qz, qw), vector)
 
 
 class RobotStates(Sequence[RobotState]):
@@ -113,11 +126,8 @@ class RobotStates(Sequence[RobotState]):
 
 
 def _robot_state(row: NDArray[np.float64]) -> RobotState:
-    x, y, z, qx, qy, qz, qw, *twist = row.tolist()
-    quaternion, to_base = (qx, qy, qz, qw), (-qx, -qy, -qz, qw)
-    return RobotState(
-        Pose3D(x, y, z, quaternion), rotate(to_base, twist[:3]), rotate(to_base, twist[3:])
-    )
+    x, y, z, qx, qy, qz, qw, *velocities = row.tolist()
+    return RobotState(Pose3D(x, y, z, (qx, qy, qz, qw)), velocities)
 
 
 class Simulation:
