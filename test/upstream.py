@@ -10,6 +10,8 @@ UPSTREAM = {
     "clear_any_obstacle_layer": False,
     "reject_colliding_escape": False,
     "escape_collision": False,
+    "command_in_first_cycle": False,
+    "stop_while_planning": False,
     "predict_goal_turn": False,
     "stop_after_rotation": False,
     "avoid_peers": False,

@@ -150,7 +150,7 @@ def test_costmaps_are_updated_at_their_own_frequencies():
 
 
 def test_a_goal_is_planned_once_and_commanded_in_every_cycle():
-    flight = Flight(controller_frequency_hz=2.0)
+    flight = Flight(fixes={}, controller_frequency_hz=2.0)
     flight.navigator.set_goal(GOAL, 0.0)
     ticks = flight.until(2.0)
     assert flight.planner.calls == 1
@@ -195,16 +195,6 @@ def test_no_plan_within_patience_runs_all_recoveries_and_aborts():
     assert outcomes(ticks) == [(False, Trigger.PLANNING.value)]
     ended = next(tick.now_s for tick in ticks if tick.outcome)
     assert ended == pytest.approx(3 * 2.0, abs=0.5)  # patience before each of three endings
-
-
-def test_a_goal_without_a_plan_ends_the_command_of_the_previous_goal():
-    flight = Flight()
-    flight.navigator.set_goal(GOAL, 0.0)
-    flight.until(1.0)
-    flight.planner.fails = True
-    flight.navigator.set_goal(Pose2D(20.0, 20.0), flight.now_s)
-    ticks = flight.until(2.0)
-    assert {tick.command for tick in ticks if tick.cycle} == {Twist2D()}
 
 
 def test_retries_end_planning_before_patience():

@@ -116,6 +116,25 @@ _SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
     ),
     (
         flag(
+            "command_in_first_cycle",
+            True,
+            "command_in_first_cycle",
+            "Publish the first command of a goal in the control cycle that takes it, not one period"
+            " later.",
+        ),
+        (NavigatorParams,),
+    ),
+    (
+        flag(
+            "stop_while_planning",
+            True,
+            "stop_while_planning",
+            "Publish a stop in each control cycle without a plan.",
+        ),
+        (NavigatorParams,),
+    ),
+    (
+        flag(
             "predict_goal_turn",
             True,
             "predict_goal_turn",

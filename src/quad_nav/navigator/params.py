@@ -21,6 +21,10 @@ class NavigatorParams:
             own period and keeps recovering without sensor data.
         escape_collision: A round robot without a legal trajectory moves to where costs are
             lower; False restores upstream behaviour.
+        command_in_first_cycle: The cycle that takes a goal also plans and commands; False
+            restores upstream behaviour, which commands one control period later.
+        stop_while_planning: A robot without a plan stops; False restores upstream behaviour,
+            which leaves the last command in force.
         progress: Detection of a robot that makes no progress.
     """
 
@@ -42,4 +46,6 @@ class NavigatorParams:
     make_plan_add_unreachable_goal: bool = True
     sensor_timeout_s: float = 1.0
     escape_collision: bool = True
+    command_in_first_cycle: bool = True
+    stop_while_planning: bool = True
     progress: ProgressParams = ProgressParams()

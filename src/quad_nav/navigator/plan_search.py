@@ -13,15 +13,58 @@ from quad_nav.navigator.tick import State
 from quad_nav.timing import Schedule
 
 
+class PlannerThread:
+    """Times at which upstream's planner thread searches.
+
+    A control cycle wakes the thread, which searches while the cycle ends: the next cycle is the
+    first to follow the plan. With a planner frequency the thread also wakes by itself, one
+    planner period after the start of its last search.
+
+    Attributes:
+        is_running: The thread searches when it wakes; upstream's ``runPlanner_``.
+    """
+
+    def __init__(self) -> None:
+        """Create a thread that waits."""
+        self.stop()
+
+    def stop(self) -> None:
+        """Let the thread wait until a cycle wakes it."""
+        self.is_running = self._is_woken = False
+        self._due_s = math.inf
+
+    def wake(self) -> None:
+        """Make a search due now."""
+        self.is_running = self._is_woken = True
+
+    def start_search(self, now_s: float, period_s: float) -> None:
+        """Start a search; the next one is due in a planner period, +inf for none."""
+        self._is_woken = False
+        self._due_s = now_s + period_s
+
+    @property
+    def due_s(self) -> float:
+        """Time at which the thread wakes by itself, +inf for never."""
+        return self._due_s if self.is_running else math.inf
+
+    def is_due(self, now_s: float) -> bool:
+        """Return whether the thread searches now."""
+        return self.is_running and (self._is_woken or now_s >= self._due_s - 1e-9)
+
+
 class PlanSearch:
     """Schedules the search for a global plan and keeps the newest plan.
 
     A failed search is repeated once for each control cycle: the costs that it depends on
     change no faster. With a plan, the search runs at the planner frequency.
+
+    Attributes:
+        thread: Times of the search in the order of upstream, which plans after control.
     """
 
     def __init__(self, frequency_hz: float) -> None:
         """Create a search that has not begun."""
+        self.thread = PlannerThread()
         self._schedule = Schedule(frequency_hz)
         self._plan: Optional[NDArray[np.float64]] = None
         self._last_valid_s = -math.inf
@@ -36,8 +79,10 @@ class PlanSearch:
         """Change the planner frequency; 0 means one search for each goal."""
         self._schedule.set_frequency(frequency_hz, now_s)
 
-    def begin(self, now_s: float) -> None:
+    def begin(self, now_s: float, wakes_thread: bool = True) -> None:
         """Begin the search for a plan; patience and retries count from now."""
+        if wakes_thread:
+            self.thread.wake()
         self._plan = None
         self._last_valid_s = now_s
         self._failures = 0
@@ -49,6 +94,28 @@ class PlanSearch:
             return now_s >= cycle_due_s - 1e-9
         return state is State.CONTROLLING and self._schedule.pop(now_s)
 
+    def is_retry_due(self, state: State, now_s: float, cycle_due_s: float) -> bool:
+        """Return whether upstream's thread, which repeats a failed search, has searched by now.
+
+        Without a planner frequency it repeats the search without a pause. Here the last of these
+        searches stands for all, the one right before a control cycle.
+        """
+        repeats = self.thread.is_running and self._failures > 0 and not self._is_periodic
+        return repeats and state is State.PLANNING and now_s >= cycle_due_s - 1e-9
+
+    def notify_thread(self) -> None:
+        """Wake upstream's thread in a control cycle without a plan, unless it searches anyway."""
+        if self._is_periodic or not self.thread.is_running:
+            self.thread.wake()
+
+    @property
+    def _is_periodic(self) -> bool:
+        return math.isfinite(self._schedule.period_s)
+
+    def start(self, now_s: float) -> None:
+        """Start a search."""
+        self.thread.start_search(now_s, self._schedule.period_s)
+
     def succeed(self, plan: NDArray[np.float64], state: State, now_s: float) -> None:
         """Keep a plan that was found, float64[n, 3] of (x_m, y_m, yaw_rad)."""
         self._plan = plan
@@ -56,6 +123,8 @@ class PlanSearch:
         self._failures = 0
         if state is State.PLANNING:
             self._schedule.pop(now_s)
+        if not self._is_periodic:
+            self.thread.stop()
 
     def fail(self, now_s: float, params: NavigatorParams) -> bool:
         """Count a failed search; return whether patience or retries are exhausted."""
@@ -70,5 +139,6 @@ class PlanSearch:
         return plan
 
     def drop(self) -> None:
-        """Drop the newest plan."""
+        """Drop the newest plan and search for no other."""
         self._plan = None
+        self.thread.stop()

@@ -72,6 +72,8 @@ class StateMachine:
         self._peers = peers
         self._search = PlanSearch(params.planner_frequency_hz)
         self._cycle = Schedule(params.controller_frequency_hz)
+        self._starts_from_rest = False  # no control cycle since an idle robot took a goal
+        self._recovery_overruns = False  # the last control cycle fell into a recovery
 
     # -- goals ---------------------------------------------------------------------------
 
@@ -79,6 +81,7 @@ class StateMachine:
         """Head for a pose in the global costmap's frame, from this cycle on."""
         if self.state is State.IDLE:
             self._cycle.start(now_s)
+            self._starts_from_rest = True
         self.goal = goal
         self.recovery.reset()
         self.control.reset()
@@ -112,6 +115,8 @@ class StateMachine:
         if self.state is State.IDLE:
             return math.inf
         due_s = min(self._cycle.due_s, self.recovery.due_s)
+        if not self.params.command_in_first_cycle:
+            return min(due_s, self._search.thread.due_s)
         return min(due_s, self._search.due_s) if self.state is State.CONTROLLING else due_s
 
     def is_cycle_due(self, now_s: float) -> bool:
@@ -128,7 +133,7 @@ class StateMachine:
         """
         self._cycle.set_frequency(self.params.controller_frequency_hz, tick.now_s)
         self._search.set_frequency(self.params.planner_frequency_hz, tick.now_s)
-        if self._search.is_due(self.state, tick.now_s, self._cycle.due_s):
+        if self._is_search_due(tick.now_s):
             self._search_plan(tick, poses.in_global)
         if self.recovery.is_running and not (
             self._stops_without_data and self._updates.missing_data(tick.now_s)
@@ -136,7 +141,11 @@ class StateMachine:
             self._step_recovery(tick, poses)
         if self._cycle.pop(tick.now_s):
             tick.cycle = True
+            self._recovery_overruns = self.recovery.is_running
             self._run_control_cycle(tick, poses, velocity)
+            self._starts_from_rest = False
+        if not self.params.command_in_first_cycle and self._search.thread.is_due(tick.now_s):
+            self._search_plan(tick, poses.in_global)
 
     def limit_command(self, tick: Tick, pose: Optional[Pose2D], velocity: Twist2D) -> None:
         """Limit the final command so that it cannot lead to a collision with a peer."""
@@ -153,11 +162,18 @@ class StateMachine:
 
     # -- planning ------------------------------------------------------------------------
 
-    def _begin_planning(self, now_s: float) -> None:
+    def _begin_planning(self, now_s: float, wakes_thread: bool = True) -> None:
         self.state = State.PLANNING
-        self._search.begin(now_s)
+        self._search.begin(now_s, wakes_thread)
+
+    def _is_search_due(self, now_s: float) -> bool:
+        """Return whether to search before the control cycle."""
+        if self.params.command_in_first_cycle:
+            return self._search.is_due(self.state, now_s, self._cycle.due_s)
+        return self._search.is_retry_due(self.state, now_s, self._cycle.due_s)
 
     def _search_plan(self, tick: Tick, start: Optional[Pose2D]) -> None:
+        self._search.start(tick.now_s)
         target = self._peers.holding_point or self.goal
         costmap = self._global
         try:
@@ -173,7 +189,7 @@ class StateMachine:
             return
         self._peers.follow_plan(tick.plan)
         self._search.succeed(tick.plan, self.state, tick.now_s)
-        if self.state is State.PLANNING:
+        if not self.recovery.is_running:
             self.state = State.CONTROLLING
 
     # -- control -------------------------------------------------------------------------
@@ -199,7 +215,9 @@ class StateMachine:
         elif self.state is State.CLEARING and not self.recovery.is_running:
             self._start_recovery(tick, poses)
         elif self.state is State.PLANNING:
-            tick.command = Twist2D()  # ends the command of the goal before
+            self._search.notify_thread()
+            if self.params.stop_while_planning or self._starts_from_rest:
+                tick.command = Twist2D()
 
     def _stop_without_data(self, tick: Tick, reason: str) -> None:
         tick.warnings.append(STOPPING + reason)
@@ -268,6 +286,8 @@ class StateMachine:
             return
         self.state = State.CLEARING
         self.recovery.trigger = trigger
+        if trigger is Trigger.PLANNING:
+            self._search.thread.stop()
         tick.command = Twist2D()
 
     def _start_recovery(self, tick: Tick, poses: RobotPoses) -> None:
@@ -280,4 +300,6 @@ class StateMachine:
     def _step_recovery(self, tick: Tick, poses: RobotPoses) -> None:
         if self.recovery.step(tick, poses, self.control.limiter):
             self.control.end_recovery(tick.now_s)
-            self._begin_planning(tick.now_s)
+            self._begin_planning(tick.now_s, wakes_thread=False)
+            if self._recovery_overruns and not self.params.command_in_first_cycle:
+                self._cycle.start(tick.now_s)  # upstream's recoveries delay its control cycles

@@ -1,0 +1,190 @@
+"""From a goal to its plan and its first command, as upstream and with the fixes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from test_navigator import FORWARD, GOAL, FakeRecovery, Flight, outcomes
+from upstream import UPSTREAM
+
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.navigator.recovery_sequence import NamedRecovery
+from quad_nav.navigator.tick import Trigger
+
+FIXED = {"avoid_peers": False}
+STOP = Twist2D()
+OTHER_GOAL = Pose2D(5.0, 3.0, 0.0)
+
+
+def plans(ticks):
+    return pytest.approx([tick.now_s for tick in ticks if tick.plan is not None])
+
+
+def commands(ticks, command=FORWARD):
+    return pytest.approx([tick.now_s for tick in ticks if tick.command == command])
+
+
+def first_motion_s(ticks):
+    return next(tick.now_s for tick in ticks if tick.command not in (None, STOP))
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 10.0])
+@pytest.mark.parametrize("fixes, periods", [(UPSTREAM, 1), (FIXED, 0)])
+class TestFromGoalToMotion:
+    """The plan comes in the cycle that takes the goal; the command so many periods later."""
+
+    def flight(self, rate_hz, fixes):
+        return Flight(
+            [NamedRecovery("none", FakeRecovery())],
+            fixes,
+            controller_frequency_hz=rate_hz,
+            planner_patience_s=1.0,
+        )
+
+    def test_from_idle(self, rate_hz, fixes, periods):
+        flight = self.flight(rate_hz, fixes)
+        flight.until(0.3)
+        taken_s = flight.now_s
+        flight.navigator.set_goal(GOAL, taken_s)
+        ticks = flight.until(taken_s + 2.0)
+        assert [taken_s] == plans(ticks)
+        assert first_motion_s(ticks) - taken_s == pytest.approx(periods / rate_hz)
+        assert [taken_s][:periods] == commands(ticks, STOP)
+
+    def test_over_an_active_goal(self, rate_hz, fixes, periods):
+        flight = self.flight(rate_hz, fixes)
+        flight.navigator.set_goal(GOAL, 0.0)
+        flight.until(2.95)
+        assert not flight.navigator.accepts_goal(2.95)
+        taken_s = flight.now_s = 3.0
+        assert flight.navigator.accepts_goal(taken_s)
+        flight.navigator.set_goal(OTHER_GOAL, taken_s)
+        ticks = flight.until(taken_s + 2.0)
+        assert [taken_s] == plans(ticks)
+        assert first_motion_s(ticks) - taken_s == pytest.approx(periods / rate_hz)
+        assert [] == commands(ticks, STOP)  # the command of the goal before goes on
+
+    def test_after_an_abort(self, rate_hz, fixes, periods):
+        flight = self.flight(rate_hz, fixes)
+        flight.planner.fails = True
+        flight.navigator.set_goal(GOAL, 0.0)
+        assert len(outcomes(flight.until(6.0))) == 1
+        flight.planner.fails = False
+        taken_s = flight.now_s
+        flight.navigator.set_goal(GOAL, taken_s)
+        ticks = flight.until(taken_s + 2.0)
+        assert [taken_s] == plans(ticks)
+        assert first_motion_s(ticks) - taken_s == pytest.approx(periods / rate_hz)
+
+
+@pytest.mark.parametrize("fixes, motion_s", [(UPSTREAM, 1.3), (FIXED, 1.2)])
+def test_after_a_recovery_that_takes_no_time(fixes, motion_s):
+    """The search fails for more than 1 s at 1.1 s; the next cycle plans."""
+    flight = Flight([NamedRecovery("r", FakeRecovery())], fixes, planner_patience_s=1.0)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = flight.until(1.15)
+    assert [tick.now_s for tick in ticks if tick.recovery] == pytest.approx([1.1])
+    flight.planner.fails = False
+    ticks = flight.until(2.0)
+    assert [1.2] == plans(ticks)
+    assert first_motion_s(ticks) == pytest.approx(motion_s)
+
+
+def test_upstream_delays_its_cycles_by_a_rotation():
+    """Fifty steps from 1.1 s on; the last one, at 3.55 s, is followed by a cycle and a plan."""
+    flight = Flight([NamedRecovery("turn", FakeRecovery(steps=50))], planner_patience_s=1.0)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(3.0)
+    flight.planner.fails = False
+    ticks = flight.until(4.0)
+    assert [3.55] == plans(ticks)
+    assert [3.65, 3.75, 3.85, 3.95] == commands(ticks)
+    assert [] == commands(ticks, STOP)
+
+
+@pytest.mark.parametrize("fixes, followed", [(UPSTREAM, [0, 1, 2]), (FIXED, [1, 2, 3])])
+def test_a_periodic_plan_is_followed_from_the_next_cycle_on(fixes, followed):
+    """Planner and controller at 2 Hz: the plans that were followed after 0.1, 0.6 and 1.1 s."""
+    flight = Flight(fixes=fixes, controller_frequency_hz=2.0, planner_frequency_hz=2.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    counts = []
+    for end_s in (0.1, 0.6, 1.1):
+        flight.until(end_s)
+        counts.append(len(flight.controller.plans))
+    assert counts == followed
+
+
+@pytest.mark.parametrize("fixes, motion_s", [(UPSTREAM, 1.5), (FIXED, 1.5)])
+def test_a_plan_found_after_failures_is_followed_in_the_same_cycle(fixes, motion_s):
+    """Upstream's thread repeats a failed search without a pause, so it ends before a cycle."""
+    flight = Flight(fixes=fixes)
+    flight.planner.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.45)
+    flight.planner.fails = False
+    ticks = flight.until(2.0)
+    assert [motion_s] == plans(ticks)
+    assert first_motion_s(ticks) == pytest.approx(motion_s)
+
+
+@pytest.mark.parametrize("fixes, searches_s", [(UPSTREAM, [1.0, 1.5]), (FIXED, [1.5])])
+def test_a_failed_command_is_followed_by_a_new_plan(fixes, searches_s):
+    """One command is missing either way; upstream plans in the cycle that failed."""
+    flight = Flight(fixes=fixes, controller_frequency_hz=2.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(0.95)
+    flight.controller.fails = True
+    ticks = flight.until(1.0)
+    flight.controller.fails = False
+    ticks += flight.until(1.9)
+    assert searches_s[:1] == plans(ticks)
+    assert [1.0] == commands(ticks, STOP)
+    assert [1.5] == commands(ticks)
+
+
+@pytest.mark.parametrize("fixes, recovers", [(UPSTREAM, False), (FIXED, True)])
+def test_a_plan_ends_upstreams_recovery_before_it_starts(fixes, recovers):
+    """The planner thread sets the state after every plan, also when control has failed."""
+    recovery = FakeRecovery()
+    flight = Flight(
+        [NamedRecovery("r", recovery)],
+        fixes,
+        controller_frequency_hz=1.0,
+        planner_frequency_hz=2.0,
+        controller_patience_s=1.5,
+    )
+    flight.controller.fails = True
+    flight.navigator.set_goal(GOAL, 0.0)
+    ticks = flight.until(10.0)
+    assert (recovery.started > 0) is recovers
+    assert outcomes(ticks) == ([(False, Trigger.CONTROLLING.value)] if recovers else [])
+
+
+@pytest.mark.parametrize("fixes, first_stop_s", [(UPSTREAM, 3.1), (FIXED, 2.0)])
+def test_a_new_goal_without_a_plan_over_an_active_one(fixes, first_stop_s):
+    """Upstream flies on for planner_patience with the last command of the goal before."""
+    flight = Flight(fixes=fixes, planner_patience_s=1.0, recovery_behavior_enabled=False)
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.95)
+    flight.planner.fails = True
+    flight.now_s = 2.0
+    flight.navigator.set_goal(OTHER_GOAL, 2.0)
+    ticks = flight.until(4.0)
+    assert next(t.now_s for t in ticks if t.command == STOP) == pytest.approx(first_stop_s)
+    assert outcomes(ticks) == [(False, Trigger.PLANNING.value)]
+    assert commands(ticks) == []
+
+
+def test_the_order_changes_in_flight():
+    """With a planner frequency: plans go on after the change, and so do commands."""
+    flight = Flight(fixes=FIXED, planner_frequency_hz=1.0)
+    flight.navigator.set_goal(GOAL, 0.0)
+    flight.until(1.5)
+    for on, end_s in ((False, 4.5), (True, 7.5)):
+        flight.navigator.set_params(replace(flight.navigator.params, command_in_first_cycle=on))
+        ticks = flight.until(end_s)
+        assert len([tick for tick in ticks if tick.plan is not None]) in (3, 4)
+        assert len([tick for tick in ticks if tick.command == FORWARD]) == 30
