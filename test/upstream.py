@@ -16,4 +16,9 @@ UPSTREAM = {
     "stop_after_rotation": False,
     "avoid_peers": False,
     "yield_when_idle": False,
+    "draw_all_map_updates": False,
+    "restore_static_map": False,
+    "transform_map_bounds": False,
+    "clip_voxel_rays": False,
+    "redraw_emptied_voxels": False,
 }

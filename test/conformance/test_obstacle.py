@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from families import cases, obstacle
+from families import cases, layered
 
 
 @pytest.mark.parametrize("path", cases("obstacle"), ids=lambda path: path.stem)
 def test_case(path):
-    assert obstacle.check(path) == []
+    assert layered.check(path) == []

@@ -73,7 +73,9 @@ SWITCH_OWNERS = [
     ProgressParams,
     RotateParams,
     ScanValidatorParams,
+    StaticLayerParams,
     TrajectoryPlannerParams,
+    VoxelLayerParams,
 ]
 
 

@@ -9,7 +9,7 @@ from costmap_maps import costs_of, drawn, picture
 from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
 from quad_nav.costmap.static import StaticLayer, StaticLayerParams, StaticMap
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
-from quad_nav.grid import GridSpec
+from quad_nav.grid import UNKNOWN, GridSpec
 
 ROBOT = Pose2D(0.0, 0.0)
 OCCUPANCY = {".": 0, "#": 100, "?": -1}
@@ -81,13 +81,21 @@ def test_updates_replace_a_rectangle_and_only_that_is_asked_for():
     assert picture(layer.grid.costs) == drawn("...#\n.#?.\n.##.")
 
 
-def test_reset_reads_the_map_again():
-    layer = layer_of(map_of("#..."))
-    layer.update_map(occupancy_of("####"), 0, 0)
+@pytest.mark.parametrize(
+    "restore, costs, bounds", [(True, "###.", (0.5, 4.5)), (False, "??#?", (2.5, 3.5))]
+)
+def test_reset_restores_the_map_with_its_updates(restore, costs, bounds):
+    given = map_of("##..")
+    layer = layer_of(given, restore_static_map=restore)
+    layer.update_map(occupancy_of("#"), 2, 0)
+    assert picture(layer.grid.costs) == "###."
     layer.update_bounds(ROBOT, 0.0, NOWHERE)
+    layer.grid.costs[0, [0, 1, 3]] = UNKNOWN  # as a recovery clears it
     layer.reset(1.0)
-    assert picture(layer.grid.costs) == "#..."
-    assert layer.update_bounds(ROBOT, 1.0, NOWHERE) != NOWHERE
+    assert picture(layer.grid.costs) == costs
+    found = layer.update_bounds(ROBOT, 1.0, NOWHERE)
+    assert (found.min_x_m, found.max_x_m) == bounds
+    assert given.occupancy.tolist() == [[100, 100, 0, 0]]  # other robots have it too
 
 
 def test_first_map_only():

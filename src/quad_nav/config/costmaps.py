@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, Mapping, Set, Tuple
 
+from quad_nav.config.fixes import with_fixes
 from quad_nav.config.layers import LAYERS, PARENT_PARAMETERS, layer_params, normalise_layer
 from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import PluginLayerParams, is_dotted
@@ -62,7 +63,7 @@ def costmap_params(tree: Mapping[str, Any], name: str) -> CostmapParams:
     for plugin in costmap["plugins"]:
         params = layer_params(costmap, name, plugin["name"], plugin["type"])
         if params is not None:
-            layers.append((plugin["name"], params))
+            layers.append((plugin["name"], with_fixes(params, tree)))
     return CostmapParams(layers=tuple(layers), **fields(costmap, COSTMAP_TABLE.parameters))
 
 

@@ -15,6 +15,8 @@ from quad_nav.config.spec import RESTORE_DEFAULTS, Parameter, Table, double, fla
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
+from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.peers.coordinator import PeerParams
@@ -201,6 +203,53 @@ _SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
             "A robot without a goal leaves the path of a peer, and comes back.",
         ),
         (PeerParams,),
+    ),
+    (
+        flag(
+            "draw_all_map_updates",
+            True,
+            "draw_all_map_updates",
+            "Draw every map update of a static layer, not only the last one before an update of the"
+            " costmap.",
+        ),
+        (StaticLayerParams,),
+    ),
+    (
+        flag(
+            "restore_static_map",
+            True,
+            "restore_static_map",
+            "clear_costmaps restores the map of a static layer and draws all of it.",
+        ),
+        (StaticLayerParams,),
+    ),
+    (
+        flag(
+            "transform_map_bounds",
+            True,
+            "transform_map_bounds",
+            "Draw a map in another frame than a rolling costmap's wherever it is in that costmap.",
+        ),
+        (StaticLayerParams,),
+    ),
+    (
+        flag(
+            "clip_voxel_rays",
+            True,
+            "clip_voxel_rays",
+            "Rays that leave the voxels clear up to their borders, also where upstream clears"
+            " nothing.",
+        ),
+        (VoxelLayerParams,),
+    ),
+    (
+        flag(
+            "redraw_emptied_voxels",
+            True,
+            "redraw_emptied_voxels",
+            "Draw a voxel layer again after a reconfiguration that empties it.",
+        ),
+        (VoxelLayerParams,),
     ),
 )
 

@@ -37,6 +37,15 @@ class Window:
             max(self.yn, other.yn),
         )
 
+    def intersection(self, other: Window) -> Window:
+        """Return the cells that are in both."""
+        return Window(
+            max(self.x0, other.x0),
+            min(self.xn, other.xn),
+            max(self.y0, other.y0),
+            min(self.yn, other.yn),
+        )
+
     @property
     def slices(self) -> Tuple[slice, slice]:
         """Index of the window in ``[y, x]`` arrays."""

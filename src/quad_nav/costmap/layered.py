@@ -130,7 +130,9 @@ class LayeredCostmap:
         for layer in layers:
             bounds = layer.update_bounds(robot, now_s, bounds)
         window = self._master.window_of(bounds)
-        if not layers or window.is_empty:
+        # As in costmap_2d an empty window counts unless its end is below its begin: inflation
+        # can change costs outside of it.
+        if not layers or window.xn < window.x0 or window.yn < window.y0:
             return NO_CELLS
         self._master.reset(window)
         for layer in layers:
@@ -261,7 +263,8 @@ class LayeredCostmap:
         elif params.footprint_padding_m != old.footprint_padding_m:
             self.set_footprint(self._unpadded_footprint)
         for name, layer_params in params.layers:
-            self.layers[name].reconfigure(layer_params)
+            if layer_params != self.layers[name].params:
+                self.layers[name].reconfigure(layer_params)
 
     def _resize(self, spec: GridSpec) -> None:
         if spec != self.spec:

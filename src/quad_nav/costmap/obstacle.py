@@ -70,6 +70,8 @@ class ObstacleLayer(GridLayer):
     """
 
     params: ObstacleLayerParams
+    # costmap_2d does not clear while a source that marks is overdue, but in its voxel layer.
+    _clears_when_overdue = False
 
     def __init__(
         self, params: ObstacleLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
@@ -200,9 +202,9 @@ class ObstacleLayer(GridLayer):
         for buffer in self.buffers.values():
             buffer.start_clock(now_s)
         marking = [b for b in self.buffers.values() if b.params.marking]
-        # costmap_2d does not clear while a source that marks is overdue.
-        overdue = not all(b.is_current(now_s) for b in marking)
-        clearing = [] if overdue else [b for b in self.buffers.values() if b.params.clearing]
+        clearing = [b for b in self.buffers.values() if b.params.clearing]
+        if not self._clears_when_overdue and not all(b.is_current(now_s) for b in marking):
+            clearing = []
         touched = np.array([bounds.min_x_m, bounds.min_y_m, bounds.max_x_m, bounds.max_y_m])
         for buffer in clearing:
             self._clear(buffer, self._raytrace_range(buffer.params), touched)

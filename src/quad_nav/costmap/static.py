@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.cost_grid import NO_CELLS, Bounds, CostGrid, Window, merge_maximum
+from quad_nav.costmap.cost_grid import (
+    NO_CELLS,
+    NOWHERE,
+    Bounds,
+    CostGrid,
+    Window,
+    merge_maximum,
+)
 from quad_nav.costmap.layer import GridLayer, LayerParams
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
@@ -36,6 +43,14 @@ class StaticLayerParams(LayerParams):
     Attributes:
         lethal_cost_threshold: Occupancy, 0..100, from which on cells are lethal.
         unknown_cost_value: Occupancy, -1..100, of unknown cells.
+        draw_all_map_updates: Draw every map update, cut at the map's borders, and in a rolling
+            window the whole map; False restores upstream behaviour: the last one alone, and
+            in a rolling window its area alone until the next map.
+        restore_static_map: ``reset`` restores and draws the whole map; False restores upstream
+            behaviour: what was cleared stays so, and only the area of the last map or map
+            update is drawn.
+        transform_map_bounds: Draw the map where it is in the costmap's frame; False restores
+            upstream behaviour: only where its own coordinates are in that frame.
     """
 
     map_topic: str = "map"
@@ -46,6 +61,9 @@ class StaticLayerParams(LayerParams):
     lethal_cost_threshold: int = 100
     unknown_cost_value: int = -1
     trinary_costmap: bool = True
+    draw_all_map_updates: bool = True
+    restore_static_map: bool = True
+    transform_map_bounds: bool = True
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> StaticLayer:
         """Make a static layer."""
@@ -72,12 +90,21 @@ class StaticLayer(GridLayer):
         self.map_from_global: Optional[Pose3D] = Pose3D(0.0, 0.0, 0.0)
         self._rolling_window = rolling_window
         self._map: Optional[StaticMap] = None
-        self._changed = NO_CELLS
+        self._owns_map = False
+        self._last_area = NO_CELLS  # of the last map or map update
+        self._changed = NO_CELLS  # since the last update of the costmap
+        self._has_changed = False
 
     def resize(self, spec: GridSpec) -> None:
         """Follow the master grid, in a costmap that is no rolling window."""
         if not self._rolling_window:
             super().resize(spec)
+
+    def reconfigure(self, params: StaticLayerParams) -> None:
+        """Take other parameters; a layer that was enabled or disabled draws its whole map."""
+        if params.enabled != self.params.enabled:
+            self._mark_all_changed()
+        self.params = params
 
     @property
     def map_frame(self) -> str:
@@ -93,7 +120,7 @@ class StaticLayer(GridLayer):
         """Take a map; with ``first_map_only`` later ones are ignored."""
         if not self.accepts_maps:
             return
-        self._map = static_map
+        self._map, self._owns_map = static_map, False
         if self.grid.spec != static_map.spec:
             self.grid.resize(static_map.spec)
         self.grid.costs[...] = self.costs_of(static_map.occupancy)
@@ -103,7 +130,9 @@ class StaticLayer(GridLayer):
         """Replace a rectangle of the map; before the first map it is ignored.
 
         Args:
-            occupancy: int8[h, w]; what lies outside of the map is cut off.
+            occupancy: int8[h, w]; what lies outside of the map is cut off. Without
+                ``draw_all_map_updates`` cells beyond the right border go on at the left of the
+                next row, as upstream.
             cell_x: Column of its lower left cell.
             cell_y: Row of its lower left cell.
         """
@@ -111,17 +140,20 @@ class StaticLayer(GridLayer):
             return
         height, width = occupancy.shape
         spec = self.grid.spec
-        area = Window(
-            max(0, cell_x),
-            min(spec.size_x, cell_x + width),
-            max(0, cell_y),
-            min(spec.size_y, cell_y + height),
-        )
-        if area.is_empty:
-            return
-        part = occupancy[area.y0 - cell_y : area.yn - cell_y, area.x0 - cell_x : area.xn - cell_x]
-        self.grid.costs[area.slices] = self.costs_of(part)
-        self._changed = self._changed.union(area)
+        rows, columns = np.ogrid[cell_y : cell_y + height, cell_x : cell_x + width]
+        cells = rows * spec.size_x + columns
+        known = (cells >= 0) & (cells < spec.size_x * spec.size_y)
+        self._last_area = Window(cell_x, cell_x + width, cell_y, cell_y + height)
+        if self.params.draw_all_map_updates:
+            known &= (columns >= 0) & (columns < spec.size_x)
+            self._last_area = self._last_area.intersection(self._everything())
+            if self._last_area.is_empty:
+                return
+        self.grid.costs.reshape(-1)[cells[known]] = self.costs_of(occupancy)[known]
+        if self._map.spec == spec:
+            self._own_map().occupancy.reshape(-1)[cells[known]] = occupancy[known]
+        self._changed = self._changed.union(self._last_area)
+        self._has_changed = True
 
     def costs_of(self, occupancy: NDArray[np.int8]) -> NDArray[np.uint8]:
         """Convert occupancies, int8 of any shape, to costs by the layer's thresholds."""
@@ -139,36 +171,50 @@ class StaticLayer(GridLayer):
         return FREE if params.trinary_costmap else int(value / threshold * LETHAL)
 
     def reset(self, now_s: float) -> None:
-        """Restore the map, without the updates that came later."""
+        """Restore the map with its updates; without ``restore_static_map`` only draw it again."""
         self._awaits_update = False
         if self._map is None:
             return
-        if not self.params.first_map_only:
-            self.grid.costs[...] = self.costs_of(self._map.occupancy)
-        self._mark_all_changed()
+        self._changed = self._changed.union(self._last_area)
+        self._has_changed = True
+        if self.params.restore_static_map:
+            if self._map.spec == self.grid.spec:
+                self.grid.costs[...] = self.costs_of(self._map.occupancy)
+            self._mark_all_changed()
 
     def is_current(self, now_s: float) -> bool:
-        """Tell whether there is a map and the master grid has it."""
-        return super().is_current(now_s) and self._map is not None
+        """Tell whether there is a map with a place, and the master grid has it."""
+        return super().is_current(now_s) and self._map is not None and self._is_placed
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
         """Add the changed part of the map, or all of it in a rolling window."""
+        has_changed = self._has_changed or self._cleared != NOWHERE
         bounds = super().update_bounds(robot, now_s, bounds)
-        area, self._changed = self._changed, NO_CELLS
-        if self._rolling_window and self._map is not None:
-            area = self._everything()
-        if area.is_empty:
+        if self._map is None or not (self._rolling_window or has_changed):
             return bounds
+        area, self._changed, self._has_changed = self._changed, NO_CELLS, False
+        if not self.params.draw_all_map_updates:
+            area = self._last_area
+        elif self._rolling_window:
+            area = self._everything()
+        elif area.is_empty:
+            return bounds
+        return bounds.including(self._corners(area)) if self._is_placed else bounds
+
+    def _corners(self, area: Window) -> NDArray[np.float64]:
+        """Return the corners of an area in the costmap's frame, float64[4, 2].
+
+        As upstream they are the centres of its first cell and of the cell behind its last one.
+        """
         spec = self.grid.spec
         corners = np.array(
             [spec.centre_of(x, y) for x in (area.x0, area.xn) for y in (area.y0, area.yn)]
         )
-        if not self._rolling_window:
-            return bounds.including(corners)
-        if self.map_from_global is None:
-            return bounds
+        if not self._rolling_window or not self.params.transform_map_bounds:
+            return corners
+        assert self.map_from_global is not None
         corners = np.column_stack((corners, np.zeros(len(corners))))
-        return bounds.including(self.map_from_global.inverse().transform_points(corners)[:, :2])
+        return self.map_from_global.inverse().transform_points(corners)[:, :2]
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
         """Copy the map into the window."""
@@ -194,11 +240,26 @@ class StaticLayer(GridLayer):
         below = master.costs[window.slices]
         below[inside] = np.maximum(found, below[inside]) if self.params.use_maximum else found
 
+    @property
+    def _is_placed(self) -> bool:
+        """False if bounds need a transform that is not known."""
+        needed = self._rolling_window and self.params.transform_map_bounds
+        return self.map_from_global is not None or not needed
+
+    def _own_map(self) -> StaticMap:
+        """Return the map, copied before its first change: robots share the one that was set."""
+        assert self._map is not None
+        if not self._owns_map:
+            self._map = replace(self._map, occupancy=self._map.occupancy.copy())
+            self._owns_map = True
+        return self._map
+
     def _everything(self) -> Window:
         return Window(0, self.grid.spec.size_x, 0, self.grid.spec.size_y)
 
     def _mark_all_changed(self) -> None:
-        self._changed = self._everything()
+        self._last_area = self._changed = self._everything()
+        self._has_changed = True
 
 
 def _centres(spec: GridSpec, window: Window) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:

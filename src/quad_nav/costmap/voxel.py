@@ -15,17 +15,17 @@ stay, and count again when a sensor sees something in their column.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.cost_grid import shift
+from quad_nav.costmap.cost_grid import Bounds, shift
 from quad_nav.costmap.observation import ObservationBuffer
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.voxels import VoxelGrid, clear_voxel_rays, mark_voxels
+from quad_nav.kernels.voxels import RayLimits, VoxelGrid, clear_voxel_rays, mark_voxels
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,12 @@ class VoxelLayerParams(ObstacleLayerParams):
         z_voxels: Voxels in a column.
         unknown_threshold: Most unknown voxels of a column that is not unknown.
         mark_threshold: Most marked voxels of a column that is no obstacle.
+        clip_voxel_rays: Cut rays at all borders of the voxels, so that they clear up to there,
+            and draw the cells around the sensor; False restores upstream behaviour, where rays
+            whose end is above the voxels, or by rounding below them, clear nothing.
+        redraw_emptied_voxels: Draw the layer again after a reconfiguration that changes values
+            and empties it; it is not current until then. False restores upstream behaviour,
+            where every reconfiguration empties the layer, and old obstacles stay drawn.
     """
 
     origin_z_m: float = 0.0
@@ -46,6 +52,8 @@ class VoxelLayerParams(ObstacleLayerParams):
     unknown_threshold: int = 15
     mark_threshold: int = 0
     publish_voxel_map: bool = False
+    clip_voxel_rays: bool = True
+    redraw_emptied_voxels: bool = True
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> VoxelLayer:
         """Make a voxel layer."""
@@ -60,21 +68,32 @@ class VoxelLayer(ObstacleLayer):
     """
 
     params: VoxelLayerParams
+    _clears_when_overdue = True
 
     def __init__(
         self, params: VoxelLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
     ) -> None:
         super().__init__(params, spec, rolling_window, default_cost)
+        self._was_current = True
         self._make_voxels()
 
     def reconfigure(self, params: VoxelLayerParams) -> None:
-        """Take other parameters; any change empties the layer, as in costmap_2d."""
-        if params == self.params:
+        """Take other parameters and empty the layer, as in costmap_2d.
+
+        With ``redraw_emptied_voxels`` equal parameters empty nothing.
+        """
+        old, self.params = self.params, params
+        switched = replace(
+            old,
+            clip_voxel_rays=params.clip_voxel_rays,
+            redraw_emptied_voxels=params.redraw_emptied_voxels,
+        )
+        if switched == params and (switched != old or params.redraw_emptied_voxels):
             return
-        self.params = params
         self.grid.reset()
         self._make_voxels()
-        self._pass_on(self._whole_map())
+        if params.redraw_emptied_voxels:
+            self._pass_on(self._whole_map())
 
     def resize(self, spec: GridSpec) -> None:
         """Follow the master grid, and forget all voxels."""
@@ -82,9 +101,16 @@ class VoxelLayer(ObstacleLayer):
         self._make_voxels()
 
     def reset(self, now_s: float) -> None:
-        """Forget costs and voxels."""
+        """Forget costs and voxels; an overdue layer is current from the next update on."""
         super().reset(now_s)
         self.voxels[...] = UNKNOWN
+        self._awaits_update = not self._was_current
+
+    def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
+        """Clear and mark with the kept observations."""
+        bounds = super().update_bounds(robot, now_s, bounds)
+        self._was_current = not self.stale_sources(now_s)
+        return bounds
 
     def marked_voxels(self) -> NDArray[np.float64]:
         """Return the centres of the marked voxels, float64[n, 3] in the global frame."""
@@ -114,9 +140,10 @@ class VoxelLayer(ObstacleLayer):
     def _clear(
         self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
     ) -> None:
-        grid, max_height_m = self._voxel_grid(), self.params.max_obstacle_height_m
+        grid, params = self._voxel_grid(), self.params
+        limits = RayLimits(range_m, params.max_obstacle_height_m, params.clip_voxel_rays)
         for seen in buffer.observations:
-            clear_voxel_rays(grid, seen.sensor, seen.points, range_m, max_height_m, touched)
+            clear_voxel_rays(grid, seen.sensor, seen.points, limits, touched)
 
     def _mark(
         self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]

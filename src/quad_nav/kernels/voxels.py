@@ -29,13 +29,20 @@ class VoxelGrid(NamedTuple):
     mark_threshold: int  # a column with more marked voxels is lethal
 
 
+class RayLimits(NamedTuple):
+    """Limits of the rays that clear."""
+
+    range_m: float  # length to which they clear
+    max_height_m: float  # height at which they are cut
+    clip: bool  # cut at all borders, never backwards, with the end inside; else as upstream
+
+
 @njit(cache=True, nogil=True)
 def clear_voxel_rays(
     grid: VoxelGrid,
     sensor: NDArray[np.float64],
     points: NDArray[np.float32],
-    range_m: float,
-    max_height_m: float,
+    limits: RayLimits,
     bounds: NDArray[np.float64],
 ) -> bool:
     """Free the voxels from a sensor towards each of its points, and their columns' costs.
@@ -44,9 +51,9 @@ def clear_voxel_rays(
         grid: The voxels, changed in place.
         sensor: float64[3], where the rays start, metres in the global frame.
         points: float32[n, 3], metres in the global frame.
-        range_m: Length to which rays are cleared.
-        max_height_m: Height at which rays are cut.
-        bounds: float64[4], min x, min y, max x, max y in metres, grown by what rays reach.
+        limits: Limits of the rays.
+        bounds: float64[4], min x, min y, max x, max y in metres, grown by the ends of rays, and
+            by the sensor if rays are clipped.
 
     Returns:
         False if the sensor is outside of the voxels and nothing was cleared.
@@ -59,7 +66,9 @@ def clear_voxel_rays(
         or cell_index(sensor[2], origin[2], size[2], size_z) < 0
     ):
         return False
-    include(bounds, sensor[0], sensor[1])
+    if limits.clip:
+        include(bounds, sensor[0], sensor[1])
+    range_m = limits.range_m
     max_voxels = max(0.0, math.ceil(range_m / size[0]))
     begin = (
         (sensor[0] - origin[0]) / size[0],
@@ -67,7 +76,7 @@ def clear_voxel_rays(
         (sensor[2] - origin[2]) / size[2],
     )
     for k in range(points.shape[0]):
-        x, y, z = ray_end(grid, sensor, points[k], max_height_m)
+        x, y, z = ray_end(grid, sensor, points[k], limits)
         if (
             cell_index(x, origin[0], size[0], size_x) < 0
             or cell_index(y, origin[1], size[1], size_y) < 0
@@ -85,31 +94,40 @@ def clear_voxel_rays(
 
 @njit(cache=True, nogil=True)
 def ray_end(
-    grid: VoxelGrid, sensor: NDArray[np.float64], point: NDArray[np.float32], max_height_m: float
+    grid: VoxelGrid, sensor: NDArray[np.float64], point: NDArray[np.float32], limits: RayLimits
 ) -> Triple:
     """Return the point (x, y, z) where the ray to a point ends.
 
     It is two cells short of the point, so that a ray does not clear the obstacle that it
-    met, and inside of the voxels. All numbers are metres in the global frame.
+    met, and before the borders of the voxels. The order of operations is that of costmap_2d.
+    All numbers are metres in the global frame.
 
     Args:
         grid: The voxels.
         sensor: float64[3], where the ray starts.
         point: float32[3], what the sensor saw.
-        max_height_m: Height at which the ray is cut.
+        limits: Limits of the ray. Without ``clip`` the end can be outside of the voxels by
+            rounding, or above them, and behind the sensor if that is in the last half cell.
     """
     origin, size = grid.origin, grid.size
-    size_y, size_x = grid.costs.shape
+    size_y, size_x, size_z = grid.voxels.shape
     dx, dy, dz = point[0] - sensor[0], point[1] - sensor[1], point[2] - sensor[2]
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
-    short = 0.0 if length <= 2.0 * size[0] else (length - 2.0 * size[0]) / length
-    dx, dy, dz = short * dx, short * dy, short * dz
-    x, y, z = sensor[0] + dx, sensor[1] + dy, sensor[2] + dz
+    if not math.isfinite(length):
+        return math.nan, math.nan, math.nan
+    short = 0.0
+    if length > 2.0 * size[0]:
+        short = min(1.0, (length - 2.0 * size[0]) / length)
+    x, y, z = short * dx + sensor[0], short * dy + sensor[1], short * dz + sensor[2]
+    dx, dy, dz = x - sensor[0], y - sensor[1], z - sensor[2]
     high_x = origin[0] + (size_x - 0.5) * size[0]
     high_y = origin[1] + (size_y - 0.5) * size[1]
+    top = limits.max_height_m
+    if limits.clip:
+        top = min(top, origin[2] + size_z * size[2])
     t = 1.0
-    if z > max_height_m:
-        t = _cut(t, max_height_m - 0.01 - sensor[2], dz)
+    if z > top or (limits.clip and z == top):
+        t = max(0.0, _cut(t, top - 0.01 - sensor[2], dz))
     elif z < origin[2]:
         t = _cut(t, origin[2] - sensor[2], dz)
     if x < origin[0]:
@@ -120,7 +138,9 @@ def ray_end(
         t = _cut(t, high_x - sensor[0], dx)
     if y > high_y:
         t = _cut(t, high_y - sensor[1], dy)
-    # Rounding must not put an end on the low border outside.
+    if not limits.clip:
+        return sensor[0] + dx * t, sensor[1] + dy * t, sensor[2] + dz * t
+    t = max(0.0, t)
     return (
         max(sensor[0] + dx * t, origin[0]),
         max(sensor[1] + dy * t, origin[1]),
@@ -130,10 +150,10 @@ def ray_end(
 
 @njit(cache=True, nogil=True)
 def _cut(t: float, to_border: float, step: float) -> float:
-    """Return the part of a ray up to a border, if less than ``t``; never backwards."""
+    """Return the part of a ray up to a border, if less than ``t``; division as in C++."""
     if step == 0.0:
-        return 0.0
-    return max(0.0, min(t, to_border / step))
+        return -math.inf if to_border < 0.0 else t
+    return to_border / step if to_border / step < t else t
 
 
 @njit(cache=True, nogil=True)

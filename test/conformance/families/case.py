@@ -6,7 +6,7 @@ import json
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List
+from typing import Any, Dict, List, Mapping, Set
 
 import numpy as np
 
@@ -22,11 +22,28 @@ class Recorded(Dict[str, Any]):
         raise InvalidValue(f"there is no {key!r}")
 
 
+class Arrays(Recorded):
+    """Recorded arrays that remember which of them were looked at."""
+
+    def __init__(self, arrays: Mapping[str, Any]) -> None:
+        super().__init__(arrays)
+        self._read: Set[str] = set()
+
+    def __getitem__(self, key: str) -> Any:
+        self._read.add(key)
+        return super().__getitem__(key)
+
+    @property
+    def unread(self) -> List[str]:
+        """Names of the arrays that nothing has looked at."""
+        return sorted(set(self) - self._read)
+
+
 @dataclass(frozen=True)
 class Case:
     """``arrays`` by name, and ``meta``: the parameters and whatever is no array."""
 
-    arrays: Recorded
+    arrays: Arrays
     meta: Recorded
 
 
@@ -58,7 +75,7 @@ def load_case(path: Path) -> Case:
     """Raises InvalidValue when the file is no recording."""
     try:
         with np.load(path) as file:
-            arrays = Recorded(file)
+            arrays = Arrays(file)
         meta = json.loads(str(arrays.pop("meta")), object_hook=Recorded)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise InvalidValue(f"cannot be read: {error}") from error

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Iterator, Optional, Tuple
 
 import numpy as np
 
 from families.case import Case, Recorded
+from families.frames import inverted, yaw_of_inverse
 from quad_nav.control.controller import Control, LocalPlanner
 from quad_nav.errors import ControlError
-from quad_nav.geometry import Pose2D, Twist2D, multiply_quaternions, rotation_from_quaternion
+from quad_nav.geometry import Pose2D, Pose3D, Twist2D
 from quad_nav.grid import GridSpec
 
 
@@ -56,19 +56,11 @@ def replayed(planner: LocalPlanner, case: Case) -> Iterator[Tuple[int, Optional[
 def _local_from_plan(meta: Recorded) -> Pose2D:
     """The inverse of the recorded frame's pose, to the last bit as tf2 computes it.
 
-    The plan's points lie on cell borders, so the last bit decides about their
-    cells. tf2 turns the translation by two quaternion products, and takes the
-    rotation from quaternion to matrix and back.
+    The plan's points lie on cell borders, so the last bit decides about their cells.
     """
     frame = meta.get("map_to_costmap_frame")  # pose of the costmap frame in the map frame
     if frame is None:
         return Pose2D(0.0, 0.0, 0.0)
-    qx, qy, qz, qw = frame["quaternion_xyzw"]
-    inverse = (-qx, -qy, -qz, qw)
-    translation = multiply_quaternions(
-        multiply_quaternions(inverse, (-frame["x"], -frame["y"], 0.0, 0.0)), (qx, qy, qz, qw)
-    )
-    rotation = rotation_from_quaternion(inverse)
-    root = math.sqrt(np.trace(rotation) + 1.0)
-    yaw = 2.0 * math.atan2((rotation[1, 0] - rotation[0, 1]) * (0.5 / root), root * 0.5)
-    return Pose2D(translation[0], translation[1], yaw)
+    pose = Pose3D(frame["x"], frame["y"], 0.0, tuple(frame["quaternion_xyzw"]))
+    inverse = inverted(pose)
+    return Pose2D(inverse.x_m, inverse.y_m, yaw_of_inverse(pose))

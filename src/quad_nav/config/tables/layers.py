@@ -286,9 +286,7 @@ STATIC_LAYER_TABLE = Table(
             -1,
             "unknown_cost_value",
             "",
-            "The occupancy that means unknown.",
-            low=-1,
-            high=255,
+            "The occupancy that means unknown; counts modulo 256.",
         ),
         flag(
             "trinary_costmap",
