@@ -146,7 +146,7 @@ def test_a_folder_keeps_to_its_study(tmp_path):
     ]
     assert json_differences({"a": (1,)}, {"a": [2, 3]}) != []
     (tmp_path / "study.db").write_text("no database, but long enough to be looked at" * 100)
-    with pytest.raises(InputError, match="cannot read as a study"):
+    with pytest.raises(InputError, match="file is not a database; expected a file of quad tune"):
         with open_study(tmp_path, {}):
             pass
 

@@ -83,6 +83,10 @@ class FlightsBar(StudyObserver):
         self._candidates, self._best = candidates, best
         self._show()
 
+    def on_problem(self, problem: str) -> None:
+        """Print a fault that does not end the flights."""
+        click.echo(problem, err=True)
+
     def _show(self) -> None:
         parts = [f"{self.per_minute:.1f} per minute", f"{self.failed} failed"]
         if self._candidates:

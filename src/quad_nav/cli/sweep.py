@@ -10,7 +10,7 @@ from typing import Any, List, Optional, Sequence, TextIO, Tuple
 import click
 import yaml
 
-from quad_nav.cli import EXIT_SUCCESS
+from quad_nav.cli import EXIT_FAILURE, EXIT_SUCCESS
 from quad_nav.cli.flights_bar import run_with_bar
 from quad_nav.cli.options import A_FILE, A_FOLDER, COUNT, OUTPUT, exit_on_faults, is_terminal
 from quad_nav.cli.study_options import (
@@ -98,10 +98,11 @@ def sweep(
 
     Every point flies the same flights.
 
-    Exit status: 0, 1 if workers die repeatedly, 2 for invalid input, 130 after Ctrl-C.
+    Exit status: 0, 1 if workers die repeatedly or flights cannot be stored in --cache, 2 for
+    invalid input, 130 after Ctrl-C.
     """
     with exit_on_faults():
-        setup, rows = _fly(quiet=quiet, **given)
+        setup, rows, is_stored = _fly(quiet=quiet, **given)
     if not quiet:
         click.echo(table(rows), err=is_terminal(json_file) or is_terminal(csv_file))
     if json_file is not None:
@@ -109,7 +110,7 @@ def sweep(
     if csv_file is not None:
         write_csv(rows, csv_file)
     _draw(setup, rows, report, png)
-    sys.exit(EXIT_SUCCESS)
+    sys.exit(EXIT_SUCCESS if is_stored else EXIT_FAILURE)
 
 
 def _fly(
@@ -121,7 +122,7 @@ def _fly(
     cache: Optional[Path],
     quiet: bool,
     **given: Any,
-) -> Tuple[SweepSetup, List[SweepRow]]:
+) -> Tuple[SweepSetup, List[SweepRow], bool]:
     setup = read_sweep_setup(SweepOptions(course_of(**given), _points(over, points), flights))
     pool = workers_of(workers, ray_address)
     if not quiet:
@@ -139,7 +140,7 @@ def _fly(
         lambda _: "with --cache, the same command resumes the sweep",
         quiet,
     )
-    return setup, rows
+    return setup, rows, not flight_cache.is_broken
 
 
 def _points(over: Sequence[str], points: Optional[Path]) -> Tuple[Point, ...]:

@@ -115,7 +115,8 @@ def tune(
     move_base's files, with the study and a report. The same command resumes an interrupted study;
     no flight is flown twice.
 
-    Exit status: 0, 1 if workers die repeatedly, 2 for invalid input, 130 after Ctrl-C.
+    Exit status: 0, 1 if workers die repeatedly or the study cannot be stored, 2 for invalid input,
+    130 after Ctrl-C.
     """
     with exit_on_faults():
         setup = read_tune_setup(_options(output, **given))

@@ -8,8 +8,10 @@ problems += unknown_names(values, RULES, "simulator", "a parameter of the simula
 from __future__ import annotations
 
 import difflib
-import math
+import sys
 from typing import Any, Callable, Iterable, List, Mapping, NamedTuple, Optional, Sequence
+
+_LARGEST = sys.float_info.max
 
 
 class Rule(NamedTuple):
@@ -21,7 +23,11 @@ class Rule(NamedTuple):
 
 def is_number(value: Any) -> bool:
     """True for a finite int or float; a bool is no number."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    return bool(
+        -_LARGEST <= value <= _LARGEST
+    )  # math.isfinite raises for ints that exceed any float
 
 
 def is_whole(value: Any) -> bool:

@@ -5,7 +5,8 @@ Reading order:
 - ``space`` (searched parameters), ``courses`` and ``barn_course`` (flown missions or worlds),
   ``study_input`` (checks of both);
 - ``flight_result`` (result of a flight), ``score`` (its cost), ``statistics`` (of many flights),
-  ``flight_cache`` (results on disk), ``evaluation`` (candidates times flights);
+  ``study_database`` and ``flight_cache`` (results on disk), ``evaluation`` (candidates times
+  flights);
 - ``proposals`` and ``study`` (candidates and their trials), ``search`` (all generations),
   ``refinement`` (the best candidate without needless changes), ``tune`` (the whole study);
 - ``parameter_files`` and ``yaml_edit`` (tuned YAML), ``study_text`` and ``study_files`` (outputs);

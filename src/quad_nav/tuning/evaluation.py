@@ -8,9 +8,10 @@ from quad_nav.errors import InputError
 from quad_nav.offline.workers import Workers, fly_all
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import Case
-from quad_nav.tuning.flight_cache import FlightCache, Key, key_text
+from quad_nav.tuning.flight_cache import FlightCache, key_text
 from quad_nav.tuning.flight_result import FlightResult, FlightTask, fly_task
 from quad_nav.tuning.space import Assignments, SearchSpace, Values
+from quad_nav.tuning.study_database import Key
 
 
 class Course(Protocol):
@@ -67,6 +68,9 @@ class StudyObserver:
 
     def on_candidates(self, candidates: int, best: float) -> None:
         """Handle completed candidates; ``best`` is the lowest cost so far."""
+
+    def on_problem(self, problem: str) -> None:
+        """Handle a fault that does not end the flights, such as a full disk."""
 
 
 class Evaluation:

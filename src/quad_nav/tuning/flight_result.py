@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass
-from typing import List, Optional
+from dataclasses import MISSING, asdict, dataclass
+from dataclasses import fields as dataclass_fields
+from typing import Any, List, Mapping, Optional
 
+from quad_nav.files.values import Rule, is_number, number, unknown_names, value_faults, whole
 from quad_nav.geometry import Twist2D
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.navigator.tick import RobotPoses, Tick
@@ -81,8 +83,51 @@ class FlightResult:
 
     @classmethod
     def from_json(cls, text: str) -> FlightResult:
-        """Parse a serialized result."""
-        return cls(**json.loads(text))
+        """Parse a serialized result.
+
+        Raises:
+            ValueError: The text is not a result; says all that is wrong.
+        """
+        try:
+            fields = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"result is not JSON: {error}") from None
+        faults = _result_faults(fields)
+        if faults:
+            raise ValueError("; ".join(faults))
+        return cls(**fields)
+
+
+_MOST = 10**9
+_GAP = Rule(lambda value: value is None or is_number(value), "a number or null")
+_RULES = {
+    "goals": whole(0, _MOST),
+    "reached": whole(0, _MOST),
+    "contacts": whole(0, _MOST),
+    "time_s": number(at_least=0, at_most=_MOST),
+    "straight_m": number(at_least=0, at_most=_MOST),
+    "clearance_m": _GAP,
+    "separation_m": _GAP,
+    "roughness_mps2": number(at_least=0, at_most=_MOST),
+    "recoveries": whole(0, _MOST),
+    "reason": Rule(lambda value: isinstance(value, str), "a text"),
+}
+_DEFAULTS = {
+    field.name: None if field.default is MISSING else field.default
+    for field in dataclass_fields(FlightResult)
+}
+
+
+def _result_faults(fields: Any) -> List[str]:
+    """Return the faults of a serialized result; older ones lack fields that have a default."""
+    if not isinstance(fields, dict):
+        return ["result is no mapping"]
+    values: Mapping[str, Any] = {**_DEFAULTS, **fields}
+    faults = unknown_names(fields, _RULES, "result", "a field of a result")
+    faults += value_faults(values, _RULES, "result")
+    if not faults and values["reached"] > values["goals"]:
+        faults.append(f"result: reached: {values['reached']} of {values['goals']} goals")
+    return [fault if len(fault) <= 300 else f"{fault[:300]} ..." for fault in faults]
 
 
 def fly_task(task: FlightTask) -> FlightResult:

@@ -13,11 +13,10 @@ from quad_nav.tuning.evaluation import Evaluation
 from quad_nav.tuning.proposals import distributions, propose, should_prune
 from quad_nav.tuning.score import mean_cost
 from quad_nav.tuning.space import Values
-from quad_nav.tuning.statistics import flight_statistics
+from quad_nav.tuning.statistics import STATISTICS, flight_statistics
 from quad_nav.tuning.study import TuneStudy
 
 FIRST_ROUND = 2
-STATISTICS = "statistics"
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Optional, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, List, Optional, Sequence
 
+from quad_nav.files.values import is_number
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.score import mean_cost
+
+STATISTICS = "statistics"
+"""Name of a trial's attribute with its ``FlightStatistics``."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,19 @@ def flight_statistics(flights: Sequence[FlightResult]) -> FlightStatistics:
         sum(flight.recoveries for flight in flights),
         mean_cost(flights),
     )
+
+
+def statistics_faults(found: Any) -> List[str]:
+    """Return the faults of statistics that were read as JSON."""
+    optional = ("mean_time_s", "least_gap_m", "mean_gap_m")
+    names = [field.name for field in fields(FlightStatistics)]
+    if not isinstance(found, dict) or set(found) != set(names):
+        return [f"has no statistics of its flights; expected {', '.join(names)}"]
+    return [
+        f"its statistics have no number for {name}"
+        for name in names
+        if not is_number(found[name]) and not (found[name] is None and name in optional)
+    ]
 
 
 def _mean(values: Sequence[float]) -> Optional[float]:

@@ -23,6 +23,7 @@ from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.space import Dimension, SearchSpace
 from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
+from quad_nav.tuning.study_database import NotStored
 from quad_nav.tuning.study_input import CourseOptions, parameter_faults, read_course
 from quad_nav.versions import versions
 
@@ -154,13 +155,21 @@ def space_of(points: Sequence[Point]) -> SearchSpace:
 def run_sweep(
     setup: SweepSetup, workers: Workers, journal: FlightCache, observer: StudyObserver
 ) -> List[SweepRow]:
-    """Fly all points; each case of all points before the next case."""
+    """Fly all points; each case of all points before the next case.
+
+    If a flight cannot be stored, the sweep continues without storing, and the observer is told.
+    """
     evaluation = Evaluation(
         setup.course, space_of(setup.points), workers, journal, observer, {_BASE: setup.base}
     )
     observer.on_expected(len(setup.points) * setup.flights)
     observer.on_stage("sweep")
-    flights = evaluation.evaluate(setup.points, setup.cases)
+    try:
+        flights = evaluation.evaluate(setup.points, setup.cases)
+    except NotStored as error:
+        observer.on_problem(f"{error}; the sweep continues without storing its flights")
+        journal.keep_in_memory()
+        flights = evaluation.evaluate(setup.points, setup.cases)
     return [SweepRow(point, tuple(own)) for point, own in zip(setup.points, flights)]
 
 

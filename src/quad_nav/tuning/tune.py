@@ -12,7 +12,7 @@ from optuna.trial import FrozenTrial
 from quad_nav import config
 from quad_nav.barn.setup import BarnOptions
 from quad_nav.config.plugins import plugin_name
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, QuadError
 from quad_nav.files.shipped import config_folder, shipped
 from quad_nav.offline.workers import Workers
 from quad_nav.tuning.courses import Case
@@ -23,11 +23,16 @@ from quad_nav.tuning.refinement import BASE, Refinement, refine
 from quad_nav.tuning.search import SearchOptions, best_first, search
 from quad_nav.tuning.space import Assignments, SearchSpace, load_space
 from quad_nav.tuning.study import TuneStudy, open_study
+from quad_nav.tuning.study_database import NotStored
 from quad_nav.tuning.study_input import CourseOptions, parameter_faults, read_course, with_config
 from quad_nav.versions import versions
 
 TUNED = "tuned"
 _DWA = "DWAPlannerROS"
+
+
+class StudyStopped(QuadError):
+    """The study's file cannot be written any more; the message ends with the best candidate."""
 
 
 @dataclass(frozen=True)
@@ -161,15 +166,32 @@ def run_tune(setup: TuneSetup, workers: Workers, observer: StudyObserver) -> Tun
 
     Raises:
         InputError: The folder holds another study, or another process works on it.
+        StudyStopped: The study's file cannot be written any more.
         WorkersLost: Workers died repeatedly.
     """
-    with open_study(setup.options.output, setup.identity) as study:
+    with open_study(setup.options.output, setup.identity, setup.space) as study:
         evaluation = Evaluation(setup.course, setup.space, workers, study.journal, observer)
-        result = _run(setup, evaluation, study)
-        others = tuple(
-            (name, _fly_other(name, course, result, evaluation)) for name, course in setup.against
-        )
+        try:
+            result = _run(setup, evaluation, study)
+            others = tuple(
+                (name, _fly_other(name, course, result, evaluation))
+                for name, course in setup.against
+            )
+        except NotStored as error:
+            raise StudyStopped(f"study stopped: {error}\n{_best_text(study)}") from error
         return replace(result, held_out=replace(result.held_out, others=others))
+
+
+def _best_text(study: TuneStudy) -> str:
+    """Describe the best candidate so far."""
+    best = best_first(study.trials)[:1]
+    if not best:
+        return f"no best candidate yet: 0 of {len(study.trials)} candidates flew all flights"
+    (trial,) = best
+    lines = [
+        f"best so far: candidate {trial.number} of {len(study.trials)}, cost {trial.value:.3f}"
+    ]
+    return "\n  ".join([*lines, *(f"{path}: {value}" for path, value in trial.params.items())])
 
 
 def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResult:

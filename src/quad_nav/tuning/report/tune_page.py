@@ -22,8 +22,8 @@ from quad_nav.tuning.report.search_pictures import (
     slice_picture,
 )
 from quad_nav.tuning.score import TERMS
-from quad_nav.tuning.search import STATISTICS, is_complete
-from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
+from quad_nav.tuning.search import is_complete
+from quad_nav.tuning.statistics import STATISTICS, FlightStatistics, flight_statistics
 from quad_nav.tuning.tune import TuneResult, all_versions
 
 _FOLDER = Path(__file__).parent
