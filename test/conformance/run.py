@@ -3,8 +3,12 @@
 
     test/conformance/run.py [FOLDER]
 
-Exit status: 0 when every case agrees, 1 when one does not, 2 when the folder or one of
-its cases cannot be used.
+Exit status: 0 when every case agrees, 1 when one does not or was not compared, 2 when there
+is no folder or nothing in it.
+
+A case is not compared when nothing here knows its family, when it cannot be read, when the
+index names it and there is no file, or when there is a file and the index does not name it.
+Each is named, and counted among the cases.
 """
 
 from __future__ import annotations
@@ -21,45 +25,45 @@ import tabulate
 _TEST = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(_TEST.parent / "src"), str(_TEST)]
 
-from families import DATA, FAMILIES, Difference, InvalidValue, cases  # noqa: E402
+from families import DATA, FAMILIES, Difference, InvalidValue, cases, missing_cases  # noqa: E402
+from families.case import recordings_in  # noqa: E402
 
 EXIT_AGREES, EXIT_DIFFERS, EXIT_UNUSABLE = 0, 1, 2
 
 
 @dataclass
 class Result:
-    """A family's outcome: the cases that failed, each with its first difference, and the
-    recordings that could not be used."""
+    """A family's outcome: the cases that failed, each with its first difference, and why
+    others were not compared."""
 
     family: str
     cases: int = 0
     passed: int = 0
     failed: List[Tuple[str, Difference]] = field(default_factory=list)
-    unusable: List[str] = field(default_factory=list)
+    not_compared: List[str] = field(default_factory=list)
     note: str = ""
 
     def row(self) -> List[object]:
         if self.note:
-            return [self.family, "-", "-", self.note, "", ""]
+            return [self.family, self.cases or "-", "-", self.note, "", ""]
         case, difference = self.failed[0] if self.failed else ("", Difference("", ""))
         return [self.family, self.cases, self.passed, case, difference.field, difference.text]
 
 
 def run_family(family: str, data: Path) -> Result:
     """Compares every case of a family."""
-    result = Result(family)
     try:
-        paths = cases(family, data)
+        paths, missing = cases(family, data), missing_cases(family, data)
     except InvalidValue as error:
-        return Result(family, unusable=[str(error)], note="unusable")
-    if not paths:
+        return _not_compared(family, data, f"{error}", "cannot be read, not compared")
+    if not paths and not missing:
         return Result(family, note="not in this folder")
+    result = Result(family, len(paths) + len(missing), not_compared=missing)
     for path in paths:
-        result.cases += 1
         try:
             differences = FAMILIES[family](path)
         except InvalidValue as error:
-            result.unusable.append(f"{path}: {error}")
+            result.not_compared.append(f"{path}: {error}")
             continue
         except Exception as error:  # what ours raises, whatever it is, is a failure of the case
             traceback.print_exc()
@@ -74,10 +78,17 @@ def run_family(family: str, data: Path) -> Result:
 def unknown_families(data: Path) -> List[Result]:
     """Folders of recordings that nothing here compares."""
     return [
-        Result(path.name, note="unknown family, not compared")
+        _not_compared(path.name, data, f"{path}: unknown family", "unknown family, not compared")
         for path in sorted(data.iterdir())
-        if path.name not in FAMILIES and (path / "index.json").is_file()
+        if path.name not in FAMILIES
+        if (path / "index.json").is_file() or recordings_in(path)
     ]
+
+
+def _not_compared(family: str, data: Path, reason: str, note: str) -> Result:
+    """The result of a family of which no case was compared: it counts as one at least."""
+    count = max(1, len(recordings_in(data / family)))
+    return Result(family, count, not_compared=[f"{reason} ({count} cases)"], note=note)
 
 
 def run(data: Path) -> int:
@@ -97,14 +108,14 @@ def run(data: Path) -> int:
         )
     )
     total, passed = sum(r.cases for r in results), sum(r.passed for r in results)
-    print(f"\n{passed} of {total} cases agree.")
-    unusable = [line for result in results for line in result.unusable]
-    if not total and not unusable:
-        unusable = [f"{data}: there are no recordings in it that could be compared"]
-    for line in unusable:
-        print(f"unusable: {line}", file=sys.stderr)
-    if unusable:
+    if not total:
+        print(f"{data}: there are no recordings in it that could be compared", file=sys.stderr)
         return EXIT_UNUSABLE
+    not_compared = total - passed - sum(len(result.failed) for result in results)
+    rest = f", {not_compared} were not compared" if not_compared else ""
+    print(f"\n{passed} of {total} cases agree{rest}.")
+    for line in (line for result in results for line in result.not_compared):
+        print(f"not compared: {line}", file=sys.stderr)
     return EXIT_AGREES if passed == total else EXIT_DIFFERS
 
 

@@ -70,14 +70,20 @@ def test_what_ours_raises_is_a_failure(tmp_path, capsys, monkeypatch):
     assert rows(capsys.readouterr().out)["occupancy"][2:5] == ["case", "(raised)", "IndexError:"]
 
 
-def test_unknown_family_is_said_and_not_counted(tmp_path, capsys):
+def test_unknown_families_are_counted_and_named(tmp_path, capsys):
     put(tmp_path, "occupancy", "cost_to_occupancy", "case")
+    put(tmp_path, "occupancy", "footprint_00", "another")
     shutil.copytree(tmp_path / "occupancy", tmp_path / "teb")
+    shutil.copytree(tmp_path / "occupancy", tmp_path / "mpc")
+    (tmp_path / "mpc" / "index.json").unlink()
     (tmp_path / "notes").mkdir()
-    assert run(tmp_path) == 0
-    output = capsys.readouterr().out
-    assert rows(output)["teb"] == ["-", "-", "unknown", "family,", "not", "compared"]
+    assert run(tmp_path) == 1
+    output, errors = capsys.readouterr()
+    for family in ("teb", "mpc"):
+        assert rows(output)[family] == ["2", "-", "unknown", "family,", "not", "compared"]
+        assert f"not compared: {tmp_path / family}: unknown family (2 cases)\n" in errors
     assert "notes" not in rows(output)
+    assert output.endswith("\n2 of 6 cases agree, 4 were not compared.\n")
 
 
 @pytest.mark.parametrize(
@@ -85,23 +91,54 @@ def test_unknown_family_is_said_and_not_counted(tmp_path, capsys):
     [
         (lambda family: (family / "index.json").unlink(), "index.json: cannot be read"),
         (lambda family: (family / "index.json").write_text("{"), "index.json: cannot be read"),
+        (lambda family: (family / "index.json").write_text("[" * 99999), "json: cannot be read"),
         (lambda family: (family / "index.json").write_text("[1]"), "expected a list of {case: "),
         (lambda family: (family / "index.json").write_text("[]"), "there is no case in it"),
-        (lambda family: (family / "case.npz").unlink(), "files that are not there: case.npz"),
+        (lambda family: (family / "case.npz").unlink(), "case.npz: the index names it, and there"),
         (lambda family: (family / "case.npz").write_text("?"), "case.npz: cannot be read"),
+        (lambda family: (family / "case.npz").write_bytes(b""), "case.npz: cannot be read"),
+        (
+            lambda family: np.savez(family / "case.npz", meta=np.array("[]")),
+            "case.npz: cannot be read: 'meta' is no JSON object",
+        ),
+        (
+            lambda family: (family / "case.npz").rename(family / "stray.npz"),
+            "stray.npz: the index does not name it",
+        ),
         (
             lambda family: put(
-                family.parent, "occupancy", "cost_to_occupancy", "other", occupancy=None
+                family.parent, "occupancy", "cost_to_occupancy", "case", occupancy=None
             ),
-            "other.npz: there is no 'occupancy'",
+            "case.npz: there is no 'occupancy'",
         ),
     ],
 )
-def test_folders_that_cannot_be_used(tmp_path, capsys, spoil, said):
+def test_what_cannot_be_compared_is_named_and_the_rest_is_compared(tmp_path, capsys, spoil, said):
     put(tmp_path, "occupancy", "cost_to_occupancy", "case")
+    put(tmp_path, "inflation", "inf_03", "x")
     spoil(tmp_path / "occupancy")
-    assert run(tmp_path) == 2
-    assert said in capsys.readouterr().err
+    assert run(tmp_path) == 1
+    output, errors = capsys.readouterr()
+    assert "not compared: " in errors and said in errors
+    assert "\n1 of " in output and "were not compared.\n" in output
+
+
+def test_damaged_recordings_never_end_the_command(tmp_path, capsys):
+    put(tmp_path, "occupancy", "cost_to_occupancy", "good")
+    put(tmp_path, "occupancy", "footprint_00", "case")
+    path = tmp_path / "occupancy" / "case.npz"
+    whole = path.read_bytes()
+    for place in range(0, len(whole), max(1, len(whole) // 150)):
+        for damaged in (whole[:place], whole[:place] + b"\xff\x00\xff" + whole[place + 3 :]):
+            path.write_bytes(damaged)
+            assert run(tmp_path) in (0, 1)
+            assert rows(capsys.readouterr().out)["occupancy"][0] == "2"
+
+
+def test_arrays_that_nothing_compares_are_named(tmp_path, capsys):
+    put(tmp_path, "static", "static_00", "case", tomorrow_000=np.zeros(3))
+    assert run(tmp_path) == 1
+    assert "case.npz: nothing compares tomorrow_000" in capsys.readouterr().err
 
 
 def test_no_folder_and_no_recordings(tmp_path, capsys):

@@ -23,7 +23,7 @@ from families import (
     occupancy,
     trajectory_planner,
 )
-from families.case import InvalidValue, cases_in
+from families.case import InvalidValue, named_in, recordings_in
 from families.comparison import Difference
 
 Check = Callable[[Path], List[Difference]]
@@ -43,7 +43,7 @@ FAMILIES: Dict[str, Check] = {
 }
 DATA = Path(__file__).resolve().parents[1] / "data"
 
-__all__ = ["DATA", "FAMILIES", "Check", "Difference", "InvalidValue", "cases"]
+__all__ = ["DATA", "FAMILIES", "Check", "Difference", "InvalidValue", "cases", "missing_cases"]
 
 
 def cases(family: str, data: Path = DATA) -> List[Path]:
@@ -56,4 +56,28 @@ def cases(family: str, data: Path = DATA) -> List[Path]:
         file = data / "defaults.json"
         return [file] if file.is_file() else []
     folder = data / family
-    return cases_in(folder) if folder.is_dir() else []
+    return [path for path in named_in(folder) if path.is_file()] if folder.is_dir() else []
+
+
+def missing_cases(family: str, data: Path) -> List[str]:
+    """What keeps index and files of a family apart: a line for each case that one of them lacks.
+
+    Raises:
+        InvalidValue: the family is there and can't be read.
+    """
+    folder = data / family
+    if family == "defaults" or not folder.is_dir():
+        return []
+    named = named_in(folder)
+    return [
+        *(
+            f"{path}: the index names it, and there is no such file"
+            for path in named
+            if not path.is_file()
+        ),
+        *(
+            f"{path}: the index does not name it"
+            for path in recordings_in(folder)
+            if path not in named
+        ),
+    ]

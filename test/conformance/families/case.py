@@ -4,11 +4,24 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Set
 
 import numpy as np
+
+# What numpy, zipfile and json raise over files that are damaged.
+_UNREADABLE = (
+    OSError,
+    EOFError,
+    ValueError,
+    KeyError,
+    RuntimeError,
+    MemoryError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 class InvalidValue(Exception):
@@ -47,28 +60,27 @@ class Case:
     meta: Recorded
 
 
-def cases_in(folder: Path) -> List[Path]:
-    """The files that a folder's index names, in its order.
+def recordings_in(folder: Path) -> List[Path]:
+    """All files of recordings in a folder, sorted; none in what is no folder."""
+    return sorted(folder.glob("*.npz"))
+
+
+def named_in(folder: Path) -> List[Path]:
+    """The files that a folder's index names, in its order, whether they are there or not.
 
     Raises:
-        InvalidValue: no index, one of another form, or a file that is not there.
+        InvalidValue: no index, or one of another form.
     """
     path = folder / "index.json"
     try:
         names = [entry["case"] for entry in json.loads(path.read_text(encoding="utf-8"))]
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidValue(f"{path}: cannot be read: {error}") from error
     except (TypeError, KeyError) as error:
         raise InvalidValue(f"{path}: expected a list of {{case: , note: }}") from error
-    files = [folder / f"{name}.npz" for name in names]
-    missing = [file.name for file in files if not file.is_file()]
-    if missing:
-        raise InvalidValue(
-            f"{folder}: the index names files that are not there: {', '.join(missing)}"
-        )
-    if not files:
+    if not names:
         raise InvalidValue(f"{path}: there is no case in it")
-    return files
+    return [folder / f"{name}.npz" for name in names]
 
 
 def load_case(path: Path) -> Case:
@@ -77,6 +89,8 @@ def load_case(path: Path) -> Case:
         with np.load(path) as file:
             arrays = Arrays(file)
         meta = json.loads(str(arrays.pop("meta")), object_hook=Recorded)
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except _UNREADABLE as error:
         raise InvalidValue(f"cannot be read: {error}") from error
+    if not isinstance(meta, Recorded):
+        raise InvalidValue("cannot be read: 'meta' is no JSON object")
     return Case(arrays, meta)
