@@ -1,12 +1,13 @@
-"""Kill and stop nodes at random moments of a flight, cut a link, fill a disk.
+"""Kill and stop nodes at random moments of a flight, cut a link, fill a disk, send bad messages.
 
     scripts/ros_env python3 bench/faults.py --each 20 --seed 1
     scripts/ros_env python3 bench/faults.py --kinds link --each 3        (as root)
 
 Each flight is that of test/ros/respawn_goals, two quadcopters with three goals, at three times
 real time. One fault is injected at a moment drawn evenly from the first ``MISSION_S`` simulated
-seconds. A flight that ends by its fault (simulator, roscore) is resumed with resume:=true. A flight
-passes if every goal is reached, none in two flights, without a contact. The table shows simulated
+seconds; ``hung`` begins when robot 0 is 0.2 m to 0.8 m from its first goal. A flight that ends by
+its fault (simulator, roscore) is resumed with resume:=true. A flight passes if every goal is
+reached at the first attempt, none in two flights, without a contact. The table shows simulated
 seconds from the fault until the last moving quadcopter hovered, and until all that had goals left
 flew again. For a stop or a cut they count from its begin and from its end.
 """
@@ -33,6 +34,7 @@ from pathlib import Path
 from typing import Any, Dict, Iterator, List, Optional, Tuple
 
 import tabulate
+from bad_messages import TRUE_ODOMETRY, FutureTransform, OdometryRelay
 from launched import Launch, Watch, answers, wait_for
 from link import HERE_IP, THERE_IP, Link, why_no_links
 
@@ -42,16 +44,22 @@ SCENE = ROOT / "scenes" / "arena.yaml"
 RATE = 3.0
 MISSION_S = 18.0
 STOPPED_S, CUT_S, FULL_S = 5.0, 10.0, 4.0  # wall time
+NAN_S = 3.0  # simulated time, as the next
+BRAKES_S, FLIES_WITHIN_S = 1.5, 8.0  # a half turn on the spot takes 4.5 s
 HOVERS_MPS, FLIES_MPS = 0.05, 0.12
+KILL, STOP = signal.SIGKILL, signal.SIGSTOP
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A fault: ``node`` gets the signal ``number``, and ``flyers`` lose their input."""
+    """A fault: ``node`` gets the signal ``number``, and ``flyers`` lose their input.
+
+    ``node`` is "" for the rosmaster; without a signal the fault is another one.
+    """
 
     name: str
-    node: str
-    number: int = signal.SIGKILL
+    node: str = ""
+    number: Optional[signal.Signals] = None
     flyers: Tuple[int, ...] = ()
     fleet: bool = False
     ends_flight: bool = False
@@ -60,14 +68,17 @@ class Kind:
 KINDS = {
     kind.name: kind
     for kind in (
-        Kind("sequencer", "/sequencer"),
-        Kind("navigator", "/move_base0", flyers=(0,)),
-        Kind("fleet", "/fleet0", flyers=(0, 1), fleet=True),
-        Kind("stopped", "/move_base0", signal.SIGSTOP, flyers=(0,)),
-        Kind("simulator", "/simulator", ends_flight=True),
-        Kind("roscore", "", ends_flight=True),
-        Kind("link", "", flyers=(1,), fleet=True),
-        Kind("disk", ""),
+        Kind("sequencer", "/sequencer", KILL),
+        Kind("navigator", "/move_base0", KILL, flyers=(0,)),
+        Kind("fleet", "/fleet0", KILL, flyers=(0, 1), fleet=True),
+        Kind("stopped", "/move_base0", STOP, flyers=(0,)),
+        Kind("simulator", "/simulator", KILL, ends_flight=True),
+        Kind("roscore", "", KILL, ends_flight=True),
+        Kind("link", flyers=(1,), fleet=True),
+        Kind("disk"),
+        Kind("hung", "", STOP),
+        Kind("nan_odometry", flyers=(0,), fleet=True),
+        Kind("future_transform"),
     )
 }
 
@@ -85,6 +96,8 @@ class Outcome:
 
 def arguments_of(kind: Kind, result: Path, *more: str) -> List[str]:
     file = ["fleet.launch", "robots:=2", f"scene:={SCENE}"] if kind.fleet else ["two_quads.launch"]
+    if kind.name == "nan_odometry":
+        file = ["relayed.launch", f"scene:={SCENE}"]
     return [
         *file,
         "rviz:=false",
@@ -116,8 +129,7 @@ def fly(kind: Kind, at_s: float, folder: Path) -> Outcome:
     outcome, result = Outcome(at_s), folder / "result.json"
     launch, other = start(kind, folder, result)
     wait_for(lambda: answers(launch.port), "the roscore")
-    watch = Watch()
-    wait_for(lambda: watch.now_s >= 1.0 + at_s, "the moment of the fault")
+    watch = Watch((TRUE_ODOMETRY, "/odom1")) if kind.name == "nan_odometry" else Watch()
     inject(kind, launch, watch, outcome)
     if not launch.end():
         outcome.problems.append("did not end")
@@ -133,39 +145,79 @@ def fly(kind: Kind, at_s: float, folder: Path) -> Outcome:
 
 
 def inject(kind: Kind, launch: Launch, watch: Watch, outcome: Outcome) -> None:
-    pid = launch.pid_of(kind.node) if kind.name not in ("link", "disk") else 0
+    """Wait for the moment of the fault, inject it, and wait until the robots have recovered."""
+    relay = OdometryRelay() if kind.name == "nan_odometry" else None
+    future = FutureTransform(listeners=3) if kind.name == "future_transform" else None
+
+    def is_due() -> bool:
+        if kind.name == "hung":
+            return watch.remaining_m(0) <= 0.2 + 0.6 * outcome.at_s / MISSION_S
+        return watch.now_s >= 1.0 + outcome.at_s and (future is None or future.is_connected)
+
+    wait_for(is_due, "the moment of the fault")
+    pid = launch.pid_of(kind.node) if kind.number is not None else 0
     done, fault_s = watch.done, watch.now_s
-    if kind.name == "link":
+    if relay is not None:
+        relay.is_nan = True
+        wait_for(lambda: watch.now_s >= fault_s + NAN_S, "the end of the fault")
+        relay.is_nan = False
+    elif future is not None:
+        future.publish(fault_s)
+        check_flight(watch, fault_s + BRAKES_S, outcome)
+    elif kind.name == "link":
         Link.cut(CUT_S)
     elif kind.name == "disk":
         fill(launch.folder / "disk", watch, outcome)
-    else:
+    elif kind.number is not None:
         os.kill(pid, kind.number)
-        if kind.number == signal.SIGSTOP:
+        if kind.number == STOP:
             time.sleep(STOPPED_S)
             os.kill(pid, signal.SIGCONT)
-    over_s = watch.now_s
-    blind = [robot for robot in kind.flyers if robot not in done]
-    if not blind or kind.ends_flight:
-        return
+    if not kind.ends_flight:
+        blind = [robot for robot in kind.flyers if robot not in done]
+        wait_for_recovery(watch, blind, (fault_s, watch.now_s), outcome)
 
-    def resumed() -> bool:
-        return all(
-            robot in watch.done
-            or watch.first(robot, max(over_s, hover_s(robot)), lambda v: v > FLIES_MPS) < math.inf
-            for robot in blind
-        )
+
+def check_flight(watch: Watch, begin_s: float, outcome: Outcome) -> None:
+    """Check that robot 0 does not hover, unless it has flown all its goals."""
+
+    def flies() -> bool:
+        return watch.first(0, begin_s, lambda v: v > FLIES_MPS) < math.inf
+
+    wait_for(lambda: flies() or watch.now_s > begin_s + FLIES_WITHIN_S, "flight")
+    if not flies() and 0 not in watch.done:
+        outcome.problems.append(f"quad0 hovered for {FLIES_WITHIN_S:g} s")
+
+
+def wait_for_recovery(
+    watch: Watch, blind: List[int], fault: Tuple[float, float], outcome: Outcome
+) -> None:
+    """Wait until the robots that lost their input have hovered and fly again.
+
+    Args:
+        watch: Observes the flight.
+        blind: Robots that had goals left at the fault.
+        fault: Begin and end of the fault in simulated seconds.
+        outcome: Gets the times.
+    """
+    fault_s, over_s = fault
+    if not blind:
+        return
 
     def hover_s(robot: int) -> float:
         return watch.first(robot, fault_s, lambda v: v < HOVERS_MPS)
 
+    def again_s(robot: int) -> float:
+        return watch.first(robot, max(over_s, hover_s(robot)), lambda v: v > FLIES_MPS)
+
     wait_for(lambda: all(hover_s(robot) < math.inf for robot in blind), "hover")
-    wait_for(resumed, "flying again")
+    wait_for(
+        lambda: all(robot in watch.done or again_s(robot) < math.inf for robot in blind),
+        "flying again",
+    )
     outcome.hover_s = max(map(hover_s, blind)) - fault_s
-    again_s = [
-        watch.first(robot, max(over_s, hover_s(robot)), lambda v: v > FLIES_MPS) for robot in blind
-    ]
-    outcome.resume_s = max((t for t in again_s if t < math.inf), default=over_s) - over_s
+    flying_s = [t for t in map(again_s, blind) if t < math.inf]
+    outcome.resume_s = max(flying_s, default=over_s) - over_s
 
 
 def resume(kind: Kind, folder: Path, first: Dict[str, Any], outcome: Outcome) -> Dict[str, Any]:

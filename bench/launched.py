@@ -10,7 +10,7 @@ import socket
 import subprocess
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional, Set, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Set, Tuple
 from xmlrpc.client import ServerProxy
 
 from link import HERE_IP
@@ -21,7 +21,8 @@ TIMEOUT_S = 150.0  # wall time
 class Watch:
     """A node that records the robots' speeds and the sequencer's events."""
 
-    def __init__(self) -> None:
+    def __init__(self, odometry: Sequence[str] = ("/odom0", "/odom1")) -> None:
+        """Subscribe to the odometry of robots 0 and 1 and to the events."""
         import rospy
         from nav_msgs.msg import Odometry
         from std_msgs.msg import String
@@ -29,9 +30,11 @@ class Watch:
         rospy.init_node("faults", anonymous=True, disable_signals=True)
         self.events: List[Dict[str, Any]] = []
         self.now_s = 0.0
+        self._places_m: Dict[int, Tuple[float, float]] = {}
         self.speeds_mps: List[Tuple[float, int, float]] = []  # time, robot, speed
         self._subscribers = [rospy.Subscriber("/quad/events", String, self._on_event)] + [
-            rospy.Subscriber(f"/odom{i}", Odometry, self._on_odometry, i) for i in (0, 1)
+            rospy.Subscriber(topic, Odometry, self._on_odometry, robot)
+            for robot, topic in enumerate(odometry)
         ]
 
     def _on_event(self, message: Any) -> None:
@@ -41,11 +44,21 @@ class Watch:
         v = message.twist.twist.linear
         self.now_s = message.header.stamp.to_sec()
         self.speeds_mps.append((self.now_s, robot, math.hypot(v.x, v.y)))
+        p = message.pose.pose.position
+        self._places_m[robot] = p.x, p.y
 
     @property
     def done(self) -> Set[int]:
         """Robots without further goals."""
         return {event["robot"] for event in self.events if event["event"] == "done"}
+
+    def remaining_m(self, robot: int) -> float:
+        """Distance of a robot to the goal that was sent last; inf before the first one."""
+        sent = [e for e in self.events if e["event"] == "sent" and e["robot"] == robot]
+        if not sent or robot not in self._places_m:
+            return math.inf
+        x, y = self._places_m[robot]
+        return math.hypot(sent[-1]["x_m"] - x, sent[-1]["y_m"] - y)
 
     def first(self, robot: int, after_s: float, holds: Callable[[float], bool]) -> float:
         """First time after ``after_s`` at which ``holds`` accepts the speed; inf for never."""
