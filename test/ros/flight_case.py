@@ -43,6 +43,15 @@ def topics_sent_here():
     return topics
 
 
+def pid_of(name):
+    """None if no node with this name responds."""
+    try:
+        uri = rosnode.get_api_uri(rosgraph.Master("/test"), name, skip_cache=True)
+        return ServerProxy(uri).getPid("/test")[2] if uri else None
+    except OSError:
+        return None  # the dead node's address is still registered
+
+
 class Latest:
     """The last message of a topic, and how many there were."""
 

@@ -5,25 +5,13 @@ import json
 import os
 import signal
 import time
-from xmlrpc.client import ServerProxy
 
-import rosgraph
-import rosnode
 import rospy
 import rostest
-from flight_case import FlightCase
+from flight_case import FlightCase, pid_of
 from std_msgs.msg import String
 
 STOPPED_S = 5.0  # wall time
-
-
-def pid_of(name):
-    """None if no node with this name responds."""
-    try:
-        uri = rosnode.get_api_uri(rosgraph.Master("/test"), name, skip_cache=True)
-        return ServerProxy(uri).getPid("/test")[2] if uri else None
-    except OSError:
-        return None  # the dead node's address is still registered
 
 
 class Respawn(FlightCase):
