@@ -15,6 +15,7 @@ from typing import Callable, Dict
 
 import numpy as np
 from PIL import Image
+from study_target import study
 
 from quad_nav import config
 from quad_nav.cli.options import parameter
@@ -159,6 +160,7 @@ TARGETS: Dict[str, Callable[[bytes], None]] = {
         flight_info,
         page,
         robot_messages,
+        study,
     )
 }
 

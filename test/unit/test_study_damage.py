@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
+import sys
 import tempfile
 from contextlib import closing
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from study_flights import SYNTHETIC_SPACE, write_mission
 from test_tuning_search import IDENTITY, run
 
@@ -18,6 +21,11 @@ from quad_nav.cli.sweep import sweep
 from quad_nav.errors import InputError
 from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.study import open_study
+
+FUZZ = Path(__file__).parents[1] / "fuzz"
+sys.path.insert(0, str(FUZZ))
+
+import targets  # noqa: E402
 
 RESULT = '{"goals": 2, "reached": 2, "contacts": 0, "time_s": 40.0, "straight_m": 10.0}'
 
@@ -280,3 +288,29 @@ def test_a_file_that_cannot_be_written_is_refused(study, readable_folder):
     finally:
         os.seteuid(user)
     assert "readonly database; expected a file and a folder that can be written" in message
+
+
+edits = st.tuples(
+    st.integers(0, 255),
+    st.integers(0, 255),
+    st.integers(0, 7),
+    st.integers(0, 5),
+    st.sampled_from([b"", b"x", b"null", b"{}", b"[]", b"-1", b"1e300", b"9" * 30, b"\xff", b"["])
+    | st.binary(max_size=20).map(lambda value: value.replace(b"\n", b"")),
+)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.lists(edits, min_size=1, max_size=3))
+def test_changed_values_are_used_or_refused(changes):
+    lines = [bytes(numbers) + value for *numbers, value in changes]
+    targets.run("study", b"\n".join(lines))
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.data())
+def test_changed_bytes_are_used_or_refused(data):
+    content = bytearray((FUZZ / "corpus" / "study" / "usual.db").read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    targets.run("study", bytes(content))
