@@ -23,6 +23,7 @@ from quad_nav.cli.options import (
     is_terminal,
     parameter,
     raise_on_signals,
+    show_warnings,
 )
 from quad_nav.cli.progress import flights_progress
 from quad_nav.errors import InputError
@@ -121,8 +122,7 @@ def barn(
         setup = read_barn_setup(_options(**given))
         workers = min(workers, setup.wanted)
         if not quiet:
-            for warning in setup.warnings:
-                click.echo(warning, err=True)
+            show_warnings(setup.warnings)
             click.echo(f"{setup.wanted} flights, {workers} at the same time", err=True)
         results, interrupted = _fly(setup, workers, quiet)
     if not quiet:

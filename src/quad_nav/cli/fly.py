@@ -14,7 +14,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 import click
 
 from quad_nav.cli import EXIT_INTERRUPTED
-from quad_nav.cli.options import exit_on_faults, parameter
+from quad_nav.cli.options import exit_on_faults, parameter, show_warnings
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.files.shipped import shipped
@@ -192,8 +192,7 @@ def fly(
         pictures = FlightPictures(setup, report, animate)
         observers = _observers(record, view)
     if not quiet:
-        for warning in setup.warnings:
-            click.echo(warning, err=True)
+        show_warnings(setup.warnings)
     processes = processes or processes_for(len(setup.robots))
     sys.exit(_fly(setup, observers, json_path, pictures, quiet, processes))
 

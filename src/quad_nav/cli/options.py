@@ -6,7 +6,7 @@ import signal
 import sys
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Iterator, Optional, TextIO, Tuple
+from typing import Any, Iterable, Iterator, Optional, TextIO, Tuple
 
 import click
 import yaml
@@ -14,6 +14,7 @@ import yaml
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
 from quad_nav.errors import InputError, QuadError
 from quad_nav.files import plain_yaml
+from quad_nav.kernels.jit import cache_warnings
 
 A_FILE = click.Path(dir_okay=False, path_type=Path)
 A_FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -56,6 +57,12 @@ def exit_on_faults() -> Iterator[None]:
     except QuadError as error:
         click.echo(str(error), err=True)
         sys.exit(EXIT_FAILURE)
+
+
+def show_warnings(warnings: Iterable[str]) -> None:
+    """Print the warnings of a set-up, and what a missing cache of the kernels costs."""
+    for warning in (*warnings, *cache_warnings()):
+        click.echo(warning, err=True)
 
 
 def is_terminal(file: Optional[TextIO]) -> bool:

@@ -12,7 +12,15 @@ import yaml
 
 from quad_nav.cli import EXIT_FAILURE, EXIT_SUCCESS
 from quad_nav.cli.flights_bar import run_with_bar
-from quad_nav.cli.options import A_FILE, A_FOLDER, COUNT, OUTPUT, exit_on_faults, is_terminal
+from quad_nav.cli.options import (
+    A_FILE,
+    A_FOLDER,
+    COUNT,
+    OUTPUT,
+    exit_on_faults,
+    is_terminal,
+    show_warnings,
+)
 from quad_nav.cli.study_options import (
     course_of,
     flown_options,
@@ -126,8 +134,7 @@ def _fly(
     setup = read_sweep_setup(SweepOptions(course_of(**given), _points(over, points), flights))
     pool = workers_of(workers, ray_address)
     if not quiet:
-        for warning in setup.warnings:
-            click.echo(warning, err=True)
+        show_warnings(setup.warnings)
         click.echo(
             f"{len(setup.points)} points, {flights} flights each, {pool.count} flights at the "
             "same time",

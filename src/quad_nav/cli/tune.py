@@ -11,7 +11,7 @@ import click
 
 from quad_nav.cli import EXIT_SUCCESS
 from quad_nav.cli.flights_bar import run_with_bar
-from quad_nav.cli.options import A_FILE, A_FOLDER, COUNT, exit_on_faults
+from quad_nav.cli.options import A_FILE, A_FOLDER, COUNT, exit_on_faults, show_warnings
 from quad_nav.cli.study_options import (
     course_of,
     flown_options,
@@ -168,8 +168,7 @@ def _options(
 
 
 def _announce(setup: TuneSetup, workers: Workers) -> None:
-    for warning in setup.warnings:
-        click.echo(warning, err=True)
+    show_warnings(setup.warnings)
     search = setup.options.search
     click.echo(
         f"{search.candidates} candidates of up to {search.flights} flights, "

@@ -6,11 +6,11 @@ import math
 from typing import Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN
 from quad_nav.kernels.cost_grid import CostmapView, cell_of, fill_convex_polygon
+from quad_nav.kernels.jit import njit
 
 Triple = Tuple[float, float, float]
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import UNKNOWN
+from quad_nav.kernels.jit import njit
 
 
 class CostmapView(NamedTuple):

@@ -10,9 +10,9 @@ import math
 from typing import Any, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from quad_nav.kernels.jit import njit
 from quad_nav.kernels.wave import NOT_REACHED
 
 OBSTACLE = 254  # NavFn never enters cells of this cost

@@ -11,11 +11,11 @@ import math
 from typing import Any, NamedTuple, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.kernels.collision import Triple, footprint_cost
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
+from quad_nav.kernels.jit import njit
 
 _TOLERANCE = 1e-4
 # Columns of the distances

@@ -11,8 +11,9 @@ import math
 from typing import NamedTuple, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
 
 
 class BodyConstants(NamedTuple):

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.kernels.descent import leaves_map, step_down
+from quad_nav.kernels.jit import njit
 from quad_nav.kernels.wave import NOT_REACHED, arrival_at
 
 

@@ -6,10 +6,10 @@ Mirrors ``costmap/inflation.py``.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN
+from quad_nav.kernels.jit import njit
 
 _VISITED = -1
 _NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))  # left, lower, right, upper

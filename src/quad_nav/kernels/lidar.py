@@ -12,9 +12,9 @@ import math
 from typing import NamedTuple, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from quad_nav.kernels.jit import njit
 from quad_nav.kernels.rays import Triple, dot, enter_solid, through_slab, triple, turn
 from quad_nav.kernels.sectors import sector_of
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import INSCRIBED, UNKNOWN
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
+from quad_nav.kernels.jit import njit
 
 
 @njit(cache=True, nogil=True)

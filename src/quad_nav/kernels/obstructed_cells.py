@@ -10,10 +10,10 @@ import math
 from typing import Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE
+from quad_nav.kernels.jit import njit
 
 SECTORS = 1024
 MAX_OBSTRUCTED = 512  # cells that are worth looking for lines towards them

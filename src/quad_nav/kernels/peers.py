@@ -9,8 +9,9 @@ import math
 from typing import Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
 
 
 @njit(cache=True, nogil=True)

@@ -18,8 +18,9 @@ import math
 from typing import Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
 
 Triple = Tuple[float, float, float]
 

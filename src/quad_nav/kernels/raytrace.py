@@ -9,11 +9,11 @@ import math
 from typing import NamedTuple, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL
 from quad_nav.kernels.cost_grid import CostmapView, cell_index
+from quad_nav.kernels.jit import njit
 from quad_nav.kernels.obstructed_cells import (
     MAX_OBSTRUCTED,
     SECTORS,

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
 
 
 @njit(cache=True, nogil=True)

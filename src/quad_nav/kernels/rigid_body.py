@@ -9,10 +9,10 @@ import math
 from typing import NamedTuple, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.kernels.flight_law import BodyConstants, FlightGains, fly, rotation_from_quaternion
+from quad_nav.kernels.jit import njit
 
 NOBODY = -1
 

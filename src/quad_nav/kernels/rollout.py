@@ -10,12 +10,12 @@ import math
 from typing import NamedTuple, Tuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import INSCRIBED
 from quad_nav.kernels.collision import COLLIDES, Triple, footprint_cost, line_cost
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
+from quad_nav.kernels.jit import njit
 
 OUT_OF_REACH = -2.0  # the cost of a trajectory that leaves the reach of path or goal
 _NO_LINE_OF_SIGHT = 1.7976931348623157e308

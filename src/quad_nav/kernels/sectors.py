@@ -14,8 +14,7 @@ from __future__ import annotations
 import math
 from typing import Tuple
 
-from numba import njit
-
+from quad_nav.kernels.jit import njit
 from quad_nav.kernels.rays import BOX, CYLINDER, Triple, dot, enter_box
 
 EMPTY = (0.0, -1.0)

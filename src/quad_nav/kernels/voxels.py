@@ -9,12 +9,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL, UNKNOWN
 from quad_nav.kernels.collision import Triple
 from quad_nav.kernels.cost_grid import cell_index
+from quad_nav.kernels.jit import njit
 from quad_nav.kernels.raytrace import include
 
 

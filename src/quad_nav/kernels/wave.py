@@ -11,8 +11,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
 
 NOT_REACHED = np.float32(1e10)
 BUCKET_SIZE = 10000  # cells that one bucket holds; further ones are dropped

@@ -15,6 +15,7 @@ import rospy
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
+from quad_nav.kernels.jit import cache_warnings
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.loop import NavigatorLoop
@@ -101,7 +102,7 @@ def _run(
     try:
         configurations = read()
         warnings = [line for one in configurations.values() for line in one.warnings]
-        for warning in dict.fromkeys(warnings):
+        for warning in dict.fromkeys((*warnings, *cache_warnings())):
             rospy.logwarn("%s", warning)
         for configuration in _distinct(configurations.values()):
             warm_up(configuration)

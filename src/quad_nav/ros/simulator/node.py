@@ -29,6 +29,7 @@ from std_srvs.srv import (
 from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.errors import InputError
+from quad_nav.kernels.jit import cache_warnings
 from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.ros.simulator.topics import SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
@@ -289,7 +290,7 @@ def main() -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
-    for remark in setup.scene.remarks:
+    for remark in (*setup.scene.remarks, *cache_warnings()):
         rospy.logwarn("%s", remark)
     if not rospy.get_param("/use_sim_time", False):
         rospy.logwarn(
