@@ -57,22 +57,25 @@ class InflationLayer(Layer):
         self._resolution_m = resolution_m
         self._inscribed_radius_m = inscribed_radius_m
         self._last_bounds = EVERYWHERE
+        self._redo_everything = True
         self._make_tables()
 
     def reconfigure(self, params: InflationLayerParams) -> None:
         """Take other parameters and write all costs again at the next update."""
         if params != self.params:
             self.params = params
+            self._redo_everything = True
             self._make_tables()
 
     def resize(self, spec: GridSpec) -> None:
-        """Follow the master grid, and write all costs again at the next update."""
+        """Follow the master grid to another resolution; the layers before it ask for updates."""
         self._resolution_m = spec.resolution_m
         self._make_tables()
 
     def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
         """Take another inscribed radius, and write all costs again at the next update."""
         self._inscribed_radius_m = inscribed_radius_m
+        self._redo_everything = True
         self._make_tables()
 
     def reset(self, now_s: float) -> None:
@@ -107,7 +110,6 @@ class InflationLayer(Layer):
         self.radius_cells = int(
             max(0.0, math.ceil(self.params.inflation_radius_m / self._resolution_m))
         )
-        self._redo_everything = True
         n = self.radius_cells + 2
         squared = np.array([[dx * dx + dy * dy for dx in range(n)] for dy in range(n)])
         self.cost_table = np.array(
