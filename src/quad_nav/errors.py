@@ -70,10 +70,25 @@ class InvalidGoal(NavigationError):
     """The pose of a goal is invalid: no rotation, not finite, or in an unknown frame."""
 
 
+def printable(text: object, keep: str = "") -> str:
+    """Escape each character that a terminal would obey instead of show.
+
+    These are control characters, line ends, and marks that change the direction of text. Everything
+    that goes to a terminal passes through here, because keys, names and messages may come from
+    others. Escaping twice changes nothing.
+
+    Args:
+        text: Text, or an object with one.
+        keep: Characters that stay, such as the line ends of a table.
+    """
+    return "".join(
+        c if c.isprintable() or c in keep else c.encode("unicode_escape").decode()
+        for c in str(text)
+    )
+
+
 def _line(problem: str) -> str:
-    """Cut a long problem and escape its control characters."""
+    """Cut a long problem and escape what would not stay in its line."""
     if len(problem) > _MAX_LENGTH:
         problem = problem[:_MAX_LENGTH] + " ..."
-    return "".join(
-        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in problem
-    )
+    return printable(problem)

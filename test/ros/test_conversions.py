@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Conversions to messages and back return the input."""
 
+import logging
 import math
 import unittest
 
@@ -8,14 +9,37 @@ import numpy as np
 import rospy
 import rostest
 
+from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D, Scan, Twist2D, quaternion_from_euler
 from quad_nav.peers.peer import Intention, idle_priority, priority_of
 from quad_nav.ros.common import conversions
+from quad_nav.ros.common.readiness import escape_log_messages
 from quad_nav.ros.navigator.peer_topics import intention_from_message, intention_message
 
 POSE = Pose3D(1.0, -2.0, 0.5, quaternion_from_euler(0.1, -0.2, 2.0))
 TWIST = Twist2D(0.3, -0.1, 0.7)
 STAMP = rospy.Time(12, 345678901)
+
+
+class LogMessages(unittest.TestCase):
+    def test_control_characters_are_escaped(self):
+        logger, found = logging.getLogger("rosout"), []
+        handler = logging.Handler()
+        handler.emit = lambda record: found.append(record.getMessage())
+        escape_log_messages()
+        logger.addHandler(handler)
+        rospy.logwarn("%s: %d of %.1f%%: %s", "a\x1b[2J", 3, 0.5, "b\nforged\u202e")
+        rospy.logwarn(f"quad0: {chr(0x9B)}2J\r")
+        rospy.logwarn("faults:\n%s", InputError(["one\n\x07", "two"]))
+        logger.removeHandler(handler)
+        self.assertEqual(
+            found,
+            [
+                "a\\x1b[2J: 3 of 0.5%: b\\nforged\\u202e",
+                "quad0: \\x9b2J\\r",
+                "faults:\none\\n\\x07\ntwo",
+            ],
+        )
 
 
 class Conversions(unittest.TestCase):

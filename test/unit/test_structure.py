@@ -21,6 +21,7 @@ MOST_LINES = 400
 MOST_FUNCTION_LINES = 40  # signature and docstring included, kernels apart
 SMALL_LINES = 60
 MOST_SMALL_MODULES = 34
+PRINTS_ITS_OWN = ("config/reference.py",)  # our own documentation
 
 
 def test_few_modules_are_outside_of_packages():
@@ -70,6 +71,52 @@ def test_undocumented_finds_what_is_public(source, missing):
 
 def test_nothing_is_imported_for_annotations_alone():
     assert [name(path) for path in MODULES if "TYPE_CHECKING" in path.read_text()] == []
+
+
+def test_everything_printed_is_escaped():
+    """Terminals obey escape sequences, and keys, names and messages come from others."""
+    assert [
+        f"{name(path)}:{line}"
+        for path in MODULES
+        for line in unescaped_prints(path, ast.parse(path.read_text()))
+    ] == []
+
+
+def unescaped_prints(path: Path, tree: ast.Module) -> Iterator[int]:
+    """Yield lines that print to the terminal without ``errors.printable``."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        function = dotted(node.func)
+        if function == "print" and name(path) not in PRINTS_ITS_OWN:
+            if not is_escaped(node.args[0]):
+                yield node.lineno
+        elif function in ("click.echo", "click.secho", "sys.stdout.write", "sys.stderr.write"):
+            if len(node.args) == 1 and name(path) != "cli/options.py":  # 2: into a file
+                yield node.lineno
+
+
+def is_escaped(node: ast.AST) -> bool:
+    """Return true for ``printable(...)``, and for a text that begins with it."""
+    if isinstance(node, ast.BinOp):
+        return is_escaped(node.left)
+    if isinstance(node, ast.JoinedStr):
+        return is_escaped(node.values[0])
+    if isinstance(node, ast.FormattedValue):
+        return is_escaped(node.value)
+    return isinstance(node, ast.Call) and dotted(node.func) == "printable"
+
+
+def dotted(node: ast.AST) -> str:
+    """Return ``a.b`` for an attribute ``b`` of ``a``."""
+    if isinstance(node, ast.Attribute):
+        return f"{dotted(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+@pytest.mark.parametrize("source", ["print(x)", "click.echo(x)", "click.echo(x, err=True)"])
+def test_unescaped_prints_are_found(source):
+    assert list(unescaped_prints(PACKAGE / "x.py", ast.parse(source))) == [1]
 
 
 def test_version_is_the_one_of_the_ros_package():

@@ -6,11 +6,13 @@ A command's module is imported when the command runs, so none waits for unneeded
 from __future__ import annotations
 
 import importlib
-from typing import List, Optional
+from contextlib import contextmanager
+from typing import Any, Iterator, List, Optional
 
 import click
 
 import quad_nav
+from quad_nav.errors import printable
 
 # The exit statuses of every command; 130 after Ctrl-C as from a shell.
 EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
@@ -18,8 +20,30 @@ EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 COMMANDS = ("barn", "check", "fly", "report", "sweep", "tune")
 
 
+@contextmanager
+def _escaped_messages() -> Iterator[None]:
+    """Escape the messages of click's own errors: they repeat arguments and file names."""
+    try:
+        yield
+    except click.ClickException as error:
+        error.message = printable(error.message)
+        if isinstance(error, click.FileError):
+            error.ui_filename = printable(error.ui_filename)
+        raise
+
+
 class Commands(click.Group):
     """Finds the command ``name`` in the module of that name."""
+
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Parse the arguments before the command's name."""
+        with _escaped_messages():
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Parse the arguments behind the command's name, and run the command."""
+        with _escaped_messages():
+            return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> List[str]:
         """Return the names of all commands."""

@@ -19,6 +19,8 @@ from quad_nav.cli.options import (
     COUNT,
     OUTPUT,
     POSITIVE,
+    echo,
+    echo_lines,
     exit_on_faults,
     is_terminal,
     parameter,
@@ -123,10 +125,10 @@ def barn(
         workers = min(workers, setup.wanted)
         if not quiet:
             show_warnings(setup.warnings)
-            click.echo(f"{setup.wanted} flights, {workers} at the same time", err=True)
+            echo(f"{setup.wanted} flights, {workers} at the same time", err=True)
         results, interrupted = _fly(setup, workers, quiet)
     if not quiet:
-        click.echo(text(results, per_world), err=is_terminal(json_file) or is_terminal(csv_file))
+        echo_lines(text(results, per_world), err=is_terminal(json_file) or is_terminal(csv_file))
     if json_file is not None:
         click.echo(json.dumps(to_json(results), indent=2, allow_nan=False), json_file)
     if csv_file is not None:

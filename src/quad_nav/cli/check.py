@@ -10,6 +10,7 @@ from typing import List, Optional, Sequence, Tuple
 import click
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS
+from quad_nav.cli.options import echo, echo_lines
 from quad_nav.config.check import Report, check_files, check_folder, counts, report_text
 from quad_nav.config.files import PlacedFile
 from quad_nav.errors import InputError
@@ -59,13 +60,14 @@ def check(paths: Tuple[str, ...], robot: Optional[int], strict: bool) -> None:
 def _show(reports: Sequence[Report], unused: Sequence[Path], empty: Sequence[str]) -> None:
     terminal = shutil.get_terminal_size((_WIDEST, 24)).columns
     width = max(_NARROWEST, min(terminal, _WIDEST))
-    click.echo("\n\n".join(report_text(report, width) for report in reports))
+    echo_lines("\n\n".join(report_text(report, width) for report in reports))
     if unused:
-        click.echo("\nNot checked, no move_base parameters in: " + ", ".join(map(str, unused)))
+        echo("")
+        echo("Not checked, no move_base parameters in: " + ", ".join(map(str, unused)))
     if len(reports) > 1:
-        click.echo(f"\n{len(reports)} configurations: {counts(reports)}")
+        echo_lines(f"\n{len(reports)} configurations: {counts(reports)}")
     for line in empty:
-        click.echo(line, err=True)
+        echo(line, err=True)
 
 
 def _placed(word: str) -> PlacedFile:

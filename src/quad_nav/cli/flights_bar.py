@@ -7,11 +7,12 @@ import sys
 import time
 from typing import Callable, TypeVar
 
-import click
+from rich.markup import escape
 
 from quad_nav.cli import EXIT_INTERRUPTED
-from quad_nav.cli.options import raise_on_signals
+from quad_nav.cli.options import echo, raise_on_signals
 from quad_nav.cli.progress import flights_progress
+from quad_nav.errors import printable
 from quad_nav.files.shipped import config_folder
 from quad_nav.scenario.warm_up import simulate, warm_up
 from quad_nav.tuning.evaluation import Course, StudyObserver
@@ -69,7 +70,7 @@ class FlightsBar(StudyObserver):
 
     def on_stage(self, name: str) -> None:
         """Show the stage."""
-        self._progress.update(self._task, description=name)
+        self._progress.update(self._task, description=escape(printable(name)))
 
     def on_flight(self, flight: FlightResult, cached: bool) -> None:
         """Count a flight."""
@@ -85,7 +86,7 @@ class FlightsBar(StudyObserver):
 
     def on_problem(self, problem: str) -> None:
         """Print a fault that does not end the flights."""
-        click.echo(problem, err=True)
+        echo(problem, err=True)
 
     def _show(self) -> None:
         parts = [f"{self.per_minute:.1f} per minute", f"{self.failed} failed"]
@@ -121,8 +122,8 @@ def run_with_bar(
             result = run(bar)
         except KeyboardInterrupt:
             bar.__exit__()
-            click.echo(f"interrupted; {interrupted(bar)}", err=True)
+            echo(f"interrupted; {interrupted(bar)}", err=True)
             sys.exit(EXIT_INTERRUPTED)
     if not quiet:
-        click.echo(bar.text, err=True)
+        echo(bar.text, err=True)
     return result

@@ -14,7 +14,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 import click
 
 from quad_nav.cli import EXIT_INTERRUPTED
-from quad_nav.cli.options import exit_on_faults, parameter, show_warnings
+from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.files.shipped import shipped
@@ -247,13 +247,13 @@ def _fly(
     to_terminal = json_path == "-"
     if not quiet:
         width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
-        click.echo(table(summary, width), err=to_terminal)
+        echo_lines(table(summary, width), err=to_terminal)
     if to_terminal:
-        click.echo(json.dumps(to_json(summary), indent=2, allow_nan=False))
+        echo_lines(json.dumps(to_json(summary), indent=2, allow_nan=False))
     elif json_path is not None:
         write_json(summary, json_path)
     for line in pictures.write(summary):
-        click.echo(line, err=True)
+        echo(line, err=True)
     return EXIT_INTERRUPTED if summary.reason == INTERRUPTED else summary.exit_status
 
 

@@ -12,8 +12,9 @@ import click
 import yaml
 
 from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
-from quad_nav.errors import InputError, QuadError
+from quad_nav.errors import InputError, QuadError, printable
 from quad_nav.files import plain_yaml
+from quad_nav.files.document import yaml_fault
 from quad_nav.kernels.jit import cache_warnings
 
 A_FILE = click.Path(dir_okay=False, path_type=Path)
@@ -41,9 +42,19 @@ def parameter(text: str) -> Tuple[str, Any]:
         raise InputError(
             [
                 f"--set {text}: {value!r} is not YAML, expected a value as in a "
-                f"parameter file: {error}"
+                f"parameter file: {yaml_fault(error)}"
             ]
         ) from error
+
+
+def echo(line: object, err: bool = False) -> None:
+    """Print one line; line ends within it are escaped, too."""
+    click.echo(printable(line), err=err)
+
+
+def echo_lines(text: str, err: bool = False) -> None:
+    """Print a text of several lines, such as a table."""
+    click.echo(printable(text, "\n"), err=err)
 
 
 @contextmanager
@@ -52,17 +63,17 @@ def exit_on_faults() -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        click.echo("flight not started, invalid input:\n  " + "\n  ".join(error.problems), err=True)
+        echo_lines("flight not started, invalid input:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
     except QuadError as error:
-        click.echo(str(error), err=True)
+        echo_lines(str(error), err=True)
         sys.exit(EXIT_FAILURE)
 
 
 def show_warnings(warnings: Iterable[str]) -> None:
     """Print the warnings of a set-up, and what a missing cache of the kernels costs."""
     for warning in (*warnings, *cache_warnings()):
-        click.echo(warning, err=True)
+        echo(warning, err=True)
 
 
 def is_terminal(file: Optional[TextIO]) -> bool:

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import track
 
 from quad_nav.cli import EXIT_BAD_INPUT
+from quad_nav.cli.options import echo, echo_lines
 from quad_nav.errors import InputError
 from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.trace import FlightTrace
@@ -65,12 +66,12 @@ def report(
         else:
             write_comparison(_read(flights, flight_metrics, faults), output, png)
     except InputError as error:
-        click.echo("no report written:\n  " + "\n  ".join(error.problems), err=True)
+        echo_lines("no report written:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
-    click.echo(f"report: {output}")
+    echo(f"report: {output}")
     if animate is not None:
         animate_flight(trace, animate)
-        click.echo(f"animation: {animate}")
+        echo(f"animation: {animate}")
 
 
 def _read(

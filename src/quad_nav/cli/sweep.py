@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from pathlib import Path
@@ -17,6 +18,8 @@ from quad_nav.cli.options import (
     A_FOLDER,
     COUNT,
     OUTPUT,
+    echo,
+    echo_lines,
     exit_on_faults,
     is_terminal,
     show_warnings,
@@ -112,10 +115,14 @@ def sweep(
     with exit_on_faults():
         setup, rows, is_stored = _fly(quiet=quiet, **given)
     if not quiet:
-        click.echo(table(rows), err=is_terminal(json_file) or is_terminal(csv_file))
+        echo_lines(table(rows), err=is_terminal(json_file) or is_terminal(csv_file))
     if json_file is not None:
         click.echo(json.dumps(to_json(setup, rows), indent=2, allow_nan=False), json_file)
-    if csv_file is not None:
+    if csv_file is not None and is_terminal(csv_file):
+        lines = io.StringIO()
+        write_csv(rows, lines)
+        echo_lines(lines.getvalue().rstrip("\n"))
+    elif csv_file is not None:
         write_csv(rows, csv_file)
     _draw(setup, rows, report, png)
     sys.exit(EXIT_SUCCESS if is_stored else EXIT_FAILURE)
@@ -135,7 +142,7 @@ def _fly(
     pool = workers_of(workers, ray_address)
     if not quiet:
         show_warnings(setup.warnings)
-        click.echo(
+        echo(
             f"{len(setup.points)} points, {flights} flights each, {pool.count} flights at the "
             "same time",
             err=True,
@@ -187,4 +194,4 @@ def _draw(
     from quad_nav.tuning.report.sweep_page import write_sweep_report
 
     for path in write_sweep_report(setup, rows, report, png):
-        click.echo(f"written: {path}", err=True)
+        echo(f"written: {path}", err=True)

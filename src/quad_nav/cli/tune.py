@@ -11,7 +11,15 @@ import click
 
 from quad_nav.cli import EXIT_SUCCESS
 from quad_nav.cli.flights_bar import run_with_bar
-from quad_nav.cli.options import A_FILE, A_FOLDER, COUNT, exit_on_faults, show_warnings
+from quad_nav.cli.options import (
+    A_FILE,
+    A_FOLDER,
+    COUNT,
+    echo,
+    echo_lines,
+    exit_on_faults,
+    show_warnings,
+)
 from quad_nav.cli.study_options import (
     course_of,
     flown_options,
@@ -133,9 +141,9 @@ def tune(
         )
         for path in write_result(result, shlex.join(["quad", *sys.argv[1:]])):
             if not quiet:
-                click.echo(f"written: {path}", err=True)
+                echo(f"written: {path}", err=True)
     if not quiet:
-        click.echo(text(result))
+        echo_lines(text(result))
     sys.exit(EXIT_SUCCESS)
 
 
@@ -170,7 +178,7 @@ def _options(
 def _announce(setup: TuneSetup, workers: Workers) -> None:
     show_warnings(setup.warnings)
     search = setup.options.search
-    click.echo(
+    echo(
         f"{search.candidates} candidates of up to {search.flights} flights, "
         f"{len(setup.space.dimensions)} parameters, {workers.count} flights at the same time",
         err=True,

@@ -15,7 +15,7 @@ from quad_nav.config import Remark, load, load_files
 from quad_nav.config.file_sets import FileSet, file_sets
 from quad_nav.config.files import PlacedFile
 from quad_nav.config.notes import ERROR, ParameterError
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, printable
 
 _COSTMAPS = ("global_costmap/", "local_costmap/")
 _BOTH = "*_costmap/"
@@ -91,7 +91,13 @@ def check_set(file_set: FileSet) -> Report:
         remarks = error.remarks
     # Remarks mean nothing while some of the files are missing from the tree.
     lines = faults if len(readable) < len(file_set.files) else [*faults, *remarks]
-    return Report(file_set, tuple(_merged(lines)))
+    return Report(file_set, tuple(map(_in_one_line, _merged(lines))))
+
+
+def _in_one_line(line: Remark) -> Remark:
+    """Escape line ends in keys and values: each text is a cell of a table."""
+    texts = (line.place, line.kind, line.text, line.origin, line.nearest)
+    return Remark(*map(printable, texts))
 
 
 def _fault_of_file(problem: str) -> Remark:
@@ -105,9 +111,9 @@ def report_text(report: Report, width: int = 100) -> str:
     files = report.files
     names = ", ".join(_seen_from(_root(files), str(file.path)) for file in files.files)
     parts = [
-        f"{_title(files)}: {counts([report])}",
+        f"{printable(_title(files))}: {counts([report])}",
         textwrap.fill(
-            names,
+            printable(names),
             width,
             initial_indent="  ",
             subsequent_indent="  ",

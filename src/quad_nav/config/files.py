@@ -17,6 +17,7 @@ import yaml
 
 from quad_nav.config.notes import CAUTION, Remark
 from quad_nav.errors import InputError
+from quad_nav.files.document import yaml_fault
 from quad_nav.files.plain_yaml import MAX_BYTES, MAX_LEVELS, PlainLoader
 from quad_nav.files.user_files import read_text
 
@@ -283,6 +284,6 @@ def _namespace(tree: Dict[str, Any], path: Iterable[str]) -> Dict[str, Any]:
 def _syntax_error(error: yaml.YAMLError, path: Path) -> str:
     mark = getattr(error, "problem_mark", None)
     if mark is None:
-        return f"{path}: not YAML: {error}"
+        return f"{path}: {yaml_fault(error)}"
     what = ", ".join(filter(None, (getattr(error, "context", None), error.problem)))  # type: ignore[attr-defined]
     return f"{path}:{mark.line + 1}:{mark.column + 1}: not YAML: {what}"

@@ -26,7 +26,7 @@ def read_yaml(path: Path) -> Any:
     try:
         return yaml.load(read_text(path, MAX_BYTES), Loader=_Loader)
     except yaml.YAMLError as error:
-        raise InputError([f"{path}: {_yaml_fault(error)}"]) from error
+        raise InputError([f"{path}: {yaml_fault(error)}"]) from error
 
 
 class Checker:
@@ -141,9 +141,10 @@ class _Loader(PlainLoader):
         return super().construct_mapping(node, deep)
 
 
-def _yaml_fault(error: yaml.YAMLError) -> str:
+def yaml_fault(error: yaml.YAMLError) -> str:
+    """Describe an error of YAML in one line, with its place if that is known."""
     mark = getattr(error, "problem_mark", None)
-    problem = getattr(error, "problem", None) or str(error)
+    problem = getattr(error, "problem", None) or " ".join(str(error).split())
     if mark is None:
         return f"not YAML: {problem}"
     return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"

@@ -17,6 +17,8 @@ import sys
 import threading
 from typing import List
 
+from quad_nav.errors import printable
+
 RESPAWNED = "--respawned"
 DELAY_S = 1.0
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
@@ -42,7 +44,7 @@ def main() -> int:
         if status >= 0 or ended.is_set():
             return status if status >= 0 else 128 - status
         print(
-            f"{command[0]}: killed by {signal.Signals(-status).name}, restarting",
+            f"{printable(command[0])}: killed by {signal.Signals(-status).name}, restarting",
             file=sys.stderr,
             flush=True,
         )

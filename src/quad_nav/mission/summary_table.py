@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Container, Iterable, List, Optional, Sequence, Tuple
 
+from quad_nav.errors import printable
 from quad_nav.mission.flight_log import INTERRUPTED, Leg
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.sim.contacts import Contact
@@ -66,7 +67,7 @@ def _goal_table(robots: Sequence[RobotSummary], width: int) -> str:
             goal = f"{leg.lap}/{leg.index + 1}" if has_laps else str(leg.index + 1)
             _add_row(columns, _goal_row(robot.robot if leg is robot.legs[0] else "", goal, leg))
             if leg.reason and leg.attempts and leg.reason != INTERRUPTED:
-                notes.append(f"{robot.robot}: goal {goal}: {leg.reason}")
+                notes.append(printable(f"{robot.robot}: goal {goal}: {leg.reason}"))
     return "\n".join([_text(columns, width, first_rows[1:]), *notes])
 
 
@@ -144,7 +145,7 @@ def _contact_table(contacts: Sequence[Contact], width: int) -> str:
 
 def _add_row(columns: Sequence[_Column], cells: Iterable[str]) -> None:
     for column, cell in zip(columns, cells):
-        column.cells.append(cell)
+        column.cells.append(printable(cell))
 
 
 def _text(columns: Sequence[_Column], width: int, lines_above: Container[int] = ()) -> str:
@@ -192,7 +193,8 @@ def _verdict(summary: MissionSummary) -> str:
     speed = f", real-time factor {factor:.2f}" if factor is not None else ""
     count = len(summary.contacts)
     contacts = f", {count} contact{'s' * (count != 1)}" if summary.contacts_reported else ""
-    reason = f"\nThe mission ended early: {summary.reason}." if summary.reason else ""
+    early = f"\nThe mission ended early: {printable(summary.reason)}."
+    reason = early if summary.reason else ""
     return (
         f"Mission {'succeeded' if summary.success else 'FAILED'}: {reached} of {len(legs)} goals "
         f"reached{contacts} in {summary.sim_time_s:.1f} s "

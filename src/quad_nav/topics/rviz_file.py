@@ -17,7 +17,7 @@ from typing import Any, Dict, List, Sequence, Tuple
 
 import yaml
 
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, printable
 from quad_nav.files.shipped import shipped
 from quad_nav.scenario.rules import RANDOM
 from quad_nav.scenario.scenario import scene_of
@@ -160,7 +160,7 @@ def main() -> int:
     try:
         yaml.safe_dump(document(given.robots, scene_of(vars(given))), sys.stdout, sort_keys=False)
     except InputError as error:
-        print(error, file=sys.stderr)
+        print(printable(error, "\n"), file=sys.stderr)
         return EXIT_BAD_INPUT
     return 0
 

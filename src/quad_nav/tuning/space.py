@@ -23,6 +23,7 @@ import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
+from quad_nav.files.document import yaml_fault
 from quad_nav.files.user_files import read_text
 from quad_nav.files.values import is_number
 
@@ -134,7 +135,7 @@ def load_space(path: Path) -> SearchSpace:
     try:
         entries = plain_yaml.load(read_text(path, plain_yaml.MAX_BYTES))
     except yaml.YAMLError as error:
-        raise InputError([f"{path}: cannot read: {error}"]) from error
+        raise InputError([f"{path}: cannot read: {yaml_fault(error)}"]) from error
     if not isinstance(entries, dict) or not entries:
         raise InputError(
             [

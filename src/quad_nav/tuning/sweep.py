@@ -14,6 +14,7 @@ import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
+from quad_nav.files.document import yaml_fault
 from quad_nav.files.shipped import config_folder
 from quad_nav.files.user_files import read_text
 from quad_nav.offline.workers import Workers
@@ -118,7 +119,7 @@ def read_points(path: Path) -> Tuple[Point, ...]:
             {name: plain_yaml.load(word) for name, word in zip(paths, row)} for row in rows
         )
     except yaml.YAMLError as error:
-        raise InputError([f"{path}: a value is not YAML: {error}"]) from error
+        raise InputError([f"{path}: a value is not YAML: {yaml_fault(error)}"]) from error
 
 
 def read_sweep_setup(options: SweepOptions) -> SweepSetup:

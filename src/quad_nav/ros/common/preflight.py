@@ -19,7 +19,7 @@ from typing import Any, Callable, Dict, List, Mapping
 import rospkg
 import yaml
 
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, printable
 from quad_nav.mission.summary import MissionSummary, write_json
 from quad_nav.scenario import fleet_setup, mission_setup, simulator_setup
 from quad_nav.scenario.mission_setup import MissionSetup
@@ -90,7 +90,8 @@ def main() -> int:
     problems = faults(tree)
     if not problems:
         return 0
-    print("flight not started, invalid input:\n  " + "\n  ".join(problems), file=sys.stderr)
+    lines = "flight not started, invalid input:\n  " + "\n  ".join(problems)
+    print(printable(lines, "\n"), file=sys.stderr)
     if tree.get("sequencer", {}).get("result"):
         write_json(
             MissionSummary((), reason="bad input", problems=tuple(problems)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import signal
 import socket
 import threading
@@ -12,6 +13,8 @@ from typing import Callable, Dict, List, Optional, Sequence
 
 import rosgraph
 import rospy
+
+from quad_nav.errors import QuadError, printable
 
 WARN_EVERY_S = 10.0  # wall time, as all durations here
 POLL_S = 0.1
@@ -27,6 +30,7 @@ def init_node(name: str) -> None:
     that thread is publishing and holds the lock.
     """
     rospy.init_node(name, disable_signals=True)
+    escape_log_messages()
 
     def shut_down(number: int, _frame: Optional[FrameType]) -> None:
         reason = signal.Signals(number).name
@@ -34,6 +38,29 @@ def init_node(name: str) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, shut_down)
+
+
+def escape_log_messages() -> None:
+    """Escape what a terminal would obey in all further messages of this node."""
+    logging.getLogger("rosout").addFilter(_EscapedMessages())
+
+
+class _EscapedMessages(logging.Filter):
+    """Escapes messages and their arguments; lists of faults keep their lines."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        record.msg = printable(record.msg, "\n")
+        if isinstance(record.args, tuple):
+            record.args = tuple(map(_printable_argument, record.args))
+        return True
+
+
+def _printable_argument(value: object) -> object:
+    if isinstance(value, (int, float)):
+        return value
+    if isinstance(value, QuadError):
+        return printable(value, "\n")
+    return printable(value)
 
 
 @dataclass(frozen=True)

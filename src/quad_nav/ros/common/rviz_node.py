@@ -9,7 +9,7 @@ from pathlib import Path
 import rospkg
 import yaml
 
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, printable
 from quad_nav.scenario.scenario import scene_of
 from quad_nav.topics.rviz_file import EXIT_BAD_INPUT, arguments, document
 
@@ -24,7 +24,7 @@ def main() -> int:
     try:
         content = document(given.robots, scene_of(vars(given)))
     except InputError as error:
-        print(error, file=sys.stderr)
+        print(printable(error, "\n"), file=sys.stderr)
         return EXIT_BAD_INPUT
     path = Path(rospkg.get_log_dir()) / "quad" / f"fleet-{os.getpid()}.rviz"
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ import rospy
 
 from quad_nav import config
 from quad_nav.config import Configuration
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, printable
 from quad_nav.kernels.jit import cache_warnings
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms
@@ -111,7 +111,8 @@ def _run(
         NavigatorLoop(group.robots, group.peers, period_s).run()
     except InputError as error:
         rospy.logfatal("%s: invalid parameters, shutting down:\n%s", name, error)
-        print(f"{name}: invalid parameters, shutting down:\n{error}", file=sys.stderr)
+        lines = f"{name}: invalid parameters, shutting down:\n{error}"
+        print(printable(lines, "\n"), file=sys.stderr)
         return EXIT_BAD_INPUT
     except rospy.ROSInterruptException:
         return 0  # a shutdown interrupts the loop's sleep

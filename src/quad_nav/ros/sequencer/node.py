@@ -14,7 +14,7 @@ from typing import List, Optional
 
 import rospy
 
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, printable
 from quad_nav.mission.flight_log import unflown_legs
 from quad_nav.mission.respawn import RESPAWNED
 from quad_nav.mission.summary import (
@@ -61,10 +61,10 @@ def watch(mission: MissionRunner, exit_when_done: bool, result: Path) -> int:
 def report(summary: MissionSummary, result: Path) -> int:
     """Print the summary table, write the JSON file and return the exit status."""
     width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
-    print(f"\n{table(summary, width)}", flush=True)
+    print(printable(f"\n{table(summary, width)}", "\n"), flush=True)
     if not _write(summary, result):
         return summary.exit_status or EXIT_FAILURE
-    print(f"Summary written to {result}\n", flush=True)
+    print(printable(f"Summary written to {result}") + "\n", flush=True)
     return summary.exit_status
 
 
@@ -99,7 +99,8 @@ def fly(mission: MissionRunner, setup: MissionSetup, result: Path) -> int:
 
 
 def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:
-    rospy.logfatal("sequencer: flight not started, %s:\n  %s", reason, "\n  ".join(lines))
+    problems = "\n  ".join(map(printable, lines))
+    rospy.logfatal(f"sequencer: flight not started, {printable(reason)}:\n  {problems}")
     robots = tuple(
         RobotSummary(robot.name, tuple(unflown_legs(robot.sequence))) for robot in setup.robots
     )

@@ -28,9 +28,10 @@ from std_srvs.srv import (
 )
 from visualization_msgs.msg import Marker, MarkerArray
 
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, printable
 from quad_nav.kernels.jit import cache_warnings
 from quad_nav.ros.common.conversions import twist_from_message
+from quad_nav.ros.common.readiness import escape_log_messages
 from quad_nav.ros.simulator.topics import SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
     DEFAULTS,
@@ -275,6 +276,7 @@ def main() -> int:
         0 after a shutdown, 2 if the parameters or the scene are not valid.
     """
     rospy.init_node("simulator", disable_signals=True)
+    escape_log_messages()
     name = rospy.get_name().lstrip("/")
     try:
         parameters = rospy.get_param("~", {})
@@ -288,7 +290,7 @@ def main() -> int:
         setup = read_setup(parameters, name)
         node = SimulatorNode(setup)
     except InputError as error:
-        print(error, file=sys.stderr)
+        print(printable(error, "\n"), file=sys.stderr)
         return 2
     for remark in (*setup.scene.remarks, *cache_warnings()):
         rospy.logwarn("%s", remark)

@@ -1,0 +1,229 @@
+"""No text of files and arguments reaches the terminal as a control sequence or a line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import unicodedata
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+from study_flights import FLOWN, SCENE, SPACE, write_mission
+
+from quad_nav.cli import main
+from quad_nav.errors import InputError, printable
+from quad_nav.files.shipped import shipped
+from quad_nav.mission.flight_log import Leg
+from quad_nav.mission.goal_file import Goal
+from quad_nav.mission.summary import MissionSummary, RobotSummary
+from quad_nav.mission.summary_table import table
+from quad_nav.recording.bag_info import checked_flight
+from quad_nav.sim.contacts import Contact
+from quad_nav.tuning.flight_cache import FlightCache
+
+EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\x08\x7f\u202ecod\u2066\u200e\nforged: all goals reached"
+NAME = EVIL.replace("/", "")
+QUOTED = json.dumps(EVIL)  # as JSON and as YAML
+
+
+def assert_harmless(text, *, shown=True):
+    """Fail if a terminal would obey the text, or if it has a line from a file."""
+    bad = {c for c in text if c != "\n" and unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp")}
+    assert bad == set(), repr(text)
+    assert not any(line.lstrip().startswith("forged") for line in text.splitlines()), text
+    assert not shown or "forged" in text, text  # otherwise the case says nothing
+
+
+def quad(*arguments, status=2, shown=True):
+    """Run a command and look at all that it prints."""
+    done = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    assert done.exit_code == status, done.output
+    assert_harmless(done.output, shown=shown)
+    return done.output
+
+
+@pytest.fixture
+def mission(tmp_path):
+    """The files of a small mission."""
+    return write_mission(tmp_path)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A configuration that can be changed."""
+    return Path(shutil.copytree(shipped("config", "default"), tmp_path / "config"))
+
+
+YAML = {
+    "key": f"TrajectoryPlannerROS: {{{QUOTED}: 1}}\n",
+    "key at the top": f"{QUOTED}: 1\n",
+    "value": f"TrajectoryPlannerROS: {{max_vel_x: {QUOTED}}}\n",
+    "planner": f"base_local_planner: {QUOTED}\nmax_vel_x: 1.0\n",
+    "frame": f"local_costmap: {{global_frame: {QUOTED}, footprint: {QUOTED}}}\n",
+    "twice": f"{{? {QUOTED} : 1, ? {QUOTED} : 2}}\n",
+    "not YAML": "a: [\x1b[2J\n",
+    "alias": "a: *forged\u202e\n",
+    "tag": "a: !forged\u202e x\n",
+}
+
+
+@pytest.mark.parametrize("how", YAML)
+def test_parameters(folder, mission, how):
+    (folder / "base_local_planner_params.yaml").write_text(YAML[how], encoding="utf-8")
+    names_it = how not in ("not YAML", "alias", "tag")
+    done = CliRunner().invoke(main, ["check", str(folder)])
+    assert_harmless(done.output, shown=names_it)
+    if how in ("key", "key at the top", "value"):
+        files = ["--scene", str(mission.scene), "--goals", str(mission.goals)]
+        arguments = ["fly", "--time-limit", "0.1", *files, "--config", str(folder)]
+        done = CliRunner().invoke(main, arguments)
+        assert done.exit_code == (2 if how == "value" else 1), done.output
+        assert_harmless(done.output)
+
+
+def test_names_of_files_and_folders(tmp_path, mission):
+    named = tmp_path / NAME
+    quad("check", named)
+    quad("fly", "--scene", named)
+    quad("fly", "--goals", named)
+    quad("fly", "--config", named)
+    quad("fly", "--record", named)
+    quad("report", named)
+    quad("tune", "--space", named, "--output", tmp_path / "out")
+    quad("tune", "--against", NAME, "--output", tmp_path / "out")
+    quad("sweep", "--points", named)
+    quad("barn", "--worlds", named)
+    named.mkdir()
+    (named / "costmap_common_params.yaml").write_text("local_costmap: {width: 3.0}\n")
+    quad("check", named, status=0)
+    (named / "other.yaml").write_text("[]")
+    files = ["--scene", mission.scene, "--goals", mission.goals]
+    over = ["--over", "TrajectoryPlannerROS/max_vel_x=0.4"]
+    quad("sweep", *files, *over, "--cache", named / "nowhere" / "f.db")
+
+
+def test_arguments(tmp_path):
+    for arguments in (
+        [f"--{NAME}"],
+        [NAME],
+        ["fly", f"--{NAME}"],
+        ["fly", NAME],
+        ["fly", "--seed", NAME],
+        ["fly", "--set", NAME],
+        ["fly", "--set", f"global_costmap/width=[{NAME}"],
+        ["sweep", "--over", NAME],
+        ["sweep", "--over", f"TrajectoryPlannerROS/{NAME}=1,2"],
+        ["barn", "--worlds", "x.npz", "--only", NAME],
+    ):
+        quad(*arguments)
+
+
+GOALS = [
+    f'{{"goals": [[1, 2]], {QUOTED}: 1}}',
+    f'{{"goals": [[1, 2]], "goal_tolerance": {QUOTED}}}',
+    f'{{"goals": [[1, 2]], {QUOTED}: 1, {QUOTED}: 2}}',
+]
+
+
+@pytest.mark.parametrize("text", GOALS)
+def test_goals(mission, text):
+    (mission.goals / "quad0_goals.json").write_text(text)
+    quad("fly", "--scene", mission.scene, "--goals", mission.goals, shown="tol" not in text)
+
+
+SCENES = [
+    f"{SCENE}{QUOTED}: 1\n",
+    SCENE.replace("name: small", f"name: {QUOTED}"),
+    SCENE.replace("name: pillar", f"name: {QUOTED}"),
+    SCENE.replace("shape: cylinder", f"shape: {QUOTED}"),
+    SCENE.replace("altitude: 1.0", f"altitude: {QUOTED}"),
+    f"{SCENE}map: {QUOTED}\n",
+    f"world: {QUOTED}\n",
+    f"name: x\nmap: {QUOTED}\n",
+]
+
+
+@pytest.mark.parametrize("text", SCENES)
+def test_scenes(mission, text):
+    mission.scene.write_text(text, encoding="utf-8")
+    quad("fly", "--scene", mission.scene, "--goals", mission.goals)
+
+
+XML_EVIL = "&#x202e;&#x9b;31m&#x85;&#10;forged: all goals reached"
+WORLD = "<sdf version='1.6'><world name='w'>{}</world></sdf>"
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        f"<model name='{XML_EVIL}'><link name='l'><collision name='c'><geometry><box><size>0 1 1"
+        "</size></box></geometry></collision></link></model>",
+        f"<include><uri>{XML_EVIL}</uri></include>",
+        f"<model name='m'><pose>{XML_EVIL}</pose></model>",
+        f"<model name='{XML_EVIL}'><pose>nan</pose></model>",
+    ],
+)
+def test_worlds(mission, tmp_path, parts):
+    (tmp_path / "a.world").write_text(WORLD.format(parts), encoding="utf-8")
+    world = tmp_path / "a.world"
+    quad("fly", "--scene", world, "--goals", mission.goals, shown="<pose>&" in parts)
+
+
+@pytest.mark.parametrize(
+    "line", [f"image: {QUOTED}", f"image: m.png\nmode: {QUOTED}", f"{QUOTED}: 1"]
+)
+def test_maps(mission, tmp_path, line):
+    Image.fromarray(np.full((40, 40), 254, np.uint8)).save(tmp_path / "m.png")
+    usual = "resolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 2\nfree_thresh: 0.1\n"
+    (tmp_path / "m.yaml").write_text(f"{line}\n{usual}")
+    shown = line != f"{QUOTED}: 1"  # the faults of the other keys are first
+    quad("fly", "--scene", tmp_path / "m.yaml", "--goals", mission.goals, shown=shown)
+
+
+def test_studies(tmp_path, mission):
+    files = ["--scene", mission.scene, "--goals", mission.goals]
+    (tmp_path / "space.yaml").write_text(f"{SPACE}{QUOTED}: {{range: [0, 1]}}\n")
+    quad("tune", *files, "--space", tmp_path / "space.yaml", "--output", tmp_path / "out")
+    (tmp_path / "p.csv").write_text(f'TrajectoryPlannerROS/max_vel_x,"{EVIL}"\n0.3,1\n')
+    quad("sweep", *files, "--points", tmp_path / "p.csv")
+    (tmp_path / "p.csv").write_text(f'TrajectoryPlannerROS/max_vel_x\n"{EVIL}"\n')
+    quad("sweep", *files, "--points", tmp_path / "p.csv", shown=False)
+    cache = FlightCache(tmp_path / "f.db")
+    cache.add(("{}", "m", 0), replace(FLOWN, reached=7, goals=2, reason=EVIL))
+    over = ["--over", "TrajectoryPlannerROS/max_vel_x=0.4", "--cache", tmp_path / "f.db"]
+    quad("sweep", *files, *over, shown=False)
+    (tmp_path / "f.db").write_text(f"{EVIL}" * 50)
+    quad("sweep", *files, *over, shown=False)
+
+
+@pytest.mark.parametrize("name", ["a.bag", "a.mcap", f"{NAME}.bag", "a.txt"])
+def test_recordings(tmp_path, name):
+    path = tmp_path / name
+    path.write_text(f"#ROSBAG V2.0\n{EVIL}")
+    quad("report", path, shown="forged" in name)
+
+
+def test_messages_of_move_base_in_the_summary():
+    leg = Leg(0, 1, Goal(1.0, 2.0), False, EVIL, 1, 3.0, 1.0, 1.0)
+    robots = (RobotSummary("quad0", (leg, replace(leg, time_s=None))),)
+    contacts = (Contact(1.0, "quad0", EVIL, 1.0, 2.0),)
+    assert_harmless(table(MissionSummary(robots, contacts=contacts, reason=EVIL)))
+
+
+def test_recorded_flights_are_refused_in_one_line():
+    with pytest.raises((InputError, ValueError)) as raised:
+        checked_flight({"robots": [{"parameters": {EVIL: {EVIL: 1}}, "name": 5}], EVIL: 1})
+    assert_harmless(printable(raised.value), shown=False)
+
+
+def test_printable():
+    assert printable("a\tb\x1b[0m\x85\u2028\u202e") == "a\\tb\\x1b[0m\\x85\\u2028\\u202e"
+    assert printable("quäd 漢字 → 90°") == "quäd 漢字 → 90°"
+    assert printable("a\nb") == "a\\nb" and printable("a\nb\r", "\n") == "a\nb\\r"
+    assert printable(printable(EVIL)) == printable(EVIL)
+    assert printable("\udcff") == "\\udcff"
