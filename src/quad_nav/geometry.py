@@ -119,6 +119,17 @@ class Pose2D:
         """
         return np.column_stack(self.transform(points[:, 0], points[:, 1]))
 
+    def transform_poses(self, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Transform poses, such as those of a plan, from frame b to frame a.
+
+        Args:
+            poses: float64[n, 3], rows x, y, yaw in frame b.
+
+        Returns:
+            float64[n, 3], rows x, y, yaw in frame a; the yaws are not normalised.
+        """
+        return np.column_stack((self.transform_points(poses[:, :2]), poses[:, 2] + self.yaw_rad))
+
     def inverse_transform_points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transform points from frame a to frame b; see ``inverse_transform``.
 
@@ -129,6 +140,10 @@ class Pose2D:
             float64[n, 2], metres in frame b.
         """
         return np.column_stack(self.inverse_transform(points[:, 0], points[:, 1]))
+
+    def to_3d(self) -> Pose3D:
+        """Return the same pose in space, at z = 0."""
+        return Pose3D(self.x_m, self.y_m, 0.0, quaternion_from_yaw(self.yaw_rad))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from quad_nav.offline.run import fly as fly_setup
 from quad_nav.offline.worker_process import processes_for
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.odometry import MAX_DRIFT, OdomDrift
 from quad_nav.sim.simulation import LIDAR_CASTERS, SimulationParams
 
 _TUTORIAL_ROBOTS = 2
@@ -80,7 +81,7 @@ _AMOUNT = click.FloatRange(min=0.0)
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help="Seed of jitter, noise and random missions; the same seed gives the same flight.",
+    help="Seed of jitter, noise, drift and random missions; the same seed gives the same flight.",
 )
 @click.option(
     "--jitter",
@@ -122,6 +123,14 @@ _AMOUNT = click.FloatRange(min=0.0)
     default=0.0,
     metavar="M",
     help="Standard deviation of the LIDARs' range noise.",
+)
+@click.option(
+    "--odom-drift",
+    nargs=2,
+    type=click.FloatRange(0.0, MAX_DRIFT),
+    default=(0.0, 0.0),
+    metavar="M/S RAD/S",
+    help="Speeds at which each robot's frame odom{i} drifts and turns in map. [default: none]",
 )
 @click.option(
     "--lidar",
@@ -203,6 +212,7 @@ def _options(
     range_noise: float,
     jitter: float,
     lidar: str,
+    odom_drift: Tuple[float, float],
     parameters: Tuple[str, ...],
     **given: Any,
 ) -> FlightOptions:
@@ -211,7 +221,9 @@ def _options(
     options = FlightOptions(
         **given,
         parameters=tuple(map(parameter, parameters)),
-        simulation=SimulationParams(beam_params, jitter_m=jitter, lidar_caster=lidar),
+        simulation=SimulationParams(
+            beam_params, jitter_m=jitter, lidar_caster=lidar, odom_drift=OdomDrift(*odom_drift)
+        ),
     )
     few = (options.robots or 0) <= _TUTORIAL_ROBOTS and not options.size_m
     if few and options.scene is None and options.goals is None:

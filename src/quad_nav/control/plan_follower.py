@@ -109,12 +109,12 @@ def plan_in_window(
     first = int(np.argmax(near))
     far_after = np.flatnonzero(~near[first:])
     end = first + int(far_after[0]) + 1 if len(far_after) else len(plan)
-    return _transform(local_from_plan, plan[first:end])
+    return local_from_plan.transform_poses(plan[first:end])
 
 
 def plan_end(plan: NDArray[np.float64], local_from_plan: Pose2D) -> Pose2D:
     """Return the last pose of a plan, float64[n, 3] with n >= 1, in the local frame."""
-    return Pose2D(*_transform(local_from_plan, plan[-1:])[0].tolist())
+    return Pose2D(*local_from_plan.transform_poses(plan[-1:])[0].tolist())
 
 
 def count_passed(plan: NDArray[np.float64], pose: Pose2D) -> int:
@@ -128,9 +128,3 @@ def _distance2(plan: NDArray[np.float64], pose: Pose2D) -> NDArray[np.float64]:
     dx: NDArray[np.float64] = np.subtract(pose.x_m, plan[:, 0])
     dy: NDArray[np.float64] = np.subtract(pose.y_m, plan[:, 1])
     return dx * dx + dy * dy
-
-
-def _transform(a_from_b: Pose2D, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.column_stack(
-        (a_from_b.transform_points(poses[:, :2]), poses[:, 2] + a_from_b.yaw_rad)
-    )

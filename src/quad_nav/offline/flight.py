@@ -10,7 +10,11 @@ from __future__ import annotations
 from operator import attrgetter
 from typing import Dict, List, Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from quad_nav.config import Configuration
+from quad_nav.costmap.layered import CostmapParams
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.robot_goals import RobotGoals
@@ -190,6 +194,13 @@ class Flight:
         """The observers' reasons to end the flight, [] to continue."""
         reasons = (observer.stop_reason for observer in self._observers)
         return list(dict.fromkeys(reason for reason in reasons if reason))
+
+    def plan_in_map(
+        self, robot: int, plan: NDArray[np.float64], costmap: CostmapParams
+    ) -> NDArray[np.float64]:
+        """Express a plan of now, float64[n, 3] in the frame of a robot's costmap, in ``map``."""
+        map_from_frame = self.simulation.map_from_frame(costmap.global_frame, robot)
+        return plan if map_from_frame == Pose2D(0.0, 0.0) else map_from_frame.transform_poses(plan)
 
     def advance(self) -> None:
         """Fly for one period of odometry, 1/40 s.

@@ -23,10 +23,12 @@ from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.odometry import OdomFrames, pose_in
 from quad_nav.sim.simulation import RobotState, RobotStates
 
 LocatedScan = Tuple[Scan, Pose3D]
 """A scan and ``map_from_lidar``, the LIDAR's pose at its stamp."""
+_IDENTITY = Pose2D(0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class NavigatorResult:
     """The result of one navigator's tick.
 
     ``goal_waits`` while the navigator has not taken the last goal that was sent. ``wall_s`` is
-    the tick's wall time.
+    the tick's wall time. ``intention`` is in ``map``.
     """
 
     robot: int
@@ -50,36 +52,74 @@ class OfflineRobot:
 
     Attributes:
         navigator: The navigator.
-        waiting_goal: The last goal that was sent, until the navigator takes it.
+        waiting_goal: The last goal that was sent, in ``map``, until the navigator takes it.
     """
 
-    def __init__(self, configuration: Configuration, number: int) -> None:
-        """Build the navigator of robot ``number``."""
+    def __init__(self, configuration: Configuration, number: int, frames: OdomFrames) -> None:
+        """Build the navigator of robot ``number``, which knows poses in the frames' places."""
         self.navigator = build_navigator(configuration, number)
         self.waiting_goal: Optional[Pose2D] = None
+        self._number, self._frames = number, frames
         costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
         self._intake = ScanIntake(sinks_of(costmaps), configuration.scan_validator)
 
     def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> None:
         """Hand a scan that arrives now to the costmaps, unless it is implausible."""
-        poses = [SensorPose(map_from_lidar, map_from_lidar)] * len(self._intake.sinks)
+        at = {
+            frame: SensorPose(pose, pose)
+            for frame, pose in self._in_costmaps(map_from_lidar, now_s).items()
+        }
+        poses = [at[sink.costmap.params.global_frame] for sink in self._intake.sinks]
         self._intake.add_scan(scan, poses, scan.stamp_s, now_s)
 
     def is_due(self, now_s: float) -> bool:
         """Set the waiting goal if the navigator accepts it; return True if a tick is due."""
         navigator = self.navigator
         if self.waiting_goal is not None and navigator.accepts_goal(now_s):
-            navigator.set_goal(self.waiting_goal, now_s)
+            goal, map_from_global = self.waiting_goal, self.map_from_global(now_s)
+            if map_from_global != _IDENTITY:
+                goal = goal.relative_to(map_from_global)
+            navigator.set_goal(goal, now_s)
             self.waiting_goal = None
         return navigator.next_due_s <= now_s + 1e-9 or navigator.has_work
 
     def navigate(
         self, now_s: float, state: RobotState, peers: Sequence[Peer]
     ) -> Tuple[Tick, RobotPoses]:
-        """Tick the navigator; also return the poses that it was given."""
-        pose = state.map_from_base.to_2d()
-        located = RobotPoses(pose, pose)
+        """Tick the navigator; also return the poses that it was given.
+
+        Args:
+            now_s: Simulated time.
+            state: State of the robot.
+            peers: The other robots, in ``map``.
+        """
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        poses = self._in_costmaps(state.map_from_base, now_s)
+        located = RobotPoses(*(poses[one.params.global_frame].to_2d() for one in costmaps))
+        map_from_global = self.map_from_global(now_s)
+        if map_from_global != _IDENTITY:
+            peers = [peer.relative_to(map_from_global) for peer in peers]
         return self.navigator.tick(now_s, located, state.twist, peers), located
+
+    def intention(self, now_s: float) -> Intention:
+        """Return the navigator's intention in ``map``."""
+        intention, map_from_global = self.navigator.peers.intention, self.map_from_global(now_s)
+        if map_from_global == _IDENTITY:
+            return intention
+        return intention.transformed(map_from_global)
+
+    def map_from_global(self, now_s: float) -> Pose2D:
+        """Return the pose of the global costmap's frame in ``map``."""
+        frame = self.navigator.global_costmap.params.global_frame
+        return self._frames.map_from_frame(frame, self._number, now_s)
+
+    def _in_costmaps(self, map_from_pose: Pose3D, now_s: float) -> Dict[str, Pose3D]:
+        """Express a pose in ``map`` in the frames of the costmaps, by their names."""
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        return {
+            frame: pose_in(self._frames.map_from_frame(frame, self._number, now_s), map_from_pose)
+            for frame in dict.fromkeys(costmap.params.global_frame for costmap in costmaps)
+        }
 
 
 class NavigatorGroup:
@@ -91,12 +131,15 @@ class NavigatorGroup:
 
     def __init__(self, setup: FlightSetup, robots: Sequence[int], lidars: Lidars) -> None:
         """Build the navigators of ``robots``; ``lidars`` are those of all robots."""
-        self.robots = {robot: OfflineRobot(setup.configurations[robot], robot) for robot in robots}
+        frames = OdomFrames(setup.simulation.odom_drift, len(setup.robots), setup.seed)
+        self.robots = {
+            robot: OfflineRobot(setup.configurations[robot], robot, frames) for robot in robots
+        }
         self._lidars = lidars
         self._names = [goals.name for goals in setup.robots]
         self._intentions = [Intention()] * len(setup.robots)
         for number, robot in self.robots.items():
-            self._intentions[number] = robot.navigator.peers.intention
+            self._intentions[number] = robot.intention(0.0)
         maps = SceneMaps(setup.scene)
         for robot in self.robots.values():
             maps.set_map_of(robot.navigator.global_costmap)
@@ -128,8 +171,8 @@ class NavigatorGroup:
         Args:
             now_s: Simulated time.
             states: States of all robots.
-            goals: New goals of robots of this group, by number.
-            updates: Intentions of all robots that have changed, by number.
+            goals: New goals in ``map`` of robots of this group, by number.
+            updates: Intentions in ``map`` of all robots that have changed, by number.
         """
         for number, goal in goals.items():
             self.robots[number].waiting_goal = goal
@@ -154,7 +197,7 @@ class NavigatorGroup:
             located,
             time.perf_counter() - start_s,
             robot.waiting_goal is not None,
-            robot.navigator.peers.intention,
+            robot.intention(now_s),
         )
 
     def _peers_in_reach(

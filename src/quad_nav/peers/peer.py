@@ -1,7 +1,7 @@
 """Peers: state, intention and priority of the other robots.
 
-All positions are in ``map``, the frame of the global costmap. Each robot tells its peers its
-intention: its priority and the path that it follows.
+All positions are in the frame of the global costmap, here called ``map``. Each robot tells its peers
+its intention: its priority and the path that it follows.
 """
 
 from __future__ import annotations
@@ -53,6 +53,10 @@ class Intention:
     priority: float = IDLE_PRIORITY
     path: NDArray[np.float64] = field(default_factory=lambda: NO_PATH)
 
+    def transformed(self, a_from_b: Pose2D) -> Intention:
+        """Return an intention in frame b in frame a."""
+        return replace(self, path=a_from_b.transform_points(self.path))
+
 
 @dataclass(frozen=True)
 class Peer:
@@ -89,6 +93,21 @@ class Peer:
             x_m=self.x_m + self.vx_mps * age_s,
             y_m=self.y_m + self.vy_mps * age_s,
             stamp_s=now_s,
+        )
+
+    def relative_to(self, map_from_frame: Pose2D) -> Peer:
+        """Return a peer and its intention in ``map`` in another frame, as if that stood still."""
+        frame_from_map = map_from_frame.inverse()
+        x_m, y_m = map_from_frame.inverse_transform(self.x_m, self.y_m)
+        vx_mps, vy_mps = frame_from_map.rotate(self.vx_mps, self.vy_mps)
+        return Peer(
+            self.name,
+            x_m,
+            y_m,
+            vx_mps,
+            vy_mps,
+            self.stamp_s,
+            self.intention.transformed(frame_from_map),
         )
 
     def with_intention(self, intention: Intention) -> Peer:

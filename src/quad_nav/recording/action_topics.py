@@ -40,7 +40,8 @@ class _Goal:
 class ActionTopics:
     """Goals, status, feedback and results of one robot's action server."""
 
-    def __init__(self, robot: int, topics: TopicWriter) -> None:
+    def __init__(self, robot: int, topics: TopicWriter, global_frame: str = "map") -> None:
+        self._global_frame = global_frame
         self._topics = topics
         self._robot = robot
         self._node = f"/move_base{robot}"
@@ -90,7 +91,7 @@ class ActionTopics:
         self._write_status(now_s)
 
     def feedback(self, now_s: float, pose: Pose2D) -> None:
-        """Write the feedback of a control cycle at ``pose`` in ``map``."""
+        """Write the feedback of a control cycle at ``pose`` in the global costmap's frame."""
         if self._active is None:
             return
         stamp = stamp_at(now_s)
@@ -102,7 +103,8 @@ class ActionTopics:
                 header("", stamp),
                 self._active.message(),
                 message(
-                    "move_base_msgs/MoveBaseFeedback", pose_stamped(planar_pose(pose), "map", stamp)
+                    "move_base_msgs/MoveBaseFeedback",
+                    pose_stamped(planar_pose(pose), self._global_frame, stamp),
                 ),
             ),
         )

@@ -18,10 +18,16 @@ _STATES = {state.value: state for state in State}
 
 
 class BagRobot:
-    """Collects messages and builds a ``RobotTrace``; times are the recording's until then."""
+    """Collects messages and builds a ``RobotTrace``; times are the recording's until then.
+
+    Attributes:
+        map_from_odom: Last pose of the odometry frame in ``map``.
+        odom_frame: Name of the odometry frame; "" if the recording has no transform of it.
+    """
 
     def __init__(self) -> None:
         self.map_from_odom = Pose3D(0.0, 0.0, 0.0)
+        self.odom_frame = ""
         self._moves: List[Tuple[float, ...]] = []
         self._commands: List[Tuple[float, float, float, float]] = []
         self._cycles: List[float] = []
@@ -100,6 +106,8 @@ class BagRobot:
         if poses:
             plan = np.array([_planar(pose.pose) for pose in poses])
             require_finite((float(np.abs(plan).max()),))
+            if message.content.header.frame_id.lstrip("/") == self.odom_frame:
+                plan = self.map_from_odom.to_2d().transform_poses(plan)
             self._plans.append((time_s, plan))
 
     def add_state(self, message: Message) -> None:

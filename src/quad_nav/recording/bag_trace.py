@@ -173,7 +173,9 @@ class TraceReader:
         for transform in message.content.transforms:
             match = re.fullmatch(r"/?odom([0-9]{1,4})", transform.child_frame_id)
             if match and transform.header.frame_id.lstrip("/") == "map":
-                self._robot(int(match.group(1))).map_from_odom = checked_pose(
+                robot = self._robot(int(match.group(1)))
+                robot.odom_frame = transform.child_frame_id.lstrip("/")
+                robot.map_from_odom = checked_pose(
                     pose_from(transform.transform.translation, transform.transform.rotation)
                 )
 

@@ -28,7 +28,7 @@ class NavigatorTopics:
     """Writes ticks as the topics of the node ``move_base``."""
 
     def __init__(self, robot: int, navigator: Navigator, topics: TopicWriter) -> None:
-        self.action = ActionTopics(robot, topics)
+        self.action = ActionTopics(robot, topics, navigator.global_costmap.params.global_frame)
         self._topics = topics
         self._navigator = navigator
         self._node = f"/move_base{robot}"

@@ -19,13 +19,13 @@ from quad_nav.recording.navigator_topics import NavigatorTopics
 from quad_nav.recording.record_file import START_NS, TopicWriter, create, stamp_at
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.odometry import pose_in
 from quad_nav.sim.simulation import RobotState
 from quad_nav.topics import flight_info
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
 from quad_nav.topics.markers import goal_markers, quadcopter_markers, scene_markers
 from quad_nav.topics.publishing import FlownPath
 
-_IDENTITY = Pose3D(0.0, 0.0, 0.0)
 _SIMULATOR, _SEQUENCER = "/simulator", "/sequencer"
 
 
@@ -113,7 +113,7 @@ class Recorder(FlightObserver):
                 [
                     transform
                     for robot, state in enumerate(flight.states)
-                    for transform in _transforms(robot, state.map_from_base, stamp)
+                    for transform in self._transforms(robot, state.map_from_base, stamp)
                 ],
             ),
             _SIMULATOR,
@@ -149,9 +149,19 @@ class Recorder(FlightObserver):
         self._write_flight()
         self._topics.close()
 
+    def _transforms(self, robot: int, map_from_base: Pose3D, stamp: int) -> List[Any]:
+        odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"
+        map_from_odom = self._flight.simulation.map_from_frame(odom, robot)
+        return [
+            messages.transform(map_from_odom.to_3d(), "map", odom, stamp),
+            messages.transform(pose_in(map_from_odom, map_from_base), odom, base, stamp),
+            messages.transform(base_from_lidar, base, lidar, stamp),
+        ]
+
     def _write_odometry(self, robot: int, state: RobotState, stamp: int) -> None:
+        map_from_odom = self._flight.simulation.map_from_frame(f"odom{robot}", robot)
         odometry = messages.odometry(
-            state.map_from_base,
+            pose_in(map_from_odom, state.map_from_base),
             state.linear_mps,
             state.angular_radps,
             (f"odom{robot}", f"base_link{robot}"),
@@ -205,15 +215,6 @@ class Recorder(FlightObserver):
         self, topic: str, stamp: int, content: Any, node: str, latched: bool = False
     ) -> None:
         self._topics.write(topic, stamp, content, node, latched)
-
-
-def _transforms(robot: int, map_from_base: Pose3D, stamp: int) -> List[Any]:
-    odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"
-    return [
-        messages.transform(_IDENTITY, "map", odom, stamp),
-        messages.transform(map_from_base, odom, base, stamp),
-        messages.transform(base_from_lidar, base, lidar, stamp),
-    ]
 
 
 def _path_pose(stamp_s: float, pose: Pose3D) -> bytes:

@@ -156,7 +156,9 @@ class TraceObserver(FlightObserver):
             command = tick.command
             record.commands.append((now_s, command.vx_mps, command.vy_mps, command.vyaw_radps))
         if tick.plan is not None:
-            record.plans.append((now_s, tick.plan))
+            assert self._flight is not None
+            costmap = self._flight.setup.configurations[robot].global_costmap
+            record.plans.append((now_s, self._flight.plan_in_map(robot, tick.plan, costmap)))
         if not record.states or record.states[-1][1] is not tick.state:
             record.states.append((now_s, tick.state))
         if tick.recovery is not None:

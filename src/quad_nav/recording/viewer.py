@@ -135,15 +135,15 @@ class View(FlightObserver):
     def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:
         """Log the plans of a tick."""
         self._at(tick.now_s)
+        configuration = self._flight.setup.configurations[robot]
         if tick.plan is not None:
-            self._line(f"map/quad{robot}/plan", self._lifted(tick.plan), _colour(robot), 0.01)
+            plan = self._flight.plan_in_map(robot, tick.plan, configuration.global_costmap)
+            self._line(f"map/quad{robot}/plan", self._lifted(plan), _colour(robot), 0.01)
         if tick.control is not None and len(tick.control.local_plan):
-            self._line(
-                f"map/quad{robot}/local_plan",
-                self._lifted(tick.control.local_plan),
-                (40, 200, 40),
-                0.02,
+            plan = self._flight.plan_in_map(
+                robot, tick.control.local_plan, configuration.local_costmap
             )
+            self._line(f"map/quad{robot}/local_plan", self._lifted(plan), (40, 200, 40), 0.02)
 
     def on_end(self, flight: Flight) -> None:
         """Close the connection or the file."""

@@ -14,6 +14,7 @@ from quad_nav.files.values import (
     text,
     whole,
 )
+from quad_nav.sim.odometry import MAX_DRIFT
 from quad_nav.sim.simulation import LIDAR_CASTERS, STEPS_PER_S
 
 RANDOM = "random"
@@ -32,6 +33,12 @@ def _divides(value: Any) -> bool:
         return False
     steps = STEPS_PER_S / value
     return abs(steps - round(steps)) < 1e-9
+
+
+def _is_drift(value: Any) -> bool:
+    """True for two speeds of an odometry frame."""
+    speed = number(at_least=0, at_most=MAX_DRIFT)
+    return isinstance(value, (list, tuple)) and len(value) == 2 and all(map(speed.accepts, value))
 
 
 def _is_path_or_paths(value: Any) -> bool:
@@ -62,6 +69,9 @@ RULES: Dict[str, Rule] = {
     "scan_range": number(at_least=0),
     "step_size": number(at_least=0),
     "range_noise": number(at_least=0),
+    "odom_drift": Rule(
+        _is_drift, f"[m/s, rad/s], two numbers from 0 to {MAX_DRIFT:g}, such as [0.02, 0.01]"
+    ),
     "command_timeout": number(at_least=0),
     "controller_period": number(at_least=0),
     "gui": BOOLEAN,

@@ -11,6 +11,7 @@ from quad_nav.files.values import is_number, is_whole, unknown_names, value_faul
 from quad_nav.scenario.rules import RULES, optional, steps_per_scan
 from quad_nav.scenario.scenario import mission_of, read_configurations, scene_of
 from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.odometry import OdomDrift
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation import SimulationParams, start_poses
 
@@ -28,7 +29,8 @@ DEFAULTS: Dict[str, Any] = {
     "step_size": 0.0,  # rad between beams; 0: 512 beams over scan_range
     "lidar_rate": 20.0,  # scans per simulated second
     "range_noise": 0.0,  # standard deviation, m
-    "seed": 0,  # for noise and jitter
+    "odom_drift": [0.0, 0.0],  # m/s and rad/s of each frame odom{i} in map
+    "seed": 0,  # for noise, jitter and drift
     "jitter": 0.0,  # radius of the disc in which starts are displaced, m
     "command_timeout": 0.5,  # s; a robot hovers after command_timeout plus
     "controller_period": 0.05,  # controller_period without commands; the node asks the navigators
@@ -120,4 +122,5 @@ def _simulation_params(values: Mapping[str, Any]) -> SimulationParams:
         controller_period_s=float(values["controller_period"]),
         jitter_m=float(values["jitter"]),
         lidar_caster=values["lidar"],
+        odom_drift=OdomDrift(*map(float, values["odom_drift"])),
     )

@@ -21,6 +21,7 @@ from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import Airframe, BodyState, FlightLaw, FlightParams, limit_command
 from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.odometry import OdomDrift, OdomFrames
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 STEPS_PER_S = 240
@@ -47,6 +48,7 @@ class SimulationParams:
         controller_period_s: Period of the navigators' commands.
         jitter_m: Largest random displacement of a start pose.
         lidar_caster: Ray caster, see ``casters``: "kernel", or "bullet" for the physics engine.
+        odom_drift: Speeds at which the odometry frames drift and turn in ``map``.
 
     Raises:
         InputError: A value is out of range; lists all of them.
@@ -59,6 +61,7 @@ class SimulationParams:
     controller_period_s: float = 0.05
     jitter_m: float = 0.0
     lidar_caster: str = "kernel"
+    odom_drift: OdomDrift = OdomDrift()
 
     def __post_init__(self) -> None:
         problems = [
@@ -137,7 +140,7 @@ class Simulation:
         scene: The scene.
         n_robots: Number of quadcopters.
         params: Parameters.
-        seed: Seed of the LIDARs' noise and of the starts' displacements.
+        seed: Seed of the LIDARs' noise, the starts' displacements and the odometry's drift.
         gui: Open the engine's window.
         start_step: Step at which the clock starts.
 
@@ -167,10 +170,12 @@ class Simulation:
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
         # The engine's window and rays need the bodies in the engine.
         self._always_in_engine = gui or params.lidar_caster == "bullet"
+        self._odom_frames = OdomFrames(params.odom_drift, n_robots, seed)
         self._begin()
 
     def _begin(self) -> None:
         n = self.n_robots
+        self._first_step = self.step_count
         self._commands = np.zeros((n, 3))
         self._hover_step = np.full(n, -math.inf)  # last step for which a command is valid
         self._next_hover_step = math.inf
@@ -209,7 +214,7 @@ class Simulation:
         return self._contact_log.contacts
 
     def reset(self) -> None:
-        """Return to the start poses without commands or contacts; the clock continues."""
+        """Return to the start poses without commands, contacts or drift; the clock continues."""
         self._world.reset(self._starts)
         self._begin()
 
@@ -299,6 +304,11 @@ class Simulation:
     def state(self, robot: int) -> RobotState:
         """Return the state of a quadcopter."""
         return _robot_state(self._state.rows[robot])
+
+    def map_from_frame(self, frame: str, robot: int) -> Pose2D:
+        """Return the present pose of a frame of a quadcopter in ``map``, see ``OdomFrames``."""
+        elapsed_s = (self.step_count - self._first_step) / STEPS_PER_S
+        return self._odom_frames.map_from_frame(frame, robot, elapsed_s)
 
     def scan(self, robot: int) -> Scan:
         """Return a scan of a quadcopter's LIDAR at the present time."""

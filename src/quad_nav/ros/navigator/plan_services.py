@@ -66,10 +66,9 @@ class PlanServices:
 
     def _plan_response(self, request: GetPlanRequest) -> GetPlanResponse:
         frame = self._navigator.global_costmap.params.global_frame
-        if request.goal.header.frame_id.lstrip("/") != frame:
-            raise rospy.ServiceException(
-                f"the goal is in frame '{request.goal.header.frame_id}', expected '{frame}'"
-            )
+        self._check_frame("goal", request.goal.header.frame_id, frame)
+        if request.start.header.frame_id:
+            self._check_frame("start", request.start.header.frame_id, frame)
         try:
             goal = goal_from_message(request.goal.pose).to_2d()
             plan = self._navigator.make_plan(self._start(request), goal, request.tolerance)
@@ -83,6 +82,10 @@ class PlanServices:
         response = GetPlanResponse()
         response.plan.poses = path_message(plan, frame, now).poses
         return response
+
+    def _check_frame(self, what: str, frame: str, expected: str) -> None:
+        if frame.lstrip("/") != expected.lstrip("/"):
+            raise rospy.ServiceException(f"the {what} is in frame '{frame}', expected '{expected}'")
 
     def _start(self, request: GetPlanRequest) -> Pose2D:
         if request.start.header.frame_id:

@@ -13,7 +13,6 @@ from std_msgs.msg import Header, String
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import (
     ScanMessage,
     marker_array,
@@ -26,6 +25,7 @@ from quad_nav.ros.common.conversions import (
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.odometry import pose_in
 from quad_nav.sim.simulation import RobotState, Simulation
 from quad_nav.topics.flight_info import (
     CONTACT_STATUS,
@@ -37,7 +37,7 @@ from quad_nav.topics.flight_info import (
 )
 from quad_nav.topics.markers import quadcopter_markers, scene_markers
 
-_IDENTITY, _MOUNT = transform(Pose3D(0.0, 0.0, 0.0)), transform(base_from_lidar)
+_MOUNT = transform(base_from_lidar)
 _LAGS_BELOW = 0.9
 """The simulation lags if it reaches less than this part of the requested rate."""
 _LAGGING_REPORTS = 3
@@ -90,13 +90,14 @@ class SimulatorTopics:
 
     def _publish_transforms(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
         """Publish `map -> odom{i} -> base_link{i} -> Lidar{i}` of all quadcopters."""
-        header = Header(0, stamp, "map")
         transforms = []
         for i, state in enumerate(states):
             odom, base, lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
+            map_from_odom = self._simulation.map_from_frame(odom, i)
+            odom_from_base = pose_in(map_from_odom, state.map_from_base)
             transforms += [
-                TransformStamped(header, odom, _IDENTITY),
-                transform_message(state.map_from_base, odom, base, stamp),
+                transform_message(map_from_odom.to_3d(), "map", odom, stamp),
+                transform_message(odom_from_base, odom, base, stamp),
                 TransformStamped(Header(0, stamp, base), lidar, _MOUNT),
             ]
         self._tf.publish(TFMessage(transforms))
@@ -104,12 +105,14 @@ class SimulatorTopics:
     def _publish_odometry(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
         for i, (publisher, state) in enumerate(zip(self._odometry, states)):
             if publisher.get_num_connections():
+                odom = f"odom{i}"
+                map_from_odom = self._simulation.map_from_frame(odom, i)
                 publisher.publish(
                     odometry_message(
-                        state.map_from_base,
+                        pose_in(map_from_odom, state.map_from_base),
                         state.linear_mps,
                         state.angular_radps,
-                        (f"odom{i}", f"base_link{i}"),
+                        (odom, f"base_link{i}"),
                         stamp,
                     )
                 )
