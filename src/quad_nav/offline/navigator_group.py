@@ -14,6 +14,7 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from quad_nav.config import Configuration
+from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, sinks_of
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.navigator.tick import RobotPoses, Tick
@@ -94,8 +95,12 @@ class OfflineRobot:
             peers: The other robots, in ``map``.
         """
         costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        for costmap in costmaps:
+            if costmap.map_frames:
+                costmap.set_map_poses(self._map_poses(costmap, now_s))
         poses = self._in_costmaps(state.map_from_base, now_s)
-        located = RobotPoses(*(poses[one.params.global_frame].to_2d() for one in costmaps))
+        in_global, in_local = (poses[one.params.global_frame].to_2d() for one in costmaps)
+        located = RobotPoses(in_global, in_local)
         map_from_global = self.map_from_global(now_s)
         if map_from_global != _IDENTITY:
             peers = [peer.relative_to(map_from_global) for peer in peers]
@@ -112,6 +117,12 @@ class OfflineRobot:
         """Return the pose of the global costmap's frame in ``map``."""
         frame = self.navigator.global_costmap.params.global_frame
         return self._frames.map_from_frame(frame, self._number, now_s)
+
+    def _map_poses(self, costmap: LayeredCostmap, now_s: float) -> Dict[str, Optional[Pose3D]]:
+        """Return the pose of a costmap's frame in the frames of its maps, which are ``map``."""
+        frame = costmap.params.global_frame
+        pose = self._frames.map_from_frame(frame, self._number, now_s).to_3d()
+        return dict.fromkeys(costmap.map_frames, pose)
 
     def _in_costmaps(self, map_from_pose: Pose3D, now_s: float) -> Dict[str, Pose3D]:
         """Express a pose in ``map`` in the frames of the costmaps, by their names."""

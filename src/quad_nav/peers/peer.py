@@ -1,7 +1,7 @@
 """Peers: state, intention and priority of the other robots.
 
-All positions are in the frame of the global costmap, here called ``map``. Each robot tells its peers
-its intention: its priority and the path that it follows.
+All positions are in the frame of the global costmap, here called ``map``. Each robot tells its
+peers its intention: its priority and the path that it follows.
 """
 
 from __future__ import annotations

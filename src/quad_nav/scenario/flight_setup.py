@@ -162,6 +162,7 @@ def _request(options: FlightOptions) -> ScenarioRequest:
         options.seed,
         options.size_m,
         options.simulation.airframe.radius_m,
+        simulated=options.simulation.odom_drift.is_zero,
     )
 
 

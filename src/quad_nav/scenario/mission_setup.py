@@ -105,7 +105,7 @@ def read_setup(
     values = {**DEFAULTS, **parameters}
     settings, faults = read_settings({k: values[k] for k in SETTINGS if k in values}, name)
     problems = value_faults(values, _RULES, name) + _result_faults(result, name) + faults
-    request = _request(values, settings, name)
+    request = _request(values, settings, name, all_parameters)
     scenario, faults = read_scenario(request, _Navigators(values, all_parameters))
     if problems + faults:
         raise InputError(list(dict.fromkeys(problems + faults)))
@@ -113,14 +113,25 @@ def read_setup(
     return _mission_setup(values, scenario, warnings, journals)
 
 
-def _request(values: Mapping[str, Any], settings: SequenceSettings, name: str) -> ScenarioRequest:
+def _request(
+    values: Mapping[str, Any],
+    settings: SequenceSettings,
+    name: str,
+    all_parameters: Mapping[str, Any],
+) -> ScenarioRequest:
     return ScenarioRequest(
         **{key: values[key] for key in ("scene", "goals", "robots", "seed", "size")},
         robot_radius=values["robot_radius"],
         settings=settings,
-        simulated=values["simulation"] is not False,
+        simulated=values["simulation"] is not False and not _odometry_drifts(all_parameters),
         source=name,
     )
+
+
+def _odometry_drifts(all_parameters: Mapping[str, Any]) -> bool:
+    simulator = all_parameters.get("simulator")
+    drift = simulator.get("odom_drift") if isinstance(simulator, Mapping) else None
+    return drift is not None and drift != [0.0, 0.0]
 
 
 def _mission_setup(

@@ -57,8 +57,8 @@ class ScenarioRequest:
     ``scene`` is a file, ``RANDOM``, or "" if the arena is unknown. ``goals`` is a folder, a list
     of files, or ``RANDOM``. ``seed`` and ``size`` are those of a random mission; size 0 has room
     for all. ``simulated`` robots have exact odometry, so that every frame of a costmap is ``map``;
-    in other frames of real robots, a costmap's place is unknown. ``source`` is the request's name
-    in messages.
+    in other frames of real robots, and of simulated ones whose odometry drifts, a costmap's place
+    is unknown. ``source`` is the request's name in messages.
     """
 
     scene: Any

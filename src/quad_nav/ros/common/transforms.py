@@ -47,6 +47,22 @@ class Transforms:
         """
         return self._lookup(to_frame, from_frame, stamp_s)[0]
 
+    def lookup_near(self, to_frame: str, from_frame: str, stamp_s: float) -> Pose3D:
+        """Return the pose of `from_frame` in `to_frame` at a time, else the latest one.
+
+        For frames that move slowly, such as `odom` in `map`: their transform may come later than
+        the message that needs it.
+
+        Raises:
+            TransformUnavailable: If a frame is unknown, or the frames are not connected.
+        """
+        try:
+            return self.lookup(to_frame, from_frame, stamp_s)
+        except TransformUnavailable as error:
+            if not error.later:
+                raise
+        return self.lookup(to_frame, from_frame)
+
     def locate(
         self, to_frame: str, base_frame: str, now_s: float, tolerance_s: float
     ) -> Optional[Pose3D]:

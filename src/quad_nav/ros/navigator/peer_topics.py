@@ -72,10 +72,20 @@ class PeerTopics:
         self._odometry[number] = message
 
     def _on_intention(self, number: int, message: Path) -> None:
-        self._intentions[number] = (
-            message.header.stamp.to_sec(),
-            intention_from_message(message, number),
-        )
+        intention, frame = intention_from_message(message, number), message.header.frame_id
+        if len(intention.path) and frame.lstrip("/") != self._frame.lstrip("/"):
+            try:
+                global_from_frame = self._transforms.lookup(self._frame, frame)
+            except TransformUnavailable as error:
+                rospy.logwarn_throttle(
+                    5.0,
+                    f"quad{number}: intention dropped, expecting straight flight: frame '{frame}':"
+                    f" {error}",
+                )
+                self._intentions.pop(number, None)
+                return
+            intention = intention.transformed(global_from_frame.to_2d())
+        self._intentions[number] = message.header.stamp.to_sec(), intention
 
     def refresh(self, now_s: float) -> None:
         """Update the peers from the messages that have arrived."""
@@ -111,7 +121,9 @@ class PeerTopics:
     def _located(self, number: int, odometry: Odometry) -> Optional[Peer]:
         name = f"quad{number}"
         try:
-            map_from_odom = self._transforms.lookup(self._frame, odometry.header.frame_id)
+            global_from_odom = self._transforms.lookup_near(
+                self._frame, odometry.header.frame_id, odometry.header.stamp.to_sec()
+            )
         except TransformUnavailable as error:
             rospy.logwarn_throttle(
                 5.0, f"{name}: pose in {self._frame} unknown, ignoring this peer: {error}"
@@ -122,13 +134,14 @@ class PeerTopics:
         if problem:
             rospy.logwarn_throttle(5.0, f"{name}: odometry dropped, ignoring this peer: {problem}")
             return None
-        pose = map_from_odom.compose(odom_from_base).to_2d()
+        pose = global_from_odom.compose(odom_from_base).to_2d()
         return peer_at(name, pose, velocity, odometry.header.stamp.to_sec())
 
     def _intention(self, number: int, peer: Peer, now_s: float) -> Intention:
-        if number not in self._intentions:
+        received = self._intentions.get(number)
+        if received is None:
             return assumed_intention(peer)
-        sent_s, intention = self._intentions[number]
+        sent_s, intention = received
         if now_s - sent_s > INTENTION_VALID_S:
             return Intention(idle_priority(number))
         return intention

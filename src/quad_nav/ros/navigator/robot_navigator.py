@@ -163,6 +163,8 @@ class RobotNavigator:
         self._peers.publish(self.number, navigator.peers.intention, now_s)
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
             return
+        for costmap in (navigator.global_costmap, navigator.local_costmap):
+            static_maps.place_maps(self._name, costmap, self._transforms, self._warnings)
         in_global, located = self._locate(now_s)
         peers = self._peers.near(self.number, located.in_global, navigator.peers.reach_m)
         tick = navigator.tick(now_s, located, self._velocity, peers)

@@ -1,9 +1,9 @@
-"""Subscribe to map topics and update the static layers of costmaps."""
+"""Subscribe to map topics, and update and place the static layers of costmaps."""
 
 from __future__ import annotations
 
 import threading
-from typing import List, Sequence
+from typing import Dict, List, Optional, Sequence
 
 import numpy as np
 import rospy
@@ -12,7 +12,10 @@ from nav_msgs.msg import OccupancyGrid
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.geometry import Pose3D
 from quad_nav.grid import GridSpec
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import grid_problem
 
@@ -58,7 +61,7 @@ class MapListener:
             info.width, info.height, info.resolution, info.origin.position.x, info.origin.position.y
         )
         frame, wanted = message.header.frame_id, self._costmap.params.global_frame
-        if frame != wanted and not self._costmap.params.rolling_window:
+        if frame.lstrip("/") != wanted.lstrip("/") and not self._costmap.params.rolling_window:
             rospy.logwarn(
                 "%s: map is in frame '%s', expected '%s'; using it without a transform",
                 self._grid.resolved_name,
@@ -93,3 +96,29 @@ def connect(
         for name, layer in costmap.layers.items()
         if isinstance(layer, StaticLayer)
     ]
+
+
+def place_maps(
+    robot: str, costmap: LayeredCostmap, transforms: Transforms, warnings: ThrottledWarnings
+) -> None:
+    """Give a costmap the latest transforms to the frames of its maps, and warn of missing ones.
+
+    Args:
+        robot: Name with which the warning begins.
+        costmap: The costmap; one that needs no transform is left alone.
+        transforms: Transform tree.
+        warnings: Takes the warning.
+    """
+    poses: Dict[str, Optional[Pose3D]] = {}
+    wanted = costmap.params.global_frame
+    for frame in costmap.map_frames:
+        try:
+            poses[frame] = transforms.lookup(frame, wanted)
+        except TransformUnavailable as error:
+            poses[frame] = None
+            warnings.warn(
+                f"{robot}: static map in frame '{frame}' left out of the costmap in '{wanted}'"
+                f" until tf connects the frames: {error}"
+            )
+    if poses:
+        costmap.set_map_poses(poses)

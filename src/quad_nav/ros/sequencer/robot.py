@@ -141,13 +141,17 @@ class MissionRobot:
                     self._goal(self.sequencer.index, self.sequencer.lap),
                 )
 
-    def map_from(self, frame: str) -> Pose3D:
-        """Return the pose of a frame in `map`.
+    def map_from(self, frame: str, stamp_s: Optional[float] = None) -> Pose3D:
+        """Return the pose of a frame in `map` at a time if tf knows it, else the latest.
 
         Raises:
             TransformUnavailable: If tf does not know it.
         """
-        return self._transforms.lookup("map", frame) if frame != "map" else Pose3D(0.0, 0.0, 0.0)
+        if frame == "map":
+            return Pose3D(0.0, 0.0, 0.0)
+        if stamp_s is None:
+            return self._transforms.lookup("map", frame)
+        return self._transforms.lookup_near("map", frame, stamp_s)
 
     def _move(self, messages: Sequence[Odometry], now_s: float, log: FlightLog) -> None:
         usable = [
@@ -157,7 +161,9 @@ class MissionRobot:
             return
         before, self._odometry = self._odometry, usable[-1]
         try:
-            map_from_odom = self.map_from(usable[-1].header.frame_id)
+            map_from_odom = [
+                self.map_from(one.header.frame_id, one.header.stamp.to_sec()) for one in usable
+            ]
         except TransformUnavailable as error:
             rospy.logwarn_throttle(
                 WARN_AGAIN_S, f"{self.name}: pose in map unknown, odometry dropped: {error}"
@@ -171,9 +177,9 @@ class MissionRobot:
                 JUMP_RECOVERY_S,
             )
             self._valid_again_s = now_s + JUMP_RECOVERY_S
-        for odometry in usable:
+        for odometry, from_odom in zip(usable, map_from_odom):
             stamp_s = odometry.header.stamp.to_sec()
-            self.pose = map_from_odom.compose(pose_from_message(odometry.pose.pose))
+            self.pose = from_odom.compose(pose_from_message(odometry.pose.pose))
             log.add_pose(self.name, stamp_s, self.pose.to_2d())
             self._path.add(stamp_s, self.pose)
 
