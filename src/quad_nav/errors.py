@@ -87,6 +87,19 @@ def printable(text: object, keep: str = "") -> str:
     )
 
 
+def excerpt(text: str, limit: int = 200, keep: str = "") -> str:
+    """Cut a long text and escape the rest, for strings of messages in logs.
+
+    Args:
+        text: Text of unknown origin.
+        limit: Number of characters that are kept.
+        keep: Characters that are not escaped.
+    """
+    if len(text) > limit:
+        text = f"{text[:limit]} ... ({len(text)} characters)"
+    return text if text.isprintable() else printable(text, keep)
+
+
 def _line(problem: str) -> str:
     """Cut a long problem and escape what would not stay in its line."""
     if len(problem) > _MAX_LENGTH:

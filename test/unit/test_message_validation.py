@@ -29,6 +29,13 @@ def scan(angle_min_rad=-3.0, increment_rad=0.01, low_m=0.02, high_m=60.0, ranges
         scan(low_m=-math.inf),
         scan(high_m=math.nan),
         scan(ranges=np.ones(validation.MAX_BEAMS + 1)),
+        scan(ranges=[]),
+        scan(increment_rad=0.0),
+        scan(increment_rad=1e30),
+        scan(1e30),
+        scan(low_m=60.0, high_m=0.02),
+        scan(low_m=-1.0),
+        scan(high_m=-1.0),
     ],
 )
 def test_invalid_scans(odd):
@@ -50,6 +57,7 @@ def test_valid_scans_give_at_most_a_point_per_beam(low_rad, step_rad, low_m, hig
 def test_valid_messages():
     assert validation.scan_problem(scan(ranges=[math.nan, math.inf, -1.0])) == ""
     assert validation.scan_problem(scan(high_m=math.inf)) == ""
+    assert validation.scan_problem(scan(increment_rad=0.0, ranges=[1.0])) == ""
     assert validation.pose_problem(Pose3D(1.0, 2.0, 3.0)) == ""
     assert validation.twist_problem(Twist2D(0.3, 0.0, -1.0)) == ""
     assert validation.path_problem(np.array([[1.0, 2.0]])) == ""
@@ -88,7 +96,22 @@ def test_invalid_paths():
         (3, 2, 0.05, 5, "5 values for 3 x 2 cells"),
         (1, 1, 0.0, 1, "resolution 0 m"),
         (1, 1, math.nan, 1, "resolution nan m"),
+        (1, 1, 1e-300, 1, "resolution 1e-300 m"),
+        (1, 1, 1e30, 1, "expected 0.001 to 100"),
     ],
 )
 def test_invalid_maps(width, height, resolution_m, values, problem):
     assert problem in validation.grid_problem(width, height, resolution_m, values)
+
+
+@pytest.mark.parametrize("origin_m", [(math.nan, 0.0), (0.0, -math.inf), (1e7, 0.0)])
+def test_invalid_origins_of_maps(origin_m):
+    assert "origin" in validation.grid_problem(1, 1, 0.05, 1, origin_m)
+
+
+def test_stamps_and_ids():
+    assert validation.stamp_problem(11.0, 10.0) == validation.stamp_problem(0.0, 10.0) == ""
+    assert "1.50 s ahead of the clock" in validation.stamp_problem(11.5, 10.0)
+    assert validation.goal_id_problem("a" * 256, 10.0, 10.0) == ""
+    assert "a ... (1000000 characters)'" in validation.goal_id_problem("a" * 10**6, 0.0, 0.0)
+    assert "ahead of the clock" in validation.goal_id_problem("a", 4.29e9, 10.0)

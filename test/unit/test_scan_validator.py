@@ -147,3 +147,11 @@ def test_another_number_of_beams_is_no_loss_and_a_reset_forgets():
     judge = after_a_scan()
     judge.reset()
     assert judge.rejection_reason(scan(0.1, np.full(BEAMS, np.inf)), at(0.0), 0.1) == ""
+
+
+def test_a_single_beam_may_turn_away():
+    # Its field of view is 0 rad: a division by it ended the navigator.
+    beam, lost = Scan(1.0, 0.0, 0.0, 0.02, 60.0, WALL[:1]), np.array([math.inf], np.float32)
+    judge = validator()
+    assert judge.rejection_reason(beam, at(0.0), 1.0) == ""
+    assert judge.rejection_reason(replace(beam, ranges_m=lost), at(0.0, 0.1), 1.0) == ""

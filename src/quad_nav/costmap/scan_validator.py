@@ -123,7 +123,7 @@ class ScanValidator:
         may_leave = (
             0.0
             if field_rad >= _ALL_AROUND_RAD
-            else (abs(angle_difference(here.yaw_rad, there.yaw_rad)) / field_rad)
+            else _share(abs(angle_difference(here.yaw_rad, there.yaw_rad)), field_rad)
         )
         if near - returns <= (_LOST_SHARE + may_leave) * beams:
             return ""
@@ -134,6 +134,11 @@ def _empty(ranges: NDArray[np.float32], returns: int) -> str:
     if returns or np.isposinf(ranges).any():
         return ""
     return f"none of its {len(ranges)} beams is valid"
+
+
+def _share(turn_rad: float, field_rad: float) -> float:
+    """Return the share of a field of view that a turn takes out of sight."""
+    return min(turn_rad / field_rad, 1.0) if field_rad > 0.0 else 1.0
 
 
 def _differ(a: Pose2D, b: Pose2D, by_m: float, by_rad: float) -> bool:

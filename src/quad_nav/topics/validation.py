@@ -13,6 +13,7 @@ from typing import Dict, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose3D, Scan, Twist2D
 
 MAX_BEAMS = 100_000
@@ -21,6 +22,38 @@ MAX_POSES = 100_000
 MAX_CELLS = 10**8
 MAX_MAGNITUDE = 1e6
 """Largest accepted position coordinate in m, and speed in m/s or rad/s."""
+MAX_ANGLE_RAD = 1e3
+"""Largest accepted first angle of a scan, and largest angle between two beams."""
+MAX_FRAME_ID = 200
+MAX_GOAL_ID = 256
+MAX_LEAD_S = 1.0
+"""Largest accepted lead of a stamp over the clock; a larger one dates from before a clock jump."""
+MAX_STAMP_S = 2.0**31 - 3600.0
+"""Largest accepted stamp, in 2038: tf2 aborts when two stamps are 2**31 s apart."""
+MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-3, 100.0
+
+
+def stamp_problem(stamp_s: float, now_s: float) -> str:
+    """Check that a stamp is not from the future."""
+    if stamp_s - now_s > MAX_LEAD_S:
+        return (
+            f"stamped {stamp_s - now_s:.2f} s ahead of the clock, expected {MAX_LEAD_S:g} s at most"
+        )
+    return "" if stamp_s <= MAX_STAMP_S else f"stamp {stamp_s:.2f} s, expected {MAX_STAMP_S:.0f} s"
+
+
+def frame_problem(frame: str) -> str:
+    """Check that the name of a frame is one that tf2 can look up."""
+    if 0 < len(frame) <= MAX_FRAME_ID and frame.isprintable() and frame[0] != "/":
+        return ""
+    return f"frame '{excerpt(frame)}', expected a name of 1 to {MAX_FRAME_ID} characters"
+
+
+def goal_id_problem(goal_id: str, stamp_s: float, now_s: float) -> str:
+    """Check the id of an action's goal or cancel request, and its stamp."""
+    if len(goal_id) > MAX_GOAL_ID:
+        return f"id '{excerpt(goal_id, 20)}', expected {MAX_GOAL_ID} characters at most"
+    return stamp_problem(stamp_s, now_s)
 
 
 def scan_problem(scan: Scan) -> str:
@@ -31,8 +64,21 @@ def scan_problem(scan: Scan) -> str:
     numbers = (scan.angle_min_rad, scan.angle_increment_rad, scan.range_min_m)
     if not all(map(math.isfinite, numbers)) or math.isnan(scan.range_max_m):
         return "angles or range limits are not finite"
-    if len(scan.ranges_m) > MAX_BEAMS:
-        return f"{len(scan.ranges_m)} beams, expected {MAX_BEAMS} at most"
+    beams = len(scan.ranges_m)
+    if not 0 < beams <= MAX_BEAMS:
+        return f"{beams} beams, expected 1 to {MAX_BEAMS}"
+    if max(abs(scan.angle_min_rad), abs(scan.angle_increment_rad)) > MAX_ANGLE_RAD:
+        return (
+            f"angle_min {scan.angle_min_rad:g} rad and angle_increment"
+            f" {scan.angle_increment_rad:g} rad, expected {MAX_ANGLE_RAD:g} rad at most"
+        )
+    if beams > 1 and scan.angle_increment_rad == 0.0:
+        return f"angle_increment 0 rad between {beams} beams, expected another value"
+    if not 0.0 <= scan.range_min_m < scan.range_max_m:
+        return (
+            f"ranges from {scan.range_min_m:g} to {scan.range_max_m:g} m, expected range_min from 0"
+            " to less than range_max"
+        )
     return ""
 
 
@@ -66,7 +112,13 @@ def path_problem(path: NDArray[np.float64]) -> str:
     return "" if np.all(np.abs(path) <= MAX_MAGNITUDE) else "poses are not finite"
 
 
-def grid_problem(width: int, height: int, resolution_m: float, values: int) -> str:
+def grid_problem(
+    width: int,
+    height: int,
+    resolution_m: float,
+    values: int,
+    origin_m: Tuple[float, float] = (0.0, 0.0),
+) -> str:
     """Check the size and the resolution of a grid message.
 
     Args:
@@ -74,13 +126,21 @@ def grid_problem(width: int, height: int, resolution_m: float, values: int) -> s
         height: Number of rows that the message states.
         resolution_m: Side of a cell.
         values: Number of cells that the message carries.
+        origin_m: Lower left corner of the grid.
     """
     if not 0 < width * height <= MAX_CELLS:
         return f"{width} x {height} cells, expected 1 to {MAX_CELLS}"
     if width * height != values:
         return f"{values} values for {width} x {height} cells"
-    if not (math.isfinite(resolution_m) and resolution_m > 0.0):
-        return f"resolution {resolution_m:g} m, expected more than 0"
+    if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
+        return (
+            f"resolution {resolution_m:g} m, expected {MIN_RESOLUTION_M:g} to {MAX_RESOLUTION_M:g}"
+        )
+    if not all(abs(value) <= MAX_MAGNITUDE for value in origin_m):
+        return (
+            f"origin ({origin_m[0]:g}, {origin_m[1]:g}) m, expected finite coordinates up to"
+            f" {MAX_MAGNITUDE:g} m"
+        )
     return ""
 
 

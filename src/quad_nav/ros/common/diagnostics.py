@@ -14,10 +14,12 @@ from typing import Callable, Dict, Sequence
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from quad_nav.errors import excerpt
 from quad_nav.topics.health import Health, Level
 
 PERIOD_S = 1.0  # wall time
 REPEAT_S = 5.0  # wall time
+MAX_KINDS, MAX_WARNING = 20, 2000
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 _LOG = {
@@ -92,7 +94,9 @@ def publish_health(report: Callable[[], Sequence[Health]]) -> None:
 class ThrottledWarnings:
     """Log a repeated warning at once and then every `REPEAT_S` of wall time.
 
-    Warnings that differ only in their numbers count as the same one.
+    Warnings that differ only in their numbers count as the same one. Of different ones, `MAX_KINDS`
+    are logged in `REPEAT_S`: their texts may contain strings of messages. These are escaped and
+    cut.
     """
 
     def __init__(self) -> None:
@@ -101,7 +105,25 @@ class ThrottledWarnings:
 
     def warn(self, text: str) -> None:
         """Log a warning unless the same one was logged a short time ago."""
-        kind, now_s = _NUMBER.sub("#", text), time.monotonic()
-        if now_s - self._logged_s.get(kind, -REPEAT_S) >= REPEAT_S:
-            self._logged_s[kind] = now_s
+        text = excerpt(text, MAX_WARNING, keep="\n")
+        if self._is_due(text):
             rospy.logwarn("%s", text)
+
+    def error(self, text: str) -> None:
+        """Log an error unless the same line was logged a short time ago."""
+        text = excerpt(text, MAX_WARNING, keep="\n")
+        if self._is_due(text):
+            rospy.logerr("%s", text)
+
+    def _is_due(self, text: str) -> bool:
+        kind, now_s = _NUMBER.sub("#", text), time.monotonic()
+        if kind in self._logged_s and now_s - self._logged_s[kind] < REPEAT_S:
+            return False
+        if kind not in self._logged_s and len(self._logged_s) >= MAX_KINDS:
+            self._logged_s = {
+                one: at_s for one, at_s in self._logged_s.items() if now_s - at_s < REPEAT_S
+            }
+            if len(self._logged_s) >= MAX_KINDS:
+                return False
+        self._logged_s[kind] = now_s
+        return True

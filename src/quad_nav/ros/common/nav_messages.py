@@ -17,6 +17,7 @@ from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
 from quad_nav.plan.navfn import NOT_REACHED
 from quad_nav.ros.common.conversions import pose_from_message, pose_message
+from quad_nav.topics.validation import MAX_MAGNITUDE
 
 INVALID_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
 
@@ -25,13 +26,15 @@ def goal_from_message(message: Pose) -> Pose3D:
     """Return the pose of a goal with its quaternion normalised.
 
     Raises:
-        InvalidGoal: If the position is not finite, or the rotation is not about z. The text for
-            quaternions is that of C++ move_base.
+        InvalidGoal: If the position is not finite or too large, or the rotation is not about z.
+            The text for quaternions is that of C++ move_base.
     """
     pose = pose_from_message(message)
-    if not np.isfinite(pose.translation).all():
-        raise InvalidGoal("Aborting on goal because its position is not finite")
-    length = math.sqrt(sum(part**2 for part in pose.quaternion))
+    if not (np.abs(pose.translation) <= MAX_MAGNITUDE).all():
+        raise InvalidGoal(
+            f"Aborting on goal because its position is not finite or beyond {MAX_MAGNITUDE:g} m"
+        )
+    length = math.sqrt(sum(part * part for part in pose.quaternion))
     if not math.isfinite(length) or length < 1e-3:
         raise InvalidGoal(INVALID_QUATERNION)
     x, y, z, w = pose.quaternion

@@ -14,13 +14,14 @@ from typing import Callable, Dict, List, Optional, Sequence
 import rosgraph
 import rospy
 
-from quad_nav.errors import QuadError, printable
+from quad_nav.errors import QuadError, excerpt, printable
 
 WARN_EVERY_S = 10.0  # wall time, as all durations here
 POLL_S = 0.1
 ALIVE_WITHIN_S = 1.0
 SILENT_AFTER_S = 3.0
 REPEAT_S = 15.0
+MAX_LOG = 50_000  # characters of a line and of each of its arguments
 
 
 def init_node(name: str) -> None:
@@ -46,10 +47,10 @@ def escape_log_messages() -> None:
 
 
 class _EscapedMessages(logging.Filter):
-    """Escapes messages and their arguments; lists of faults keep their lines."""
+    """Escapes and cuts messages and their arguments; lists of faults keep their lines."""
 
     def filter(self, record: logging.LogRecord) -> bool:
-        record.msg = printable(record.msg, "\n")
+        record.msg = excerpt(str(record.msg), MAX_LOG, "\n")
         if isinstance(record.args, tuple):
             record.args = tuple(map(_printable_argument, record.args))
         return True
@@ -60,7 +61,7 @@ def _printable_argument(value: object) -> object:
         return value
     if isinstance(value, QuadError):
         return printable(value, "\n")
-    return printable(value)
+    return excerpt(str(value), MAX_LOG)
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,10 @@ def missing_service(name: str) -> str:
 
 def missing_topic(name: str, message_type: str) -> str:
     """Say why no message has arrived on a topic."""
-    types = dict(rospy.get_published_topics())
+    try:
+        types = dict(rospy.get_published_topics())
+    except OSError as error:
+        return f"{name} [{message_type}]: no message yet, and the ROS master is silent: {error}"
     if name not in types:
         alike = sorted(topic for topic, kind in types.items() if kind == message_type)
         return (

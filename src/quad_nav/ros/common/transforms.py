@@ -1,15 +1,23 @@
-"""Look up transforms of tf2 as `Pose3D`, or raise with the reason."""
+"""Receive transforms, and look them up in tf2 as `Pose3D`, or raise with the reason."""
 
 from __future__ import annotations
 
+import threading
 from typing import List, Optional, Sequence, Tuple
 
 import rospy
 import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
 
-from quad_nav.errors import NavigationError
+from quad_nav.errors import NavigationError, excerpt
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import pose_from_transform
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.topics.transform_filter import TransformFilter
+from quad_nav.topics.validation import MAX_STAMP_S, frame_problem
+
+MAX_HELD = 1000  # transforms that wait for the clock to start
 
 
 class TransformUnavailable(NavigationError):
@@ -21,17 +29,79 @@ class TransformUnavailable(NavigationError):
 
     def __init__(self, message: str, later: bool = False) -> None:
         """Store the reason."""
-        super().__init__(message)
+        super().__init__(excerpt(message, 500))
         self.later = later
 
 
 class Transforms:
-    """Transform tree received so far."""
+    """Transform tree received so far.
+
+    It takes the place of `tf2_ros.TransformListener`, which hands every transform to tf2.
+    """
 
     def __init__(self) -> None:
         """Subscribe to `/tf` and `/tf_static`."""
         self._buffer = tf2_ros.Buffer()
-        self._listener = tf2_ros.TransformListener(self._buffer)
+        self._filter = TransformFilter(self._buffer.clear)
+        self._warnings = ThrottledWarnings()
+        self._lock = threading.Lock()
+        self._now_s = 0.0
+        self._held: List[TransformStamped] = []
+        self._subscribers = [
+            rospy.Subscriber("/tf", TFMessage, self._on_transforms),
+            rospy.Subscriber("/tf_static", TFMessage, self._on_static_transforms),
+        ]
+
+    def _on_transforms(self, message: TFMessage) -> None:
+        with self._lock:
+            if not self._update_time():
+                self._held += message.transforms[: MAX_HELD - len(self._held)]
+                return
+            for transform in message.transforms:
+                self._store(transform, is_static=False)
+
+    def _on_static_transforms(self, message: TFMessage) -> None:
+        with self._lock:
+            self._update_time()
+            for transform in message.transforms:
+                self._store(transform, is_static=True)
+
+    def _update_time(self) -> bool:
+        """Note the time, and store what waited for it; return False while there is none."""
+        before_s, self._now_s = self._now_s, rospy.get_time()
+        if self._now_s < before_s:
+            self._warnings.warn(
+                f"tf: the clock jumped back by {before_s - self._now_s:.2f} s; discarding all"
+                " transforms"
+            )
+            self._filter.clear()
+        if self._now_s > 0.0 and self._held:
+            held, self._held = self._held, []
+            for transform in held:
+                self._store(transform, is_static=False)
+        return self._now_s > 0.0
+
+    def _store(self, message: TransformStamped, is_static: bool) -> None:
+        header = message.header
+        stamp_ns = 0 if is_static else header.stamp.secs * 10**9 + header.stamp.nsecs
+        try:
+            is_new = self._filter.accept(
+                header.frame_id,
+                message.child_frame_id,
+                pose_from_transform(message),
+                stamp_ns,
+                self._now_s,
+                is_static,
+            )
+        except ValueError as error:
+            topic = "/tf_static" if is_static else "/tf"
+            self._warnings.warn(f"{topic}: transform dropped: {error}")
+            return
+        if is_static:
+            header.stamp = rospy.Time()  # tf2 does not use it, but aborts if it is out of range
+            self._buffer.set_transform_static(message, "")
+        elif is_new:
+            self._buffer.set_transform(message, "")
 
     def lookup(self, to_frame: str, from_frame: str, stamp_s: Optional[float] = None) -> Pose3D:
         """Return the pose of `from_frame` in `to_frame`.
@@ -83,12 +153,18 @@ class Transforms:
     def _lookup(
         self, to_frame: str, from_frame: str, stamp_s: Optional[float]
     ) -> Tuple[Pose3D, float]:
-        if not to_frame or not from_frame:
+        if self._held:
+            with self._lock:
+                self._update_time()
+        to_frame, from_frame = to_frame.lstrip("/"), from_frame.lstrip("/")
+        problem = frame_problem(to_frame) or frame_problem(from_frame)
+        if problem:
+            raise TransformUnavailable(f"{problem}, such as '{to_frame or 'map'}'")
+        if stamp_s is not None and not 0.0 <= stamp_s <= MAX_STAMP_S:
             raise TransformUnavailable(
-                f"empty frame id, expected one such as '{to_frame or 'map'}'"
+                f"stamp {stamp_s:.2f} s, expected 0 to {MAX_STAMP_S:.0f} s", later=False
             )
         stamp = rospy.Time(0) if stamp_s is None else rospy.Time.from_sec(stamp_s)
-        to_frame, from_frame = to_frame.lstrip("/"), from_frame.lstrip("/")
         try:
             message = self._buffer.lookup_transform_core(to_frame, from_frame, stamp)
         except tf2_ros.ExtrapolationException as error:

@@ -11,17 +11,22 @@ from typing import Deque, Optional
 
 import actionlib
 import rospy
+from actionlib_msgs.msg import GoalID
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
 
-from quad_nav.errors import InvalidGoal
+from quad_nav.errors import InvalidGoal, excerpt
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import Outcome
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.nav_messages import goal_from_message, pose_stamped
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.timing import Schedule
 from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.validation import goal_id_problem
+
+MAX_STATUSES = 100  # of ended goals; actionlib keeps each for five seconds
 
 
 class GoalServer:
@@ -46,6 +51,8 @@ class GoalServer:
             names("move_base"), MoveBaseAction, auto_start=False
         )
         self._server.register_goal_callback(None)
+        self._warnings = ThrottledWarnings()
+        self._guard_callbacks()
         self._action_goal = rospy.Publisher(
             names("move_base/goal"), MoveBaseActionGoal, queue_size=1
         )
@@ -56,6 +63,42 @@ class GoalServer:
         self._simple = rospy.Subscriber(
             names("move_base_simple/goal"), PoseStamped, self._store, queue_size=1
         )
+
+    def _guard_callbacks(self) -> None:
+        """Let actionlib have only goals and cancel requests that it can handle.
+
+        One from the future would cancel or precede all goals until then, and it repeats the ids of
+        the last seconds in every status.
+        """
+        server = self._server.action_server
+        take_goal, take_cancel = server.internal_goal_callback, server.internal_cancel_callback
+
+        def on_goal(message: MoveBaseActionGoal) -> None:
+            if self._is_valid(message.goal_id, "goal"):
+                take_goal(message)
+
+        def on_cancel(message: GoalID) -> None:
+            if self._is_valid(message, "cancel request"):
+                with server.lock:
+                    take_cancel(message)
+                    for one in server.status_list:
+                        # actionlib logs errors for a request whose goal has not come.
+                        one.goal = one.goal or MoveBaseActionGoal(goal_id=one.status.goal_id)
+
+        # `start` subscribes with these.
+        server.internal_goal_callback, server.internal_cancel_callback = on_goal, on_cancel
+
+    def _is_valid(self, goal_id: GoalID, kind: str) -> bool:
+        problem = goal_id_problem(goal_id.id, goal_id.stamp.to_sec(), rospy.get_time())
+        if problem:
+            self._warnings.warn(f"{self._robot}: {kind} dropped: {problem}")
+            return False
+        server = self._server.action_server
+        with server.lock:
+            ended = [one for one in server.status_list if one.handle_destruction_time]
+            for one in ended[: max(len(server.status_list) - MAX_STATUSES, 0)]:
+                server.status_list.remove(one)
+        return True
 
     def _stop_status_thread(self) -> float:
         """Stop actionlib's status thread and return its frequency in Hz.
@@ -68,8 +111,14 @@ class GoalServer:
         return max(server.status_frequency, 0.0)
 
     def restart(self, now_s: float) -> None:
-        """Restart the status schedule after a clock jump."""
+        """Restart the status schedule after a clock jump, and adapt stamps from the future."""
         self._status.start(now_s)
+        server, now = self._server.action_server, rospy.Time.from_sec(now_s)
+        with server.lock:
+            server.last_cancel = min(server.last_cancel, now)
+            for one in server.status_list:
+                one.status.goal_id.stamp = min(one.status.goal_id.stamp, now)
+                one.handle_destruction_time = min(one.handle_destruction_time, now)
 
     def _store(self, message: PoseStamped) -> None:
         self._simple_goals.append(message)
@@ -102,7 +151,7 @@ class GoalServer:
             pose = self._in_global_frame(message)
         except InvalidGoal as error:
             navigator.cancel()
-            rospy.logerr("%s: %s", self._robot, error)
+            self._warnings.error(f"{self._robot}: {error}")
             self._server.set_aborted(MoveBaseResult(), str(error))
             return
         navigator.set_goal(pose.to_2d(), now_s)
@@ -117,7 +166,7 @@ class GoalServer:
             return self._transforms.lookup(self._global_frame, frame).compose(pose)
         except TransformUnavailable as error:
             raise InvalidGoal(
-                f"Aborting on goal because its frame '{frame}' cannot be transformed to "
+                f"Aborting on goal because its frame '{excerpt(frame)}' cannot be transformed to "
                 f"'{self._global_frame}': {error}"
             ) from error
 

@@ -21,7 +21,14 @@ from quad_nav.ros.common.conversions import odometry_from_message, time_message
 from quad_nav.ros.common.nav_messages import path_message
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.publishing import Names
-from quad_nav.topics.validation import MAX_POSES, path_problem, pose_problem, twist_problem
+from quad_nav.topics.validation import (
+    MAX_LEAD_S,
+    MAX_POSES,
+    path_problem,
+    pose_problem,
+    stamp_problem,
+    twist_problem,
+)
 
 REPEAT_S = 0.25
 INTENTION_VALID_S = 2.0  # the navigator that published an older intention has died
@@ -130,19 +137,24 @@ class PeerTopics:
             )
             return None
         odom_from_base, velocity = odometry_from_message(odometry)
-        problem = pose_problem(odom_from_base) or twist_problem(velocity)
+        stamp_s = odometry.header.stamp.to_sec()
+        problem = (
+            pose_problem(odom_from_base)
+            or twist_problem(velocity)
+            or stamp_problem(stamp_s, rospy.get_time())
+        )
         if problem:
             rospy.logwarn_throttle(5.0, f"{name}: odometry dropped, ignoring this peer: {problem}")
             return None
         pose = global_from_odom.compose(odom_from_base).to_2d()
-        return peer_at(name, pose, velocity, odometry.header.stamp.to_sec())
+        return peer_at(name, pose, velocity, stamp_s)
 
     def _intention(self, number: int, peer: Peer, now_s: float) -> Intention:
         received = self._intentions.get(number)
         if received is None:
             return assumed_intention(peer)
         sent_s, intention = received
-        if now_s - sent_s > INTENTION_VALID_S:
+        if not -MAX_LEAD_S <= now_s - sent_s <= INTENTION_VALID_S:
             return Intention(idle_priority(number))
         return intention
 

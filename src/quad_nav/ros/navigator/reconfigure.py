@@ -10,16 +10,20 @@ import types
 from typing import Any, Callable, Dict, List, Sequence
 
 import rospy
+from dynamic_reconfigure.msg import Config
 from dynamic_reconfigure.server import Server
+from dynamic_reconfigure.srv import ReconfigureRequest
 
 from quad_nav import config
 from quad_nav.errors import InputError
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.topics.publishing import Names, own_node
 
 OnReconfigure = Callable[[str, Dict[str, Any]], config.Configuration]
 
 _CTYPES = {"double": "double", "int": "int", "bool": "bool", "str": "std::string"}
 _INT_MAX = 2**31 - 1
+_FIELDS = {"bools": "bool", "ints": "int", "strs": "str", "doubles": "double"}
 
 
 # Messages of dynamic_reconfigure carry the group beside the values.
@@ -108,7 +112,25 @@ class _Server(Server):
 
     def __init__(self, type_: Any, callback: Any, namespace: str, values: Dict[str, Any]) -> None:
         self._stored = dict(values)
+        self._warnings = ThrottledWarnings()
         super().__init__(type_, callback, "" if namespace == "~" else namespace)
+
+    def _set_callback(self, request: ReconfigureRequest) -> Config:
+        """Handle a request without the values that have an unknown name or another type."""
+        given, types_ = request.config, self.type.type
+        known = Config(
+            **{
+                field: [one for one in getattr(given, field) if types_.get(one.name) == type_]
+                for field, type_ in _FIELDS.items()
+            }
+        )
+        unknown = sum(len(getattr(given, field)) - len(getattr(known, field)) for field in _FIELDS)
+        if unknown:
+            self._warnings.warn(
+                f"{rospy.resolve_name(self.ns)}: reconfiguration: values dropped: {unknown} have"
+                " an unknown name or another type"
+            )
+        return super()._set_callback(ReconfigureRequest(known))
 
     def _copy_from_parameter_server(self) -> None:
         self.config.update(self._stored)

@@ -6,7 +6,6 @@ move_base's message filter. When too many wait, the oldest is dropped.
 
 from __future__ import annotations
 
-import struct
 import threading
 from collections import deque
 from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
@@ -14,22 +13,31 @@ from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 import numpy as np
 import rospy
 from numpy.typing import NDArray
-from sensor_msgs import point_cloud2
-from sensor_msgs.msg import PointCloud, PointCloud2
+from sensor_msgs.msg import PointCloud, PointCloud2, PointField
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, Sink, sinks_of
 from quad_nav.costmap.scan_validator import ScanValidatorParams
+from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.publishing import Names, own_node
-from quad_nav.topics.validation import MAX_POINTS, scan_problem
+from quad_nav.topics.validation import MAX_MAGNITUDE, MAX_POINTS, scan_problem, stamp_problem
 
 MESSAGE_TYPES = {"LaserScan": ScanMessage, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
 QUEUE_LENGTH = 50
-MESSAGE_ERRORS = (ValueError, TypeError, ArithmeticError, struct.error)  # of a bad message
+_FIELD_TYPES = {
+    PointField.INT8: np.int8,
+    PointField.UINT8: np.uint8,
+    PointField.INT16: np.int16,
+    PointField.UINT16: np.uint16,
+    PointField.INT32: np.int32,
+    PointField.UINT32: np.uint32,
+    PointField.FLOAT32: np.float32,
+    PointField.FLOAT64: np.float64,
+}
 
 
 class Sensor:
@@ -62,8 +70,13 @@ class Sensor:
         )
 
     def _store(self, message: Any) -> None:
+        now_s = rospy.get_time()
+        problem = stamp_problem(message.header.stamp.to_sec(), now_s)
+        if problem:
+            self._warn_dropped(problem)
+            return
         with self._lock:
-            self._waiting.append((message, rospy.get_time()))
+            self._waiting.append((message, now_s))
 
     def reset(self) -> None:
         """Forget waiting messages and earlier scans, after the clock has jumped."""
@@ -72,34 +85,31 @@ class Sensor:
         self.intake.reset()
 
     def deliver(self, transforms: Transforms) -> None:
-        """Hand every message whose transforms are known to the layers."""
-        while True:
-            with self._lock:
-                if not self._waiting:
-                    return
-                message, received_s = self._waiting[0]
+        """Hand every message whose transforms are known to the layers.
+
+        One that waits for its transforms does not delay the others.
+        """
+        with self._lock:
+            waiting = list(self._waiting)
+        for message, received_s in waiting:
             try:
                 poses = self._poses_if_known(transforms, message)
             except TransformUnavailable as error:
-                rospy.logwarn_throttle(
-                    5.0,
-                    "%s: %s: message in frame '%s' dropped: %s",
-                    self._robot,
-                    self.topic,
-                    message.header.frame_id,
-                    error,
-                )
                 self._drop(message)
+                self._warn_dropped(f"frame '{excerpt(message.header.frame_id)}': {error}")
                 continue
-            if poses is None:
-                return
-            self._drop(message)
-            self._hand_over(message, received_s, poses)
+            if poses is not None:
+                self._drop(message)
+                self._hand_over(message, received_s, poses)
 
     def _drop(self, message: Any) -> None:
         with self._lock:
-            if self._waiting and self._waiting[0][0] is message:
-                self._waiting.popleft()
+            self._waiting = deque(
+                (one for one in self._waiting if one[0] is not message), maxlen=QUEUE_LENGTH
+            )
+
+    def _warn_dropped(self, reason: str) -> None:
+        self._warnings.warn(f"{self._robot}: {self.topic}: message dropped: {reason}")
 
     def _poses_if_known(self, transforms: Transforms, message: Any) -> Optional[List[SensorPose]]:
         """Look up the sensor's poses; None while the transforms may still come.
@@ -157,10 +167,8 @@ class Sensor:
             else:
                 points, stamp_s = _cloud_points(message), message.header.stamp.to_sec()
                 self.intake.add_cloud(points, poses, stamp_s, received_s)
-        except MESSAGE_ERRORS as error:
-            rospy.logwarn_throttle(
-                5.0, "%s: %s: message dropped: %s", self._robot, self.topic, error
-            )
+        except ValueError as error:
+            self._warn_dropped(str(error))
 
     def _warn_rejected(self, reason: str) -> None:
         period_s = self.intake.expected_period_s
@@ -185,20 +193,54 @@ def _cloud_points(message: Any) -> NDArray[np.float32]:
     """Return the finite points of a cloud, float32[n, 3] in the message's frame.
 
     Raises:
-        ValueError: The cloud has too many points.
-        Exception: What numpy and struct raise for a message shorter than it declares.
+        ValueError: The cloud has too many points, or not the content that it declares.
     """
-    count = (
-        len(message.points) if isinstance(message, PointCloud) else message.width * message.height
-    )
+    is_list = isinstance(message, PointCloud)
+    count = len(message.points) if is_list else message.width * message.height
     if count > MAX_POINTS:
         raise ValueError(f"{count} points, expected {MAX_POINTS} at most")
-    if isinstance(message, PointCloud):
-        points = [(p.x, p.y, p.z) for p in message.points]
-    else:
-        points = list(point_cloud2.read_points(message, field_names=("x", "y", "z")))
-    cloud = np.array(points, dtype=np.float32).reshape(-1, 3)
-    return cloud[np.isfinite(cloud).all(axis=1)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        if is_list:
+            points = [(p.x, p.y, p.z) for p in message.points]
+            cloud = np.array(points, dtype=np.float32).reshape(-1, 3)
+        else:
+            columns = [_column(message, name).ravel() for name in ("x", "y", "z")]
+            cloud = np.stack([column.astype(np.float32) for column in columns], axis=1)
+    return cloud[(np.abs(cloud) <= MAX_MAGNITUDE).all(axis=1)]
+
+
+def _column(message: PointCloud2, name: str) -> NDArray[Any]:
+    """Return one field of all points of a cloud, shape (height, width), as a view of its data.
+
+    Raises:
+        ValueError: The field is missing, or lies outside of the points or the data.
+    """
+    field = next((one for one in message.fields if one.name == name), None)
+    if field is None or field.datatype not in _FIELD_TYPES:
+        raise ValueError(f"no field {name} of a known datatype, expected x, y and z")
+    datatype = np.dtype(_FIELD_TYPES[field.datatype])
+    rows, columns = message.height, message.width
+    row_step = message.row_step if rows > 1 else columns * message.point_step
+    if columns and not field.offset + datatype.itemsize <= message.point_step:
+        raise ValueError(
+            f"field {name} at byte {field.offset}, expected it within point_step"
+            f" {message.point_step}"
+        )
+    if row_step < columns * message.point_step:
+        raise ValueError(
+            f"row_step {row_step}, expected {columns} points of {message.point_step} bytes"
+        )
+    if rows * row_step > len(message.data):
+        raise ValueError(f"{len(message.data)} bytes of data, expected {rows} rows of {row_step}")
+    if rows * columns == 0:
+        return np.empty((rows, columns), datatype)
+    return np.ndarray(
+        (rows, columns),
+        datatype.newbyteorder(">" if message.is_bigendian else "<"),
+        message.data,
+        field.offset,
+        (row_step, message.point_step),
+    )
 
 
 def connect(

@@ -12,6 +12,7 @@ from nav_msgs.msg import OccupancyGrid
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose3D
 from quad_nav.grid import GridSpec
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
@@ -44,6 +45,7 @@ class MapListener:
         self._name = name
         self._layer = layer
         self._lock = lock
+        self._warnings = ThrottledWarnings()
         topic = names(layer.params.map_topic)
         self._grid = rospy.Subscriber(topic, OccupancyGrid, self._on_map, queue_size=1)
         if layer.params.subscribe_to_updates:
@@ -52,21 +54,19 @@ class MapListener:
             )
 
     def _on_map(self, message: OccupancyGrid) -> None:
-        info = message.info
-        problem = grid_problem(info.width, info.height, info.resolution, len(message.data))
-        if problem:
-            rospy.logwarn("%s: map dropped: %s", self._grid.resolved_name, problem)
-            return
-        spec = GridSpec(
-            info.width, info.height, info.resolution, info.origin.position.x, info.origin.position.y
+        info, origin = message.info, message.info.origin.position
+        problem = grid_problem(
+            info.width, info.height, info.resolution, len(message.data), (origin.x, origin.y)
         )
+        if problem:
+            self._warnings.warn(f"{self._grid.resolved_name}: map dropped: {problem}")
+            return
+        spec = GridSpec(info.width, info.height, info.resolution, origin.x, origin.y)
         frame, wanted = message.header.frame_id, self._costmap.params.global_frame
         if frame.lstrip("/") != wanted.lstrip("/") and not self._costmap.params.rolling_window:
-            rospy.logwarn(
-                "%s: map is in frame '%s', expected '%s'; using it without a transform",
-                self._grid.resolved_name,
-                frame,
-                wanted,
+            self._warnings.warn(
+                f"{self._grid.resolved_name}: map is in frame '{excerpt(frame)}', expected"
+                f" '{wanted}'; using it without a transform"
             )
         occupancy = np.array(message.data, dtype=np.int8).reshape(spec.shape)
         with self._lock:
@@ -77,9 +77,7 @@ class MapListener:
     def _on_update(self, message: OccupancyGridUpdate) -> None:
         problem = grid_problem(message.width, message.height, 1.0, len(message.data))
         if problem:
-            rospy.logwarn_throttle(
-                5.0, f"{self._updates.resolved_name}: map update dropped: {problem}"
-            )
+            self._warnings.warn(f"{self._updates.resolved_name}: map update dropped: {problem}")
             return
         part = np.array(message.data, dtype=np.int8).reshape(message.height, message.width)
         with self._lock:
@@ -117,7 +115,7 @@ def place_maps(
         except TransformUnavailable as error:
             poses[frame] = None
             warnings.warn(
-                f"{robot}: static map in frame '{frame}' left out of the costmap in '{wanted}'"
+                f"{robot}: static map in frame '{excerpt(frame)}' left out of the costmap in '{wanted}'"
                 f" until tf connects the frames: {error}"
             )
     if poses:

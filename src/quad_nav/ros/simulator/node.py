@@ -28,7 +28,7 @@ from std_srvs.srv import (
 )
 from visualization_msgs.msg import Marker, MarkerArray
 
-from quad_nav.errors import InputError, printable
+from quad_nav.errors import InputError, excerpt, printable
 from quad_nav.kernels.jit import cache_warnings
 from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.ros.common.readiness import escape_log_messages
@@ -42,7 +42,7 @@ from quad_nav.scenario.simulator_setup import (
 from quad_nav.sim.body import GoalSphere
 from quad_nav.sim.pacing import Pacer, RateMeter
 from quad_nav.sim.simulation import STEP_S, STEPS_PER_S, Simulation
-from quad_nav.topics.validation import CommandLease, twist_problem
+from quad_nav.topics.validation import MAX_MAGNITUDE, CommandLease, twist_problem
 
 _STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 _STEPS_PER_CLOCK = STEPS_PER_S // 120
@@ -52,6 +52,7 @@ _HEALTH_PERIOD_S = 1.0  # wall time, as the next two
 _PAUSED_PERIOD_S = 0.5
 _PAUSED_SLEEP_S = 0.02
 _RESPONSE_TIMEOUT_S = 10.0
+_MAX_MARKERS = 10_000
 
 
 class SimulatorNode:
@@ -212,7 +213,7 @@ class SimulatorNode:
             if problem:
                 rospy.logwarn_throttle(5.0, "quad%d: command dropped: %s", robot, problem)
                 continue
-            node = message._connection_header["callerid"]
+            node = excerpt(message._connection_header.get("callerid", "an unnamed node"))
             holder = self._lease.holder(robot, node, self._simulation.now_s)
             if holder == node:
                 self._simulation.set_command(robot, twist)
@@ -254,16 +255,29 @@ class SimulatorNode:
 
 
 def _goal_spheres(message: MarkerArray) -> List[GoalSphere]:
-    """Return the spheres among markers in `map`: centre, radius and colour."""
-    return [
+    """Return the valid spheres among markers in `map`: centre, radius and colour."""
+    spheres = [
         (
             (m.pose.position.x, m.pose.position.y, m.pose.position.z),
             m.scale.x / 2,
             (m.color.r, m.color.g, m.color.b, m.color.a),
         )
-        for m in message.markers
+        for m in message.markers[:_MAX_MARKERS]
         if m.type == Marker.SPHERE and m.action == Marker.ADD
     ]
+    valid = [
+        one
+        for one in spheres
+        if all(abs(value) <= MAX_MAGNITUDE for value in (*one[0], *one[2])) and 0.0 < one[1] <= 1e3
+    ]
+    if len(valid) < len(spheres):
+        rospy.logwarn_throttle(
+            5.0,
+            "simulator: /goals: markers dropped: %d of %d have an invalid position, size or colour",
+            len(spheres) - len(valid),
+            len(spheres),
+        )
+    return valid
 
 
 def main() -> int:
