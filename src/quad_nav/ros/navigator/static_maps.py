@@ -115,8 +115,8 @@ def place_maps(
         except TransformUnavailable as error:
             poses[frame] = None
             warnings.warn(
-                f"{robot}: static map in frame '{excerpt(frame)}' left out of the costmap in '{wanted}'"
-                f" until tf connects the frames: {error}"
+                f"{robot}: static map in frame '{excerpt(frame)}' left out of the costmap in"
+                f" '{wanted}' until tf connects the frames: {error}"
             )
     if poses:
         costmap.set_map_poses(poses)
