@@ -37,7 +37,17 @@ _BITS = 16  # of one half of a column of voxels
 
 def load_upstream(**costmaps: Any) -> Configuration:
     """The configuration with these costmaps and every fix off."""
-    return load({**costmaps, "fixes": UPSTREAM})
+    return load({**_as_set(costmaps), "fixes": UPSTREAM})
+
+
+def _as_set(values: Any) -> Any:
+    """Parameters as a user sets them: 2 is what the original makes of combination_method 99."""
+    if not isinstance(values, dict):
+        return values
+    changed = {name: _as_set(value) for name, value in values.items()}
+    if changed.get("combination_method") == 2:
+        changed["combination_method"] = 99
+    return changed
 
 
 class Player:
@@ -315,7 +325,7 @@ class Player:
     def _reconfigure_layer(self, layer: str, values: Any) -> None:
         """Take values as the layer's own server of dynamic_reconfigure does."""
         self._layer(layer)
-        self.configuration = updated(self.configuration, f"{self.name}/{layer}", dict(values))
+        self.configuration = updated(self.configuration, f"{self.name}/{layer}", _as_set(values))
         params = dict(getattr(self.configuration, self.name).layers)[layer]
         self.costmap.layers[layer].reconfigure(params)
 
