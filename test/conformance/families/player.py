@@ -102,13 +102,9 @@ class Player:
             raise InvalidValue(f"there is no layer {name!r}")
         return self.costmap.layers[name]
 
-    def _static_layers(self, topic: str) -> List[Tuple[str, StaticLayer]]:
-        return [
-            (name, layer)
-            for name, layer in self.costmap.layers.items()
-            if isinstance(layer, StaticLayer)
-            and layer.params.map_topic.lstrip("/") == topic.lstrip("/")
-        ]
+    def _static_layers(self) -> List[Tuple[str, StaticLayer]]:
+        layers = self.costmap.layers.items()
+        return [(name, layer) for name, layer in layers if isinstance(layer, StaticLayer)]
 
     # -- before the first update -----------------------------------------------------------
 
@@ -120,11 +116,11 @@ class Player:
         """
         before = takewhile(lambda event: event["type"] in ("map", "transform"), events)
         self.first_maps = [event for event in before if event["type"] == "map"]
-        for name, layer in self.costmap.layers.items():
-            for event in self.first_maps[::-1]:
-                if (name, layer) in self._static_layers(event["topic"]):
-                    self.costmap.set_map(self._map_of(event), name)
-                    break
+        maps = {_global_name(event["topic"]): self._map_of(event) for event in self.first_maps}
+        for name, layer in self._static_layers():
+            topic = _global_name(layer.params.map_topic)
+            if topic in maps:
+                self.costmap.set_map(maps[topic], name)
 
     def check_parameters(self, effective: Any) -> None:
         """Compare with ``meta.effective``, after the first maps."""
@@ -191,13 +187,16 @@ class Player:
     def map(self, event: Any) -> None:
         if event in self.first_maps:
             return
-        for name, _ in self._static_layers(event["topic"]):
-            self.costmap.set_map(self._map_of(event), name)
+        static_map = self._map_of(event)
+        for name, layer in self._static_layers():
+            if _global_name(layer.params.map_topic) == _global_name(event["topic"]):
+                self.costmap.set_map(static_map, name)
 
     def map_update(self, event: Any) -> None:
         occupancy = self.recorded[f"map_update_{event['index']:03d}"]
-        for _, layer in self._static_layers(event["topic"]):
-            if layer.params.subscribe_to_updates:
+        for _, layer in self._static_layers():
+            listens = _global_name(layer.params.map_topic) == _global_name(event["topic"])
+            if listens and layer.params.subscribe_to_updates:
                 layer.update_map(occupancy, event["x"], event["y"])
 
     def transform(self, event: Any) -> None:
@@ -339,6 +338,10 @@ def columns(voxels: np.ndarray) -> np.ndarray:
         low[voxels[:, :, z] == FREE] &= ~bit
         high[voxels[:, :, z] == LETHAL] |= bit
     return low | high << np.uint32(_BITS)
+
+
+def _global_name(topic: str) -> str:
+    return "/" + topic.lstrip("/")
 
 
 def _pose_of(numbers: Sequence[float]) -> Pose3D:
