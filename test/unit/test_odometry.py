@@ -207,6 +207,15 @@ def test_goals_are_reached_with_both_costmaps_in_a_frame_that_drifts(tmp_path):
     assert summary.success, summary
 
 
+def test_a_flight_that_drifts_is_the_same_in_two_processes(tmp_path):
+    """Intentions cross from process to process in the map."""
+    config = configuration(tmp_path / "config", *2 * ("odom$(arg i)",))
+    flight = setup(
+        tmp_path, config=config, simulation=SimulationParams(odom_drift=DRIFT), time_limit_s=10.0
+    )
+    assert fly(flight, processes=2).robots == fly(flight).robots
+
+
 def test_goals_off_a_costmap_that_drifts_are_not_refused(tmp_path):
     """The costmap's place in the map changes, so that nobody knows what it will cover."""
     config = configuration(tmp_path / "config", "odom$(arg i)", "map")
