@@ -124,3 +124,16 @@ def test_minima_are_computed_once_for_all_robots():
         log.min_clearance_m(name)
         log.min_separation_m(name)
     assert len(calls) == len(names)
+
+
+def test_a_journal_gets_distances_before_their_block_ends():
+    """1 m apart after 2 s; a block takes 10 s."""
+    log = DistanceLog(["quad0", "quad1"], RADIUS_M)
+    for k in range(81):
+        log.add("quad0", 0.025 * k, 0.0, 0.0)
+        log.add("quad1", 0.025 * k, 5.0 - 0.05 * k, 0.0)
+    assert log.recent_minima_m("quad0") == (None, pytest.approx(1.0 - 0.6))
+    log.add("quad0", 2.025, 0.5, 0.0)
+    log.add("quad1", 2.025, 1.0, 0.0)
+    assert log.recent_minima_m("quad0") == (None, pytest.approx(1.0 - 0.6))  # within a second
+    assert log.min_separation_m("quad0") == pytest.approx(0.5 - 0.6)

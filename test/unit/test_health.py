@@ -19,7 +19,8 @@ from quad_nav.topics.health import (
 
 SCAN = Input("/scan0", 10.0, 0.05, 0.01, 1.0)
 ODOM = Input("/odom0", 40.0, 0.02, 0.0, 3.0)
-CONTROL = Control(State.CONTROLLING, 9.6, 10.0, 0, "", "no plan: the goal is off the map", 12.5)
+REASON = "no plan: the goal is off the map"
+CONTROL = Control(State.CONTROLLING, 9.6, 10.0, 0, "", False, REASON, 12.5)
 LOOP = Loop(8, 0.02, 0.0, 0.4, 190.0)
 
 
@@ -80,8 +81,10 @@ def test_values_of_inputs():
         ),
         ({"state": State.CLEARING}, Level.WARN, "clearing at 9.6 Hz: recovery behaviour active"),
         ({"fault": "no plan: blocked"}, Level.WARN, "controlling: no plan: blocked"),
+        # The level does not depend on the wording.
+        ({"fault": "stopping: said"}, Level.WARN, "controlling: stopping: said"),
         (
-            {"fault": "stopping: no data from scan"},
+            {"fault": "stopping: no data from scan", "is_stopped": True},
             Level.ERROR,
             "controlling: stopping: no data from scan",
         ),

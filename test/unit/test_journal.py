@@ -9,7 +9,7 @@ import resource
 import pytest
 
 from quad_nav.errors import InputError
-from quad_nav.mission.journal import Journal
+from quad_nav.mission.journal import Journal, encode
 
 
 def lines(path):
@@ -144,3 +144,16 @@ def test_two_missions_cannot_share_a_journal(tmp_path):
     first.close()
     assert second.flush().endswith("nothing is missing")
     assert lines(tmp_path / "j") == [b'{"head": 2}']
+
+
+def test_many_records_take_one_access_to_the_disk(tmp_path, monkeypatch):
+    kept, forced = Journal(tmp_path / "j"), []
+    monkeypatch.setattr(os, "fsync", forced.append)
+    kept.clear()
+    assert kept.append_lines([encode({"goal": number}) for number in range(50)]) == ""
+    assert len(lines(tmp_path / "j")) == 50 and len(forced) == 1
+
+
+def test_a_number_that_is_not_finite_is_refused():
+    with pytest.raises(ValueError):
+        encode({"x_m": float("nan")})

@@ -115,3 +115,24 @@ def test_stamps_and_ids():
     assert validation.goal_id_problem("a" * 256, 10.0, 10.0) == ""
     assert "a ... (1000000 characters)'" in validation.goal_id_problem("a" * 10**6, 0.0, 0.0)
     assert "ahead of the clock" in validation.goal_id_problem("a", 4.29e9, 10.0)
+
+
+@pytest.mark.parametrize(
+    "frame, pose, twist, problem",
+    [
+        ("odom0", Pose3D(1.0, 2.0, 1.0), Twist2D(0.1), ""),
+        ("", Pose3D(1.0, 2.0, 1.0), Twist2D(), "frame '', expected"),
+        ("o" * 201, Pose3D(1.0, 2.0, 1.0), Twist2D(), "frame 'ooo"),
+        ("odom0", Pose3D(math.nan, 2.0, 1.0), Twist2D(), "position (nan, 2, 1) m"),
+        ("odom0", Pose3D(1.0, -math.inf, 1.0), Twist2D(), "position (1, -inf, 1) m"),
+        ("odom0", Pose3D(1.0, 2.0, 1e300), Twist2D(), "position (1, 2, 1e+300) m"),
+        ("odom0", Pose3D(1.0, 2.0, 1.0, (0.0, 0.0, 0.0, 0.0)), Twist2D(), "quaternion of length 0"),
+        ("odom0", Pose3D(1.0, 2.0, 1.0, (0.0, 0.0, 0.0, math.nan)), Twist2D(), "length nan"),
+        ("odom0", Pose3D(1.0, 2.0, 1.0, (1e200, 0.0, 0.0, 0.0)), Twist2D(), "length inf"),
+        ("odom0", Pose3D(1.0, 2.0, 1.0), Twist2D(0.0, 0.0, math.nan), "velocity (0.0, 0.0, nan)"),
+    ],
+)
+def test_odometry(frame, pose, twist, problem):
+    found = validation.odometry_problem(frame, pose, twist)
+    assert found.startswith(problem) if problem.startswith("frame") else problem in found
+    assert bool(found) == bool(problem)

@@ -169,3 +169,15 @@ def test_goals_appended_after_the_end_are_flown():
     assert s.done
     s.replace_sequence(GoalSequence((A, B)))
     assert s.tick(9.0, at(A)) == [SendGoal(1, 1, Pose2D(3.0, 8.0, math.pi / 2), 1)]
+
+
+def test_the_end_of_another_nodes_goal_matters_only_if_it_has_replaced_ours():
+    other_ended = NavigatorReport(Verdict.OTHER_ENDED)
+    s = flying(A)
+    assert s.tick(1.0, START, [other_ended]) == []
+    assert s.tick(2.0, START, [NavigatorReport(Verdict.REPLACED)]) == []
+    (sent,) = s.tick(3.0, START, [other_ended])
+    assert (sent.attempt, sent.resend_reason) == (
+        1,
+        "the navigator has finished another node's goal",
+    )

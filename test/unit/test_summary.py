@@ -11,6 +11,7 @@ from quad_nav.mission.sequencer import Sequencer
 from quad_nav.mission.summary import (
     MissionSummary,
     RobotSummary,
+    summarize,
     summarize_robot,
     to_json,
     write_json,
@@ -174,6 +175,7 @@ DOCUMENTED = {
     "robots": [
         {
             "robot": "quad0",
+            "reason": "",
             "goals": [
                 {
                     "goal": 1,
@@ -227,3 +229,26 @@ def test_a_mission_that_did_not_start_lists_its_goals():
         (1, False, "not sent"),
         (2, False, "not sent"),
     ]
+
+
+def test_a_robot_whose_mission_ended_early_fails_the_mission():
+    log = FlightLog(["quad0", "quad1"], 0.3)
+    sequencers = {name: Sequencer(GoalSequence(GOALS.goals[:1])) for name in log.robots}
+    for name, sequencer in sequencers.items():
+        fly(log, name, sequencer, DETOUR)
+    reasons = {"quad1": "internal error: OSError(5, 'disk')"}
+    times = {"sim_time_s": 20.0, "wall_time_s": 20.0}
+    assert summarize(log, sequencers, 20.0, **times).exit_status == 0
+    flown = summarize(log, sequencers, 20.0, reasons=reasons, **times)
+    assert (flown.success, flown.exit_status, flown.reason) == (False, 1, "")
+    robots = to_json(flown)["robots"]
+    assert [robot["reason"] for robot in robots] == ["", "internal error: OSError(5, 'disk')"]
+    assert "quad1 ended early: internal error: OSError(5, 'disk')." in table(flown)
+
+
+def test_a_summary_with_a_number_that_is_not_finite_is_written(tmp_path):
+    odd = leg(path_length_m=float("nan"))
+    write_json(mission(odd, sim_time_s=float("inf")), tmp_path / "result.json")
+    written = json.loads((tmp_path / "result.json").read_text())
+    assert written["sim_time_s"] is None
+    assert written["robots"][0]["goals"][0]["path_length_m"] is None

@@ -186,6 +186,32 @@ def test_a_contact_comes_back_from_its_values():
     assert contact_from_values("quad0", values) == Contact(13.3456, "quad0", "quad1", 1.23456, 7.0)
 
 
+def test_a_contact_after_days_keeps_its_milliseconds():
+    """Contacts of a pair are told apart by 0.25 s."""
+    contact = Contact(0.0, "quad0", "wall", 1234.56789, 1 / 3)
+    back = contact_from_values("quad0", contact_values(contact, 1234567.125))
+    assert back == Contact(1234567.125, "quad0", "wall", 1234.56789, 1 / 3)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"time_s": "nan"},
+        {"time_s": "-1"},
+        {"time_s": "1e300"},
+        {"x_m": "nan"},
+        {"y_m": "-inf"},
+        {"x_m": "1e300"},
+        {"with": "w" * 201},
+    ],
+)
+def test_a_contact_with_odd_values_is_refused(changed):
+    values = {"with": "wall", "time_s": "1", "x_m": "2", "y_m": "3"}
+    assert contact_from_values("quad0", values) == Contact(1.0, "quad0", "wall", 2.0, 3.0)
+    with pytest.raises(ValueError, match="contact with"):
+        contact_from_values("quad0", {**values, **changed})
+
+
 def test_a_contact_without_a_position_is_refused():
     with pytest.raises(ValueError, match="has no valid .y_m'"):
         contact_from_values("quad0", {"with": "wall", "time_s": "1", "x_m": "2"})

@@ -63,7 +63,7 @@ def robot_record(
     active = sequencer.active_goal
     state = dataclasses.asdict(dataclasses.replace(log.robots[name].state, legs=()))
     del state["legs"]  # each has a record of its own
-    clearance_m, separation_m = log.distances.minima_of_blocks_m(name)
+    clearance_m, separation_m = log.distances.recent_minima_m(name)
     return {
         "robot": name,
         "index": sequencer.index,

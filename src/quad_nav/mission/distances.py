@@ -22,6 +22,7 @@ negative inside."""
 
 BLOCK_S = 10.0
 """Poses are compared in blocks of this length: arrays cost about as much as two numbers."""
+RECENT_S = 1.0
 MAX_DELAY_S = 1.0
 """Largest delay of a robot's poses relative to the other robots."""
 _ROUNDING_M = 1e-9
@@ -84,11 +85,13 @@ class DistanceLog:
         self._min_separation_m = dict.fromkeys(names, math.inf)
         self._next_block_s = -math.inf
         self._is_compared = True
+        self._newest_s = self._compared_s = -math.inf
 
     def add(self, name: str, stamp_s: float, x_m: float, y_m: float) -> None:
         """Add a robot's position in ``map``; the stamps of one robot increase."""
         self._samples[name].append((stamp_s, x_m, y_m))
         self._is_compared = False
+        self._newest_s = max(self._newest_s, stamp_s)
         if stamp_s >= self._next_block_s:
             if self._next_block_s > -math.inf:
                 self._compare()
@@ -105,8 +108,13 @@ class DistanceLog:
             if value_m is not None:
                 minima[name] = min(minima[name], value_m)
 
-    def minima_of_blocks_m(self, name: str) -> Tuple[Optional[float], Optional[float]]:
-        """Return clearance and separation without the unfinished block; costs nothing."""
+    def recent_minima_m(self, name: str) -> Tuple[Optional[float], Optional[float]]:
+        """Return clearance and separation for a journal.
+
+        They may lack the poses of the last `RECENT_S`, so that many calls cost little.
+        """
+        if self._newest_s - self._compared_s >= RECENT_S:
+            self._compare()
         return _finite(self._min_clearance_m[name]), _finite(self._min_separation_m[name])
 
     def min_clearance_m(self, name: str) -> Optional[float]:
@@ -123,7 +131,7 @@ class DistanceLog:
         """Compare all samples, then drop those that later samples do not need."""
         if self._is_compared:
             return
-        self._is_compared = True
+        self._is_compared, self._compared_s = True, self._newest_s
         tracks = [(name, np.array(samples)) for name, samples in self._samples.items() if samples]
         if self._surface_distance is not None:
             for name, track in tracks:

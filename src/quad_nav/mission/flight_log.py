@@ -114,6 +114,10 @@ class RobotLog:
         self._pose, self._stamp_s = pose, stamp_s
         return True
 
+    def relocate(self) -> None:
+        """Forget the last pose: the robot did not fly to the next one."""
+        self._pose = None
+
     def _add_step(self, before: Pose2D, after: Pose2D, time_s: float) -> None:
         length_m = before.distance_to(after)
         self.path_length_m += length_m

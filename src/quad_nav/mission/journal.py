@@ -10,7 +10,7 @@ import fcntl
 import json
 import os
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
 
@@ -31,8 +31,12 @@ class Journal:
 
     def start(self, head: Mapping[str, Any]) -> str:
         """Discard the content of the file and write the first record."""
-        self._size, self._waiting = 0, []
+        self.clear()
         return self.append(head)
+
+    def clear(self) -> None:
+        """Discard the content of the file with the next record."""
+        self._size, self._waiting = 0, []
 
     def resume(self) -> List[Dict[str, Any]]:
         """Return the records of the file, [] if there is no file; append after them.
@@ -56,7 +60,11 @@ class Journal:
 
     def append(self, record: Mapping[str, Any]) -> str:
         """Add a record and write all records that wait."""
-        self._waiting.append(json.dumps(record, allow_nan=False).encode() + b"\n")
+        return self.append_lines([encode(record)])
+
+    def append_lines(self, lines: Sequence[bytes]) -> str:
+        """Add encoded records and write all records that wait, in one access to the disk."""
+        self._waiting += lines
         return self.flush()
 
     def flush(self) -> str:
@@ -109,6 +117,15 @@ class Journal:
             os.close(file)
             raise OSError(error.errno, "another running mission writes it") from error
         return file
+
+
+def encode(record: Mapping[str, Any]) -> bytes:
+    """Return a record as a line of the file.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    return json.dumps(record, allow_nan=False).encode() + b"\n"
 
 
 def _records(content: bytes, path: Path) -> Tuple[List[Dict[str, Any]], int]:

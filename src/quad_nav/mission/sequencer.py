@@ -34,6 +34,10 @@ class Verdict(enum.Enum):
     ABORTED = "aborted"
     CANCELLED = "cancelled"
     REPLACED = "replaced by another node's goal"
+    OTHER_ENDED = "another node's goal has ended"
+
+
+_ENDED = (Verdict.SUCCEEDED, Verdict.ABORTED, Verdict.OTHER_ENDED)
 
 
 @dataclass(frozen=True)
@@ -222,8 +226,7 @@ class Sequencer:
         """Return why the navigator has not got the goal any more, "" if it has."""
         if self._is_resumed:
             return "the sequencer or the clock restarted"
-        ended = any(report.verdict in (Verdict.SUCCEEDED, Verdict.ABORTED) for report in reports)
-        if active.replaced and ended:
+        if active.replaced and any(report.verdict in _ENDED for report in reports):
             return "the navigator has finished another node's goal"
         if now_s - self._busy_s >= GOAL_LOST_AFTER_S:
             return f"the navigator has had no goal for {GOAL_LOST_AFTER_S:.0f} s"

@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 from quad_nav.mission.flight_log import INTERRUPTED, FlightLog, Leg
@@ -21,7 +23,10 @@ EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT = 0, 1, 2
 
 @dataclass(frozen=True)
 class RobotSummary:
-    """Figures of one robot; lengths and distances are None if they were not measured."""
+    """Figures of one robot; lengths and distances are None if they were not measured.
+
+    ``reason`` says why its mission ended before the others', "" if it did not.
+    """
 
     robot: str
     legs: Tuple[Leg, ...]
@@ -32,6 +37,7 @@ class RobotSummary:
     contacts: int = 0
     aborts: int = 0
     spin_s: float = 0.0
+    reason: str = ""
 
     @property
     def straight_length_m(self) -> float:
@@ -86,6 +92,7 @@ class MissionSummary:
             not self.reason
             and not self.problems
             and not self.contacts
+            and not any(robot.reason for robot in self.robots)
             and all(leg.reached for robot in self.robots for leg in robot.legs)
         )
 
@@ -116,6 +123,7 @@ def summarize(
     sim_time_s: float,
     wall_time_s: float,
     reason: str = "",
+    reasons: Mapping[str, str] = MappingProxyType({}),
     seed: Optional[int] = None,
     contacts_reported: bool = True,
 ) -> MissionSummary:
@@ -128,12 +136,13 @@ def summarize(
         sim_time_s: Duration of the mission.
         wall_time_s: Wall time that it took.
         reason: Reason why the mission ended before its goals did, "" if it did not.
+        reasons: The same by robot.
         seed: Seed of the simulation.
         contacts_reported: False if nothing reports contacts, as on real quadcopters.
     """
     robots = (
-        summarize_robot(log, name, log.robots[name].all_legs(sequencer, clock_s))
-        for name, sequencer in sequencers.items()
+        summarize_robot(log, name, log.robots[name].all_legs(one, clock_s), reasons.get(name, ""))
+        for name, one in sequencers.items()
     )
     return MissionSummary(
         tuple(robots),
@@ -148,8 +157,17 @@ def summarize(
     )
 
 
-def summarize_robot(log: FlightLog, name: str, legs: Sequence[Leg]) -> RobotSummary:
-    """Sum up one robot's part; ``legs`` are all of its goals, flown or not."""
+def summarize_robot(
+    log: FlightLog, name: str, legs: Sequence[Leg], reason: str = ""
+) -> RobotSummary:
+    """Sum up one robot's part.
+
+    Args:
+        log: Flight log of all robots.
+        name: The robot's name.
+        legs: All of its goals, flown or not.
+        reason: Reason why its mission ended early.
+    """
     robot = log.robots[name]
     return RobotSummary(
         name,
@@ -161,11 +179,15 @@ def summarize_robot(log: FlightLog, name: str, legs: Sequence[Leg]) -> RobotSumm
         log.contacts_of(name),
         robot.aborts,
         robot.spin_s,
+        reason,
     )
 
 
 def to_json(summary: MissionSummary) -> Dict[str, Any]:
-    """Return the JSON object; lengths and times are rounded to 1 mm and 1 ms."""
+    """Return the JSON object; lengths and times are rounded to 1 mm and 1 ms.
+
+    A number that is not finite is null: a summary can always be written.
+    """
     return {
         "success": summary.success,
         "exit_status": summary.exit_status,
@@ -209,12 +231,13 @@ def write_json(summary: MissionSummary, path: Union[str, Path]) -> None:
 
 
 def _rounded(value: Optional[float]) -> Optional[float]:
-    return None if value is None else round(value, 3)
+    return None if value is None or not math.isfinite(value) else round(value, 3)
 
 
 def _robot_json(robot: RobotSummary) -> Dict[str, Any]:
     return {
         "robot": robot.robot,
+        "reason": robot.reason,
         "goals": [
             {
                 "goal": leg.index + 1,

@@ -195,6 +195,9 @@ def _verdict(summary: MissionSummary) -> str:
     contacts = f", {count} contact{'s' * (count != 1)}" if summary.contacts_reported else ""
     early = f"\nThe mission ended early: {printable(summary.reason)}."
     reason = early if summary.reason else ""
+    for robot in summary.robots:
+        if robot.reason:
+            reason += f"\n{robot.robot} ended early: {printable(robot.reason)}."
     return (
         f"Mission {'succeeded' if summary.success else 'FAILED'}: {reached} of {len(legs)} goals "
         f"reached{contacts} in {summary.sim_time_s:.1f} s "

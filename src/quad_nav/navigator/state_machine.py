@@ -20,7 +20,7 @@ from quad_nav.navigator.costmap_updates import CostmapUpdates
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.navigator.plan_search import PlanSearch
 from quad_nav.navigator.recovery_sequence import NamedRecovery, RecoverySequence
-from quad_nav.navigator.tick import STOPPING, Outcome, RobotPoses, State, Tick, Trigger
+from quad_nav.navigator.tick import Outcome, RobotPoses, State, Tick, Trigger
 from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.planner import GlobalPlanner
 from quad_nav.timing import Schedule
@@ -220,7 +220,8 @@ class StateMachine:
                 tick.command = Twist2D()
 
     def _stop_without_data(self, tick: Tick, reason: str) -> None:
-        tick.warnings.append(STOPPING + reason)
+        tick.warnings.append(f"stopping: {reason}")
+        tick.is_stopped = True
         tick.command = Twist2D()
         if self._stops_without_data:
             self.control.restart_timers(tick.now_s)

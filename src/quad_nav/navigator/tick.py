@@ -14,8 +14,6 @@ from quad_nav.costmap.cost_grid import Window
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.peers.right_of_way import YieldDecision
 
-STOPPING = "stopping: "  # begins the warnings of a robot that stops for lack of data
-
 
 class State(enum.Enum):
     """States of move_base."""
@@ -99,6 +97,7 @@ class Tick:
         limited_by: Name of the peer that limited the command, "" if none did.
         notes: Messages for the log that tell no fault.
         warnings: Messages for the log that tell a fault.
+        is_stopped: The robot stops for lack of data; the first warning says of which.
     """
 
     now_s: float
@@ -115,3 +114,4 @@ class Tick:
     limited_by: str = ""
     notes: List[str] = field(default_factory=list)
     warnings: List[str] = field(default_factory=list)
+    is_stopped: bool = False

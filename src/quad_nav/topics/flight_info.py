@@ -16,10 +16,13 @@ from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_writer import scene_document
+from quad_nav.topics.validation import contact_problem
 from quad_nav.versions import versions
 
 FLIGHT_TOPIC, EVENTS_TOPIC = "/quad/flight", "/quad/events"
 CONTACT_STATUS = "contact"
+RESET_TOPIC = "/simulation/last_reset"
+"""`std_msgs/Time`, latched: time on `/clock` of the simulation's last reset, if there was one."""
 
 _MAX_DIGITS = 100
 START_S = 1.0
@@ -118,19 +121,19 @@ def text_values(**entries: object) -> Dict[str, str]:
 
 
 def contact_values(contact: Contact, clock_s: float) -> Dict[str, str]:
-    """Return the diagnostic values of a contact.
+    """Return the diagnostic values of a contact, its numbers with all their digits.
 
     Args:
         contact: The contact as the simulation logs it.
         clock_s: Time on `/clock` at the contact.
     """
-    return text_values(
-        time_s=clock_s,
-        robot=contact.robot,
-        **{"with": contact.other},
-        x_m=contact.x_m,
-        y_m=contact.y_m,
-    )
+    return {
+        "time_s": repr(float(clock_s)),
+        "robot": contact.robot,
+        "with": contact.other,
+        "x_m": repr(float(contact.x_m)),
+        "y_m": repr(float(contact.y_m)),
+    }
 
 
 def contact_from_values(robot: str, values: Mapping[str, str]) -> Contact:
@@ -141,10 +144,10 @@ def contact_from_values(robot: str, values: Mapping[str, str]) -> Contact:
         values: Values by their keys.
 
     Raises:
-        ValueError: If a value is missing or not a number.
+        ValueError: If a value is missing, not a number or out of its range.
     """
     try:
-        return Contact(
+        contact = Contact(
             float(values["time_s"]),
             robot,
             values["with"],
@@ -155,3 +158,7 @@ def contact_from_values(robot: str, values: Mapping[str, str]) -> Contact:
         raise ValueError(
             f"contact has no valid {error}; expected the values time_s, with, x_m, y_m"
         ) from error
+    problem = contact_problem(contact)
+    if problem:
+        raise ValueError(f"contact with {problem}")
+    return contact

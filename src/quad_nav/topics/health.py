@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import Dict, Mapping, Optional, Sequence
 
-from quad_nav.navigator.tick import STOPPING, State
+from quad_nav.navigator.tick import State
 
 SLOW_BELOW = 0.8
 """A second is slow if the control rate is below this part of the configured one."""
@@ -77,6 +77,7 @@ class Control:
         expected_hz: The configured rate.
         slow_seconds: How long `rate_hz` has been below `SLOW_BELOW` of `expected_hz`.
         fault: Present fault, or "".
+        is_stopped: Whether the robot stops because of the fault.
         reason: The last fault, present or past.
         reason_s: Time of the last fault.
     """
@@ -86,6 +87,7 @@ class Control:
     expected_hz: float
     slow_seconds: int
     fault: str
+    is_stopped: bool
     reason: str
     reason_s: float
 
@@ -144,7 +146,7 @@ def control_health(node: str, robot: str, control: Control) -> Health:
         level, message = Level.WARN, f"{message}: recovery behaviour active"
     if control.fault:
         level, message = Level.WARN, f"{control.state.value}: {control.fault}"
-        if control.fault.startswith(STOPPING):
+        if control.is_stopped:
             level = Level.ERROR
     return Health(
         f"{node}: control",

@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose3D, Scan, Twist2D
+from quad_nav.sim.contacts import Contact
 
 MAX_BEAMS = 100_000
 MAX_POINTS = 1_000_000
 MAX_POSES = 100_000
 MAX_CELLS = 10**8
+MAX_TIME_S = 2.0**32
+"""End of the range of ROS times."""
 MAX_MAGNITUDE = 1e6
 """Largest accepted position coordinate in m, and speed in m/s or rad/s."""
 MAX_ANGLE_RAD = 1e3
@@ -84,8 +87,10 @@ def scan_problem(scan: Scan) -> str:
 
 def pose_problem(pose: Pose3D) -> str:
     """Check that the position is finite and the quaternion close to unit length."""
-    length = math.sqrt(sum(part * part for part in pose.quaternion))
-    if not all(abs(value) <= MAX_MAGNITUDE for value in (pose.x_m, pose.y_m, pose.z_m)):
+    x, y, z, w = pose.quaternion
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    most = MAX_MAGNITUDE
+    if not (-most <= pose.x_m <= most and -most <= pose.y_m <= most and -most <= pose.z_m <= most):
         return (
             f"position ({pose.x_m:g}, {pose.y_m:g}, {pose.z_m:g}) m, expected finite coordinates"
             f" up to {MAX_MAGNITUDE:g} m"
@@ -95,10 +100,32 @@ def pose_problem(pose: Pose3D) -> str:
 
 def twist_problem(twist: Twist2D) -> str:
     """Check that every component of a velocity is finite."""
-    values = (twist.vx_mps, twist.vy_mps, twist.vyaw_radps)
-    if all(abs(value) <= MAX_MAGNITUDE for value in values):
+    vx, vy, vyaw, most = twist.vx_mps, twist.vy_mps, twist.vyaw_radps, MAX_MAGNITUDE
+    if -most <= vx <= most and -most <= vy <= most and -most <= vyaw <= most:
         return ""
-    return f"velocity {values}, expected finite numbers up to {MAX_MAGNITUDE:g}"
+    return f"velocity {(vx, vy, vyaw)}, expected finite numbers up to {MAX_MAGNITUDE:g}"
+
+
+def odometry_problem(frame: str, odom_from_base: Pose3D, velocity: Twist2D) -> str:
+    """Check the frame, the pose and the velocity of an odometry message."""
+    return (
+        frame_problem(frame.lstrip("/")) or pose_problem(odom_from_base) or twist_problem(velocity)
+    )
+
+
+def contact_problem(contact: Contact) -> str:
+    """Check the time, the position and the names of a contact."""
+    x_m, y_m = contact.x_m, contact.y_m
+    if not 0.0 <= contact.time_s <= MAX_TIME_S:
+        return f"time {contact.time_s:g} s, expected 0 to {MAX_TIME_S:g}"
+    if not (abs(x_m) <= MAX_MAGNITUDE and abs(y_m) <= MAX_MAGNITUDE):
+        return f"position ({x_m:g}, {y_m:g}) m, expected finite numbers up to {MAX_MAGNITUDE:g}"
+    longest = max(len(contact.robot), len(contact.other))
+    return (
+        ""
+        if longest <= MAX_FRAME_ID
+        else f"name of {longest} characters, expected {MAX_FRAME_ID} or less"
+    )
 
 
 def path_problem(path: NDArray[np.float64]) -> str:

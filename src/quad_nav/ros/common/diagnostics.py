@@ -103,10 +103,16 @@ class ThrottledWarnings:
         """Start without logged warnings."""
         self._logged_s: Dict[str, float] = {}
 
-    def warn(self, text: str) -> None:
-        """Log a warning unless the same one was logged a short time ago."""
+    def warn(self, text: str, kind: str = "") -> None:
+        """Log a warning unless the same one was logged a short time ago.
+
+        Args:
+            text: The warning.
+            kind: Warnings of one kind are the same. Give it for a text with words from a message:
+                a flood of different words would be a flood of lines.
+        """
         text = excerpt(text, MAX_WARNING, keep="\n")
-        if self._is_due(text):
+        if self._is_due(kind or text):
             rospy.logwarn("%s", text)
 
     def error(self, text: str) -> None:

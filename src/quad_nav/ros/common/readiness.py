@@ -13,6 +13,7 @@ from typing import Callable, Dict, List, Optional, Sequence
 
 import rosgraph
 import rospy
+from rospy.impl.paramserver import get_param_server_cache
 
 from quad_nav.errors import QuadError, excerpt, printable
 
@@ -22,6 +23,7 @@ ALIVE_WITHIN_S = 1.0
 SILENT_AFTER_S = 3.0
 REPEAT_S = 15.0
 MAX_LOG = 50_000  # characters of a line and of each of its arguments
+_ROSOUT_PARAMETER = "/rosout_disable_topics_generation"
 
 
 def init_node(name: str) -> None:
@@ -32,6 +34,7 @@ def init_node(name: str) -> None:
     """
     rospy.init_node(name, disable_signals=True)
     escape_log_messages()
+    log_without_master()
 
     def shut_down(number: int, _frame: Optional[FrameType]) -> None:
         reason = signal.Signals(number).name
@@ -62,6 +65,16 @@ def _printable_argument(value: object) -> object:
     if isinstance(value, QuadError):
         return printable(value, "\n")
     return excerpt(str(value), MAX_LOG)
+
+
+def log_without_master() -> None:
+    """Let log calls return at once while the ROS master hangs.
+
+    Each log call of rospy reads a parameter, and asks the master for it as long as it is not set:
+    rospy does not cache that it is missing. This puts the default into the cache.
+    """
+    if rospy.get_param_cached(_ROSOUT_PARAMETER, None) is None:
+        get_param_server_cache().set(_ROSOUT_PARAMETER, False)
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,7 @@ class NavigatorHealth:
         self._cycles = self._cycles_read = 0
         self._busy_since_s = self._read_s = self._fault_s = self._reason_s = 0.0
         self._fault = self._reason = ""
+        self._is_stopped = False  # by the fault
         self._slow_seconds = 0
         self.expected_hz = 0.0
 
@@ -75,7 +76,7 @@ class NavigatorHealth:
         if tick.warnings or tick.planning_failed:
             self._fault = (tick.warnings or [f"no plan: {tick.planning_failed}"])[0]
             self._fault_s = self._reason_s = tick.now_s
-            self._reason = self._fault
+            self._reason, self._is_stopped = self._fault, tick.is_stopped
         if tick.outcome is not None and not tick.outcome.succeeded:
             self._reason, self._reason_s = tick.outcome.text, tick.now_s
 
@@ -94,6 +95,7 @@ class NavigatorHealth:
             self.expected_hz,
             self._slow_seconds,
             fault,
+            self._is_stopped,
             self._reason,
             self._reason_s,
         )

@@ -24,10 +24,9 @@ from quad_nav.topics.publishing import Names
 from quad_nav.topics.validation import (
     MAX_LEAD_S,
     MAX_POSES,
+    odometry_problem,
     path_problem,
-    pose_problem,
     stamp_problem,
-    twist_problem,
 )
 
 REPEAT_S = 0.25
@@ -138,11 +137,9 @@ class PeerTopics:
             return None
         odom_from_base, velocity = odometry_from_message(odometry)
         stamp_s = odometry.header.stamp.to_sec()
-        problem = (
-            pose_problem(odom_from_base)
-            or twist_problem(velocity)
-            or stamp_problem(stamp_s, rospy.get_time())
-        )
+        problem = odometry_problem(
+            odometry.header.frame_id, odom_from_base, velocity
+        ) or stamp_problem(stamp_s, rospy.get_time())
         if problem:
             rospy.logwarn_throttle(5.0, f"{name}: odometry dropped, ignoring this peer: {problem}")
             return None

@@ -16,7 +16,7 @@ from nav_msgs.msg import Odometry
 from quad_nav import config
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.navigator.tick import RobotPoses, Tick
-from quad_nav.ros.common.conversions import twist_from_message
+from quad_nav.ros.common.conversions import odometry_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator import sensors, static_maps
@@ -29,7 +29,7 @@ from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.ros.navigator.reconfigure import serve_namespaces
 from quad_nav.scenario.assembly import apply_configuration, build_navigator
 from quad_nav.topics.publishing import Names, own_node
-from quad_nav.topics.validation import twist_problem
+from quad_nav.topics.validation import odometry_problem
 
 POLL_S = 0.05  # delay after which an idle navigator notices a goal
 
@@ -137,8 +137,8 @@ class RobotNavigator:
     # -- callbacks -----------------------------------------------------------------
 
     def _on_odometry(self, message: Odometry) -> None:
-        velocity = twist_from_message(message.twist.twist)
-        problem = twist_problem(velocity)
+        odom_from_base, velocity = odometry_from_message(message)
+        problem = odometry_problem(message.header.frame_id, odom_from_base, velocity)
         if problem:
             self._warnings.warn(f"{self._name}: odometry dropped: {problem}")
         else:

@@ -1,41 +1,50 @@
-"""Run a mission: the sequencers of all quadcopters, one flight log and one journal.
+"""Run a mission: the threads of all quadcopters, one flight log and one journal.
 
-One loop reads the messages and ticks each quadcopter's sequencer. One lock guards the flight log
-against contacts, which arrive in a thread of rospy.
+Each quadcopter has a thread. The main thread watches them: it restarts the mission after a reset,
+resumes it after a clock jump, and publishes goals and progress.
 """
 
 from __future__ import annotations
 
 import contextlib
 import threading
-import time
-from dataclasses import replace
-from typing import Iterator, List, Optional
+from typing import Dict, Iterator, List, Optional
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
-from std_msgs.msg import String
+from std_msgs.msg import String, Time
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from quad_nav.mission.checkpoint import MissionCheckpoint, RobotCheckpoint, shift_to_clock
-from quad_nav.mission.flight_log import FlightLog, Leg
+from quad_nav.mission.checkpoint import MissionCheckpoint, shift_to_clock
+from quad_nav.mission.flight_log import FlightLog
 from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.conversions import replacing_markers
-from quad_nav.ros.common.diagnostics import DiagnosticsTopic
+from quad_nav.ros.common.diagnostics import DiagnosticsTopic, ThrottledWarnings
 from quad_nav.ros.common.readiness import Need
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.ros.sequencer.flight_record import FlightRecord
 from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress_message
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.robot import MissionRobot
+from quad_nav.ros.sequencer.robot_thread import RobotThread
 from quad_nav.scenario.mission_setup import MissionSetup
-from quad_nav.topics.flight_info import CONTACT_STATUS, FLIGHT_TOPIC, mission_info, to_text
+from quad_nav.topics.flight_info import (
+    CONTACT_STATUS,
+    FLIGHT_TOPIC,
+    RESET_TOPIC,
+    mission_info,
+    to_text,
+)
 from quad_nav.topics.markers import goal_markers
+from quad_nav.topics.validation import MAX_LEAD_S
 
 START_SERVICE = "/simulation/start"
 WAIT_S = 0.2  # wall time, as the next; longest delay until the node notices a shutdown
-GATHER_S = 0.02  # odometry of one time arrives in one message per quadcopter
+PAUSE_S = 1.0  # longest wait for a step of a robot that is in progress
+MOST_AHEAD_S = 60.0  # simulated; /clock may be as far behind on a busy machine
+END_S = 5.0  # longest wait for the journal at the end
 
 
 class MissionRunner:
@@ -52,34 +61,44 @@ class MissionRunner:
             InputError: If the journal is not valid.
         """
         self._setup, self._respawned = setup, respawned
-        self._journal = MissionJournal(setup.journal, [robot.name for robot in setup.robots])
-        self._before = self._journal.read() if setup.resume or respawned else None
+        journal = MissionJournal(setup.journal, [robot.name for robot in setup.robots])
+        self._before = journal.read() if setup.resume or respawned else None
         if self._before is None:
-            self._journal.begin(0.0)  # removes the journal of an older mission
-        self._lock = threading.Lock()
-        self._transforms = Transforms()
-        self._received = threading.Event()
+            journal.begin(0.0)  # removes the journal of an older mission
+        self._record = FlightRecord(self._new_log, journal)
+        self._news = threading.Event()
+        transforms = Transforms()
         self.robots = [
-            MissionRobot(index, goals, self._transforms, self._received)
-            for index, goals in enumerate(setup.robots)
+            MissionRobot(index, goals, transforms) for index, goals in enumerate(setup.robots)
         ]
-        self._log = self._new_log()
+        self._threads = [
+            RobotThread(robot, self._record, self._news, len(self.robots)) for robot in self.robots
+        ]
         self._seed: Optional[int] = rospy.get_param("/simulator/seed", None)
         self._now_s = 0.0
+        self._begun_s = 0.0  # a reset after this time restarts the mission
+        self._reset_s = 0.0  # the last reset
+        self._warnings = ThrottledWarnings()
+        self._connect()
+
+    def _connect(self) -> None:
+        setup = self._setup
         self._goals = rospy.Publisher("/goals", MarkerArray, queue_size=1, latch=True)
         self._diagnostics = DiagnosticsTopic()
-        self._contacts = rospy.Subscriber(
-            "/simulation/contacts", DiagnosticStatus, self._on_contact
-        )
         self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
         goals = {robot.name: robot.sequence for robot in setup.robots}
         self._flight.publish(to_text(mission_info(goals, setup.parameters, setup.robot_radius_m)))
         self._publish_goals()
+        self._contacts = rospy.Subscriber(
+            "/simulation/contacts", DiagnosticStatus, self._on_contact, queue_size=100
+        )
+        if setup.simulation:
+            self._resets = rospy.Subscriber(RESET_TOPIC, Time, self._on_reset)
 
     @property
     def is_done(self) -> bool:
-        """True when all sequencers are done."""
-        return all(robot.sequencer.done for robot in self.robots)
+        """True when the missions of all robots have ended."""
+        return all(thread.is_done for thread in self._threads)
 
     def needs(self) -> List[Need]:
         """Return the conditions for the start of the mission."""
@@ -104,13 +123,13 @@ class MissionRunner:
             ServiceException: If the simulator refuses.
         """
         self._start_simulation()
-        with self._lock:
-            if self._before is None:
-                self._begin(rospy.get_time())
-            else:
-                self._resume(self._before, rospy.get_time())
-        for robot in self.robots:
+        if self._before is None:
+            self._begin(rospy.get_time())
+        else:
+            self._resume(self._before, rospy.get_time(), self._respawned)
+        for robot, thread in zip(self.robots, self._threads):
             robot.link.pop()  # messages from before the start are not part of the flight
+            thread.start()
 
     def _start_simulation(self) -> None:
         if self._setup.simulation:
@@ -119,36 +138,59 @@ class MissionRunner:
                 raise rospy.ServiceException(response.message or "refused without giving a reason")
 
     def advance(self) -> None:
-        """Wait for odometry, then process all messages."""
-        self._received.wait(WAIT_S)
-        self._received.clear()
-        time.sleep(GATHER_S)
-        inboxes = [robot.link.pop() for robot in self.robots]
-        with self._lock, _topics_may_close():
-            now_s = rospy.get_time()
-            if any(robot.was_reset(inbox) for robot, inbox in zip(self.robots, inboxes)):
-                rospy.logwarn("sequencer: simulation was reset; restarting the mission")
-                self._begin(now_s)
-            elif now_s < self._now_s:
-                rospy.logwarn(
-                    "sequencer: /clock jumped back by %.2f s; resuming the mission",
-                    self._now_s - now_s,
-                )
-                self._resume(self._checkpoint(), now_s)
-                self._start_new_simulation()
-            self._now_s = now_s
-            changed = [
-                robot.step(inbox, now_s, self._log, self._write_journal)
-                for robot, inbox in zip(self.robots, inboxes)
-            ]
-            if any(changed):
+        """Wait for news of the robots, and process them."""
+        self._news.wait(WAIT_S)
+        self._news.clear()
+        with _topics_may_close():
+            self._watch_clock(rospy.get_time())
+            if any([_pop_change(thread) for thread in self._threads]):
                 self._publish_goals()
+
+    def _watch_clock(self, now_s: float) -> None:
+        reset_s, before_s = self._reset_s, self._now_s
+        if self._begun_s < reset_s <= now_s + MAX_LEAD_S:
+            rospy.logwarn("sequencer: simulation was reset; restarting the mission")
+            with self._paused_robots():
+                self._begin(now_s)
+                self._begun_s = max(now_s, reset_s)
+                for robot in self.robots:
+                    robot.odometry.begin(self._begun_s)  # without that from before the reset
+            for thread in self._threads:
+                thread.start()
+        elif now_s < before_s or any(robot.clock_went_back for robot in self.robots):
+            rospy.logwarn(
+                "sequencer: /clock jumped back by %.2f s; resuming the mission",
+                max(before_s - now_s, 0.0),
+            )
+            with self._paused_robots():
+                progress = [robot.sequencer.progress for robot in self.robots]
+                self._resume(self._record.checkpoint(before_s, progress), now_s, False)
+            self._start_new_simulation()
+        else:
+            self._now_s = now_s
+
+    @contextlib.contextmanager
+    def _paused_robots(self) -> Iterator[None]:
+        """Let no robot begin a step meanwhile, apart from one that is stuck in a step."""
+        with contextlib.ExitStack() as held:
+            for robot in self.robots:
+                if robot.lock.acquire(timeout=PAUSE_S):
+                    held.callback(robot.lock.release)
+            yield
 
     def publish_progress(self) -> None:
         """Publish the progress on `/diagnostics` and retry failed writes of the journal."""
-        with self._lock, _topics_may_close():
-            self._diagnostics.publish(progress_message(self.robots, self._log))
-            self._journal.flush()
+        for thread in self._threads:
+            thread.check()
+        with _topics_may_close():
+            with self._record.lock:
+                message = progress_message(self.robots, self._record.log, self._failures)
+            self._diagnostics.publish(message)
+        self._record.journal.retry()
+
+    @property
+    def _failures(self) -> Dict[str, str]:
+        return {thread.robot.name: thread.failure for thread in self._threads if thread.failure}
 
     def stop_reason(self) -> str:
         """Return why the node stops before the mission is done."""
@@ -157,22 +199,24 @@ class MissionRunner:
 
     def summary(self, reason: str = "") -> MissionSummary:
         """Summarize the flight so far; `reason` says why it stopped early."""
-        with self._lock:
+        record, journal = self._record, self._record.journal
+        journal.wait(patience_s=END_S)
+        with self._paused_robots(), record.lock:
             return summarize(
-                self._log,
+                record.log,
                 {robot.name: robot.sequencer for robot in self.robots},
                 self._now_s,
-                sim_time_s=self._now_s - self._journal.start_s,
-                wall_time_s=self._journal.wall_time_s,
+                sim_time_s=self._now_s - journal.start_s,
+                wall_time_s=journal.wall_time_s,
                 reason=reason,
+                reasons=self._failures,
                 seed=self._seed,
                 contacts_reported=self._setup.simulation,
             )
 
     def _begin(self, now_s: float) -> None:
-        self._log = self._new_log()
-        self._now_s = now_s
-        self._journal.begin(now_s)
+        self._now_s = self._begun_s = now_s
+        self._record.begin(now_s)
         for robot in self.robots:
             robot.begin(now_s)
 
@@ -183,49 +227,23 @@ class MissionRunner:
         except rospy.ServiceException as error:
             rospy.logwarn("sequencer: %s failed: %s", START_SERVICE, error)
 
-    def _checkpoint(self) -> MissionCheckpoint:
-        """Return the progress in a form that does not depend on the clock."""
-        start_s = self._journal.start_s
-        robots = {
-            robot.name: RobotCheckpoint(
-                shift_to_clock(robot.sequencer.progress, -start_s),
-                self._log.robots[robot.name].state,
-                *self._log.distances.minima_of_blocks_m(robot.name),
-            )
-            for robot in self.robots
-        }
-        contacts = [replace(one, time_s=one.time_s - start_s) for one in self._log.contacts]
-        return MissionCheckpoint(
-            start_s,
-            self._journal.start_epoch_s,
-            self._now_s - start_s,
-            self._journal.wall_time_s,
-            robots,
-            contacts,
-        )
-
-    def _resume(self, before: MissionCheckpoint, now_s: float) -> None:
+    def _resume(self, before: MissionCheckpoint, now_s: float, same_clock: bool) -> None:
         """Resume the mission from a checkpoint."""
-        self._now_s, self._log = now_s, self._new_log()
-        self._journal.resume(before, now_s, same_clock=self._respawned)
-        start_s = self._journal.start_s
+        self._now_s = self._begun_s = now_s
+        last_s = before.clock_s + before.mission_s
+        if same_clock and last_s <= now_s:
+            self._begun_s = last_s  # a reset since then counts
+        self._record.resume(before, now_s, same_clock)
         for robot in self.robots:
-            checkpoint = before.robots[robot.name]
-            state = checkpoint.log if self._respawned else replace(checkpoint.log, pose=None)
-            self._log.resume(robot.name, state, checkpoint.clearance_m, checkpoint.separation_m)
-            robot.begin(now_s, shift_to_clock(checkpoint.progress, start_s))
+            progress = before.robots[robot.name].progress
+            robot.begin(now_s, shift_to_clock(progress, self._record.journal.start_s))
             rospy.loginfo(
                 "%s: resuming goal %d of %d, lap %d",
                 robot.name,
-                checkpoint.progress.index + 1,
+                progress.index + 1,
                 len(robot.sequencer.sequence.goals),
-                checkpoint.progress.lap,
+                progress.lap,
             )
-        for contact in before.contacts:
-            self._log.add_contact(replace(contact, time_s=contact.time_s + start_s))
-
-    def _write_journal(self, robot: MissionRobot, leg: Optional[Leg]) -> None:
-        self._journal.write_robot(robot.name, robot.sequencer, self._log, leg, self._now_s)
 
     def _new_log(self) -> FlightLog:
         return FlightLog(
@@ -246,16 +264,16 @@ class MissionRunner:
     def _on_contact(self, message: DiagnosticStatus) -> None:
         if message.name != CONTACT_STATUS:
             return
+        now_s = rospy.get_time()
         try:
             contact = contact_from_message(message)
+            if contact.time_s > now_s + MAX_LEAD_S:
+                raise ValueError(f"contact at {contact.time_s:.2f} s, /clock is at {now_s:.2f} s")
         except ValueError as error:
-            rospy.logwarn("%s: contact dropped: %s", self._contacts.resolved_name, error)
+            name = self._contacts.resolved_name
+            self._warnings.warn(f"{name}: message dropped: {error}", kind=name)
             return
-        with self._lock:
-            is_new = self._log.add_contact(contact)
-            if is_new:
-                self._journal.write_contact(contact, self._now_s)
-        if is_new:
+        if self._record.add_contact(contact, now_s):
             rospy.logwarn(
                 "%s: CONTACT with %s at (%.2f, %.2f) m",
                 contact.robot,
@@ -263,6 +281,22 @@ class MissionRunner:
                 contact.x_m,
                 contact.y_m,
             )
+
+    def _on_reset(self, message: Time) -> None:
+        reset_s, now_s = message.data.to_sec(), rospy.get_time()
+        if reset_s > now_s + MOST_AHEAD_S:
+            self._warnings.warn(
+                f"{self._resets.resolved_name}: message dropped: reset at {reset_s:.2f} s, /clock"
+                f" is at {now_s:.2f} s"
+            )
+            return
+        self._reset_s = reset_s
+        self._news.set()
+
+
+def _pop_change(thread: RobotThread) -> bool:
+    changed, thread.goals_changed = thread.goals_changed, False
+    return changed
 
 
 @contextlib.contextmanager
@@ -283,7 +317,7 @@ def _robot_needs(robot: MissionRobot) -> List[Need]:
         if link.odometry_frame is None:
             return ""
         try:
-            robot.map_from(link.odometry_frame)
+            robot.odometry.map_from(link.odometry_frame)
         except TransformUnavailable as error:
             return f"/tf: {error}"
         return ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from typing import Mapping, Sequence
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -13,18 +13,27 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.topics.flight_info import contact_from_values
 
 
-def progress_message(robots: Sequence[MissionRobot], log: FlightLog) -> DiagnosticArray:
-    """Return the status of each robot of the mission."""
-    array = DiagnosticArray(status=[_robot_status(robot, log) for robot in robots])
+def progress_message(
+    robots: Sequence[MissionRobot], log: FlightLog, failures: Mapping[str, str]
+) -> DiagnosticArray:
+    """Return the status of each robot of the mission.
+
+    Args:
+        robots: The robots.
+        log: Their log.
+        failures: Why the missions of single robots ended early, by their names.
+    """
+    array = DiagnosticArray(
+        status=[_robot_status(robot, log, failures.get(robot.name, "")) for robot in robots]
+    )
     array.header.stamp = rospy.Time.now()
     return array
 
 
-def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
-    sequencer, flown = robot.sequencer, log.robots[robot.name]
+def _robot_status(robot: MissionRobot, log: FlightLog, failure: str) -> DiagnosticStatus:
+    sequencer, odometry, flown = robot.sequencer, robot.odometry, log.robots[robot.name]
     count = len(sequencer.sequence.goals)
-    skipped = sum(not leg.reached for leg in flown.legs)
-    contacts = log.contacts_of(robot.name)
+    skipped, contacts = sum(not leg.reached for leg in flown.legs), log.contacts_of(robot.name)
     active, pose = sequencer.active_goal, robot.pose
     attempts = [leg.attempts for leg in flown.legs] + ([active.attempt] if active else [])
     distance_m = None
@@ -35,8 +44,10 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
         message = f"flying to goal {sequencer.index + 1} of {count}, {distance_m:.2f} m away"
     if skipped or contacts or (active is not None and active.attempt > 1):
         level = DiagnosticStatus.WARN
-    if robot.is_silent:
-        level, message = DiagnosticStatus.ERROR, f"no odometry for {robot.silent_s:.0f} s"
+    if odometry.is_silent:
+        level, message = DiagnosticStatus.ERROR, f"no odometry for {odometry.silent_s:.0f} s"
+    if failure:
+        level, message = DiagnosticStatus.ERROR, f"ended early: {failure}"
     values = {
         "goal": min(sequencer.index + 1, count),
         "goals": count,
@@ -48,7 +59,7 @@ def _robot_status(robot: MissionRobot, log: FlightLog) -> DiagnosticStatus:
         "skipped": skipped,
         "contacts": contacts,
         "last reason": next((leg.reason for leg in reversed(flown.legs) if leg.reason), ""),
-        "odometry silent s": f"{robot.silent_s:.2f}",
+        "odometry silent s": f"{odometry.silent_s:.2f}",
         "recoveries": flown.recoveries,
         "path_length_m": f"{flown.path_length_m:.2f}",
     }

@@ -1,136 +1,121 @@
-"""Run one quadcopter of a mission: connect its sequencer to its topics, log and journal."""
+"""Fly one quadcopter's goals: connect its sequencer to its topics and to the flight record."""
 
 from __future__ import annotations
 
-import math
 import threading
 import time
-from typing import Callable, Optional, Sequence
+from typing import Iterable, List, Optional
 
 import rospy
-from nav_msgs.msg import Odometry
+from move_base_msgs.msg import RecoveryStatus
 from std_msgs.msg import String
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose3D
-from quad_nav.mission.flight_log import FlightLog, Leg
+from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import (
     START,
     Action,
+    NavigatorReport,
     SendGoal,
     SequenceDone,
     SequenceProgress,
     Sequencer,
-    Verdict,
 )
-from quad_nav.ros.common.conversions import pose_from_message
-from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.transforms import Transforms
+from quad_nav.ros.sequencer.flight_record import FlightRecord
+from quad_nav.ros.sequencer.odometry import OdometryIntake
 from quad_nav.ros.sequencer.robot_link import Inbox, PathPublisher, RobotLink
 from quad_nav.topics.flight_info import EVENTS_TOPIC, event, to_text
 
 FILE_POLL_S = 0.5  # wall time, because users edit files while the simulation is paused
-ODOMETRY_SILENT_S = 3.0
-WARN_AGAIN_S = 5.0
-# Accepted lead of odometry over our clock; a larger one dates from before a clock jump.
-AHEAD_S = 1.0
-# A step of odometry that no flight makes: the simulation was reset.
-JUMP_M, JUMP_MPS = 1.0, 5.0
-# A smaller step is a fault of the odometry, which may end soon.
-STEP_M, JUMP_RECOVERY_S = 0.25, 1.0
-
-
-# Writes a robot and the leg that has ended, if any, to the journal.
-WriteJournal = Callable[["MissionRobot", Optional[Leg]], None]
+MAX_NAME = 80  # characters of a recovery behaviour's name in the log
 
 
 class MissionRobot:
-    """Fly one quadcopter's goals.
+    """Fly one quadcopter's goals, in a thread of its own.
 
     Attributes:
         name: Name of the robot.
         sequencer: State of its goals.
         link: Its topics.
+        odometry: Its odometry.
         pose: Last pose in `map`.
-        is_silent: Whether odometry has timed out.
-        silent_s: Time since the last odometry.
+        lock: Held during a step; whoever restarts the mission holds it.
+        is_done: Whether all goals have ended and are in the log.
+        clock_went_back: Whether a step has seen this; steps do nothing until `begin`.
     """
 
-    def __init__(
-        self, index: int, goals: RobotGoals, transforms: Transforms, received: threading.Event
-    ) -> None:
-        """Connect to the topics of robot `index`; odometry sets the event."""
+    def __init__(self, index: int, goals: RobotGoals, transforms: Transforms) -> None:
+        """Connect to the topics of robot `index`."""
         self.name = goals.name
         self.sequencer = Sequencer(goals.sequence)
-        self.link = RobotLink(index, received)
+        self.link = RobotLink(index)
+        self.odometry = OdometryIntake(self.name, self.link.odometry.resolved_name, transforms)
         self.pose: Optional[Pose3D] = None
-        self.is_silent, self.silent_s = False, 0.0
-        self._odometry: Optional[Odometry] = None
-        self._start_s = 0.0
-        self._odometry_s = self._valid_again_s = 0.0
+        self.lock = threading.Lock()
+        self.is_done = self.clock_went_back = False
+        self._now_s = 0.0
+        self._reports: List[NavigatorReport] = []  # for the next tick
         self._file = goals.file
         self._next_poll_s = 0.0
-        self._transforms = transforms
         self._index = index
+        self._warnings = ThrottledWarnings()
         self._events = rospy.Publisher(EVENTS_TOPIC, String, queue_size=100)
         self._path = PathPublisher(f"/path{index}")
 
     def begin(self, now_s: float, progress: SequenceProgress = START) -> None:
         """Begin with the first goal, or resume the progress of another sequencer."""
         self.sequencer = Sequencer(self.sequencer.sequence, progress)
-        self.pose, self.is_silent, self._start_s, self._odometry_s = None, False, now_s, now_s
-        self._odometry, self._valid_again_s = None, 0.0
+        self.pose, self._reports, self._now_s = None, [], now_s
+        self.is_done = self.clock_went_back = False
+        self.odometry.begin(now_s)
         self.link.clear()
         self._path.clear()
 
-    def was_reset(self, inbox: Inbox) -> bool:
-        """Return whether odometry shows that the simulation was reset."""
-        usable = [o for o in inbox.odometry if o.header.stamp.to_sec() >= self._start_s]
-        before = [self._odometry, *usable] if self._odometry is not None else usable
-        return any(_is_jump(a, b) for a, b in zip(before, before[1:]))
-
-    def step(self, inbox: Inbox, now_s: float, log: FlightLog, write_journal: WriteJournal) -> bool:
-        """Process the messages of a robot and act on them.
+    def step(self, record: FlightRecord) -> bool:
+        """Process the messages of the robot and act on them.
 
         Args:
-            inbox: Messages since the last step.
-            now_s: Present time on the clock.
-            log: Log of the mission.
-            write_journal: Called before an action is carried out.
+            record: Record of the mission.
 
         Returns:
             Whether the goals or their states have changed.
         """
-        changed = self._poll_file()
-        self._move(inbox.odometry, now_s, log)
-        self._log_reports(inbox, log)
+        now_s = rospy.get_time()
+        if now_s < self._now_s:
+            self.clock_went_back = True
+        if self.clock_went_back:
+            return False
+        self._now_s, inbox = now_s, self.link.pop()
+        located = self.odometry.take(inbox.odometry, now_s)
+        self._log_recoveries(inbox.recoveries)
+        record.add_flight(self.name, located, inbox.reports, len(inbox.recoveries))
+        for one in located:
+            self.pose = one.pose
+            self._path.add(one.stamp_s, one.pose)
         self._serve_subscribers(inbox)
-        self._watch_silence(now_s)
-        if self.pose is None or self._valid_again_s > now_s:
-            return changed
-        actions = self.sequencer.tick(
-            now_s, self.pose.to_2d(), inbox.reports, self.link.navigator_is_idle(now_s)
-        )
-        legs = [log.robots[self.name].add_action(action) for action in actions]
-        if actions:
-            write_journal(self, next((leg for leg in legs if leg is not None), None))
+        self._reports += inbox.reports
+        if self.pose is None or (self.odometry.is_jumping and not located):
+            return False
+        reports, self._reports = self._reports, []
+        idle = self.link.navigator_is_idle(now_s)
+        actions = self.sequencer.tick(now_s, self.pose.to_2d(), reports, idle)
+        legs = record.add_actions(self.name, self.sequencer, actions, now_s)
         for action, leg in zip(actions, legs):
             self._do(action, leg, now_s)
-        return changed or bool(actions)
+        self.is_done = self.sequencer.done
+        return bool(actions)
 
-    def _log_reports(self, inbox: Inbox, log: FlightLog) -> None:
-        for recovery in inbox.recoveries:
-            log.robots[self.name].recoveries += 1
-            rospy.logwarn(
-                "%s: recovery %d of %d: %s",
-                self.name,
-                recovery.current_recovery_number + 1,
-                recovery.total_number_of_recoveries,
-                recovery.recovery_behavior_name,
+    def _log_recoveries(self, recoveries: Iterable[RecoveryStatus]) -> None:
+        for recovery in recoveries:
+            self._warnings.warn(
+                f"{self.name}: recovery {recovery.current_recovery_number + 1} of"
+                f" {recovery.total_number_of_recoveries}:"
+                f" {recovery.recovery_behavior_name[:MAX_NAME]}"
             )
-        log.robots[self.name].aborts += sum(
-            report.verdict is Verdict.ABORTED for report in inbox.reports
-        )
 
     def _serve_subscribers(self, inbox: Inbox) -> None:
         for subscriber in inbox.subscribers:
@@ -141,60 +126,11 @@ class MissionRobot:
                     self._goal(self.sequencer.index, self.sequencer.lap),
                 )
 
-    def map_from(self, frame: str, stamp_s: Optional[float] = None) -> Pose3D:
-        """Return the pose of a frame in `map` at a time if tf knows it, else the latest.
+    def poll_file(self) -> bool:
+        """Follow the goal file if it has been edited; return whether it has.
 
-        Raises:
-            TransformUnavailable: If tf does not know it.
+        This takes the lock only to replace the goals: reading a file may take long.
         """
-        if frame == "map":
-            return Pose3D(0.0, 0.0, 0.0)
-        if stamp_s is None:
-            return self._transforms.lookup("map", frame)
-        return self._transforms.lookup_near("map", frame, stamp_s)
-
-    def _move(self, messages: Sequence[Odometry], now_s: float, log: FlightLog) -> None:
-        usable = [
-            one for one in messages if self._start_s <= one.header.stamp.to_sec() <= now_s + AHEAD_S
-        ]
-        if not usable:
-            return
-        before, self._odometry = self._odometry, usable[-1]
-        try:
-            map_from_odom = [
-                self.map_from(one.header.frame_id, one.header.stamp.to_sec()) for one in usable
-            ]
-        except TransformUnavailable as error:
-            rospy.logwarn_throttle(
-                WARN_AGAIN_S, f"{self.name}: pose in map unknown, odometry dropped: {error}"
-            )
-            return
-        self._odometry_s = now_s
-        if any(_is_jump(a, b, STEP_M) for a, b in zip([before, *usable], usable) if a is not None):
-            rospy.logwarn(
-                "%s: odometry jumped; no goal counts as reached for %g s",
-                self.name,
-                JUMP_RECOVERY_S,
-            )
-            self._valid_again_s = now_s + JUMP_RECOVERY_S
-        for odometry, from_odom in zip(usable, map_from_odom):
-            stamp_s = odometry.header.stamp.to_sec()
-            self.pose = from_odom.compose(pose_from_message(odometry.pose.pose))
-            log.add_pose(self.name, stamp_s, self.pose.to_2d())
-            self._path.add(stamp_s, self.pose)
-
-    def _watch_silence(self, now_s: float) -> None:
-        self.silent_s = now_s - self._odometry_s
-        was_silent, self.is_silent = self.is_silent, self.silent_s > ODOMETRY_SILENT_S
-        if self.is_silent and not was_silent:
-            rospy.logwarn(
-                "%s: no message on %s for %.0f s; waiting for odometry",
-                self.name,
-                self.link.odometry.resolved_name,
-                ODOMETRY_SILENT_S,
-            )
-
-    def _poll_file(self) -> bool:
         if time.monotonic() < self._next_poll_s:
             return False
         self._next_poll_s = time.monotonic() + FILE_POLL_S
@@ -209,7 +145,9 @@ class MissionRobot:
             return False
         if sequence is None:
             return False
-        self.sequencer.replace_sequence(sequence)
+        with self.lock:
+            self.sequencer.replace_sequence(sequence)
+            self.is_done = False
         rospy.loginfo(
             "%s: goal file reloaded: %d goals, %d of them flown",
             self.name,
@@ -271,10 +209,3 @@ class MissionRobot:
         sequence = self.sequencer.sequence
         round_ = f"lap {lap}, " if sequence.settings.loop else ""
         return f"{round_}goal {index + 1} of {len(sequence.goals)}"
-
-
-def _is_jump(before: Odometry, after: Odometry, least_m: float = JUMP_M) -> bool:
-    a, b = before.pose.pose.position, after.pose.pose.position
-    distance_m = math.hypot(b.x - a.x, b.y - a.y)
-    time_s = (after.header.stamp - before.header.stamp).to_sec()
-    return distance_m > max(least_m, JUMP_MPS * time_s)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from dataclasses import dataclass, field
-from typing import Any, Callable, List, Optional
+from typing import Any, Callable, Deque, List, Optional, Tuple
 
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
@@ -13,13 +14,14 @@ from move_base_msgs.msg import MoveBaseActionResult, RecoveryStatus
 from nav_msgs.msg import Odometry, Path
 
 from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.mission.goal_ids import MAX_IDS, GoalIds, Owner
 from quad_nav.mission.sequencer import NavigatorReport, Verdict
 from quad_nav.ros.common.nav_messages import planar_pose, pose_stamped
 from quad_nav.topics.publishing import FlownPath
 
-# The navigator stamps a goal's id when it receives the goal; its clock may lag behind ours.
-CLOCK_LAG_S = 0.5
 STATUS_FRESH_S = 3.0
+MAX_WAITING = 1000  # messages of a topic that wait for the robot's thread; older ones are dropped
+MAX_TEXT = 500  # characters of a result's text
 
 _BUSY = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 _VERDICTS = {
@@ -34,11 +36,11 @@ _VERDICTS = {
 
 @dataclass
 class Inbox:
-    """Messages that have arrived since the last `pop`."""
+    """Messages that have arrived since the last `pop`, bounded in number."""
 
-    odometry: List[Odometry] = field(default_factory=list)
-    reports: List[NavigatorReport] = field(default_factory=list)
-    recoveries: List[RecoveryStatus] = field(default_factory=list)
+    odometry: Deque[Odometry] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
+    reports: Deque[NavigatorReport] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
+    recoveries: Deque[RecoveryStatus] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
     subscribers: List[Callable[[PoseStamped], Any]] = field(default_factory=list)
 
 
@@ -48,15 +50,16 @@ class RobotLink(rospy.SubscribeListener):
     Attributes:
         goals: Publisher of the goals.
         odometry: Subscriber to the odometry.
+        received: Set by each message of odometry.
     """
 
-    def __init__(self, index: int, received: threading.Event) -> None:
-        """Connect to the topics of robot `index`; odometry sets the event."""
+    def __init__(self, index: int) -> None:
+        """Connect to the topics of robot `index`."""
         super().__init__()
-        self._received = received
+        self.received = threading.Event()
         self._lock = threading.Lock()
         self._inbox = Inbox()
-        self._sent_s = 0.0
+        self._ids = GoalIds()
         self._busy = True
         self._status_s: Optional[float] = None
         self._odometry_frame: Optional[str] = None
@@ -94,19 +97,25 @@ class RobotLink(rospy.SubscribeListener):
         """Send a goal in `map` to the navigator."""
         now = rospy.Time.now()
         self._goal = pose_stamped(planar_pose(pose), "map", now)
-        self._sent_s = now.to_sec()
+        with self._lock:
+            self._inbox.reports.clear()  # on the goal before
+            self._ids.send(now.to_sec())
         self.goals.publish(self._goal)
 
     def send_to(self, subscriber: Callable[[PoseStamped], Any]) -> bool:
         """Send the active goal to one new subscriber; return False without an active goal."""
         if self._goal is None:
             return False
+        with self._lock:
+            self._ids.resend(rospy.get_time())
         subscriber(self._goal)
         return True
 
     def clear(self) -> None:
         """Clear the active goal."""
         self._goal = None
+        with self._lock:
+            self._ids.clear()
 
     def peer_subscribe(
         self,
@@ -126,25 +135,43 @@ class RobotLink(rospy.SubscribeListener):
         self._odometry_frame = message.header.frame_id
         with self._lock:
             self._inbox.odometry.append(message)
-        self._received.set()
+        if not self.received.is_set():
+            self.received.set()
 
     def _on_result(self, message: MoveBaseActionResult) -> None:
         status = message.status
         verdict = _VERDICTS.get(status.status)
-        if verdict is None or status.goal_id.stamp.to_sec() < self._sent_s - CLOCK_LAG_S:
-            return  # result of an earlier goal
+        if verdict is None:
+            return
         if verdict is Verdict.CANCELLED and "another goal" in status.text:
             verdict = Verdict.REPLACED
+        goal_id, stamp_s = _id_of(status)
         with self._lock:
-            self._inbox.reports.append(NavigatorReport(verdict, status.text))
+            see = self._ids.see_replaced if verdict is Verdict.REPLACED else self._ids.see
+            owner = see(goal_id, stamp_s)
+            if owner is Owner.ACTIVE:
+                self._inbox.reports.append(NavigatorReport(verdict, status.text[:MAX_TEXT]))
+            elif owner is Owner.OTHER and verdict is not Verdict.REPLACED:
+                self._inbox.reports.append(NavigatorReport(Verdict.OTHER_ENDED))
 
     def _on_status(self, message: GoalStatusArray) -> None:
-        self._busy = any(status.status in _BUSY for status in message.status_list)
+        unfinished = [status for status in message.status_list if status.status in _BUSY]
+        with self._lock:
+            for status in unfinished[-MAX_IDS:]:
+                self._ids.see(*_id_of(status))
+        self._busy = bool(unfinished)
         self._status_s = rospy.get_time()
 
     def _on_recovery(self, message: RecoveryStatus) -> None:
         with self._lock:
             self._inbox.recoveries.append(message)
+
+
+def _id_of(status: GoalStatus) -> Tuple[int, float]:
+    """Return the id of a goal, shortened to a number, and its stamp in seconds."""
+    goal_id = status.goal_id
+    stamp = goal_id.stamp
+    return hash((goal_id.id, stamp.secs, stamp.nsecs)), stamp.to_sec()
 
 
 class PathPublisher:

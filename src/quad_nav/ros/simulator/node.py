@@ -31,7 +31,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from quad_nav.errors import InputError, excerpt, printable
 from quad_nav.kernels.jit import cache_warnings
 from quad_nav.ros.common.conversions import twist_from_message
-from quad_nav.ros.common.readiness import escape_log_messages
+from quad_nav.ros.common.readiness import escape_log_messages, log_without_master
 from quad_nav.ros.simulator.topics import SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
     DEFAULTS,
@@ -182,6 +182,7 @@ class SimulatorNode:
         self._commands.clear()
         self._lease.clear()
         self._goals_are_shown = False
+        self._topics.publish_reset()
         self._publish_all()
         rospy.loginfo("simulator: reset")
         return "the quadcopters are at their start poses; the clock continues"
@@ -291,6 +292,7 @@ def main() -> int:
     """
     rospy.init_node("simulator", disable_signals=True)
     escape_log_messages()
+    log_without_master()
     name = rospy.get_name().lstrip("/")
     try:
         parameters = rospy.get_param("~", {})

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Header, String
+from std_msgs.msg import Header, String, Time
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -30,6 +30,7 @@ from quad_nav.sim.simulation import RobotState, Simulation
 from quad_nav.topics.flight_info import (
     CONTACT_STATUS,
     FLIGHT_TOPIC,
+    RESET_TOPIC,
     contact_values,
     simulation_info,
     text_values,
@@ -66,6 +67,7 @@ class SimulatorTopics:
         self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
         self._scans = [rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=10) for i in robots]
         self._contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=100)
+        self._reset = rospy.Publisher(RESET_TOPIC, Time, queue_size=1, latch=True)
         self._diagnostics = DiagnosticsTopic()
         self._scene = rospy.Publisher("/simulation/scene", MarkerArray, queue_size=1, latch=True)
         self._quadcopters = rospy.Publisher(
@@ -79,6 +81,10 @@ class SimulatorTopics:
     def publish_clock(self) -> None:
         """Publish the simulated time."""
         self._clock.publish(Clock(time_message(self._simulation.now_s)))
+
+    def publish_reset(self) -> None:
+        """Publish the simulated time as that of the last reset."""
+        self._reset.publish(Time(time_message(self._simulation.now_s)))
 
     def publish_poses(self, with_transforms: bool = True) -> None:
         """Publish the transforms in one message, and the odometry that has subscribers."""
