@@ -45,14 +45,14 @@ def test_sizes_out_of_range_are_all_reported():
             "/nav",
         )
     assert caught.value.problems == [
-        "/nav/global_costmap: 501 x 500 m with cells of 0.05 m is not supported;"
-        " expected 1 to 100000000 cells",
-        "/nav/local_costmap: 3 x 12 m with cells of 4 m is not supported; expected 1 to 100000000"
-        " cells",
+        "/nav/global_costmap: 501 x 500 m with cells of 0.05 m is not supported: 10020 x 10000"
+        " cells of 38 bytes each take 3.8076 GB of memory; expected 1 GB at most (a smaller width"
+        " and height, a larger resolution, or fewer layers)",
+        "/nav/local_costmap: 3 x 12 m with cells of 4 m is not supported; expected at least 1 cell",
     ]
-    assert local_costmap({"width": 50, "height": 50, "resolution": 0.005}).spec.shape == (
-        10000,
-        10000,
+    assert local_costmap({"width": 50, "height": 50, "resolution": 0.01}).spec.shape == (
+        5000,
+        5000,
     )
     assert local_costmap({"width": 4, "height": 4, "resolution": 4.0}).spec.shape == (1, 1)
 

@@ -187,8 +187,9 @@ def test_size_out_of_range_is_refused(configuration):
     with pytest.raises(InputError) as caught:
         updated(configuration, "global_costmap", {"width": 21474836})
     assert caught.value.problems == [
-        "global_costmap: 21474836 x 10 m with cells of 0.05 m is not supported;"
-        " expected 1 to 100000000 cells"
+        "global_costmap: 21474836 x 10 m with cells of 0.05 m is not supported: 429496720 x"
+        " 200 cells of 38 bytes each take 3264.2 GB of memory; expected 1 GB at most (a smaller"
+        " width and height, a larger resolution, or fewer layers)"
     ]
     with pytest.raises(
         InputError, match="^local_costmap: 10 x 10 m with cells of 20 m is not supported;"

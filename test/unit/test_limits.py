@@ -5,13 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from quad_nav import errors
 from quad_nav.barn import worlds
 from quad_nav.config import workload
-from quad_nav.files import document, plain_yaml
+from quad_nav.costmap.layered import CostmapParams
+from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.costmap.voxel import VoxelLayerParams
+from quad_nav.errors import InputError
+from quad_nav.files import document, plain_yaml, values
 from quad_nav.mission import goal_file
 from quad_nav.recording import bag_info, bag_trace
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim import (
     imported_scene,
     map_file,
@@ -48,9 +54,9 @@ ROWS = {
         world_file.MAX_INCLUDES,
     ],
     "models, links and collisions": [world_file.MAX_PARTS, world_file.MAX_OBSTACLES],
-    "image of a map": [map_image.MAX_BYTES, map_image.MAX_CELLS],
+    "image of a map": [map_image.MAX_BYTES, map_image.MAX_CELLS, values.MAX_MEMORY_BYTES // 10**9],
     "cells of a map": [map_file.MIN_RESOLUTION_M, map_file.MAX_RESOLUTION_M, map_file.MAX_BOXES],
-    "costmap": [workload.MAX_CELLS],
+    "costmap": [values.MAX_MEMORY_BYTES // 10**9, workload.MAX_POINTS],
     "BARN worlds (`.npz`)": [worlds.MAX_BYTES],
     "recording that is read": [
         bag_trace.MAX_MEMORY_BYTES / 1e9,
@@ -61,7 +67,7 @@ ROWS = {
     "point cloud": [validation.MAX_POINTS],
     "odometry, commands, goals": [validation.MAX_MAGNITUDE],
     "intention of a peer": [validation.MAX_POSES],
-    "map on a topic": [validation.MAX_CELLS],
+    "map on a topic": [validation.MAX_CELLS, values.MAX_MEMORY_BYTES // 10**9],
 }
 
 
@@ -75,3 +81,77 @@ def test_the_table_has_the_limits_in_force(row):
     words = set(line.replace(",", " ").replace(";", " ").split())
     for number in ROWS[row]:
         assert spellings(number) & words, number
+
+
+def costmap(side_m, *layers, **fields):
+    """A square costmap with cells of 5 cm."""
+    named = tuple((str(number), layer) for number, layer in enumerate(layers))
+    return CostmapParams(width_m=side_m, height_m=side_m, layers=named, **fields)
+
+
+@pytest.mark.parametrize(
+    "layers, bytes_per_cell, side_m",
+    [
+        ((), 36, 263.5),  # 5270.46 cells in 1 GB: the square root of 1e9 / 36
+        ((StaticLayerParams(),), 39, 253.1),
+        ((VoxelLayerParams(z_voxels=10),), 57, 209.4),
+        ((StaticLayerParams(), VoxelLayerParams(z_voxels=16)), 72, 186.3),
+    ],
+)
+def test_a_costmap_takes_a_gigabyte_at_most(layers, bytes_per_cell, side_m):
+    largest = costmap(side_m, *layers)
+    assert largest.bytes_per_cell == bytes_per_cell
+    assert workload.size_problem(largest) == ""
+    problem = workload.size_problem(costmap(side_m + 0.1, *layers))
+    assert f"cells of {bytes_per_cell} bytes each take 1.00" in problem
+    assert "larger resolution" in problem
+
+
+def test_a_map_on_a_topic_takes_a_gigabyte_at_most():
+    params = costmap(10.0, StaticLayerParams())
+    assert params.bytes_per_map_cell == 39 + 9
+    assert costmap(10.0, StaticLayerParams(), rolling_window=True).bytes_per_map_cell == 3 + 9
+    side = 4564  # the square root of 1e9 / 48
+    for more in (0, 1):
+        cells = (side + more) ** 2
+        problem = validation.grid_problem(
+            side + more, side + more, 0.05, cells, bytes_per_cell=params.bytes_per_map_cell
+        )
+        assert problem.startswith(f"{side + 1} x {side + 1} cells of 48 bytes" if more else "")
+        assert bool(problem) == bool(more)
+
+
+@pytest.mark.parametrize(
+    "mode, side", [("L", 10000), ("RGB", 10000), ("LA", 10000), ("RGBA", 9128), ("I", 8770)]
+)
+def test_an_image_takes_a_gigabyte_at_most(tmp_path, mode, side):
+    assert not _image_problem(tmp_path, mode, side)
+    problem = _image_problem(tmp_path, mode, side + 1)
+    assert "of memory; expected 1 GB at most" in problem or "pixels, expected 1 to" in problem
+
+
+def _image_problem(folder, mode, side):
+    """What is wrong with the size of a square image, of which there is only the head."""
+    image = Image.new(mode, (1, 1))
+    image._size = (side, side)
+    try:
+        map_image._check_size(folder / "map.png", image)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def test_a_scene_whose_map_does_not_fit_is_refused_before_it_flies(tmp_path):
+    scene = tmp_path / "large.yaml"
+    scene.write_text("name: large\nsize: [90000, 90000]\nstarts:\n  - [2.0, 2.0, 0.0]\n")
+    (tmp_path / "goals").mkdir()
+    (tmp_path / "goals" / "quad0_goals.json").write_text('{"goals": [[3.0, 3.0]]}')
+    layers = [{"name": "static", "type": "costmap_2d::StaticLayer"}]
+    with pytest.raises(InputError) as raised:
+        read_setup(
+            FlightOptions(
+                scene, tmp_path / "goals", parameters=(("global_costmap/plugins", layers),)
+            )
+        )
+    assert "quad0: global_costmap: 1800004 x 1800004 cells of the scene's map" in str(raised.value)
+    assert "expected 1 GB at most (a smaller scene" in str(raised.value)

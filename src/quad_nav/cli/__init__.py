@@ -26,9 +26,9 @@ def _escaped_messages() -> Iterator[None]:
     try:
         yield
     except click.ClickException as error:
-        error.message = printable(error.message)
+        error.message = printable(error.message)  # type: ignore[misc]
         if isinstance(error, click.FileError):
-            error.ui_filename = printable(error.ui_filename)
+            error.ui_filename = printable(error.ui_filename)  # type: ignore[misc]
         raise
 
 

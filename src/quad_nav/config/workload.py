@@ -12,8 +12,8 @@ from typing import Any, Tuple
 from quad_nav.control.dwa_planner import DwaParams
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.layered import CostmapParams
+from quad_nav.files.values import memory_problem
 
-MAX_CELLS = 10**8  # of one costmap: some GB, with its layers and the planner's potential
 MAX_POINTS = 10**8  # of all trajectories in one control period: some seconds
 
 
@@ -21,12 +21,18 @@ def size_problem(params: CostmapParams) -> str:
     """Return the reason why a costmap of this size is refused, "" if it is accepted."""
     columns = params.width_m / params.resolution_m
     rows = params.height_m / params.resolution_m
-    if min(columns, rows) >= 1.0 and columns * rows <= MAX_CELLS:
-        return ""
-    return (
-        f"{params.width_m:.15g} x {params.height_m:.15g} m with cells of {params.resolution_m:g} m"
-        f" is not supported; expected 1 to {MAX_CELLS} cells"
+    size = f"{params.width_m:.15g} x {params.height_m:.15g} m"
+    size += f" with cells of {params.resolution_m:g} m"
+    if not min(columns, rows) >= 1.0:
+        return f"{size} is not supported; expected at least 1 cell"
+    problem = memory_problem(
+        columns,
+        rows,
+        "cells",
+        params.bytes_per_cell,
+        "a smaller width and height, a larger resolution, or fewer layers",
     )
+    return f"{size} is not supported: {problem}" if problem else ""
 
 
 def rollout_problem(params: Any) -> str:

@@ -32,6 +32,11 @@ class LayerParams:
 
     enabled: bool = True
 
+    @property
+    def bytes_per_cell(self) -> int:
+        """Memory of the layer's own arrays for each cell of the costmap."""
+        return 1
+
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> Layer:
         """Make a layer for a master grid at ``spec`` with empty cells of ``default_cost``."""
         raise NotImplementedError

@@ -23,6 +23,15 @@ from quad_nav.costmap.static import StaticLayer, StaticMap
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
 
+WORKING_BYTES_PER_CELL = 36
+"""Memory of the master grid, its copies, and the largest working arrays, measured.
+
+Inflation takes up to 30 bytes for each cell, DWAPlannerROS 28, GlobalPlanner 14, NavfnROS 11;
+inflation and planners do not run at the same time.
+"""
+MESSAGE_BYTES_PER_CELL = 9
+"""Memory of a map's message for each cell: Python keeps a pointer for each value."""
+
 NamedLayers = Tuple[Tuple[str, LayerParams], ...]
 
 
@@ -66,6 +75,19 @@ class CostmapParams:
             self.origin_x_m,
             self.origin_y_m,
         )
+
+    @property
+    def bytes_per_cell(self) -> int:
+        """Most memory for each cell, of layers, inflation and planner together."""
+        layers = (getattr(params, "bytes_per_cell", 1) for _, params in self.layers)
+        return WORKING_BYTES_PER_CELL + sum(layers)
+
+    @property
+    def bytes_per_map_cell(self) -> int:
+        """Most memory for each cell of a map: a costmap that does not roll takes its size."""
+        if self.rolling_window:
+            return MESSAGE_BYTES_PER_CELL + 3
+        return MESSAGE_BYTES_PER_CELL + self.bytes_per_cell
 
     @property
     def unpadded_footprint(self) -> NDArray[np.float64]:

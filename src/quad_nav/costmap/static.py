@@ -20,6 +20,9 @@ from quad_nav.costmap.layer import GridLayer, LayerParams
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 
+UPDATE_BYTES_PER_CELL = 30
+"""Memory of a map update's indices and costs, for each of its cells."""
+
 
 @dataclass(frozen=True)
 class StaticMap:
@@ -64,6 +67,11 @@ class StaticLayerParams(LayerParams):
     draw_all_map_updates: bool = True
     restore_static_map: bool = True
     transform_map_bounds: bool = True
+
+    @property
+    def bytes_per_cell(self) -> int:
+        """Memory of costs, map, and the map's copy with updates."""
+        return 3
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> StaticLayer:
         """Make a static layer."""

@@ -55,6 +55,11 @@ class VoxelLayerParams(ObstacleLayerParams):
     clip_voxel_rays: bool = True
     redraw_emptied_voxels: bool = True
 
+    @property
+    def bytes_per_cell(self) -> int:
+        """Memory of costs and voxels, and of the voxels' copy when a rolling window moves."""
+        return 1 + 2 * self.z_voxels
+
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> VoxelLayer:
         """Make a voxel layer."""
         return VoxelLayer(self, spec, rolling_window, self.cost_of_unseen(default_cost))

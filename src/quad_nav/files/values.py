@@ -11,6 +11,8 @@ import difflib
 import sys
 from typing import Any, Callable, Iterable, List, Mapping, NamedTuple, Optional, Sequence
 
+MAX_MEMORY_BYTES = 1_000_000_000
+"""Most memory that one costmap, map or image may take while it is used."""
 _LARGEST = sys.float_info.max
 
 
@@ -91,6 +93,25 @@ def value_faults(values: Mapping[str, Any], rules: Mapping[str, Rule], source: s
         for name, rule in rules.items()
         if not rule.accepts(values[name])
     ]
+
+
+def memory_problem(width: float, height: float, unit: str, bytes_each: int, advice: str) -> str:
+    """Return the reason why a grid takes too much memory, "" if it does not.
+
+    Args:
+        width: Number of columns.
+        height: Number of rows.
+        unit: Name of an element, in the plural.
+        bytes_each: Memory that an element takes, all arrays that are computed from it included.
+        advice: What to change.
+    """
+    total = width * height * bytes_each
+    if total <= MAX_MEMORY_BYTES:
+        return ""
+    return (
+        f"{width:.10g} x {height:.10g} {unit} of {bytes_each} bytes each take {total / 1e9:.5g} GB"
+        f" of memory; expected {MAX_MEMORY_BYTES / 1e9:g} GB at most ({advice})"
+    )
 
 
 def nearest(name: object, known: Iterable[str]) -> str:

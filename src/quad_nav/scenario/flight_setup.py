@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 from quad_nav.config import Configuration
 from quad_nav.costmap.layered import CostmapParams
@@ -19,6 +19,7 @@ from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.random_mission import RandomMission
 from quad_nav.scenario.rules import RANDOM, RULES, steps_per_scan
 from quad_nav.scenario.scenario import ScenarioRequest, read_configurations, read_scenario
+from quad_nav.scenario.scene_map import scene_map_problem
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation import SimulationParams, start_poses
 
@@ -97,10 +98,12 @@ def read_setup(options: FlightOptions) -> FlightSetup:
             )
         except InputError as error:
             problems += error.problems
+    configurations = tuple(one for one in scenario.configurations if one is not None)
+    if scene is not None:
+        problems += _map_faults(scene, configurations)
     if problems:
         raise InputError(problems)
     assert scene is not None
-    configurations = tuple(one for one in scenario.configurations if one is not None)
     longest_s = max(1.0 / one.navigator.controller_frequency_hz for one in configurations)
     warnings = dict.fromkeys(line for one in configurations for line in one.warnings)
     return FlightSetup(
@@ -114,6 +117,17 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         options.time_limit_s,
         warnings=(*scene.remarks, *scenario.warnings, *warnings),
     )
+
+
+def _map_faults(scene: Scene, configurations: Sequence[Configuration]) -> List[str]:
+    """A message for each costmap whose static layers cannot hold the scene."""
+    found = {
+        f"quad{number}: {name}: {scene_map_problem(scene, getattr(one, name))}": None
+        for number, one in enumerate(configurations)
+        for name in ("global_costmap", "local_costmap")
+        if scene_map_problem(scene, getattr(one, name))
+    }
+    return list(found)
 
 
 def sensor_faults(configuration: Configuration, place: str) -> List[str]:

@@ -7,8 +7,9 @@ from typing import Dict
 
 import numpy as np
 
-from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
+from quad_nav.costmap.static import StaticLayer, StaticLayerParams, StaticMap
+from quad_nav.files.values import memory_problem
 from quad_nav.grid import GridSpec
 from quad_nav.sim.scene import Scene
 
@@ -30,6 +31,20 @@ class SceneMaps:
         if resolution_m not in self._maps:
             self._maps[resolution_m] = scene_map(self._scene, resolution_m)
         costmap.set_map(self._maps[resolution_m])
+
+
+def scene_map_problem(scene: Scene, params: CostmapParams) -> str:
+    """Return the reason why a costmap with static layers cannot hold the scene, or ""."""
+    if not any(isinstance(layer, StaticLayerParams) for _, layer in params.layers):
+        return ""
+    margin_m = 2 * scene.walls.thickness_m
+    return memory_problem(
+        math.ceil((scene.size_x_m + margin_m) / params.resolution_m),
+        math.ceil((scene.size_y_m + margin_m) / params.resolution_m),
+        "cells of the scene's map",
+        3 if params.rolling_window else params.bytes_per_cell,
+        "a smaller scene, a larger resolution, or no static layer",
+    )
 
 
 def scene_map(scene: Scene, resolution_m: float) -> StaticMap:

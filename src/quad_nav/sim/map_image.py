@@ -12,9 +12,13 @@ from PIL import Image, UnidentifiedImageError
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import open_file
+from quad_nav.files.values import memory_problem
 
 MAX_CELLS = 10_000 * 10_000
 MAX_BYTES = 512 * 1024 * 1024
+_BYTES_PER_PIXEL = {"1": 7, "L": 6, "LA": 9, "RGB": 10, "RGBA": 12, "I;16": 9, "I;16B": 9, "I": 13}
+_MOST_BYTES_PER_PIXEL = 13
+"""Memory of an image's pixels, sums and occupancy while a map is read, measured."""
 _FORMATS = ("PPM", "PNG")  # PPM includes PGM
 _PALETTE_MODES = {"1": "L", "P": "RGBA", "PA": "RGBA", "CMYK": "RGB", "La": "LA", "RGBa": "RGBA"}
 
@@ -62,6 +66,12 @@ def _check_size(path: Path, image: Image.Image) -> None:
         raise InputError(
             [f"{path}: is {width} x {height} pixels, expected 1 to {MAX_CELLS:g} pixels"]
         )
+    each = _BYTES_PER_PIXEL.get(image.mode, _MOST_BYTES_PER_PIXEL)
+    problem = memory_problem(
+        width, height, "pixels", each, "8 bits of grey take least; or a smaller or coarser map"
+    )
+    if problem:
+        raise InputError([f"{path}: {problem}"])
     if image.mode == "F":
         raise InputError([f"{path}: has pixels with fractions, expected PGM or PNG"])
 

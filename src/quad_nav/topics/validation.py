@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.errors import excerpt
+from quad_nav.files.values import memory_problem
 from quad_nav.geometry import Pose3D, Scan, Twist2D
 from quad_nav.sim.contacts import Contact
 
@@ -145,6 +146,7 @@ def grid_problem(
     resolution_m: float,
     values: int,
     origin_m: Tuple[float, float] = (0.0, 0.0),
+    bytes_per_cell: int = 1,
 ) -> str:
     """Check the size and the resolution of a grid message.
 
@@ -154,9 +156,14 @@ def grid_problem(
         resolution_m: Side of a cell.
         values: Number of cells that the message carries.
         origin_m: Lower left corner of the grid.
+        bytes_per_cell: Memory that each cell takes here.
     """
     if not 0 < width * height <= MAX_CELLS:
         return f"{width} x {height} cells, expected 1 to {MAX_CELLS}"
+    advice = "a map with fewer or larger cells"
+    problem = memory_problem(width, height, "cells", bytes_per_cell, advice)
+    if problem:
+        return problem
     if width * height != values:
         return f"{values} values for {width} x {height} cells"
     if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:

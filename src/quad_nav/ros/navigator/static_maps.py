@@ -10,8 +10,8 @@ import rospy
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
 
-from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.costmap.layered import MESSAGE_BYTES_PER_CELL, LayeredCostmap
+from quad_nav.costmap.static import UPDATE_BYTES_PER_CELL, StaticLayer, StaticMap
 from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose3D
 from quad_nav.grid import GridSpec
@@ -56,7 +56,12 @@ class MapListener:
     def _on_map(self, message: OccupancyGrid) -> None:
         info, origin = message.info, message.info.origin.position
         problem = grid_problem(
-            info.width, info.height, info.resolution, len(message.data), (origin.x, origin.y)
+            info.width,
+            info.height,
+            info.resolution,
+            len(message.data),
+            (origin.x, origin.y),
+            self._costmap.params.bytes_per_map_cell,
         )
         if problem:
             self._warnings.warn(f"{self._grid.resolved_name}: map dropped: {problem}")
@@ -75,7 +80,13 @@ class MapListener:
             self._grid.unregister()
 
     def _on_update(self, message: OccupancyGridUpdate) -> None:
-        problem = grid_problem(message.width, message.height, 1.0, len(message.data))
+        problem = grid_problem(
+            message.width,
+            message.height,
+            1.0,
+            len(message.data),
+            bytes_per_cell=MESSAGE_BYTES_PER_CELL + UPDATE_BYTES_PER_CELL,
+        )
         if problem:
             self._warnings.warn(f"{self._updates.resolved_name}: map update dropped: {problem}")
             return
