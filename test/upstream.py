@@ -8,6 +8,8 @@ UPSTREAM = {
     "sensor_timeout": 0.0,
     "reject_implausible_scans": False,
     "clear_any_obstacle_layer": False,
+    "redraw_cleared_costmaps": False,
+    "limit_all_speeds": False,
     "reject_colliding_escape": False,
     "escape_collision": False,
     "command_in_first_cycle": False,

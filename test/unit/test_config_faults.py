@@ -120,13 +120,6 @@ def problems(tree):
             "clear/layer_names: 'obstacle_layer' is not a list of names; expected names of"
             " layers, as in [obstacle_layer]",
         ),
-        (
-            {
-                "recovery_behaviors": [{"name": "clear", "type": "ClearCostmapRecovery"}],
-                "clear": {"affected_maps": "all"},
-            },
-            "clear/affected_maps: 'all' is not a valid choice; expected local, global or both",
-        ),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
 )

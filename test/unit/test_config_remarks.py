@@ -135,6 +135,14 @@ def slow(**parameters):
             " 1.84",
         ),
         (
+            {
+                "recovery_behaviors": [{"name": "clear", "type": "ClearCostmapRecovery"}],
+                "clear": {"affected_maps": "all"},
+            },
+            "caution",
+            "clear/affected_maps: 'all' clears both; expected local, global or both",
+        ),
+        (
             {"recovery_behaviors": [{"name": "back", "type": "twist_recovery/TwistRecovery"}]},
             "unsupported",
             "recovery_behaviors/back: twist_recovery/TwistRecovery is not supported, skipping"
@@ -298,7 +306,8 @@ def test_names_of_speeds_may_be_upstream_or_of_the_planner():
         "max_rot_param_name": "max_rot_vel",
     }
     assert remarks(slow(**names)) == []
-    assert load(slow(**names), "").recoveries == load(slow(), "").recoveries
+    ((_, named),) = load(slow(**names), "").recoveries
+    assert named.limit == load(slow(), "").recoveries[0][1].limit
 
 
 def test_no_rotation_when_it_is_not_allowed():

@@ -56,7 +56,16 @@ PAIRS = [
     (CarrotParams, CARROT_TABLE, set()),
     (ClearCostmapParams, CLEAR_COSTMAP_TABLE, {"layer_names"}),
     (RotateParams, ROTATE, set()),
-    (MoveSlowAndClearParams, MOVE_SLOW_TABLE, {"translation_fields", "rotation_fields"}),
+    (
+        MoveSlowAndClearParams,
+        MOVE_SLOW_TABLE,
+        {
+            "translation_fields",
+            "rotation_fields",
+            "named_translation_field",
+            "named_rotation_field",
+        },
+    ),
     (CostmapParams, COSTMAP_TABLE, {"layers"}),
     (ObstacleLayerParams, OBSTACLE_LAYER_TABLE, {"sources", "track_unknown_space"}),
     (VoxelLayerParams, VOXEL_LAYER_TABLE, {"sources", "track_unknown_space"}),
@@ -68,6 +77,7 @@ TABLES = [*(table for _, table, _ in PAIRS), FIXES_TABLE]
 SWITCH_OWNERS = [
     ClearCostmapParams,
     DwaParams,
+    MoveSlowAndClearParams,
     NavigatorParams,
     PeerParams,
     ProgressParams,

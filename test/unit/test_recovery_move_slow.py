@@ -114,7 +114,7 @@ def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
     usual = TrajectoryPlannerParams(max_vel_x_mps=1.0, min_vel_theta_radps=-2.0)
     controller = Controller(usual)
     speed = ParameterLimiter(controller)
-    speed.impose(LIMIT, HERE)
+    speed.impose(LIMIT, HERE, 0.0)
     limited = controller.params
     assert limited == replace(
         usual, max_vel_x_mps=0.25, max_vel_theta_radps=0.45, min_vel_theta_radps=-0.45
@@ -127,7 +127,7 @@ def test_limits_are_lifted_when_the_robot_has_moved_far_enough():
 
 def test_a_limit_never_raises_a_speed():
     controller = Controller(TrajectoryPlannerParams(max_vel_x_mps=0.1))
-    ParameterLimiter(controller).impose(LIMIT, HERE)
+    ParameterLimiter(controller).impose(LIMIT, HERE, 0.0)
     assert controller.params.max_vel_x_mps == 0.1
 
 
@@ -135,9 +135,9 @@ def test_a_limit_of_the_same_parameters_replaces_the_first():
     usual = TrajectoryPlannerParams()
     controller = Controller(usual)
     speed = ParameterLimiter(controller)
-    speed.impose(LIMIT, HERE)
+    speed.impose(LIMIT, HERE, 0.0)
     faster = tuple((field, 0.4) for field, _ in LIMIT.greatest)
-    speed.impose(ParameterLimit(faster, 1.0), Pose2D(2.5, 2.7))
+    speed.impose(ParameterLimit(faster, 1.0), Pose2D(2.5, 2.7), 0.0)
     assert controller.params == replace(
         usual, max_vel_x_mps=0.4, max_vel_theta_radps=0.4, min_vel_theta_radps=-0.4
     )
@@ -150,7 +150,7 @@ def test_a_limit_of_the_same_parameters_replaces_the_first():
 def test_parameters_that_change_under_a_limit_take_effect_with_its_end():
     controller = Controller(TrajectoryPlannerParams())
     speed = ParameterLimiter(controller)
-    speed.impose(LIMIT, HERE)
+    speed.impose(LIMIT, HERE, 0.0)
     speed.set_params(TrajectoryPlannerParams(max_vel_x_mps=2.0, sim_time_s=1.0))
     assert (controller.params.max_vel_x_mps, controller.params.sim_time_s) == (0.25, 1.0)
     speed.lift()
@@ -277,8 +277,8 @@ def test_dwa_is_limited_in_all_its_speeds_and_flies_below_them():
 def test_limits_of_different_parameters_hold_side_by_side():
     controller = SimpleController(Params(speed=0.6, weight=0.01))
     limiter = ParameterLimiter(controller)
-    limiter.impose(ParameterLimit((("speed", 0.25),), 1.0), Pose2D(0.0, 0.0))
-    limiter.impose(ParameterLimit((("weight", 0.001),), 0.5), Pose2D(0.0, 0.0))
+    limiter.impose(ParameterLimit((("speed", 0.25),), 1.0), Pose2D(0.0, 0.0), 0.0)
+    limiter.impose(ParameterLimit((("weight", 0.001),), 0.5), Pose2D(0.0, 0.0), 0.0)
     assert controller.params == Params(0.25, 0.001)
     assert limiter.usual == Params(0.6, 0.01)
     limiter.track(Pose2D(0.6, 0.0))

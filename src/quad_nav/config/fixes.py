@@ -20,7 +20,7 @@ from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.peers.coordinator import PeerParams
-from quad_nav.recovery import ClearCostmapParams, RotateParams
+from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
 
 FIXES = "fixes"  # the name of the group below the node's own namespace
 
@@ -96,7 +96,26 @@ _SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
             "Clearing recoveries without layer_names clear every obstacle layer, not only one"
             " called obstacles.",
         ),
-        (ClearCostmapParams,),
+        (ClearCostmapParams, MoveSlowAndClearParams),
+    ),
+    (
+        flag(
+            "redraw_cleared_costmaps",
+            True,
+            "redraw_cleared_costmaps",
+            "The robot waits until the costmaps that a recovery cleared are drawn again.",
+        ),
+        (ClearCostmapParams, MoveSlowAndClearParams),
+    ),
+    (
+        flag(
+            "limit_all_speeds",
+            True,
+            "limit_all_speeds",
+            "move_slow_and_clear limits all speeds of the local planner and raises none, instead"
+            " of setting two named parameters.",
+        ),
+        (MoveSlowAndClearParams,),
     ),
     (
         flag(

@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from quad_nav.config.fixes import with_fixes
 from quad_nav.config.local_planners import TRAJECTORY_PLANNER
-from quad_nav.config.notes import IGNORED, UNSUPPORTED, Notes, join
+from quad_nav.config.notes import CAUTION, IGNORED, UNSUPPORTED, Notes, join
 from quad_nav.config.plugins import RECOVERY, Parameters, Plugin, is_dotted, load_class
 from quad_nav.config.reader import Namespace, check_class, fields, normalise, subtree
 from quad_nav.config.spec import Table
@@ -54,7 +54,7 @@ def normalise_recoveries(tree: Namespace, notes: Notes) -> Optional[NamedTypes]:
         layers = ("layer_names",) if kind == CLEAR else ()
         normalise(namespace, name, TABLES[kind], notes, also_known=layers)
         if kind == CLEAR:
-            _check_clearing(namespace, name, notes)
+            _normalise_clearing(namespace, name, notes)
         elif kind == MOVE_SLOW:
             check_slow(namespace, name, tree["base_local_planner"], notes)
     return listed
@@ -153,13 +153,15 @@ def full_type(kind: str) -> str:
     return kind
 
 
-def _check_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
+def _normalise_clearing(namespace: Namespace, name: str, notes: Notes) -> None:
+    """Check layers; upstream takes an unknown word of ``affected_maps`` for both."""
     maps = namespace.get("affected_maps", "both")
     if isinstance(maps, str) and maps not in _AFFECTED_MAPS:
         expected = CLEAR_COSTMAP_TABLE["affected_maps"].expected
-        notes.problem(
-            join(name, "affected_maps"), f"{maps!r} is not a valid choice; expected {expected}"
+        notes.remark(
+            join(name, "affected_maps"), CAUTION, f"{maps!r} clears both; expected {expected}"
         )
+        namespace["affected_maps"] = "both"
     layers = namespace.get("layer_names", [])
     if not isinstance(layers, list) or not all(isinstance(layer, str) for layer in layers):
         notes.problem(

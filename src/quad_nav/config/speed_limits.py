@@ -60,6 +60,7 @@ SPEEDS: Dict[str, Speeds] = {
         rotation=("max_vel_theta", "min_vel_theta"),
     ),
 }
+_UPSTREAM_NAMESPACE = "DWAPlannerROS"
 # Parameters that name one more speed, and their upstream defaults.
 _NAMES = {"max_trans_param_name": "max_trans_vel", "max_rot_param_name": "max_rot_vel"}
 
@@ -99,7 +100,15 @@ def slow_params(namespace: Mapping[str, Any], planner: str) -> MoveSlowAndClearP
             dict.fromkeys(known[name] for name in (*names, namespace.get(key, "")) if name in known)
         )
 
+    def named(key: str) -> str:
+        given = namespace.get("planner_namespace", "") or _UPSTREAM_NAMESPACE
+        if speeds is None or given.strip("/") != plugin_name(planner):
+            return ""  # upstream calls the dynamic_reconfigure server of another planner
+        return speeds.fields.get(namespace.get(key, "") or _NAMES[key], "")
+
     return MoveSlowAndClearParams(
+        named_translation_field=named("max_trans_param_name"),
+        named_rotation_field=named("max_rot_param_name"),
         translation_fields=limited(speeds.translation if speeds else (), "max_trans_param_name"),
         rotation_fields=limited(speeds.rotation if speeds else (), "max_rot_param_name"),
         **fields(namespace, MOVE_SLOW_TABLE.parameters),

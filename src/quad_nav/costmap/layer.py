@@ -11,6 +11,7 @@ To write a layer, derive its parameters from ``LayerParams`` with a ``make_layer
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 from typing import Any, List, Tuple
 
@@ -19,7 +20,15 @@ from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
 from quad_nav.geometry import Pose2D
-from quad_nav.grid import GridSpec
+from quad_nav.grid import FREE, GridSpec
+
+
+class Redraw(enum.Enum):
+    """When the master grid follows a layer that was cleared."""
+
+    BEFORE_MOVING = "at the next update; until then the layer is not current"
+    NEXT_UPDATE = "at the next update; the layer stays current, as upstream's"
+    BY_CHANCE = "where updates for other reasons happen to pass"
 
 
 @dataclass(frozen=True)
@@ -82,12 +91,23 @@ class Layer:
         """Forget collected knowledge."""
 
     def clear_area(
-        self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
+        self,
+        centre_x_m: float,
+        centre_y_m: float,
+        size_m: float,
+        keep_inside: bool,
+        redraw: Redraw = Redraw.BEFORE_MOVING,
     ) -> bool:
         """Forget the outside of a square (``keep_inside``) or its inside; False if it cannot."""
         return False
 
-    def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> bool:
+    def free_square(
+        self,
+        centre_x_m: float,
+        centre_y_m: float,
+        size_m: float,
+        redraw: Redraw = Redraw.BEFORE_MOVING,
+    ) -> bool:
         """Remove the obstacles in a square; False if there is nothing to free."""
         return False
 
@@ -121,24 +141,42 @@ class GridLayer(Layer):
         return bounds
 
     def clear_area(
-        self, centre_x_m: float, centre_y_m: float, size_m: float, keep_inside: bool
+        self,
+        centre_x_m: float,
+        centre_y_m: float,
+        size_m: float,
+        keep_inside: bool,
+        redraw: Redraw = Redraw.BEFORE_MOVING,
     ) -> bool:
-        """Make cells unknown, as ``clear_costmap_recovery`` does.
-
-        The layer is not current until the next update has written this to the master grid.
-        """
+        """Make cells unknown, as ``clear_costmap_recovery`` does."""
         self.grid.forget_area(centre_x_m, centre_y_m, size_m, keep_inside)
-        self._pass_on(self._whole_map())
+        self._pass_on(self._whole_map(), redraw)
+        return True
+
+    def free_square(
+        self,
+        centre_x_m: float,
+        centre_y_m: float,
+        size_m: float,
+        redraw: Redraw = Redraw.BEFORE_MOVING,
+    ) -> bool:
+        """Free a square of the layer; return False if it leaves the map."""
+        if not self.grid.fill_square(centre_x_m, centre_y_m, size_m, FREE):
+            return False
+        square = Bounds(centre_x_m, centre_y_m, centre_x_m, centre_y_m).grown(0.5 * size_m)
+        self._pass_on(square, redraw)
         return True
 
     def is_current(self, now_s: float) -> bool:
         """Tell whether the master grid has everything that was cleared."""
         return not self._awaits_update
 
-    def _pass_on(self, bounds: Bounds) -> None:
-        """Have the next update write the master grid there; until then the layer is not current."""
-        self._cleared = self._cleared.union(bounds)
-        self._awaits_update = True
+    def _pass_on(self, bounds: Bounds, redraw: Redraw = Redraw.BEFORE_MOVING) -> None:
+        """Have the next update write the master grid there."""
+        if redraw is not Redraw.BY_CHANCE:
+            self._cleared = self._cleared.union(bounds)
+        if redraw is Redraw.BEFORE_MOVING:
+            self._awaits_update = True
 
     def _whole_map(self) -> Bounds:
         spec = self.grid.spec

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from quad_nav import footprint as footprints
 from quad_nav.costmap.cost_grid import NO_CELLS, NOWHERE, CostGrid, Window
 from quad_nav.costmap.inflation import InflationLayerParams
-from quad_nav.costmap.layer import Layer, LayerParams
-from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.costmap.layer import Layer, LayerParams, Redraw
+from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayer, StaticMap
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
@@ -187,10 +187,9 @@ class LayeredCostmap:
         centre_y_m: float,
         size_m: float,
         keep_inside: bool,
+        redraw: Redraw = Redraw.BEFORE_MOVING,
     ) -> List[str]:
         """Forget costs of layers outside or inside of a square.
-
-        The master grid follows at the next update.
 
         Args:
             layer_names: Names of the layers; unknown names are ignored.
@@ -198,6 +197,7 @@ class LayeredCostmap:
             centre_y_m: Centre of the square in the global frame.
             size_m: Length of its sides.
             keep_inside: True to forget everything outside, False everything inside.
+            redraw: When the master grid follows.
 
         Returns:
             Names of the layers that were cleared.
@@ -206,7 +206,8 @@ class LayeredCostmap:
         return [
             name
             for name, layer in self.layers.items()
-            if name in wanted and layer.clear_area(centre_x_m, centre_y_m, size_m, keep_inside)
+            if name in wanted
+            and layer.clear_area(centre_x_m, centre_y_m, size_m, keep_inside, redraw)
         ]
 
     def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> None:
@@ -217,17 +218,37 @@ class LayeredCostmap:
         """
         self._master.fill_square(centre_x_m, centre_y_m, size_m, FREE)
 
-    def free_obstacles(self, centre_x_m: float, centre_y_m: float, size_m: float) -> List[str]:
-        """Remove what sensors saw in a square; the master grid follows at the next update.
+    def free_layers(
+        self,
+        layer_names: Iterable[str],
+        centre_x_m: float,
+        centre_y_m: float,
+        size_m: float,
+        redraw: Redraw = Redraw.BEFORE_MOVING,
+    ) -> List[str]:
+        """Free a square of layers.
+
+        Args:
+            layer_names: Names of the layers; unknown names are ignored.
+            centre_x_m: Centre of the square in the global frame.
+            centre_y_m: Centre of the square in the global frame.
+            size_m: Length of its sides.
+            redraw: When the master grid follows.
 
         Returns:
             Names of the layers that did so; none if the square leaves the map.
         """
+        wanted = set(layer_names)
         return [
             name
             for name, layer in self.layers.items()
-            if layer.free_square(centre_x_m, centre_y_m, size_m)
+            if name in wanted and layer.free_square(centre_x_m, centre_y_m, size_m, redraw)
         ]
+
+    @property
+    def obstacle_layers(self) -> List[str]:
+        """Names of the layers that sensors write to."""
+        return [name for name, layer in self.layers.items() if isinstance(layer, ObstacleLayer)]
 
     def set_footprint(self, footprint: footprints.Footprint) -> None:
         """Take an unpadded footprint, float64[n, 2] in the robot's frame."""

@@ -175,13 +175,6 @@ class ObstacleLayer(GridLayer):
         for buffer in self.buffers.values():
             buffer.restart_clock(now_s)
 
-    def free_square(self, centre_x_m: float, centre_y_m: float, size_m: float) -> bool:
-        """Free a square of the layer; return False if it leaves the map."""
-        if not self.grid.fill_square(centre_x_m, centre_y_m, size_m, FREE):
-            return False
-        self._pass_on(Bounds(centre_x_m, centre_y_m, centre_x_m, centre_y_m).grown(0.5 * size_m))
-        return True
-
     def is_current(self, now_s: float) -> bool:
         """Tell whether no source is stale and the master grid is up to date."""
         return super().is_current(now_s) and not self.stale_sources(now_s)

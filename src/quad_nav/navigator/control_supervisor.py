@@ -170,7 +170,7 @@ class ControlSupervisor:
             self.limiter.usual, params.stuck_cost_factor, oscillation_distance_m
         )
         if limit is not None:
-            self.limiter.impose(limit, pose)
+            self.limiter.impose(limit, pose, tick.now_s)
         return action
 
     def compute_velocity(

@@ -149,6 +149,7 @@ class Navigator:
         if not self._started:
             return -math.inf
         due_s = math.inf if self._costmaps_rest else self._updates.due_s
+        due_s = min(due_s, self._machine.control.limiter.due_s)
         if self._machine.state is not State.IDLE:
             return min(due_s, self._machine.due_s)
         return min(due_s, self._idle_check.due_s) if self.peers.params.avoid_peers else due_s
@@ -192,6 +193,8 @@ class Navigator:
         )
         if not self._costmaps_rest:
             self._updates.update(tick, poses)
+        if poses.in_global is not None:
+            self._machine.control.limiter.check(now_s, poses.in_global)
         if self._stop_wanted:
             self._stop_wanted = False
             tick.command = Twist2D()

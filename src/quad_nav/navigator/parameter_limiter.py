@@ -5,11 +5,29 @@ Recoveries limit the speed for a while, and a stuck robot relaxes its obstacle w
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from typing import Any, Dict, List, Tuple
 
 from quad_nav.geometry import Pose2D
 from quad_nav.recovery import ParameterLimit
+from quad_nav.timing import Schedule
+
+
+@dataclass
+class _Imposed:
+    """A limit in force, the pose since which it counts, and when that is checked."""
+
+    limit: ParameterLimit
+    since: Pose2D
+    checks: Schedule
+
+    def is_over(self, pose: Pose2D) -> bool:
+        """Return whether the robot has moved far enough; upstream compares squares."""
+        if not self.limit.check_period_s:
+            return pose.distance_to(self.since) >= self.limit.distance_m
+        dx, dy = pose.x_m - self.since.x_m, pose.y_m - self.since.y_m
+        return dx * dx + dy * dy >= self.limit.distance_m * self.limit.distance_m
 
 
 class ParameterLimiter:
@@ -24,7 +42,7 @@ class ParameterLimiter:
     def __init__(self, controller: Any) -> None:
         """Create a limiter without limits."""
         self._controller = controller
-        self._limits: Dict[Tuple[str, ...], Tuple[ParameterLimit, Pose2D]] = {}
+        self._limits: Dict[Tuple[str, ...], _Imposed] = {}
         self._usual: Any = None  # the parameters without limits, while there are any
 
     @property
@@ -37,26 +55,44 @@ class ParameterLimiter:
     def set_params(self, params: Any) -> None:
         """Change the parameters without limits; limits stay in force."""
         self._usual = params
-        for limit, _ in self._limits.values():
-            params = _limited(params, limit)
+        for imposed in self._limits.values():
+            params = _limited(params, imposed.limit)
         self._controller.set_params(params)
 
-    def impose(self, limit: ParameterLimit, pose: Pose2D) -> None:
+    def impose(self, limit: ParameterLimit, pose: Pose2D, now_s: float) -> None:
         """Impose a limit on a robot at ``pose``."""
         if not limit.greatest:
             return
         usual = self.usual
-        self._limits[tuple(field for field, _ in limit.greatest)] = limit, pose
+        checks = Schedule(1.0 / limit.check_period_s if limit.check_period_s else 0.0)
+        checks.start(now_s + limit.check_period_s)
+        self._limits[tuple(field for field, _ in limit.greatest)] = _Imposed(limit, pose, checks)
         self.set_params(usual)
+
+    @property
+    def due_s(self) -> float:
+        """Time of the next check of a limit with a check period, +inf without one."""
+        return min((imposed.checks.due_s for imposed in self._limits.values()), default=math.inf)
 
     def track(self, pose: Pose2D) -> None:
         """Lift the limits from which the robot has moved away; to be called in every cycle."""
-        over = [
-            fields
-            for fields, (limit, since) in self._limits.items()
-            if pose.distance_to(since) >= limit.distance_m
-        ]
-        self._lift(over)
+        self._lift(
+            [
+                fields
+                for fields, imposed in self._limits.items()
+                if not imposed.limit.check_period_s and imposed.is_over(pose)
+            ]
+        )
+
+    def check(self, now_s: float, pose: Pose2D) -> None:
+        """Lift those with a check period, if that is over; to be called at ``due_s``."""
+        self._lift(
+            [
+                fields
+                for fields, imposed in self._limits.items()
+                if imposed.checks.pop(now_s) and imposed.is_over(pose)
+            ]
+        )
 
     def lift(self) -> None:
         """Lift all limits."""
@@ -71,6 +107,8 @@ class ParameterLimiter:
 
 
 def _limited(params: Any, limit: ParameterLimit) -> Any:
+    if limit.raises:
+        return replace(params, **dict(limit.greatest))
     return replace(
         params,
         **{

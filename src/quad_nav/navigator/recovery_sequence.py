@@ -88,7 +88,7 @@ class RecoverySequence:
         if step.message:
             tick.warnings.append(step.message)
         if step.limit is not None and poses.in_global is not None:
-            limiter.impose(step.limit, poses.in_global)
+            limiter.impose(step.limit, poses.in_global, tick.now_s)
         if step.done:
             self._index += 1
             self.stop()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Iterable, Optional, Tuple
 
+from quad_nav.costmap.layer import Redraw
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.recovery.recovery import RecoveryContext, Step
 
 # The layers that upstream clears by default. No layer has this name there either: the
@@ -22,6 +22,8 @@ class ClearCostmapParams:
         layer_names: The layers to clear, None for the default.
         clear_any_obstacle_layer: By default clear every obstacle layer; False restores
             upstream behaviour, which clears layers called "obstacles" only.
+        redraw_cleared_costmaps: The robot waits until the costmaps are drawn again; False
+            restores upstream behaviour.
     """
 
     reset_distance_m: float = 3.0
@@ -30,6 +32,7 @@ class ClearCostmapParams:
     force_updating: bool = False
     affected_maps: str = "both"  # "global", "local" or "both"
     clear_any_obstacle_layer: bool = True
+    redraw_cleared_costmaps: bool = True
 
 
 class ClearCostmap:
@@ -50,6 +53,7 @@ class ClearCostmap:
     def step(self, context: RecoveryContext) -> Step:
         """Clear the costmaps in one step, and update them if ``force_updating`` is set."""
         params = self.params
+        redraw = Redraw.BEFORE_MOVING if params.redraw_cleared_costmaps else Redraw.NEXT_UPDATE
         skipped = []
         for name, costmap, pose in context.costmaps:
             if params.affected_maps not in (name, "both"):
@@ -63,6 +67,7 @@ class ClearCostmap:
                 pose.y_m,
                 params.reset_distance_m,
                 keep_inside=not params.invert_area_to_clear,
+                redraw=redraw,
             )
             if params.force_updating:
                 costmap.update(context.now_s, pose)
@@ -76,4 +81,4 @@ class ClearCostmap:
             return self.params.layer_names
         if not self.params.clear_any_obstacle_layer:
             return UPSTREAM_LAYER_NAMES
-        return [name for name, layer in costmap.layers.items() if isinstance(layer, ObstacleLayer)]
+        return costmap.obstacle_layers

@@ -7,9 +7,15 @@ observation that shows them marks them again.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Tuple
+from typing import List, Tuple
 
+from quad_nav.costmap.layer import Redraw
+from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.recovery.recovery import ParameterLimit, RecoveryContext, Step
+
+# Upstream clears the layers whose names have this word in them.
+UPSTREAM_LAYER_WORD = "obstacles"
+_UPSTREAM_CHECK_PERIOD_S = 0.1  # of upstream's timer, of the distance
 
 
 @dataclass(frozen=True)
@@ -20,6 +26,14 @@ class MoveSlowAndClearParams:
         translation_fields: Fields of the local planner's parameters that
             ``limited_trans_speed_mps`` limits.
         rotation_fields: Fields that ``limited_rot_speed_radps`` limits.
+        named_translation_field: The field that upstream sets, "" for none.
+        named_rotation_field: The field that upstream sets, "" for none.
+        clear_any_obstacle_layer: Clear every obstacle layer; False restores upstream
+            behaviour, which clears layers with "obstacles" in their names only.
+        redraw_cleared_costmaps: The robot waits until the costmaps are drawn again; False
+            restores upstream behaviour, which draws them where updates happen to pass.
+        limit_all_speeds: Limit all speeds of the local planner; False restores upstream
+            behaviour, which sets two named parameters, even to more than they are.
     """
 
     clearing_distance_m: float = 0.5
@@ -28,10 +42,26 @@ class MoveSlowAndClearParams:
     limited_distance_m: float = 0.3
     translation_fields: Tuple[str, ...] = ()
     rotation_fields: Tuple[str, ...] = ()
+    named_translation_field: str = ""
+    named_rotation_field: str = ""
+    clear_any_obstacle_layer: bool = True
+    redraw_cleared_costmaps: bool = True
+    limit_all_speeds: bool = True
 
     @property
     def limit(self) -> ParameterLimit:
         """The limit of both speeds."""
+        if not self.limit_all_speeds:
+            named = (
+                (self.named_translation_field, self.limited_trans_speed_mps),
+                (self.named_rotation_field, self.limited_rot_speed_radps),
+            )
+            return ParameterLimit(
+                tuple((field, speed) for field, speed in named if field),
+                self.limited_distance_m,
+                raises=True,
+                check_period_s=_UPSTREAM_CHECK_PERIOD_S,
+            )
         greatest = [(field, self.limited_trans_speed_mps) for field in self.translation_fields]
         greatest += [(field, self.limited_rot_speed_radps) for field in self.rotation_fields]
         return ParameterLimit(tuple(greatest), self.limited_distance_m)
@@ -56,11 +86,14 @@ class MoveSlowAndClear:
     def step(self, context: RecoveryContext) -> Step:
         """Clear the costmaps and limit the speed in one step."""
         params = self.params
+        redraw = Redraw.BEFORE_MOVING if params.redraw_cleared_costmaps else Redraw.BY_CHANCE
         messages = []
         for name, costmap, pose in context.costmaps:
             if pose is None:
                 messages.append(f"{name} costmap not cleared: robot pose unknown")
-            elif not costmap.free_obstacles(pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m):
+            elif not costmap.free_layers(
+                self._names(costmap), pose.x_m, pose.y_m, 2.0 * params.clearing_distance_m, redraw
+            ):
                 messages.append(
                     f"{name} costmap not cleared: it has no obstacle layer or"
                     f" ends within {params.clearing_distance_m:g} m of the robot"
@@ -74,3 +107,8 @@ class MoveSlowAndClear:
             f" {params.limited_distance_m:g} m"
         )
         return Step(done=True, message="; ".join(messages), limit=limit)
+
+    def _names(self, costmap: LayeredCostmap) -> List[str]:
+        if self.params.clear_any_obstacle_layer:
+            return costmap.obstacle_layers
+        return [name for name in costmap.layers if UPSTREAM_LAYER_WORD in name]

@@ -35,10 +35,14 @@ class ParameterLimit:
     Attributes:
         greatest: (field of the local planner's parameters, greatest magnitude) for each.
         distance_m: The limit ends when the robot has moved so far.
+        raises: Set the parameters to their greatest values, even if they are lower.
+        check_period_s: Time between two checks of the distance; 0 for one in each control cycle.
     """
 
     greatest: Tuple[Tuple[str, float], ...]
     distance_m: float
+    raises: bool = False
+    check_period_s: float = 0.0
 
 
 @dataclass(frozen=True)

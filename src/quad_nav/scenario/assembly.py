@@ -70,7 +70,7 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
             local_costmap.footprint,
             configuration.local_planner_period_s,
         ),
-        [NamedRecovery(name, _recovery(params)) for name, params in configuration.recoveries],
+        [NamedRecovery(name, build_recovery(params)) for name, params in configuration.recoveries],
         PeerCoordinator(
             configuration.peers,
             global_costmap,
@@ -154,7 +154,8 @@ def _layer_with_timeout(layer: LayerParams, limit_s: float) -> LayerParams:
     return replace(layer, sources=sources)
 
 
-def _recovery(params: RecoveryParams) -> Recovery:
+def build_recovery(params: RecoveryParams) -> Recovery:
+    """Build a recovery behaviour."""
     if isinstance(params, Plugin):
         recovery: Recovery = params.make()
         return recovery

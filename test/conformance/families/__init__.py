@@ -21,6 +21,7 @@ from families import (
     layered,
     navfn,
     occupancy,
+    recovery,
     trajectory_planner,
 )
 from families.case import InvalidValue, named_in, recordings_in
@@ -35,6 +36,7 @@ FAMILIES: Dict[str, Check] = {
     "obstacle": layered.check,
     "static": layered.check,
     "voxel": layered.check,
+    "recovery": recovery.check,
     "occupancy": occupancy.check,
     "trajectory_planner": trajectory_planner.check,
     "dwa": dwa.check,

@@ -95,7 +95,7 @@ MOVE_SLOW_TABLE = Table(
             "",
             "",
             "a planner's namespace",
-            "Read and not used: the chosen local planner is limited.",
+            "Counts without fixes/limit_all_speeds only: the planner whose speeds are set.",
         ),
         text(
             "max_trans_param_name",
