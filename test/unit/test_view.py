@@ -180,7 +180,7 @@ def test_a_viewer_that_does_not_start_is_reported(rerun, monkeypatch):
     "name, problem",
     [
         ("flight.bag", "expected a name that ends with .rrd"),
-        ("folder.rrd", "cannot write: "),
+        ("folder.rrd", "cannot be written: is a folder"),
     ],
 )
 def test_a_file_that_cannot_be_made_is_refused(rerun, tmp_path, name, problem):

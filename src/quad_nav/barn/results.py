@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import textwrap
 from dataclasses import asdict, dataclass
-from typing import Any, Dict, List, Optional, Sequence, TextIO, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import tabulate
 
@@ -139,11 +140,13 @@ def to_json(results: Results) -> Dict[str, Any]:
     }
 
 
-def write_csv(results: Results, file: TextIO) -> None:
-    """Write a row for each run."""
+def to_csv(results: Results) -> str:
+    """Return a row for each run."""
+    file = io.StringIO()
     writer = csv.DictWriter(file, _COLUMNS, lineterminator="\n")
     writer.writeheader()
     writer.writerows(_run_row(run) for run in results.runs)
+    return file.getvalue().rstrip("\n")
 
 
 def _table(rows: Sequence[Tuple[str, BarnStatistics]]) -> str:

@@ -5,7 +5,11 @@ A command's module is imported when the command runs, so none waits for unneeded
 
 from __future__ import annotations
 
+import errno
 import importlib
+import io
+import os
+import sys
 from contextlib import contextmanager
 from typing import Any, Iterator, List, Optional
 
@@ -16,6 +20,9 @@ from quad_nav.errors import printable
 
 # The exit statuses of every command; 130 after Ctrl-C as from a shell.
 EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
+
+# Errors of a write to standard output; the commands handle those of their own files.
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 COMMANDS = ("barn", "check", "fly", "report", "sweep", "tune")
 
@@ -45,6 +52,24 @@ class Commands(click.Group):
         with _escaped_messages():
             return super().invoke(ctx)
 
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the command line; end with a message if standard output is full.
+
+        Characters that the terminal cannot show become "?".
+        """
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="replace")
+        try:
+            return super().main(*args, **kwargs)
+        except OSError as error:
+            if error.filename is not None or error.errno not in _NO_SPACE:
+                raise
+            _discard_output()
+            message = f"standard output: cannot be written: {error.strerror}"
+            print(printable(message), file=sys.stderr)
+            sys.exit(EXIT_FAILURE)
+
     def list_commands(self, ctx: click.Context) -> List[str]:
         """Return the names of all commands."""
         return list(COMMANDS)
@@ -56,6 +81,13 @@ class Commands(click.Group):
         module = importlib.import_module(f"{__name__}.{cmd_name}")
         command: click.Command = getattr(module, cmd_name)
         return command
+
+
+def _discard_output() -> None:
+    """Let Python's last flush of standard output succeed."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
 
 
 @click.command(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -5,28 +5,28 @@ from __future__ import annotations
 import json
 import sys
 import time
-from typing import Any, List, Optional, TextIO, Tuple
+from pathlib import Path
+from typing import Any, List, Optional, Tuple
 
 import click
 
 from quad_nav.barn.protocol import Outcome, Run
-from quad_nav.barn.results import Results, text, to_json, write_csv
+from quad_nav.barn.results import Results, text, to_csv, to_json
 from quad_nav.barn.runs import fly_all
 from quad_nav.barn.setup import BarnOptions, BarnSetup, read_barn_setup
 from quad_nav.cli import EXIT_INTERRUPTED, EXIT_SUCCESS
 from quad_nav.cli.options import (
     A_FILE,
     COUNT,
-    OUTPUT,
     POSITIVE,
     echo,
     echo_lines,
     exit_on_faults,
-    is_terminal,
     parameter,
     raise_on_signals,
     show_warnings,
 )
+from quad_nav.cli.outputs import OUTPUT, Outputs
 from quad_nav.cli.progress import flights_progress
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import LocalWorkers
@@ -92,14 +92,14 @@ from quad_nav.scenario.warm_up import simulate, warm_up
 @click.option("--per-world", is_flag=True, help="Print a row for each world.")
 @click.option(
     "--json",
-    "json_file",
+    "json_path",
     type=OUTPUT,
     metavar="FILE",
     help="Write statistics and flights to this file; - is the terminal.",
 )
 @click.option(
     "--csv",
-    "csv_file",
+    "csv_path",
     type=OUTPUT,
     metavar="FILE",
     help="Write a row for each flight to this file.",
@@ -108,8 +108,8 @@ from quad_nav.scenario.warm_up import simulate, warm_up
 def barn(
     workers: int,
     per_world: bool,
-    json_file: Optional[TextIO],
-    csv_file: Optional[TextIO],
+    json_path: Optional[Path],
+    csv_path: Optional[Path],
     quiet: bool,
     **given: Any,
 ) -> None:
@@ -118,9 +118,11 @@ def barn(
     A flight succeeds if it gets from (-2.25, 3) to within 1 m of (-2.25, 13) in 100 s without
     contact. Ctrl-C prints the results of the flights completed so far.
 
-    Exit status: 0, 1 if workers die repeatedly, 2 for invalid input, 130 after Ctrl-C.
+    Exit status: 0, 1 if workers die repeatedly or an output cannot be written, 2 for invalid input,
+    130 after Ctrl-C.
     """
     with exit_on_faults():
+        outputs = Outputs({"--json": json_path, "--csv": csv_path})
         setup = read_barn_setup(_options(**given))
         workers = min(workers, setup.wanted)
         if not quiet:
@@ -128,12 +130,10 @@ def barn(
             echo(f"{setup.wanted} flights, {workers} at the same time", err=True)
         results, interrupted = _fly(setup, workers, quiet)
     if not quiet:
-        echo_lines(text(results, per_world), err=is_terminal(json_file) or is_terminal(csv_file))
-    if json_file is not None:
-        click.echo(json.dumps(to_json(results), indent=2, allow_nan=False), json_file)
-    if csv_file is not None:
-        write_csv(results, csv_file)
-    sys.exit(EXIT_INTERRUPTED if interrupted else EXIT_SUCCESS)
+        echo_lines(text(results, per_world), err=outputs.use_stdout)
+    outputs.write("--json", json.dumps(to_json(results), indent=2, allow_nan=False))
+    outputs.write("--csv", to_csv(results))
+    sys.exit(EXIT_INTERRUPTED if interrupted else outputs.exit_status(EXIT_SUCCESS))
 
 
 def _options(parameters: Tuple[str, ...], only: str, **given: Any) -> BarnOptions:

@@ -15,11 +15,12 @@ import click
 
 from quad_nav.cli import EXIT_INTERRUPTED
 from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
+from quad_nav.cli.outputs import OUTPUT, Outputs
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.files.shipped import shipped
 from quad_nav.mission.flight_log import INTERRUPTED
-from quad_nav.mission.summary import to_json, write_json
+from quad_nav.mission.summary import to_json
 from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
@@ -149,7 +150,7 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option(
     "--json",
     "json_path",
-    type=click.Path(dir_okay=False, allow_dash=True),
+    type=OUTPUT,
     metavar="FILE",
     help="Write the summary as JSON; - is standard output.",
 )
@@ -180,7 +181,7 @@ _AMOUNT = click.FloatRange(min=0.0)
 )
 @click.option("--quiet", "-q", is_flag=True, help="Show no progress bar and no table.")
 def fly(
-    json_path: Optional[str],
+    json_path: Optional[Path],
     record: Optional[Path],
     view: Optional[str],
     report: Optional[Path],
@@ -197,13 +198,18 @@ def fly(
     130 after Ctrl-C.
     """
     with exit_on_faults():
+        saved_view = None if view in (None, _LIVE) else Path(view)
+        outputs = Outputs(
+            {"--json": json_path, "--report": report},
+            {"--record": record, "--view": saved_view, "--animate": animate},
+        )
         setup = read_setup(_options(**given))
         pictures = FlightPictures(setup, report, animate)
         observers = _observers(record, view)
     if not quiet:
         show_warnings(setup.warnings)
     processes = processes or processes_for(len(setup.robots))
-    sys.exit(_fly(setup, observers, json_path, pictures, quiet, processes))
+    sys.exit(_fly(setup, observers, outputs, pictures, quiet, processes))
 
 
 def _options(
@@ -234,21 +240,21 @@ def _options(
 def _observers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
     """Create recorder and viewer; imported here, because both load slowly."""
     observers: List[FlightObserver] = []
-    if record is not None:
-        from quad_nav.recording.recorder import Recorder
-
-        observers.append(Recorder(record))
     if view is not None:
         from quad_nav.recording.viewer import View
 
         observers.append(View(None if view == _LIVE else Path(view)))
+    if record is not None:  # last: it leaves an unfinished file if another cannot be created
+        from quad_nav.recording.recorder import Recorder
+
+        observers.append(Recorder(record))
     return observers
 
 
 def _fly(
     setup: FlightSetup,
     observers: Sequence[FlightObserver],
-    json_path: Optional[str],
+    outputs: Outputs,
     pictures: FlightPictures,
     quiet: bool,
     processes: int,
@@ -256,17 +262,19 @@ def _fly(
     bar = [] if quiet else [ProgressBar()]
     with _StopOnSignal() as stop:
         summary = fly_setup(setup, [*observers, *pictures.observers, *bar, stop], processes)
-    to_terminal = json_path == "-"
+    width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
+    overview = table(summary, width)
     if not quiet:
-        width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
-        echo_lines(table(summary, width), err=to_terminal)
-    if to_terminal:
-        echo_lines(json.dumps(to_json(summary), indent=2, allow_nan=False))
-    elif json_path is not None:
-        write_json(summary, json_path)
-    for line in pictures.write(summary):
+        echo_lines(overview, err=outputs.use_stdout)
+    else:  # the table has the reason to end early, such as a recording on a full disk
+        for line in filter(None, (observer.stop_reason for observer in observers)):
+            echo(line, err=True)
+    outputs.write("--json", json.dumps(to_json(summary), indent=2, allow_nan=False))
+    for line in pictures.write(summary, outputs, overview if quiet else ""):
         echo(line, err=True)
-    return EXIT_INTERRUPTED if summary.reason == INTERRUPTED else summary.exit_status
+    if summary.reason == INTERRUPTED:
+        return EXIT_INTERRUPTED
+    return outputs.exit_status(summary.exit_status)
 
 
 class _StopOnSignal(FlightObserver):

@@ -6,7 +6,7 @@ import signal
 import sys
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Iterable, Iterator, Optional, TextIO, Tuple
+from typing import Any, Iterable, Iterator, Tuple
 
 import click
 import yaml
@@ -19,7 +19,6 @@ from quad_nav.kernels.jit import cache_warnings
 
 A_FILE = click.Path(dir_okay=False, path_type=Path)
 A_FOLDER = click.Path(file_okay=False, path_type=Path)
-OUTPUT = click.File("w", encoding="utf-8", lazy=False)  # fails now, not after an hour of flights
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
 AMOUNT = click.FloatRange(min=0.0)
 COUNT = click.IntRange(min=1)
@@ -74,11 +73,6 @@ def show_warnings(warnings: Iterable[str]) -> None:
     """Print the warnings of a set-up, and what a missing cache of the kernels costs."""
     for warning in (*warnings, *cache_warnings()):
         echo(warning, err=True)
-
-
-def is_terminal(file: Optional[TextIO]) -> bool:
-    """Return true if the output file is the terminal's standard output."""
-    return file is not None and file.name == "<stdout>"
 
 
 def raise_on_signals() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Iterator, Optional, Tuple
 
+from quad_nav.cli.outputs import Outputs
 from quad_nav.errors import InputError
 from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.flight import FlightObserver
@@ -46,18 +47,27 @@ class FlightPictures:
         """Observer of the flight; empty if nothing is requested."""
         return (self._observer,) if self._report or self._animation else ()
 
-    def write(self, summary: MissionSummary) -> Iterator[str]:
-        """Write the requested files and yield a line for each."""
+    def write(self, summary: MissionSummary, outputs: Outputs, instead: str) -> Iterator[str]:
+        """Write the requested files and yield a line for each.
+
+        Args:
+            summary: Summary of the flight.
+            outputs: The command's outputs, which report what cannot be written.
+            instead: Text that is printed if something cannot be written.
+        """
         if not self.observers:
             return
         trace = self._observer.trace(summary.contacts, summary.reason)
         if self._report is not None:
             from quad_nav.report.page import write_report
 
-            write_report(trace, self._report, wall_time_s=summary.wall_time_s)
-            yield f"report: {self._report}"
+            with outputs.attempt("--report", self._report, instead):
+                write_report(trace, self._report, wall_time_s=summary.wall_time_s)
+                yield f"report: {self._report}"
+                instead = ""
         if self._animation is not None:
             from quad_nav.report.animation import animate_flight
 
-            animate_flight(trace, self._animation)
-            yield f"animation: {self._animation}"
+            with outputs.attempt("--animate", self._animation, instead):
+                animate_flight(trace, self._animation)
+                yield f"animation: {self._animation}"

@@ -11,14 +11,11 @@ import click
 from rich.console import Console
 from rich.progress import track
 
-from quad_nav.cli import EXIT_BAD_INPUT
+from quad_nav.cli import EXIT_BAD_INPUT, EXIT_SUCCESS
 from quad_nav.cli.options import echo, echo_lines
+from quad_nav.cli.outputs import Outputs
 from quad_nav.errors import InputError
-from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.trace import FlightTrace
-from quad_nav.report.animation import animate_flight, animation_faults
-from quad_nav.report.flight_metrics import flight_metrics
-from quad_nav.report.page import write_comparison, write_report
 
 T = TypeVar("T")
 
@@ -56,22 +53,34 @@ def report(
     A FLIGHT is a bag or an MCAP file from quad fly --record, or a bag from rosbag record. The
     report is a single HTML file that needs no network.
 
-    Exit status: 0, or 2 for invalid input.
+    Exit status: 0, 1 if something cannot be written, 2 for invalid input.
     """
+    # Imported here, because matplotlib loads slowly.
+    from quad_nav.report import animation, page
+    from quad_nav.report.flight_metrics import flight_metrics
+
     try:
-        faults = animation_faults(animate, len(flights)) if animate is not None else []
+        outputs = Outputs({"--output": output}, {"--animate": animate}, {"--png": png})
+        faults = animation.animation_faults(animate, len(flights)) if animate is not None else []
         if len(flights) == 1:
             (trace,) = _read(flights, lambda trace: trace, faults)
-            write_report(trace, output, png)
+            content = page.flight_page(trace)
         else:
-            write_comparison(_read(flights, flight_metrics, faults), output, png)
+            content = page.comparison_page(_read(flights, flight_metrics, faults))
     except InputError as error:
         echo_lines("no report written:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
-    echo(f"report: {output}")
+    with outputs.attempt("--output", output):
+        page.write_page(content, output)
+        echo(f"report: {output}")
+    if png is not None:
+        with outputs.attempt("--png", png):
+            page.write_pictures(content, png)
     if animate is not None:
-        animate_flight(trace, animate)
-        echo(f"animation: {animate}")
+        with outputs.attempt("--animate", animate):
+            animation.animate_flight(trace, animate)
+            echo(f"animation: {animate}")
+    sys.exit(outputs.exit_status(EXIT_SUCCESS))
 
 
 def _read(
@@ -87,6 +96,8 @@ def _read(
     Raises:
         InputError: Lists ``faults`` and every flight that cannot be read.
     """
+    from quad_nav.recording.bag_trace import read_trace
+
     console = Console(stderr=True)
     reduced: List[T] = []
     problems = list(faults)

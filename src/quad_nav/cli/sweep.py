@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import json
 import sys
 from pathlib import Path
-from typing import Any, List, Optional, Sequence, TextIO, Tuple
+from typing import Any, List, Optional, Sequence, Tuple
 
 import click
 import yaml
@@ -17,13 +16,12 @@ from quad_nav.cli.options import (
     A_FILE,
     A_FOLDER,
     COUNT,
-    OUTPUT,
     echo,
     echo_lines,
     exit_on_faults,
-    is_terminal,
     show_warnings,
 )
+from quad_nav.cli.outputs import OUTPUT, Outputs
 from quad_nav.cli.study_options import (
     course_of,
     flown_options,
@@ -43,7 +41,7 @@ from quad_nav.tuning.sweep import (
     read_sweep_setup,
     run_sweep,
 )
-from quad_nav.tuning.sweep_table import table, to_json, write_csv
+from quad_nav.tuning.sweep_table import table, to_csv, to_json
 
 
 @click.command()
@@ -78,14 +76,14 @@ from quad_nav.tuning.sweep_table import table, to_json, write_csv
 )
 @click.option(
     "--json",
-    "json_file",
+    "json_path",
     type=OUTPUT,
     metavar="FILE",
     help="Write points, statistics and flights to this file; - is the terminal.",
 )
 @click.option(
     "--csv",
-    "csv_file",
+    "csv_path",
     type=OUTPUT,
     metavar="FILE",
     help="Write a row for each point to this file.",
@@ -98,8 +96,8 @@ from quad_nav.tuning.sweep_table import table, to_json, write_csv
 )
 @click.option("--quiet", "-q", is_flag=True, help="Show neither progress bar nor table.")
 def sweep(
-    json_file: Optional[TextIO],
-    csv_file: Optional[TextIO],
+    json_path: Optional[Path],
+    csv_path: Optional[Path],
     report: Optional[Path],
     png: Optional[Path],
     quiet: bool,
@@ -113,19 +111,16 @@ def sweep(
     invalid input, 130 after Ctrl-C.
     """
     with exit_on_faults():
+        outputs = Outputs(
+            {"--json": json_path, "--csv": csv_path, "--report": report}, folders={"--png": png}
+        )
         setup, rows, is_stored = _fly(quiet=quiet, **given)
     if not quiet:
-        echo_lines(table(rows), err=is_terminal(json_file) or is_terminal(csv_file))
-    if json_file is not None:
-        click.echo(json.dumps(to_json(setup, rows), indent=2, allow_nan=False), json_file)
-    if csv_file is not None and is_terminal(csv_file):
-        lines = io.StringIO()
-        write_csv(rows, lines)
-        echo_lines(lines.getvalue().rstrip("\n"))
-    elif csv_file is not None:
-        write_csv(rows, csv_file)
-    _draw(setup, rows, report, png)
-    sys.exit(EXIT_SUCCESS if is_stored else EXIT_FAILURE)
+        echo_lines(table(rows), err=outputs.use_stdout)
+    outputs.write("--json", json.dumps(to_json(setup, rows), indent=2, allow_nan=False))
+    outputs.write("--csv", to_csv(rows))
+    _draw(setup, rows, report, png, outputs)
+    sys.exit(outputs.exit_status(EXIT_SUCCESS if is_stored else EXIT_FAILURE))
 
 
 def _fly(
@@ -186,12 +181,24 @@ def _axis(text: str) -> Tuple[str, List[Any]]:
 
 
 def _draw(
-    setup: SweepSetup, rows: Sequence[SweepRow], report: Optional[Path], png: Optional[Path]
+    setup: SweepSetup,
+    rows: Sequence[SweepRow],
+    report: Optional[Path],
+    png: Optional[Path],
+    outputs: Outputs,
 ) -> None:
     """Write report and pictures; the import is local because matplotlib loads slowly."""
     if report is None and png is None:
         return
-    from quad_nav.tuning.report.sweep_page import write_sweep_report
+    from quad_nav.report.page import write_page, write_pictures
+    from quad_nav.tuning.report.sweep_page import sweep_page
 
-    for path in write_sweep_report(setup, rows, report, png):
-        echo(f"written: {path}", err=True)
+    page = sweep_page(setup, rows)
+    if report is not None:
+        with outputs.attempt("--report", report):
+            write_page(page, report)
+            echo(f"written: {report}", err=True)
+    if png is not None:
+        with outputs.attempt("--png", png):
+            write_pictures(page, png)
+            echo(f"written: {png}", err=True)

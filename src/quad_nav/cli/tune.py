@@ -20,6 +20,7 @@ from quad_nav.cli.options import (
     exit_on_faults,
     show_warnings,
 )
+from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.study_options import (
     course_of,
     flown_options,
@@ -123,10 +124,11 @@ def tune(
     move_base's files, with the study and a report. The same command resumes an interrupted study;
     no flight is flown twice.
 
-    Exit status: 0, 1 if workers die repeatedly or the study cannot be stored, 2 for invalid input,
+    Exit status: 0, 1 if workers die repeatedly or an output cannot be written, 2 for invalid input,
     130 after Ctrl-C.
     """
     with exit_on_faults():
+        outputs = Outputs({}, folders={"--output": output})
         setup = read_tune_setup(_options(output, **given))
         pool = workers_of(workers, ray_address)
         if not quiet:
@@ -139,12 +141,14 @@ def tune(
             ),
             quiet,
         )
-        for path in write_result(result, shlex.join(["quad", *sys.argv[1:]])):
-            if not quiet:
-                echo(f"written: {path}", err=True)
+        overview = text(result)
+        with outputs.attempt("--output", output, overview if quiet else ""):
+            for path in write_result(result, shlex.join(["quad", *sys.argv[1:]])):
+                if not quiet:
+                    echo(f"written: {path}", err=True)
     if not quiet:
-        echo_lines(text(result))
-    sys.exit(EXIT_SUCCESS)
+        echo_lines(overview)
+    sys.exit(outputs.exit_status(EXIT_SUCCESS))
 
 
 def _options(

@@ -147,7 +147,7 @@ def _is_special(path: Path) -> bool:
     """True for a device, a pipe or a socket."""
     try:
         mode = path.stat().st_mode
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return False
     return not stat.S_ISREG(mode) and not stat.S_ISDIR(mode)
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
 
+from quad_nav.files.output import write_text
 from quad_nav.mission.flight_log import INTERRUPTED, FlightLog, Leg
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.contacts import Contact
@@ -221,13 +221,7 @@ def write_json(summary: MissionSummary, path: Union[str, Path]) -> None:
     Raises:
         OSError: The file cannot be written.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    partial.write_text(
-        json.dumps(to_json(summary), indent=2, allow_nan=False) + "\n", encoding="utf-8"
-    )
-    partial.replace(path)
+    write_text(Path(path), json.dumps(to_json(summary), indent=2, allow_nan=False) + "\n")
 
 
 def _rounded(value: Optional[float]) -> Optional[float]:

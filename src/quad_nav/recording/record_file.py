@@ -17,6 +17,7 @@ from mcap.writer import Writer as McapLibraryWriter
 from rosbags.rosbag1 import Writer as BagLibraryWriter
 
 from quad_nav.errors import InputError
+from quad_nav.files.output import make_folder
 from quad_nav.recording.messages import definition, encode, long_name
 from quad_nav.topics.flight_info import START_S
 
@@ -60,7 +61,7 @@ def create(path: Path) -> RecordFile:
     try:
         if path.is_dir():
             raise IsADirectoryError(None, "is a folder")
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         with contextlib.suppress(FileNotFoundError):
             active.unlink()
         return BagWriter(path, active) if path.suffix == ".bag" else McapWriter(path, active)
@@ -127,6 +128,7 @@ class BagWriter:
                 with contextlib.suppress(OSError):
                     writer.bio.close()  # its buffer does not fit on the disk
             if lost is None:
+                self._active.unlink()
                 raise OSError(None, "no room for a single chunk")
             writer.bio = self._active.open("r+b")
             writer.bio.truncate(lost.pos)
@@ -164,14 +166,34 @@ class McapWriter:
         return self._writer.register_channel(topic, "ros1", self._schemas[kind], metadata)
 
     def write(self, handle: Any, stamp_ns: int, data: bytes) -> None:
-        """Append one serialized message."""
-        self._writer.add_message(handle, stamp_ns, data, stamp_ns)
+        """Append one serialized message.
+
+        Raises:
+            OSError: The file cannot be written; ``<name>.active`` keeps what fits.
+        """
+        try:
+            self._writer.add_message(handle, stamp_ns, data, stamp_ns)
+        except OSError as error:
+            raise self._lost(error) from error
 
     def close(self) -> None:
-        """Complete the file."""
-        self._writer.finish()
-        self._file.close()
+        """Complete the file.
+
+        Raises:
+            OSError: It has no index; ``<name>.active`` keeps what fits.
+        """
+        try:
+            self._writer.finish()
+            self._file.close()
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._file.close()  # its buffer does not fit on the disk
+            raise self._lost(error) from error
         os.replace(self._active, self._path)
+
+    def _lost(self, error: OSError) -> OSError:
+        kept = f"{self._active.name} keeps what fits, `mcap recover` completes it"
+        return OSError(error.errno, f"{error.strerror}; {kept}")
 
 
 START_NS = round(START_S * 1e9)

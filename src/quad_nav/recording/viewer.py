@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
+from quad_nav.files.output import make_folder, output_faults
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.mission.sequencer import Action
 from quad_nav.navigator.tick import RobotPoses, Tick
@@ -277,13 +278,10 @@ def _check(path: Path) -> None:
         raise InputError(
             [f"{path}: unknown format of a view; expected a name that ends with {SUFFIX}"]
         )
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.open("wb").close()
-    except OSError as error:
-        raise InputError(
-            [f"{path}: cannot write: {error.strerror}; expected a writable file"]
-        ) from error
+    faults = output_faults(path, "--view", any_kind=False)
+    if faults:
+        raise InputError(faults)
+    make_folder(path.parent)
 
 
 def _colour(robot: int) -> Tuple[int, int, int]:

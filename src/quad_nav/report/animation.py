@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import subprocess
 from pathlib import Path
 from typing import Any, List, Optional, Tuple
 
@@ -16,6 +17,7 @@ from matplotlib.patches import Circle
 from numpy.typing import NDArray
 from PIL import Image
 
+from quad_nav.files.output import replacing
 from quad_nav.geometry import Pose2D
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks, resampled_tracks
@@ -50,14 +52,14 @@ def animation_faults(path: Path, flights: int = 1) -> List[str]:
 
 
 def animate_flight(trace: FlightTrace, path: Path) -> None:
-    """Write the animation; ``animation_faults`` must be empty."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with styled():
-        view = _View(trace)
-        if path.suffix.lower() == ".gif":
-            _write_gif(view, path)
-        else:
-            _write_mp4(view, path)
+    """Write the animation atomically; ``animation_faults`` must be empty.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    write = _write_gif if path.suffix.lower() == ".gif" else _write_mp4
+    with styled(), replacing(path) as partial:
+        write(_View(trace), partial)
 
 
 def _write_gif(view: _View, path: Path) -> None:
@@ -69,6 +71,7 @@ def _write_gif(view: _View, path: Path) -> None:
     ]
     frames[0].save(
         path,
+        format="GIF",
         save_all=True,
         append_images=frames[1:],
         loop=0,
@@ -80,11 +83,14 @@ def _write_gif(view: _View, path: Path) -> None:
 def _write_mp4(view: _View, path: Path) -> None:
     from matplotlib.animation import FFMpegWriter
 
-    writer = FFMpegWriter(fps=_FRAMES_PER_S, extra_args=["-pix_fmt", "yuv420p"])
-    with writer.saving(view.figure, str(path), _DPI):
-        for time_s in view.times_s:
-            view.show(time_s)
-            writer.grab_frame()
+    writer = FFMpegWriter(fps=_FRAMES_PER_S, extra_args=["-pix_fmt", "yuv420p", "-f", "mp4"])
+    try:
+        with writer.saving(view.figure, str(path), _DPI):
+            for time_s in view.times_s:
+                view.show(time_s)
+                writer.grab_frame()
+    except subprocess.CalledProcessError as error:
+        raise OSError(None, f"ffmpeg exited with status {error.returncode}") from error
 
 
 class _View:

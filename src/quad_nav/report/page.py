@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, List, Optional, Sequence, Tuple
@@ -11,6 +10,7 @@ from typing import Any, Callable, List, Optional, Sequence, Tuple
 import jinja2
 from matplotlib.figure import Figure
 
+from quad_nav.files.output import write_bytes, write_text
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.comparison_picture import comparison_picture, grouped
@@ -286,12 +286,21 @@ def write_comparison(
 
 
 def write_page(page: Page, path: Path, pictures: Optional[Path] = None) -> None:
-    """Write the HTML atomically, and its pictures as PNG files to a folder, if given."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    partial.write_text(page.html, encoding="utf-8")
-    partial.replace(path)
+    """Write the HTML atomically, and its pictures as PNG files to a folder, if given.
+
+    Raises:
+        OSError: A file cannot be written.
+    """
+    write_text(path, page.html)
     if pictures is not None:
-        pictures.mkdir(parents=True, exist_ok=True)
-        for picture in page.pictures:
-            (pictures / f"{picture.name}.png").write_bytes(picture.png)
+        write_pictures(page, pictures)
+
+
+def write_pictures(page: Page, folder: Path) -> None:
+    """Write the pictures of a page as PNG files.
+
+    Raises:
+        OSError: A file cannot be written.
+    """
+    for picture in page.pictures:
+        write_bytes(folder / f"{picture.name}.png", picture.png)

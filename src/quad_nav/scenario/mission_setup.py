@@ -6,7 +6,6 @@ Everything is read before anything flies, and every fault is listed at once.
 from __future__ import annotations
 
 import json
-import os
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
+from quad_nav.files.output import output_faults
 from quad_nav.files.values import Rule, expected_name, value_faults
 from quad_nav.mission.distances import SurfaceDistance
 from quad_nav.mission.goal_file import SETTINGS, SequenceSettings, read_settings
@@ -104,7 +104,7 @@ def read_setup(
     """
     values = {**DEFAULTS, **parameters}
     settings, faults = read_settings({k: values[k] for k in SETTINGS if k in values}, name)
-    problems = value_faults(values, _RULES, name) + _result_faults(result, name) + faults
+    problems = value_faults(values, _RULES, name) + _output_faults(values, result, name) + faults
     request = _request(values, settings, name, all_parameters)
     scenario, faults = read_scenario(request, _Navigators(values, all_parameters))
     if problems + faults:
@@ -191,17 +191,13 @@ def _journal_path(values: Mapping[str, Any], journals: Path) -> Path:
     return journals / f"journal-{number:08x}.jsonl"
 
 
-def _result_faults(result: Path, name: str) -> List[str]:
-    try:
-        result.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        expected = "a file in a folder that exists or can be made"
-        return [
-            f"{name}: result: {result} cannot be written: {error.strerror}; expected {expected}"
-        ]
-    if result.is_dir() or not os.access(result.parent, os.W_OK):
-        return [f"{name}: result: {result} cannot be written; expected a file to write"]
-    return []
+def _output_faults(values: Mapping[str, Any], result: Path, name: str) -> List[str]:
+    """Faults of the files that the sequencer writes; a journal in ROS's home is not required."""
+    faults = output_faults(result, f"{name}: result")
+    if values["journal"] and isinstance(values["journal"], str):
+        journal = Path(values["journal"]).expanduser()
+        faults += output_faults(journal, f"{name}: journal", any_kind=False)
+    return faults
 
 
 def _unknown_parameters(parameters: Mapping[str, Any], name: str) -> List[str]:

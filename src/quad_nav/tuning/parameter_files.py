@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
@@ -10,6 +12,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 from quad_nav import config
 from quad_nav.config.files import COMMON, OPTIONAL, REQUIRED, set_value
 from quad_nav.errors import QuadError
+from quad_nav.files.output import make_folder, write_text
 from quad_nav.tuning.space import BOTH, COSTMAPS, costmap_paths
 from quad_nav.tuning.yaml_edit import inserted, replaced
 
@@ -63,6 +66,7 @@ def write_parameters(base: Path, target: Path, changes: Sequence[Change]) -> Non
 
     Raises:
         FilesDiffer: The files would not load as the base with these changes. Nothing is written.
+        OSError: A file cannot be written. The folder keeps what it had.
     """
     files = {
         path.name: path.read_text(encoding="utf-8")
@@ -72,20 +76,19 @@ def write_parameters(base: Path, target: Path, changes: Sequence[Change]) -> Non
     for change in changes:
         _change(files, change)
     partial = target.with_name(f"{target.name}.partial")
-    _write(files, partial)
-    _check(base, partial, changes)
-    _write(files, target)
-    for path in partial.iterdir():
-        path.unlink()
-    partial.rmdir()
-
-
-def _write(files: Mapping[str, str], folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in folder.glob("*.yaml"):
-        path.unlink()
-    for name, text in files.items():
-        (folder / name).write_text(text, encoding="utf-8")
+    make_folder(partial)
+    try:
+        for name, text in files.items():
+            write_text(partial / name, text)
+        _check(base, partial, changes)
+        make_folder(target)
+        for path in target.glob("*.yaml"):
+            if path.name not in files:
+                path.unlink()
+        for name in files:
+            os.replace(partial / name, target / name)
+    finally:
+        shutil.rmtree(partial)
 
 
 def _change(files: Dict[str, str], change: Change) -> None:

@@ -21,6 +21,7 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState
 
 from quad_nav.errors import InputError
+from quad_nav.files.output import make_folder
 from quad_nav.files.values import is_number, is_whole
 from quad_nav.tuning.courses import identity_text
 from quad_nav.tuning.flight_cache import FlightCache
@@ -87,7 +88,7 @@ def open_study(
             is damaged, or the folder cannot be used.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         lock = os.open(folder / _LOCK, os.O_CREAT | os.O_RDWR, 0o644)
     except OSError as error:
         raise InputError([f"{folder}: {error.strerror}; expected a folder to write to"]) from error

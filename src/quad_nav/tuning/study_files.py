@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Iterator
 
+from quad_nav.files.output import write_text
 from quad_nav.offline.flight import StopAtContact
 from quad_nav.offline.run import fly
 from quad_nav.recording.trace import FlightTrace, TraceObserver
@@ -29,14 +30,17 @@ def write_result(result: TuneResult, command: str) -> Iterator[Path]:
 
     Yields:
         Each path when it is written: tuned parameters, results and report.
+
+    Raises:
+        OSError: A file cannot be written.
     """
     folder = result.setup.options.output
     parameters = folder / PARAMETERS
     write_parameters(result.setup.base_folder, parameters, changes(result))
-    (parameters / RECORD).write_text(markdown(result, command), encoding="utf-8")
+    write_text(parameters / RECORD, markdown(result, command))
     yield parameters
     text = json.dumps(to_json(result, command), indent=2, allow_nan=False, default=str)
-    (folder / RESULTS).write_text(text + "\n", encoding="utf-8")
+    write_text(folder / RESULTS, text + "\n")
     yield folder / RESULTS
     yield _write_report(result, command)
 

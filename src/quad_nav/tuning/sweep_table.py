@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
+import io
 from dataclasses import asdict, fields
-from typing import Any, Dict, List, Optional, Sequence, TextIO
+from typing import Any, Dict, List, Optional, Sequence
 
 import tabulate
 
@@ -61,8 +62,9 @@ def to_json(setup: SweepSetup, rows: Sequence[SweepRow]) -> Dict[str, Any]:
     }
 
 
-def write_csv(rows: Sequence[SweepRow], file: TextIO) -> None:
-    """Write one row per point."""
+def to_csv(rows: Sequence[SweepRow]) -> str:
+    """Return one row per point."""
+    file = io.StringIO()
     names = [field.name for field in fields(FlightStatistics)]
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow([*rows[0].point, *names])
@@ -71,6 +73,7 @@ def write_csv(rows: Sequence[SweepRow], file: TextIO) -> None:
         writer.writerow(
             [*map(format_value, row.point.values()), *(figures[name] for name in names)]
         )
+    return file.getvalue().rstrip("\n")
 
 
 def _cells(statistics: FlightStatistics) -> List[str]:

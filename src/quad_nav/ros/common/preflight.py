@@ -8,6 +8,7 @@ that the others would have reported are lost. Exit status 0, or 2 with every fau
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import sys
@@ -93,10 +94,11 @@ def main() -> int:
     lines = "flight not started, invalid input:\n  " + "\n  ".join(problems)
     print(printable(lines, "\n"), file=sys.stderr)
     if tree.get("sequencer", {}).get("result"):
-        write_json(
-            MissionSummary((), reason="bad input", problems=tuple(problems)),
-            result_path(tree["sequencer"]),
-        )
+        with contextlib.suppress(OSError):  # that is one of the faults above
+            write_json(
+                MissionSummary((), reason="bad input", problems=tuple(problems)),
+                result_path(tree["sequencer"]),
+            )
     return EXIT_BAD_INPUT
 
 

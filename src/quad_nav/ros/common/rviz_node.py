@@ -10,15 +10,19 @@ import rospkg
 import yaml
 
 from quad_nav.errors import InputError, printable
+from quad_nav.files.output import reason, write_text
 from quad_nav.scenario.scenario import scene_of
 from quad_nav.topics.rviz_file import EXIT_BAD_INPUT, arguments, document
+
+EXIT_FAILURE = 1
 
 
 def main() -> int:
     """Write the configuration to the ROS log folder and replace this process by RViz.
 
     Returns:
-        2 if the arguments are not valid; otherwise RViz's exit status is the process's own.
+        2 if the arguments are not valid, 1 if the file cannot be written; otherwise RViz's exit
+        status is the process's own.
     """
     given, others = arguments(sys.argv[1:])
     try:
@@ -27,6 +31,10 @@ def main() -> int:
         print(printable(error, "\n"), file=sys.stderr)
         return EXIT_BAD_INPUT
     path = Path(rospkg.get_log_dir()) / "quad" / f"fleet-{os.getpid()}.rviz"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    try:
+        write_text(path, yaml.safe_dump(content, sort_keys=False))
+    except OSError as error:
+        message = f"fleet_rviz: {path}: cannot be written: {reason(error)}"
+        print(printable(message), file=sys.stderr)
+        return EXIT_FAILURE
     os.execvp("rviz", ["rviz", "-d", str(path), *others])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from quad_nav.report import style
-from quad_nav.report.page import Page, Section, picture, render, write_page
+from quad_nav.report.page import Page, Section, picture, render
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure
 from quad_nav.tuning.statistics import FlightStatistics
 from quad_nav.tuning.study_text import format_value
@@ -194,18 +194,3 @@ def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
         words=format_value,
         versions=versions(),
     )
-
-
-def write_sweep_report(
-    setup: SweepSetup, rows: Sequence[SweepRow], path: Optional[Path], pictures: Optional[Path]
-) -> Iterator[Path]:
-    """Write the page, its pictures, or both; yield each path when it is written."""
-    page = sweep_page(setup, rows)
-    if path is not None:
-        write_page(page, path)
-        yield path
-    if pictures is not None:
-        pictures.mkdir(parents=True, exist_ok=True)
-        for image in page.pictures:
-            (pictures / f"{image.name}.png").write_bytes(image.png)
-        yield pictures

@@ -1,0 +1,298 @@
+"""Output files: checked before a flight; afterwards complete, or absent with a message."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from study_flights import FLOWN, SPACE, write_mission
+from test_record_files import SizeLimit
+
+from quad_nav.cli import main
+from quad_nav.files import output
+from quad_nav.files.output import folder_faults, output_faults, replacing, write_text
+from quad_nav.mission.summary import MissionSummary, write_json
+from quad_nav.recording.record_file import create
+
+FULL = "No space left on device"
+FLY = ("fly", "-q", "--time-limit", "0.2", "--beams", "64", "--config", "tutorial")
+
+
+@pytest.fixture
+def full_disk(monkeypatch):
+    """Every file reaches the disk only when it is complete, and there is no space for it."""
+
+    def sync(_):
+        raise OSError(errno.ENOSPC, FULL)
+
+    monkeypatch.setattr(output, "_sync", sync)
+
+
+def run(*arguments: object):
+    done = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    return done
+
+
+def names(folder: Path):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def refusal(path: Path, **options) -> str:
+    (line,) = output_faults(path, "--json", **options)
+    start = f"--json: {path}: cannot be written: "
+    assert line.startswith(start) and line.endswith("; expected a file that can be written")
+    return line[len(start) :].partition(";")[0]
+
+
+def test_a_file_that_can_be_written_has_no_faults_and_is_not_made(tmp_path):
+    (tmp_path / "older.json").write_text("older")
+    for path in (tmp_path / "x.json", tmp_path / "new" / "er" / "x.json", tmp_path / "older.json"):
+        assert output_faults(path, "--json") == []
+    assert folder_faults(tmp_path / "new", "--png") == []
+    assert names(tmp_path) == ["older.json"]
+    assert (tmp_path / "older.json").read_text() == "older"
+
+
+def test_files_that_cannot_be_written(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    assert refusal(tmp_path) == "is a folder"
+    assert refusal(tmp_path / "file" / "x.json") == f"{tmp_path / 'file'} is not a folder"
+    assert refusal(tmp_path / ("n" * 300)) == "File name too long"
+    assert refusal(tmp_path / "nul\0") == "embedded null byte"
+    assert refusal(Path("/dev/null"), any_kind=False) == "is a device or a pipe"
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write everything
+    assert refusal(tmp_path / "file") == "is write-protected"
+
+
+def test_a_full_disk_is_noticed_before(tmp_path):
+    with SizeLimit(100):  # an empty file would fit
+        assert refusal(tmp_path / "x.json") == "File too large"
+        (line,) = folder_faults(tmp_path / "new", "--png")
+    assert line == (
+        f"--png: {tmp_path / 'new'}: cannot be written: File too large; expected a folder that can"
+        " be written"
+    )
+    assert names(tmp_path) == []
+
+
+def test_no_folder_is_made_in_the_root(tmp_path):
+    missing = Path("/quad-nav-test-misspelled")
+    for path in (missing / "x.json", missing / "deeper" / "x.json"):
+        assert refusal(path) == f"there is no folder {missing}"
+        with pytest.raises(FileNotFoundError):
+            write_text(path, "text")
+    assert folder_faults(missing, "--png") != []
+    assert not missing.exists()
+
+
+def test_a_pipe_without_a_reader_is_refused_without_waiting(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    assert refusal(tmp_path / "pipe") == "No such device or address"
+
+
+def test_a_pipe_is_written_and_not_replaced(tmp_path):
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    assert output_faults(path, "--json") == []
+    write_text(path, "text")
+    assert os.read(reader, 10) == b"text"
+    os.close(reader)
+    assert stat.S_ISFIFO(path.stat().st_mode)
+
+
+def test_a_link_stays_a_link(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    write_text(tmp_path / "link", "text")
+    assert (tmp_path / "file").read_text() == "text" and (tmp_path / "link").is_symlink()
+
+
+def test_names_that_are_not_utf8_can_be_written_about(tmp_path):
+    write_text(tmp_path / "x", os.fsdecode(b"fl\xffight"))
+    assert (tmp_path / "x").read_bytes() == b"fl?ight"
+
+
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, FULL), KeyboardInterrupt()])
+def test_whatever_fails_leaves_the_older_file_and_nothing_else(tmp_path, error):
+    (tmp_path / "x").write_text("older")
+    with pytest.raises(type(error)), replacing(tmp_path / "x") as partial:
+        partial.write_text("half")
+        raise error
+    assert names(tmp_path) == ["x"] and (tmp_path / "x").read_text() == "older"
+
+
+def test_a_summary_on_a_full_disk_leaves_nothing(tmp_path):
+    with SizeLimit(100), pytest.raises(OSError, match="File too large"):
+        write_json(MissionSummary(()), tmp_path / "x.json")
+    assert names(tmp_path) == []
+
+
+def test_a_full_disk_names_what_is_kept_of_an_mcap_file(tmp_path):
+    file = create(tmp_path / "x.mcap")
+    with SizeLimit(100), pytest.raises(OSError, match=r"x.mcap.active keeps what fits, `mcap rec"):
+        file.add_topic("/t", "std_msgs/String", False, "/test")
+        file.close()
+
+
+@pytest.mark.parametrize(
+    "command, option, name",
+    [
+        *(
+            ("fly", option, name)
+            for option, name in (
+                ("--json", "x.json"),
+                ("--report", "x.html"),
+                ("--animate", "x.gif"),
+                ("--record", "x.bag"),
+                ("--view", "x.rrd"),
+            )
+        ),
+        ("barn --worlds w.npz", "--json", "x.json"),
+        ("barn --worlds w.npz", "--csv", "x.csv"),
+        *(
+            ("sweep --over TrajectoryPlannerROS/max_vel_x=0.3", option, name)
+            for option, name in (
+                ("--json", "x.json"),
+                ("--csv", "x.csv"),
+                ("--report", "x.html"),
+                ("--png", "x"),
+            )
+        ),
+        ("tune", "--output", "x"),
+        ("report flight.bag", "--output", "x.html"),
+        ("report flight.bag", "--png", "x"),
+        ("report flight.bag", "--animate", "x.gif"),
+    ],
+)
+def test_every_output_is_checked_first(tmp_path, command, option, name):
+    """Nothing is read, flown or written before; the worlds and the bag do not even exist."""
+    (tmp_path / "file").write_text("")
+    places = {
+        Path("/quad-nav-test-misspelled"): "there is no folder /quad-nav-test-misspelled",
+        tmp_path / "file": f"{tmp_path / 'file'} is not a folder",
+    }
+    for folder, why in places.items():
+        done = run(*command.split(), option, folder / name)
+        assert done.exit_code == 2, done.output
+        assert f"  {option}: {folder / name}: cannot be written: {why}; expected" in done.output
+        assert not folder.is_dir()
+    with SizeLimit(100):
+        done = run(*command.split(), option, tmp_path / name)
+    assert done.exit_code == 2 and "cannot be written: File too large" in done.output
+    assert names(tmp_path) == ["file"]
+
+
+def test_summary_is_printed_if_it_cannot_be_written(tmp_path, full_disk):
+    path = tmp_path / "x.json"
+    path.write_text("older")
+    done = run(*FLY, "--json", path)
+    assert done.exit_code == 1
+    line, _, text = done.output.partition("\n")
+    assert line == f"--json: {path}: cannot be written: {FULL}; printing the result instead"
+    assert json.loads(text)["reason"] == "time limit of 0.2 s"
+    assert names(tmp_path) == ["x.json"] and path.read_text() == "older"
+
+
+def test_summary_of_a_successful_flight_ends_in_status_1(tmp_path, monkeypatch, full_disk):
+    summary = MissionSummary(())
+    assert summary.exit_status == 0
+    monkeypatch.setattr("quad_nav.cli.fly.fly_setup", lambda *_: summary)
+    assert run("fly", "-q", "--json", tmp_path / "x.json").exit_code == 1
+
+
+@pytest.mark.parametrize("option, name", [("--report", "x.html"), ("--animate", "x.gif")])
+def test_table_is_printed_if_a_picture_cannot_be_written(tmp_path, full_disk, option, name):
+    done = run(*FLY, option, tmp_path / name)
+    assert done.exit_code == 1
+    line, *table = done.output.splitlines()
+    assert line == (
+        f"{option}: {tmp_path / name}: cannot be written: {FULL}; printing the result instead"
+    )
+    assert "time limit of 0.2 s" in "\n".join(table)
+    assert names(tmp_path) == []
+
+
+def test_a_quiet_flight_tells_that_its_recording_failed(tmp_path):
+    with SizeLimit(5_000):
+        done = run(*FLY, "--record", tmp_path / "x.bag")
+    assert (done.exit_code, done.output) == (
+        1,
+        "cannot write the recording: no room for a single chunk\n",
+    )
+    assert names(tmp_path) == []
+
+
+class PaperWorkers:
+    """Returns the same result for each flight, without flying."""
+
+    count = 1
+
+    def run(self, function, tasks):
+        """Yield each task's number and the result."""
+        for number, _ in tasks:
+            yield number, FLOWN
+
+
+@pytest.fixture
+def on_paper(tmp_path, monkeypatch):
+    """Options of a mission that sweep and tune fly on paper."""
+    for command in ("sweep", "tune"):
+        monkeypatch.setattr(f"quad_nav.cli.{command}.workers_of", lambda *_: PaperWorkers())
+    monkeypatch.setattr("quad_nav.cli.flights_bar.warm_up", lambda _: None)
+    monkeypatch.setattr("quad_nav.cli.flights_bar.simulate", lambda: None)
+    mission = write_mission(tmp_path / "mission")
+    return ("--scene", mission.scene, "--goals", mission.goals, "-q")
+
+
+def test_a_sweep_prints_what_it_cannot_write(tmp_path, on_paper, full_disk):
+    over = ("--over", "TrajectoryPlannerROS/max_vel_x=0.3,0.4", "--flights", "2")
+    files = [("--json", "x.json"), ("--csv", "x.csv"), ("--report", "x.html"), ("--png", "x")]
+    given = [word for option, name in files for word in (option, tmp_path / name)]
+    done = run("sweep", *on_paper, *over, *given)
+    assert done.exit_code == 1
+    for option, name in files:
+        assert f"{option}: {tmp_path / name}: cannot be written: {FULL}; " in done.output
+    assert '"figures": {' in done.output
+    assert "TrajectoryPlannerROS/max_vel_x,flights," in done.output
+    assert [path for path in tmp_path.rglob("*") if path.suffix in (".partial", ".html")] == []
+
+
+def test_a_study_prints_what_it_cannot_write(tmp_path, on_paper, full_disk):
+    (tmp_path / "space.yaml").write_text(SPACE)
+    few = ["--candidates", "--flights", "--finalists", "--final-flights", "--held-out"]
+    counts = [word for option in few for word in (option, "1")]
+    out = tmp_path / "out"
+    done = run("tune", *on_paper, *counts, "--space", tmp_path / "space.yaml", "--output", out)
+    assert done.exit_code == 1, done.output
+    line, *overview = done.output.splitlines()
+    assert line == f"--output: {out}: cannot be written: {FULL}; printing the result instead"
+    assert len(overview) > 5
+    assert [name for name in names(out) if not name.startswith(("study.", ".", "lock"))] == []
+
+
+def test_standard_output_on_a_full_disk_is_told():
+    script = "from quad_nav.cli import main; main(['fly', '--help'])"
+    done = output_to_full(script)
+    assert done == (1, "standard output: cannot be written: No space left on device\n")
+
+
+def output_to_full(script: str):
+    """Exit status and standard error of a script that prints to a full disk."""
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            check=False,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+    lines = [line for line in done.stderr.decode().splitlines(True) if "pybullet" not in line]
+    return done.returncode, "".join(lines)
