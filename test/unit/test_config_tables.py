@@ -79,6 +79,7 @@ SWITCH_OWNERS = [
     DwaParams,
     MoveSlowAndClearParams,
     NavigatorParams,
+    ObstacleLayerParams,
     PeerParams,
     ProgressParams,
     RotateParams,

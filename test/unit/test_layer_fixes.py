@@ -12,7 +12,9 @@ from upstream import UPSTREAM
 
 from quad_nav.config import load, updated
 from quad_nav.costmap.cost_grid import NOWHERE, Bounds, CostGrid, Window
+from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.observation import SourceParams
+from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayer, StaticLayerParams, StaticMap
 from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
@@ -23,7 +25,7 @@ ROBOT = Pose2D(0.5, 2.5)
 FREE_MAP = StaticMap(np.zeros((3, 4), np.int8), GridSpec(4, 3, 1.0))
 WALL = np.full((1, 2), 100, np.int8)
 STATIC_SWITCHES = ("draw_all_map_updates", "restore_static_map", "transform_map_bounds")
-VOXEL_SWITCHES = ("clip_voxel_rays", "redraw_emptied_voxels")
+VOXEL_SWITCHES = ("clip_voxel_rays", "redraw_emptied_voxels", "notice_silence_at_once")
 
 
 def static_layer(rolling_window=False, static_map=FREE_MAP, **params):
@@ -190,6 +192,39 @@ def test_a_ray_from_the_last_half_cell(clip, x_m):
 def test_the_cells_around_the_sensor_are_drawn(clip, low):
     bounds = see(voxel_layer(clip_voxel_rays=clip), (0.5, 0.5), (5.5, 0.5))
     assert bounds == Bounds(low, 2.5, 5.5, 2.5)  # the ray ends at 3.5 m
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+@pytest.mark.parametrize("kind", [ObstacleLayerParams, VoxelLayerParams])
+def test_a_silent_sensor_is_noticed(kind, at_once):
+    source = SourceParams(name="cloud", expected_update_period_s=1.0)
+    params = kind(sources=(source,), notice_silence_at_once=at_once)
+    layer = params.make_layer(FREE_MAP.spec, False, 0)
+    layer.update_bounds(ROBOT, 0.0, NOWHERE)
+    assert layer.is_current(1.0)
+    assert layer.is_current(1.1) is not at_once
+    layer.update_bounds(ROBOT, 1.2, NOWHERE)
+    assert not layer.is_current(1.2)
+    cloud = np.array([(1.5, 1.5, 0.5)], np.float32)
+    layer.add_cloud("cloud", cloud, Pose3D(0.0, 0.0, 0.0), 1.3, 1.3)
+    assert layer.is_current(1.3) is at_once
+    layer.update_bounds(ROBOT, 1.4, NOWHERE)
+    assert layer.is_current(1.4)
+
+
+def test_a_layer_that_was_disabled_follows_a_rolling_window():
+    """A window moves by whole cells, cut towards zero: 1.05 m are one cell, 0.85 m back none."""
+    layers = (("voxels", replace(voxel_layer().params, enabled=False)),)
+    params = CostmapParams(
+        width_m=6.0, height_m=5.0, resolution_m=1.0, rolling_window=True, layers=layers
+    )
+    costmap = LayeredCostmap(params)
+    for x_m in (2.75, 3.8, 2.95):
+        costmap.update(0.0, Pose2D(x_m, 2.25))
+    costmap.reconfigure_layer("voxels", replace(layers[0][1], enabled=True))
+    costmap.update(1.0, Pose2D(2.95, 2.25))
+    assert costmap.spec.origin_x_m == 1.0
+    assert costmap.layers["voxels"].grid.spec == costmap.spec
 
 
 @pytest.mark.parametrize("redraw", [True, False])

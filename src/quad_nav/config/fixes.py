@@ -14,6 +14,7 @@ from quad_nav.config.reader import fields
 from quad_nav.config.spec import RESTORE_DEFAULTS, Parameter, Table, double, flag
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
@@ -222,6 +223,15 @@ _SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
             "A robot without a goal leaves the path of a peer, and comes back.",
         ),
         (PeerParams,),
+    ),
+    (
+        flag(
+            "notice_silence_at_once",
+            True,
+            "notice_silence_at_once",
+            "A costmap is out of date as soon as a sensor is overdue, not from its next update on.",
+        ),
+        (ObstacleLayerParams, VoxelLayerParams),
     ),
     (
         flag(

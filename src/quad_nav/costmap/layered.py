@@ -20,6 +20,7 @@ from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layer import Layer, LayerParams, Redraw
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayer, StaticMap
+from quad_nav.costmap.voxel import VoxelLayer
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
 
@@ -307,7 +308,14 @@ class LayeredCostmap:
             self.set_footprint(self._unpadded_footprint)
         for name, layer_params in params.layers:
             if layer_params != self.layers[name].params:
-                self.layers[name].reconfigure(layer_params)
+                self.reconfigure_layer(name, layer_params)
+
+    def reconfigure_layer(self, name: str, params: LayerParams) -> None:
+        """Take other parameters of one layer, also equal ones, as its dynamic_reconfigure does."""
+        layer = self.layers[name]
+        layer.reconfigure(params)
+        if isinstance(layer, VoxelLayer) and layer.is_empty:
+            layer.resize(self.spec)  # a rolling window has moved on while the layer was disabled
 
     def _resize(self, spec: GridSpec) -> None:
         if spec != self.spec:

@@ -37,6 +37,8 @@ class ObstacleLayerParams(LayerParams):
         raytrace_range_m: Counts for sources that set none of their own.
         track_unknown_space: None for the costmap's.
         sources: Observation sources.
+        notice_silence_at_once: The layer is not current as soon as a source is overdue; False
+            restores upstream behaviour, where an update of the costmap finds out.
     """
 
     footprint_clearing_enabled: bool = True
@@ -46,6 +48,7 @@ class ObstacleLayerParams(LayerParams):
     raytrace_range_m: float = 3.0
     track_unknown_space: Optional[bool] = None
     sources: Tuple[SourceParams, ...] = ()
+    notice_silence_at_once: bool = True
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> ObstacleLayer:
         """Make an obstacle layer."""
@@ -81,6 +84,7 @@ class ObstacleLayer(GridLayer):
             source.name: ObservationBuffer(source) for source in params.sources
         }
         self._rolling_window = rolling_window
+        self._was_current = True  # at the last update
         self._footprint = np.empty((0, 2))
         self._footprint_now = np.empty((0, 2))
         self.excluded_circles = np.empty((0, 3))
@@ -172,11 +176,14 @@ class ObstacleLayer(GridLayer):
         """Forget the grid; the next update uses the kept observations again."""
         self.grid.reset()
         self._awaits_update = False
+        self._was_current = True
         for buffer in self.buffers.values():
             buffer.restart_clock(now_s)
 
     def is_current(self, now_s: float) -> bool:
         """Tell whether no source is stale and the master grid is up to date."""
+        if not self.params.notice_silence_at_once:
+            return super().is_current(now_s) and self._was_current
         return super().is_current(now_s) and not self.stale_sources(now_s)
 
     def stale_sources(self, now_s: float) -> List[Tuple[str, float]]:
@@ -194,6 +201,7 @@ class ObstacleLayer(GridLayer):
         bounds = super().update_bounds(robot, now_s, bounds)
         for buffer in self.buffers.values():
             buffer.start_clock(now_s)
+        self._was_current = not self.stale_sources(now_s)
         marking = [b for b in self.buffers.values() if b.params.marking]
         clearing = [b for b in self.buffers.values() if b.params.clearing]
         if not self._clears_when_overdue and not all(b.is_current(now_s) for b in marking):

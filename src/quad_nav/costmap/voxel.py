@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.costmap.cost_grid import Bounds, shift
+from quad_nav.costmap.cost_grid import shift
 from quad_nav.costmap.observation import ObservationBuffer
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.geometry import Pose2D
@@ -79,7 +79,6 @@ class VoxelLayer(ObstacleLayer):
         self, params: VoxelLayerParams, spec: GridSpec, rolling_window: bool, default_cost: int
     ) -> None:
         super().__init__(params, spec, rolling_window, default_cost)
-        self._was_current = True
         self._make_voxels()
 
     def reconfigure(self, params: VoxelLayerParams) -> None:
@@ -92,6 +91,7 @@ class VoxelLayer(ObstacleLayer):
             old,
             clip_voxel_rays=params.clip_voxel_rays,
             redraw_emptied_voxels=params.redraw_emptied_voxels,
+            notice_silence_at_once=params.notice_silence_at_once,
         )
         if switched == params and (switched != old or params.redraw_emptied_voxels):
             return
@@ -107,15 +107,16 @@ class VoxelLayer(ObstacleLayer):
 
     def reset(self, now_s: float) -> None:
         """Forget costs and voxels; an overdue layer is current from the next update on."""
+        was_current = self._was_current
         super().reset(now_s)
         self.voxels[...] = UNKNOWN
-        self._awaits_update = not self._was_current
+        self._was_current = was_current
+        self._awaits_update = not was_current
 
-    def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
-        """Clear and mark with the kept observations."""
-        bounds = super().update_bounds(robot, now_s, bounds)
-        self._was_current = not self.stale_sources(now_s)
-        return bounds
+    @property
+    def is_empty(self) -> bool:
+        """True if every voxel is unknown."""
+        return bool((self.voxels == UNKNOWN).all())
 
     def marked_voxels(self) -> NDArray[np.float64]:
         """Return the centres of the marked voxels, float64[n, 3] in the global frame."""

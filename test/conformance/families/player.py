@@ -326,7 +326,7 @@ class Player:
         self._layer(layer)
         self.configuration = updated(self.configuration, f"{self.name}/{layer}", _as_set(values))
         params = dict(getattr(self.configuration, self.name).layers)[layer]
-        self.costmap.layers[layer].reconfigure(params)
+        self.costmap.reconfigure_layer(layer, params)
 
 
 def columns(voxels: np.ndarray) -> np.ndarray:
