@@ -7,6 +7,7 @@ does, and always have a subscriber. The clock stands still until `set_time`.
 
 from __future__ import annotations
 
+import collections
 import io
 import logging
 from typing import Any, Callable, Dict, List, Optional, Tuple
@@ -16,6 +17,8 @@ import genpy
 import rosgraph.masterapi
 import rospy
 from rospy.msg import args_kwds_to_message
+
+from quad_nav.ros.common.readiness import escape_log_messages
 
 
 class FakeImpl:
@@ -136,6 +139,8 @@ class FakeRos:
         self._logger = logging.getLogger("rosout")
         self._handlers, self._logger.handlers = self._logger.handlers, [self.log]
         self._logger.propagate = False
+        self._filters = list(self._logger.filters)
+        escape_log_messages()  # as `init_node`
         self._logger.setLevel(logging.INFO)
         rospy.rostime.set_rostime_initialized(True)
         self.set_time(1.0)
@@ -143,8 +148,14 @@ class FakeRos:
 
     def __exit__(self, *_: Any) -> None:
         self._logger.handlers, self._logger.propagate = self._handlers, True
+        self._logger.filters = self._filters
         for patch in self._patches:
             patch.stop()
+
+    @staticmethod
+    def forget_subscribers() -> None:
+        """Forget the subscribers so far: the node subscribes again."""
+        FakeSubscriber.all = []
 
     @staticmethod
     def set_time(now_s: float) -> None:
@@ -152,11 +163,14 @@ class FakeRos:
         rospy.rostime._set_rostime(rospy.Time.from_sec(now_s))
 
 
-def subscribers() -> List[FakeSubscriber]:
-    """Return every subscriber of the nodes that run."""
-    return list(FakeSubscriber.all)
+def subscribed() -> Dict[str, int]:
+    """Return the number of subscribers of every topic of the nodes that run."""
+    return dict(collections.Counter(one.resolved_name for one in FakeSubscriber.all))
 
 
-def subscriber(topic: str) -> FakeSubscriber:
-    """Return the first subscriber of a topic."""
-    return next(one for one in FakeSubscriber.all if one.resolved_name == topic)
+def deliver(topic: str, message: genpy.Message, sender: str = "/hostile") -> None:
+    """Hand a message to every subscriber of a topic, of which there must be one."""
+    takers = [one for one in FakeSubscriber.all if one.resolved_name == topic]
+    assert takers, f"no subscriber of {topic}"
+    for one in takers:
+        one.receive(message, sender)

@@ -19,7 +19,7 @@ from typing import Any, Callable, Dict
 
 import genpy
 import rospy
-from fake_ros import FakeRos, FakeService, FakeSubscriber, subscribers
+from fake_ros import FakeRos, FakeService, deliver, subscribed
 from message_generator import Generator
 
 SETTLE_EVERY, FLY_EVERY = 5, 200
@@ -59,12 +59,12 @@ class Feeder:
     def run(self) -> Report:
         """Feed all subscribers and services, one after the other."""
         self._node.recover()
-        for index, one in enumerate(subscribers()):
-            valid = self._node.valid.get(one.resolved_name)
+        for topic, takers in subscribed().items():
+            valid = self._node.valid.get(topic)
             if valid is None:
-                self.report.faults[f"{one.resolved_name}: no generator of {one.type}"] += 1
+                self.report.faults[f"{topic}: no generator for its {takers} subscribers"] += 1
                 continue
-            self._feed(f"{one.resolved_name} #{index}", one.resolved_name, valid, one.receive)
+            self._feed(f"{topic} (to {takers})", topic, valid, partial(deliver, topic))
         self._count = max(self._count // SERVICE_SHARE, 10)
         for name, request in self._node.requests().items():
             self._feed(name, name, lambda request=request: copy.copy(request), self._caller(name))
@@ -132,6 +132,3 @@ def feed(node_name: str, make: Callable[[FakeRos], Any], count: int) -> Report:
     """Run a node and feed it."""
     with FakeRos(node_name) as ros:
         return Feeder(ros, make(ros), count).run()
-
-
-__all__ = ["FakeSubscriber", "Report", "feed"]

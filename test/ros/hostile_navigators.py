@@ -12,7 +12,7 @@ import numpy as np
 import rospy
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
-from fake_ros import FakeRos, FakeService, subscriber
+from fake_ros import FakeRos, FakeService, deliver
 from geometry_msgs.msg import Point32, Pose, PoseStamped, Quaternion
 from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseActionGoal
@@ -121,7 +121,7 @@ class Navigators:
             self.now_s = round(self.now_s + 0.05, 9)
             self._ros.set_time(self.now_s)
             for topic in self._good_topics():
-                subscriber(topic).receive(self.valid[topic](), "/simulator")
+                deliver(topic, self.valid[topic](), "/simulator")
             self._loop._update_time()
             self._loop._step(self.now_s)
 
@@ -132,11 +132,10 @@ class Navigators:
 
     def recover(self) -> None:
         """Send good messages on every topic; each robot flies to its goal again."""
-        subscriber("/map").receive(self._map())
+        deliver("/map", self._map())
         self.fly(1.0)
         for k, names in self._names.items():
-            goal = subscriber(rospy.resolve_name(names("move_base_simple/goal")))
-            goal.receive(self._goal(k))
+            deliver(rospy.resolve_name(names("move_base_simple/goal")), self._goal(k))
         self.fly(0.2)
         # The fake publisher of action goals has no subscriber: they are handed on here.
         self._hand_on_goals()
@@ -151,10 +150,7 @@ class Navigators:
     def _hand_on_goals(self) -> None:
         for names in self._names.values():
             topic = rospy.resolve_name(names("move_base/goal"))
-            subscriber(topic).receive(self._goal_of(topic))
-
-    def _goal_of(self, topic: str) -> MoveBaseActionGoal:
-        return copy.deepcopy(self.valid[topic]())
+            deliver(topic, self.valid[topic]())
 
     def untouched(self, number: int) -> bool:
         """Return whether a robot knows its pose and its surroundings."""
