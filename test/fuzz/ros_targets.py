@@ -43,7 +43,7 @@ def messages(data: bytes) -> None:
     topic, data_class = fuzzed.topics[data[0] % len(fuzzed.topics) if data else 0]
     try:
         message = data_class().deserialize(data[1:])
-    except genpy.DeserializationError:
+    except (genpy.DeserializationError, ValueError):
         return  # rospy drops the connection
     deliver(topic, message)
     fuzzed.node.settle()

@@ -2,8 +2,9 @@
 
     run.py TARGET [SECONDS]
 
-Starts with the files of ``corpus/TARGET``; new ones go into a temporary folder, so that the corpus
-stays small. Exits with status 1 at the first fault and keeps its input.
+Starts with the files of ``corpus/TARGET``, or with a valid message for each topic: the target
+``messages`` needs ROS. New inputs go into a temporary folder, so that the corpus stays small. Exits
+with status 1 at the first fault and keeps its input.
 """
 
 from __future__ import annotations
@@ -23,6 +24,11 @@ for module in pkgutil.iter_modules(kernels.__path__):  # numba cannot compile at
 with atheris.instrument_imports(include=["quad_nav", "PIL", "yaml", "rosbags", "mcap"]):
     from targets import TARGETS, run
 
+    if sys.argv[1:2] == ["messages"]:  # the only one that needs ROS
+        import ros_targets
+
+        TARGETS["messages"] = ros_targets.messages
+
 
 def main() -> None:
     if len(sys.argv) not in (2, 3) or sys.argv[1] not in TARGETS:
@@ -30,6 +36,10 @@ def main() -> None:
     name, seconds = sys.argv[1], sys.argv[2] if len(sys.argv) == 3 else "60"
     found = Path(tempfile.mkdtemp(prefix=f"quad-fuzz-{name}-"))
     corpus = Path(__file__).parent / "corpus" / name
+    if name == "messages":
+        corpus = found / "valid"
+        corpus.mkdir()
+        ros_targets.write_corpus(corpus)
     print(f"new inputs and faults: {found}", flush=True)
     atheris.Setup(
         [
