@@ -269,6 +269,8 @@ class MissionRunner:
             contact = contact_from_message(message)
             if contact.time_s > now_s + MAX_LEAD_S:
                 raise ValueError(f"contact at {contact.time_s:.2f} s, /clock is at {now_s:.2f} s")
+            if not any(contact.involves(robot.name) for robot in self.robots):
+                raise ValueError(f"contact of {contact.robot}, expected a robot of this mission")
         except ValueError as error:
             name = self._contacts.resolved_name
             self._warnings.warn(f"{name}: message dropped: {error}", kind=name)
