@@ -31,8 +31,12 @@ RESOLUTION_M = 0.05
 PILLARS = ((2.25, 6.0), (9.0, 4.75))
 PILLAR_RADIUS_M = 0.15
 AROUND_M = 0.4  # nothing else of the map is so near a pillar
-TOLERANCE_M = 0.04  # odometry frames move 0.007 m between two transforms; cells are 0.025 m
+MEAN_M = 0.03  # a cell of the local costmap is 0.025 m
+# A busy navigator draws with a transform that is up to transform_tolerance, 0.5 s, old; at a pillar
+# a frame moves at 0.04 m/s + 0.02 rad/s * 10.2 m.
+LARGEST_M = 0.5 * (0.04 + 0.02 * 10.2) + MEAN_M
 LETHAL = 100
+TF_WAIT = rospy.Duration(10.0)  # the transform may come after the grid
 
 
 def map_with_pillars(frame="map"):
@@ -93,7 +97,7 @@ class DriftingOdometry(FlightCase):
         self.assertEqual([goal["reached"] for goal in goals], 6 * [True], goals)
         self.check_drift()
         for i, record in enumerate(grids):
-            self.check_walls(f"odom{i}", record.messages)
+            self.check_walls(f"odom{i}", list(record.messages))
 
     def check_drift(self):
         """At the end both frames are far from the map's, and they are different."""
@@ -108,7 +112,7 @@ class DriftingOdometry(FlightCase):
         offsets_m = []
         for grid in grids:
             self.assertEqual(grid.header.frame_id, frame)
-            transform = self.buffer.lookup_transform("map", frame, grid.header.stamp)
+            transform = self.buffer.lookup_transform("map", frame, grid.header.stamp, TF_WAIT)
             map_from_odom = pose_from_transform(transform).to_2d()
             in_map = map_from_odom.transform_points(lethal_points(grid))
             for pillar in PILLARS:
@@ -122,7 +126,8 @@ class DriftingOdometry(FlightCase):
             f" {np.mean(offsets_m):.3f} m, largest {max(offsets_m):.3f} m"
         )
         self.assertGreater(len(offsets_m), 10)
-        self.assertLess(max(offsets_m), TOLERANCE_M)
+        self.assertLess(np.mean(offsets_m), MEAN_M)
+        self.assertLess(max(offsets_m), LARGEST_M)
 
     def test_2_a_map_that_cannot_be_placed_is_left_out_with_a_warning(self):
         log = self.record("/rosout", Log)
@@ -155,13 +160,15 @@ class DriftingOdometry(FlightCase):
         peer, odom0_from_map = found(), self.located("odom0", "map")
         odom0_from_odom1 = odom0_from_map.compose(self.located("map", "odom1"))
         here = odom0_from_odom1.transform(1.0, 2.0)
-        # The frames have moved on since the messages: 0.1 m and more would be no transform.
-        self.assertLess(math.dist(here, (peer.x_m, peer.y_m)), 0.1)
-        self.assertLess(math.dist(odom0_from_map.transform(3.0, 4.0), peer.intention.path[0]), 0.1)
+        # The frames have moved on since the messages; they are metres apart.
+        self.assertLess(math.dist(here, (peer.x_m, peer.y_m)), 0.5)
+        self.assertLess(math.dist(odom0_from_map.transform(3.0, 4.0), peer.intention.path[0]), 0.5)
+        self.assertGreater(math.dist((1.0, 2.0), (peer.x_m, peer.y_m)), 1.0)
         self.assertGreater(math.dist((3.0, 4.0), peer.intention.path[0]), 1.0)
 
     def test_4_a_plan_from_a_start_in_another_frame_is_refused(self):
-        make_plan = rospy.ServiceProxy("/move_base0/make_plan", GetPlan)
+        # The planner's own service plans in flight, too: the last goal may not have ended.
+        make_plan = rospy.ServiceProxy("/move_base0/NavfnROS/make_plan", GetPlan)
         with self.assertRaisesRegex(rospy.ServiceException, "start is in frame 'odom0', expected"):
             make_plan(goal_pose(2.0, 2.0, frame="odom0"), goal_pose(3.0, 2.0), 0.5)
 
