@@ -6,8 +6,9 @@ import time
 
 import rospy
 import rostest
-from flight_case import FlightCase
+from flight_case import FlightCase, Latest
 from geometry_msgs.msg import Twist
+from std_msgs.msg import Time
 from std_srvs.srv import Trigger
 
 
@@ -52,8 +53,13 @@ class Simulation(FlightCase):
         self.call("start")
         x, y = self.position(0)
         self.fly(0.3, lambda: self.distance(0, x, y) > 0.3, "robot 0 away from its start")
+        resets, before_s = Latest("/simulation/last_reset", Time), rospy.get_time()
         self.call("reset")
         self.wait(lambda: self.distance(0, x, y) < 0.05, "robot 0 back at its start")
+        self.wait(
+            lambda: resets.message is not None and resets.message.data.to_sec() >= before_s,
+            "the time of this reset",
+        )
 
     def test_watchdog_hovers_when_commands_stop(self):
         self.call("start")

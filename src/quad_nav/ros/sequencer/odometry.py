@@ -39,6 +39,7 @@ class OdometryIntake:
         self._name, self._topic, self._transforms = name, topic, transforms
         self._warnings = ThrottledWarnings()
         self._filter = OdometryFilter()
+        self._latest: Dict[str, Optional[Pose3D]] = {}  # poses of frames in the last step
         self._start_s = self._odometry_s = 0.0
         self.is_silent, self.silent_s = False, 0.0
 
@@ -106,20 +107,19 @@ class OdometryIntake:
     def _origins(self, valid: Sequence[Tuple[Odometry, float, Pose3D]]) -> List[Optional[Pose3D]]:
         """Return the pose of each message's frame in `map`; None if it is unknown.
 
-        A frame that is at the same pose at the first and the last message did not move between.
+        A frame whose latest pose is that of the step before has not moved: one lookup will do.
         """
-        stamps: Dict[str, List[float]] = {}
-        for message, stamp_s, _ in valid:
-            stamps.setdefault(message.header.frame_id, []).append(stamp_s)
-        last = {frame: self._origin(frame, each[-1]) for frame, each in stamps.items()}
-        moves = {
-            frame: len(each) > 1 and self._origin(frame, each[0]) != last[frame]
-            for frame, each in stamps.items()
-        }
         frames = [(message.header.frame_id, stamp_s) for message, stamp_s, _ in valid]
-        return [self._origin(*one) if moves[one[0]] else last[one[0]] for one in frames]
+        before = self._latest
+        self._latest = {frame: self._origin(frame) for frame in dict(frames)}
+        return [
+            self._latest[frame]
+            if self._latest[frame] == before.get(frame)
+            else self._origin(frame, stamp_s)
+            for frame, stamp_s in frames
+        ]
 
-    def _origin(self, frame: str, stamp_s: float) -> Optional[Pose3D]:
+    def _origin(self, frame: str, stamp_s: Optional[float] = None) -> Optional[Pose3D]:
         try:
             map_from_odom = self.map_from(frame, stamp_s)
         except TransformUnavailable as error:

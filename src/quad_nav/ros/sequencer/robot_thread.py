@@ -17,7 +17,7 @@ from quad_nav.ros.sequencer.robot import MissionRobot
 
 WAIT_S = 0.5  # wall time, as the next; longest delay until a silent robot's thread does a step
 GATHER_S = 0.02  # shortest time between two steps, of a few robots
-STEPS_PER_S = 250.0  # of all robots of a fleet together, which share one interpreter
+STEPS_PER_S = 200.0  # of all robots of a fleet together, which share one interpreter
 JOIN_S = 1.0  # longest wait for the end of a thread that has failed
 STUCK_S = 30.0
 """A step that takes longer, such as a file on a disk that hangs, ends the robot's mission."""
