@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from typing import Dict, Iterator, List, Optional
 
 import rospy
@@ -42,6 +43,7 @@ from quad_nav.topics.validation import MAX_LEAD_S
 
 START_SERVICE = "/simulation/start"
 WAIT_S = 0.2  # wall time, as the next; longest delay until the node notices a shutdown
+GOALS_PERIOD_S = 0.2  # shortest time between two messages with the goals of all robots
 PAUSE_S = 1.0  # longest wait for a step of a robot that is in progress
 MOST_AHEAD_S = 60.0  # simulated; /clock may be as far behind on a busy machine
 END_S = 5.0  # longest wait for the journal at the end
@@ -78,6 +80,7 @@ class MissionRunner:
         self._now_s = 0.0
         self._begun_s = 0.0  # a reset after this time restarts the mission
         self._reset_s = 0.0  # the last reset
+        self._next_goals_s = 0.0
         self._warnings = ThrottledWarnings()
         self._connect()
 
@@ -143,7 +146,9 @@ class MissionRunner:
         self._news.clear()
         with _topics_may_close():
             self._watch_clock(rospy.get_time())
-            if any([_pop_change(thread) for thread in self._threads]):
+            now_s = time.monotonic()
+            if now_s >= self._next_goals_s and any([_pop_change(one) for one in self._threads]):
+                self._next_goals_s = now_s + GOALS_PERIOD_S
                 self._publish_goals()
 
     def _watch_clock(self, now_s: float) -> None:
