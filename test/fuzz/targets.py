@@ -22,7 +22,9 @@ from quad_nav.cli.options import parameter
 from quad_nav.config.files import REQUIRED
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
+from quad_nav.mission.checkpoint import read_checkpoint
 from quad_nav.mission.goal_file import parse_goals
+from quad_nav.mission.journal import Journal
 from quad_nav.recording import messages
 from quad_nav.recording.bag_file import Message
 from quad_nav.recording.bag_trace import TraceReader, _is_wanted, read_trace
@@ -107,6 +109,12 @@ def flight_info(data: bytes) -> None:
     flight_metrics(reading.trace(Path("flight.bag")))
 
 
+def journal(data: bytes) -> None:
+    """The journal of a mission of two robots."""
+    path = _written("journal.jsonl", data)
+    read_checkpoint(Journal(path).resume(), ["quad0", "quad1"], "journal.jsonl")
+
+
 def page(data: bytes) -> None:
     """The whole report of a flight that is told by ``flight_info``; slow."""
     reading = _reading_with_odometry()
@@ -158,6 +166,7 @@ TARGETS: Dict[str, Callable[[bytes], None]] = {
         bag,
         mcap,
         flight_info,
+        journal,
         page,
         robot_messages,
         study,

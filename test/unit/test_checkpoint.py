@@ -178,13 +178,49 @@ def test_another_missions_journal_is_refused():
 
 
 @pytest.mark.parametrize(
-    "change", [{"index": None}, {"log": {}}, {"active_goal": {"goal": 3}}, {"robot": "quad7"}]
+    "change",
+    [
+        {"index": None},
+        {"index": "0"},
+        {"index": -1},
+        {"index": 0.5},
+        {"index": True},
+        {"lap": 0},
+        {"log": {}},
+        {"log": []},
+        {"active_goal": {"goal": 3}},
+        {"active_goal": []},
+        {"leg": "none"},
+        {"robot": "quad7"},
+        {"robot": ["quad0"]},
+        {"contact": [1, 2, 3, 4, 5]},
+        {"clearance_m": "1"},
+        {"separation_m": [1.0]},
+        {"mission_s": "nan"},
+        {"wall_s": None},
+    ],
+    ids=str,
 )
 def test_invalid_records_are_refused(change):
     mission = a_mission_on_its_second_goal()
     mission.records[-1].update(change)
     with pytest.raises(InputError, match="journal: cannot be read"):
         mission.checkpoint()
+
+
+@pytest.mark.parametrize("part", ["active_goal", "log"])
+@pytest.mark.parametrize(
+    "value", ["1", [], {}, True, float("nan"), float("-inf"), 10**400], ids=lambda v: repr(v)[:9]
+)
+def test_every_value_of_a_record_is_checked(part, value):
+    """A value of the wrong type would end the flight later, where it is used."""
+    for key in a_mission_on_its_second_goal().records[-1][part]:
+        if (key, value) in (("replaced", True), ("log", {})):
+            continue
+        mission = a_mission_on_its_second_goal()
+        mission.records[-1][part][key] = value
+        with pytest.raises(InputError, match="journal: cannot be read"):
+            read_checkpoint(mission.records, NAMES, "journal")
 
 
 def test_journals_hold_plain_numbers():

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from quad_nav.cli import main
+from quad_nav.files.shipped import shipped
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +89,44 @@ def test_every_fault_is_listed_and_nothing_written(report, tmp_path):
 def test_a_good_flight_with_a_bad_animation_writes_nothing(report, tmp_path):
     assert report("../good.bag", "--animate", "one.avi").exit_code == 2
     assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", [b"/odom0", b"nav_msgs/Odometry"])
+def test_names_that_are_not_utf8_are_refused(report, tmp_path, name):
+    """The index of a bag holds topics and types as they are."""
+    content = (tmp_path / "good.bag").read_bytes()
+    assert name in content
+    (tmp_path / "odd.bag").write_bytes(content.replace(name, b"\xff" + name[1:]))
+    result = report("../odd.bag")
+    assert isinstance(result.exception, SystemExit), result.exception
+    assert result.exit_code == 2 and "odd.bag: " in result.output, result.output
+
+
+def test_a_file_whose_name_is_not_utf8_is_reported(report, tmp_path):
+    shutil.copy(tmp_path / "good.bag", tmp_path / os.fsdecode(b"fl\xff.bag"))
+    result = report(os.fsdecode(b"../fl\xff.bag"))
+    assert (result.exit_code, result.output) == (0, "report: report.html\n")
+    assert b"<h1>fl" in (tmp_path / "out" / "report.html").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "command, status",
+    [
+        ("fly -q --time-limit 0.2 --config {0}/k\xf6 --json {0}/\xe4 --report {0}/\xdf.html", 1),
+        ("check {0}/k\xf6", 0),
+        ("report {0}/\xfc.bag -o {0}/\xfc.html", 0),
+        ("fly --scene {0}/no\xdf.yaml", 2),
+    ],
+)
+def test_commands_run_in_a_locale_without_utf8(bag, tmp_path, command, status):
+    folder = tmp_path / "\u96f6"
+    shutil.copytree(shipped("config", "tutorial"), folder / "k\xf6")
+    shutil.copy(bag, folder / "\xfc.bag")
+    locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run(
+        [sys.executable, "-m", "quad_nav.cli", *command.format(folder).split()],
+        env={**os.environ, **locale, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        check=False,
+    )
+    assert (done.returncode, b"Traceback" in done.stderr) == (status, False), done.stderr

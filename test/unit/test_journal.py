@@ -79,7 +79,22 @@ def test_an_unfinished_line_is_ignored(tmp_path, torn):
     assert lines(path) == [b'{"head": 1}', b'{"goal": 1}', b'{"goal": 3}']
 
 
-@pytest.mark.parametrize("line", [b"nonsense", b"[1, 2]", b"\xff\xfe", b""])
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"nonsense",
+        b"[1, 2]",
+        b"\xff\xfe",
+        b"",
+        b'{"a": NaN}',
+        b'{"a": -Infinity}',
+        b'{"a": 1e999}',
+        b'{"a": ' + b"1" * 21 + b"}",
+        b'{"a": ' + b"[" * 100_000 + b"]" * 100_000 + b"}",
+        b'{"a": ' * 100_000 + b"1" + b"}" * 100_000,
+    ],
+    ids=lambda line: line[:12].decode("latin-1"),
+)
 def test_a_line_that_is_not_a_record_is_named(tmp_path, line):
     path = tmp_path / "j"
     path.write_bytes(b'{"head": 1}\n' + line + b'\n{"goal": 1}\n')
@@ -89,8 +104,14 @@ def test_a_line_that_is_not_a_record_is_named(tmp_path, line):
         Journal(path).resume()
 
 
+def test_a_pipe_is_no_journal_and_nothing_waits_for_it(tmp_path):
+    os.mkfifo(tmp_path / "j")
+    with pytest.raises(InputError, match="is a pipe; expected a file"):
+        Journal(tmp_path / "j").resume()
+
+
 def test_an_unreadable_journal_is_named(tmp_path):
-    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+    with pytest.raises(InputError, match="is a folder; expected a file"):
         Journal(tmp_path).resume()
 
 

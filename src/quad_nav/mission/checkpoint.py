@@ -8,16 +8,36 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, TypeVar
+from functools import lru_cache
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    List,
+    Mapping,
+    Optional,
+    Sequence,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from quad_nav.errors import InputError
-from quad_nav.geometry import Pose2D
+from quad_nav.files.values import is_number, is_whole
 from quad_nav.mission.flight_log import FlightLog, Leg, RobotLogState
-from quad_nav.mission.goal_file import Goal
 from quad_nav.mission.sequencer import START, ActiveGoal, SequenceProgress, Sequencer
 from quad_nav.sim.contacts import Contact
 
 T = TypeVar("T")
+_LARGEST = 10**9  # of a counter
+_ACCEPTS: Dict[Any, Callable[[Any], bool]] = {
+    float: is_number,
+    int: lambda value: is_whole(value) and abs(value) <= _LARGEST,
+    bool: lambda value: isinstance(value, bool),
+    str: lambda value: isinstance(value, str),
+}
 
 
 @dataclass(frozen=True)
@@ -107,7 +127,7 @@ def read_checkpoint(
         )
     try:
         return _read_mission(records, names)
-    except (KeyError, TypeError, ValueError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             [
                 f"{source}: cannot be read: {error!r}; expected a journal of this "
@@ -122,7 +142,7 @@ def _read_mission(records: Sequence[Mapping[str, Any]], names: Sequence[str]) ->
     head: Mapping[str, Any] = {}
     for record in records:
         if "contact" in record:
-            contacts.append(Contact(**record["contact"]))
+            contacts.append(_instance(record["contact"], Contact))
         elif "robot" in record:
             name = record["robot"]
             robots[name] = _read_robot(robots[name], record)
@@ -130,10 +150,10 @@ def _read_mission(records: Sequence[Mapping[str, Any]], names: Sequence[str]) ->
             head = record
     last = records[-1]
     return MissionCheckpoint(
-        float(head["clock_s"]),
-        float(head["epoch_s"]),
-        float(last.get("mission_s", 0.0)),
-        float(last.get("wall_s", 0.0)),
+        _value(head["clock_s"], float),
+        _value(head["epoch_s"], float),
+        _value(last.get("mission_s", 0.0), float),
+        _value(last.get("wall_s", 0.0), float),
         robots,
         tuple(contacts),
     )
@@ -142,19 +162,19 @@ def _read_mission(records: Sequence[Mapping[str, Any]], names: Sequence[str]) ->
 def _read_robot(before: RobotCheckpoint, record: Mapping[str, Any]) -> RobotCheckpoint:
     legs = before.log.legs
     if record["leg"] is not None:
-        legs = (*legs, Leg(**{**record["leg"], "goal": Goal(**record["leg"]["goal"])}))
-    state = dict(record["log"])
-    for key in ("leg_start", "pose"):
-        state[key] = _instance(state[key], Pose2D)
-    active = record["active_goal"]
-    if active is not None:
-        goal, pose = Goal(**active["goal"]), Pose2D(**active["pose"])
-        active = ActiveGoal(**{**active, "goal": goal, "pose": pose})
+        legs = (*legs, _instance(record["leg"], Leg))
+    progress = SequenceProgress(
+        _value(record["index"], int),
+        _value(record["lap"], int),
+        _value(record["active_goal"], Optional[ActiveGoal]),
+    )
+    if progress.index < 0 or progress.lap < 1:
+        raise ValueError(f"goal {progress.index} of lap {progress.lap}, expected 0 or more of 1")
     return RobotCheckpoint(
-        SequenceProgress(int(record["index"]), int(record["lap"]), active),
-        RobotLogState(legs=legs, **state),
-        record["clearance_m"],
-        record["separation_m"],
+        progress,
+        dataclasses.replace(_instance(record["log"], RobotLogState), legs=legs),
+        _value(record["clearance_m"], Optional[float]),
+        _value(record["separation_m"], Optional[float]),
     )
 
 
@@ -171,5 +191,28 @@ def _shifted(active: ActiveGoal, by_s: float) -> ActiveGoal:
     )
 
 
-def _instance(values: Optional[Mapping[str, Any]], kind: Callable[..., T]) -> Optional[T]:
-    return None if values is None else kind(**values)
+def _instance(values: Any, kind: Callable[..., T]) -> T:
+    """Return a dataclass of a JSON object, with the types of its fields."""
+    if not isinstance(values, dict):
+        raise TypeError(f"{values!r:.40}, expected an object")
+    hints = _hints(kind)
+    missing = sorted(set(hints) - set(values) - {"legs"})  # each leg has a record of its own
+    if missing:
+        raise KeyError(missing[0])
+    return kind(**{key: _value(value, hints[key]) for key, value in values.items()})
+
+
+@lru_cache(maxsize=None)
+def _hints(kind: Callable[..., Any]) -> Dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _value(value: Any, hint: Any) -> Any:
+    """Return a JSON value of a type: a number, a text, a dataclass, or None if it is optional."""
+    if get_origin(hint) is Union:
+        return None if value is None else _value(value, get_args(hint)[0])
+    if hint not in _ACCEPTS:
+        return _instance(value, hint)
+    if not _ACCEPTS[hint](value):
+        raise TypeError(f"{value!r:.40}, expected a value of the type {hint.__name__}")
+    return value

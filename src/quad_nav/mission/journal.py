@@ -8,11 +8,17 @@ from __future__ import annotations
 
 import fcntl
 import json
+import math
 import os
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
+from quad_nav.files.user_files import read_bytes
+
+MAX_BYTES = 512 * 1024 * 1024
+"""Size of a journal that is read: a million goals."""
+_MOST_DIGITS = 20  # of a whole number: thousands take long to parse
 
 
 class Journal:
@@ -44,17 +50,9 @@ class Journal:
         Raises:
             InputError: The file cannot be read or is not a journal.
         """
-        try:
-            content = self.path.read_bytes()
-        except FileNotFoundError:
+        if not os.path.lexists(self.path):
             return []
-        except OSError as error:
-            raise InputError(
-                [
-                    f"{self.path}: cannot be read: {error.strerror}; expected the "
-                    "journal of a mission"
-                ]
-            ) from error
+        content = read_bytes(self.path, MAX_BYTES)
         records, self._size = _records(content, self.path)
         return records
 
@@ -134,8 +132,8 @@ def _records(content: bytes, path: Path) -> Tuple[List[Dict[str, Any]], int]:
     records = []
     for number, line in enumerate(lines, start=1):
         try:
-            record = json.loads(line)
-        except ValueError:
+            record = json.loads(line, parse_float=_finite, parse_int=_whole, parse_constant=_finite)
+        except (ValueError, RecursionError):
             record = None
         if not isinstance(record, dict):
             raise InputError(
@@ -146,3 +144,17 @@ def _records(content: bytes, path: Path) -> Tuple[List[Dict[str, Any]], int]:
             )
         records.append(record)
     return records, sum(len(line) + 1 for line in lines)
+
+
+def _finite(text: str) -> float:
+    """Parse a number; JSON of Python's also has NaN, Infinity and 1e999."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text}, expected a finite number")
+    return value
+
+
+def _whole(text: str) -> int:
+    if len(text) > _MOST_DIGITS:
+        raise ValueError(f"a number of {len(text)} digits, expected {_MOST_DIGITS} at most")
+    return int(text)
