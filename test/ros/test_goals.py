@@ -1,11 +1,16 @@
 #!/usr/bin/env python3
 """Goals by action and by topic, preempted, cancelled and refused."""
 
+from collections import deque
+from unittest import mock
+
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from flight_case import FlightCase, Latest, action_goal, goal_pose
 from move_base_msgs.msg import MoveBaseActionResult
+
+from quad_nav.ros.navigator.goal_server import GoalServer
 
 FREE_PLACES = (((1.5, 1.5), (3.0, 6.5)), ((10.0, 2.0), (10.5, 10.0)))
 UNFINISHED = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
@@ -79,6 +84,22 @@ class Goals(FlightCase):
         self.wait(lambda: self.speed(0) < 0.02, "robot 0 standing")
         self.assertEqual(self.results[1].count, counts[1])
         self.wait(lambda: self.speed(1) > 0.05, "robot 1 still under way")
+
+    def test_goal_that_arrives_during_a_poll_is_no_cancel_request(self):
+        def arrive():
+            actions.is_new_goal_available.return_value = True
+            return True
+
+        actions, navigator = mock.Mock(), mock.Mock()
+        actions.is_new_goal_available.return_value = False
+        actions.is_preempt_requested.side_effect = arrive
+        server = GoalServer.__new__(GoalServer)
+        server._server, server._simple_goals, server._status = actions, deque(), mock.Mock()
+        with mock.patch.object(GoalServer, "_accept") as accept:
+            server.poll(navigator, 1.0)
+            server.poll(navigator, 1.05)
+        actions.set_preempted.assert_not_called()
+        self.assertTrue(accept.called)
 
     def test_zero_quaternion_is_aborted_with_the_reason(self):
         count = self.results[0].count

@@ -139,9 +139,12 @@ class GoalServer:
             self._server.action_server.publish_status()
         if not navigator.accepts_goal(now_s):
             return
+        # A new goal is stored before it requests the preemption, so read them the other way round:
+        # otherwise one that arrives between the two would count as a cancel request.
+        is_preempted = self._server.is_active() and self._server.is_preempt_requested()
         if self._server.is_new_goal_available():
             self._accept(navigator, now_s)
-        elif self._server.is_active() and self._server.is_preempt_requested():
+        elif is_preempted:
             navigator.cancel()
             self._server.set_preempted(MoveBaseResult())
 
