@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Conversions to messages and back return the input."""
+"""Conversions to messages and back return the input; log messages are escaped."""
 
 import logging
 import math
@@ -19,27 +19,6 @@ from quad_nav.ros.navigator.peer_topics import intention_from_message, intention
 POSE = Pose3D(1.0, -2.0, 0.5, quaternion_from_euler(0.1, -0.2, 2.0))
 TWIST = Twist2D(0.3, -0.1, 0.7)
 STAMP = rospy.Time(12, 345678901)
-
-
-class LogMessages(unittest.TestCase):
-    def test_control_characters_are_escaped(self):
-        logger, found = logging.getLogger("rosout"), []
-        handler = logging.Handler()
-        handler.emit = lambda record: found.append(record.getMessage())
-        escape_log_messages()
-        logger.addHandler(handler)
-        rospy.logwarn("%s: %d of %.1f%%: %s", "a\x1b[2J", 3, 0.5, "b\nforged\u202e")
-        rospy.logwarn(f"quad0: {chr(0x9B)}2J\r")
-        rospy.logwarn("faults:\n%s", InputError(["one\n\x07", "two"]))
-        logger.removeHandler(handler)
-        self.assertEqual(
-            found,
-            [
-                "a\\x1b[2J: 3 of 0.5%: b\\nforged\\u202e",
-                "quad0: \\x9b2J\\r",
-                "faults:\none\\n\\x07\ntwo",
-            ],
-        )
 
 
 class Conversions(unittest.TestCase):
@@ -102,6 +81,25 @@ class Conversions(unittest.TestCase):
     def test_times_are_rounded_to_the_nanosecond(self):
         self.assertEqual(conversions.time_message(1.0 + 1.0 / 240), rospy.Time(1, 4166667))
         self.assertEqual(conversions.time_message(2.9999999999), rospy.Time(3, 0))
+
+    def test_control_characters_in_log_messages_are_escaped(self):
+        logger, found = logging.getLogger("rosout"), []
+        handler = logging.Handler()
+        handler.emit = lambda record: found.append(record.getMessage())
+        escape_log_messages()
+        logger.addHandler(handler)
+        rospy.logwarn("%s: %d of %.1f%%: %s", "a\x1b[2J", 3, 0.5, "b\nforged\u202e")
+        rospy.logwarn(f"quad0: {chr(0x9B)}2J\r")
+        rospy.logwarn("faults:\n%s", InputError(["one\n\x07", "two"]))
+        logger.removeHandler(handler)
+        self.assertEqual(
+            found,
+            [
+                "a\\x1b[2J: 3 of 0.5%: b\\nforged\\u202e",
+                "quad0: \\x9b2J\\r",
+                "faults:\none\\n\\x07\ntwo",
+            ],
+        )
 
 
 if __name__ == "__main__":
