@@ -114,8 +114,10 @@ def _run(
         lines = f"{name}: invalid parameters, shutting down:\n{error}"
         print(printable(lines, "\n"), file=sys.stderr)
         return EXIT_BAD_INPUT
-    except rospy.ROSInterruptException:
-        return 0  # a shutdown interrupts the loop's sleep
+    except rospy.ROSException:
+        # A shutdown interrupts the loop's sleep, and closes topics while the node starts.
+        if not rospy.core.is_shutdown_requested():
+            raise
     return 0
 
 
