@@ -310,8 +310,9 @@ def test_a_rotation_pauses_without_sensor_data(fixes, turns):
     assert recovery.started == 1
     left = recovery.left
     flight.local_costmap.stale = [("obstacle_layer/base_scan", 1.26)]
-    flight.until(4.0)
+    ticks = flight.until(4.0)
     assert (recovery.left < left) is turns
+    assert len(ticks) <= 2.0 / 0.05 + 2 * 2.0 / 0.2 + 2 * 2.0 / 0.25  # no more than what is due
 
 
 def test_a_robot_that_stops_without_sensor_data_keeps_its_patience():

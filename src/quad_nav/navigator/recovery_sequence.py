@@ -94,5 +94,11 @@ class RecoverySequence:
             self.stop()
         return step.done
 
+    def pause(self, now_s: float) -> None:
+        """Skip the running behaviour's step if it is due."""
+        assert self._active is not None
+        if now_s >= self.due_s - 1e-9:
+            self.due_s = now_s + self._active.period_s
+
     def _context(self, tick: Tick, poses: RobotPoses) -> RecoveryContext:
         return RecoveryContext(tick.now_s, *self._costmaps, poses.in_global, poses.in_local)

@@ -135,10 +135,11 @@ class StateMachine:
         self._search.set_frequency(self.params.planner_frequency_hz, tick.now_s)
         if self._is_search_due(tick.now_s):
             self._search_plan(tick, poses.in_global)
-        if self.recovery.is_running and not (
-            self._stops_without_data and self._updates.missing_data(tick.now_s)
-        ):
-            self._step_recovery(tick, poses)
+        if self.recovery.is_running:
+            if self._stops_without_data and self._updates.missing_data(tick.now_s):
+                self.recovery.pause(tick.now_s)
+            else:
+                self._step_recovery(tick, poses)
         if self._cycle.pop(tick.now_s):
             tick.cycle = True
             self._recovery_overruns = self.recovery.is_running
