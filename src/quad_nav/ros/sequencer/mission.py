@@ -154,7 +154,7 @@ class MissionRunner:
     def _watch_clock(self, now_s: float) -> None:
         reset_s, before_s = self._reset_s, self._now_s
         if self._begun_s < reset_s <= now_s + MAX_LEAD_S:
-            rospy.logwarn("sequencer: simulation was reset; restarting the mission")
+            self._warnings.warn("sequencer: simulation was reset; restarting the mission")
             with self._paused_robots():
                 self._begin(now_s)
                 self._begun_s = max(now_s, reset_s)
@@ -281,12 +281,10 @@ class MissionRunner:
             self._warnings.warn(f"{name}: message dropped: {error}", kind=name)
             return
         if self._record.add_contact(contact, now_s):
-            rospy.logwarn(
-                "%s: CONTACT with %s at (%.2f, %.2f) m",
-                contact.robot,
-                contact.other,
-                contact.x_m,
-                contact.y_m,
+            self._warnings.warn(
+                f"{contact.robot}: CONTACT with {contact.other} at"
+                f" ({contact.x_m:.2f}, {contact.y_m:.2f}) m",
+                kind=f"{contact.robot}: CONTACT with {contact.other}",
             )
 
     def _on_reset(self, message: Time) -> None:
