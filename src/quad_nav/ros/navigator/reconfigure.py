@@ -156,6 +156,7 @@ class _Callback:
         self._namespace = namespace
         self._values = config.values(configuration, namespace)
         self._on_reconfigure = on_reconfigure
+        self._warnings = ThrottledWarnings()
 
     def __call__(self, requested: Any, level: int) -> Any:
         changes = {
@@ -169,7 +170,7 @@ class _Callback:
                 configuration = self._on_reconfigure(self._namespace, changes)
                 self._values = config.values(configuration, self._namespace)
             except InputError as error:
-                rospy.logerr("%s: reconfiguration refused:\n%s", self._robot, error)
+                self._warnings.error(f"{self._robot}: reconfiguration refused:\n{error}")
         requested.update(self._values)
         return requested
 
