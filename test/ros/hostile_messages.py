@@ -24,6 +24,7 @@ from message_generator import Generator
 
 SETTLE_EVERY, FLY_EVERY = 5, 200
 SERVICE_SHARE = 100  # a plan or a reconfiguration takes as long as a hundred messages
+LEAST_REQUESTS = 200
 LINES_PER_S, LINES_AT_ONCE = 20.0, 60
 
 
@@ -65,7 +66,7 @@ class Feeder:
                 self.report.faults[f"{topic}: no generator for its {takers} subscribers"] += 1
                 continue
             self._feed(f"{topic} (to {takers})", topic, valid, partial(deliver, topic))
-        self._count = max(self._count // SERVICE_SHARE, 10)
+        self._count = max(self._count // SERVICE_SHARE, LEAST_REQUESTS)
         for name, request in self._node.requests().items():
             self._feed(name, name, lambda request=request: copy.copy(request), self._caller(name))
         return self.report

@@ -18,6 +18,8 @@ from quad_nav.ros.common.nav_messages import goal_from_message, path_message
 from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.topics.publishing import Names
 
+MAX_TOLERANCE_M = 10.0  # of a plan that a service makes
+
 
 class PlanServices:
     """Serve `~make_plan`, `~<planner>/make_plan` and `~clear_costmaps`."""
@@ -69,6 +71,11 @@ class PlanServices:
         self._check_frame("goal", request.goal.header.frame_id, frame)
         if request.start.header.frame_id:
             self._check_frame("start", request.start.header.frame_id, frame)
+        if not abs(request.tolerance) <= MAX_TOLERANCE_M:
+            # Every cell within it may be planned to, while the robot stands still.
+            raise rospy.ServiceException(
+                f"tolerance {request.tolerance:g} m, expected {MAX_TOLERANCE_M:g} m at most"
+            )
         try:
             goal = goal_from_message(request.goal.pose).to_2d()
             plan = self._navigator.make_plan(self._start(request), goal, request.tolerance)
