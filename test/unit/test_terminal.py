@@ -110,7 +110,7 @@ def test_names_of_files_and_folders(tmp_path, mission):
 def test_arguments(tmp_path):
     for arguments in (
         [f"--{NAME}"],
-        [NAME],
+        [f"mission{NAME}"],  # click before 8.2 takes a first ESC for the dash of an option
         ["fly", f"--{NAME}"],
         ["fly", NAME],
         ["fly", "--seed", NAME],
