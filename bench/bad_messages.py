@@ -44,7 +44,7 @@ class FutureTransform:
 
     @property
     def is_connected(self) -> bool:
-        """Whether the nodes would receive the transform."""
+        """Return whether the nodes would receive the transform."""
         return self._publisher.get_num_connections() >= self._listeners
 
     def publish(self, now_s: float) -> None:

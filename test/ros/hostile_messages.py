@@ -30,7 +30,7 @@ LINES_PER_S, LINES_AT_ONCE = 20.0, 60
 
 @dataclass
 class Report:
-    """What a node did with generated messages.
+    """Outcome of generated messages to a node.
 
     Attributes:
         counts: Messages by subscriber or service.

@@ -1,4 +1,4 @@
-"""Where compiled kernels are cached, and what a damaged, foreign or full cache leads to."""
+"""Folders of compiled kernels; damaged, foreign and full caches."""
 
 from __future__ import annotations
 

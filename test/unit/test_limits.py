@@ -131,7 +131,7 @@ def test_an_image_takes_a_gigabyte_at_most(tmp_path, mode, side):
 
 
 def _image_problem(folder, mode, side):
-    """What is wrong with the size of a square image, of which there is only the head."""
+    """Return the fault in the size of a square image, of which there is only the head."""
     image = Image.new(mode, (1, 1))
     image._size = (side, side)
     try:

@@ -171,7 +171,7 @@ HARMLESS = {
     "a version of Optuna": "UPDATE version_info SET schema_version = 99",
     "an index": "CREATE INDEX i ON flights (seed)",
     "older results": "UPDATE flights SET result = json_remove(result, '$.recoveries', '$.reason')",
-    "a row of nobody": f"INSERT INTO flights VALUES ('{{}}', 'other', 0, '{RESULT}')",
+    "a row of another study": f"INSERT INTO flights VALUES ('{{}}', 'other', 0, '{RESULT}')",
 }
 
 

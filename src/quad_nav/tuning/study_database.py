@@ -21,7 +21,7 @@ Key = Tuple[str, str, int]
 MAX_BYTES = 1_000_000_000
 MAX_RESULT_LENGTH = 100_000
 LOCK_TIMEOUT_S = 5.0
-"""How long to wait for another process that writes the file."""
+"""Longest wait for another process that writes the file."""
 _SMALLEST_PAGE = 512
 _TABLE = (
     "CREATE TABLE IF NOT EXISTS flights (parameters TEXT, mission TEXT, seed INTEGER, "

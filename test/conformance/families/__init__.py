@@ -62,7 +62,7 @@ def cases(family: str, data: Path = DATA) -> List[Path]:
 
 
 def missing_cases(family: str, data: Path) -> List[str]:
-    """What keeps index and files of a family apart: a line for each case that one of them lacks.
+    """Compare the index and the files of a family: a line for each case that one of them lacks.
 
     Raises:
         InvalidValue: the family is there and can't be read.

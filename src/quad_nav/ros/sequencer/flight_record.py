@@ -1,6 +1,6 @@
 """Flight log and journal of a mission, shared by the threads of its quadcopters.
 
-One lock guards the log. It is held for calculations only; nobody waits for the disk with it.
+One lock guards the log. It is held for calculations only, never while a file is written.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from quad_nav.sim.contacts import Contact
 
 
 class FlightRecord:
-    """What happens in a mission, for its summary and for a sequencer that resumes it.
+    """Events of a mission, for its summary and for a sequencer that resumes it.
 
     Attributes:
         log: Flight log; hold `lock` to use it.
