@@ -1,17 +1,19 @@
 """Command line ``quad``, with one module for each command.
 
-A command's module is imported when the command runs, so none waits for unneeded imports.
+A command's module is imported when the command runs, so none waits for unneeded imports. The list
+of commands needs none of them.
 """
 
 from __future__ import annotations
 
+import difflib
 import errno
 import importlib
 import io
 import os
 import sys
 from contextlib import contextmanager
-from typing import Any, Iterator, List, Optional
+from typing import Any, Dict, Iterator, List, Optional, Tuple
 
 import click
 
@@ -24,7 +26,15 @@ EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 # Errors of a write to standard output; the commands handle those of their own files.
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
-COMMANDS = ("barn", "check", "fly", "report", "sweep", "tune")
+COMMANDS: Dict[str, str] = {
+    "barn": "Fly through the worlds of the BARN benchmark without ROS.",
+    "check": "Check move_base's YAML without flying.",
+    "fly": "Fly a mission without ROS, as fast as the machine allows.",
+    "report": "Write a report of a recorded flight, or compare several.",
+    "sweep": "Compare flights over the values of some parameters.",
+    "tune": "Search for parameters that fly better, without ROS.",
+}
+"""Name -> line in the list of commands."""
 
 
 @contextmanager
@@ -69,6 +79,27 @@ class Commands(click.Group):
             message = f"standard output: cannot be written: {error.strerror}"
             print(printable(message), file=sys.stderr)
             sys.exit(EXIT_FAILURE)
+
+    def parse_args(self, ctx: click.Context, args: List[str]) -> List[str]:
+        """Parse the arguments; without any, show the help as ``--help`` does."""
+        return super().parse_args(ctx, args or ["--help"])
+
+    def resolve_command(
+        self, ctx: click.Context, args: List[str]
+    ) -> Tuple[Optional[str], Optional[click.Command], List[str]]:
+        """Find the command; name the nearest ones if it is unknown."""
+        if args[0] not in COMMANDS and not args[0].startswith("-"):
+            nearest = difflib.get_close_matches(args[0], COMMANDS, n=2)
+            hint = (
+                f"did you mean {' or '.join(map(repr, nearest))}?" if nearest else "see quad --help"
+            )
+            ctx.fail(f"no command {args[0]!r}; {hint}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands without importing their modules."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
     def list_commands(self, ctx: click.Context) -> List[str]:
         """Return the names of all commands."""

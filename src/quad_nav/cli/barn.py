@@ -18,6 +18,7 @@ from quad_nav.cli import EXIT_INTERRUPTED, EXIT_SUCCESS
 from quad_nav.cli.options import (
     A_FILE,
     COUNT,
+    OUTPUT,
     POSITIVE,
     echo,
     echo_lines,
@@ -26,7 +27,7 @@ from quad_nav.cli.options import (
     raise_on_signals,
     show_warnings,
 )
-from quad_nav.cli.outputs import OUTPUT, Outputs
+from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.progress import flights_progress
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import LocalWorkers

@@ -2,50 +2,27 @@
 
 from __future__ import annotations
 
-import json
 import math
-import shutil
-import signal
-import sys
-from dataclasses import replace
-from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any
 
 import click
 
-from quad_nav.cli import EXIT_INTERRUPTED
-from quad_nav.cli.options import echo, echo_lines, exit_on_faults, parameter, show_warnings
-from quad_nav.cli.outputs import OUTPUT, Outputs
-from quad_nav.cli.pictures import FlightPictures
-from quad_nav.cli.progress import ProgressBar
-from quad_nav.files.shipped import shipped
-from quad_nav.mission.flight_log import INTERRUPTED
-from quad_nav.mission.summary import to_json
-from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
-from quad_nav.offline.flight import FlightObserver
-from quad_nav.offline.run import fly as fly_setup
-from quad_nav.offline.worker_process import processes_for
-from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
-from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.odometry import MAX_DRIFT, OdomDrift
-from quad_nav.sim.simulation import LIDAR_CASTERS, SimulationParams
+from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, LIVE, OUTPUT, POSITIVE
 
-_TUTORIAL_ROBOTS = 2
-_A_FILE = click.Path(dir_okay=False, path_type=Path)
-_LIVE = "live"
-_POSITIVE = click.FloatRange(min=0.0, min_open=True)
-_AMOUNT = click.FloatRange(min=0.0)
+# Those of quad_nav.sim.simulation and quad_nav.sim.odometry; importing them would load the engine.
+LIDAR_CASTERS = ("kernel", "bullet")
+MAX_DRIFT = 1.0
 
 
 @click.command()
 @click.option(
     "--scene",
-    type=_A_FILE,
+    type=A_FILE,
     help="Scene file: walls, obstacles and start poses. [default: the shipped arena]",
 )
 @click.option(
     "--goals",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=A_FOLDER,
     help="Folder with quad0_goals.json and so on. [default: the shipped goals]",
 )
 @click.option(
@@ -72,7 +49,7 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option(
     "--size",
     "size_m",
-    type=_AMOUNT,
+    type=AMOUNT,
     default=0.0,
     metavar="M",
     help="Side of a random mission's arena. [default: large enough for all quadcopters]",
@@ -86,7 +63,7 @@ _AMOUNT = click.FloatRange(min=0.0)
 )
 @click.option(
     "--jitter",
-    type=_AMOUNT,
+    type=AMOUNT,
     default=0.0,
     metavar="M",
     help="Displace each start position at random, by at most this distance.",
@@ -94,14 +71,14 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option(
     "--time-limit",
     "time_limit_s",
-    type=_POSITIVE,
+    type=POSITIVE,
     default=math.inf,
     metavar="S",
     help="End the flight after this simulated time.",
 )
 @click.option(
     "--scan-range",
-    type=_POSITIVE,
+    type=POSITIVE,
     default=2 * math.pi,
     metavar="RAD",
     help="Field of view of the LIDARs. [default: 2 pi]",
@@ -112,7 +89,7 @@ _AMOUNT = click.FloatRange(min=0.0)
 @click.option(
     "--lidar-rate",
     "scans_per_s",
-    type=_POSITIVE,
+    type=POSITIVE,
     default=20.0,
     show_default=True,
     metavar="HZ",
@@ -120,7 +97,7 @@ _AMOUNT = click.FloatRange(min=0.0)
 )
 @click.option(
     "--range-noise",
-    type=_AMOUNT,
+    type=AMOUNT,
     default=0.0,
     metavar="M",
     help="Standard deviation of the LIDARs' range noise.",
@@ -156,40 +133,31 @@ _AMOUNT = click.FloatRange(min=0.0)
 )
 @click.option(
     "--record",
-    type=_A_FILE,
+    type=A_FILE,
     metavar="FILE.bag|FILE.mcap",
     help="Record the ROS topics, for rosbag play and RViz.",
 )
 @click.option(
     "--view",
     is_flag=False,
-    flag_value=_LIVE,
+    flag_value=LIVE,
     metavar="[FILE.rrd]",
     help="Show the flight live in rerun's 3D viewer, or save it for the viewer.",
 )
 @click.option(
     "--report",
-    type=_A_FILE,
+    type=A_FILE,
     metavar="FILE.html",
     help="Write a report with pictures of the flight.",
 )
 @click.option(
     "--animate",
-    type=_A_FILE,
+    type=A_FILE,
     metavar="FILE",
     help="Write an animation: .gif, or .mp4 if ffmpeg is installed.",
 )
 @click.option("--quiet", "-q", is_flag=True, help="Show no progress bar and no table.")
-def fly(
-    json_path: Optional[Path],
-    record: Optional[Path],
-    view: Optional[str],
-    report: Optional[Path],
-    animate: Optional[Path],
-    quiet: bool,
-    processes: Optional[int],
-    **given: Any,
-) -> None:
+def fly(**given: Any) -> None:
     """Fly a mission without ROS, as fast as the machine allows.
 
     Ctrl-C ends the flight; summary, recording and report cover the part that was flown.
@@ -197,106 +165,7 @@ def fly(
     Exit status: 0 if every goal was reached without a contact, 1 otherwise, 2 for faulty input,
     130 after Ctrl-C.
     """
-    with exit_on_faults():
-        saved_view = None if view in (None, _LIVE) else Path(view)
-        outputs = Outputs(
-            {"--json": json_path, "--report": report},
-            {"--record": record, "--view": saved_view, "--animate": animate},
-        )
-        setup = read_setup(_options(**given))
-        pictures = FlightPictures(setup, report, animate)
-        observers = _observers(record, view)
-    if not quiet:
-        show_warnings(setup.warnings)
-    processes = processes or processes_for(len(setup.robots))
-    sys.exit(_fly(setup, observers, outputs, pictures, quiet, processes))
+    # Imported here: the engine loads slowly, and --help does not need it.
+    from quad_nav.cli.offline_flight import fly_mission
 
-
-def _options(
-    scan_range: float,
-    beams: int,
-    range_noise: float,
-    jitter: float,
-    lidar: str,
-    odom_drift: Tuple[float, float],
-    parameters: Tuple[str, ...],
-    **given: Any,
-) -> FlightOptions:
-    """Translate the command line's options."""
-    beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
-    options = FlightOptions(
-        **given,
-        parameters=tuple(map(parameter, parameters)),
-        simulation=SimulationParams(
-            beam_params, jitter_m=jitter, lidar_caster=lidar, odom_drift=OdomDrift(*odom_drift)
-        ),
-    )
-    few = (options.robots or 0) <= _TUTORIAL_ROBOTS and not options.size_m
-    if few and options.scene is None and options.goals is None:
-        return replace(options, goals=shipped("goals"))
-    return options
-
-
-def _observers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
-    """Create recorder and viewer; imported here, because both load slowly."""
-    observers: List[FlightObserver] = []
-    if view is not None:
-        from quad_nav.recording.viewer import View
-
-        observers.append(View(None if view == _LIVE else Path(view)))
-    if record is not None:  # last: it leaves an unfinished file if another cannot be created
-        from quad_nav.recording.recorder import Recorder
-
-        observers.append(Recorder(record))
-    return observers
-
-
-def _fly(
-    setup: FlightSetup,
-    observers: Sequence[FlightObserver],
-    outputs: Outputs,
-    pictures: FlightPictures,
-    quiet: bool,
-    processes: int,
-) -> int:
-    bar = [] if quiet else [ProgressBar()]
-    with _StopOnSignal() as stop:
-        summary = fly_setup(setup, [*observers, *pictures.observers, *bar, stop], processes)
-    width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
-    overview = table(summary, width)
-    if not quiet:
-        echo_lines(overview, err=outputs.use_stdout)
-    else:  # the table has the reason to end early, such as a recording on a full disk
-        for line in filter(None, (observer.stop_reason for observer in observers)):
-            echo(line, err=True)
-    outputs.write("--json", json.dumps(to_json(summary), indent=2, allow_nan=False))
-    for line in pictures.write(summary, outputs, overview if quiet else ""):
-        echo(line, err=True)
-    if summary.reason == INTERRUPTED:
-        return EXIT_INTERRUPTED
-    return outputs.exit_status(summary.exit_status)
-
-
-class _StopOnSignal(FlightObserver):
-    """Stops the flight at SIGINT (Ctrl-C) or SIGTERM; a second signal ends the process."""
-
-    def __init__(self) -> None:
-        self._received = False
-        self._handlers: Dict[int, Any] = {}
-
-    @property
-    def stop_reason(self) -> str:
-        return INTERRUPTED if self._received else ""
-
-    def __enter__(self) -> _StopOnSignal:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            self._handlers[number] = signal.signal(number, self._receive)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._handlers.items():
-            signal.signal(number, handler)
-
-    def _receive(self, number: int, _frame: object) -> None:
-        self._received = True
-        signal.signal(number, self._handlers[number])
+    fly_mission(**given)

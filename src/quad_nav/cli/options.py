@@ -15,13 +15,16 @@ from quad_nav.cli import EXIT_BAD_INPUT, EXIT_FAILURE
 from quad_nav.errors import InputError, QuadError, printable
 from quad_nav.files import plain_yaml
 from quad_nav.files.document import yaml_fault
-from quad_nav.kernels.jit import cache_warnings
 
 A_FILE = click.Path(dir_okay=False, path_type=Path)
 A_FOLDER = click.Path(file_okay=False, path_type=Path)
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
 AMOUNT = click.FloatRange(min=0.0)
 COUNT = click.IntRange(min=1)
+OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
+"""Type of an option whose text ``-`` sends to standard output."""
+LIVE = "live"
+"""Value of ``--view`` without a file."""
 
 
 def parameter(text: str) -> Tuple[str, Any]:
@@ -71,6 +74,8 @@ def exit_on_faults() -> Iterator[None]:
 
 def show_warnings(warnings: Iterable[str]) -> None:
     """Print the warnings of a set-up, and what a missing cache of the kernels costs."""
+    from quad_nav.kernels.jit import cache_warnings  # here, because numba loads slowly
+
     for warning in (*warnings, *cache_warnings()):
         echo(warning, err=True)
 

@@ -6,15 +6,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Iterator, List, Mapping, Optional
 
-import click
-
 from quad_nav.cli import EXIT_FAILURE
 from quad_nav.cli.options import echo, echo_lines
 from quad_nav.errors import InputError
 from quad_nav.files.output import folder_faults, output_faults, reason, write_text
 
-OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
-"""Type of an option whose text ``-`` sends to standard output."""
 STDOUT = Path("-")
 
 _Paths = Mapping[str, Optional[Path]]

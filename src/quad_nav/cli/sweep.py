@@ -16,12 +16,13 @@ from quad_nav.cli.options import (
     A_FILE,
     A_FOLDER,
     COUNT,
+    OUTPUT,
     echo,
     echo_lines,
     exit_on_faults,
     show_warnings,
 )
-from quad_nav.cli.outputs import OUTPUT, Outputs
+from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.study_options import (
     course_of,
     flown_options,

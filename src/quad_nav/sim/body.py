@@ -10,10 +10,10 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from typing import Dict, List, Optional, Sequence, Tuple
+from contextlib import contextmanager
+from typing import Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
@@ -23,6 +23,28 @@ from quad_nav.sim.contacts import Touch
 from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Box, Obstacle, Scene, Sphere
+
+
+@contextmanager
+def _discarded_errors() -> Iterator[None]:
+    """Discard what C code prints to standard error meanwhile; exceptions are not affected."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # standard error is closed
+        yield
+        return
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(null)
+        os.close(kept)
+
+
+with _discarded_errors():  # pybullet prints its build time
+    import pybullet
 
 Floats = NDArray[np.float64]
 

@@ -1,0 +1,153 @@
+"""Flight of ``quad fly``: set up, fly with a progress bar, print the table, write the outputs."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Dict, List, Optional, Sequence, Tuple
+
+from quad_nav.cli import EXIT_INTERRUPTED
+from quad_nav.cli.options import (
+    LIVE,
+    echo,
+    echo_lines,
+    exit_on_faults,
+    parameter,
+    show_warnings,
+)
+from quad_nav.cli.outputs import Outputs
+from quad_nav.cli.pictures import FlightPictures
+from quad_nav.cli.progress import ProgressBar
+from quad_nav.files.shipped import shipped
+from quad_nav.mission.flight_log import INTERRUPTED
+from quad_nav.mission.summary import to_json
+from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
+from quad_nav.offline.flight import FlightObserver
+from quad_nav.offline.run import fly as fly_setup
+from quad_nav.offline.worker_process import processes_for
+from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.odometry import OdomDrift
+from quad_nav.sim.simulation import SimulationParams
+
+_TUTORIAL_ROBOTS = 2
+
+
+def fly_mission(
+    json_path: Optional[Path],
+    record: Optional[Path],
+    view: Optional[str],
+    report: Optional[Path],
+    animate: Optional[Path],
+    quiet: bool,
+    processes: Optional[int],
+    **given: Any,
+) -> None:
+    """Fly with the options of ``quad fly`` and exit with its status."""
+    with exit_on_faults():
+        saved_view = None if view in (None, LIVE) else Path(view)
+        outputs = Outputs(
+            {"--json": json_path, "--report": report},
+            {"--record": record, "--view": saved_view, "--animate": animate},
+        )
+        setup = read_setup(_options(**given))
+        pictures = FlightPictures(setup, report, animate)
+        observers = _observers(record, view)
+    if not quiet:
+        show_warnings(setup.warnings)
+    processes = processes or processes_for(len(setup.robots))
+    sys.exit(_fly(setup, observers, outputs, pictures, quiet, processes))
+
+
+def _options(
+    scan_range: float,
+    beams: int,
+    range_noise: float,
+    jitter: float,
+    lidar: str,
+    odom_drift: Tuple[float, float],
+    parameters: Tuple[str, ...],
+    **given: Any,
+) -> FlightOptions:
+    """Translate the command line's options."""
+    beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
+    options = FlightOptions(
+        **given,
+        parameters=tuple(map(parameter, parameters)),
+        simulation=SimulationParams(
+            beam_params, jitter_m=jitter, lidar_caster=lidar, odom_drift=OdomDrift(*odom_drift)
+        ),
+    )
+    few = (options.robots or 0) <= _TUTORIAL_ROBOTS and not options.size_m
+    if few and options.scene is None and options.goals is None:
+        return replace(options, goals=shipped("goals"))
+    return options
+
+
+def _observers(record: Optional[Path], view: Optional[str]) -> List[FlightObserver]:
+    """Create recorder and viewer; imported here, because both load slowly."""
+    observers: List[FlightObserver] = []
+    if view is not None:
+        from quad_nav.recording.viewer import View
+
+        observers.append(View(None if view == LIVE else Path(view)))
+    if record is not None:  # last: it leaves an unfinished file if another cannot be created
+        from quad_nav.recording.recorder import Recorder
+
+        observers.append(Recorder(record))
+    return observers
+
+
+def _fly(
+    setup: FlightSetup,
+    observers: Sequence[FlightObserver],
+    outputs: Outputs,
+    pictures: FlightPictures,
+    quiet: bool,
+    processes: int,
+) -> int:
+    bar = [] if quiet else [ProgressBar()]
+    with _StopOnSignal() as stop:
+        summary = fly_setup(setup, [*observers, *pictures.observers, *bar, stop], processes)
+    width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
+    overview = table(summary, width)
+    if not quiet:
+        echo_lines(overview, err=outputs.use_stdout)
+    else:  # the table has the reason to end early, such as a recording on a full disk
+        for line in filter(None, (observer.stop_reason for observer in observers)):
+            echo(line, err=True)
+    outputs.write("--json", json.dumps(to_json(summary), indent=2, allow_nan=False))
+    for line in pictures.write(summary, outputs, overview if quiet else ""):
+        echo(line, err=True)
+    if summary.reason == INTERRUPTED:
+        return EXIT_INTERRUPTED
+    return outputs.exit_status(summary.exit_status)
+
+
+class _StopOnSignal(FlightObserver):
+    """Stops the flight at SIGINT (Ctrl-C) or SIGTERM; a second signal ends the process."""
+
+    def __init__(self) -> None:
+        self._received = False
+        self._handlers: Dict[int, Any] = {}
+
+    @property
+    def stop_reason(self) -> str:
+        return INTERRUPTED if self._received else ""
+
+    def __enter__(self) -> _StopOnSignal:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._handlers[number] = signal.signal(number, self._receive)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
+
+    def _receive(self, number: int, _frame: object) -> None:
+        self._received = True
+        signal.signal(number, self._handlers[number])
