@@ -23,7 +23,7 @@ test: unit unit38 lint docs rostest  ## Run every test and static check
 
 unit: venv  ## The unit tests
 	@scripts/make_venv .venv requirements-test.txt
-	$(PYTHON) -m pytest
+	$(PYTHON) -m pytest -n auto --dist loadfile
 
 unit38: packages  ## The unit tests under Python 3.8, where there is one
 	@scripts/unit_tests_38

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "ros"))
 from fake_ros import FakeRos, FakeSubscriber, deliver  # noqa: E402
 from hostile_navigators import Navigators  # noqa: E402
 
-FLY_EVERY, RECOVER_EVERY = 500, 50_000
+SETTLE_EVERY, FLY_EVERY, RECOVER_EVERY = 5, 500, 50_000
 
 
 class _Fuzzed:
@@ -46,8 +46,9 @@ def messages(data: bytes) -> None:
     except (genpy.DeserializationError, ValueError):
         return  # rospy drops the connection
     deliver(topic, message)
-    fuzzed.node.settle()
     fuzzed.count += 1
+    if fuzzed.count % SETTLE_EVERY == 0:
+        fuzzed.node.settle()
     if fuzzed.count % FLY_EVERY == 0:
         fuzzed.node.fly()
         fuzzed.ros.log.lines.clear()

@@ -24,7 +24,7 @@ from quad_nav.grid import FREE, GridSpec
 
 
 class Redraw(enum.Enum):
-    """When the master grid follows a layer that was cleared."""
+    """Time at which the master grid is redrawn where a layer was cleared."""
 
     BEFORE_MOVING = "at the next update; until then the layer is not current"
     NEXT_UPDATE = "at the next update; the layer stays current, as upstream's"
