@@ -28,6 +28,7 @@ setuptools.setup(
     package_dir={"": "src"},
     package_data={
         "quad_nav": ["py.typed"],
+        "quad_nav.config": ["*.pyi"],
         "quad_nav.report": ["*.jinja"],
         "quad_nav.tuning.report": ["*.jinja"],
     },

@@ -12,12 +12,15 @@ import rospkg
 import rostest
 
 QUAD = rospkg.RosPack().get_path("quad")
+COLLECT = {**os.environ, "QUAD_COLLECT_FAULTS": "1"}
 ARGUMENTS = ["--dump-params", "quad", "two_quads.launch", "rviz:=false"]
 
 
 def preflight(*arguments):
     """Exit status and error output for a launch with these arguments."""
-    dump = subprocess.run(["roslaunch", *ARGUMENTS, *arguments], stdout=subprocess.PIPE, check=True)
+    dump = subprocess.run(
+        ["roslaunch", *ARGUMENTS, *arguments], stdout=subprocess.PIPE, env=COLLECT, check=True
+    )
     check = subprocess.run(
         ["python3", "-m", "quad_nav.ros.common.preflight"],
         input=dump.stdout,
@@ -62,6 +65,24 @@ class Preflight(unittest.TestCase):
                 self.assertEqual(status, 2)
                 self.assertIn("quad0_goals.json: goals[0] (goal 1)", errors)
                 self.assertIn("is off the global costmap, x 0 to 12 m, y 0 to 3 m", errors)
+
+    def test_unreadable_parameters_are_listed_with_the_other_faults(self):
+        with tempfile.TemporaryDirectory() as folder:
+            status, errors = preflight(f"config:={folder}", "goals:=/nowhere")
+        self.assertEqual(status, 2)
+        self.assertIn(f"{folder}: missing local_costmap_params.yaml or ", errors)
+        self.assertIn("goals: folder /nowhere does not exist", errors)
+        self.assertNotIn("costmap, x", errors)
+
+    def test_roslaunch_ends_with_the_faults_of_the_parameters(self):
+        launch = subprocess.run(
+            ["roslaunch", *ARGUMENTS, "config:=/nowhere"], capture_output=True, check=False
+        )
+        self.assertEqual(launch.stdout, b"")  # --dump-params ends with 0
+        errors = launch.stderr.decode()
+        self.assertIn(
+            "quad0: invalid configuration:\n  config: /nowhere: expected a folder", errors
+        )
 
 
 if __name__ == "__main__":

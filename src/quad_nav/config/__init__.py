@@ -9,19 +9,29 @@
 Reading order: ``spec`` (parameters and tables), ``tables`` (the tables), ``reader`` (check of a
 namespace), ``costmaps``, ``layers``, ``planners``, ``local_planners``, ``recoveries`` and ``fixes``
 (namespaces to dataclasses), ``configuration`` (the whole), ``reconfiguration`` (changes in flight),
-``files`` and ``file_sets`` (YAML), ``check`` (the report of ``quad check``), ``plugins`` (classes
-of users), ``reference`` (generates ``docs/parameters.md``).
+``files``, ``file_sets`` and ``robot_tree`` (YAML), ``check`` (the report of ``quad check``),
+``plugins`` (classes of users), ``reference`` (generates ``docs/parameters.md``).
+
+The names above are imported when they are first used: ``load`` needs numba, reading files does not.
 """
 
 from __future__ import annotations
 
-from quad_nav.config.configuration import Configuration, load
-from quad_nav.config.files import load_files
-from quad_nav.config.notes import Remark
-from quad_nav.config.reconfiguration import reconfigurable, updated, values
-from quad_nav.config.spec import Parameter
+import importlib
+from typing import Any
 
-__all__ = [
+_MODULES = {
+    "Configuration": "configuration",
+    "Parameter": "spec",
+    "Remark": "notes",
+    "load": "configuration",
+    "load_files": "files",
+    "reconfigurable": "reconfiguration",
+    "updated": "reconfiguration",
+    "values": "reconfiguration",
+}
+
+__all__ = [  # noqa: F822
     "Configuration",
     "Parameter",
     "Remark",
@@ -31,3 +41,10 @@ __all__ = [
     "updated",
     "values",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name from its module; ``__init__.pyi`` has the types."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)

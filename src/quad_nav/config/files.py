@@ -75,7 +75,7 @@ def load_files(
     arguments = {} if substitutions is None else dict(substitutions)
     tree = ParameterTree()
     problems: List[str] = []
-    for file in _placed_files(source, arguments):
+    for file in placed_files(source, arguments):
         try:
             document = _read(file.path, arguments)
         except InputError as error:
@@ -92,13 +92,25 @@ def load_files(
     return tree
 
 
-def _placed_files(
-    source: Union[str, Path, Sequence[FileName]], arguments: Mapping[str, str]
+def placed_files(
+    source: Union[str, Path, Sequence[FileName]],
+    arguments: Mapping[str, str],
+    numbered: bool = False,
 ) -> List[PlacedFile]:
+    """List the files of a robot with their namespaces, in the order of loading.
+
+    Args:
+        source: As for ``load_files``.
+        arguments: As for ``load_files``.
+        numbered: Use only files of a folder that have the robot's number in their names.
+
+    Raises:
+        InputError: The folder or one of its four files is missing.
+    """
     if isinstance(source, (str, Path)):
         return [
             PlacedFile(path, _COSTMAPS if path.name.startswith(COMMON) else ("",))
-            for path in files_of(Path(source), arguments.get("i"))
+            for path in files_of(Path(source), arguments.get("i"), numbered)
         ]
     return [file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ()) for file in source]
 
@@ -110,8 +122,13 @@ def set_value(tree: ParameterTree, path: str, value: Any, origin: str) -> None:
     tree.origins["/".join(keys)] = origin
 
 
-def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
+def files_of(folder: Path, number: Optional[str] = None, numbered: bool = False) -> List[Path]:
     """List the files of a robot in a folder, in the order of loading.
+
+    Args:
+        folder: The folder.
+        number: Number of the robot.
+        numbered: Use only files with the robot's number in their names.
 
     Raises:
         InputError: The folder or one of the four files is missing.
@@ -121,13 +138,15 @@ def files_of(folder: Path, number: Optional[str] = None) -> List[Path]:
     paths: List[Path] = []
     problems: List[str] = []
     for stem in REQUIRED + OPTIONAL:
-        numbered, plain = folder / f"{stem}{number}.yaml", folder / f"{stem}.yaml"
-        found = [path for path in (numbered, plain) if path.is_file()]
+        plain = folder / f"{stem}.yaml"
+        names = [plain] if number is None else [folder / f"{stem}{number}.yaml", plain]
+        accepted = names[:1] if numbered else names
+        found = [path for path in accepted if path.is_file()]
         if found:
             paths.append(found[0])
         elif stem in REQUIRED:
-            names = plain.name if number is None else f"{plain.name} or {numbered.name}"
-            problems.append(f"{folder}: missing {names}")
+            expected = " or ".join(sorted(path.name for path in accepted))
+            problems.append(f"{folder}: missing {expected}")
     if problems:
         raise InputError(problems)
     own = folder / f"robot{number}.yaml"

@@ -15,8 +15,8 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.config.files import set_value
+from quad_nav.config.robot_tree import COMMAND_LINE, RobotSource, robot_tree
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import config_folder
 from quad_nav.files.values import value_faults
 from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings
 from quad_nav.mission.robot_goals import (
@@ -153,15 +153,12 @@ def read_configurations(
     Raises:
         InputError: Every fault in any robot's files; a fault in a shared file is listed once.
     """
-    path = config_folder(folder)
     configurations: List[Configuration] = []
     problems: List[str] = []
     for number in range(robots):
-        numbers = (("robot", number), ("robots", robots)) if numbered else ()
+        source = RobotSource(folder, number, robots if numbered else None, parameters=parameters)
         try:
-            configuration = _read_configuration(
-                path, number, (*numbers, *_arena_size(mission)), parameters
-            )
+            configuration = _read_configuration(source, mission)
         except InputError as error:
             problems += error.problems
             continue
@@ -172,15 +169,13 @@ def read_configurations(
     return configurations
 
 
-def _read_configuration(
-    folder: Path, number: int, scenario: Parameters, command_line: Parameters
-) -> Configuration:
+def _read_configuration(source: RobotSource, mission: Optional[RandomMission]) -> Configuration:
     """Read a robot's files and set the scenario's parameters and the command line's on top."""
-    tree = config.load_files(folder, {"i": str(number)})
-    for name, value in scenario:
+    tree = robot_tree(replace(source, parameters=()))
+    for name, value in _arena_size(mission):
         set_value(tree, name, value, "the scenario")
-    for name, value in command_line:
-        set_value(tree, name, value, "the command line")
+    for name, value in source.parameters:
+        set_value(tree, name, value, COMMAND_LINE)
     return config.load(tree)
 
 

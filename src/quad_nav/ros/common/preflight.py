@@ -24,6 +24,7 @@ from quad_nav.errors import InputError, printable
 from quad_nav.mission.summary import MissionSummary, write_json
 from quad_nav.scenario import fleet_setup, mission_setup, simulator_setup
 from quad_nav.scenario.mission_setup import MissionSetup
+from quad_nav.scenario.robot_parameters import FAULTS
 
 EXIT_BAD_INPUT = 2
 _FLEET = re.compile(r"fleet\d*")
@@ -49,7 +50,8 @@ def faults(tree: Mapping[str, Any]) -> List[str]:
         "sequencer": partial(read_mission_setup, result=result, all_parameters=tree),
     }
     fleets = sorted(name for name in tree if _FLEET.fullmatch(name))
-    found: List[str] = []
+    tree = dict(tree)
+    found = _take_faults_of_files(tree)
     for name, read in {**readers, **dict.fromkeys(fleets, fleet_setup.read_setup)}.items():
         try:
             if name in tree:
@@ -57,6 +59,21 @@ def faults(tree: Mapping[str, Any]) -> List[str]:
         except InputError as error:
             found += error.problems
     return list(dict.fromkeys(found))
+
+
+def _take_faults_of_files(tree: Dict[str, Any]) -> List[str]:
+    """Remove navigators whose files have faults, and return the faults.
+
+    The parameters of such a navigator are unknown, so that no goal is checked against them.
+    """
+    faulty = {
+        name: list(map(str, node[FAULTS]))
+        for name, node in tree.items()
+        if isinstance(node, Mapping) and FAULTS in node
+    }
+    for name in faulty:
+        del tree[name]
+    return [fault for found in faulty.values() for fault in found]
 
 
 def result_path(parameters: Mapping[str, Any]) -> Path:

@@ -1,0 +1,81 @@
+"""Print a robot's parameters as YAML, for roslaunch to load: see ``launch/quad.launch``.
+
+    python3 -m quad_nav.scenario.robot_parameters --config default --robot 0 --robots 2
+
+The faults of the files go to stderr, one a line, with exit status 2, which ends roslaunch. With
+``QUAD_COLLECT_FAULTS`` in the environment they are printed as a parameter instead, exit status 0:
+``quad_nav.ros.common.preflight`` lists them together with the faults of goals, scene and values.
+roslaunch waits for this command, so it imports neither numba nor pybullet.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import Any, Dict, List, Optional
+
+import yaml
+
+from quad_nav.config.robot_tree import RobotSource, plain_tree, robot_tree
+from quad_nav.errors import InputError, printable
+
+COLLECT = "QUAD_COLLECT_FAULTS"
+FAULTS = "files_with_faults"
+"""Parameter that has the faults while they are collected."""
+EXIT_BAD_INPUT = 2
+
+
+def main(arguments: Optional[List[str]] = None) -> int:
+    """Print the parameters of the robot that the command line names.
+
+    Returns:
+        Exit status: 0, or 2 for files that cannot be read.
+    """
+    given = _parser().parse_args(arguments)
+    try:
+        tree = robot_tree(_source(given))
+    except InputError as error:
+        if os.environ.get(COLLECT):
+            print(printable(_yaml({FAULTS: error.problems}), "\n"))
+            return 0
+        lines = "\n  ".join(error.problems)
+        print(
+            printable(f"quad{given.robot}: invalid configuration:\n  {lines}", "\n"),
+            file=sys.stderr,
+        )
+        return EXIT_BAD_INPUT
+    print(printable(_yaml(plain_tree(tree)), "\n"))
+    return 0
+
+
+def _yaml(tree: Dict[str, Any]) -> str:
+    text: str = yaml.safe_dump(tree, sort_keys=False)
+    return text
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="robot_parameters", description=__doc__.splitlines()[0])
+    parser.add_argument("--config", required=True, help="folder, or name of a shipped one")
+    parser.add_argument("--robot", type=int, required=True, help="number of the robot")
+    parser.add_argument("--robots", type=int, help="number of robots that fly together")
+    parser.add_argument(
+        "--numbered", default="false", help="true: read only files with the robot's number"
+    )
+    parser.add_argument("--override", default="", help="file that is loaded last")
+    return parser
+
+
+def _source(given: argparse.Namespace) -> RobotSource:
+    return RobotSource(
+        given.config,
+        given.robot,
+        given.robots,
+        given.numbered.lower() in ("true", "1"),
+        Path(given.override) if given.override else None,
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
