@@ -29,7 +29,7 @@ from quad_nav.recording import messages
 from quad_nav.recording.bag_file import Message
 from quad_nav.recording.bag_trace import TraceReader, _is_wanted, read_trace
 from quad_nav.report.flight_metrics import flight_metrics
-from quad_nav.report.page import flight_page
+from quad_nav.report.flight_page import flight_page
 from quad_nav.scenario.goal_checks import scene_check
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.topics.flight_info import EVENTS_TOPIC, FLIGHT_TOPIC

@@ -69,6 +69,7 @@ PLACES = {
     "mcap": "recording/",
     "matplotlib": ("report/", "tuning/report/"),
     "jinja2": "report/",
+    "plotly": "report/",
     "PIL": ("sim/map_image.py", "report/"),
 }
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")

@@ -10,7 +10,7 @@ from matplotlib.text import Text
 from optuna.distributions import CategoricalDistribution, FloatDistribution
 from optuna.trial import TrialState, create_trial
 
-from quad_nav.report.page import flight_page
+from quad_nav.report.flight_page import flight_page
 from quad_nav.report.style import label_log, png, styled
 from quad_nav.tuning.report.search_pictures import history_picture, slice_picture
 from quad_nav.tuning.space import Dimension, SearchSpace
@@ -72,7 +72,8 @@ def written(monkeypatch):
 def test_no_source_of_formulas_in_reports_of_flights(written):
     near = flight(robot(0, (1.0, 2.0), (0.5, 0.0)), robot(1, (6.0, 3.0), (-0.5, 0.0)))
     for trace in (fleet(3), near):
-        flight_page(trace, wall_time_s=2.0)
+        for picture in flight_page(trace, wall_time_s=2.0).pictures:
+            assert picture.png
     texts = [text for text in written if isinstance(text, str)]
     assert {"close encounter", "contact", "100 %"} <= set(texts)
     assert [text for text in texts if "$" in text] == []

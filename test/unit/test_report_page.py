@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import base64
 import io
+import json
 import re
+from dataclasses import replace
 from functools import lru_cache
+from hashlib import sha256
+from html import unescape
 from html.parser import HTMLParser
 
 import numpy as np
+import plotly.graph_objects
 import pytest
 from hand_made_traces import TIMES_S, fleet, flight, goal, robot
 from PIL import Image
 
 from quad_nav.report.animation import animate_flight, animation_faults
+from quad_nav.report.comparison import comparison_page, write_comparison
 from quad_nav.report.flight_metrics import flight_metrics
-from quad_nav.report.page import (
-    MAX_STRIPS,
-    Page,
-    comparison_page,
-    flight_page,
-    write_comparison,
-    write_report,
-)
+from quad_nav.report.flight_page import flight_page, write_report
+from quad_nav.report.page import MAX_STRIPS, Page
+from quad_nav.report.plot import plot_scripts
 
 SECTIONS = [
     "paths",
@@ -34,6 +36,7 @@ SECTIONS = [
     "parameters",
 ]
 PICTURES = ["paths", "distances", "timeline", "motion", "cycles"]
+PLOTS = ["paths", "distances", "timeline"]
 NOBODY = np.empty(0)
 
 
@@ -60,8 +63,28 @@ class Parsed(HTMLParser):
 
 
 def assert_loads_nothing(html: str) -> None:
+    """Nothing but our scripts runs, and plotly.js loads nothing that the policy forbids."""
+    texts = plot_scripts().texts if 'class="plot"' in html else ()
+    for text in texts:
+        assert html.count(f"<script>{text}</script>") == 1
+        html = html.replace(text, "")
+    assert html.count("<script") == len(texts) + html.count('<script type="application/json" id=')
     assert all(value.startswith("data:image/png;base64,") for value in Parsed(html).loads)
-    assert not re.search(r"url\(|@import|<script|<link|<iframe", html)
+    assert not re.search(r"url\(|@import|<link|<iframe", html)
+    policy = re.search('Content-Security-Policy" content="([^"]*)"', html).group(1)
+    hashes = [base64.b64encode(sha256(text.encode()).digest()).decode() for text in texts]
+    assert unescape(policy).split("; ") == [
+        "default-src 'none'",
+        " ".join(
+            ["script-src", *(f"'sha256-{one}'" for one in hashes)]
+            if texts
+            else ["script-src 'none'"]
+        ),
+        "style-src 'unsafe-inline'",
+        "img-src data: blob:",
+        "base-uri 'none'",
+        "form-action 'none'",
+    ]
 
 
 @lru_cache(maxsize=None)
@@ -79,7 +102,7 @@ def test_page_of_so_many(count):
     assert [name for name in names if not name.startswith("encounter")] == PICTURES
     strips = [name for name in names if name.startswith("encounter")]
     assert len(strips) == min(count, MAX_STRIPS)  # a contact, and neighbours 0.4 m apart
-    for picture in page.pictures:
+    for picture in page.pictures if count == 2 else ():
         image = Image.open(io.BytesIO(picture.png))
         image.load()
         assert image.width == 1120
@@ -165,14 +188,70 @@ def test_files_of_one_and_of_several(tmp_path):
     write_report(fleet(2), tmp_path / "new" / "one.html", tmp_path / "pictures")
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["one.html"]
     assert sorted(path.name for path in (tmp_path / "pictures").iterdir()) == sorted(
-        f"{name}.png" for name in [*PICTURES, "encounter_A", "encounter_B"]
+        f"{name}.{kind}"
+        for name in [*PICTURES, "encounter_A", "encounter_B"]
+        for kind in ("png", "svg")
     )
     write_comparison([flight_metrics(fleet(2))] * 2, tmp_path / "two.html", tmp_path / "compared")
-    assert [path.name for path in (tmp_path / "compared").iterdir()] == ["comparison.png"]
+    names = sorted(path.name for path in (tmp_path / "compared").iterdir())
+    assert names == ["comparison.png", "comparison.svg"]
 
 
 def test_size_of_the_page():
-    assert len(page_of(2).html) < 1e6
+    """Most of it is plotly.js, 4.8 MB."""
+    assert len(page_of(2).html) - sum(map(len, plot_scripts().texts)) < 5e5
+
+
+def figures_of(html: str):
+    """The plots of a page by their names."""
+    pattern = r'<script type="application/json" id="figure-plot-(\w+)">(.*?)</script>'
+    return {name: json.loads(text) for name, text in re.findall(pattern, html)}
+
+
+@pytest.mark.parametrize("count", [1, 2, 20])
+def test_plots_are_figures_of_plotly(count):
+    figures = figures_of(page_of(count).html)
+    assert list(figures) == PLOTS
+    for figure in figures.values():
+        assert plotly.graph_objects.Figure(figure).data
+
+
+def test_plot_of_the_paths():
+    """Robot 0 flies from (1, 1) with 0.5 m/s to goal 0.1 at (1, 3.5) and 0.2 at (1, 6)."""
+    figure = figures_of(page_of(2).html)["paths"]
+    path, start, goals = [one for one in figure["data"] if one.get("legendgroup") == "robot0"][:3]
+    assert path["name"] == "quad0"
+    assert (path["x"][0], path["y"][0], path["y"][-1]) == (1.0, 1.0, 6.0)
+    assert path["customdata"][-1] == [10.0, 0.5]  # seconds and m/s
+    assert start["text"] == ["0"]
+    assert (goals["text"], goals["y"]) == (["0.1", "0.2"], [3.5, 6.0])
+    second = next(one for one in figure["data"] if one.get("legendgroup") == "robot1")
+    assert path["line"]["dash"] != second["line"]["dash"]
+    assert path["line"]["color"] != second["line"]["color"]
+
+
+def test_animation_in_the_page():
+    """The flight of ten seconds has a frame each 0.1 s; all robots move in each."""
+    figure = figures_of(page_of(2).html)["paths"]
+    assert [frame["name"] for frame in figure["frames"]] == [f"{k / 10:.1f}" for k in range(101)]
+    middle = figure["frames"][50]
+    assert middle["data"] == [{"x": [1.0], "y": [3.5]}, {"x": [2.0], "y": [3.5]}]
+    assert [figure["data"][k]["legendgroup"] for k in middle["traces"]] == ["robot0", "robot1"]
+    steps = figure["layout"]["sliders"][0]["steps"]
+    assert [step["args"][0] for step in steps] == [[frame["name"]] for frame in figure["frames"]]
+
+
+def test_names_of_others_stay_text():
+    """A name cannot end the script, add tags to a plot, or use plotly's own templates."""
+    odd = "</script><b>%{x}<!--"
+    trace = fleet(2)
+    trace = replace(trace, robots=(replace(trace.robots[0], name=odd), trace.robots[1]))
+    html = flight_page(trace).html
+    assert_loads_nothing(html)
+    texts = [figure for figure in figures_of(html).values()]
+    assert "<" not in "".join(re.findall(r'id="figure-[^>]*>(.*?)</script>', html))
+    assert "&#60;/script&#62;&#60;b&#62;&#37;{x}&#60;!--" in json.dumps(texts)
+    assert odd not in json.dumps(texts)
 
 
 def test_animation(tmp_path):

@@ -59,7 +59,7 @@ class FlightPictures:
             return
         trace = self._observer.trace(summary.contacts, summary.reason)
         if self._report is not None:
-            from quad_nav.report.page import write_report
+            from quad_nav.report.flight_page import write_report
 
             with outputs.attempt("--report", self._report, instead):
                 write_report(trace, self._report, wall_time_s=summary.wall_time_s)

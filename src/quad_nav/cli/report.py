@@ -57,16 +57,18 @@ def report(
     """
     # Imported here, because matplotlib loads slowly.
     from quad_nav.report import animation, page
+    from quad_nav.report.comparison import comparison_page
     from quad_nav.report.flight_metrics import flight_metrics
+    from quad_nav.report.flight_page import flight_page
 
     try:
         outputs = Outputs({"--output": output}, {"--animate": animate}, {"--png": png})
         faults = animation.animation_faults(animate, len(flights)) if animate is not None else []
         if len(flights) == 1:
             (trace,) = _read(flights, lambda trace: trace, faults)
-            content = page.flight_page(trace)
+            content = flight_page(trace)
         else:
-            content = page.comparison_page(_read(flights, flight_metrics, faults))
+            content = comparison_page(_read(flights, flight_metrics, faults))
     except InputError as error:
         echo_lines("no report written:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from typing import Sequence
+from typing import List, Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +15,8 @@ from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter
 from quad_nav.report.measures import Tracks, clearances_m, separations_m
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure, robot_legend, time_axis
 
-_SHOWN_M = 3.0  # larger distances are cut off
+SHOWN_M = 3.0
+"""Larger distances are cut off."""
 _FEW = 4  # more lines cannot be followed one by one
 
 
@@ -23,18 +24,7 @@ def distance_picture(
     trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter] = ()
 ) -> Figure:
     """Draw a panel for each measured distance; ``marked`` encounters keep their letters."""
-    panels = []
-    if len(trace.robots) > 1:
-        panels.append(
-            ("Separation from the nearest robot", separations_m(tracks, trace.robot_radius_m))
-        )
-    if trace.scene is not None:
-        panels.append(
-            (
-                "Clearance to the nearest obstacle or wall",
-                clearances_m(tracks, trace.scene, trace.robot_radius_m),
-            )
-        )
+    panels = shown_gaps(trace, tracks)
     figure = new_figure(0.6 + 2.1 * max(len(panels), 1))
     column = figure.subplots(max(len(panels), 1), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (title, gaps_m) in zip(column, panels):
@@ -46,6 +36,30 @@ def distance_picture(
     time_axis(column[-1])
     robot_legend(figure, [robot.name for robot in trace.robots])
     return figure
+
+
+def shown_gaps(trace: FlightTrace, tracks: Tracks) -> List[Tuple[str, NDArray[np.float64]]]:
+    """Return title and distances, shape (n, t), of each panel of distances.
+
+    The distance of a robot that touches something is 0 then.
+    """
+    panels = []
+    if len(trace.robots) > 1:
+        separations = separations_m(tracks, trace.robot_radius_m)
+        panels.append(("Separation from the nearest robot", separations))
+    if trace.scene is not None:
+        clearances = clearances_m(tracks, trace.scene, trace.robot_radius_m)
+        panels.append(("Clearance to the nearest obstacle or wall", clearances))
+    return panels
+
+
+def smallest_of_all(gaps_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the smallest of the robots' distances, shape (n, t), at each time, shape (t,)."""
+    if not gaps_m.size:
+        return np.empty(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # times without any sample
+        return np.asarray(np.nanmin(gaps_m, axis=0))
 
 
 def _draw_gaps(
@@ -61,9 +75,7 @@ def _draw_gaps(
             lw=0.8 if many else 1.4,
             alpha=0.55 if many else 1.0,
         )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # times without any sample
-        least_m = np.nanmin(gaps_m, axis=0) if gaps_m.size else np.empty(0)
+    least_m = smallest_of_all(gaps_m)
     if many:
         axes.plot(times_s, least_m, color="black", lw=1.3)
     touching = np.where(least_m <= 0.0, 0.0, np.nan)
@@ -73,7 +85,7 @@ def _draw_gaps(
     axes.set(
         title=title + (", smallest of all in black" if many else ""),
         ylabel="distance (m)",
-        ylim=(bottom, _SHOWN_M),
+        ylim=(bottom, SHOWN_M),
     )
 
 

@@ -1,28 +1,19 @@
-"""Reports as single HTML files with embedded pictures that load nothing."""
+"""Pages: single HTML files with their plots and pictures inside, which load nothing."""
 
 from __future__ import annotations
 
 import base64
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Callable, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Optional, Sequence, Tuple, Union
 
 import jinja2
 from matplotlib.figure import Figure
 
 from quad_nav.files.output import write_bytes, write_text
-from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
-from quad_nav.report.comparison_picture import comparison_picture, grouped
-from quad_nav.report.distance_picture import distance_picture
-from quad_nav.report.encounter_picture import encounter_picture
-from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, separation_text
-from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
-from quad_nav.report.measures import Tracks, resampled_tracks
-from quad_nav.report.parameter_table import parameter_rows
-from quad_nav.report.paths_picture import paths_picture
-from quad_nav.report.robot_picture import cycle_picture, has_wall_times, motion_picture
-from quad_nav.report.timeline_picture import timeline_picture
+from quad_nav.report.plot import Plot, Scripts, plot_scripts
 
 MAX_STRIPS = 6
 """Number of close encounters that a report shows."""
@@ -30,11 +21,26 @@ MAX_STRIPS = 6
 
 @dataclass(frozen=True)
 class Picture:
-    """PNG picture with its file name; ``alt`` describes its content."""
+    """Picture for paper, with its file name; ``alt`` describes its content.
+
+    It is drawn when it is needed. ``draw`` returns a new figure each time.
+    """
 
     name: str
     alt: str
-    png: bytes
+    draw: Callable[[], Figure]
+
+    @cached_property
+    def png(self) -> bytes:
+        """The picture as a PNG file."""
+        with style.styled():
+            return style.png(self.draw())
+
+    @property
+    def svg(self) -> bytes:
+        """The picture as an SVG file."""
+        with style.styled():
+            return style.svg(self.draw())
 
     @property
     def source(self) -> str:
@@ -44,190 +50,38 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """Section of a page: heading, caption and pictures; ``notes`` are the pictures' headings."""
+    """Section of a page.
+
+    Attributes:
+        anchor: Name for links.
+        heading: Heading.
+        caption: Text below the heading.
+        pictures: Pictures that the page shows.
+        notes: Headings of the pictures.
+        plots: Plots that the page shows, above the pictures.
+        paper: Pictures that the page does not show, as it has a plot of the same.
+    """
 
     anchor: str
     heading: str
     caption: str
     pictures: Tuple[Picture, ...] = ()
     notes: Tuple[str, ...] = ()
+    plots: Tuple[Plot, ...] = ()
+    paper: Tuple[Picture, ...] = ()
 
 
 @dataclass(frozen=True)
 class Page:
-    """HTML and the pictures in it."""
+    """HTML of a page, and its pictures for paper."""
 
     html: str
     pictures: Tuple[Picture, ...]
 
 
-def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page:
-    """Build the report of one flight; ``wall_time_s`` is how long it took, if known."""
-    with style.styled():
-        tracks = resampled_tracks(trace)
-        flight = flight_metrics(trace, tracks)
-        found = encounters(trace, tracks)
-        shown = found[:MAX_STRIPS]
-        sections = [
-            _paths(trace, tracks, shown),
-            _encounters(trace, tracks, found, shown),
-            *_curves(trace, tracks, flight, shown),
-        ]
-    sim_s = float(tracks.times_s[-1]) if len(tracks.times_s) else 0.0
-    factor = sim_s / wall_time_s if wall_time_s else None
-    return render(
-        "flight.html.jinja",
-        sections,
-        trace=trace,
-        flight=flight,
-        factor=factor,
-        parameters=parameter_rows(trace),
-        parameters_known=any(robot.parameters for robot in trace.robots),
-    )
-
-
-def comparison_page(flights: Sequence[FlightMetrics]) -> Page:
-    """Build the report that compares several flights."""
-    with style.styled():
-        compared = picture("comparison", "Metrics of each flight", comparison_picture(flights))
-    section = Section(
-        "comparison",
-        "Side by side",
-        "A dot is a flight. Boxes span the middle half of five or more flights, with the median.",
-        (compared,),
-    )
-    return render("comparison.html.jinja", [section], flights=flights, groups=grouped(flights))
-
-
-def _paths(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
-    return Section(
-        "paths",
-        "Paths",
-        "Goals have their numbers in the order of flight, start positions the robot's number. "
-        "Discs show the final positions. Check whether paths keep to the middle of gaps, and "
-        "whether they circle.",
-        (picture("paths", "Paths over the scene", paths_picture(trace, tracks, shown)),),
-    )
-
-
-def _encounters(
-    trace: FlightTrace, tracks: Tracks, found: Sequence[Encounter], shown: Sequence[Encounter]
-) -> Section:
-    if not found:
-        text = (
-            f"No separation below {CLOSE_M:g} m and no contact with an obstacle."
-            if len(trace.robots) > 1
-            else "No contact with an obstacle."
-        )
-        return Section("encounters", "Close encounters", text)
-    caption = (
-        f"Contacts with obstacles, and separations below {CLOSE_M:g} m. The closest moment is "
-        "framed in red. Discs are to scale, the line in a disc points to the nose, arrows show "
-        "the displacement in 1.5 s. Each frame is 3.2 m wide."
-    )
-    if len(found) > len(shown):
-        caption += f" The {len(shown)} closest encounters of {len(found)} are shown."
-    pictures = tuple(
-        picture(f"encounter_{letter}", note, encounter_picture(trace, tracks, encounter))
-        for letter, note, encounter in zip(LETTERS, map(_note, shown), shown)
-    )
-    return Section(
-        "encounters",
-        "Close encounters",
-        caption,
-        pictures,
-        tuple(f"{letter}: {_note(encounter)}" for letter, encounter in zip(LETTERS, shown)),
-    )
-
-
-def _note(encounter: Encounter) -> str:
-    name, other = encounter.names
-    if encounter.other is None:
-        return f"{name} touches {other} at {encounter.time_s:.1f} s"
-    text = separation_text(encounter.separation_m)
-    return f"{name} and {other}: {text} at {encounter.time_s:.1f} s"
-
-
-def _curves(
-    trace: FlightTrace, tracks: Tracks, flight: FlightMetrics, shown: Sequence[Encounter]
-) -> List[Section]:
-    return [
-        _distances(trace, tracks, shown),
-        Section(
-            "timeline",
-            "Timeline",
-            "A bar is a goal with its number, from sending it to its end.",
-            (picture("timeline", "Goals over time", timeline_picture(trace)),),
-        ),
-        _motion(trace, flight),
-        _cycles(trace),
-    ]
-
-
-def _distances(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
-    return Section(
-        "gaps",
-        "Distances",
-        "Separation is the distance between the hulls of two robots, clearance the distance from "
-        f"a hull to the nearest obstacle or wall. Hulls are discs of {trace.robot_radius_m:.2f} m "
-        "radius; below zero they overlap. Letters are close encounters, dashed lines contacts.",
-        (
-            picture(
-                "distances",
-                "Separation and clearance over time",
-                distance_picture(trace, tracks, shown),
-            ),
-        ),
-    )
-
-
-def _motion(trace: FlightTrace, flight: FlightMetrics) -> Section:
-    rows = _rows_to_show(flight)
-    caption = (
-        "The flown motion in the robot's colour, the navigator's commands in black. Commands that "
-        "oscillate, or that the body does not follow, cost time. A tilted LIDAR sees the floor."
-    )
-    if len(rows) < len(trace.robots):
-        caption += (
-            f" The {len(rows)} quadcopters of {len(trace.robots)} that came closest to an "
-            "obstacle or to each other are shown."
-        )
-    alt = "Speed, turn rate and tilt over time"
-    return Section(
-        "motion", "Motion", caption, (picture("motion", alt, motion_picture(trace, rows)),)
-    )
-
-
-def _cycles(trace: FlightTrace) -> Section:
-    caption = (
-        "A cycle that takes longer than the control period delays all navigators of its process."
-        if has_wall_times(trace)
-        else "The recording has no wall times. The plot shows the time between control cycles."
-    )
-    return Section(
-        "cycles",
-        "Control cycles",
-        caption,
-        (picture("cycles", "Times of control cycles", cycle_picture(trace)),),
-    )
-
-
-def _rows_to_show(flight: FlightMetrics) -> List[int]:
-    """Return the numbers of the robots with the smallest distances, in order."""
-
-    def min_distance_m(number: int) -> float:
-        robot = flight.robots[number]
-        distances = (robot.min_clearance_m, robot.min_separation_m)
-        return min(
-            (distance for distance in distances if distance is not None), default=float("inf")
-        )
-
-    return sorted(sorted(range(len(flight.robots)), key=min_distance_m)[: style.MAX_ROWS])
-
-
-def picture(name: str, alt: str, figure: Figure) -> Picture:
-    """Render a figure as a picture."""
-    return Picture(name, alt, style.png(figure))
+def picture(name: str, alt: str, figure: Union[Figure, Callable[[], Figure]]) -> Picture:
+    """Make a picture from a figure, or from a function that draws it."""
+    return Picture(name, alt, figure if callable(figure) else lambda: figure)
 
 
 def render(
@@ -249,44 +103,20 @@ def render(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["figure"] = _figure_filter()
-    html = environment.get_template(template).render(sections=sections, **context)
-    return Page(html, tuple(picture for section in sections for picture in section.pictures))
+    environment.filters["figure"] = _number
+    has_plots = any(section.plots for section in sections)
+    scripts = plot_scripts() if has_plots else Scripts()
+    html = environment.get_template(template).render(sections=sections, scripts=scripts, **context)
+    pictures = (one for section in sections for one in (*section.paper, *section.pictures))
+    return Page(html, tuple(pictures))
 
 
-def _figure_filter() -> Callable[[Optional[float], int], str]:
-    def figure(value: Optional[float], decimals: int = 2) -> str:
-        return "–" if value is None else f"{round(value, decimals) + 0.0:.{decimals}f}"
-
-    return figure
-
-
-def write_report(
-    trace: FlightTrace,
-    path: Path,
-    pictures: Optional[Path] = None,
-    wall_time_s: Optional[float] = None,
-) -> None:
-    """Write the report of one flight; folders are created.
-
-    Args:
-        trace: Trace of the flight.
-        path: HTML file.
-        pictures: Folder that gets every picture as a PNG file, or None.
-        wall_time_s: How long the flight took, if known.
-    """
-    write_page(flight_page(trace, wall_time_s), path, pictures)
-
-
-def write_comparison(
-    flights: Sequence[FlightMetrics], path: Path, pictures: Optional[Path] = None
-) -> None:
-    """Write the report that compares several flights, as ``write_report`` does."""
-    write_page(comparison_page(flights), path, pictures)
+def _number(value: Optional[float], decimals: int = 2) -> str:
+    return "–" if value is None else f"{round(value, decimals) + 0.0:.{decimals}f}"
 
 
 def write_page(page: Page, path: Path, pictures: Optional[Path] = None) -> None:
-    """Write the HTML atomically, and its pictures as PNG files to a folder, if given.
+    """Write the HTML atomically, and its pictures to a folder, if given.
 
     Raises:
         OSError: A file cannot be written.
@@ -297,10 +127,11 @@ def write_page(page: Page, path: Path, pictures: Optional[Path] = None) -> None:
 
 
 def write_pictures(page: Page, folder: Path) -> None:
-    """Write the pictures of a page as PNG files.
+    """Write the pictures of a page as PNG and SVG files; folders are created.
 
     Raises:
         OSError: A file cannot be written.
     """
-    for picture in page.pictures:
-        write_bytes(folder / f"{picture.name}.png", picture.png)
+    for one in page.pictures:
+        write_bytes(folder / f"{one.name}.png", one.png)
+        write_bytes(folder / f"{one.name}.svg", one.svg)

@@ -37,13 +37,43 @@ def draw_scene(axes: Axes, scene: Optional[Scene], near: Optional[Extent] = None
     for solid in (*scene.wall_boxes(), *scene.obstacles):
         if near is not None and not _reaches(solid, near):
             continue
-        meets = solid.bottom_m <= z_m <= solid.bottom_m + solid.height_m
-        (solids if meets else passed).append(_outline(solid))
+        (solids if _meets(solid, z_m) else passed).append(_outline(solid))
     axes.add_collection(
         PatchCollection(solids, facecolor=_SOLID, edgecolor=_EDGE, lw=0.8, zorder=1)
     )
     axes.add_collection(
         PatchCollection(passed, facecolor="none", edgecolor=_EDGE, lw=0.8, linestyle=":", zorder=1)
+    )
+
+
+def outlines(
+    scene: Scene,
+) -> Tuple[List[NDArray[np.float64]], List[NDArray[np.float64]]]:
+    """Return closed outlines, shape (k, 2) in ``map``, of all obstacles and walls.
+
+    Returns:
+        Those at the flight altitude, and those above or below it.
+    """
+    solids: List[NDArray[np.float64]] = []
+    passed: List[NDArray[np.float64]] = []
+    for solid in (*scene.wall_boxes(), *scene.obstacles):
+        (solids if _meets(solid, scene.altitude_m) else passed).append(_corners(solid))
+    return solids, passed
+
+
+def _meets(solid: Obstacle, altitude_m: float) -> bool:
+    return solid.bottom_m <= altitude_m <= solid.bottom_m + solid.height_m
+
+
+def _corners(solid: Obstacle) -> NDArray[np.float64]:
+    if isinstance(solid, Box):
+        x_m, y_m = solid.size_x_m / 2, solid.size_y_m / 2
+        corners = [(x_m, y_m), (-x_m, y_m), (-x_m, -y_m), (x_m, -y_m), (x_m, y_m)]
+        pose = Pose2D(solid.x_m, solid.y_m, solid.yaw_rad)
+        return np.array([pose.transform(*corner) for corner in corners])
+    turns = np.linspace(0.0, 2 * np.pi, 33)
+    return np.column_stack(
+        [solid.x_m + solid.radius_m * np.cos(turns), solid.y_m + solid.radius_m * np.sin(turns)]
     )
 
 

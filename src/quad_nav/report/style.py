@@ -1,4 +1,4 @@
-"""Common sizes, fonts and colours of all pictures, and PNG output."""
+"""Common sizes, fonts and colours of all pictures, and their files."""
 
 from __future__ import annotations
 
@@ -43,6 +43,7 @@ RC: Dict[Any, Any] = {
     "lines.linewidth": 1.4,
     "hatch.linewidth": 0.6,
     "figure.facecolor": "white",
+    "svg.hashsalt": "quad",  # the names of elements, which are random without
     "text.parse_math": False,  # names of quadcopters may hold any character
 }
 
@@ -58,6 +59,13 @@ def png(figure: Figure) -> bytes:
     """Encode a figure as PNG."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def svg(figure: Figure) -> bytes:
+    """Encode a figure as SVG; the same figure gives the same bytes."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
 

@@ -15,9 +15,12 @@ from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.measures import goal_end_s, spins, trace_span_s
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure, robot_legend, time_axis
 
-_BAR = 0.52  # height of a goal's bar in a row of height 1
-_STRIP = 0.14
-_SPIN, _STATE = "#202428", {State.PLANNING: "#9ec4ee", State.CLEARING: "#e8a33d"}
+BAR = 0.52
+"""Height of a goal's bar in a row of height 1."""
+STRIP = 0.14
+"""Height of a strip beside a bar."""
+STATE_COLOURS = {State.PLANNING: "#9ec4ee", State.CLEARING: "#e8a33d"}
+_SPIN = "#202428"
 _RECOVERY: Any = {"marker": "v", "color": "#e8a33d", "mec": "black", "mew": 0.6, "ms": 8}
 _CONTACT: Any = {"marker": "X", "color": ALARM, "mec": "white", "mew": 0.7, "ms": 10}
 _NARROW = 0.02  # shorter bars, in parts of the whole time, have no room for a number
@@ -34,9 +37,9 @@ def timeline_picture(trace: FlightTrace) -> Figure:
         _draw_goals(axes, k, robot, last_s - first_s)
         _draw_states(axes, k, robot, last_s)
         for begin_s, end in spins(robot):
-            axes.barh(k + _BAR / 2 + _STRIP / 2, end - begin_s, _STRIP, begin_s, color=_SPIN)
+            axes.barh(k + BAR / 2 + STRIP / 2, end - begin_s, STRIP, begin_s, color=_SPIN)
         for time_s, _ in robot.recoveries:
-            axes.plot(time_s, k - _BAR / 2 - _STRIP, clip_on=False, zorder=6, **_RECOVERY)
+            axes.plot(time_s, k - BAR / 2 - STRIP, clip_on=False, zorder=6, **_RECOVERY)
         for contact in trace.contacts:
             if robot.name in (contact.robot, contact.other):
                 axes.plot(contact.time_s, k, zorder=7, **_CONTACT)
@@ -59,7 +62,7 @@ def _draw_goals(axes: Axes, row: int, robot: RobotTrace, duration_s: float) -> N
         axes.barh(
             row,
             length_s,
-            _BAR,
+            BAR,
             goal.sent_s,
             facecolor=(*colour(row), 0.85 - 0.35 * (k % 2)),
             edgecolor=ALARM if failed else "white",
@@ -88,14 +91,19 @@ def _halo(row: int, k: int) -> List[Any]:
 
 def _draw_states(axes: Axes, row: int, robot: RobotTrace, last_s: float) -> None:
     """Draw a strip above the bar while the navigator plans without moving or recovers."""
-    for time_s, state, until_s in _periods(robot, last_s):
-        if state in _STATE:
+    for time_s, state, until_s in periods(robot, last_s):
+        if state in STATE_COLOURS:
             axes.barh(
-                row - _BAR / 2 - _STRIP / 2, until_s - time_s, _STRIP, time_s, color=_STATE[state]
+                row - BAR / 2 - STRIP / 2,
+                until_s - time_s,
+                STRIP,
+                time_s,
+                color=STATE_COLOURS[state],
             )
 
 
-def _periods(robot: RobotTrace, last_s: float) -> List[Tuple[float, State, float]]:
+def periods(robot: RobotTrace, last_s: float) -> List[Tuple[float, State, float]]:
+    """Return (begin, state, end) of each period between two changes of state."""
     ends = [*(time_s for time_s, _ in robot.states[1:]), last_s]
     return [(time_s, state, end) for (time_s, state), end in zip(robot.states, ends)]
 
@@ -112,9 +120,9 @@ def _symbols(trace: FlightTrace) -> List[Any]:
     if any(spins(robot) for robot in robots):
         found.append(Patch(color=_SPIN, label="turns in place"))
     if any(state is State.PLANNING for robot in robots for _, state in robot.states):
-        found.append(Patch(color=_STATE[State.PLANNING], label="planning"))
+        found.append(Patch(color=STATE_COLOURS[State.PLANNING], label="planning"))
     if any(state is State.CLEARING for robot in robots for _, state in robot.states):
-        found.append(Patch(color=_STATE[State.CLEARING], label="recovering"))
+        found.append(Patch(color=STATE_COLOURS[State.CLEARING], label="recovering"))
     if any(robot.recoveries for robot in robots):
         found.append(Line2D([], [], ls="", label="recovery starts", **_RECOVERY))
     if trace.contacts:

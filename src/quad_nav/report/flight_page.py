@@ -1,0 +1,196 @@
+"""Report of one flight: its sections, plots and pictures."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import List, Optional, Sequence
+
+from quad_nav.recording.trace import FlightTrace
+from quad_nav.report import style
+from quad_nav.report.distance_picture import distance_picture
+from quad_nav.report.distance_plot import distance_plot
+from quad_nav.report.encounter_picture import encounter_picture
+from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, separation_text
+from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
+from quad_nav.report.measures import Tracks, resampled_tracks
+from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render, write_page
+from quad_nav.report.parameter_table import parameter_rows
+from quad_nav.report.paths_picture import paths_picture
+from quad_nav.report.paths_plot import paths_plot
+from quad_nav.report.robot_picture import cycle_picture, has_wall_times, motion_picture
+from quad_nav.report.timeline_picture import timeline_picture
+from quad_nav.report.timeline_plot import timeline_plot
+
+
+def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page:
+    """Build the report of one flight; ``wall_time_s`` is how long it took, if known."""
+    tracks = resampled_tracks(trace)
+    flight = flight_metrics(trace, tracks)
+    found = encounters(trace, tracks)
+    shown = found[:MAX_STRIPS]
+    sections = [
+        _paths(trace, tracks, shown),
+        _encounters(trace, tracks, found, shown),
+        *_curves(trace, tracks, flight, shown),
+    ]
+    sim_s = float(tracks.times_s[-1]) if len(tracks.times_s) else 0.0
+    factor = sim_s / wall_time_s if wall_time_s else None
+    return render(
+        "flight.html.jinja",
+        sections,
+        trace=trace,
+        flight=flight,
+        factor=factor,
+        parameters=parameter_rows(trace),
+        parameters_known=any(robot.parameters for robot in trace.robots),
+    )
+
+
+def _paths(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
+    return Section(
+        "paths",
+        "Paths",
+        "Goal 0.2 is the second goal of quadcopter 0. Squares are start positions, discs the "
+        "quadcopters, at the end or at the time of the slider. Drag to zoom, double-click to zoom "
+        "out. A click in the legend hides a quadcopter, a double click all others. Check whether "
+        "paths keep to the middle of gaps, and whether they circle.",
+        plots=(paths_plot(trace, tracks, shown),),
+        paper=(
+            picture("paths", "Paths over the scene", lambda: paths_picture(trace, tracks, shown)),
+        ),
+    )
+
+
+def _encounters(
+    trace: FlightTrace, tracks: Tracks, found: Sequence[Encounter], shown: Sequence[Encounter]
+) -> Section:
+    if not found:
+        text = (
+            f"No separation below {CLOSE_M:g} m and no contact with an obstacle."
+            if len(trace.robots) > 1
+            else "No contact with an obstacle."
+        )
+        return Section("encounters", "Close encounters", text)
+    caption = (
+        f"Contacts with obstacles, and separations below {CLOSE_M:g} m. The closest moment is "
+        "framed in red. Discs are to scale, the line in a disc points to the nose, arrows show "
+        "the displacement in 1.5 s. Each frame is 3.2 m wide."
+    )
+    if len(found) > len(shown):
+        caption += f" The {len(shown)} closest encounters of {len(found)} are shown."
+    pictures = tuple(
+        picture(f"encounter_{letter}", note, partial(encounter_picture, trace, tracks, encounter))
+        for letter, note, encounter in zip(LETTERS, map(_note, shown), shown)
+    )
+    return Section(
+        "encounters",
+        "Close encounters",
+        caption,
+        pictures,
+        tuple(f"{letter}: {_note(encounter)}" for letter, encounter in zip(LETTERS, shown)),
+    )
+
+
+def _note(encounter: Encounter) -> str:
+    name, other = encounter.names
+    if encounter.other is None:
+        return f"{name} touches {other} at {encounter.time_s:.1f} s"
+    text = separation_text(encounter.separation_m)
+    return f"{name} and {other}: {text} at {encounter.time_s:.1f} s"
+
+
+def _curves(
+    trace: FlightTrace, tracks: Tracks, flight: FlightMetrics, shown: Sequence[Encounter]
+) -> List[Section]:
+    return [
+        _distances(trace, tracks, shown),
+        Section(
+            "timeline",
+            "Timeline",
+            "A bar is a goal with its number, from sending it to its end.",
+            plots=(timeline_plot(trace),),
+            paper=(picture("timeline", "Goals over time", lambda: timeline_picture(trace)),),
+        ),
+        _motion(trace, flight),
+        _cycles(trace),
+    ]
+
+
+def _distances(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
+    return Section(
+        "gaps",
+        "Distances and speeds",
+        "Separation is the distance between the hulls of two robots, clearance the distance from "
+        f"a hull to the nearest obstacle or wall. Hulls are discs of {trace.robot_radius_m:.2f} m "
+        "radius; below zero they overlap. Letters are close encounters, dashed lines contacts.",
+        plots=(distance_plot(trace, tracks, shown),),
+        paper=(
+            picture(
+                "distances",
+                "Separation and clearance over time",
+                lambda: distance_picture(trace, tracks, shown),
+            ),
+        ),
+    )
+
+
+def _motion(trace: FlightTrace, flight: FlightMetrics) -> Section:
+    rows = _rows_to_show(flight)
+    caption = (
+        "The flown motion in the robot's colour, the navigator's commands in black. Commands that "
+        "oscillate, or that the body does not follow, cost time. A tilted LIDAR sees the floor."
+    )
+    if len(rows) < len(trace.robots):
+        caption += (
+            f" The {len(rows)} quadcopters of {len(trace.robots)} that came closest to an "
+            "obstacle or to each other are shown."
+        )
+    alt = "Speed, turn rate and tilt over time"
+    return Section(
+        "motion", "Motion", caption, (picture("motion", alt, lambda: motion_picture(trace, rows)),)
+    )
+
+
+def _cycles(trace: FlightTrace) -> Section:
+    caption = (
+        "A cycle that takes longer than the control period delays all navigators of its process."
+        if has_wall_times(trace)
+        else "The recording has no wall times. The plot shows the time between control cycles."
+    )
+    return Section(
+        "cycles",
+        "Control cycles",
+        caption,
+        (picture("cycles", "Times of control cycles", lambda: cycle_picture(trace)),),
+    )
+
+
+def _rows_to_show(flight: FlightMetrics) -> List[int]:
+    """Return the numbers of the robots with the smallest distances, in order."""
+
+    def min_distance_m(number: int) -> float:
+        robot = flight.robots[number]
+        distances = (robot.min_clearance_m, robot.min_separation_m)
+        return min(
+            (distance for distance in distances if distance is not None), default=float("inf")
+        )
+
+    return sorted(sorted(range(len(flight.robots)), key=min_distance_m)[: style.MAX_ROWS])
+
+
+def write_report(
+    trace: FlightTrace,
+    path: Path,
+    pictures: Optional[Path] = None,
+    wall_time_s: Optional[float] = None,
+) -> None:
+    """Write the report of one flight; folders are created.
+
+    Args:
+        trace: Trace of the flight.
+        path: HTML file.
+        pictures: Folder that gets every picture as a PNG and an SVG file, or None.
+        wall_time_s: How long the flight took, if known.
+    """
+    write_page(flight_page(trace, wall_time_s), path, pictures)

@@ -1,0 +1,219 @@
+"""Interactive plots: figures of plotly.js as JSON, and the script that draws them in a page.
+
+A page has the script once, in its own text, and loads nothing. Figures are plain dictionaries:
+plotly's Python classes would check every value again, which takes seconds with 50 robots; a test
+checks the figures with them.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.sim.colours import robot_rgba
+
+Json = Dict[str, Any]
+
+INK, QUIET, GRID, ALARM = "#20262c", "#5a6570", "#e4e8ec", "#c01020"
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+"""Line patterns; robots with similar colours have different ones."""
+_LONGEST_TEXT = 80
+_MOST_POINTS = 40_000  # of all lines of a panel: more make the page slow
+_FEWEST, _MOST = 120, 1500  # points of one line
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Figure that the reader can zoom and hover.
+
+    Attributes:
+        name: Name of the element in the page; letters, digits and ``_``.
+        alt: Description of the content.
+        traces: Traces of plotly.js.
+        layout: Layout of plotly.js; ``layout`` makes one in the style of the reports.
+        frames: Frames of an animation.
+        height_px: Height that does not depend on the width.
+        aspect: Further height, as a part of the width.
+    """
+
+    name: str
+    alt: str
+    traces: Sequence[Json]
+    layout: Json
+    frames: Sequence[Json] = ()
+    height_px: int = 420
+    aspect: float = 0.0
+
+    @property
+    def json(self) -> str:
+        """The figure as JSON that can stand between script tags."""
+        return script_json(
+            {"data": list(self.traces), "layout": self.layout, "frames": list(self.frames)}
+        )
+
+    @property
+    def height(self) -> str:
+        """The height as a value of CSS; the width is that of the page's text."""
+        return f"calc(min(100vw - 2rem, 74rem) * {self.aspect:.3f} + {self.height_px}px)"
+
+
+def script_json(value: Any) -> str:
+    """Encode a value as JSON without characters that can end or open an element.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return re.sub("[<>&]", lambda found: f"\\u{ord(found.group()):04x}", text)
+
+
+def plot_text(text: str) -> str:
+    """Escape a text of others: plotly reads tags, entities and ``%{...}`` in its texts."""
+    cut = text if len(text) <= _LONGEST_TEXT else text[: _LONGEST_TEXT - 1] + "…"
+    return re.sub("[<>&%$]", lambda found: f"&#{ord(found.group())};", cut.replace("\n", " "))
+
+
+def numbers(values: Any, decimals: int = 3) -> List[Optional[float]]:
+    """Convert an array, shape (k,), to rounded numbers, with None for those not finite."""
+    array = np.round(np.asarray(values, dtype=float), decimals)
+    return [value if abs(value) < np.inf else None for value in array.tolist()]
+
+
+def rgb(robot: int, alpha: float = 1.0) -> str:
+    """Return a robot's colour as a value of CSS."""
+    red, green, blue = (round(255 * part) for part in robot_rgba(robot)[:3])
+    return f"rgba({red},{green},{blue},{alpha:g})"
+
+
+def dash(robot: int) -> str:
+    """Return a robot's line pattern."""
+    return DASHES[robot % len(DASHES)]
+
+
+def sample(count: int, lines: int) -> NDArray[np.int64]:
+    """Return the indices of the samples that a line shows, first and last included.
+
+    Args:
+        count: Number of samples of the line.
+        lines: Number of lines in the panel; together they have about 40,000 points.
+    """
+    most = int(np.clip(_MOST_POINTS // max(lines, 1), _FEWEST, _MOST))
+    if count <= most:
+        return np.arange(count)
+    return np.unique(np.linspace(0, count - 1, most).round().astype(np.int64))
+
+
+def smallest_samples(values: NDArray[np.float64], lines: int) -> NDArray[np.int64]:
+    """Return indices as ``sample`` does, but of the smallest value of each period.
+
+    Args:
+        values: Values of the line, shape (k,); NaN where unknown.
+        lines: Number of lines in the panel.
+    """
+    edges = sample(len(values), lines)
+    if len(edges) == len(values):
+        return edges
+    known = np.where(np.isfinite(values), values, np.inf)
+    return np.unique(
+        [first + int(np.argmin(known[first:end])) for first, end in zip(edges[:-1], edges[1:])]
+        + [int(edges[-1])]
+    )
+
+
+def axis(title: str = "", **more: Any) -> Json:
+    """Make an axis in the style of the reports; ``more`` are further keys of plotly.js."""
+    return {
+        "title": {"text": title, "standoff": 6},
+        "gridcolor": GRID,
+        "linecolor": "#a0a8b0",
+        "zeroline": False,
+        "automargin": True,
+        **more,
+    }
+
+
+def layout(**more: Any) -> Json:
+    """Make a layout in the style of the reports; ``more`` are further keys of plotly.js."""
+    return {
+        "font": {
+            "family": "system-ui, Segoe UI, DejaVu Sans, sans-serif",
+            "size": 13,
+            "color": INK,
+        },
+        "paper_bgcolor": "#fff",
+        "plot_bgcolor": "#fff",
+        "margin": {"l": 56, "r": 12, "t": 28, "b": 44},
+        "hovermode": "closest",
+        "hoverlabel": {"bgcolor": "#fff", "font": {"color": INK, "size": 13}, "align": "left"},
+        "legend": {"groupclick": "togglegroup", "tracegroupgap": 0, "font": {"size": 12}},
+        "barmode": "overlay",
+        "bargap": 0,
+        **more,
+    }
+
+
+@dataclass(frozen=True)
+class Scripts:
+    """Scripts of a page: plotly.js and the one that draws the figures; empty without figures."""
+
+    texts: Tuple[str, ...] = ()
+    hashes: Tuple[str, ...] = field(default=())
+
+    @property
+    def policy(self) -> str:
+        """Content security policy: these scripts run, no other, and nothing is loaded."""
+        allowed = " ".join(f"'sha256-{code}'" for code in self.hashes) or "'none'"
+        return (
+            f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; "
+            "img-src data: blob:; base-uri 'none'; form-action 'none'"
+        )
+
+
+@lru_cache(maxsize=1)
+def plot_scripts() -> Scripts:
+    """Return the scripts that a page with plots needs, 4.8 MB with plotly 7."""
+    # Imported here: pages without plots need no plotly.
+    from plotly.offline import get_plotlyjs
+
+    texts = (get_plotlyjs().replace("\r\n", "\n"), _DRAW % script_json(_CONFIG))
+    return Scripts(texts, tuple(map(_hash, texts)))
+
+
+def _hash(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+
+
+_CONFIG: Mapping[str, Any] = {
+    "responsive": True,
+    "displaylogo": False,
+    "displayModeBar": True,
+    "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+    "toImageButtonOptions": {"format": "svg"},
+}
+# The paper is narrower than the screen; a plot has to be drawn again before it is printed.
+_DRAW = """
+(() => {
+  const config = %s;
+  const plots = [...document.querySelectorAll(".plot")];
+  for (const element of plots) {
+    const figure = JSON.parse(document.getElementById("figure-" + element.id).textContent);
+    const options = {...config, toImageButtonOptions: {format: "svg", filename: element.id}};
+    element.textContent = "";
+    Plotly.newPlot(element, {...figure, config: options});
+  }
+  window.addEventListener("beforeprint", () => {
+    for (const element of plots) Plotly.relayout(element, {width: 680, autosize: false});
+  });
+  window.addEventListener("afterprint", () => {
+    for (const element of plots) Plotly.relayout(element, {width: null, autosize: true});
+  });
+})();
+"""
