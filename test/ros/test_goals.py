@@ -8,7 +8,9 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from flight_case import FlightCase, Latest, action_goal, goal_pose
+from geometry_msgs.msg import Point, PointStamped, PoseStamped
 from move_base_msgs.msg import MoveBaseActionResult
+from visualization_msgs.msg import MarkerArray
 
 from quad_nav.ros.navigator.goal_server import GoalServer
 
@@ -123,6 +125,26 @@ class Goals(FlightCase):
         self.goal_topics[0].publish(goal_pose(0.3, 0.0, frame="base_link0"))
         self.assertEqual(self.result_after(0, count).status, GoalStatus.SUCCEEDED)
         self.assertLess(abs(self.distance(0, x, y) - 0.3), 0.15)
+
+    def test_goal_of_the_fleet_goes_to_the_nearest_or_to_the_selected_robot(self):
+        here, there = self.position(0), self.position(1)
+        taken = [self.record(f"/move_base{i}/current_goal", PoseStamped) for i in (0, 1)]
+        fleet = rospy.Publisher("/move_base_simple/goal", PoseStamped, queue_size=1)
+        click = rospy.Publisher("/clicked_point", PointStamped, queue_size=1)
+        for topic in (fleet, click):
+            self.wait(lambda t=topic: t.get_num_connections() > 0, f"listener on {topic.name}")
+        selection = Latest("/goal_router/selection", MarkerArray)
+
+        fleet.publish(goal_pose(there[0] - 0.3, there[1]))
+        self.wait(lambda: len(taken[1].messages) == 1, "robot 1 to get the goal near it")
+        point = PointStamped(point=Point(here[0] + 0.2, here[1], 1.0))
+        point.header.frame_id = "map"
+        click.publish(point)
+        selection.wait()
+        self.assertEqual(selection.message.markers[-1].header.frame_id, "base_link0")
+        fleet.publish(goal_pose(there[0] - 0.3, there[1]))
+        self.wait(lambda: len(taken[0].messages) == 1, "robot 0, which is selected, to get it")
+        self.assertEqual(len(taken[1].messages), 1)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """A fleet's names, parameters and RViz file: what needs no ROS to be looked at."""
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -117,6 +118,30 @@ def test_rviz_of_many_listens_to_the_overview_only():
 
     assert shown(5) == {"Global plan", "Flown path"}
     assert {"Scan", "Global costmap"} <= shown(4)
+
+
+def test_rviz_numbers_the_tools_of_few_quadcopters():
+    def tools(robots):
+        tools = document(robots, random_mission(robots, 0).scene)["Visualization Manager"]["Tools"]
+        return {one["Class"]: one.get("Topic") for one in tools if one["Class"].startswith("quad/")}
+
+    fleet = {"quad/GoalFleet": "/move_base_simple/goal", "quad/SelectQuadcopter": "/clicked_point"}
+    assert tools(5) == fleet
+    assert tools(3) == {
+        **fleet,
+        **{f"quad/Goal{i}": f"/move_base_simple/goal{i}" for i in range(3)},
+        **{f"quad/Pose{i}": f"/initialpose{i}" for i in range(3)},
+        **{f"quad/PointQuad{i}": f"/clicked_point{i}" for i in range(3)},
+    }
+
+
+def test_rviz_finds_a_class_and_an_icon_for_each_tool():
+    plugin = ElementTree.parse(shipped("rviz", "tools.xml"))
+    classes = {one.get("name") for one in plugin.iter("class")}
+    tools = {f"quad/{kind}{i}" for kind in ("Goal", "Pose", "PointQuad") for i in range(4)}
+    assert classes == tools | {"quad/GoalFleet", "quad/SelectQuadcopter"}
+    icons = Path(__file__).resolve().parents[2] / "icons" / "classes"
+    assert {f"quad/{path.stem}" for path in icons.glob("*.svg")} == classes
 
 
 def test_rviz_looks_at_the_middle_of_the_arena():

@@ -15,7 +15,7 @@ from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.goal_file import Goal, GoalSequence
 from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Sphere, Walls
 from quad_nav.sim.scene_file import load_scene, scene_from_document
 from quad_nav.sim.scene_writer import scene_document
 from quad_nav.topics.flight_info import (
@@ -27,12 +27,14 @@ from quad_nav.topics.flight_info import (
     simulation_info,
     to_text,
 )
+from quad_nav.topics.goal_routing import GoalRouter, Route, selection_markers
 from quad_nav.topics.markers import (
     CUBE,
     CUBE_LIST,
     CYLINDER,
     SPHERE,
     goal_markers,
+    number_markers,
     quadcopter_markers,
     scene_markers,
 )
@@ -271,3 +273,48 @@ def test_flight_info_is_json():
 @pytest.mark.parametrize("text", ["", "no JSON", "[1, 2]", '"text"'])
 def test_a_text_without_a_json_object_is_ignored(text):
     assert from_text(text) is None
+
+
+def test_numbers_stand_beside_the_quadcopters_and_grow_with_the_arena():
+    small, large = (
+        number_markers(2, Scene("it", side_m, side_m, 1.0, Walls(), (), ()))
+        for side_m in (12.0, 40.0)
+    )
+    assert [(one.text, one.frame, one.frame_locked) for one in small] == [
+        ("0", "base_link0", True),
+        ("1", "base_link1", True),
+    ]
+    assert [one.size_m[2] for one in (small[0], large[0])] == pytest.approx([0.4, 1.0])
+    assert small[0].place_m[1] >= BODY_RADIUS_M + 0.5 * small[0].size_m[2]
+    bodies = {(one.namespace, one.number) for one in quadcopter_markers(2)}
+    assert bodies.isdisjoint((one.namespace, one.number) for one in small)
+
+
+# Goals of the fleet.
+
+
+def test_a_goal_goes_to_the_nearest_quadcopter():
+    router = GoalRouter()
+    places = {0: (0.0, 0.0), 1: (4.0, 0.0)}
+    assert router.route(3.0, 0.0, places) == Route(1, "nearest, 1.00 m from it")
+    assert router.route(2.0, 1.0, places).robot == 0  # as near: the lower number
+    assert router.route(2.0, 1.0, {}) is None
+
+
+def test_a_goal_goes_to_the_selected_quadcopter_until_it_is_deselected():
+    router = GoalRouter()
+    places = {0: (0.0, 0.0), 1: (4.0, 0.0)}
+    assert "quad1 selected" in router.click(4.0, 0.9, places)
+    assert router.route(0.0, 0.0, places) == Route(1, "selected")
+    assert router.route(0.0, 0.0, {0: (0.0, 0.0)}).robot == 1  # also while its place is unknown
+    assert [one.frame for one in selection_markers(router.selected)] == ["base_link1"]
+    assert "quad1 deselected" in router.click(4.0, 0.0, places)
+    assert router.route(0.0, 0.0, places).robot == 0
+    assert selection_markers(router.selected) == []
+
+
+def test_a_click_beside_all_quadcopters_deselects():
+    router = GoalRouter()
+    router.click(0.0, 0.0, {0: (0.0, 0.0)})
+    assert "no quadcopter within 1 m" in router.click(1.1, 0.0, {0: (0.0, 0.0)})
+    assert router.selected is None

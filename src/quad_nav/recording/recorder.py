@@ -23,7 +23,12 @@ from quad_nav.sim.odometry import pose_in
 from quad_nav.sim.simulation import RobotState
 from quad_nav.topics import flight_info
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
-from quad_nav.topics.markers import goal_markers, quadcopter_markers, scene_markers
+from quad_nav.topics.markers import (
+    goal_markers,
+    number_markers,
+    quadcopter_markers,
+    scene_markers,
+)
 from quad_nav.topics.publishing import FlownPath
 
 _SIMULATOR, _SEQUENCER = "/simulator", "/sequencer"
@@ -60,6 +65,7 @@ class Recorder(FlightObserver):
         ]
         self._paths = [FlownPath(_path_pose) for _ in flight.robots]
         self._write_flight()
+        count = len(flight.robots)
         self._write(
             "/simulation/scene",
             START_NS,
@@ -70,7 +76,9 @@ class Recorder(FlightObserver):
         self._write(
             "/simulation/quadcopters",
             START_NS,
-            messages.marker_array(quadcopter_markers(len(flight.robots))),
+            messages.marker_array(
+                [*quadcopter_markers(count), *number_markers(count, flight.setup.scene)]
+            ),
             _SIMULATOR,
             latched=True,
         )

@@ -28,6 +28,8 @@ _ROTOR_DIAMETER_M = 0.20
 _MANY_BOXES = 256
 _SMALL_M = 1.0
 _GOAL_DIAMETER_M, _ACTIVE_GOAL_DIAMETER_M, _GOAL_TEXT_HEIGHT_M = 0.30, 0.45, 0.35
+_MIN_NUMBER_HEIGHT_M, _NUMBER_PART = 0.4, 0.025
+_NUMBER_ABOVE_M = 0.6  # above most obstacles, which would hide it from above
 _REACHED_ALPHA, _PENDING_ALPHA = 0.2, 0.75
 
 Triple = Tuple[float, float, float]
@@ -78,6 +80,28 @@ def scene_markers(scene: Scene) -> List[Marker]:
 def quadcopter_markers(n_robots: int) -> List[Marker]:
     """Return body, arms, rotors and LIDAR of each quadcopter, locked to `base_link{i}`."""
     return [marker for robot in range(n_robots) for marker in _quadcopter(robot)]
+
+
+def number_markers(n_robots: int, scene: Scene) -> List[Marker]:
+    """Return each quadcopter's number beside it, locked to `base_link{i}`.
+
+    The text grows with the arena, so that it stays readable when RViz shows all of it.
+    """
+    height_m = max(_MIN_NUMBER_HEIGHT_M, _NUMBER_PART * max(scene.size_x_m, scene.size_y_m))
+    return [
+        Marker(
+            f"base_link{robot}",
+            f"quad{robot}_number",
+            0,
+            TEXT,
+            (0.0, BODY_RADIUS_M + 0.5 * height_m, _NUMBER_ABOVE_M),
+            (0.0, 0.0, height_m),
+            robot_rgba(robot),
+            text=str(robot),
+            frame_locked=True,
+        )
+        for robot in range(n_robots)
+    ]
 
 
 def _quadcopter(robot: int) -> List[Marker]:

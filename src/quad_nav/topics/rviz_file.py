@@ -26,8 +26,6 @@ from quad_nav.sim.scene import Scene
 
 MAX_WITH_ALL_DISPLAYS = 4
 _ENABLED_FOR_MANY = ("Global plan", "Flown path")
-_GOAL_TOOL = "rviz/SetGoal"
-_NUMBERED_TOOLS = (_GOAL_TOOL, "rviz/SetInitialPose", "rviz/PublishPoint")
 _WINDOW_PX = 750.0  # the shorter side of the view in an ordinary window
 EXIT_BAD_INPUT = 2
 
@@ -97,26 +95,24 @@ def _renumbered(value: Any, number: int) -> Any:
     return copy.copy(value)
 
 
-def _with_number(topic: str, number: int) -> str:
-    return topic[:-1] + str(number) if topic.endswith("0") else topic
+def _with_number(value: Any, number: int) -> Any:
+    """Replace the 0 at the end of a topic or a class."""
+    return value[:-1] + str(number) if isinstance(value, str) and value.endswith("0") else value
 
 
 def _tools(tools: Sequence[Dict[str, Any]], robots: int) -> List[Dict[str, Any]]:
-    """Return goal buttons for the first `MAX_WITH_ALL_DISPLAYS` quadcopters.
+    """Return numbered tools for each quadcopter, if these are few, and all others.
 
-    Pose and point buttons are added only if these are all. RViz gives all buttons the same icon,
-    so more of them would be indistinguishable.
+    Larger fleets have the tools that route goals to the selected or the nearest quadcopter.
     """
     made: List[Dict[str, Any]] = []
     for tool in tools:
-        if tool["Class"] not in _NUMBERED_TOOLS:
+        if not tool["Class"][-1].isdigit():
             made.append(tool)
-        elif tool["Topic"].endswith("0") and (
-            robots <= MAX_WITH_ALL_DISPLAYS or tool["Class"] == _GOAL_TOOL
-        ):
+        elif tool["Class"].endswith("0") and robots <= MAX_WITH_ALL_DISPLAYS:
             made += [
-                {**tool, "Topic": _with_number(tool["Topic"], number)}
-                for number in range(min(robots, MAX_WITH_ALL_DISPLAYS))
+                {key: _with_number(value, number) for key, value in tool.items()}
+                for number in range(robots)
             ]
     return made
 

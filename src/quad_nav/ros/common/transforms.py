@@ -52,6 +52,11 @@ class Transforms:
             rospy.Subscriber("/tf_static", TFMessage, self._on_static_transforms),
         ]
 
+    def close(self) -> None:
+        """Receive no further transforms."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
     def _on_transforms(self, message: TFMessage) -> None:
         with self._lock:
             if not self._update_time():

@@ -36,7 +36,7 @@ from quad_nav.topics.flight_info import (
     text_values,
     to_text,
 )
-from quad_nav.topics.markers import quadcopter_markers, scene_markers
+from quad_nav.topics.markers import number_markers, quadcopter_markers, scene_markers
 
 _MOUNT = transform(base_from_lidar)
 _LAGS_BELOW = 0.9
@@ -76,7 +76,10 @@ class SimulatorTopics:
         self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
         self._flight.publish(to_text(simulation_info(simulation.scene, simulation.seed)))
         self._scene.publish(marker_array(scene_markers(simulation.scene)))
-        self._quadcopters.publish(marker_array(quadcopter_markers(simulation.n_robots)))
+        count = simulation.n_robots
+        self._quadcopters.publish(
+            marker_array(quadcopter_markers(count) + number_markers(count, simulation.scene))
+        )
 
     def publish_clock(self) -> None:
         """Publish the simulated time."""

@@ -1,0 +1,126 @@
+"""Node `goal_router`: one goal topic for the whole fleet.
+
+It sends each goal of `/move_base_simple/goal` on to one quadcopter's own topic: the selected one,
+or the nearest one. A point on `/clicked_point` selects the quadcopter there. It subscribes to the
+transforms only while it looks for positions, because those of a fleet are many.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Dict, Optional, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PointStamped, PoseStamped
+from visualization_msgs.msg import MarkerArray
+
+from quad_nav.files.values import is_whole
+from quad_nav.ros.common.conversions import replacing_markers
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.readiness import init_node
+from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.topics.goal_routing import GoalRouter, selection_markers
+from quad_nav.topics.validation import MAX_MAGNITUDE
+
+EXIT_BAD_INPUT = 2
+PATIENCE_S = 2.0  # wall time to wait for the transforms of all quadcopters
+POLL_S = 0.02
+
+
+class GoalRouterNode:
+    """Subscribers and publishers of the node."""
+
+    def __init__(self, robots: int) -> None:
+        """Connect to the topics of quadcopters 0 to `robots` - 1."""
+        self._router = GoalRouter()
+        self._lock = threading.Lock()
+        self._warnings = ThrottledWarnings()
+        self._goals = [
+            rospy.Publisher(f"/move_base_simple/goal{i}", PoseStamped, queue_size=1)
+            for i in range(robots)
+        ]
+        self._selection = rospy.Publisher("~selection", MarkerArray, queue_size=1, latch=True)
+        self._subscribers = [
+            rospy.Subscriber("/move_base_simple/goal", PoseStamped, self._on_goal, queue_size=1),
+            rospy.Subscriber("/clicked_point", PointStamped, self._on_click, queue_size=1),
+        ]
+
+    def _on_goal(self, message: PoseStamped) -> None:
+        with self._lock:
+            point = message.pose.position
+            located = self._locate("goal", message.header.frame_id, point.x, point.y)
+            if located is None:
+                return
+            place, positions = located
+            route = self._router.route(*place, positions)
+            if route is None:
+                rospy.logerr(
+                    "goal_router: goal dropped: no quadcopter has a transform from map to"
+                    " base_link{i}"
+                )
+                return
+            rospy.loginfo("quad%d: goal (%.2f, %.2f) m: %s", route.robot, *place, route.reason)
+            self._goals[route.robot].publish(message)
+
+    def _on_click(self, message: PointStamped) -> None:
+        with self._lock:
+            point = message.point
+            located = self._locate("point", message.header.frame_id, point.x, point.y)
+            if located is None:
+                return
+            place, positions = located
+            rospy.loginfo("goal_router: %s", self._router.click(*place, positions))
+            self._selection.publish(replacing_markers(selection_markers(self._router.selected)))
+
+    def _locate(
+        self, kind: str, frame: str, x_m: float, y_m: float
+    ) -> Optional[Tuple[Tuple[float, float], Dict[int, Tuple[float, float]]]]:
+        """Return a message's position in `map` and those of the quadcopters, or log the fault."""
+        if not (abs(x_m) <= MAX_MAGNITUDE and abs(y_m) <= MAX_MAGNITUDE):
+            self._warnings.warn(
+                f"goal_router: {kind} dropped: position ({x_m:g}, {y_m:g}) m, expected finite"
+                f" coordinates up to {MAX_MAGNITUDE:g} m",
+                kind=kind,
+            )
+            return None
+        transforms = Transforms()
+        try:
+            positions = self._positions(transforms)
+            map_from_frame = transforms.lookup("map", frame)
+        except TransformUnavailable as error:
+            self._warnings.warn(f"goal_router: {kind} dropped: {error}", kind=f"{kind} frame")
+            return None
+        finally:
+            transforms.close()
+        x, y, _ = map_from_frame.transform_points(np.array([[x_m, y_m, 0.0]]))[0]
+        return (float(x), float(y)), positions
+
+    def _positions(self, transforms: Transforms) -> Dict[int, Tuple[float, float]]:
+        """Return the known positions, as soon as all are known or the patience is over."""
+        found: Dict[int, Tuple[float, float]] = {}
+        end_s = time.monotonic() + PATIENCE_S
+        while len(found) < len(self._goals) and time.monotonic() < end_s:
+            time.sleep(POLL_S)
+            for robot in range(len(self._goals)):
+                try:
+                    pose = transforms.lookup("map", f"base_link{robot}")
+                except TransformUnavailable:
+                    continue
+                found[robot] = (pose.x_m, pose.y_m)
+        return found
+
+
+def main() -> int:
+    """Run the node; return 0, or 2 if the parameter `robots` is not valid."""
+    init_node("goal_router")
+    robots = rospy.get_param("~robots", 2)
+    if not is_whole(robots) or robots < 1:
+        rospy.logfatal("goal_router: robots: %s; expected a whole number, at least 1", robots)
+        return EXIT_BAD_INPUT
+    node = GoalRouterNode(robots)
+    while not rospy.is_shutdown():
+        time.sleep(0.2)
+    del node
+    return 0
