@@ -4,6 +4,7 @@ catkin executes this file and reads the arguments of ``setup``, so everything th
 here; the rest of the metadata is in ``pyproject.toml``. The version is the one of ``package.xml``.
 """
 
+import runpy
 from itertools import groupby
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,6 +12,8 @@ from xml.etree import ElementTree
 import setuptools
 
 ROOT = Path(__file__).parent
+# Sooner than pip compares requires-python, and with the way out.
+runpy.run_path(str(ROOT / "scripts" / "check_python.py"), run_name="__main__")
 # Files that `quad_nav.files.shipped` finds by name. CMakeLists.txt installs them for catkin.
 SHIPPED = sorted(
     path.relative_to(ROOT)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import platform
 from importlib import metadata
 from pathlib import Path
-from typing import Dict
+from typing import Dict, Sequence
 from xml.etree import ElementTree
 
 DISTRIBUTION = "quad-nav"
-# The result of a flight depends on these.
-_LIBRARIES = ("numpy", "numba", "pybullet")
+# The result of a flight depends on these. Newer Pythons have pybullet from a fork of that name.
+_LIBRARIES = {"numpy": ("numpy",), "numba": ("numba",), "pybullet": ("pybullet", "pybullet-arm64")}
 
 
 def package_version() -> str:
@@ -28,6 +28,16 @@ def package_version() -> str:
 def versions() -> Dict[str, str]:
     """Return name -> version of the package, Python and the libraries that compute a flight."""
     found = {"quad": package_version(), "python": platform.python_version()}
-    for library in _LIBRARIES:
-        found[library] = metadata.version(library)
+    for library, distributions in _LIBRARIES.items():
+        found[library] = _version_of_any(distributions)
     return found
+
+
+def _version_of_any(distributions: Sequence[str]) -> str:
+    """Return the version of the first of these distributions that is installed."""
+    for name in distributions[:-1]:
+        try:
+            return metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return metadata.version(distributions[-1])
