@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from hand_made_traces import flight, robot
 
 from quad_nav import config
+from quad_nav.config.difference_table import ParameterRow, difference_list, parameter_rows
 from quad_nav.config.differences import Difference, differences
 from quad_nav.files.shipped import shipped
-from quad_nav.report.parameter_table import ParameterRow, parameter_rows
 
 
 def tree_of(number: int, **changes):
@@ -69,9 +68,7 @@ def test_every_difference_of_the_tutorial_is_found():
 
 
 def test_costmaps_and_robots_share_rows():
-    rows = parameter_rows(
-        flight(*(robot(k, (1.0 + k, 1.0), parameters=tree_of(k)) for k in range(2)))
-    )
+    rows = parameter_rows({f"quad{k}": tree_of(k) for k in range(2)})
     assert ParameterRow("*_costmap/robot_base_frame", "base_link{i}", "base_link", "") in rows
     assert ParameterRow("*_costmap/robot_radius", "0.35", "0.46", "metres") in rows
     assert ParameterRow("global_costmap/width", "12", "10", "metres") in rows
@@ -80,12 +77,7 @@ def test_costmaps_and_robots_share_rows():
 
 
 def test_rows_of_one_robot_name_it():
-    rows = parameter_rows(
-        flight(
-            robot(0, (1.0, 1.0), parameters=tree_of(0)),
-            robot(1, (2.0, 1.0), parameters=tree_of(1, controller_frequency=5.0)),
-        )
-    )
+    rows = parameter_rows({"quad0": tree_of(0), "quad1": tree_of(1, controller_frequency=5.0)})
     assert [(row.value, row.robots) for row in rows if row.path == "controller_frequency"] == [
         ("1", "quad0"),
         ("5", "quad1"),
@@ -93,4 +85,19 @@ def test_rows_of_one_robot_name_it():
 
 
 def test_unknown_parameters_make_no_rows():
-    assert parameter_rows(flight(robot(0, (1.0, 1.0)))) == ()
+    assert parameter_rows({"quad0": {}}) == ()
+    assert difference_list({"quad0": {}}) == []
+
+
+def test_differences_as_json_have_exact_values_and_robots():
+    trees = {"quad0": tree_of(0), "quad1": tree_of(1, controller_frequency=1 / 3)}
+    found = {(one["parameter"], one["value"]): one for one in difference_list(trees)}
+    assert found["controller_frequency", 1 / 3] == {
+        "parameter": "controller_frequency",
+        "value": 1 / 3,
+        "default": 20.0,
+        "unit": "Hz",
+        "robots": ["quad1"],
+    }
+    frames = found["local_costmap/robot_base_frame", "base_link{i}"]
+    assert frames["robots"] is None  # all

@@ -204,7 +204,7 @@ def test_summary_is_printed_if_it_cannot_be_written(tmp_path, full_disk):
 def test_summary_of_a_successful_flight_ends_in_status_1(tmp_path, monkeypatch, full_disk):
     summary = MissionSummary(())
     assert summary.exit_status == 0
-    monkeypatch.setattr("quad_nav.cli.fly.fly_setup", lambda *_: summary)
+    monkeypatch.setattr("quad_nav.cli.offline_flight.fly_setup", lambda *_: summary)
     assert run("fly", "-q", "--json", tmp_path / "x.json").exit_code == 1
 
 

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D
@@ -206,6 +207,14 @@ DOCUMENTED = {
     "min_separation_m": None,
     "seed": None,
     "versions": {},
+    "command": ["quad", "fly"],
+    "configuration": None,
+    "scene": None,
+    "goals": None,
+    "jitter_m": "inf",
+    "odom_drift": None,
+    "lidar": None,
+    "time_limit_s": None,
 }
 
 
@@ -216,11 +225,29 @@ def test_the_json_has_the_documented_keys(tmp_path):
         sim_time_s=20.0,
         wall_time_s=10.0,
         robot_radius_m=0.3,
+        facts={"command": ("quad", "fly"), "jitter_m": float("inf")},
     )
     path = tmp_path / "deep" / "result.json"
     write_json(summary, path)
     assert json.loads(path.read_text()) == to_json(summary) == DOCUMENTED
     assert list(path.parent.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    "contact, clearance_m, separation_m",
+    [(None, 2.7, 0.4), ("pillar", 0.0, 0.4), ("quad1", 2.7, 0.0)],
+)
+def test_the_gap_of_a_contact_is_zero(contact, clearance_m, separation_m):
+    """The obstacle is 3 m from quad0, whose hull has 0.3 m; quad1 is 1 m beside it."""
+    log = FlightLog(["quad0", "quad1"], 0.3, lambda places_m: np.full(places_m.shape[:-1], 3.0))
+    for now_s in (0.0, 20.0):
+        log.add_pose("quad0", now_s, Pose2D(0, 0))
+        log.add_pose("quad1", now_s, Pose2D(1, 0))
+    if contact is not None:
+        log.add_contact(Contact(5.0, contact, "quad0", 1.0, 2.0))
+    robot = summarize_robot(log, "quad0", [])
+    assert robot.min_clearance_m == pytest.approx(clearance_m)
+    assert robot.min_separation_m == pytest.approx(separation_m)
 
 
 def test_a_mission_that_did_not_start_lists_its_goals():

@@ -8,7 +8,7 @@ import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.cli import EXIT_INTERRUPTED
 from quad_nav.cli.options import (
@@ -29,6 +29,7 @@ from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
 from quad_nav.offline.worker_process import processes_for
+from quad_nav.scenario.flight_facts import offline_facts
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift
@@ -54,13 +55,15 @@ def fly_mission(
             {"--json": json_path, "--report": report},
             {"--record": record, "--view": saved_view, "--animate": animate},
         )
-        setup = read_setup(_options(**given))
+        options = _options(**given)
+        setup = read_setup(options)
         pictures = FlightPictures(setup, report, animate)
         observers = _observers(record, view)
     if not quiet:
         show_warnings(setup.warnings)
     processes = processes or processes_for(len(setup.robots))
-    sys.exit(_fly(setup, observers, outputs, pictures, quiet, processes))
+    facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
+    sys.exit(_fly(setup, facts, observers, outputs, pictures, quiet, processes))
 
 
 def _options(
@@ -104,6 +107,7 @@ def _observers(record: Optional[Path], view: Optional[str]) -> List[FlightObserv
 
 def _fly(
     setup: FlightSetup,
+    facts: Mapping[str, Any],
     observers: Sequence[FlightObserver],
     outputs: Outputs,
     pictures: FlightPictures,
@@ -112,7 +116,8 @@ def _fly(
 ) -> int:
     bar = [] if quiet else [ProgressBar()]
     with _StopOnSignal() as stop:
-        summary = fly_setup(setup, [*observers, *pictures.observers, *bar, stop], processes)
+        flown = fly_setup(setup, [*observers, *pictures.observers, *bar, stop], processes)
+    summary = replace(flown, facts=facts)
     width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
     overview = table(summary, width)
     if not quiet:

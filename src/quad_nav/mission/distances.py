@@ -65,6 +65,19 @@ def nearest_separations_m(positions_m: Floats, radius_m: float) -> Floats:
     return nearest
 
 
+def gap_m(smallest_m: Optional[float], touched: bool) -> Optional[float]:
+    """Return the smallest distance of a robot, which is 0 after a contact.
+
+    Measured from hulls it may be a little more or less: poses are samples, hulls are discs, and
+    bodies yield when they touch.
+
+    Args:
+        smallest_m: Smallest distance measured; None if it was not.
+        touched: Whether the robot had a contact.
+    """
+    return 0.0 if touched and smallest_m is not None else smallest_m
+
+
 class DistanceLog:
     """Smallest clearance and separation of each robot, from poses that arrive one at a time.
 

@@ -214,6 +214,14 @@ class FlightLog:
         self.robots[name] = RobotLog(name, previous)
         self.distances.restore(name, clearance_m, separation_m)
 
+    def touches(self, name: str, robots: bool) -> bool:
+        """Return whether a robot had a contact with another robot, or else with anything else."""
+        return any(
+            contact.involves(name)
+            and (contact.robot in self.robots and contact.other in self.robots) is robots
+            for contact in self.contacts
+        )
+
     def contacts_of(self, name: str) -> int:
         """Return the number of contacts of a robot."""
         return sum(contact.involves(name) for contact in self.contacts)

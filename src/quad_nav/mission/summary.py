@@ -13,12 +13,24 @@ from types import MappingProxyType
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 from quad_nav.files.output import write_text
+from quad_nav.mission.distances import gap_m
 from quad_nav.mission.flight_log import INTERRUPTED, FlightLog, Leg
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.contacts import Contact
 from quad_nav.versions import versions
 
 EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT = 0, 1, 2
+FACTS = (
+    "command",
+    "configuration",
+    "scene",
+    "goals",
+    "jitter_m",
+    "odom_drift",
+    "lidar",
+    "time_limit_s",
+)
+"""Keys of the JSON object about the set-up of the flight; null if unknown."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +84,7 @@ class MissionSummary:
         contacts_reported: False if nothing reports contacts.
         seed: Seed of the simulation.
         versions: Versions of the software that flew.
+        facts: Facts about the set-up, by the keys of ``FACTS``; see ``scenario.flight_facts``.
     """
 
     robots: Tuple[RobotSummary, ...]
@@ -84,6 +97,7 @@ class MissionSummary:
     contacts_reported: bool = True
     seed: Optional[int] = None
     versions: Mapping[str, str] = field(default_factory=dict)
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def success(self) -> bool:
@@ -173,8 +187,8 @@ def summarize_robot(
         name,
         tuple(legs),
         robot.path_length_m,
-        log.distances.min_clearance_m(name),
-        log.distances.min_separation_m(name),
+        gap_m(log.distances.min_clearance_m(name), log.touches(name, robots=False)),
+        gap_m(log.distances.min_separation_m(name), log.touches(name, robots=True)),
         robot.recoveries,
         log.contacts_of(name),
         robot.aborts,
@@ -212,6 +226,7 @@ def to_json(summary: MissionSummary) -> Dict[str, Any]:
         "min_separation_m": _rounded(summary.min_separation_m),
         "seed": summary.seed,
         "versions": dict(summary.versions),
+        **{key: _plain(summary.facts.get(key)) for key in FACTS},
     }
 
 
@@ -222,6 +237,16 @@ def write_json(summary: MissionSummary, path: Union[str, Path]) -> None:
         OSError: The file cannot be written.
     """
     write_text(Path(path), json.dumps(to_json(summary), indent=2, allow_nan=False) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON; numbers that are not finite and other types become text."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    is_number = isinstance(value, (int, float)) and math.isfinite(value)
+    return value if value is None or is_number or isinstance(value, str) else str(value)
 
 
 def _rounded(value: Optional[float]) -> Optional[float]:

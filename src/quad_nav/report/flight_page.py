@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import List, Optional, Sequence
 
+from quad_nav.config.difference_table import parameter_rows
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report import style
 from quad_nav.report.distance_picture import distance_picture
@@ -15,7 +16,6 @@ from quad_nav.report.encounters import CLOSE_M, LETTERS, Encounter, encounters, 
 from quad_nav.report.flight_metrics import FlightMetrics, flight_metrics
 from quad_nav.report.measures import Tracks, resampled_tracks
 from quad_nav.report.page import MAX_STRIPS, Page, Section, picture, render, write_page
-from quad_nav.report.parameter_table import parameter_rows
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.paths_plot import paths_plot
 from quad_nav.report.robot_picture import cycle_picture, has_wall_times, motion_picture
@@ -42,7 +42,7 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
         trace=trace,
         flight=flight,
         factor=factor,
-        parameters=parameter_rows(trace),
+        parameters=parameter_rows({robot.name: robot.parameters for robot in trace.robots}),
         parameters_known=any(robot.parameters for robot in trace.robots),
     )
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
@@ -20,6 +20,7 @@ from quad_nav.files.values import Rule, expected_name, value_faults
 from quad_nav.mission.distances import SurfaceDistance
 from quad_nav.mission.goal_file import SETTINGS, SequenceSettings, read_settings
 from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.scenario.flight_facts import ros_facts
 from quad_nav.scenario.random_mission import RandomMission
 from quad_nav.scenario.rules import RANDOM, RULES, optional
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
@@ -32,6 +33,7 @@ DEFAULTS: Dict[str, Any] = {
     "seed": 0,  # of a random mission, as the next
     "size": 0.0,
     "config": "",  # folder of a fleet's navigators
+    "config_name": "",  # name of the navigators' configuration, for the summary
     "robot_radius": BODY_RADIUS_M,
     "simulation": True,
     "ready_timeout": 60.0,
@@ -62,7 +64,7 @@ class MissionSetup:
     """A mission that can be flown.
 
     ``surface_distance`` and ``altitude_m`` are None if the scene is unknown. ``parameters`` are
-    the navigators' trees, {} for one whose parameters are unknown.
+    the navigators' trees, {} for one whose parameters are unknown. ``facts`` are for the summary.
     """
 
     robots: Tuple[RobotGoals, ...]
@@ -76,6 +78,7 @@ class MissionSetup:
     journal: Path
     resume: bool
     parameters: Tuple[Mapping[str, Any], ...] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
 
 def read_setup(
@@ -110,7 +113,9 @@ def read_setup(
     if problems + faults:
         raise InputError(list(dict.fromkeys(problems + faults)))
     warnings = (*_unknown_parameters(parameters, name), *scenario.warnings)
-    return _mission_setup(values, scenario, warnings, journals)
+    setup = _mission_setup(values, scenario, warnings, journals)
+    trees = {robot.name: tree for robot, tree in zip(setup.robots, setup.parameters)}
+    return replace(setup, facts=ros_facts(values, scenario.scene, trees, all_parameters))
 
 
 def _request(

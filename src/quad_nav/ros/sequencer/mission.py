@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
+from dataclasses import replace
 from typing import Dict, Iterator, List, Optional
 
 import rospy
@@ -207,7 +208,7 @@ class MissionRunner:
         record, journal = self._record, self._record.journal
         journal.wait(patience_s=END_S)
         with self._paused_robots(), record.lock:
-            return summarize(
+            summary = summarize(
                 record.log,
                 {robot.name: robot.sequencer for robot in self.robots},
                 self._now_s,
@@ -218,6 +219,7 @@ class MissionRunner:
                 seed=self._seed,
                 contacts_reported=self._setup.simulation,
             )
+        return replace(summary, facts=self._setup.facts)
 
     def _begin(self, now_s: float) -> None:
         self._now_s = self._begun_s = now_s

@@ -6,9 +6,11 @@ the mission and writes the summary. Timers use simulated time and stop with a pa
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import List, Optional
 
@@ -110,10 +112,27 @@ def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str])
             robot_radius_m=setup.robot_radius_m,
             reason=f"{reason}: {'; '.join(lines)}",
             contacts_reported=False,
+            facts=setup.facts,
         ),
         result,
     )
     return EXIT_FAILURE
+
+
+def launch_command() -> List[str]:
+    """Return the command line of the roslaunch that started this node, or else the node's own."""
+    pid = os.getppid()
+    while pid > 1:
+        try:
+            argv = Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0")
+            stat = Path(f"/proc/{pid}/stat").read_text()
+        except OSError:  # an ancestor has ended meanwhile
+            break
+        for place, argument in enumerate(argv):
+            if Path(argument).name in ("roslaunch", "rostest"):
+                return [Path(argument).name, *argv[place + 1 : -1]]
+        pid = int(stat.rpartition(")")[2].split()[1])  # behind the name: state, parent
+    return list(sys.argv)
 
 
 def main() -> int:
@@ -129,12 +148,21 @@ def main() -> int:
     result = result_path(parameters)
     try:
         setup = read_mission_setup(parameters, name, result, rospy.get_param("/", {}))
+        setup = replace(setup, facts={**setup.facts, "command": launch_command()})
         mission = MissionRunner(setup, RESPAWNED in sys.argv)
     except InputError as error:
         rospy.logfatal(
             "sequencer: flight not started, invalid input:\n  %s", "\n  ".join(error.problems)
         )
-        _write(MissionSummary((), reason="bad input", problems=tuple(error.problems)), result)
+        _write(
+            MissionSummary(
+                (),
+                reason="bad input",
+                problems=tuple(error.problems),
+                facts={"command": launch_command()},
+            ),
+            result,
+        )
         return EXIT_BAD_INPUT
     for warning in setup.warnings:
         rospy.logwarn("%s", warning)

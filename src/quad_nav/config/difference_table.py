@@ -1,13 +1,16 @@
-"""Parameters that differ from move_base's defaults, as few table rows."""
+"""Parameters that differ from move_base's defaults, as few table rows, and as JSON."""
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Mapping, Tuple
 
 from quad_nav.config.differences import differences
-from quad_nav.recording.trace import FlightTrace
+
+Trees = Mapping[str, Mapping[str, Any]]
+"""Robot's name -> its tree of ``Configuration.to_tree``; an empty tree is unknown."""
 
 _COSTMAPS = ("global_costmap/", "local_costmap/")
 
@@ -27,14 +30,13 @@ class ParameterRow:
     robots: str = ""
 
 
-def parameter_rows(trace: FlightTrace) -> Tuple[ParameterRow, ...]:
+def parameter_rows(trees: Trees) -> Tuple[ParameterRow, ...]:
     """Build the rows; costmaps with equal values share one, and so do robots."""
     found: Dict[ParameterRow, List[str]] = {}
-    known = [robot for robot in trace.robots if robot.parameters]
-    for robot in known:
-        number = "".join(re.findall(r"\d+$", robot.name))
-        for row in _with_common_costmaps(_rows(robot.parameters, number)):
-            found.setdefault(row, []).append(robot.name)
+    known = [name for name, tree in trees.items() if tree]
+    for name in known:
+        for row in _with_common_costmaps(_rows(trees[name], _number(name))):
+            found.setdefault(row, []).append(name)
     return tuple(
         ParameterRow(
             row.path,
@@ -45,6 +47,41 @@ def parameter_rows(trace: FlightTrace) -> Tuple[ParameterRow, ...]:
         )
         for row, names in found.items()
     )
+
+
+def difference_list(trees: Trees) -> List[Dict[str, Any]]:
+    """Return the differences as JSON objects with their exact values.
+
+    Each has ``parameter``, ``value``, ``default``, ``unit`` and the ``robots`` that it holds for,
+    None for all. ``{i}`` in a text stands for the robot's number.
+    """
+    found: Dict[str, Dict[str, Any]] = {}
+    for name, tree in trees.items():
+        for entry in differences(tree) if tree else ():
+            value = entry.value
+            if isinstance(value, str):
+                value = _numbered(value, _number(name))
+            fields = {
+                "parameter": entry.path,
+                "value": value,
+                "default": entry.default,
+                "unit": entry.unit,
+            }
+            key = json.dumps(fields, default=str)
+            found.setdefault(key, {**fields, "robots": []})["robots"].append(name)
+    known = sum(bool(tree) for tree in trees.values())
+    for fields in found.values():
+        fields["robots"] = fields["robots"] if len(fields["robots"]) < known else None
+    return list(found.values())
+
+
+def _number(robot: str) -> str:
+    return "".join(re.findall(r"\d+$", robot))
+
+
+def _numbered(text: str, number: str) -> str:
+    """Replace the robot's number in names such as ``odom0`` by ``{i}``."""
+    return re.sub(rf"(?<=[A-Za-z_]){number}\b", "{i}", text) if number else text
 
 
 def _rows(tree: Any, number: str) -> List[ParameterRow]:
@@ -59,8 +96,7 @@ def _text(value: Any, number: str) -> str:
         return str(value).lower()
     if isinstance(value, float):
         return f"{value:g}"
-    text = str(value)
-    return re.sub(rf"(?<=[A-Za-z_]){number}\b", "{i}", text) if number else text or '""'
+    return _numbered(str(value), number) or '""'
 
 
 def _with_common_costmaps(rows: List[ParameterRow]) -> List[ParameterRow]:
