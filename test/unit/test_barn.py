@@ -22,7 +22,7 @@ from quad_nav.barn.worlds import BarnWorld, load_worlds
 from quad_nav.cli.barn import barn
 from quad_nav.errors import InputError
 from quad_nav.mission.flight_log import Leg
-from quad_nav.mission.goal_file import Goal
+from quad_nav.mission.goal import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.offline.flight import StopAtContact
 from quad_nav.offline.run import fly

@@ -17,8 +17,9 @@ from quad_nav.mission.checkpoint import (
     shift_to_clock,
 )
 from quad_nav.mission.flight_log import FlightLog
-from quad_nav.mission.goal_file import Goal, GoalSequence, SequenceSettings
-from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
+from quad_nav.mission.sequencer import Dwell, GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import Contact
 
 A, B, C = Goal(3.0, 0.0), Goal(3.0, 4.0), Goal(0.0, 4.0, 1.5)
@@ -177,6 +178,35 @@ def test_another_missions_journal_is_refused():
         read_checkpoint(a_mission_on_its_second_goal().records, ["quad0"], "journal")
 
 
+def test_a_dwell_continues_on_a_new_clock():
+    stay = Goal(3.0, 0.0, wait_s=20.0)
+    mission = JournaledRobot(stay, B)
+    mission.fly(100.0, START)
+    mission.fly(110.0, A.pose)
+    later = mission.taken_over(-10.0, stay, B)  # 10 s flown, now it is 0
+    assert later.sequencer.dwell == Dwell(stay, 0.0)
+    assert later.fly(19.9, A.pose) == []
+    (sent,) = later.fly(20.0, A.pose)
+    assert (sent.index, sent.resend_reason) == (1, "")
+    # A wait that was edited meanwhile applies.
+    shorter = mission.taken_over(START_S, Goal(3.0, 0.0, wait_s=1.0), B)
+    assert len(shorter.fly(111.0, A.pose)) == 1
+
+
+def test_journals_of_older_versions_are_resumed():
+    mission = JournaledRobot(C, A)
+    mission.fly(100.0, START)
+    mission.fly(110.0, C.pose)
+    for record in mission.records[1:]:
+        del record["dwell"]
+        for part in (record["active_goal"]["goal"], *([record["leg"]] if record["leg"] else [])):
+            for key in ("wait_s", "tolerance_m", "yaw_tolerance_rad", "yaw_error_rad"):
+                part.pop(key, None)
+                part.get("goal", {}).pop(key, None)
+    later = mission.taken_over(START_S, C, A)
+    assert (later.log.robots["quad0"].legs[0].goal, later.sequencer.active_goal.goal) == (C, A)
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -190,6 +220,9 @@ def test_another_missions_journal_is_refused():
         {"log": []},
         {"active_goal": {"goal": 3}},
         {"active_goal": []},
+        {"dwell": {"since_s": 1.0}},
+        {"dwell": {"since_s": "1", "goal": {"x_m": 1.0, "y_m": 1.0, "yaw_rad": None}}},
+        {"dwell": 3.0},
         {"leg": "none"},
         {"robot": "quad7"},
         {"robot": ["quad0"]},

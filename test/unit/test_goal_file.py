@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from quad_nav.errors import InputError
+from quad_nav.mission.goal import GOAL_KEYS, Goal, goal_entry
 from quad_nav.mission.goal_file import (
     KEYS,
     SETTINGS,
-    Goal,
     GoalSequence,
     SequenceSettings,
     clearance_check,
@@ -59,11 +59,12 @@ def test_the_tutorials_listing_loads_without_braces():
 def test_every_key_is_read():
     sequence = parse_goals(
         """{"$schema": "schema.json", "goals": [[1, 2], [3, 4, 1.5]],
-        "loop": true, "goal_tolerance": 0.25, "goal_timeout": 60, "retries": 3}""",
+        "loop": true, "goal_tolerance": 0.25, "yaw_tolerance": 0.3, "goal_timeout": 60,
+        "retries": 3}""",
         "f.json",
     )
     assert sequence.goals == (Goal(1.0, 2.0), Goal(3.0, 4.0, 1.5))
-    assert sequence.settings == SequenceSettings(0.25, 60.0, 3, True)
+    assert sequence.settings == SequenceSettings(0.25, 60.0, 3, True, 0.3)
     assert isinstance(sequence.settings.retries, int)
 
 
@@ -75,6 +76,36 @@ def test_a_file_overrides_only_the_defaults_that_it_names():
 
 def test_a_byte_order_mark_is_ignored():
     assert parse_goals(b'\xef\xbb\xbf{"goals": [[1, 2]]}', "f.json").goals == (Goal(1.0, 2.0),)
+
+
+def test_a_goal_may_be_an_object_with_settings_of_its_own():
+    content = """{"goals": [[1, 2, null], {"x": 1, "y": 2}, {"x": 3, "y": 4, "yaw": null,
+        "wait_s": 5, "tolerance": 0.2}, {"x": 5, "y": 6, "yaw": -1, "yaw_tolerance": 0.5}],
+        "goal_tolerance": 0.3, "yaw_tolerance": 0.25}"""
+    sequence = parse_goals(content, "f.json")
+    assert sequence.goals == (
+        Goal(1.0, 2.0),
+        Goal(1.0, 2.0),
+        Goal(3.0, 4.0, wait_s=5.0, tolerance_m=0.2),
+        Goal(5.0, 6.0, -1.0, yaw_tolerance_rad=0.5),
+    )
+    assert [sequence.tolerance_m(goal) for goal in sequence.goals] == [0.3, 0.3, 0.2, 0.3]
+    assert [sequence.yaw_tolerance_rad(goal) for goal in sequence.goals] == [0.25, 0.25, 0.25, 0.5]
+    entries = [goal_entry(goal) for goal in sequence.goals]
+    assert entries[0] == [1.0, 2.0] and entries[2] == {
+        "x": 3.0,
+        "y": 4.0,
+        "wait_s": 5.0,
+        "tolerance": 0.2,
+    }
+    assert parse_goals(json.dumps({"goals": entries}), "f.json").goals == sequence.goals
+
+
+def test_goals_at_one_place_are_a_loop_if_they_differ_in_yaw():
+    content = '{{"goals": [[1, 2, 0], [1, 2, {yaw}]], "loop": true, "yaw_tolerance": 0.5}}'
+    assert parse_goals(content.format(yaw=1.1), "f.json").settings.loop
+    for yaw in (0.9, 2 * math.pi - 0.9, "null"):
+        assert "all goals are reached at one position" in faults(content.format(yaw=yaw))[0]
 
 
 @pytest.mark.parametrize(
@@ -109,6 +140,46 @@ def test_a_byte_order_mark_is_ignored():
                 "-2 pi and 2 pi (90 degrees are 1.571)"
             ),
         ),
+        (
+            '{"goals": [{"x": 1, "y": 2, "altitude": 3}]}',
+            "f.json: goals[0] (goal 1): altitude cannot be set for a goal: all quadcopters fly at "
+            "the scene's altitude; expected none here, and altitude in the scene file",
+        ),
+        ('{"goals": [{"x": 1, "y": 2, "Z": 0}]}', "f.json: goals[0] (goal 1): Z cannot be set"),
+        ('{"goals": [[1, 2]], "altitude": 2}', "f.json: altitude cannot be set for a goal: all"),
+        (
+            '{"goals": [{"x": 1, "y": 2, "wait": 3}]}',
+            "f.json: goals[0] (goal 1): wait is not a key of goals; expected wait_s",
+        ),
+        (
+            '{"goals": [{"x": 1}]}',
+            "f.json: goals[0] (goal 1): has no y; expected a number of metres",
+        ),
+        (
+            '{"goals": [{"x": null, "y": 2}]}',
+            "f.json: goals[0] (goal 1): x is null; expected a finite number of metres",
+        ),
+        (
+            '{"goals": [{"x": 1, "y": 2, "wait_s": -1}]}',
+            "f.json: goals[0] (goal 1): wait_s is -1; expected a number of seconds, 0 to 1e+09",
+        ),
+        (
+            '{"goals": [{"x": 1, "y": 2, "tolerance": null}]}',
+            "f.json: goals[0] (goal 1): tolerance is null; expected a number of metres above 0",
+        ),
+        (
+            '{"goals": [{"x": 1, "y": 2, "yaw": 0, "yaw_tolerance": 4}]}',
+            "f.json: goals[0] (goal 1): yaw_tolerance is 4; expected a number of radians above 0",
+        ),
+        (
+            '{"goals": [{"x": 1, "y": 2, "yaw": null, "yaw_tolerance": 1}]}',
+            "f.json: goals[0] (goal 1): yaw_tolerance has no effect without a yaw; expected a yaw",
+        ),
+        (
+            '{"goals": [{"x": 1, "y": 2, "yaw": "north"}]}',
+            'f.json: goals[0] (goal 1): yaw is "north"; expected a finite number of radians',
+        ),
+        ('{"goals": [{"x": 1, "x": 1, "y": 2}]}', "f.json: x: is given twice; expected once"),
         ('{"goals": [[1, 2]], "goals": [[3, 4]]}', "f.json: goals: is given twice; expected once"),
         (
             '{"goals": [[1, 2]], "Retrys": 1}',
@@ -230,4 +301,7 @@ def test_the_schema_agrees_with_the_code():
     assert schema["required"] == ["goals"] and schema["additionalProperties"] is False
     defaults = SequenceSettings()
     for key, setting in SETTINGS.items():
-        assert schema["properties"][key]["default"] == getattr(defaults, setting.field)
+        assert schema["properties"][key].get("default") == getattr(defaults, setting.field)
+    properties = schema["properties"]["goals"]["items"]["anyOf"][1]["properties"]
+    assert set(properties) == set(GOAL_KEYS)
+    assert properties["wait_s"]["default"] == Goal(0.0, 0.0).wait_s

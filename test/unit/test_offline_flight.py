@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from quad_nav.errors import InputError
+from quad_nav.geometry import Pose2D, angle_difference
 from quad_nav.mission.summary import to_json
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.navigator_group import NavigatorGroup
@@ -184,6 +185,26 @@ def test_a_short_mission_is_flown_to_its_end(tmp_path):
     assert summary.robots[0].legs[0].reached
     assert summary.robots[0].min_separation_m is None and summary.min_separation_m is None
     assert 0.0 < summary.robots[0].min_clearance_m < 1.5
+
+
+def test_goals_with_a_yaw_are_reached_facing_it_and_a_robot_stays_for_its_wait(tmp_path):
+    """From (1.5, 1.5) upwards, a turn to face backwards, 3 s, and again after the last goal."""
+    stay = {"x": 1.5, "y": 2.2, "yaw": -1.5, "wait_s": 3.0}
+    goals = write_goals(tmp_path / "goals", [stay, {"x": 1.5, "y": 2.2, "yaw": 1.5, "wait_s": 2.0}])
+    setup = read_setup(options(goals=goals, config="default", time_limit_s=60.0))
+    flight, ended = Flight(setup), {}
+    while not flight.is_done:
+        legs = len(flight.log.robots["quad0"].legs)
+        flight.advance()
+        if len(flight.log.robots["quad0"].legs) > legs:
+            ended[legs] = flight.now_s, next(iter(flight.states)).map_from_base.to_2d()
+    sent_s = flight.log.robots["quad0"].legs[1].time_s
+    flight.end()
+    for index, yaw_rad in ((0, -1.5), (1, 1.5)):
+        assert abs(angle_difference(ended[index][1].yaw_rad, yaw_rad)) <= 0.1
+        assert ended[index][1].distance_to(Pose2D(1.5, 2.2)) <= 0.4
+    assert ended[1][0] - sent_s - ended[0][0] == pytest.approx(3.0, abs=0.03)
+    assert flight.now_s - ended[1][0] == pytest.approx(2.0, abs=0.03)
 
 
 @pytest.mark.parametrize("seed", [1, 3])

@@ -19,6 +19,7 @@ from quad_nav.sim.scene import Scene, Walls
 
 ARENA = shipped("scenes", "arena.yaml")
 GOAL = [1.5, 6.0]
+DWA = "dwa_local_planner/DWAPlannerROS"
 GLOBAL = "global_costmap:\n"
 LOW = GLOBAL + "  height: 3.0\n"
 OFF = "(1.5, 6) is off the global costmap, x 0 to 12 m, y 0 to 3 m; expected a larger"
@@ -140,6 +141,55 @@ def test_faulty_values_do_not_hide_faults_in_files(tmp_path):
     expected = ("sequencer: size: is -1.0", "nowhere.yaml: cannot be read", OFF)
     assert len(problems) == 3
     assert all(fault in problem for fault, problem in zip(expected, problems))
+
+
+@pytest.mark.parametrize(
+    "tree, given, expected_rad",
+    [
+        ("TrajectoryPlannerROS:\n  yaw_goal_tolerance: 0.2\n", None, 0.2),
+        ("TrajectoryPlannerROS:\n  yaw_goal_tolerance: 0.2\n", 0.3, 0.3),
+        (f"base_local_planner: {DWA}\nDWAPlannerROS:\n  yaw_goal_tolerance: 0.15\n", None, 0.15),
+    ],
+)
+def test_the_tolerance_of_yaws_is_the_local_planners(tmp_path, tree, given, expected_rad):
+    goals = {"goals": [[*GOAL, 1.0]], **({"yaw_tolerance": given} if given else {})}
+    write(tmp_path, Case([goals], 1, tree))
+    folder = str(tmp_path / "config")
+    setups = [flight_setup.read_setup(FlightOptions(ARENA, tmp_path / "goals", folder))]
+    parameters = {"scene": str(ARENA), "goals": str(tmp_path / "goals"), "robots": 1}
+    server = {"move_base0": dict(config.load_files(Path(folder), {"i": "0"}))}
+    for more, known in (({}, server), ({"config": folder}, {})):
+        setups.append(
+            mission_setup.read_setup(
+                {**parameters, **more}, "sequencer", tmp_path / "r.json", tmp_path, known
+            )
+        )
+    for setup in setups:
+        sequence = setup.robots[0].sequence
+        assert sequence.yaw_tolerance_rad(sequence.goals[0]) == expected_rad
+
+
+def test_unknown_navigators_have_a_tolerance_of_yaws_and_the_node_may_set_one(tmp_path):
+    write(tmp_path, Case([{"goals": [[*GOAL, 1.0]]}]))
+    parameters = {"goals": str(tmp_path / "goals"), "robots": 1}
+    for more, expected_rad in (({}, 0.1), ({"yaw_tolerance": 0.7}, 0.7)):
+        setup = mission_setup.read_setup(
+            {**parameters, **more}, "sequencer", tmp_path / "r.json", tmp_path
+        )
+        sequence = setup.robots[0].sequence
+        assert sequence.yaw_tolerance_rad(sequence.goals[0]) == expected_rad
+
+
+def test_tolerances_below_the_local_planners_are_named(tmp_path):
+    goals = [[1.5, 3.0, 0.5], {"x": 1.5, "y": 6.0, "tolerance": 0.05}]
+    write(tmp_path, Case([{"goals": goals, "yaw_tolerance": 0.02}, {"goals": [GOAL]}], 2))
+    setup = flight_setup.read_setup(
+        FlightOptions(ARENA, tmp_path / "goals", str(tmp_path / "config"))
+    )
+    warnings = [line for line in setup.warnings if "quad0_goals.json" in line]
+    assert len(warnings) == 2 and not [line for line in setup.warnings if "quad1_g" in line]
+    assert "a tolerance of 0.05 m is below the local planner's xy_goal_tolerance" in warnings[0]
+    assert "a tolerance of 0.02 rad is below the local planner's yaw_goal_tol" in warnings[1]
 
 
 @pytest.mark.parametrize("robots", [0, -1, "two", True])

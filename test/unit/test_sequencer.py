@@ -5,8 +5,10 @@ import math
 import pytest
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal_file import Goal, GoalSequence, SequenceSettings
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
 from quad_nav.mission.sequencer import (
+    Dwell,
     GoalEnded,
     NavigatorReport,
     SendGoal,
@@ -181,3 +183,133 @@ def test_the_end_of_another_nodes_goal_matters_only_if_it_has_replaced_ours():
         1,
         "the navigator has finished another node's goal",
     )
+
+
+# Goals with a yaw: (0, 8), facing -1 rad.
+
+
+def facing(yaw_rad, off_m=0.0):
+    return Pose2D(C.x_m + off_m, C.y_m, yaw_rad)
+
+
+def test_a_goal_with_a_yaw_is_reached_in_position_and_yaw():
+    s = flying(C, yaw_tolerance_rad=0.05)
+    assert s.tick(1.0, facing(-1.0, off_m=0.41)) == []  # the yaw alone
+    assert s.tick(2.0, facing(-0.94)) == []  # the position alone
+    ended, done = s.tick(3.0, facing(-1.04, off_m=0.4))
+    assert (ended.reached, ended.time_s, done) == (True, 3.0, SequenceDone())
+    assert ended.yaw_error_rad == pytest.approx(-0.04)
+
+
+def test_the_error_of_a_yaw_does_not_count_full_turns():
+    s = flying(Goal(0.0, 8.0, 2 * math.pi - 0.01), yaw_tolerance_rad=0.05)
+    assert s.tick(1.0, facing(0.02))[0].yaw_error_rad == pytest.approx(0.03)
+
+
+def test_without_a_yaw_only_the_position_counts():
+    for goal in (Goal(0.0, 8.0), Goal(0.0, 8.0, yaw_tolerance_rad=0.01)):
+        assert flying(goal).tick(1.0, facing(3.0))[0].yaw_error_rad is None
+
+
+def test_a_goal_has_tolerances_of_its_own():
+    s = flying(Goal(0.0, 8.0, -1.0, tolerance_m=0.1, yaw_tolerance_rad=0.5))
+    assert s.tick(1.0, facing(-1.0, off_m=0.11)) == []
+    assert s.tick(2.0, facing(-0.6, off_m=0.1))[0].reached
+    s = flying(Goal(0.0, 8.0, tolerance_m=0.1), retries=0)
+    ended = s.tick(1.0, facing(0.0, off_m=0.15), [SUCCEEDED])[0]
+    assert ended.reason == "the navigator stopped 0.15 m from it (tolerance 0.10 m)"
+
+
+def test_a_navigator_that_stops_beside_the_yaw_may_settle():
+    s = flying(C, yaw_tolerance_rad=0.05)
+    assert s.tick(5.0, facing(-0.93), [SUCCEEDED]) == []
+    assert s.tick(5.9, facing(-0.94)) == []
+    assert s.tick(5.95, facing(-0.96))[0].reached
+
+
+def test_a_navigator_that_stays_beside_the_yaw_gets_the_goal_again_then_it_is_skipped():
+    s = flying(C, yaw_tolerance_rad=0.05, retries=1)
+    assert s.tick(5.0, facing(-0.93), [SUCCEEDED]) == []
+    reason = "the navigator stopped at it with a yaw error of 0.07 rad (yaw_tolerance 0.05 rad)"
+    assert s.tick(6.0, facing(-0.93)) == [SendGoal(0, 1, C.pose, 2, reason)]
+    assert s.tick(6.5, facing(-0.93), [SUCCEEDED]) == []
+    ended = s.tick(7.5, facing(-0.93))[0]
+    assert (ended.reached, ended.attempts, ended.reason) == (False, 2, reason)
+    assert ended.yaw_error_rad == pytest.approx(0.07)
+
+
+def test_a_goal_whose_yaw_is_not_reached_in_time_says_so():
+    s = flying(C, goal_timeout_s=30.0, retries=0)
+    ended = s.tick(30.0, facing(0.5))[0]
+    assert ended.reason == (
+        "not reached in 30 s, at it with a yaw error of 1.50 rad (yaw_tolerance 0.10 rad)"
+    )
+
+
+# Goals at which the robot stays.
+
+STAY = Goal(3.0, 4.0, wait_s=5.0)
+
+
+def test_the_next_goal_is_sent_after_the_dwell():
+    s = flying(STAY, B)
+    assert s.tick(20.0, at(STAY, 0.3)) == [GoalEnded(0, 1, STAY, True, 20.0, 1)]
+    assert (s.dwell, s.active_goal, s.index) == (Dwell(STAY, 20.0), None, 1)
+    assert s.tick(24.9, at(STAY), [SUCCEEDED], navigator_idle=True) == []
+    (sent,) = s.tick(25.0, at(STAY, 2.0), [NavigatorReport(Verdict.OTHER_ENDED)])
+    assert (sent.index, s.dwell) == (1, None)
+    # The dwell does not count for the time of the next goal.
+    assert s.tick(31.0, at(B))[0].time_s == 6.0
+
+
+def test_the_mission_ends_after_the_last_dwell():
+    s = flying(STAY)
+    assert len(s.tick(1.0, at(STAY))) == 1 and not s.done
+    assert s.tick(5.9, at(STAY)) == [] and not s.done
+    assert s.tick(6.0, at(STAY)) == [SequenceDone()] and s.done
+
+
+def test_a_lap_ends_after_the_last_dwell():
+    s = flying(B, STAY, loop=True)
+    s.tick(1.0, at(B))
+    s.tick(2.0, at(STAY))
+    assert (s.index, s.lap) == (2, 1)
+    (sent,) = s.tick(7.0, at(STAY))
+    assert (sent.index, sent.lap) == (0, 2)
+
+
+def test_a_robot_does_not_stay_at_a_goal_that_is_skipped():
+    s = flying(STAY, B, retries=0)
+    assert [type(one) for one in s.tick(1.0, START, [ABORTED])] == [GoalEnded, SendGoal]
+
+
+def test_a_dwell_counts_as_time_of_no_attempt():
+    s = flying(Goal(3.0, 4.0, wait_s=500.0), B, goal_timeout_s=30.0)
+    s.tick(1.0, at(STAY))
+    assert s.tick(500.0, at(STAY)) == []
+
+
+@pytest.mark.parametrize("wait_s, until_s", [(0.0, 2.0), (2.5, 3.5), (9.0, 10.0)])
+def test_an_edited_wait_applies_to_the_dwell(wait_s, until_s):
+    s = flying(STAY, B)
+    s.tick(1.0, at(STAY))
+    s.replace_sequence(GoalSequence((Goal(3.0, 4.0, wait_s=wait_s), B)))
+    if until_s > 2.0:
+        assert s.tick(until_s - 0.01, at(STAY)) == []
+    assert s.tick(until_s, at(STAY))[0].index == 1
+
+
+def test_an_edit_that_moves_the_goal_leaves_its_dwell():
+    s = flying(STAY, B)
+    s.tick(1.0, at(STAY))
+    s.replace_sequence(GoalSequence((Goal(9.0, 9.0), C)))
+    assert s.tick(5.9, at(STAY)) == []
+    assert s.tick(6.0, at(STAY))[0].pose == C.pose
+
+
+def test_edited_settings_of_the_active_goal_apply_without_sending_it_again():
+    s = flying(A, B)
+    s.replace_sequence(GoalSequence((Goal(3.0, 4.0, wait_s=5.0, tolerance_m=0.1), B)))
+    assert s.tick(1.0, at(A, 0.3)) == []
+    assert len(s.tick(2.0, at(A, 0.09))) == 1
+    assert s.dwell == Dwell(Goal(3.0, 4.0, wait_s=5.0, tolerance_m=0.1), 2.0)

@@ -1,13 +1,15 @@
 """Flight log and summary, with figures that can be computed by hand."""
 
 import json
+import math
 
 import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.flight_log import FlightLog, Leg, unflown_legs
-from quad_nav.mission.goal_file import Goal, GoalSequence
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.mission.summary import (
     MissionSummary,
@@ -149,6 +151,24 @@ def test_the_table_has_figures_and_reasons():
     )
 
 
+def test_goals_with_a_yaw_have_its_error():
+    log = FlightLog(["quad0"], 0.3)
+    goals = (Goal(3.0, 4.0, 1.0), Goal(9.0, 4.0), Goal(9.0, 9.0, -3.0), Goal(9.0, 9.0, 0.0))
+    sequencer = Sequencer(GoalSequence(goals))
+    fly(log, "quad0", sequencer, [(0.0, Pose2D(0, 0)), (9.0, Pose2D(3, 4, 0.92))])
+    fly(log, "quad0", sequencer, [(12.0, Pose2D(9, 4, 2.0)), (15.0, Pose2D(9, 8, 3.0))])
+    legs = log.robots["quad0"].all_legs(sequencer, 20.0)
+    errors = (-0.08, None, 6.0 - 2 * math.pi, None)  # reached, without, interrupted, not sent
+    assert [one.yaw_error_rad for one in legs] == [
+        None if error is None else pytest.approx(error) for error in errors
+    ]
+    summary = summarize(log, {"quad0": sequencer}, 20.0, sim_time_s=20.0, wall_time_s=1.0)
+    assert to_json(summary)["robots"][0]["goals"][0]["yaw_error_rad"] == -0.08
+    text = table(summary)
+    assert "yaw error" in text and "-0.08" in text and "-0.28" in text
+    assert "yaw error" not in table(SUMMARY)
+
+
 def test_a_narrow_terminal_drops_columns_and_names_them():
     goals, robots, *_ = table(SUMMARY, 60).split("\n\n")
     lines = goals.splitlines()
@@ -184,6 +204,8 @@ DOCUMENTED = {
                     "x_m": 3.0,
                     "y_m": 4.0,
                     "yaw_rad": None,
+                    "yaw_error_rad": None,
+                    "wait_s": 0.0,
                     "reached": True,
                     "time_s": 10.0,
                     "reason": "",

@@ -18,7 +18,7 @@ from quad_nav.cli import main
 from quad_nav.errors import InputError, printable
 from quad_nav.files.shipped import shipped
 from quad_nav.mission.flight_log import Leg
-from quad_nav.mission.goal_file import Goal
+from quad_nav.mission.goal import Goal
 from quad_nav.mission.summary import MissionSummary, RobotSummary
 from quad_nav.mission.summary_table import table
 from quad_nav.recording.bag_info import checked_flight

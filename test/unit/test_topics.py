@@ -12,7 +12,8 @@ from quad_nav.costmap.cost_grid import NO_CELLS, Window
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D
-from quad_nav.mission.goal_file import Goal, GoalSequence
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Sphere, Walls
@@ -29,6 +30,7 @@ from quad_nav.topics.flight_info import (
 )
 from quad_nav.topics.goal_routing import GoalRouter, Route, selection_markers
 from quad_nav.topics.markers import (
+    ARROW,
     CUBE,
     CUBE_LIST,
     CYLINDER,
@@ -101,6 +103,13 @@ def test_the_active_goal_is_large_and_the_reached_one_dim():
     spheres = [m for m in goal_markers([sequencer], 1.0) if m.kind == SPHERE]
     assert [m.size_m[0] for m in spheres] == [0.30, 0.45, 0.30]
     assert [m.rgba[3] for m in spheres] == [0.2, 1.0, 0.75]
+
+
+def test_a_goal_with_a_yaw_has_an_arrow():
+    sequencer = Sequencer(GoalSequence((Goal(1.0, 0.0), Goal(2.0, 0.0, -0.5), Goal(3.0, 0.0))))
+    (arrow,) = [m for m in goal_markers([sequencer], 1.5) if m.kind == ARROW]
+    assert (arrow.namespace, arrow.number, arrow.yaw_rad) == ("goal0_yaw", 1, -0.5)
+    assert arrow.place_m == (2.0, 0.0, 1.5) and arrow.size_m[0] > 0.45
 
 
 # Paths and costmaps.
@@ -244,6 +253,7 @@ def test_events_of_the_sequencer():
         "reached": False,
         "attempts": 2,
         "reason": "aborted",
+        "yaw_error_rad": None,
     }
     assert event(0, 9.0, SequenceDone())["event"] == "done"
 

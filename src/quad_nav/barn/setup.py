@@ -16,7 +16,8 @@ from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import config_folder
-from quad_nav.mission.goal_file import Goal, GoalSequence, SequenceSettings
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, WatchedGoalFile
 from quad_nav.scenario.flight_setup import FlightSetup, sensor_faults
 from quad_nav.scenario.goal_checks import goals_off_the_costmap

@@ -27,11 +27,13 @@ from typing import (
 from quad_nav.errors import InputError
 from quad_nav.files.values import is_number, is_whole
 from quad_nav.mission.flight_log import FlightLog, Leg, RobotLogState
-from quad_nav.mission.sequencer import START, ActiveGoal, SequenceProgress, Sequencer
+from quad_nav.mission.sequencer import START, ActiveGoal, Dwell, SequenceProgress, Sequencer
 from quad_nav.sim.contacts import Contact
 
 T = TypeVar("T")
 _LARGEST = 10**9  # of a counter
+# Records have one each of the legs; older journals lack the others, which then have their defaults.
+_MAY_LACK = {"legs", "wait_s", "tolerance_m", "yaw_tolerance_rad", "yaw_error_rad"}
 _ACCEPTS: Dict[Any, Callable[[Any], bool]] = {
     float: is_number,
     int: lambda value: is_whole(value) and abs(value) <= _LARGEST,
@@ -80,15 +82,17 @@ def robot_record(
     name: str, sequencer: Sequencer, log: FlightLog, leg: Optional[Leg], start_s: float
 ) -> Dict[str, Any]:
     """Return the record of a robot's state; ``leg`` is the leg that has just ended, if any."""
-    active = sequencer.active_goal
+    progress = _shifted(sequencer.progress, -start_s)
+    active, dwell = progress.active_goal, progress.dwell
     state = dataclasses.asdict(dataclasses.replace(log.robots[name].state, legs=()))
     del state["legs"]  # each has a record of its own
     clearance_m, separation_m = log.distances.recent_minima_m(name)
     return {
         "robot": name,
-        "index": sequencer.index,
-        "lap": sequencer.lap,
-        "active_goal": None if active is None else dataclasses.asdict(_shifted(active, -start_s)),
+        "index": progress.index,
+        "lap": progress.lap,
+        "active_goal": None if active is None else dataclasses.asdict(active),
+        "dwell": None if dwell is None else dataclasses.asdict(dwell),
         "log": state,
         "leg": None if leg is None else dataclasses.asdict(leg),
         "clearance_m": clearance_m,
@@ -167,6 +171,7 @@ def _read_robot(before: RobotCheckpoint, record: Mapping[str, Any]) -> RobotChec
         _value(record["index"], int),
         _value(record["lap"], int),
         _value(record["active_goal"], Optional[ActiveGoal]),
+        _value(record.get("dwell"), Optional[Dwell]),
     )
     if progress.index < 0 or progress.lap < 1:
         raise ValueError(f"goal {progress.index} of lap {progress.lap}, expected 0 or more of 1")
@@ -180,15 +185,18 @@ def _read_robot(before: RobotCheckpoint, record: Mapping[str, Any]) -> RobotChec
 
 def shift_to_clock(progress: SequenceProgress, start_s: float) -> SequenceProgress:
     """Shift times since the start of the mission to a clock that was ``start_s`` then."""
-    if progress.active_goal is None:
-        return progress
-    return dataclasses.replace(progress, active_goal=_shifted(progress.active_goal, start_s))
+    return _shifted(progress, start_s)
 
 
-def _shifted(active: ActiveGoal, by_s: float) -> ActiveGoal:
-    return dataclasses.replace(
-        active, first_sent_s=active.first_sent_s + by_s, sent_s=active.sent_s + by_s
-    )
+def _shifted(progress: SequenceProgress, by_s: float) -> SequenceProgress:
+    active, dwell = progress.active_goal, progress.dwell
+    if active is not None:
+        active = dataclasses.replace(
+            active, first_sent_s=active.first_sent_s + by_s, sent_s=active.sent_s + by_s
+        )
+    if dwell is not None:
+        dwell = dataclasses.replace(dwell, since_s=dwell.since_s + by_s)
+    return dataclasses.replace(progress, active_goal=active, dwell=dwell)
 
 
 def _instance(values: Any, kind: Callable[..., T]) -> T:
@@ -196,7 +204,7 @@ def _instance(values: Any, kind: Callable[..., T]) -> T:
     if not isinstance(values, dict):
         raise TypeError(f"{values!r:.40}, expected an object")
     hints = _hints(kind)
-    missing = sorted(set(hints) - set(values) - {"legs"})  # each leg has a record of its own
+    missing = sorted(set(hints) - set(values) - _MAY_LACK)
     if missing:
         raise KeyError(missing[0])
     return kind(**{key: _value(value, hints[key]) for key, value in values.items()})

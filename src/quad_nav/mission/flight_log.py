@@ -11,7 +11,8 @@ from typing import Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.geometry import Pose2D, angle_difference
 from quad_nav.mission.distances import DistanceLog, SurfaceDistance
-from quad_nav.mission.goal_file import Goal, GoalSequence
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal, SequenceDone, Sequencer
 from quad_nav.sim.contacts import CONTACT_GAP_S, Contact
 
@@ -31,7 +32,8 @@ class Leg:
     """Flight to one goal.
 
     ``straight_length_m`` is the distance from the position where the goal was sent to the one
-    where it ended. ``time_s`` is None if the goal was not sent.
+    where it ended. ``time_s`` is None if the goal was not sent. ``yaw_error_rad`` is the robot's
+    yaw at the end less the goal's; None for a goal without yaw, or if it was not sent.
     """
 
     index: int
@@ -43,6 +45,7 @@ class Leg:
     time_s: Optional[float] = None
     path_length_m: float = 0.0
     straight_length_m: float = 0.0
+    yaw_error_rad: Optional[float] = None
 
 
 @dataclass(frozen=True)
@@ -145,9 +148,10 @@ class RobotLog:
         ]
         if active is not None and rest:
             time_s = now_s - active.first_sent_s
+            error_rad = None if self._pose is None else active.goal.yaw_error_rad(self._pose)
             rest[0] = self._present_leg(
                 GoalEnded(
-                    first, lap, rest[0].goal, False, time_s, active.attempt, reason=INTERRUPTED
+                    first, lap, active.goal, False, time_s, active.attempt, INTERRUPTED, error_rad
                 )
             )
         return self.legs + rest
@@ -166,6 +170,7 @@ class RobotLog:
             ended.time_s,
             self.path_length_m - self._leg_start_length_m,
             straight_m,
+            ended.yaw_error_rad,
         )
 
 

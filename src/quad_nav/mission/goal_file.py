@@ -1,5 +1,6 @@
 """Goal files: ``{"goals": [[x, y], [x, y, yaw], ...]}``, metres and radians in ``map``.
 
+A goal with further settings is an object: ``{"x": 1.0, "y": 2.0, "yaw": null, "wait_s": 5.0}``.
 A file with a fault is refused as a whole. The error lists every fault as ``file: place: what is
 wrong; what was expected``. ``goals/schema.json`` describes the format for editors,
 ``docs/goals.md`` for people.
@@ -12,37 +13,33 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import read_bytes
 from quad_nav.files.values import expected_name, is_number
-from quad_nav.geometry import Pose2D
+from quad_nav.mission.goal import (
+    ALTITUDES,
+    MAX_TIMEOUT_S,
+    YAW_TOLERANCE,
+    Goal,
+    Setting,
+    altitude_fault,
+    goal_faults,
+    position_tolerance,
+    read_goal,
+    show,
+)
 
 MAX_BYTES = 4 * 1024 * 1024
 MAX_GOALS = 10_000
-MAX_COORDINATE_M = 1e6
-"""Largest coordinate of a goal, and largest tolerance."""
-MAX_TIMEOUT_S = 1e9
+DEFAULT_YAW_TOLERANCE_RAD = 0.1
+"""Tolerance of a robot whose local planner is unknown or has no ``yaw_goal_tolerance``."""
 
 PlaceCheck = Callable[[float, float], Optional[str]]
 """Returns what is wrong with a position (x, y) in ``map``, or None if a robot fits there."""
-
-
-@dataclass(frozen=True)
-class Goal:
-    """Position in ``map``; without a yaw the robot may face in the direction of its path."""
-
-    x_m: float
-    y_m: float
-    yaw_rad: Optional[float] = None
-
-    @property
-    def pose(self) -> Pose2D:
-        """Pose in ``map``, with yaw 0 if the goal has none."""
-        return Pose2D(self.x_m, self.y_m, self.yaw_rad or 0.0)
 
 
 @dataclass(frozen=True)
@@ -54,12 +51,15 @@ class SequenceSettings:
         goal_timeout_s: Time for one attempt.
         retries: Further attempts before the goal is skipped.
         loop: Start again with the first goal after the last one.
+        yaw_tolerance_rad: Error of the yaw within which a goal with a yaw counts as reached; None
+            for ``DEFAULT_YAW_TOLERANCE_RAD``.
     """
 
     goal_tolerance_m: float = 0.4
     goal_timeout_s: float = 120.0
     retries: int = 1
     loop: bool = False
+    yaw_tolerance_rad: Optional[float] = None
 
 
 DEFAULT_SETTINGS = SequenceSettings()
@@ -72,32 +72,32 @@ class GoalSequence:
     goals: Tuple[Goal, ...]
     settings: SequenceSettings = DEFAULT_SETTINGS
 
+    def tolerance_m(self, goal: Goal) -> float:
+        """Return the distance from a goal within which it counts as reached."""
+        return self.settings.goal_tolerance_m if goal.tolerance_m is None else goal.tolerance_m
 
-class _Setting(NamedTuple):
-    """Field of ``SequenceSettings``, test for a value, and phrase for messages."""
+    def yaw_tolerance_rad(self, goal: Goal) -> float:
+        """Return the error of the yaw within which a goal with a yaw counts as reached."""
+        for tolerance_rad in (goal.yaw_tolerance_rad, self.settings.yaw_tolerance_rad):
+            if tolerance_rad is not None:
+                return tolerance_rad
+        return DEFAULT_YAW_TOLERANCE_RAD
 
-    field: str
-    accepts: Callable[[Any], bool]
-    expected: str
 
-
-SETTINGS: Dict[str, _Setting] = {
-    "goal_tolerance": _Setting(
-        "goal_tolerance_m",
-        lambda v: is_number(v) and 0 < v <= MAX_COORDINATE_M,
-        f"a number of metres above 0, {MAX_COORDINATE_M:g} at most",
-    ),
-    "goal_timeout": _Setting(
+SETTINGS: Dict[str, Setting] = {
+    "goal_tolerance": position_tolerance("goal_tolerance_m"),
+    "yaw_tolerance": YAW_TOLERANCE,
+    "goal_timeout": Setting(
         "goal_timeout_s",
         lambda v: is_number(v) and 0 < v <= MAX_TIMEOUT_S,
         f"a number of seconds above 0, {MAX_TIMEOUT_S:g} at most",
     ),
-    "retries": _Setting(
+    "retries": Setting(
         "retries",
         lambda v: is_number(v) and 0 <= v <= MAX_GOALS and v == int(v),
         f"a whole number, 0 to {MAX_GOALS}",
     ),
-    "loop": _Setting("loop", lambda v: isinstance(v, bool), "true or false"),
+    "loop": Setting("loop", lambda v: isinstance(v, bool), "true or false"),
 }
 KEYS: Tuple[str, ...] = ("goals", "$schema", *SETTINGS)
 
@@ -142,13 +142,13 @@ def parse_goals(
         raise InputError([f'{name}: is {_kind(tree)}; expected {{"goals": [[x, y], ...]}}'])
     problems += [_unknown_key(name, key) for key in tree if key not in KEYS]
     if not isinstance(tree.get("$schema", ""), str):
-        problems.append(f"{name}: $schema: is {_show(tree['$schema'])}; expected a string")
+        problems.append(f"{name}: $schema: is {show(tree['$schema'])}; expected a string")
     given = {key: tree[key] for key in SETTINGS if key in tree}
     settings, faults = read_settings(given, name, defaults)
-    goals, goal_faults = _read_goals(tree, name, check_place)
-    problems += faults + goal_faults
+    goals, faults_in_goals = _read_goals(tree, name, check_place)
+    problems += faults + faults_in_goals
     if not problems and settings.loop:
-        problems += _loop_faults(goals, settings.goal_tolerance_m, name)
+        problems += _loop_faults(GoalSequence(tuple(goals), settings), name)
     if problems:
         raise InputError(problems)
     return GoalSequence(tuple(goals), settings)
@@ -159,7 +159,7 @@ def read_settings(
 ) -> Tuple[SequenceSettings, List[str]]:
     """Return the settings with these names in a goal file, and the faults in their values."""
     problems = [
-        f"{name}: {key}: is {_show(value)}; expected {SETTINGS[key].expected}"
+        f"{name}: {key}: is {show(value)}; expected {SETTINGS[key].expected}"
         for key, value in values.items()
         if not SETTINGS[key].accepts(value)
     ]
@@ -255,44 +255,36 @@ def _read_goals(
     problems: List[str] = []
     for index, entry in enumerate(entries):
         place = f"{name}: goals[{index}] (goal {index + 1})"
-        faults = list(_goal_faults(entry))
+        faults = list(goal_faults(entry))
         if not faults:
-            goals.append(Goal(*entry))
-            fault = check_place(entry[0], entry[1]) if check_place else None
-            faults = [f": ({entry[0]:g}, {entry[1]:g}) {fault}"] if fault else []
+            goal = read_goal(entry)
+            goals.append(goal)
+            fault = check_place(goal.x_m, goal.y_m) if check_place else None
+            faults = [f": ({goal.x_m:g}, {goal.y_m:g}) {fault}"] if fault else []
         problems += [place + fault for fault in faults]
     return goals, problems
 
 
-def _goal_faults(entry: Any) -> Iterable[str]:
-    if not isinstance(entry, list):
-        yield f": is {_show(entry)}; expected [x, y] or [x, y, yaw]"
-        return
-    if len(entry) not in (2, 3):
-        yield f": has {len(entry)} numbers; expected [x, y] or [x, y, yaw]"
-        return
-    for label, unit, value in zip(("x", "y", "yaw"), ("metres", "metres", "radians"), entry):
-        if not is_number(value):
-            yield f": {label} is {_show(value)}; expected a finite number of {unit}"
-        elif label != "yaw" and abs(value) > MAX_COORDINATE_M:
-            yield f": {label} is {value:g}; expected {MAX_COORDINATE_M:g} metres at most"
-        elif label == "yaw" and abs(value) > 2 * math.pi:
-            yield (
-                f": yaw is {value:g}; expected radians between -2 pi and 2 pi "
-                f"({value:g} degrees are {math.radians(value):.4g})"
-            )
-
-
-def _loop_faults(goals: List[Goal], tolerance_m: float, name: str) -> List[str]:
-    """Refuse a loop whose goals are all reached at one position: it would never end there."""
+def _loop_faults(sequence: GoalSequence, name: str) -> List[str]:
+    """Refuse a loop whose goals are all reached at one pose: it would never end there."""
+    goals = sequence.goals
     places = np.array([(goal.x_m, goal.y_m) for goal in goals])
-    if any(np.hypot(*(places - place).T).max() > 2 * tolerance_m for place in places):
-        return []
-    expected = f"two goals more than twice the goal_tolerance apart ({2 * tolerance_m:g} m)"
+    near_m = np.array([sequence.tolerance_m(goal) for goal in goals])
+    yaws = np.array([math.nan if goal.yaw_rad is None else goal.yaw_rad for goal in goals])
+    near_rad = np.array([sequence.yaw_tolerance_rad(goal) for goal in goals])
+    for place, tolerance_m, yaw_rad, tolerance_rad in zip(places, near_m, yaws, near_rad):
+        turns_rad = np.abs(np.remainder(yaws - yaw_rad + math.pi, 2 * math.pi) - math.pi)
+        is_apart = np.hypot(*(places - place).T) > near_m + tolerance_m
+        if (is_apart | (turns_rad > near_rad + tolerance_rad)).any():
+            return []
+    least_m = 2 * sequence.settings.goal_tolerance_m
+    expected = f"two goals more than twice the goal_tolerance apart ({least_m:g} m)"
     return [f"{name}: loop: all goals are reached at one position; expected {expected}"]
 
 
 def _unknown_key(name: str, key: str) -> str:
+    if key.lower() in ALTITUDES:
+        return f"{name}: {altitude_fault(key)}"
     return f"{name}: {key}: is not a key of goal files; expected {expected_name(key.lower(), KEYS)}"
 
 
@@ -301,10 +293,4 @@ def _kind(value: Any) -> str:
         return "an object"
     if isinstance(value, list):
         return "a list"
-    return _show(value)
-
-
-def _show(value: Any) -> str:
-    """Return a value as the file shows it, shortened."""
-    text = f"{value:g}" if isinstance(value, float) and math.isfinite(value) else json.dumps(value)
-    return text if len(text) <= 40 else text[:37] + "..."
+    return show(value)

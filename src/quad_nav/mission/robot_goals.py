@@ -104,14 +104,14 @@ def goal_paths(folder: Path, robots: int) -> Tuple[Dict[int, Path], List[str]]:
 def load_robot_goals(
     paths: Mapping[int, Path],
     checks: Mapping[int, PlaceCheck] = MappingProxyType({}),
-    settings: SequenceSettings = DEFAULT_SETTINGS,
+    settings: Mapping[int, SequenceSettings] = MappingProxyType({}),
 ) -> Tuple[List[RobotGoals], List[str]]:
     """Read the goal files of several robots.
 
     Args:
         paths: The files, by the robots' numbers.
         checks: Checks for the positions of goals, by the robots' numbers.
-        settings: Settings that a file does not give.
+        settings: Settings that a file does not give, by the robots' numbers.
 
     Returns:
         The goals of each readable file, and all faults in the other files.
@@ -119,7 +119,7 @@ def load_robot_goals(
     robots: List[RobotGoals] = []
     problems: List[str] = []
     for number, path in paths.items():
-        file = WatchedGoalFile(path, checks.get(number), settings)
+        file = WatchedGoalFile(path, checks.get(number), settings.get(number, DEFAULT_SETTINGS))
         try:
             robots.append(RobotGoals(f"quad{number}", file, file.load()))
         except InputError as error:

@@ -1,9 +1,9 @@
 """State machine that flies one robot's goals in order, without ROS and without a clock.
 
-A goal is reached when the robot's odometry is within the tolerance of it. What the navigator
-reports only decides when to send the goal again.
+A goal is reached when the robot's odometry is within the tolerance of it, and, if it has a yaw,
+within the tolerance of that. What the navigator reports only decides when to send the goal again.
 
-    send -> flying -> reached ------------------> next goal, or done
+    send -> flying -> reached -> dwell (wait_s) -> next goal, or done
               |
               +-> aborted, timed out, reported as reached elsewhere
               |       -> send again while retries remain -> skipped -> next
@@ -21,10 +21,13 @@ from dataclasses import dataclass
 from typing import List, Optional, Sequence, Union
 
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal_file import Goal, GoalSequence
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.goal_file import GoalSequence
 
 GOAL_LOST_AFTER_S = 5.0
 """A navigator that is idle for so long has lost the goal: it restarted, or was not ready."""
+SETTLE_S = 1.0
+"""A robot may still turn, and odometry lag, for so long after the navigator's success."""
 
 
 class Verdict(enum.Enum):
@@ -64,7 +67,11 @@ class SendGoal:
 
 @dataclass(frozen=True)
 class GoalEnded:
-    """Action: a goal is reached, or skipped for ``reason``; ``time_s`` since it was first sent."""
+    """Action: a goal is reached, or skipped for ``reason``.
+
+    ``time_s`` is the time since it was first sent, ``yaw_error_rad`` the robot's yaw less the
+    goal's; None for a goal without yaw. The robot stays for the goal's ``wait_s`` afterwards.
+    """
 
     index: int
     lap: int
@@ -73,6 +80,7 @@ class GoalEnded:
     time_s: float
     attempts: int
     reason: str = ""
+    yaw_error_rad: Optional[float] = None
 
 
 @dataclass(frozen=True)
@@ -105,12 +113,33 @@ class ActiveGoal:
 
 
 @dataclass(frozen=True)
+class Dwell:
+    """Stay at a goal that was reached at ``since_s``, for its ``wait_s``."""
+
+    goal: Goal
+    since_s: float
+
+    @property
+    def until_s(self) -> float:
+        """Time from which the next goal is due."""
+        return self.since_s + self.goal.wait_s
+
+
+@dataclass(frozen=True)
 class SequenceProgress:
-    """Snapshot of a sequencer: index of the active or next goal, lap, and the active goal."""
+    """Snapshot of a sequencer.
+
+    Attributes:
+        index: Index of the active or next goal.
+        lap: Round through the goals, 1 for the first.
+        active_goal: The goal that the robot flies to.
+        dwell: The stay at the goal before ``index``.
+    """
 
     index: int = 0
     lap: int = 1
     active_goal: Optional[ActiveGoal] = None
+    dwell: Optional[Dwell] = None
 
 
 START = SequenceProgress()
@@ -126,10 +155,12 @@ class Sequencer:
     def __init__(self, sequence: GoalSequence, progress: SequenceProgress = START) -> None:
         self._sequence = sequence
         self._index, self._lap, self._active = progress.index, progress.lap, progress.active_goal
+        self._dwell = progress.dwell
         self._is_resumed = progress.active_goal is not None
         self._busy_s = 0.0  # the last time at which the navigator was not known to be idle
+        self._stopped_s: Optional[float] = None  # since when it reports the goal as reached
         self._done = False
-        self._drop_replaced_goal()
+        self._adopt_goals()
 
     @property
     def sequence(self) -> GoalSequence:
@@ -148,13 +179,18 @@ class Sequencer:
 
     @property
     def active_goal(self) -> Optional[ActiveGoal]:
-        """The goal that the robot flies to; None before the first and after the last."""
+        """The goal that the robot flies to; None before the first, after the last, in a dwell."""
         return self._active
+
+    @property
+    def dwell(self) -> Optional[Dwell]:
+        """The stay at the goal that was reached last; None if it has ended or there is none."""
+        return self._dwell
 
     @property
     def progress(self) -> SequenceProgress:
         """Snapshot that another sequencer can resume from."""
-        return SequenceProgress(self._index, self._lap, self._active)
+        return SequenceProgress(self._index, self._lap, self._active, self._dwell)
 
     @property
     def done(self) -> bool:
@@ -165,17 +201,26 @@ class Sequencer:
         """Follow an edited goal file from the next tick on.
 
         Goals before the present index stay ended. The active goal stays active if the new list
-        has the same goal at its index.
+        has the same pose at its index; its other settings apply from now on. So does the
+        ``wait_s`` of the goal at which the robot stays.
         """
         self._sequence = sequence
         self._done = False
-        self._drop_replaced_goal()
+        self._adopt_goals()
 
-    def _drop_replaced_goal(self) -> None:
-        goals = self._sequence.goals
-        current = goals[self._index] if self._index < len(goals) else None
-        if self._active is not None and self._active.goal != current:
-            self._active = None
+    def _adopt_goals(self) -> None:
+        """Take the settings of the active goal and of the dwell's from the sequence."""
+        goals = dict(enumerate(self._sequence.goals))
+        if self._active is not None:
+            goal = goals.get(self._index)
+            if goal is None or not goal.is_same_pose(self._active.goal):
+                self._active = None
+            else:
+                self._active = dataclasses.replace(self._active, goal=goal)
+        if self._dwell is not None:
+            goal = goals.get(self._index - 1)
+            if goal is not None and goal.is_same_pose(self._dwell.goal):
+                self._dwell = dataclasses.replace(self._dwell, goal=goal)
 
     def tick(
         self,
@@ -194,6 +239,10 @@ class Sequencer:
         """
         if self._done:
             return []
+        if self._dwell is not None:
+            if now_s < self._dwell.until_s:
+                return []
+            self._dwell = None
         if self._active is None:
             return self._start_next(now_s, pose)
         if not navigator_idle:
@@ -206,7 +255,7 @@ class Sequencer:
         self, active: ActiveGoal, now_s: float, pose: Pose2D, reports: Sequence[NavigatorReport]
     ) -> List[Action]:
         settings = self._sequence.settings
-        if pose.distance_to(active.pose) <= settings.goal_tolerance_m:
+        if self._is_at(active.goal, pose) and self._has_yaw(active.goal, pose):
             return self._end(active, now_s, pose, "")
         if any(report.verdict is Verdict.CANCELLED for report in reports):
             return self._end(active, now_s, pose, "cancelled by another node")
@@ -219,6 +268,14 @@ class Sequencer:
             retry = dataclasses.replace(active, sent_s=now_s, attempt=active.attempt + 1)
             return [self._send(now_s, retry, failure)]
         return self._end(active, now_s, pose, failure) if failure else []
+
+    def _is_at(self, goal: Goal, pose: Pose2D) -> bool:
+        return pose.distance_to(goal.pose) <= self._sequence.tolerance_m(goal)
+
+    def _has_yaw(self, goal: Goal, pose: Pose2D) -> bool:
+        """Return whether a pose has a goal's yaw; any yaw will do for a goal without one."""
+        error_rad = goal.yaw_error_rad(pose)
+        return error_rad is None or abs(error_rad) <= self._sequence.yaw_tolerance_rad(goal)
 
     def _loss_reason(
         self, active: ActiveGoal, now_s: float, reports: Sequence[NavigatorReport]
@@ -240,14 +297,32 @@ class Sequencer:
         for report in reports:
             if report.verdict is Verdict.ABORTED:
                 return f"aborted: {report.text}" if report.text else "aborted"
-            if report.verdict is Verdict.SUCCEEDED:
-                return (
-                    f"the navigator stopped {pose.distance_to(active.pose):.2f} m from it "
-                    f"(goal_tolerance {settings.goal_tolerance_m:.2f} m)"
-                )
+            if report.verdict is Verdict.SUCCEEDED and self._stopped_s is None:
+                self._stopped_s = now_s
+        if self._stopped_s is not None:
+            is_settling = active.goal.yaw_rad is not None and self._is_at(active.goal, pose)
+            if not is_settling or now_s - self._stopped_s >= SETTLE_S:
+                return f"the navigator stopped {self._offset_text(active.goal, pose)}"
         if now_s - active.sent_s >= settings.goal_timeout_s:
-            return f"not reached in {settings.goal_timeout_s:g} s"
+            timeout = f"not reached in {settings.goal_timeout_s:g} s"
+            if active.goal.yaw_rad is None or not self._is_at(active.goal, pose):
+                return timeout
+            return f"{timeout}, {self._offset_text(active.goal, pose)}"
         return ""
+
+    def _offset_text(self, goal: Goal, pose: Pose2D) -> str:
+        """Return the distance from a goal, or the error of the yaw at a goal with one."""
+        error_rad = goal.yaw_error_rad(pose)
+        if error_rad is not None and self._is_at(goal, pose):
+            return (
+                f"at it with a yaw error of {error_rad:.2f} rad "
+                f"(yaw_tolerance {self._sequence.yaw_tolerance_rad(goal):.2f} rad)"
+            )
+        name = "goal_tolerance" if goal.tolerance_m is None else "tolerance"
+        return (
+            f"{pose.distance_to(goal.pose):.2f} m from it "
+            f"({name} {self._sequence.tolerance_m(goal):.2f} m)"
+        )
 
     def _start_next(self, now_s: float, pose: Pose2D) -> List[Action]:
         """Send the goal at the present index, or end the sequence or lap."""
@@ -262,6 +337,7 @@ class Sequencer:
 
     def _send(self, now_s: float, active: ActiveGoal, resend_reason: str) -> SendGoal:
         self._active, self._busy_s, self._is_resumed = active, now_s, False
+        self._stopped_s = None
         return SendGoal(self._index, self._lap, active.pose, active.attempt, resend_reason)
 
     def _end(self, active: ActiveGoal, now_s: float, pose: Pose2D, reason: str) -> List[Action]:
@@ -274,9 +350,13 @@ class Sequencer:
             now_s - active.first_sent_s,
             active.attempt,
             reason,
+            active.goal.yaw_error_rad(pose),
         )
         self._active = None
         self._index += 1
+        if not reason and active.goal.wait_s > 0.0:
+            self._dwell = Dwell(active.goal, now_s)
+            return [ended]
         return [ended, *self._start_next(now_s, pose)]
 
 

@@ -264,6 +264,8 @@ def _robot_json(robot: RobotSummary) -> Dict[str, Any]:
                 "x_m": leg.goal.x_m,
                 "y_m": leg.goal.y_m,
                 "yaw_rad": leg.goal.yaw_rad,
+                "yaw_error_rad": _rounded(leg.yaw_error_rad),
+                "wait_s": leg.goal.wait_s,
                 "reached": leg.reached,
                 "time_s": _rounded(leg.time_s),
                 "reason": leg.reason,

@@ -47,6 +47,7 @@ def table(summary: MissionSummary, width: int = DEFAULT_WIDTH) -> str:
 
 def _goal_table(robots: Sequence[RobotSummary], width: int) -> str:
     has_laps = any(leg.lap > 1 for robot in robots for leg in robot.legs)
+    has_yaws = any(leg.goal.yaw_rad is not None for robot in robots for leg in robot.legs)
     columns = [
         _Column("robot", is_text=True),
         _Column("lap/goal" if has_laps else "goal"),
@@ -59,24 +60,29 @@ def _goal_table(robots: Sequence[RobotSummary], width: int) -> str:
         _Column("straight (m)", drop_rank=6),
         _Column("detour", drop_rank=5),
     ]
+    if has_yaws:
+        columns.insert(5, _Column("yaw error\n(rad)", drop_rank=2))
     first_rows: List[int] = []
     notes: List[str] = []
     for robot in robots:
         first_rows.append(len(columns[0].cells))
         for leg in robot.legs:
             goal = f"{leg.lap}/{leg.index + 1}" if has_laps else str(leg.index + 1)
-            _add_row(columns, _goal_row(robot.robot if leg is robot.legs[0] else "", goal, leg))
+            cells = _goal_row(robot.robot if leg is robot.legs[0] else "", goal, leg)
+            if has_yaws:
+                cells.insert(5, _number(leg.yaw_error_rad, 2))
+            _add_row(columns, cells)
             if leg.reason and leg.attempts and leg.reason != INTERRUPTED:
                 notes.append(printable(f"{robot.robot}: goal {goal}: {leg.reason}"))
     return "\n".join([_text(columns, width, first_rows[1:]), *notes])
 
 
-def _goal_row(robot: str, goal: str, leg: Leg) -> Sequence[str]:
+def _goal_row(robot: str, goal: str, leg: Leg) -> List[str]:
     is_sent = leg.time_s is not None
     result = "reached"
     if not leg.reached:
         result = leg.reason if leg.reason == INTERRUPTED or not is_sent else "skipped"
-    return (
+    return [
         robot,
         goal,
         f"{leg.goal.x_m:.2f}",
@@ -87,7 +93,7 @@ def _goal_row(robot: str, goal: str, leg: Leg) -> Sequence[str]:
         _number(leg.path_length_m if is_sent else None, 2),
         _number(leg.straight_length_m if is_sent else None, 2),
         _detour(leg.path_length_m, leg.straight_length_m),
-    )
+    ]
 
 
 def _robot_table(summary: MissionSummary, width: int) -> str:

@@ -65,8 +65,10 @@ def checked_event(event: Mapping[str, Any]) -> Dict[str, Any]:
         "time_s": _number(event, "time_s", MAX_SECONDS),
     }
     if kind == "ended":
+        has_error = event.get("yaw_error_rad") is not None  # a goal without yaw has none
         return {
             **checked,
+            "yaw_error_rad": _number(event, "yaw_error_rad", math.pi) if has_error else None,
             "reached": event.get("reached") is True,
             "reason": _text(event, "reason"),
             "attempts": _whole(event, "attempts"),

@@ -138,6 +138,7 @@ class BagRobot:
                 "reached": event["reached"],
                 "reason": event["reason"],
                 "attempts": event["attempts"],
+                "yaw_error_rad": event["yaw_error_rad"],
             }
 
     def trace(self, number: int, start_s: float, info: Mapping[str, Any]) -> RobotTrace:
@@ -179,6 +180,7 @@ def _goal(event: Mapping[str, Any], start_s: float) -> GoalTrace:
         event.get("reached", False),
         event.get("reason", ""),
         event.get("attempts", 1),
+        event.get("yaw_error_rad"),
     )
 
 

@@ -25,6 +25,7 @@ class GoalTrace:
     """Flight to one goal.
 
     ``ended_s`` is None if the goal had not ended. ``reason`` says why it was not reached.
+    ``yaw_error_rad`` is the robot's yaw at the end less the goal's; None for a goal without yaw.
     """
 
     index: int
@@ -35,6 +36,7 @@ class GoalTrace:
     reached: bool = False
     reason: str = ""
     attempts: int = 1
+    yaw_error_rad: Optional[float] = None
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,7 @@ class TraceObserver(FlightObserver):
                 action.reached,
                 action.reason,
                 action.attempts,
+                action.yaw_error_rad,
             )
 
     def on_tick(self, robot: int, tick: Tick, located: RobotPoses, wall_s: float) -> None:

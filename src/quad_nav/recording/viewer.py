@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.files.output import make_folder, output_faults
-from quad_nav.geometry import Pose3D, Scan
+from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.mission.sequencer import Action
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.recording.viewer_solids import colour_of, solid
 from quad_nav.sim.colours import ROBOT_COLOURS
 from quad_nav.sim.contacts import Contact
-from quad_nav.topics.markers import SPHERE, goal_markers, quadcopter_markers, scene_markers
+from quad_nav.topics.markers import ARROW, SPHERE, goal_markers, quadcopter_markers, scene_markers
 from quad_nav.topics.publishing import FlownPath
 
 SUFFIX = ".rrd"
@@ -178,6 +178,18 @@ class View(FlightObserver):
                 # A reached goal is a dot: rerun draws no translucent spheres.
                 radii=[one.size_m[0] / 2 if one.rgba[3] > 0.5 else 0.05 for one in spheres],
                 labels=[str(one.number + 1) for one in spheres],
+            ),
+        )
+        arrows = [marker for marker in markers if marker.kind == ARROW]
+        self._rr.log(
+            "map/goal_yaws",
+            self._rr.Arrows3D(
+                origins=[one.place_m for one in arrows],
+                vectors=[
+                    (*Pose2D(0.0, 0.0, one.yaw_rad).rotate(one.size_m[0], 0.0), 0.0)
+                    for one in arrows
+                ],
+                colors=[colour_of(one) for one in arrows],
             ),
         )
 

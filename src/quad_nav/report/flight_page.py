@@ -44,6 +44,9 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
         factor=factor,
         parameters=parameter_rows({robot.name: robot.parameters for robot in trace.robots}),
         parameters_known=any(robot.parameters for robot in trace.robots),
+        has_yaws=any(
+            goal.yaw_error_rad is not None for robot in trace.robots for goal in robot.goals
+        ),
     )
 
 

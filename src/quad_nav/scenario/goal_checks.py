@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.config import Configuration
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.static import StaticLayerParams
-from quad_nav.mission.goal_file import PlaceCheck, clearance_check
+from quad_nav.mission.goal_file import PlaceCheck, SequenceSettings, clearance_check
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.sim.scene import Scene
 
+_YAW_FIELD = "yaw_goal_tolerance_rad"  # of both local planners
 Bounds = Tuple[float, float, float, float]
 """low x, low y, high x, high y of an area, m in ``map``."""
 
@@ -74,6 +77,51 @@ def goals_off_the_costmap(
                     f"({goal.x_m:g}, {goal.y_m:g}) {fault}"
                 )
     return problems
+
+
+def with_planner_tolerance(
+    settings: SequenceSettings, configuration: Optional[Configuration]
+) -> SequenceSettings:
+    """Return settings with the local planner's yaw tolerance if they have none of their own.
+
+    Args:
+        settings: Settings that a goal file does not give.
+        configuration: The robot's, None if it is unknown. A planner of the user's need not have
+            a ``yaw_goal_tolerance``.
+    """
+    planners_rad = getattr(configuration and configuration.local_planner, _YAW_FIELD, None)
+    if settings.yaw_tolerance_rad is not None or planners_rad is None:
+        return settings
+    return replace(settings, yaw_tolerance_rad=planners_rad)
+
+
+def tolerance_warnings(
+    robots: Sequence[RobotGoals], configurations: Sequence[Optional[Configuration]]
+) -> List[str]:
+    """A warning for each goal file whose tolerances the local planner may not reach.
+
+    It is no fault: the robot usually stops nearer than the planner's tolerance demands.
+    """
+    warnings = []
+    for robot, configuration in zip(robots, configurations):
+        planner = configuration.local_planner if configuration else None
+        sequence = robot.sequence
+        near_m = min(map(sequence.tolerance_m, sequence.goals))
+        turned = [goal for goal in sequence.goals if goal.yaw_rad is not None]
+        near_rad = min(map(sequence.yaw_tolerance_rad, turned), default=math.inf)
+        for value, unit, name, field in (
+            (near_m, "m", "xy_goal_tolerance", "xy_goal_tolerance_m"),
+            (near_rad, "rad", "yaw_goal_tolerance", _YAW_FIELD),
+        ):
+            planners = getattr(planner, field, 0.0)
+            if value < planners:
+                warnings.append(
+                    f"{robot.file.path}: a tolerance of {value:g} {unit} is below the local "
+                    f"planner's {name}, {planners:g} {unit}: the quadcopter may stop outside, and "
+                    f"the goal would be skipped; expected {planners:g} {unit} or more, or a "
+                    f"smaller {name}"
+                )
+    return warnings
 
 
 def cover_warnings(scene: Scene, configurations: Sequence[Optional[Configuration]]) -> List[str]:

@@ -17,7 +17,8 @@ import numpy as np
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.mission.goal_file import DEFAULT_SETTINGS, Goal, GoalSequence, SequenceSettings
+from quad_nav.mission.goal import Goal
+from quad_nav.mission.goal_file import DEFAULT_SETTINGS, GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, WatchedGoalFile
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Walls
 from quad_nav.sim.scene_writer import write_scene

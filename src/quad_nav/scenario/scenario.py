@@ -25,7 +25,13 @@ from quad_nav.mission.robot_goals import (
     last_goal_conflicts,
     load_robot_goals,
 )
-from quad_nav.scenario.goal_checks import cover_warnings, goals_off_the_costmap, place_check
+from quad_nav.scenario.goal_checks import (
+    cover_warnings,
+    goals_off_the_costmap,
+    place_check,
+    tolerance_warnings,
+    with_planner_tolerance,
+)
 from quad_nav.scenario.random_mission import RandomMission, random_mission
 from quad_nav.scenario.rules import RANDOM, RULES, optional
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
@@ -101,10 +107,11 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
     if request.goals == RANDOM:
         robots, faults = _random_goals(request, mission, located)
     else:
-        robots, faults = _read_goals(request, scene, located)
+        robots, faults = _read_goals(request, scene, located, configurations)
     problems += faults
     warnings = [
         *last_goal_conflicts(robots, request.robot_radius),
+        *tolerance_warnings(robots, configurations),
         *(cover_warnings(scene, located) if scene else ()),
     ]
     scenario = Scenario(scene, tuple(robots), configurations, tuple(warnings))
@@ -236,14 +243,18 @@ def _random_goals(
 def _read_goals(
     request: ScenarioRequest,
     scene: Optional[Scene],
+    located: Sequence[Optional[Configuration]],
     configurations: Sequence[Optional[Configuration]],
 ) -> Tuple[List[RobotGoals], List[str]]:
     paths, missing = _goal_files(request)
-    known = dict(enumerate(configurations))
+    known, placed = dict(enumerate(configurations)), dict(enumerate(located))
     checks = {
-        number: place_check(scene, request.robot_radius, known.get(number)) for number in paths
+        number: place_check(scene, request.robot_radius, placed.get(number)) for number in paths
     }
-    robots, faults = load_robot_goals(paths, checks, request.settings)
+    settings = {
+        number: with_planner_tolerance(request.settings, known.get(number)) for number in paths
+    }
+    robots, faults = load_robot_goals(paths, checks, settings)
     return robots, missing + faults
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from typing import Any, Dict, Mapping, Optional, Sequence
 
+from quad_nav.mission.goal import goal_entry
 from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.sim.contacts import Contact
@@ -52,7 +53,7 @@ def mission_info(
         robot_radius_m: Radius of a robot's hull.
     """
     robots = [
-        {"name": name, "goals": [_goal(goal) for goal in sequence.goals], "parameters": tree}
+        {"name": name, "goals": [goal_entry(goal) for goal in sequence.goals], "parameters": tree}
         for (name, sequence), tree in zip(sequences.items(), parameters)
     ]
     return {"robots": robots, "robot_radius_m": robot_radius_m}
@@ -83,6 +84,7 @@ def event(robot: int, clock_s: float, action: Action) -> Dict[str, Any]:
             "reached": action.reached,
             "attempts": action.attempts,
             "reason": action.reason,
+            "yaw_error_rad": action.yaw_error_rad,
         }
     return {**fields, "event": "done"}
 
@@ -105,11 +107,6 @@ def _whole_number(digits: str) -> int:
     if len(digits) > _MAX_DIGITS:
         raise ValueError(f"a number with more than {_MAX_DIGITS} digits")
     return int(digits)
-
-
-def _goal(goal: Any) -> Sequence[float]:
-    at = [goal.x_m, goal.y_m]
-    return at if goal.yaw_rad is None else [*at, goal.yaw_rad]
 
 
 def text_values(**entries: object) -> Dict[str, str]:

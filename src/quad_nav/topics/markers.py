@@ -17,6 +17,7 @@ from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene, Sphere
 
 # Shapes, numbered as in visualization_msgs/Marker.
+ARROW = 0
 CUBE, SPHERE, CYLINDER, CUBE_LIST, TEXT = 1, 2, 3, 6, 9
 
 _WALL_RGBA = (0.55, 0.60, 0.65, 0.35)
@@ -27,6 +28,7 @@ _ARM_M = 0.19
 _ROTOR_DIAMETER_M = 0.20
 _MANY_BOXES = 256
 _SMALL_M = 1.0
+_GOAL_ARROW_M = (0.6, 0.08, 0.08)  # length, width and height
 _GOAL_DIAMETER_M, _ACTIVE_GOAL_DIAMETER_M, _GOAL_TEXT_HEIGHT_M = 0.30, 0.45, 0.35
 _MIN_NUMBER_HEIGHT_M, _NUMBER_PART = 0.4, 0.025
 _NUMBER_ABOVE_M = 0.6  # above most obstacles, which would hide it from above
@@ -162,7 +164,7 @@ class _RobotPart:
 
 
 def goal_markers(sequencers: Sequence[Sequencer], altitude_m: float) -> List[Marker]:
-    """Return numbered spheres for the goals of all robots.
+    """Return numbered spheres for the goals of all robots, with an arrow for each yaw.
 
     Reached goals are dimmed, the active one is larger and opaque. The result replaces all goal
     markers that were published before.
@@ -181,7 +183,18 @@ def _goal_markers(robot: int, index: int, sequencer: Sequencer, altitude_m: floa
     alpha = 1.0 if is_active else _REACHED_ALPHA if index < sequencer.index else _PENDING_ALPHA
     diameter_m = _ACTIVE_GOAL_DIAMETER_M if is_active else _GOAL_DIAMETER_M
     above_m = altitude_m + diameter_m / 2 + _GOAL_TEXT_HEIGHT_M / 2
+    arrow = Marker(
+        "map",
+        f"goal{robot}_yaw",
+        index,
+        ARROW,
+        (goal.x_m, goal.y_m, altitude_m),
+        _GOAL_ARROW_M,
+        robot_rgba(robot, alpha),
+        goal.pose.yaw_rad,
+    )
     return [
+        *([] if goal.yaw_rad is None else [arrow]),
         Marker(
             "map",
             f"goal{robot}",

@@ -247,7 +247,7 @@ class MissionRunner:
             rospy.loginfo(
                 "%s: resuming goal %d of %d, lap %d",
                 robot.name,
-                progress.index + 1,
+                min(progress.index + 1, len(robot.sequencer.sequence.goals)),
                 len(robot.sequencer.sequence.goals),
                 progress.lap,
             )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Mapping, Sequence
+from typing import Mapping, Optional, Sequence
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from quad_nav.mission.flight_log import FlightLog
+from quad_nav.mission.sequencer import Sequencer
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.sim.contacts import Contact
 from quad_nav.topics.flight_info import contact_from_values
@@ -39,9 +40,7 @@ def _robot_status(robot: MissionRobot, log: FlightLog, failure: str) -> Diagnost
     distance_m = None
     if active is not None and pose is not None:
         distance_m = pose.to_2d().distance_to(active.pose)
-    level, message = DiagnosticStatus.OK, "done" if sequencer.done else "starting"
-    if distance_m is not None:
-        message = f"flying to goal {sequencer.index + 1} of {count}, {distance_m:.2f} m away"
+    level, message = DiagnosticStatus.OK, _state(sequencer, distance_m)
     if skipped or contacts or (active is not None and active.attempt > 1):
         level = DiagnosticStatus.WARN
     if odometry.is_silent:
@@ -70,6 +69,16 @@ def _robot_status(robot: MissionRobot, log: FlightLog, failure: str) -> Diagnost
         hardware_id=robot.name,
         values=[KeyValue(key, str(value)) for key, value in values.items()],
     )
+
+
+def _state(sequencer: Sequencer, distance_m: Optional[float]) -> str:
+    count = len(sequencer.sequence.goals)
+    if distance_m is not None:
+        return f"flying to goal {sequencer.index + 1} of {count}, {distance_m:.2f} m away"
+    if sequencer.dwell is not None:
+        left_s = max(sequencer.dwell.until_s - rospy.get_time(), 0.0)
+        return f"staying at goal {sequencer.index} of {count} for {left_s:.0f} s"
+    return "done" if sequencer.done else "starting"
 
 
 def contact_from_message(status: DiagnosticStatus) -> Contact:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Iterable, List, Optional
+from typing import Iterable, List, Optional, Sequence
 
 import rospy
 from move_base_msgs.msg import RecoveryStatus
@@ -26,7 +26,7 @@ from quad_nav.mission.sequencer import (
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.sequencer.flight_record import FlightRecord
-from quad_nav.ros.sequencer.odometry import OdometryIntake
+from quad_nav.ros.sequencer.odometry import LocatedPose, OdometryIntake
 from quad_nav.ros.sequencer.robot_link import Inbox, PathPublisher, RobotLink
 from quad_nav.topics.flight_info import EVENTS_TOPIC, event, to_text
 
@@ -100,14 +100,25 @@ class MissionRobot:
         self._reports += inbox.reports
         if self.pose is None or (self.odometry.is_jumping and not located):
             return False
-        reports, self._reports = self._reports, []
-        idle = self.link.navigator_is_idle(now_s)
-        actions = self.sequencer.tick(now_s, self.pose.to_2d(), reports, idle)
+        actions = self._tick(now_s, self.pose, located)
         legs = record.add_actions(self.name, self.sequencer, actions, now_s)
         for action, leg in zip(actions, legs):
             self._do(action, leg, now_s)
         self.is_done = self.sequencer.done
         return bool(actions)
+
+    def _tick(self, now_s: float, pose: Pose3D, located: Sequence[LocatedPose]) -> List[Action]:
+        """Pass the new poses to the sequencer until it acts.
+
+        All of them, because a robot that turns has the goal's yaw only for a short time.
+        """
+        reports, self._reports = self._reports, []  # on the goal that an action ends
+        idle = self.link.navigator_is_idle(now_s)
+        for one in located[:-1]:
+            actions = self.sequencer.tick(now_s, one.planar, (), idle)
+            if actions:
+                return actions
+        return self.sequencer.tick(now_s, pose.to_2d(), reports, idle)
 
     def _log_recoveries(self, recoveries: Iterable[RecoveryStatus]) -> None:
         for recovery in recoveries:
@@ -200,6 +211,10 @@ class MissionRobot:
                 leg.path_length_m,
                 leg.straight_length_m,
             )
+            if leg.yaw_error_rad is not None:
+                rospy.loginfo("%s: %s yaw error %.2f rad", self.name, goal, leg.yaw_error_rad)
+            if leg.goal.wait_s > 0.0:
+                rospy.loginfo("%s: %s staying for %g s", self.name, goal, leg.goal.wait_s)
         else:
             rospy.logwarn(
                 "%s: %s SKIPPED after %.1f s: %s", self.name, goal, leg.time_s, leg.reason
