@@ -15,7 +15,7 @@ from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.errors import InputError
 from quad_nav.files import document, plain_yaml, values
-from quad_nav.mission import goal_file
+from quad_nav.mission import goal, goal_file
 from quad_nav.recording import bag_info, bag_trace
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim import (
@@ -34,8 +34,8 @@ ROWS = {
     "goal file": [
         goal_file.MAX_BYTES,
         goal_file.MAX_GOALS,
-        goal_file.MAX_COORDINATE_M,
-        goal_file.MAX_TIMEOUT_S,
+        goal.MAX_COORDINATE_M,
+        goal.MAX_TIMEOUT_S,
     ],
     "YAML: scenes, maps, parameters": [
         plain_yaml.MAX_BYTES,
