@@ -17,7 +17,7 @@ import rostest
 
 FLY = Path(__file__).resolve().parents[2] / "scripts" / "fly"
 PATIENCE_S = 90.0
-NODES = {"rosmaster", "rosout", "simulator", "move_base", "sequencer", "roslaunch"}
+NODES = {"rosmaster", "rosout", "simulator", "move_base", "sequencer", "quiet_roslaunch"}
 LOOPBACK = ("0100007F", "00000000000000000000000001000000")  # as in /proc/net: little endian
 TCP_LISTENS, UDP_IS_BOUND = "0A", "07"
 

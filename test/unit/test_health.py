@@ -14,6 +14,7 @@ from quad_nav.topics.health import (
     Loop,
     control_health,
     inputs_health,
+    logged_name,
     loop_health,
 )
 
@@ -114,3 +115,21 @@ def test_loop(fields, level, message):
 
 def test_levels_are_numbered_as_in_the_messages():
     assert list(map(int, Level)) == [0, 1, 2, 3]
+
+
+def test_loop_of_one_robot_is_that_robots():
+    health = loop_health("move_base0", LOOP, "quad0")
+    assert (health.name, health.hardware_id) == ("move_base0: loop", "quad0")
+
+
+@pytest.mark.parametrize(
+    "name, hardware_id, logged",
+    [
+        ("move_base0: inputs", "quad0", "quad0: inputs"),
+        ("fleet0: loop", "fleet0", "fleet0: loop"),
+        ("mission: quad1", "quad1", "mission: quad1"),
+        ("simulator: clock", "simulator", "simulator: clock"),
+    ],
+)
+def test_log_lines_of_a_navigator_begin_with_the_robot(name, hardware_id, logged):
+    assert logged_name(name, hardware_id) == logged

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 # Dies at first, prints its arguments the second time, and exits with 3.
 DIES_ONCE = """
@@ -17,6 +19,18 @@ print(sys.argv[1:], flush=True)
 sys.exit(3)
 """
 WAITS = "import signal; print('here', flush=True); signal.pause()"
+
+
+# Starts a program and waits for its end, or for Ctrl-C, which it passes on as roslaunch does.
+PARENT = """
+import signal, subprocess, sys
+def end(*_):
+    print("interrupted", flush=True)
+    program.send_signal(signal.SIGINT)
+signal.signal(signal.SIGINT, end)
+program = subprocess.Popen(sys.argv[1:])
+print(program.wait(), flush=True)
+"""
 
 
 def respawned(program: str, *arguments: str) -> subprocess.Popen:
@@ -65,3 +79,27 @@ def test_the_command_ends_with_its_supervisor():
     assert not Path(f"/proc/{child}/cmdline").exists() or (
         Path(f"/proc/{child}/cmdline").read_bytes() == b""
     )
+
+
+@pytest.mark.parametrize(
+    "name, options, printed",
+    [
+        ("roslaunch", ["--end-roslaunch"], "interrupted\n3\n"),
+        ("quiet_roslaunch", ["--end-roslaunch"], "interrupted\n3\n"),
+        ("rostest", ["--end-roslaunch"], "3\n"),
+        ("roslaunch", [], "3\n"),
+    ],
+)
+def test_the_end_of_the_node_ends_roslaunch(tmp_path, name, options, printed):
+    parent = tmp_path / name
+    parent.write_text(PARENT)
+    supervisor = [sys.executable, "-m", "quad_nav.mission.respawn", *options]
+    done = subprocess.run(
+        [sys.executable, str(parent), *supervisor, sys.executable, "-c", "raise SystemExit(3)"],
+        env={"PYTHONPATH": str(ROOT / "src")},
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stdout == printed

@@ -117,7 +117,8 @@ CONTACT = Contact(5.0, "quad0", "pillar", 1.0, 2.0)
         (mission(), 0),
         (mission(leg(), leg(False, reason="aborted")), 1),
         (mission(contacts=(CONTACT,)), 1),
-        (mission(reason="interrupted"), 1),
+        (mission(reason="interrupted"), 130),
+        (mission(reason="time limit of 5 s"), 1),
         (mission(problems=("f.json: goals: is empty",)), 2),
     ],
 )

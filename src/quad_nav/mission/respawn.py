@@ -1,26 +1,35 @@
 """Run a node and restart it when a signal kills it.
 
-    python3 -m quad_nav.mission.respawn COMMAND [ARGUMENT...]
+    python3 -m quad_nav.mission.respawn [--end-roslaunch] COMMAND [ARGUMENT...]
 
 The launch files use this as the sequencer's `launch-prefix`. roslaunch's own `respawn` also
 restarts a node that has finished, and excludes `required`. Here, a node that exits ends this
 program with the same status. A node that a signal kills is restarted with `--respawned` as its
 last argument, so that it resumes its mission from the journal.
+
+With `--end-roslaunch`, a node that exits ends the roslaunch that started this program, as Ctrl-C
+does. A node that is `required` does the same, but roslaunch reports that in red, also after a
+mission that has succeeded.
 """
 
 from __future__ import annotations
 
 import ctypes
+import os
 import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from typing import List
 
 from quad_nav.errors import printable
 
 RESPAWNED = "--respawned"
+END_ROSLAUNCH = "--end-roslaunch"
 DELAY_S = 1.0
+ENDS_WITHIN_S = 15.0
+ROSLAUNCH = (b"roslaunch", b"quiet_roslaunch")
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
@@ -31,6 +40,8 @@ def main() -> int:
         The command's exit status, or 128 plus the number of the signal passed on to it.
     """
     command, ended = sys.argv[1:], threading.Event()
+    ends_roslaunch = command[:1] == [END_ROSLAUNCH]
+    command = command[ends_roslaunch:]
     child = _start(command)
 
     def end(number: int, _frame: object) -> None:
@@ -42,6 +53,8 @@ def main() -> int:
     while True:
         status = child.wait()
         if status >= 0 or ended.is_set():
+            if ends_roslaunch and not ended.is_set() and _end_roslaunch():
+                ended.wait(ENDS_WITHIN_S)  # roslaunch calls the end of a node in red
             return status if status >= 0 else 128 - status
         print(
             f"{printable(command[0])}: killed by {signal.Signals(-status).name}, restarting",
@@ -55,6 +68,19 @@ def main() -> int:
 
 def _start(command: List[str]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, preexec_fn=_end_with_parent)
+
+
+def _end_roslaunch() -> bool:
+    """Interrupt the parent process if it is roslaunch, and return whether it is."""
+    parent = os.getppid()
+    try:
+        words = Path(f"/proc/{parent}/cmdline").read_bytes().split(b"\0")
+    except OSError:  # no such file system, or the parent has just ended
+        return False
+    if not any(os.path.basename(word) in ROSLAUNCH for word in words[:3]):
+        return False
+    os.kill(parent, signal.SIGINT)
+    return True
 
 
 def _end_with_parent() -> None:

@@ -19,7 +19,7 @@ from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.contacts import Contact
 from quad_nav.versions import versions
 
-EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT = 0, 1, 2
+EXIT_SUCCESS, EXIT_FAILURE, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 FACTS = (
     "command",
     "configuration",
@@ -115,6 +115,8 @@ class MissionSummary:
         """Exit status of the program that flew the mission."""
         if self.problems:
             return EXIT_BAD_INPUT
+        if self.reason == INTERRUPTED:
+            return EXIT_INTERRUPTED
         return EXIT_SUCCESS if self.success else EXIT_FAILURE
 
     @property

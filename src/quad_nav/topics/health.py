@@ -163,8 +163,14 @@ def control_health(node: str, robot: str, control: Control) -> Health:
     )
 
 
-def loop_health(node: str, loop: Loop) -> Health:
-    """Assess whether a process serves its robots in time."""
+def logged_name(name: str, hardware_id: str) -> str:
+    """Return a status's name for the log: that of a navigator begins with the robot's name."""
+    node, colon, part = name.partition(": ")
+    return f"{hardware_id}: {part}" if colon and node.startswith("move_base") else name
+
+
+def loop_health(node: str, loop: Loop, robot: str = "") -> Health:
+    """Assess whether a process serves its robots in time; ``robot`` is its only one."""
     level, message = Level.OK, f"serving {loop.robots} robot{'s' * (loop.robots != 1)}"
     if loop.late_s > LATE_S:
         level, message = Level.WARN, f"up to {loop.late_s:.2f} s late, skipping control cycles"
@@ -172,7 +178,7 @@ def loop_health(node: str, loop: Loop) -> Health:
         level, message = Level.ERROR, f"control loop blocked for {loop.blocked_s:.0f} s"
     return Health(
         f"{node}: loop",
-        node,
+        robot or node,
         level,
         message,
         {

@@ -15,7 +15,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from quad_nav.errors import excerpt
-from quad_nav.topics.health import Health, Level
+from quad_nav.topics.health import Health, Level, logged_name
 
 PERIOD_S = 1.0  # wall time
 REPEAT_S = 5.0  # wall time
@@ -46,7 +46,11 @@ class DiagnosticsTopic:
             if before is not None and before != status.level:
                 level = Level(status.level)
                 _LOG[level](
-                    "%s: %s -> %s: %s", status.name, Level(before).name, level.name, status.message
+                    "%s: %s -> %s: %s",
+                    logged_name(status.name, status.hardware_id),
+                    Level(before).name,
+                    level.name,
+                    status.message,
                 )
         self._publisher.publish(array)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import signal
 import socket
@@ -12,6 +13,7 @@ from types import FrameType
 from typing import Callable, Dict, List, Optional, Sequence
 
 import rosgraph
+import rosgraph.network
 import rospy
 from rospy.impl.paramserver import get_param_server_cache
 
@@ -23,14 +25,19 @@ ALIVE_WITHIN_S = 1.0
 SILENT_AFTER_S = 3.0
 REPEAT_S = 15.0
 MAX_LOG = 50_000  # characters of a line and of each of its arguments
+_MAX_HEADER = 4096  # bytes
 _ROSOUT_PARAMETER = "/rosout_disable_topics_generation"
 
 
-def init_node(name: str) -> None:
+def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
     """Call `rospy.init_node` and let Ctrl-C and SIGTERM shut down from another thread.
 
     rospy's own handler closes the publishers in the thread that it interrupts. It deadlocks if
     that thread is publishing and holds the lock.
+
+    Args:
+        name: Name of the node.
+        at_signal: Called in the other thread, before anything is shut down.
     """
     rospy.init_node(name, disable_signals=True)
     escape_log_messages()
@@ -38,7 +45,12 @@ def init_node(name: str) -> None:
 
     def shut_down(number: int, _frame: Optional[FrameType]) -> None:
         reason = signal.Signals(number).name
-        threading.Thread(target=rospy.signal_shutdown, args=(reason,), daemon=True).start()
+
+        def run() -> None:
+            at_signal()
+            rospy.signal_shutdown(reason)
+
+        threading.Thread(target=run, daemon=True).start()
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, shut_down)
@@ -172,10 +184,20 @@ def lost_service(service: str, node: str) -> str:
     except OSError:
         return "the ROS master has died"
     try:
-        socket.create_connection(rospy.core.parse_rosrpc_uri(address), ALIVE_WITHIN_S).close()
-    except OSError:
+        _probe(service, address)
+    except (OSError, rosgraph.network.ROSHandshakeException):
         return f"the {node} has died"
     return ""
+
+
+def _probe(service: str, address: str) -> None:
+    """Exchange the headers of a connection, as a client that only asks for a service's type."""
+    server = rospy.core.parse_rosrpc_uri(address)
+    with socket.create_connection(server, ALIVE_WITHIN_S) as connection:
+        connection.settimeout(ALIVE_WITHIN_S)
+        header = {"probe": "1", "md5sum": "*", "callerid": rospy.get_name(), "service": service}
+        rosgraph.network.write_ros_handshake_header(connection, header)
+        rosgraph.network.read_ros_handshake_header(connection, io.BytesIO(), _MAX_HEADER)
 
 
 def missing_service(name: str) -> str:

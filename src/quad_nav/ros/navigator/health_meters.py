@@ -116,8 +116,8 @@ class LoopHealth:
     The loop calls `update`, another thread calls `read`.
     """
 
-    def __init__(self, robots: int) -> None:
-        """Start with a number of robots to serve."""
+    def __init__(self, robots: Sequence[str]) -> None:
+        """Start with the names of the robots to serve."""
         self._robots = robots
         self._late_s, self._round_s, self._round_now_s = 0.0, time.monotonic(), 0.0
         self._read_wall_s, self._read_cpu_s = time.monotonic(), time.process_time()
@@ -139,7 +139,8 @@ class LoopHealth:
         blocked_s = wall_s - self._round_s if now_s > self._round_now_s + health.LATE_S else 0.0
         return health.loop_health(
             rospy.get_name().lstrip("/"),
-            health.Loop(self._robots, late_s, blocked_s, cpu, _memory_mb()),
+            health.Loop(len(self._robots), late_s, blocked_s, cpu, _memory_mb()),
+            self._robots[0] if len(self._robots) == 1 else "",
         )
 
 

@@ -38,14 +38,14 @@ class NavigatorLoop:
             period_s: Shortest time between two rounds.
         """
         self._robots, self._peers, self._period_s = robots, peers, period_s
-        self._name = rospy.get_name().lstrip("/")
+        self._name = robots[0].name if len(robots) == 1 else rospy.get_name().lstrip("/")
         self._topic_watch = TopicWatch(
             [
                 *(subscriber for one in peers for subscriber in one.subscribers),
                 *(subscriber for one in robots for subscriber in one.subscribers),
             ]
         )
-        self._health = LoopHealth(len(robots))
+        self._health = LoopHealth([robot.name for robot in robots])
         self._start_s = self._now_s = 0.0
 
     def run(self) -> None:

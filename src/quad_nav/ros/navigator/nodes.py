@@ -107,7 +107,10 @@ def _run(
         for configuration in _distinct(configurations.values()):
             warm_up(configuration)
         group = Fleet(configurations, names)
-        rospy.loginfo("%s: ready, robots: %d", name, len(group.robots))
+        if len(group.robots) == 1:
+            rospy.loginfo("%s: ready", group.robots[0].name)
+        else:
+            rospy.loginfo("%s: ready, robots: %d", name, len(group.robots))
         NavigatorLoop(group.robots, group.peers, period_s).run()
     except InputError as error:
         rospy.logfatal("%s: invalid parameters, shutting down:\n%s", name, error)

@@ -39,6 +39,7 @@ class RobotNavigator:
 
     Attributes:
         number: Number of the robot.
+        name: Name of the robot, for messages.
         due_s: Time at which `step` is due.
         health: Meters of the navigator.
     """
@@ -59,7 +60,7 @@ class RobotNavigator:
             names: Names of the robot's topics, services and parameters.
         """
         self.number = configuration.robot
-        self._name = f"quad{self.number}"
+        self.name = f"quad{self.number}"
         self.due_s = 0.0
         self._warnings, self._configuration = ThrottledWarnings(), configuration
         self._navigator = navigator = build_navigator(configuration)
@@ -74,12 +75,12 @@ class RobotNavigator:
         }
         self._topics = PlanTopics(navigator, names)
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
-        self._sensors = sensors.connect(self._name, costmaps, configuration.scan_validator, names)
+        self._sensors = sensors.connect(self.name, costmaps, configuration.scan_validator, names)
         self._maps = static_maps.connect(costmaps, self._lock, names)
-        self._reconfigure = serve_namespaces(self._name, configuration, self._on_reconfigure, names)
+        self._reconfigure = serve_namespaces(self.name, configuration, self._on_reconfigure, names)
         self._services = self._advertise_services(names)
         self._goals = GoalServer(
-            self._name, transforms, navigator.global_costmap.params.global_frame, names
+            self.name, transforms, navigator.global_costmap.params.global_frame, names
         )
         self.health = self._new_health(names)
 
@@ -102,7 +103,7 @@ class RobotNavigator:
         node = rospy.get_name() if names is own_node else names("~")
         return NavigatorHealth(
             node.strip("/"),
-            self._name,
+            self.name,
             [
                 InputMeter(self._odometry),
                 *(
@@ -140,7 +141,7 @@ class RobotNavigator:
         odom_from_base, velocity = odometry_from_message(message)
         problem = odometry_problem(message.header.frame_id, odom_from_base, velocity)
         if problem:
-            self._warnings.warn(f"{self._name}: odometry dropped: {problem}")
+            self._warnings.warn(f"{self.name}: odometry dropped: {problem}")
         else:
             self._velocity, self._odometry_s = velocity, rospy.get_time()
 
@@ -164,7 +165,7 @@ class RobotNavigator:
         if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
             return
         for costmap in (navigator.global_costmap, navigator.local_costmap):
-            static_maps.place_maps(self._name, costmap, self._transforms, self._warnings)
+            static_maps.place_maps(self.name, costmap, self._transforms, self._warnings)
         in_global, located = self._locate(now_s)
         peers = self._peers.near(self.number, located.in_global, navigator.peers.reach_m)
         tick = navigator.tick(now_s, located, self._velocity, peers)
@@ -205,15 +206,15 @@ class RobotNavigator:
 
     def _publish(self, tick: Tick, in_global: Optional[Pose3D], located: RobotPoses) -> None:
         for warning in tick.warnings:
-            self._warnings.warn(f"{self._name}: {warning}")
+            self._warnings.warn(f"{self.name}: {warning}")
         for note in tick.notes:
-            rospy.loginfo("%s: %s", self._name, note)
+            rospy.loginfo("%s: %s", self.name, note)
         if tick.planning_failed:
-            self._warnings.warn(f"{self._name}: no plan: {tick.planning_failed}")
+            self._warnings.warn(f"{self.name}: no plan: {tick.planning_failed}")
         if tick.recovery is not None:
             rospy.logwarn(
                 "%s: recovery %d of %d: %s",
-                self._name,
+                self.name,
                 tick.recovery.index + 1,
                 tick.recovery.total,
                 tick.recovery.name,

@@ -198,11 +198,6 @@ class MissionRunner:
     def _failures(self) -> Dict[str, str]:
         return {thread.robot.name: thread.failure for thread in self._threads if thread.failure}
 
-    def stop_reason(self) -> str:
-        """Return why the node stops before the mission is done."""
-        fault = readiness.lost_service(START_SERVICE, "simulator") if self._setup.simulation else ""
-        return fault or "stopped before all goals were reached"
-
     def summary(self, reason: str = "") -> MissionSummary:
         """Summarize the flight so far; `reason` says why it stopped early."""
         record, journal = self._record, self._record.journal

@@ -12,12 +12,12 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import List, Optional
+from typing import Callable, List, Optional
 
 import rospy
 
 from quad_nav.errors import InputError, printable
-from quad_nav.mission.flight_log import unflown_legs
+from quad_nav.mission.flight_log import INTERRUPTED, unflown_legs
 from quad_nav.mission.respawn import RESPAWNED
 from quad_nav.mission.summary import (
     EXIT_BAD_INPUT,
@@ -33,10 +33,13 @@ from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
 from quad_nav.scenario.mission_setup import MissionSetup
 
+STOPPED = "stopped before all goals were reached"
+Stop = Callable[[], str]
+"""Returns why the node shuts down, "" if nothing is known."""
 DIAGNOSTICS_PERIOD_S = 1.0  # wall time, to show the state of a paused simulation
 
 
-def watch(mission: MissionRunner, exit_when_done: bool, result: Path) -> int:
+def watch(mission: MissionRunner, exit_when_done: bool, result: Path, stop: Stop) -> int:
     """Run the mission to its end, and report whenever all goals have been flown.
 
     Returns:
@@ -56,7 +59,7 @@ def watch(mission: MissionRunner, exit_when_done: bool, result: Path) -> int:
             if exit_when_done:
                 return status
     if status is None:
-        status = report(mission.summary(mission.stop_reason()), result)
+        status = report(mission.summary(stop() or STOPPED), result)
     return status
 
 
@@ -79,12 +82,12 @@ def _write(summary: MissionSummary, result: Path) -> bool:
     return True
 
 
-def fly(mission: MissionRunner, setup: MissionSetup, result: Path) -> int:
+def fly(mission: MissionRunner, setup: MissionSetup, result: Path, stop: Stop) -> int:
     """Wait for the nodes, fly the mission, summarize it and return the exit status."""
     missing = readiness.wait_for(mission.needs(), setup.ready_timeout_s)
     if missing:
-        reason = "stopped while waiting" if rospy.is_shutdown() else "not ready"
-        return _not_flown(setup, result, reason, missing)
+        reason = STOPPED if rospy.is_shutdown() else "not ready"
+        return _not_flown(setup, result, stop() if stop() == INTERRUPTED else reason, missing)
     try:
         mission.start()
     except (rospy.ServiceException, rospy.ROSException) as error:
@@ -92,7 +95,7 @@ def fly(mission: MissionRunner, setup: MissionSetup, result: Path) -> int:
             setup, result, "the simulation did not start", [f"{START_SERVICE}: {error}"]
         )
     try:
-        return watch(mission, setup.exit_when_done, result)
+        return watch(mission, setup.exit_when_done, result, stop)
     except Exception as error:  # keep the result of the flight after a bug
         report(mission.summary(f"internal error: {error!r}"), result)
         raise
@@ -102,21 +105,41 @@ def fly(mission: MissionRunner, setup: MissionSetup, result: Path) -> int:
 
 def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:
     problems = "\n  ".join(map(printable, lines))
-    rospy.logfatal(f"sequencer: flight not started, {printable(reason)}:\n  {problems}")
+    if rospy.is_shutdown():  # what is missing may have been on its way
+        print(f"\nsequencer: flight not started, {printable(reason)}", flush=True)
+    else:
+        rospy.logfatal(f"sequencer: flight not started, {printable(reason)}:\n  {problems}")
     robots = tuple(
         RobotSummary(robot.name, tuple(unflown_legs(robot.sequence))) for robot in setup.robots
     )
-    _write(
-        MissionSummary(
-            robots,
-            robot_radius_m=setup.robot_radius_m,
-            reason=f"{reason}: {'; '.join(lines)}",
-            contacts_reported=False,
-            facts=setup.facts,
-        ),
-        result,
+    summary = MissionSummary(
+        robots,
+        robot_radius_m=setup.robot_radius_m,
+        reason=reason if reason == INTERRUPTED else f"{reason}: {'; '.join(lines)}",
+        contacts_reported=False,
+        facts=setup.facts,
     )
-    return EXIT_FAILURE
+    _write(summary, result)
+    return summary.exit_status
+
+
+class _Signalled:
+    """Reason of a shutdown by a signal: Ctrl-C, or roslaunch, which ends all nodes if one dies.
+
+    In the second case the simulator is gone before the signal comes.
+    """
+
+    def __init__(self) -> None:
+        self.simulation = True
+        self._reason = ""
+
+    def __call__(self) -> str:
+        return self._reason
+
+    def receive(self) -> None:
+        """Find out the reason while all other nodes still live."""
+        lost = readiness.lost_service(START_SERVICE, "simulator") if self.simulation else ""
+        self._reason = lost or INTERRUPTED
 
 
 def launch_command() -> List[str]:
@@ -129,8 +152,9 @@ def launch_command() -> List[str]:
         except OSError:  # an ancestor has ended meanwhile
             break
         for place, argument in enumerate(argv):
-            if Path(argument).name in ("roslaunch", "rostest"):
-                return [Path(argument).name, *argv[place + 1 : -1]]
+            name = Path(argument).name.replace("quiet_", "")  # that of scripts/fly
+            if name in ("roslaunch", "rostest"):
+                return [name, *argv[place + 1 : -1]]
         pid = int(stat.rpartition(")")[2].split()[1])  # behind the name: state, parent
     return list(sys.argv)
 
@@ -140,9 +164,10 @@ def main() -> int:
 
     Returns:
         Exit status: 0 if all goals were reached without a contact, 1 otherwise, 2 for parameters
-        or files that are not valid.
+        or files that are not valid, 130 after Ctrl-C.
     """
-    init_node("sequencer")
+    stop = _Signalled()
+    init_node("sequencer", stop.receive)
     name = rospy.get_name()
     parameters = rospy.get_param("~", {})
     result = result_path(parameters)
@@ -164,6 +189,7 @@ def main() -> int:
             result,
         )
         return EXIT_BAD_INPUT
+    stop.simulation = setup.simulation
     for warning in setup.warnings:
         rospy.logwarn("%s", warning)
-    return fly(mission, setup, result)
+    return fly(mission, setup, result, stop)
