@@ -60,7 +60,8 @@ class Screen(unittest.TestCase):
         self.assertNotIn("killing on exit", text)
         self.assertNotIn(RED, text)
         self.assertIn("Mission succeeded", text)
-        self.assertRegex(text.rstrip(), "Summary written to .*/result.json$")
+        last = [line for line in lines if line and not line.startswith("[")][-1]
+        self.assertRegex(last, "^Summary written to .*/result.json$")
 
     def test_roslaunch_ends_without_red_lines(self):
         flight = self.fly([*ROSLAUNCH, SHORT])

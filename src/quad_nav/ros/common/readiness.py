@@ -22,6 +22,7 @@ from quad_nav.errors import QuadError, excerpt, printable
 WARN_EVERY_S = 10.0  # wall time, as all durations here
 POLL_S = 0.1
 ALIVE_WITHIN_S = 1.0
+WITHDRAWN_WITHIN_S = 2.0
 SILENT_AFTER_S = 3.0
 REPEAT_S = 15.0
 MAX_LOG = 50_000  # characters of a line and of each of its arguments
@@ -176,18 +177,30 @@ def service_exists(name: str) -> bool:
 
 
 def lost_service(service: str, node: str) -> str:
-    """Say that the ROS master or the node that provided a service has died; "" if both live."""
+    """Say that the ROS master or the node that provides a service has died; "" if neither has.
+
+    A node that shuts down in order withdraws its services from the master, a dead one does not.
+    """
+    end_s = time.monotonic() + WITHDRAWN_WITHIN_S
+    while time.monotonic() < end_s:
+        try:
+            _probe(service, rosgraph.Master(rospy.get_name()).lookupService(service))
+            return ""
+        except rosgraph.MasterError:
+            return ""
+        except (OSError, rosgraph.network.ROSHandshakeException):
+            if not _is_master_alive():
+                return "the ROS master has died"
+            time.sleep(POLL_S)
+    return f"the {node} has died"
+
+
+def _is_master_alive() -> bool:
     try:
-        address = rosgraph.Master(rospy.get_name()).lookupService(service)
-    except rosgraph.MasterError:
-        return f"the {node} has shut down"
-    except OSError:
-        return "the ROS master has died"
-    try:
-        _probe(service, address)
-    except (OSError, rosgraph.network.ROSHandshakeException):
-        return f"the {node} has died"
-    return ""
+        rosgraph.Master(rospy.get_name()).getPid()
+    except (OSError, rosgraph.MasterError):
+        return False
+    return True
 
 
 def _probe(service: str, address: str) -> None:

@@ -106,7 +106,7 @@ def fly(mission: MissionRunner, setup: MissionSetup, result: Path, stop: Stop) -
 def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str]) -> int:
     problems = "\n  ".join(map(printable, lines))
     if rospy.is_shutdown():  # what is missing may have been on its way
-        print(f"\nsequencer: flight not started, {printable(reason)}", flush=True)
+        print(printable("sequencer: stopped before the flight started"), flush=True)
     else:
         rospy.logfatal(f"sequencer: flight not started, {printable(reason)}:\n  {problems}")
     robots = tuple(
@@ -124,10 +124,7 @@ def _not_flown(setup: MissionSetup, result: Path, reason: str, lines: List[str])
 
 
 class _Signalled:
-    """Reason of a shutdown by a signal: Ctrl-C, or roslaunch, which ends all nodes if one dies.
-
-    In the second case the simulator is gone before the signal comes.
-    """
+    """Reason of a shutdown by a signal: Ctrl-C, or roslaunch, which ends all nodes if one dies."""
 
     def __init__(self) -> None:
         self.simulation = True
@@ -137,7 +134,7 @@ class _Signalled:
         return self._reason
 
     def receive(self) -> None:
-        """Find out the reason while all other nodes still live."""
+        """Find out the reason while the ROS master lives."""
         lost = readiness.lost_service(START_SERVICE, "simulator") if self.simulation else ""
         self._reason = lost or INTERRUPTED
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import collections
 import functools
+import os
 import signal
 import sys
 import time
+import traceback
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from typing import Callable, Deque, List, Tuple
@@ -317,6 +319,15 @@ def main() -> int:
         )
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: node.stop())
-    node.run()
-    rospy.signal_shutdown("the simulation is closed")
+    _run(node)
     return 0
+
+
+def _run(node: SimulatorNode) -> None:
+    try:
+        node.run()
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+        os._exit(1)  # keeps the services: by them the sequencer knows a dead simulator
+    rospy.signal_shutdown("the simulation is closed")
