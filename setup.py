@@ -30,7 +30,7 @@ setuptools.setup(
     packages=setuptools.find_packages("src"),
     package_dir={"": "src"},
     package_data={
-        "quad_nav": ["py.typed"],
+        "quad_nav": ["py.typed", "*.pyi"],
         "quad_nav.config": ["*.pyi"],
         "quad_nav.report": ["*.jinja"],
         "quad_nav.tuning.report": ["*.jinja"],

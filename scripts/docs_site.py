@@ -4,16 +4,20 @@
 * A link to any other file or folder of the repository leads to a page that shows it, so that links
   work in the site as they do in a view of the repository.
 * Each package of ``quad_nav`` has a page of the API reference.
+* The examples of ``docs/python.md`` run; one that fails ends the build.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path, PurePosixPath
 from typing import Any, Dict, List
 
 from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -25,6 +29,32 @@ PAGES = {
 }
 # [text](target) and ![text](target), the anchor apart; links with a scheme are not ours.
 LINK = re.compile(r"(\]\()(?![a-z]+:)([^)#\s]+)(#[^)\s]*)?(\))")
+EXAMPLES = ROOT / "docs" / "python.md"
+EXAMPLE = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+def on_pre_build(config: MkDocsConfig) -> None:
+    """Run the examples for Python, all at the same time.
+
+    Raises:
+        PluginError: An example fails.
+    """
+    text = EXAMPLES.read_text(encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    runs = []
+    for example in EXAMPLE.finditer(text):
+        # Empty lines before it, so that a traceback has the lines of the page.
+        source = "\n" * text.count("\n", 0, example.start(1)) + example[1]
+        command = [sys.executable, "-W", "error::DeprecationWarning:__main__", "-c", source]
+        runs.append(
+            subprocess.Popen(
+                command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+            )
+        )
+    errors = [run.communicate()[1].decode() for run in runs]
+    for run, error in zip(runs, errors):
+        if run.returncode != 0:
+            raise PluginError(f"docs/python.md: an example fails:\n{error}")
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:

@@ -19,12 +19,59 @@ Reading order:
    checked set-up. ``files`` reads what users give.
 8. ``offline``, ``topics``, ``ros``: the two shells, and the contents of the topics.
 9. ``recording``, ``report``, ``barn``, ``tuning``, ``cli``: what is built on flights.
+10. ``api``, ``rl``: flights for Python programs and for learning.
 
 ``docs/architecture.md`` has a picture of the loop and of the packages.
 """
 
 from __future__ import annotations
 
+import importlib
+from typing import Any, List
+
 from quad_nav.versions import package_version
 
 __version__ = package_version()
+
+# The names of ``quad_nav.api``, loaded at their first use: importing the package must stay fast.
+# ``__init__.pyi`` lists them with their types.
+_API = (
+    "TRAJECTORY_COLUMNS",
+    "Box",
+    "Command",
+    "Configuration",
+    "Contact",
+    "Cylinder",
+    "Flight",
+    "FlightObserver",
+    "FlightResult",
+    "FlightSetup",
+    "Goal",
+    "GoalSequence",
+    "InputError",
+    "MissionSummary",
+    "Observation",
+    "Pose2D",
+    "Scan",
+    "Scene",
+    "SequenceSettings",
+    "Sphere",
+    "Walls",
+    "fly",
+    "lidar_simulation",
+    "load_configuration",
+    "load_goals",
+    "load_scene",
+    "prepare",
+)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _API:
+        raise AttributeError(f"module 'quad_nav' has no attribute {name!r}")
+    value = globals()[name] = getattr(importlib.import_module("quad_nav.api"), name)
+    return value
+
+
+def __dir__() -> List[str]:
+    return sorted([*globals(), *_API])

@@ -26,11 +26,11 @@ LAYERS = [
     {"scenario"},
     {"topics"},
     {"offline", "ros"},
-    {"recording"},
+    {"recording", "api"},
     {"report"},
     {"barn"},
     {"tuning"},
-    {"cli"},
+    {"cli", "rl"},
 ]
 # Navigation and the simulator do not import each other.
 WORLD_USERS = {
@@ -45,6 +45,8 @@ WORLD_USERS = {
     "tuning",
     "cli",
     "ros",
+    "api",
+    "rl",
 }
 
 # The files or folders in which a third-party package may be imported.
@@ -70,6 +72,9 @@ PLACES = {
     "matplotlib": ("report/", "tuning/report/"),
     "jinja2": "report/",
     "plotly": "report/",
+    "pandas": "api/",
+    "gymnasium": "rl/",
+    "pettingzoo": "rl/",
     "PIL": ("sim/map_image.py", "report/"),
 }
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from quad_nav.kernels.jit import njit
 
-NOT_REACHED = np.float32(1e10)
+NOT_REACHED: np.float32 = np.float32(1e10)
 BUCKET_SIZE = 10000  # cells that one bucket holds; further ones are dropped
 
 _INVERSE_SQRT2 = 0.707106781

@@ -131,11 +131,15 @@ class Flight:
 
     LIDARs and navigators are divided among ``processes``; the flight does not depend on their
     number. There is one process if an observer needs that, or if the physics engine casts the
-    beams.
+    beams. Without ``navigators`` nothing scans or commands but who calls the simulation.
     """
 
     def __init__(
-        self, setup: FlightSetup, observers: Sequence[FlightObserver] = (), processes: int = 1
+        self,
+        setup: FlightSetup,
+        observers: Sequence[FlightObserver] = (),
+        processes: int = 1,
+        navigators: bool = True,
     ) -> None:
         self.setup = setup
         self._observers = tuple(observers)
@@ -153,10 +157,8 @@ class Flight:
             FlightRobot(goals, configuration, self.log)
             for goals, configuration in zip(setup.robots, setup.configurations)
         ]
-        shares = [
-            range(first, len(self.robots), processes)
-            for first in range(min(processes, len(self.robots)))
-        ]
+        count = len(self.robots) if navigators else 0
+        shares = [range(first, count, processes) for first in range(max(1, min(processes, count)))]
         # Before the engine is created: forked processes must not inherit it.
         self._workers = [WorkerProcess(setup, share) for share in shares[1:]]
         self.simulation = Simulation(setup.scene, len(setup.robots), setup.simulation, setup.seed)
@@ -217,6 +219,11 @@ class Flight:
         self._sequence()
         self._navigate()
 
+    def command(self, robot: int, tick: Tick) -> None:
+        """Pass the command of a navigator's tick to the simulation, if there is one."""
+        if tick.command is not None:
+            self.simulation.set_command(robot, tick.command)
+
     def end(self, reason: str = "") -> None:
         """Call every observer's ``on_end``, then close the simulation and the processes."""
         self.reason = reason
@@ -258,8 +265,7 @@ class Flight:
         for result in sorted(self._tick_navigators(), key=attrgetter("robot")):
             index = result.robot
             self.robots[index].update(result.tick, result.goal_waits)
-            if result.tick.command is not None:
-                self.simulation.set_command(index, result.tick.command)
+            self.command(index, result.tick)
             for observer in self._observers:
                 observer.on_tick(index, result.tick, result.located, result.wall_s)
 

@@ -41,6 +41,8 @@ class FlightOptions:
         time_limit_s: Simulated time after which the flight ends.
         scans_per_s: Rate of the LIDARs in simulated time.
         simulation: Bodies and LIDARs.
+        configurations: Configurations of the robots, if they are there already, instead of those
+            that ``config`` and ``parameters`` name.
     """
 
     scene: Optional[Path]
@@ -53,6 +55,7 @@ class FlightOptions:
     time_limit_s: float = math.inf
     scans_per_s: float = 20.0
     simulation: SimulationParams = field(default_factory=SimulationParams)
+    configurations: Tuple[Configuration, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -183,6 +186,8 @@ def _request(options: FlightOptions) -> ScenarioRequest:
 def _configurations(
     options: FlightOptions, robots: int, mission: Optional[RandomMission]
 ) -> List[Configuration]:
+    if options.configurations:
+        return _given_configurations(options.configurations, robots)
     return read_configurations(
         options.config,
         robots,
@@ -190,6 +195,24 @@ def _configurations(
         options.parameters,
         partial(_input_faults, config_folder(options.config)),
     )
+
+
+def _given_configurations(
+    configurations: Sequence[Configuration], robots: int
+) -> List[Configuration]:
+    """Check configurations that no file has.
+
+    Raises:
+        InputError: They are not one for each robot, or have frames or sensors of their own.
+    """
+    problems = []
+    if len(configurations) != robots:
+        problems = [f"config: {len(configurations)} configurations; expected {robots}, the robots"]
+    for number, one in enumerate(configurations):
+        problems += _input_faults(Path("config"), one, number)
+    if problems:
+        raise InputError(problems)
+    return list(configurations)
 
 
 def _input_faults(folder: Path, configuration: Configuration, number: int) -> List[str]:

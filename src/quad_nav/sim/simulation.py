@@ -297,6 +297,11 @@ class Simulation:
         return self._state
 
     @property
+    def commands(self) -> NDArray[np.float64]:
+        """Commands in force float64[n, 3], (vx, vy, vyaw) in the bodies' frames; a copy."""
+        return self._commands.copy()
+
+    @property
     def is_hovering(self) -> NDArray[np.bool_]:
         """Mask bool[n] of the quadcopters without a command, or with one that has timed out."""
         return self.step_count > self._hover_step
