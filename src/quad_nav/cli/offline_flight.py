@@ -73,18 +73,22 @@ def _options(
     jitter: float,
     lidar: str,
     odom_drift: Tuple[float, float],
-    parameters: Tuple[str, ...],
     **given: Any,
 ) -> FlightOptions:
     """Translate the command line's options."""
     beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
-    options = FlightOptions(
-        **given,
-        parameters=tuple(map(parameter, parameters)),
-        simulation=SimulationParams(
-            beam_params, jitter_m=jitter, lidar_caster=lidar, odom_drift=OdomDrift(*odom_drift)
-        ),
+    simulation = SimulationParams(
+        beam_params, jitter_m=jitter, lidar_caster=lidar, odom_drift=OdomDrift(*odom_drift)
     )
+    return mission_options(simulation=simulation, **given)
+
+
+def mission_options(parameters: Tuple[str, ...], **given: Any) -> FlightOptions:
+    """Translate the options that ``quad fly`` and ``quad preview`` share.
+
+    Without scene and goals, few quadcopters fly the shipped goals, and more a random mission.
+    """
+    options = FlightOptions(**given, parameters=tuple(map(parameter, parameters)))
     few = (options.robots or 0) <= _TUTORIAL_ROBOTS and not options.size_m
     if few and options.scene is None and options.goals is None:
         return replace(options, goals=shipped("goals"))

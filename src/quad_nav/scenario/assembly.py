@@ -64,7 +64,7 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
         configuration.navigator,
         global_costmap,
         local_costmap,
-        _global_planner(configuration.global_planner, global_costmap.footprint),
+        build_global_planner(configuration.global_planner, global_costmap.footprint),
         _local_planner(
             configuration.local_planner,
             local_costmap.footprint,
@@ -92,13 +92,14 @@ def apply_configuration(navigator: Navigator, configuration: Configuration) -> N
     if not isinstance(configuration.global_planner, Plugin) or not np.array_equal(
         footprint, new_footprint
     ):
-        navigator.set_planner(_global_planner(configuration.global_planner, new_footprint))
+        navigator.set_planner(build_global_planner(configuration.global_planner, new_footprint))
     if not isinstance(configuration.local_planner, Plugin):
         navigator.set_controller_params(configuration.local_planner)
     navigator.controller.set_footprint(navigator.local_costmap.footprint)
 
 
-def _global_planner(params: Any, footprint: NDArray[np.float64]) -> GlobalPlanner:
+def build_global_planner(params: Any, footprint: NDArray[np.float64]) -> GlobalPlanner:
+    """Build a global planner from its parameters and the footprint, float64[n, 2]."""
     if isinstance(params, Plugin):
         planner: GlobalPlanner = params.make(footprint)
         return planner

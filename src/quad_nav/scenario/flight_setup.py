@@ -18,7 +18,7 @@ from quad_nav.files.values import value_faults
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.random_mission import RandomMission
 from quad_nav.scenario.rules import RANDOM, RULES, steps_per_scan
-from quad_nav.scenario.scenario import ScenarioRequest, read_configurations, read_scenario
+from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
 from quad_nav.scenario.scene_map import scene_map_problem
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation import SimulationParams, start_poses
@@ -88,7 +88,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
     Raises:
         InputError: Every fault in options, scene, goal files and configurations.
     """
-    options = _with_default_files(options)
+    options = with_default_files(options)
     problems = value_faults(_values(options), _RULES, "")
     simulation = options.simulation
     scenario, faults = read_scenario(_request(options), partial(_configurations, options))
@@ -120,6 +120,12 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         options.time_limit_s,
         warnings=(*scene.remarks, *scenario.warnings, *warnings),
     )
+
+
+def read_readable_parts(options: FlightOptions) -> Scenario:
+    """Read what has no faults, to show it; ``read_setup`` has the faults."""
+    options = with_default_files(options)
+    return read_scenario(_request(options), partial(_configurations, options))[0]
 
 
 def _map_faults(scene: Scene, configurations: Sequence[Configuration]) -> List[str]:
@@ -157,7 +163,7 @@ def _values(options: FlightOptions) -> Dict[str, Any]:
     }
 
 
-def _with_default_files(options: FlightOptions) -> FlightOptions:
+def with_default_files(options: FlightOptions) -> FlightOptions:
     """Add the shipped scene or goals if only the other is given, and the number of robots."""
     scene, goals, robots = options.scene, options.goals, options.robots
     if goals is None and scene is not None:

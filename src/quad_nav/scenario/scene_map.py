@@ -6,6 +6,7 @@ import math
 from typing import Dict
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.static import StaticLayer, StaticLayerParams, StaticMap
@@ -61,11 +62,20 @@ def scene_map(scene: Scene, resolution_m: float) -> StaticMap:
         low_x,
         low_y,
     )
-    x_m = low_x + (np.arange(spec.size_x) + 0.5) * resolution_m
-    y_m = low_y + (np.arange(spec.size_y) + 0.5) * resolution_m
+    return StaticMap(scene_occupancy(scene, spec), spec)
+
+
+def scene_occupancy(scene: Scene, spec: GridSpec, margin_m: float = 0.0) -> NDArray[np.int8]:
+    """Return the occupancy of a grid in ``map``, int8[H, W].
+
+    It is 100 where a cell's centre is in a wall or an obstacle, or at most ``margin_m`` from one,
+    else 0.
+    """
+    x_m = spec.origin_x_m + (np.arange(spec.size_x) + 0.5) * spec.resolution_m
+    y_m = spec.origin_y_m + (np.arange(spec.size_y) + 0.5) * spec.resolution_m
     occupancy = np.zeros(spec.shape, dtype=np.int8)
     for row in range(0, spec.size_y, _ROWS):
         rows = slice(row, row + _ROWS)
         centres = np.stack(np.meshgrid(x_m, y_m[rows]), axis=-1)
-        occupancy[rows][scene.flight_surface_distances_m(centres) <= 0.0] = 100
-    return StaticMap(occupancy, spec)
+        occupancy[rows][scene.flight_surface_distances_m(centres) <= margin_m] = 100
+    return occupancy

@@ -31,7 +31,7 @@ _SMALL_M = 1.0
 _GOAL_ARROW_M = (0.6, 0.08, 0.08)  # length, width and height
 _GOAL_DIAMETER_M, _ACTIVE_GOAL_DIAMETER_M, _GOAL_TEXT_HEIGHT_M = 0.30, 0.45, 0.35
 _MIN_NUMBER_HEIGHT_M, _NUMBER_PART = 0.4, 0.025
-_NUMBER_ABOVE_M = 0.6  # above most obstacles, which would hide it from above
+_NUMBER_ABOVE_M = 1.2  # above most obstacles, which would hide it from above
 _REACHED_ALPHA, _PENDING_ALPHA = 0.2, 0.75
 
 Triple = Tuple[float, float, float]

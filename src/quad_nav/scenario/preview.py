@@ -1,0 +1,203 @@
+"""Preview of a mission before it flies: costs, goals with their faults, and plans between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Dict, List, Optional, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.config import Configuration
+from quad_nav.costmap.inflation import InflationLayerParams
+from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
+from quad_nav.costmap.static import StaticLayerParams, StaticMap
+from quad_nav.errors import InputError, PlanningError
+from quad_nav.geometry import Pose2D
+from quad_nav.mission.goal_file import GoalSequence, PlaceCheck, load_goals
+from quad_nav.mission.robot_goals import goal_paths
+from quad_nav.scenario.assembly import build_global_planner
+from quad_nav.scenario.flight_setup import (
+    FlightOptions,
+    read_readable_parts,
+    read_setup,
+    with_default_files,
+)
+from quad_nav.scenario.goal_checks import place_check
+from quad_nav.scenario.scene_map import scene_map, scene_occupancy
+from quad_nav.sim.scene import Scene
+
+_ROUNDING_M = 1e-9
+NO_PLAN: NDArray[np.float64] = np.empty((0, 2))
+
+
+@dataclass(frozen=True)
+class RobotPreview:
+    """One robot's goals and the plans between them.
+
+    Attributes:
+        number: Number of the robot.
+        start: Start pose in ``map``; None if the scene has none for this robot.
+        sequence: Content of the goal file, faulty positions included.
+        faults: What is wrong with each goal's position, "" for a good one.
+        plans: float64[n, 2] of (x_m, y_m) in ``map`` for each goal, from the goal before it or the
+            start; empty without a plan.
+        warnings: A line for each goal that no plan leads to.
+    """
+
+    number: int
+    start: Optional[Pose2D]
+    sequence: GoalSequence
+    faults: Tuple[str, ...]
+    plans: Tuple[NDArray[np.float64], ...]
+    warnings: Tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return f"quad{self.number}"
+
+
+class MissionPreview:
+    """Everything of a mission that can be shown, also if it cannot fly.
+
+    Attributes:
+        scene: The scene; None if it cannot be read.
+        problems: The faults for which ``quad fly`` refuses the mission.
+        warnings: The warnings of ``quad fly``.
+        files: Goal files by the robots' numbers; none for a random mission.
+        robot_radius_m: Radius of the robots' hulls.
+    """
+
+    def __init__(self, options: FlightOptions) -> None:
+        """Read whatever can be read of the files that a flight needs."""
+        self.problems: Tuple[str, ...] = ()
+        self.robot_radius_m = options.simulation.airframe.radius_m
+        try:
+            setup = read_setup(options)
+        except InputError as error:
+            parts = read_readable_parts(options)
+            self.problems, self.warnings = tuple(error.problems), parts.warnings
+            self.scene, robots = parts.scene, parts.robots
+            configurations: Sequence[Optional[Configuration]] = parts.configurations
+        else:
+            self.scene, self.warnings, robots = setup.scene, setup.warnings, setup.robots
+            configurations = setup.configurations
+        self._configurations = dict(enumerate(configurations))
+        self._sequences = {int(one.name[len("quad") :]): one.sequence for one in robots}
+        self._costmaps: Dict[CostmapParams, LayeredCostmap] = {}
+        self.files: Dict[int, Path] = {}
+        options = with_default_files(options)
+        if options.goals is not None:
+            self.files, _ = goal_paths(Path(options.goals).expanduser(), options.robots or 1)
+            self._read_faulty_files()
+
+    def _read_faulty_files(self) -> None:
+        """Read the goals of files in which only positions are faulty."""
+        for number, path in self.files.items():
+            if number not in self._sequences:
+                try:
+                    self._sequences[number] = load_goals(path)
+                except InputError:
+                    continue  # its faults are among the problems
+
+    @property
+    def numbers(self) -> List[int]:
+        """Numbers of the robots whose goals can be shown."""
+        return sorted(self._sequences)
+
+    def check(self, number: int) -> PlaceCheck:
+        """Return the check for positions of a robot's goals, as ``quad fly`` has it."""
+        return place_check(self.scene, self.robot_radius_m, self._configurations.get(number))
+
+    def robot(self, number: int, sequence: Optional[GoalSequence] = None) -> RobotPreview:
+        """Check and plan a robot's goals.
+
+        Args:
+            number: The robot's number.
+            sequence: Its goals; None for those of its file.
+        """
+        sequence = sequence or self._sequences[number]
+        check = self.check(number)
+        faults = tuple(check(goal.x_m, goal.y_m) or "" for goal in sequence.goals)
+        starts = self.scene.starts if self.scene else ()
+        start = starts[number] if number < len(starts) else None
+        plans, warnings = self._plans(number, start, sequence, faults)
+        return RobotPreview(number, start, sequence, faults, tuple(plans), tuple(warnings))
+
+    def _plans(
+        self,
+        number: int,
+        start: Optional[Pose2D],
+        sequence: GoalSequence,
+        faults: Sequence[str],
+    ) -> Tuple[List[NDArray[np.float64]], List[str]]:
+        """Plan from goal to goal; faulty goals, and those without a plan, are left out."""
+        plans = [NO_PLAN for _ in sequence.goals]
+        warnings: List[str] = []
+        costmap, configuration = self.costmap(number), self._configurations.get(number)
+        if costmap is None or configuration is None or start is None:
+            return plans, warnings
+        planner = build_global_planner(configuration.global_planner, costmap.footprint)
+        here, name = start, "the start"
+        for index, (goal, fault) in enumerate(zip(sequence.goals, faults)):
+            if fault:
+                continue
+            goal_name = f"goal {index + 1}"
+            try:
+                plan = planner.make_plan(costmap.spec, costmap.costs.copy(), here, goal.pose)
+            except PlanningError as error:
+                warnings.append(
+                    f"quad{number}: {goal_name} ({goal.x_m:g}, {goal.y_m:g}): no path from {name}"
+                    f" over the global costmap of the whole scene: {error}"
+                )
+                continue
+            plans[index] = plan[:, :2]
+            here, name = goal.pose, goal_name
+        return plans, warnings
+
+    def costmap(self, number: int) -> Optional[LayeredCostmap]:
+        """Return a robot's global costmap as if it had seen the whole scene; None if unknown."""
+        configuration = self._configurations.get(number)
+        if configuration is None or self.scene is None:
+            return None
+        params = _without_sensors(configuration.global_costmap)
+        if params not in self._costmaps:
+            self._costmaps[params] = _costmap(params, self.scene, _follows(configuration))
+        return self._costmaps[params]
+
+
+def _follows(configuration: Configuration) -> bool:
+    """True for a global costmap that takes its map's size or follows the robot."""
+    costmap = configuration.global_costmap
+    has_map = any(isinstance(layer, StaticLayerParams) for _, layer in costmap.layers)
+    return has_map or costmap.rolling_window
+
+
+def _without_sensors(params: CostmapParams) -> CostmapParams:
+    """Put one map of the scene in the place of maps and sensors; the same for equal robots."""
+    inflation = [
+        (name, layer)
+        for name, layer in params.layers
+        if isinstance(layer, InflationLayerParams) and layer.enabled
+    ]
+    return replace(
+        params,
+        global_frame="map",
+        robot_base_frame="base_link",
+        rolling_window=False,
+        layers=(("scene", StaticLayerParams()), *inflation),
+    )
+
+
+def _costmap(params: CostmapParams, scene: Scene, covers_scene: bool) -> LayeredCostmap:
+    costmap = LayeredCostmap(params)
+    if covers_scene:
+        costmap.set_map(scene_map(scene, params.resolution_m))
+    else:
+        # A LIDAR marks the cells that surfaces lie in, also those of walls that end at the costmap.
+        seen = scene_occupancy(scene, params.spec, 0.5 * params.resolution_m + _ROUNDING_M)
+        costmap.set_map(StaticMap(seen, params.spec))
+    costmap.update(0.0, Pose2D(0.0, 0.0))
+    return costmap
