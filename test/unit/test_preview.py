@@ -282,6 +282,17 @@ def test_a_faulty_place_is_refused_as_by_fly_and_nothing_is_written(server, hall
     assert [(hall.goals / f"quad{i}_goals.json").read_text() for i in (0, 1)] == [GOALS, GOALS]
 
 
+def test_a_moved_goal_keeps_its_further_keys(server, hall):
+    path = hall.goals / "quad0_goals.json"
+    path.write_text('{"goals": [{"x": 1.0, "y": 5.0, "wait_s": 10}], "loop": false}')
+    data, _ = page_data_of(server)
+    version = data["robots"][0]["version"]
+    moved = {"robot": 0, "version": version, "goals": edits((0, 2.0, 5.0, 1.5))}
+    assert post(server, "save", {"robots": [moved]})["problems"] == []
+    text = '{"goals": [{"x": 2.0, "y": 5.0, "wait_s": 10, "yaw": 1.5}], "loop": false}'
+    assert path.read_text() == text
+
+
 def test_a_file_that_changed_meanwhile_is_not_overwritten(server, hall):
     data, _ = page_data_of(server)
     write_goals(hall, 0, [[2.0, 2.0]])

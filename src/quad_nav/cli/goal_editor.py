@@ -180,11 +180,11 @@ def _goals_of(request: Any) -> Tuple[int, List[GoalEdit]]:
     for goal in goals:
         if not isinstance(goal, Mapping):
             raise expected
-        source, x_m, y_m, yaw_rad = (goal.get(key) for key in ("source", "x", "y", "yaw"))
-        numbers = [x_m, y_m] if yaw_rad is None else [x_m, y_m, yaw_rad]
+        source, yaw_rad = goal.get("source"), goal.get("yaw")
+        numbers = [goal.get("x"), goal.get("y"), *([] if yaw_rad is None else [yaw_rad])]
         if not all(map(is_number, numbers)) or not (source is None or is_whole(source)):
             raise expected
-        edits.append(GoalEdit(source, x_m, y_m, yaw_rad))
+        edits.append(GoalEdit(source, goal["x"], goal["y"], yaw_rad))
     return int(request["robot"]), edits
 
 
