@@ -65,11 +65,14 @@ def mission_options(folder: Path, **given: Any) -> MissionOptions:
     return MissionOptions((write_mission(folder),), parameters=FAST, **given)
 
 
-def tune_setup(folder: Path, output: Path, candidates: int = 3, **given: Any) -> TuneSetup:
+def tune_setup(
+    folder: Path, output: Path, candidates: int = 3, config: str = "default", **given: Any
+) -> TuneSetup:
     """A study of few short flights."""
-    options = mission_options(folder)
+    options = mission_options(folder, config=config)
     space = folder / "space.yaml"
-    space.write_text(SPACE)
+    if not space.exists():
+        space.write_text(SPACE)
     return read_tune_setup(
         TuneOptions(
             options,
@@ -78,8 +81,7 @@ def tune_setup(folder: Path, output: Path, candidates: int = 3, **given: Any) ->
             SearchOptions(candidates, 2, 3, 0),
             finalists=1,
             final_flights=2,
-            held_out=1,
-            **given,
+            **{"held_out": 1, "free_speed": True, **given},
         )
     )
 
@@ -183,3 +185,30 @@ SYNTHETIC_SPACE = SearchSpace(
     (Dimension("speed", 0.0, 1.0), Dimension("idle", 0.0, 1.0), Dimension("bad", 0.0, 10.0)),
 )
 SYNTHETIC_BASE = {"speed": 0.1, "idle": 0.5, "bad": 0.0}
+
+
+class PaperWorkers:
+    """Returns the result of a function for each flight, without flying."""
+
+    count = 1
+
+    def __init__(self, fly: Callable[[FlightTask], FlightResult] = lambda _: FLOWN) -> None:
+        self._fly = fly
+        self.flown = 0
+
+    def run(
+        self, function: Any, tasks: Iterable[Tuple[int, FlightTask]]
+    ) -> Iterator[Tuple[int, FlightResult]]:
+        """Yield each task's number and the result."""
+        for number, task in tasks:
+            self.flown += 1
+            yield number, self._fly(task)
+
+
+def without_flying(
+    monkeypatch: Any, module: str, fly: Callable[[FlightTask], FlightResult] = lambda _: FLOWN
+) -> None:
+    """Let a command fly on paper."""
+    monkeypatch.setattr(f"quad_nav.cli.{module}.workers_of", lambda *_: PaperWorkers(fly))
+    monkeypatch.setattr("quad_nav.cli.flights_bar.warm_up", lambda _: None)
+    monkeypatch.setattr("quad_nav.cli.flights_bar.simulate", lambda: None)

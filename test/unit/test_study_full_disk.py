@@ -7,7 +7,15 @@ from contextlib import closing
 
 import pytest
 from click.testing import CliRunner
-from study_flights import FLOWN, SPACE, trials_as_data, tune_setup, write_mission
+from study_flights import (
+    FLOWN,
+    SPACE,
+    PaperWorkers,
+    trials_as_data,
+    tune_setup,
+    without_flying,
+    write_mission,
+)
 
 from quad_nav.cli.sweep import sweep
 from quad_nav.cli.tune import tune
@@ -17,21 +25,6 @@ from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.study import open_study
 from quad_nav.tuning.study_database import NotStored
 from quad_nav.tuning.tune import StudyStopped, run_tune
-
-
-class PaperWorkers:
-    """Returns the same result for each flight, without flying."""
-
-    count = 1
-
-    def __init__(self):
-        self.flown = 0
-
-    def run(self, function, tasks):
-        """Yield each task's number and the result."""
-        for number, _ in tasks:
-            self.flown += 1
-            yield number, FLOWN
 
 
 def fill_disk(monkeypatch, pages):
@@ -87,14 +80,8 @@ def tune_command(folder):
     (folder / "space.yaml").write_text(SPACE)
     files = ["--scene", str(mission.scene), "--goals", str(mission.goals)]
     search = ["--candidates", "24", "--flights", "2", "--space", str(folder / "space.yaml")]
+    search += ["--free-speed"]
     return [*files, *search, "--output", str(folder / "out")]
-
-
-def without_flying(monkeypatch, module):
-    """Let a command fly on paper."""
-    monkeypatch.setattr(f"quad_nav.cli.{module}.workers_of", lambda *_: PaperWorkers())
-    monkeypatch.setattr("quad_nav.cli.flights_bar.warm_up", lambda _: None)
-    monkeypatch.setattr("quad_nav.cli.flights_bar.simulate", lambda: None)
 
 
 def test_the_command_prints_the_best_and_ends_with_status_1(tmp_path, monkeypatch):

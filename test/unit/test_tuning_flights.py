@@ -195,6 +195,7 @@ def tune_arguments(folder):
         "--space",
         str(space),
         *SETS,
+        "--free-speed",
         "--candidates",
         "2",
         "--flights",

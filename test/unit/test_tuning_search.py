@@ -30,6 +30,7 @@ from quad_nav.tuning.refinement import refine
 from quad_nav.tuning.report.search_pictures import importances
 from quad_nav.tuning.search import SearchOptions, best_first, rounds, search
 from quad_nav.tuning.study import json_differences, open_study
+from quad_nav.tuning.study_text import gain_text
 
 HERE = Path(__file__).resolve().parent
 OPTIONS = SearchOptions(candidates=32, flights=4, generation=8, seed=3)
@@ -177,7 +178,10 @@ def test_refining_keeps_what_helps_and_takes_back_what_does_not():
     (gain,) = refined.gains
     assert (gain.path, gain.value, gain.base) == ("speed", 0.5, 0.1)
     # 40 s less over 10 m: 4 s for each metre.
-    assert (gain.time_s, gain.cost) == (pytest.approx(40.0), pytest.approx(4.0))
+    found = gain.difference
+    assert (found.time_s.mean, gain.cost) == (pytest.approx(-40.0), pytest.approx(4.0))
+    assert (found.time_s.low, found.time_s.high) == (pytest.approx(-40.0), pytest.approx(-40.0))
+    assert gain_text(gain) == "not distinguishable from chance with 3 flights"
     assert len(workers.flown) == len(set(workers.flown))
 
 

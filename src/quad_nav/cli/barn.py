@@ -28,7 +28,7 @@ from quad_nav.cli.options import (
     show_warnings,
 )
 from quad_nav.cli.outputs import Outputs
-from quad_nav.cli.progress import flights_progress
+from quad_nav.cli.progress import FlightPace, flights_progress, processes_text
 from quad_nav.errors import InputError
 from quad_nav.offline.workers import LocalWorkers
 from quad_nav.scenario.warm_up import simulate, warm_up
@@ -128,7 +128,7 @@ def barn(
         workers = min(workers, setup.wanted)
         if not quiet:
             show_warnings(setup.warnings)
-            echo(f"{setup.wanted} flights, {workers} at the same time", err=True)
+            echo(f"barn: {setup.wanted} flights on {processes_text(workers)}", err=True)
         results, interrupted = _fly(setup, workers, quiet)
     if not quiet:
         echo_lines(text(results, per_world), err=outputs.use_stdout)
@@ -152,7 +152,7 @@ def _numbers(text: str) -> Tuple[int, ...]:
 
 def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
     """Return the results, and true if Ctrl-C interrupted the flights."""
-    bar = _Bar(setup.wanted, quiet)
+    bar = _Bar(setup.wanted, workers, quiet)
     runs: List[Run] = []
     interrupted = False
     start_s = time.monotonic()
@@ -161,6 +161,7 @@ def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
         with bar:
             warm_up(setup.contestant.configuration)  # compile once instead of in every worker
             simulate()
+            bar.start()
             for run in fly_all(setup, workers):
                 runs.append(run)
                 bar.show(runs)
@@ -174,10 +175,12 @@ def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
 class _Bar:
     """Progress bar with counts of outcomes and the rate of flights."""
 
-    def __init__(self, wanted: int, quiet: bool) -> None:
+    def __init__(self, wanted: int, workers: int, quiet: bool) -> None:
         self._progress = flights_progress(quiet)
         self._task = self._progress.add_task("flights", total=wanted, status="")
-        self._start_s = time.monotonic()
+        self._wanted = wanted
+        self._pace = FlightPace(workers)
+        self._is_announced = quiet
 
     def __enter__(self) -> _Bar:
         return self
@@ -185,15 +188,22 @@ class _Bar:
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
+    def start(self) -> None:
+        """Start the clock of the rate."""
+        self._pace.start()
+
     def show(self, runs: List[Run]) -> None:
-        """Update the bar."""
-        counts = [
+        """Count a flight and update the bar."""
+        self._pace.on_flight()
+        left = self._wanted - len(runs)
+        parts = [
             f"{sum(run.outcome is outcome for run in runs)} {outcome.value}" for outcome in Outcome
         ]
-        per_minute = 60.0 * len(runs) / max(time.monotonic() - self._start_s, 1e-3)
-        self._progress.update(
-            self._task,
-            completed=len(runs),
-            status=f"{', '.join(counts)}; {per_minute:.1f} per minute",
-        )
+        status = f"{', '.join(parts)}; {self._pace.per_minute:.1f} per minute"
+        if self._pace.is_known:
+            status += f"; {self._pace.left_text(left)} left"
+            if not self._is_announced and left:
+                self._is_announced = True
+                echo(f"barn: {self._pace.estimate(left)}", err=True)
+        self._progress.update(self._task, completed=len(runs), status=status)
         self._progress.start()

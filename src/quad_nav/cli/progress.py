@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Optional
+from typing import Callable, Optional
 
 from rich.console import Console
 from rich.progress import (
@@ -13,13 +13,13 @@ from rich.progress import (
     TaskID,
     TextColumn,
     TimeElapsedColumn,
-    TimeRemainingColumn,
 )
 
 from quad_nav.mission.sequencer import Action, GoalEnded
 from quad_nav.offline.flight import Flight, FlightObserver
 
 _PERIOD_S = 0.1  # wall time between two updates
+_SURE_AFTER_S = 10.0
 
 _STARTING = "starting (the first flight after an installation compiles kernels for 30 s)"
 
@@ -27,7 +27,8 @@ _STARTING = "starting (the first flight after an installation compiles kernels f
 def flights_progress(quiet: bool) -> Progress:
     """Create a bar for many flights, with the time left.
 
-    A task has a description, and a field ``status`` with text behind the count. Start the bar
+    A task has a description, and a field ``status`` with text behind the count, which ends with the
+    time left; rich's own estimate counts flights that were stored earlier as fast. Start the bar
     with the first completed flight: before that, the workers' libraries may print messages.
     """
     console = Console(stderr=True)
@@ -36,13 +37,88 @@ def flights_progress(quiet: bool) -> Progress:
         BarColumn(bar_width=24),
         MofNCompleteColumn(),
         TextColumn("{task.fields[status]}"),
-        TimeRemainingColumn(elapsed_when_finished=True),
-        TextColumn("left"),
         console=console,
         transient=True,
-        speed_estimate_period=300.0,
         disable=quiet or not console.is_terminal,
     )
+
+
+class FlightPace:
+    """Time that flights take, measured from those that ended.
+
+    The first flight of each process does not count once others have ended: it also starts the
+    process and loads libraries.
+
+    Args:
+        processes: Flights at the same time.
+        clock: Returns the wall time in seconds.
+    """
+
+    def __init__(self, processes: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._processes = processes
+        self._clock = clock
+        self._first_s = self._last_s = 0.0
+        self.start()
+
+    def start(self) -> None:
+        """Start the clock."""
+        self._start_s = self._clock()
+        self.flights = 0
+
+    def on_flight(self) -> None:
+        """Count a flight that ended now."""
+        self.flights += 1
+        self._last_s = self._clock()
+        if self.flights <= self._processes:
+            self._first_s = self._last_s
+
+    @property
+    def wall_time_s(self) -> float:
+        """Time since the start."""
+        return self._clock() - self._start_s
+
+    @property
+    def per_minute(self) -> float:
+        """Rate of flights since the start."""
+        return 60.0 * self.flights / max(self.wall_time_s, 1e-3)
+
+    @property
+    def flight_s(self) -> Optional[float]:
+        """Time of a flight on one process, None before the first has ended."""
+        if not self.flights:
+            return None
+        count = self.flights - self._processes
+        if count > 0:
+            return self._processes * (self._last_s - self._first_s) / count
+        return self._last_s - self._start_s
+
+    @property
+    def is_known(self) -> bool:
+        """True after two flights of each process, or ten seconds with at least one."""
+        enough = self.flights >= 2 * self._processes
+        return enough or (self.flights > 0 and self._last_s - self._start_s >= _SURE_AFTER_S)
+
+    def left_text(self, flights: int) -> str:
+        """Describe the time that further flights take: "about 14 minutes"."""
+        return duration_text((self.flight_s or 0.0) * flights / self._processes)
+
+    def estimate(self, flights: int) -> str:
+        """Describe the time of a flight and of the flights that are left."""
+        return f"{self.flight_s or 0.0:.1f} s per flight; {flights} left, {self.left_text(flights)}"
+
+
+def processes_text(count: int) -> str:
+    """Return "1 process" or "2 processes"."""
+    return f"{count} process{'es' * (count != 1)}"
+
+
+def duration_text(seconds: float) -> str:
+    """Describe a duration to two digits: "about 14 minutes"."""
+    for unit, name in ((3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= 2 * unit:
+            count = seconds / unit
+            return f"about {count:.0f} {name}" if count >= 10 else f"about {count:.1f} {name}"
+    return f"about {max(round(seconds), 1)} second{'s' * (seconds >= 1.5)}"
 
 
 class ProgressBar(FlightObserver):

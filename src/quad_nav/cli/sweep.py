@@ -23,6 +23,7 @@ from quad_nav.cli.options import (
     show_warnings,
 )
 from quad_nav.cli.outputs import Outputs
+from quad_nav.cli.progress import processes_text
 from quad_nav.cli.study_options import (
     course_of,
     flown_options,
@@ -139,12 +140,14 @@ def _fly(
     if not quiet:
         show_warnings(setup.warnings)
         echo(
-            f"{len(setup.points)} points, {flights} flights each, {pool.count} flights at the "
-            "same time",
+            f"sweep: {len(setup.points)} points x {flights} flights = "
+            f"{len(setup.points) * flights} flights on {processes_text(pool.count)}",
             err=True,
         )
     flight_cache = FlightCache(cache)
     rows = run_with_bar(
+        "sweep",
+        pool.count,
         setup.course,
         lambda bar: run_sweep(setup, pool, flight_cache, bar),
         lambda _: "with --cache, the same command resumes the sweep",

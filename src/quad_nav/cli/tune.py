@@ -21,6 +21,7 @@ from quad_nav.cli.options import (
     show_warnings,
 )
 from quad_nav.cli.outputs import Outputs
+from quad_nav.cli.progress import processes_text
 from quad_nav.cli.study_options import (
     course_of,
     flown_options,
@@ -31,7 +32,7 @@ from quad_nav.cli.study_options import (
 from quad_nav.offline.workers import Workers
 from quad_nav.tuning.search import SearchOptions
 from quad_nav.tuning.study_files import write_result
-from quad_nav.tuning.study_text import text
+from quad_nav.tuning.study_text import format_value, text
 from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup, run_tune
 
 
@@ -51,6 +52,12 @@ from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup, run_tu
     type=A_FILE,
     help="Searched parameters with their ranges. [default: the shipped spaces/default.yaml,"
     " barn.yaml or dwa.yaml]",
+)
+@click.option(
+    "--free-speed",
+    is_flag=True,
+    help="Also search the robot's limits, its speeds and accelerations, where the space has them."
+    " Without it they keep the values of the base.",
 )
 @click.option(
     "--candidates",
@@ -134,6 +141,8 @@ def tune(
         if not quiet:
             _announce(setup, pool)
         result = run_with_bar(
+            "tune",
+            pool.count,
             setup.course,
             lambda bar: run_tune(setup, pool, bar),
             lambda bar: (
@@ -163,6 +172,7 @@ def _options(
     generation: int,
     held_out_scenes: Tuple[Path, ...],
     held_out_goals: Tuple[Path, ...],
+    free_speed: bool,
     **given: Any,
 ) -> TuneOptions:
     course = course_of(**given, held_out=missions_of(held_out_scenes, held_out_goals, "held-out-"))
@@ -176,14 +186,23 @@ def _options(
         final_flights,
         held_out or default,
         against,
+        free_speed,
     )
 
 
 def _announce(setup: TuneSetup, workers: Workers) -> None:
     show_warnings(setup.warnings)
     search = setup.options.search
+    if setup.held:
+        values = ", ".join(f"{path} {format_value(value)}" for path, value in setup.held.items())
+        echo(
+            f"tune: the robot's limits stay as in {setup.course.config}: {values}; --free-speed "
+            "searches them",
+            err=True,
+        )
     echo(
-        f"{search.candidates} candidates of up to {search.flights} flights, "
-        f"{len(setup.space.dimensions)} parameters, {workers.count} flights at the same time",
+        f"tune: {search.candidates} candidates x up to {search.flights} flights, "
+        f"{len(setup.space.dimensions)} parameters; with finalists and held-out flights up to "
+        f"about {setup.planned_flights} flights on {processes_text(workers.count)}",
         err=True,
     )

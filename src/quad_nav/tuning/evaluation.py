@@ -57,8 +57,11 @@ def task_of(course: Course, case: Case, assignments: Assignments) -> FlightTask:
 class StudyObserver:
     """Base class of progress displays; every method may do nothing."""
 
-    def on_expected(self, flights: int) -> None:
-        """Handle a change of the number of expected flights."""
+    def on_stored(self, flights: int) -> None:
+        """Handle the number of flights that are stored already."""
+
+    def on_remaining(self, flights: int) -> None:
+        """Handle a new estimate of the flights still to come, stored ones included."""
 
     def on_stage(self, name: str) -> None:
         """Handle the start of a stage of the study."""
@@ -77,6 +80,9 @@ class Evaluation:
     """Flies what is not in the cache, and caches each result at once.
 
     ``context`` distinguishes the flights of several studies in one cache.
+
+    Attributes:
+        later: Estimate of the flights after the present stage of the study.
     """
 
     def __init__(
@@ -95,10 +101,15 @@ class Evaluation:
         self._cache = journal
         self._context = {} if context is None else dict(context)
         self._counted: Set[Key] = set()
+        self.later = 0
 
     def of(self, course: Course, context: Mapping[str, Any]) -> Evaluation:
         """Return an evaluation of another course with the same workers and cache."""
         return Evaluation(course, self.space, self._workers, self._cache, self.observer, context)
+
+    def expect(self, flights: int) -> None:
+        """Tell the observer how many flights the present stage still flies."""
+        self.observer.on_remaining(flights + self.later)
 
     def fly(self, wanted: Iterable[Tuple[Values, Case]]) -> None:
         """Fly all cases that are not in the cache."""

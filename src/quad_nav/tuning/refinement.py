@@ -8,13 +8,14 @@ change is measured: flights without it beside flights with it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Sequence, Tuple
 
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Evaluation
+from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.score import mean_cost
 from quad_nav.tuning.space import Values
-from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
+from quad_nav.tuning.statistics import Comparison, FlightStatistics, compare, flight_statistics
 
 BASE: Values = {}
 NEGLIGIBLE_COST = 0.02
@@ -31,6 +32,7 @@ class Gain:
         base: Base's value, None if the base does not set it.
         with_it: Statistics with the change.
         without_it: Statistics without the change.
+        difference: What the change differs in, flight by flight, with intervals.
     """
 
     path: str
@@ -38,25 +40,24 @@ class Gain:
     base: Any
     with_it: FlightStatistics
     without_it: FlightStatistics
+    difference: Comparison
 
     @property
     def cost(self) -> float:
         """Cost that the change saves."""
         return self.without_it.cost - self.with_it.cost
 
-    @property
-    def time_s(self) -> Optional[float]:
-        """Time that the change saves per mission; None if one set completed no mission."""
-        before, after = self.without_it.mean_time_s, self.with_it.mean_time_s
-        return None if before is None or after is None else before - after
-
 
 @dataclass(frozen=True)
 class Refinement:
-    """Changes of the winner and their gains; empty if no candidate is better than the base."""
+    """Changes of the winner and their gains; empty if no candidate is better than the base.
+
+    ``has_completed`` is false if no flight of the winner completed its mission.
+    """
 
     values: Dict[str, Any]
     gains: Tuple[Gain, ...]
+    has_completed: bool = True
 
 
 def refine(
@@ -77,13 +78,27 @@ def refine(
     """
     candidates = [BASE, *(_changed(values, base) for values in finalists)]
     evaluation.observer.on_stage("finalists")
-    evaluation.observer.on_expected(len(candidates) * len(many))
+    final = len(candidates) * (len(many) - len(few))
+    evaluation.expect(final + refinement_flights(len(base), len(few), len(many)))
     flights = evaluation.evaluate(candidates, many)
     costs = list(map(mean_cost, flights))
-    best = candidates[costs.index(min(costs))]
+    number = costs.index(min(costs))
+    has_completed = any(flight.completed for flight in flights[number])
+    if not has_completed and _reached(flights[number]) <= _reached(flights[0]):
+        return Refinement({}, (), has_completed)  # it only failed faster than the base
+    best = candidates[number]
     values = _simplified(evaluation, best, few, many)
     evaluation.observer.on_stage("gain of each change")
-    return Refinement(values, _gains(evaluation, values, base, many))
+    return Refinement(values, _gains(evaluation, values, base, many), has_completed)
+
+
+def refinement_flights(changes: int, few: int, many: int) -> int:
+    """Estimate the flights after the selection; needless changes are taken back all at once."""
+    return changes * few + (many if changes else 0) + changes * many
+
+
+def _reached(flights: Sequence[FlightResult]) -> int:
+    return sum(flight.reached for flight in flights)
 
 
 def _changed(values: Values, base: Mapping[str, Any]) -> Dict[str, Any]:
@@ -100,7 +115,7 @@ def _simplified(
 ) -> Dict[str, Any]:
     """Take changes without benefit back, if all of them together are no benefit either."""
     evaluation.observer.on_stage("simplification")
-    evaluation.observer.on_expected(len(best) * len(few))
+    evaluation.expect(refinement_flights(len(best), len(few), len(many)))
     savings = [
         (path, cost - mean_cost(evaluation.flights(best, few)))
         for path, cost in zip(best, _costs_without(evaluation, best, few))
@@ -116,7 +131,7 @@ def _simplified(
     while waiting:  # all at once, then halves: they may matter together
         paths = waiting.pop(0)
         simpler = _without(simplest, paths)
-        evaluation.observer.on_expected(len(many))
+        evaluation.expect((1 + len(simpler)) * len(many))
         (flights,) = evaluation.evaluate([simpler], many)
         if mean_cost(flights) <= limit:
             simplest = simpler
@@ -136,11 +151,18 @@ def _gains(
     evaluation: Evaluation, values: Values, base: Mapping[str, Any], cases: Sequence[Case]
 ) -> Tuple[Gain, ...]:
     """Measure the gain of every change, largest first."""
-    evaluation.observer.on_expected(len(values) * len(cases))
+    evaluation.expect(len(values) * len(cases))
     without = evaluation.evaluate([_without(values, [path]) for path in values], cases)
-    with_it = flight_statistics(evaluation.flights(values, cases))
+    tuned = evaluation.flights(values, cases)
     gains = [
-        Gain(path, value, base.get(path), with_it, flight_statistics(flights))
+        Gain(
+            path,
+            value,
+            base.get(path),
+            flight_statistics(tuned),
+            flight_statistics(flights),
+            compare(tuned, flights),
+        )
         for (path, value), flights in zip(values.items(), without)
     ]
     return tuple(sorted(gains, key=lambda gain: -gain.cost))

@@ -48,7 +48,6 @@ def rounds(flights: int) -> Tuple[int, ...]:
 
 def search(evaluation: Evaluation, study: TuneStudy, start: Values, options: SearchOptions) -> None:
     """Fly generations until there are ``candidates`` trials; ``start`` is the first candidate."""
-    evaluation.observer.on_expected(options.candidates * options.flights)
     evaluation.observer.on_stage("search")
     for generation in range(-(-options.candidates // options.generation)):
         _fly_generation(evaluation, study, start, options, generation)
@@ -66,7 +65,8 @@ def _fly_generation(
         candidates[0] = dict(start)
     candidates = candidates[: options.candidates - first]
     cases = evaluation.course.search_cases(options.flights)
-    means = _fly_rounds(evaluation, history[:first], candidates, cases)
+    left = options.candidates - first - len(candidates)
+    means = _fly_rounds(evaluation, history[:first], candidates, cases, left * len(cases))
     for number, (values, steps) in enumerate(zip(candidates, means), start=first):
         if number >= len(history):
             study.add(_trial(evaluation, values, steps, cases))
@@ -85,18 +85,24 @@ def _fly_rounds(
     history: Sequence[FrozenTrial],
     candidates: Sequence[Values],
     cases: Sequence[Case],
+    next_flights: int,
 ) -> List[Dict[int, float]]:
-    """Return for each candidate its mean cost after each round that it survived."""
+    """Return for each candidate its mean cost after each round that it survived.
+
+    ``next_flights`` are those of later generations, for the estimate.
+    """
     means: List[Dict[int, float]] = [{} for _ in candidates]
     flying = list(range(len(candidates)))
+    flown = 0
     for count in rounds(len(cases)):
+        evaluation.expect(len(flying) * (len(cases) - flown) + next_flights)
         evaluation.fly((candidates[k], case) for case in cases[:count] for k in flying)
         for k in flying:
             means[k][count] = mean_cost(evaluation.flights(candidates[k], cases[:count]))
         if count < len(cases):
             hopeless = {k for k in flying if should_prune(history, count, means[k][count])}
-            evaluation.observer.on_expected(-len(hopeless) * (len(cases) - count))
             flying = [k for k in flying if k not in hopeless]
+        flown = count
     return means
 
 

@@ -13,7 +13,7 @@ import os
 import sqlite3
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set
 
 import optuna
 import sqlalchemy.exc
@@ -26,6 +26,7 @@ from quad_nav.files.values import is_number, is_whole
 from quad_nav.tuning.courses import identity_text
 from quad_nav.tuning.flight_cache import FlightCache
 from quad_nav.tuning.proposals import distributions
+from quad_nav.tuning.robot_limits import is_limit
 from quad_nav.tuning.space import SearchSpace
 from quad_nav.tuning.statistics import STATISTICS, statistics_faults
 from quad_nav.tuning.study_database import NotStored, advice, reason
@@ -34,6 +35,8 @@ FILE = "study.db"
 _LOCK = ".lock"
 _NAME = "quad tune"
 _IDENTITY = "identity"
+_SPACE = "space"
+_LIMIT_HINT = " (a limit of the robot, searched only with --free-speed)"
 _FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 _STORAGE_ERRORS = (
     sqlite3.Error,
@@ -182,6 +185,14 @@ def json_differences(there: Any, here: Any, place: str = "") -> Sequence[str]:
                 there.get(key), here.get(key), f"{place}/{key}".lstrip("/")
             )
         ]
+    if place == _SPACE and isinstance(there, list) and isinstance(here, list):
+        searched, now = _paths_of(there), _paths_of(here)
+        if searched != now:
+            return [
+                f"{path} was {'searched and is not' if path in searched else 'not searched and is'}"
+                f"{_LIMIT_HINT if is_limit(path) else ''}"
+                for path in sorted(searched ^ now)
+            ]
     if isinstance(there, list) and isinstance(here, list) and len(there) == len(here):
         return [
             line
@@ -189,6 +200,11 @@ def json_differences(there: Any, here: Any, place: str = "") -> Sequence[str]:
             for line in json_differences(one, other, f"{place}[{k}]")
         ]
     return [] if there == here else [f"{place} was {_shown(there)} and is {_shown(here)}"]
+
+
+def _paths_of(space: Sequence[Any]) -> Set[str]:
+    """Return the paths of a serialized space."""
+    return {entry["path"] for entry in space if isinstance(entry, dict) and "path" in entry}
 
 
 def _shown(value: Any) -> str:

@@ -13,9 +13,22 @@ from quad_nav.tuning.parameter_files import Change, base_configuration, base_val
 from quad_nav.tuning.refinement import Gain
 from quad_nav.tuning.score import TERMS
 from quad_nav.tuning.space import costmap_paths
-from quad_nav.tuning.statistics import FlightStatistics, flight_statistics
+from quad_nav.tuning.statistics import (
+    CONFIDENCE,
+    MIN_PAIRS,
+    Comparison,
+    Difference,
+    FlightStatistics,
+    flight_statistics,
+)
 from quad_nav.tuning.tune import TuneResult, all_versions
 
+INTERVAL_TEXT = (
+    "Intervals are 95 % bootstrap intervals of the mean difference of flights of the same mission "
+    "and seed. A difference is named only if its interval excludes 0, with at least "
+    f"{MIN_PAIRS} flights."
+)
+_CHANCE = "not distinguishable from chance"
 _HEADER = [
     "",
     "flights",
@@ -40,12 +53,50 @@ _BARN_HEADER = [
 
 def text(result: TuneResult) -> str:
     """Format the outcome for the terminal."""
-    parts = [held_out_table(result)]
-    if result.refined.gains:
-        parts.append(gain_table(result))
-    else:
-        parts.append("No candidate is better than the base; its parameters are written unchanged.")
+    parts = [held_out_table(result), "\n".join(held_out_lines(result))]
+    parts.append(gain_table(result) if result.refined.gains else unchanged_text(result))
     return "\n\n".join(parts)
+
+
+def unchanged_text(result: TuneResult) -> str:
+    """Say why a study keeps the base's parameters."""
+    if result.refined.has_completed:
+        return "No candidate is better than the base; its parameters are written unchanged."
+    base = result.setup.course.config
+    return (
+        "No flight completed its mission, neither with the base nor with a candidate that reaches "
+        f"more goals. The parameters of {base} are written unchanged. Fly the mission once with "
+        "quad fly to see what stops it."
+    )
+
+
+def held_out_lines(result: TuneResult) -> List[str]:
+    """Compare the tuned parameters to each other set in the held-out flights, a line for each."""
+    lines = [
+        f"tuned compared to {name}: {comparison_text(comparison)}"
+        for name, comparison in result.held_out.comparisons(result.setup.course.config)
+        if result.refined.values or name != result.setup.course.config
+    ]
+    if not any(flight.completed for flight in result.held_out.tuned):
+        lines.append("No held-out flight of the tuned parameters completed its mission.")
+    return lines
+
+
+def verdict(result: TuneResult) -> Tuple[str, str]:
+    """Return what the held-out flights show of the tuned parameters.
+
+    Returns:
+        A short text, and "good", "bad" or "unclear".
+    """
+    if not result.refined.values:
+        return "Base kept: no candidate is better", "unclear"
+    name, comparison = result.held_out.comparisons(result.setup.course.config)[-1]
+    count = comparison.flights
+    if not comparison.cost.is_claimed:
+        return f"{_CHANCE} with {_flights(count)}".capitalize(), "unclear"
+    if comparison.cost.mean < 0.0:
+        return f"Better than {name} in {_flights(count)}", "good"
+    return f"Worse than {name} in {_flights(count)}", "bad"
 
 
 def held_out_table(result: TuneResult, tablefmt: str = "simple") -> str:
@@ -140,28 +191,55 @@ def gain_table(result: TuneResult, tablefmt: str = "simple") -> str:
 
 
 def gain_text(gain: Gain) -> str:
-    """Describe the effect of a change, most important first: "3.4 s faster"."""
-    before, after = gain.without_it, gain.with_it
-    words = []
-    if after.completed != before.completed:
-        words.append(
-            f"{after.completed} of {after.flights} missions completed instead of {before.completed}"
+    """Describe the effect of a change: "3.4 s faster (95 %: 2.0 to 4.9)"."""
+    return comparison_text(gain.difference)
+
+
+def comparison_text(found: Comparison) -> str:
+    """Describe the differences that are no chance, most important first, with their intervals."""
+    words = [
+        f"{part:.0f} % {'more' if share.mean > 0 else 'fewer'} {what} ({_interval(share, 100, 0)})"
+        for share, what in (
+            (found.completed, "completed missions"),
+            (found.touched, "flights with contacts"),
         )
-    if after.touched != before.touched:
-        words.append(
-            f"{after.touched} of {after.flights} flights with contacts instead of {before.touched}"
+        for part in (100 * abs(share.mean),)
+        if share.is_claimed
+    ]
+    words += [
+        f"{prefix}{abs(one.mean):.{decimals}f}{unit} {up if one.mean > 0 else down}"
+        f" ({_interval(one, 1, decimals)})"
+        for one, prefix, decimals, unit, up, down in (
+            (found.time_s, "", 1, " s", "slower", "faster"),
+            (found.gap_m, "gaps ", 2, " m", "wider", "narrower"),
+            (found.roughness_mps2, "", 2, " m/s2", "rougher", "smoother"),
         )
-    time_s = gain.time_s
-    if time_s is not None and abs(time_s) >= 0.05:
-        words.append(f"{abs(time_s):.1f} s {'faster' if time_s > 0 else 'slower'}")
-    if before.mean_gap_m is not None and after.mean_gap_m is not None:
-        wider_m = after.mean_gap_m - before.mean_gap_m
-        if abs(wider_m) >= 0.005:
-            words.append(f"gaps {abs(wider_m):.2f} m {'wider' if wider_m > 0 else 'narrower'}")
-    smoother = before.roughness_mps2 - after.roughness_mps2
-    if abs(smoother) >= 0.05:
-        words.append(f"{'smoother' if smoother > 0 else 'rougher'} by {abs(smoother):.2f} m/s2")
-    return ", ".join(words) or "no measurable effect"
+        if one is not None and one.is_claimed and round(abs(one.mean), decimals) > 0.0
+    ]
+    if words:
+        return ", ".join(words)
+    return _cost_text(found)
+
+
+def _cost_text(found: Comparison) -> str:
+    cost = found.cost
+    if cost.is_claimed:
+        word = "lower" if cost.mean < 0.0 else "higher"
+        return f"cost {abs(cost.mean):.3f} {word} ({_interval(cost, 1, 3)})"
+    if cost.mean == cost.low == cost.high == 0.0:
+        return f"no effect in {_flights(found.flights)}"
+    return f"{_CHANCE} with {_flights(found.flights)}"
+
+
+def _interval(found: Difference, factor: float, decimals: int) -> str:
+    """Format the interval of a difference that is no chance, without its sign."""
+    assert found.low is not None and found.high is not None
+    low, high = sorted((factor * abs(found.low), factor * abs(found.high)))
+    return f"95 %: {low:.{decimals}f} to {high:.{decimals}f}"
+
+
+def _flights(count: int) -> str:
+    return f"{count} flight{'s' * (count != 1)}"
 
 
 def changes(result: TuneResult) -> List[Change]:
@@ -214,6 +292,11 @@ def to_json(result: TuneResult, command: str) -> Dict[str, Any]:
         "parameters": dict(result.assignments),
         "gains": [{**asdict(gain), "cost": gain.cost} for gain in result.refined.gains],
         "held_out": {name: asdict(statistics) for name, statistics in held_out_rows(result)},
+        "confidence": CONFIDENCE,
+        "held_out_differences": {
+            name: asdict(comparison)
+            for name, comparison in held_out.comparisons(setup.course.config)
+        },
         "held_out_flights": [
             {
                 "mission": case.name,
@@ -234,11 +317,8 @@ def markdown(result: TuneResult, command: str) -> str:
     """Format STUDY.md, which documents the origin of the parameters beside it."""
     search = result.setup.options.search
     with_versions = ", ".join(f"{name} {version}" for name, version in all_versions().items())
-    gains = (
-        gain_table(result, "github")
-        if result.refined.gains
-        else "No candidate is better than the base."
-    )
+    gains = gain_table(result, "github") if result.refined.gains else unchanged_text(result)
+    lines = "\n".join(f"* {line}" for line in held_out_lines(result))
     return f"""# Tuning study of these parameters
 
 ```sh
@@ -254,6 +334,10 @@ same result.
 {held_out_table(result, "github")}
 
 A gap is the smaller of clearance and separation. A lower cost is better.
+
+{lines}
+
+{INTERVAL_TEXT}
 
 ## Effect of each change
 

@@ -163,7 +163,7 @@ def run_sweep(
     evaluation = Evaluation(
         setup.course, space_of(setup.points), workers, journal, observer, {_BASE: setup.base}
     )
-    observer.on_expected(len(setup.points) * setup.flights)
+    evaluation.expect(len(setup.points) * setup.flights)
     observer.on_stage("sweep")
     try:
         flights = evaluation.evaluate(setup.points, setup.cases)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
 import optuna
 from optuna.trial import FrozenTrial
@@ -19,9 +19,11 @@ from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Course, Evaluation, StudyObserver
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.parameter_files import base_configuration, base_value
-from quad_nav.tuning.refinement import BASE, Refinement, refine
+from quad_nav.tuning.refinement import BASE, Refinement, refine, refinement_flights
+from quad_nav.tuning.robot_limits import hold_limits, protected_faults
 from quad_nav.tuning.search import SearchOptions, best_first, search
 from quad_nav.tuning.space import Assignments, SearchSpace, load_space
+from quad_nav.tuning.statistics import Comparison, compare
 from quad_nav.tuning.study import TuneStudy, open_study
 from quad_nav.tuning.study_database import NotStored
 from quad_nav.tuning.study_input import CourseOptions, parameter_faults, read_course, with_config
@@ -48,6 +50,7 @@ class TuneOptions:
         final_flights: Flights of each finalist.
         held_out: Flights that the search never flies, with base and tuned parameters.
         against: Further configurations that fly the held-out flights unchanged.
+        free_speed: Search the robot's limits too, where the space has them; otherwise they stay.
     """
 
     course: CourseOptions
@@ -58,16 +61,28 @@ class TuneOptions:
     final_flights: int = 16
     held_out: int = 20
     against: Tuple[str, ...] = ()
+    free_speed: bool = False
 
 
 @dataclass(frozen=True)
 class TuneSetup:
-    """Checked study; ``base`` holds the base's value of each searched parameter."""
+    """Checked study.
+
+    Attributes:
+        options: Options of the study.
+        course: Flights of every candidate.
+        space: Searched parameters.
+        base: Base's value of each searched parameter.
+        held: Limits of the robot that the space's file has and that keep the base's value.
+        against: Compared configurations by name.
+        warnings: Lines to show before the study starts.
+    """
 
     options: TuneOptions
     course: Course
     space: SearchSpace
     base: Mapping[str, Any]
+    held: Mapping[str, Any]
     against: Tuple[Tuple[str, Course], ...]
     warnings: Tuple[str, ...]
 
@@ -75,6 +90,20 @@ class TuneSetup:
     def base_folder(self) -> Path:
         """Folder of the base configuration."""
         return config_folder(self.course.config)
+
+    @property
+    def planned_flights(self) -> int:
+        """Estimate of the study's flights, as if no candidate were pruned."""
+        options = self.options
+        few = options.search.flights
+        many = max(options.final_flights, few)
+        finalists = min(options.finalists, options.search.candidates)
+        return (
+            (1 + options.search.candidates) * few
+            + (1 + finalists) * (many - few)
+            + refinement_flights(len(self.space.dimensions), few, many)
+            + (2 + len(options.against)) * options.held_out
+        )
 
     @property
     def identity(self) -> Dict[str, Any]:
@@ -106,6 +135,11 @@ class HeldOut:
         """Return all flights by name; ``base`` is the name of the base."""
         return (*self.others, (base, self.base), (TUNED, self.tuned))
 
+    def comparisons(self, base: str) -> Tuple[Tuple[str, Comparison], ...]:
+        """Return the tuned flights compared to each other set, by its name."""
+        *others, _ = self.sets(base)
+        return tuple((name, compare(self.tuned, flights)) for name, flights in others)
+
 
 @dataclass(frozen=True)
 class TuneResult:
@@ -135,25 +169,40 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
     )
     folder = config_folder(course.config)
     configuration = base_configuration(folder, course.fixed)
-    space = load_space(options.space or _shipped_space(options.course, configuration)).without(
+    given = load_space(options.space or _shipped_space(options.course, configuration)).without(
         [path for path, _ in course.fixed]
     )
-    problems = [
+    space, held = (given, ()) if options.free_speed else hold_limits(given)
+    problems = protected_faults(given) + [
         line
-        for values in space.corners()
+        for values in given.corners()
         for line in parameter_faults(
-            (*course.fixed, *space.assignments(values)), folder, space.name
+            (*course.fixed, *given.assignments(values)), folder, given.name
         )
     ]
     if not space.dimensions:
-        problems.append(
-            f"{space.name}: every parameter is fixed by --set; expected at least one to search"
-        )
+        problems.append(_nothing_to_search(given))
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
     tree = configuration.to_tree()
-    base = {path: base_value(tree, path) for path in space.paths}
-    return TuneSetup(options, course, space, base, against, tuple(warnings))
+    return TuneSetup(
+        options,
+        course,
+        space,
+        {path: base_value(tree, path) for path in space.paths},
+        {path: base_value(tree, path) for path in held},
+        against,
+        tuple(warnings),
+    )
+
+
+def _nothing_to_search(given: SearchSpace) -> str:
+    if given.dimensions:
+        return (
+            f"{given.name}: every parameter is a limit of the robot, which is searched only with "
+            "--free-speed; expected another parameter, or --free-speed"
+        )
+    return f"{given.name}: every parameter is fixed by --set; expected at least one to search"
 
 
 def all_versions() -> Dict[str, str]:
@@ -196,17 +245,25 @@ def _best_text(study: TuneStudy) -> str:
 
 def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResult:
     options, course, observer = setup.options, setup.course, evaluation.observer
+    plan = setup.planned_flights
+    observer.on_stored(study.journal.known_at_start)
     few = course.search_cases(options.search.flights)
-    observer.on_expected(len(few))
+    evaluation.later = plan - len(few)
+    evaluation.expect(len(few))
     observer.on_stage("base")
     (reference,) = evaluation.evaluate([BASE], few)
+    if not any(flight.completed for flight in reference):
+        observer.on_problem(_none_completed(course.config, reference))
+    evaluation.later -= options.search.candidates * len(few)
     search(evaluation, study, start_values(setup.space, setup.base), options.search)
     trials = study.trials[: options.search.candidates]
     finalists = [trial.params for trial in best_first(trials)[: options.finalists]]
     many = course.search_cases(max(options.final_flights, len(few)))
+    evaluation.later = held_flights = (2 + len(setup.against)) * options.held_out
     refined = refine(evaluation, finalists, setup.base, few, many)
     held_out = course.held_out_cases(options.held_out)
-    observer.on_expected(2 * len(held_out))
+    evaluation.later = held_flights - 2 * len(held_out)
+    evaluation.expect((2 if refined.values else 1) * len(held_out))
     observer.on_stage("held-out flights")
     base, tuned = evaluation.evaluate([BASE, refined.values], held_out)
     return TuneResult(
@@ -218,11 +275,20 @@ def _run(setup: TuneSetup, evaluation: Evaluation, study: TuneStudy) -> TuneResu
     )
 
 
+def _none_completed(config: str, flights: Sequence[FlightResult]) -> str:
+    """Warn that the base never reaches every goal."""
+    reached, goals = sum(one.reached for one in flights), sum(one.goals for one in flights)
+    reason = next((f" ({one.reason})" for one in flights if one.reason), "")
+    return (
+        f"tune: the base {config} completed none of {len(flights)} flights{reason} and reached "
+        f"{reached} of {goals} goals; a search from a base that flies the mission finds more"
+    )
+
+
 def _fly_other(
     name: str, course: Course, result: TuneResult, evaluation: Evaluation
 ) -> Tuple[FlightResult, ...]:
     """Fly the held-out flights with another configuration."""
-    evaluation.observer.on_expected(len(result.held_out.cases))
     evaluation.observer.on_stage(f"held-out flights of {name}")
     other = evaluation.of(course, {"config": name, **course.identity()["config"]})
     (flights,) = other.evaluate([BASE], result.held_out.cases)
