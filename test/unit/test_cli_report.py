@@ -60,9 +60,11 @@ def test_one_flight(report, tmp_path):
 
 
 def test_pictures_and_animation(report, tmp_path):
-    result = report("../good.bag", "-o", "new/one.html", "--png", "png", "--animate", "new/one.gif")
-    assert result.output == "report: new/one.html\nanimation: new/one.gif\n"
-    assert (tmp_path / "out" / "png" / "paths.png").read_bytes().startswith(b"\x89PNG")
+    outputs = ("-o", "new/one.html", "--pictures", "paper", "--animate", "new/one.gif")
+    result = report("../good.bag", *outputs)
+    assert result.output == ("report: new/one.html\npictures: paper\nanimation: new/one.gif\n")
+    assert (tmp_path / "out" / "paper" / "paths.png").read_bytes().startswith(b"\x89PNG")
+    assert b"<svg" in (tmp_path / "out" / "paper" / "paths.svg").read_bytes()[:1000]
     assert (tmp_path / "out" / "new" / "one.gif").read_bytes().startswith(b"GIF89a")
 
 
@@ -70,7 +72,18 @@ def test_several_flights(report, tmp_path):
     assert report("../good.bag", "../good2.bag", "-o", "both.html").exit_code == 0
     html = (tmp_path / "out" / "both.html").read_text(encoding="utf-8")
     assert "2 flights compared" in html
-    assert "<td>good.bag</td><td>tutorial</td>" in html and "<td>good2.bag</td>" in html
+    assert '<td class="name">good.bag</td><td class="name">tutorial</td>' in html
+    assert '<td class="name">good2.bag</td>' in html
+    assert "All flights have the same parameters and set-up." in html
+
+
+def test_pictures_of_a_flight_as_it_is_flown(tmp_path):
+    arguments = ["fly", "-q", "--time-limit", "0.2", "--beams", "64"]
+    result = CliRunner().invoke(main, [*arguments, "--pictures", str(tmp_path / "paper")])
+    assert f"pictures: {tmp_path / 'paper'}" in result.output
+    names = {path.name for path in (tmp_path / "paper").iterdir()}
+    assert {"paths.png", "paths.svg", "timeline.svg"} <= names
+    assert not any(path.suffix == ".html" for path in tmp_path.iterdir())
 
 
 def test_every_fault_is_listed_and_nothing_written(report, tmp_path):

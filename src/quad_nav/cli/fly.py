@@ -148,7 +148,13 @@ MAX_DRIFT = 1.0
     "--report",
     type=A_FILE,
     metavar="FILE.html",
-    help="Write a report with pictures of the flight.",
+    help="Write a report with plots of the flight.",
+)
+@click.option(
+    "--pictures",
+    type=A_FOLDER,
+    metavar="FOLDER",
+    help="Write the report's pictures to this folder, each as a PNG and an SVG file.",
 )
 @click.option(
     "--animate",

@@ -43,6 +43,7 @@ def fly_mission(
     record: Optional[Path],
     view: Optional[str],
     report: Optional[Path],
+    pictures: Optional[Path],
     animate: Optional[Path],
     quiet: bool,
     processes: Optional[int],
@@ -54,16 +55,17 @@ def fly_mission(
         outputs = Outputs(
             {"--json": json_path, "--report": report},
             {"--record": record, "--view": saved_view, "--animate": animate},
+            {"--pictures": pictures},
         )
         options = _options(**given)
         setup = read_setup(options)
-        pictures = FlightPictures(setup, report, animate)
+        drawn = FlightPictures(setup, report, pictures, animate)
         observers = _observers(record, view)
     if not quiet:
         show_warnings(setup.warnings)
     processes = processes or processes_for(len(setup.robots))
     facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
-    sys.exit(_fly(setup, facts, observers, outputs, pictures, quiet, processes))
+    sys.exit(_fly(setup, facts, observers, outputs, drawn, quiet, processes))
 
 
 def _options(

@@ -34,10 +34,12 @@ T = TypeVar("T")
     help="Write the report to this file.",
 )
 @click.option(
+    "--pictures",
     "--png",
+    "pictures",
     type=click.Path(file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help="Also write every picture to this folder as a PNG file.",
+    help="Also write every picture to this folder, as a PNG and an SVG file.",
 )
 @click.option(
     "--animate",
@@ -46,7 +48,7 @@ T = TypeVar("T")
     help="Write an animation: .gif, or .mp4 (requires ffmpeg). Takes exactly one FLIGHT.",
 )
 def report(
-    flights: Tuple[Path, ...], output: Path, png: Optional[Path], animate: Optional[Path]
+    flights: Tuple[Path, ...], output: Path, pictures: Optional[Path], animate: Optional[Path]
 ) -> None:
     """Write a report of a recorded flight, or compare several flights.
 
@@ -57,27 +59,28 @@ def report(
     """
     # Imported here, because matplotlib loads slowly.
     from quad_nav.report import animation, page
+    from quad_nav.report.compared_flight import compared_flight
     from quad_nav.report.comparison import comparison_page
-    from quad_nav.report.flight_metrics import flight_metrics
     from quad_nav.report.flight_page import flight_page
 
     try:
-        outputs = Outputs({"--output": output}, {"--animate": animate}, {"--png": png})
+        outputs = Outputs({"--output": output}, {"--animate": animate}, {"--pictures": pictures})
         faults = animation.animation_faults(animate, len(flights)) if animate is not None else []
         if len(flights) == 1:
             (trace,) = _read(flights, lambda trace: trace, faults)
             content = flight_page(trace)
         else:
-            content = comparison_page(_read(flights, flight_metrics, faults))
+            content = comparison_page(_read(flights, compared_flight, faults))
     except InputError as error:
         echo_lines("no report written:\n  " + "\n  ".join(error.problems), err=True)
         sys.exit(EXIT_BAD_INPUT)
     with outputs.attempt("--output", output):
         page.write_page(content, output)
         echo(f"report: {output}")
-    if png is not None:
-        with outputs.attempt("--png", png):
-            page.write_pictures(content, png)
+    if pictures is not None:
+        with outputs.attempt("--pictures", pictures):
+            page.write_pictures(content, pictures)
+            echo(f"pictures: {pictures}")
     if animate is not None:
         with outputs.attempt("--animate", animate):
             animation.animate_flight(trace, animate)

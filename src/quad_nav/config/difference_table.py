@@ -91,12 +91,15 @@ def _rows(tree: Any, number: str) -> List[ParameterRow]:
     ]
 
 
-def _text(value: Any, number: str) -> str:
+def number_text(value: Any) -> str:
+    """Return a parameter's value as text."""
     if isinstance(value, bool):
         return str(value).lower()
-    if isinstance(value, float):
-        return f"{value:g}"
-    return _numbered(str(value), number) or '""'
+    return f"{value:g}" if isinstance(value, float) else str(value) or '""'
+
+
+def _text(value: Any, number: str) -> str:
+    return _numbered(number_text(value), number) if isinstance(value, str) else number_text(value)
 
 
 def _with_common_costmaps(rows: List[ParameterRow]) -> List[ParameterRow]:

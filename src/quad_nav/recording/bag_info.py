@@ -34,8 +34,9 @@ def checked_flight(info: Mapping[str, Any]) -> Dict[str, Any]:
             given[key] = _text(info, key)
     if "start_s" in info:
         given["start_s"] = _number(info, "start_s", MAX_SECONDS)
-    if "robot_radius_m" in info:
-        given["robot_radius_m"] = _number(info, "robot_radius_m", LARGEST_M)
+    for key in ("robot_radius_m", "jitter_m"):
+        if key in info:
+            given[key] = _number(info, key, LARGEST_M)
     if info.get("seed") is not None:
         given["seed"] = _whole(info, "seed")
     if "versions" in info:

@@ -207,6 +207,7 @@ class TraceReader:
             self.info.get("config", ""),
             self.info.get("versions", {}),
             self.info.get("reason", ""),
+            self.info.get("jitter_m"),
         )
 
     def _flown_robots(self, path: Path) -> Dict[int, BagRobot]:

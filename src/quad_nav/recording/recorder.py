@@ -193,7 +193,7 @@ class Recorder(FlightObserver):
             "title": self._title,
             "config": setup.config_name,
             "reason": flight.reason,
-            **flight_info.simulation_info(setup.scene, setup.seed),
+            **flight_info.simulation_info(setup.scene, setup.seed, setup.simulation.jitter_m),
             **flight_info.mission_info(
                 {robot.name: robot.sequencer.sequence for robot in flight.robots},
                 [robot.configuration.to_tree() for robot in flight.robots],

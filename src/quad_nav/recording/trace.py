@@ -78,7 +78,10 @@ class RobotTrace:
 
 @dataclass(frozen=True)
 class FlightTrace:
-    """Trace of all robots of a flight, with its contacts and scene."""
+    """Trace of all robots of a flight, with its contacts and scene.
+
+    ``jitter_m`` is the largest displacement of a start position; None if it is unknown.
+    """
 
     title: str
     robots: Tuple[RobotTrace, ...]
@@ -89,6 +92,7 @@ class FlightTrace:
     config_name: str = ""
     versions: Mapping[str, str] = field(default_factory=dict)
     reason: str = ""
+    jitter_m: Optional[float] = None
 
 
 class _RobotRecord:
@@ -186,6 +190,7 @@ class TraceObserver(FlightObserver):
             setup.config_name,
             versions(),
             reason,
+            setup.simulation.jitter_m,
         )
 
     def _robot_traces(self, flight: Flight) -> Tuple[RobotTrace, ...]:

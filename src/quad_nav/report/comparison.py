@@ -2,27 +2,151 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Optional, Sequence
+from typing import Callable, List, Optional, Sequence, Tuple
 
-from quad_nav.report.comparison_picture import comparison_picture, grouped
+from quad_nav.report.compared_flight import (
+    ComparedFlight,
+    Variant,
+    difference_rows,
+    labelled,
+    variants,
+)
+from quad_nav.report.comparison_picture import comparison_picture, grouped, overlay_picture
+from quad_nav.report.comparison_plot import MOST_OVERLAID, overlay_plot
 from quad_nav.report.flight_metrics import FlightMetrics
 from quad_nav.report.page import Page, Section, picture, render, write_page
 
+_MOST_NUMBERS = 6  # in the head of a column
 
-def comparison_page(flights: Sequence[FlightMetrics]) -> Page:
+
+@dataclass(frozen=True)
+class Column:
+    """Column of the table of values.
+
+    Attributes:
+        title: Heading; its unit is in a second line.
+        unit: Unit, or empty.
+        decimals: Number of decimals.
+        value: Returns the value of a flight; None if it is not known.
+        prefers: ``min`` or ``max`` of two values is the better one.
+        only_completed: Values of failed flights cannot be the best: they flew less.
+    """
+
+    title: str
+    unit: str
+    decimals: int
+    value: Callable[[FlightMetrics], Optional[float]]
+    prefers: Callable[..., float] = min
+    only_completed: bool = True
+
+
+COLUMNS: Tuple[Column, ...] = (
+    Column("goals reached", "", 0, lambda flight: flight.reached, max, False),
+    Column("mission time", "s", 1, lambda flight: flight.mission_s),
+    Column("path length", "m", 1, lambda flight: flight.path_length_m),
+    Column("detour", "", 2, lambda flight: flight.detour),
+    Column("min clearance", "m", 2, lambda flight: flight.min_clearance_m, max),
+    Column("min separation", "m", 2, lambda flight: flight.min_separation_m, max),
+    Column("contacts", "", 0, lambda flight: flight.contacts, min, False),
+    Column("recoveries", "", 0, lambda flight: flight.recoveries),
+    Column("time spinning", "s", 1, lambda flight: flight.spin_s),
+    Column("control cycle", "ms", 1, lambda flight: flight.cycle_ms, min, False),
+)
+"""Columns of the table of values; those without any value are left out."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Value in the table, and whether it is the best of its column."""
+
+    text: str
+    best: bool = False
+
+
+def comparison_page(flights: Sequence[ComparedFlight]) -> Page:
     """Build the report that compares several flights."""
-    section = Section(
+    groups = variants(flights)
+    metrics = labelled(flights, groups)
+    columns = [
+        column for column in COLUMNS if any(column.value(one) is not None for one in metrics)
+    ]
+    comparable = len({(one.setting["scene"], one.setting["quadcopters"]) for one in flights}) == 1
+    cells = [_cells(column, metrics, comparable) for column in columns]
+    return render(
+        "comparison.html.jinja",
+        [_paths(flights, metrics), _dots(metrics)],
+        flights=metrics,
+        groups=grouped(metrics),
+        columns=columns,
+        rows=list(zip(metrics, zip(*cells))) if cells else [],
+        comparable=comparable,
+        variants=[(group.label, _flights_text(group)) for group in groups],
+        differences=difference_rows(flights, groups),
+        parameters_known=any(flight.differences is not None for flight in flights),
+    )
+
+
+def _cells(column: Column, flights: Sequence[FlightMetrics], comparable: bool) -> List[Cell]:
+    values = [column.value(flight) for flight in flights]
+    texts = ["–" if value is None else f"{value:.{column.decimals}f}" for value in values]
+    known = [
+        float(text)
+        for flight, text in zip(flights, texts)
+        if text != "–" and (flight.success or not column.only_completed)
+    ]
+    # Values that are printed alike are equal, and no flight is the best of one.
+    if not comparable or len(set(texts)) < 2 or len(known) < 2:
+        return list(map(Cell, texts))
+    best = column.prefers(known)
+    return [
+        Cell(
+            text,
+            text != "–" and float(text) == best and (flight.success or not column.only_completed),
+        )
+        for flight, text in zip(flights, texts)
+    ]
+
+
+def _flights_text(group: Variant) -> str:
+    count = len(group.numbers)
+    if count == 1:
+        return f"flight {group.numbers[0]}"
+    if count <= _MOST_NUMBERS:
+        return f"flights {', '.join(map(str, group.numbers))}"
+    return f"{count} flights"
+
+
+def _paths(flights: Sequence[ComparedFlight], metrics: Sequence[FlightMetrics]) -> Section:
+    caption = (
+        "All flights over the scene of the first one. Each flight has a colour and a line pattern. "
+        "Squares are start positions, goal 0.2 is the second goal of quadcopter 0. A click in the "
+        "legend hides a flight, a double click all others."
+    )
+    if len(flights) > MOST_OVERLAID:
+        caption += f" The first {MOST_OVERLAID} flights of {len(flights)} are shown."
+    shown = flights[:MOST_OVERLAID]
+    return Section(
+        "paths",
+        "Paths",
+        caption,
+        plots=(overlay_plot(shown, metrics),),
+        paper=(picture("paths", "Paths of all flights", lambda: overlay_picture(shown, metrics)),),
+    )
+
+
+def _dots(metrics: Sequence[FlightMetrics]) -> Section:
+    return Section(
         "comparison",
         "Side by side",
         "A dot is a flight. Boxes span the middle half of five or more flights, with the median.",
-        (picture("comparison", "Metrics of each flight", lambda: comparison_picture(flights)),),
+        (picture("comparison", "Metrics of each flight", lambda: comparison_picture(metrics)),),
     )
-    return render("comparison.html.jinja", [section], flights=flights, groups=grouped(flights))
 
 
 def write_comparison(
-    flights: Sequence[FlightMetrics], path: Path, pictures: Optional[Path] = None
+    flights: Sequence[ComparedFlight], path: Path, pictures: Optional[Path] = None
 ) -> None:
     """Write the report that compares several flights, as ``write_report`` does."""
     write_page(comparison_page(flights), path, pictures)

@@ -46,11 +46,39 @@ def shown_gaps(trace: FlightTrace, tracks: Tracks) -> List[Tuple[str, NDArray[np
     panels = []
     if len(trace.robots) > 1:
         separations = separations_m(tracks, trace.robot_radius_m)
-        panels.append(("Separation from the nearest robot", separations))
+        panels.append(
+            ("Separation from the nearest robot", _touching(trace, tracks, separations, True))
+        )
     if trace.scene is not None:
         clearances = clearances_m(tracks, trace.scene, trace.robot_radius_m)
-        panels.append(("Clearance to the nearest obstacle or wall", clearances))
+        panels.append(
+            (
+                "Clearance to the nearest obstacle or wall",
+                _touching(trace, tracks, clearances, False),
+            )
+        )
     return panels
+
+
+def _touching(
+    trace: FlightTrace, tracks: Tracks, gaps_m: NDArray[np.float64], robots: bool
+) -> NDArray[np.float64]:
+    """Set the distances to 0 at contacts, and negative ones of robots with a contact.
+
+    Args:
+        trace: Trace of the flight.
+        tracks: Its tracks.
+        gaps_m: Distances, shape (n, t).
+        robots: Whether the distances, and the contacts, are those between robots.
+    """
+    numbers = {robot.name: k for k, robot in enumerate(trace.robots)}
+    gaps_m = gaps_m.copy()
+    for contact in trace.contacts:
+        involved = [numbers[name] for name in (contact.robot, contact.other) if name in numbers]
+        if (len(involved) == 2) is robots and len(tracks.times_s):
+            gaps_m[involved] = np.maximum(gaps_m[involved], 0.0)
+            gaps_m[involved, tracks.index_at(contact.time_s)] = 0.0
+    return gaps_m
 
 
 def smallest_of_all(gaps_m: NDArray[np.float64]) -> NDArray[np.float64]:

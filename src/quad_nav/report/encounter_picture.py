@@ -17,6 +17,7 @@ from quad_nav.report.style import ALARM, QUIET, colour, new_figure
 _FRAMES = 5
 _HALF_SIZE_M = 1.6
 _TRAIL_S = 6.0
+_NEAR_M = 3.0  # robots farther outside of a frame are not drawn
 _ARROW_S = 1.5  # velocity arrows show the displacement in this time
 # Distance flown between two frames, and the longest time between them.
 _STEP_M, _STEP_S = 0.45, 1.5
@@ -62,8 +63,9 @@ def _draw_frame(
         encounter.y_m + _HALF_SIZE_M,
     )
     draw_scene(axes, trace.scene, shown)
-    for k in range(len(trace.robots)):
-        _draw_robot(axes, tracks, k, now, trace.robot_radius_m)
+    offsets_m = np.abs(tracks.positions_m[:, now] - (encounter.x_m, encounter.y_m)).max(axis=1)
+    for k in np.flatnonzero(offsets_m < _HALF_SIZE_M + _NEAR_M):
+        _draw_robot(axes, tracks, int(k), now, trace.robot_radius_m)
     nearest = abs(time_s - encounter.time_s) < 1e-9
     if nearest and encounter.other is None:
         axes.plot(encounter.x_m, encounter.y_m, "X", color=ALARM, mec="white", ms=10, zorder=9)
@@ -80,13 +82,13 @@ def _draw_frame(
 
 
 def _gap(trace: FlightTrace, tracks: Tracks, encounter: Encounter, now: int, nearest: bool) -> str:
-    if encounter.other is None:
-        return ""
     if nearest:
         return separation_text(encounter.separation_m)
-    return separation_text(
-        pair_separations_m(tracks, encounter.robot, encounter.other, trace.robot_radius_m)[now]
-    )
+    if encounter.other is None:
+        return ""
+    gap_m = pair_separations_m(tracks, encounter.robot, encounter.other, trace.robot_radius_m)[now]
+    # Around a contact, hulls that overlap by millimetres touch.
+    return separation_text(max(gap_m, 0.0) if encounter.separation_m == 0.0 else gap_m)
 
 
 def _draw_robot(axes: Axes, tracks: Tracks, robot: int, now: int, radius_m: float) -> None:

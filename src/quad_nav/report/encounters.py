@@ -29,8 +29,7 @@ class Encounter:
         other: Number of the other robot; None for an obstacle or wall, which only count on contact.
         names: Names of both.
         time_s: Time of the closest moment.
-        separation_m: Distance between the hulls. NaN for an obstacle. At most 0 after a contact,
-            even if the contact was between two samples.
+        separation_m: Distance between the hulls. 0 for a contact.
         x_m: Middle between both robots, or point of contact, in ``map``.
         y_m: See ``x_m``.
     """
@@ -81,7 +80,7 @@ def _of_pair(trace: FlightTrace, tracks: Tracks, a: int, b: int, below_m: float)
         names = (trace.robots[a].name, trace.robots[b].name)
         nearest_m = float(separation_m[nearest])
         if _touched(trace, names, tracks.times_s[first], tracks.times_s[last]):
-            nearest_m = min(nearest_m, 0.0)
+            nearest_m = 0.0
         x_m, y_m = tracks.positions_m[[a, b], nearest].mean(axis=0)
         found.append(
             Encounter(
@@ -124,7 +123,7 @@ def _obstacles_touched(trace: FlightTrace) -> List[Encounter]:
                     None,
                     pair,
                     contact.time_s,
-                    np.nan,
+                    0.0,
                     contact.x_m,
                     contact.y_m,
                 )

@@ -7,6 +7,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
+from quad_nav.mission.distances import gap_m
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.measures import (
     Tracks,
@@ -46,7 +47,8 @@ class RobotMetrics:
 class FlightMetrics:
     """Metrics of a flight.
 
-    ``mission_s`` runs from sending the first goal to the end of the last one.
+    ``mission_s`` runs from sending the first goal to the end of the last one. ``cycle_ms`` is the
+    mean wall time of a control cycle; None if it is not known, as from recordings.
     """
 
     title: str
@@ -56,6 +58,7 @@ class FlightMetrics:
     mission_s: float
     contacts: int
     reason: str
+    cycle_ms: Optional[float] = None
 
     @property
     def sent(self) -> int:
@@ -101,6 +104,16 @@ class FlightMetrics:
         return smallest([_number(robot.min_separation_m) for robot in self.robots])
 
     @property
+    def path_length_m(self) -> float:
+        """Length of all robots' paths."""
+        return sum(robot.path_length_m for robot in self.robots)
+
+    @property
+    def spin_s(self) -> float:
+        """Time that the robots turned in place."""
+        return sum(robot.spin_s for robot in self.robots)
+
+    @property
     def recoveries(self) -> int:
         """Number of recovery behaviours of all robots."""
         return sum(robot.recoveries for robot in self.robots)
@@ -125,7 +138,13 @@ def flight_metrics(trace: FlightTrace, tracks: Optional[Tracks] = None) -> Fligh
         max(ended) - min(sent) if sent else 0.0,
         len(trace.contacts),
         trace.reason,
+        _mean_cycle_ms(trace),
     )
+
+
+def _mean_cycle_ms(trace: FlightTrace) -> Optional[float]:
+    walls_s = np.concatenate([robot.cycle_walls_s for robot in trace.robots] or [np.empty(0)])
+    return 1e3 * float(walls_s.mean()) if len(walls_s) else None
 
 
 def _robot(
@@ -135,16 +154,22 @@ def _robot(
     separation_m: Optional[float],
 ) -> RobotMetrics:
     span = mission_span(robot)
+    others = {one.name for one in trace.robots}
+    touched = [
+        {contact.robot, contact.other} <= others
+        for contact in trace.contacts
+        if contact.involves(robot.name)
+    ]
     return RobotMetrics(
         robot.name,
         len(robot.goals),
         sum(goal.reached for goal in robot.goals),
         path_length_m(robot, span),
         straight_length_m(robot),
-        clearance_m,
-        separation_m,
+        gap_m(clearance_m, False in touched),
+        gap_m(separation_m, True in touched),
         len(robot.recoveries),
-        sum(robot.name in (contact.robot, contact.other) for contact in trace.contacts),
+        len(touched),
         sum(last - first for first, last in spins(robot)),
         float(np.max(speed_mps(robot), initial=0.0)),
         float(np.max(tilt_rad(robot.quaternions), initial=0.0)),

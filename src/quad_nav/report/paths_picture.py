@@ -16,8 +16,16 @@ from matplotlib.textpath import TextPath
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.encounters import LETTERS, Encounter
 from quad_nav.report.measures import Tracks, goal_end_s, position_m
-from quad_nav.report.scene_drawing import draw_hull, draw_scene, extent
-from quad_nav.report.style import ALARM, QUIET, WIDTH_IN, colour, new_figure, robot_legend
+from quad_nav.report.scene_drawing import draw_hull, draw_scene, extent, outlines
+from quad_nav.report.style import (
+    ALARM,
+    QUIET,
+    WIDTH_IN,
+    colour,
+    line_style,
+    new_figure,
+    robot_legend,
+)
 
 _FULL_SIZE_UP_TO = 10  # robots; with more, symbols are smaller
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
@@ -58,7 +66,8 @@ def paths_picture(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter
             arrowprops={"arrowstyle": "-", "color": QUIET, "lw": 0.8, "shrinkB": 0},
         )
     axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x (m)", ylabel="y (m)")
-    robot_legend(figure, [robot.name for robot in trace.robots], _symbols(trace, bool(marked)))
+    names = [robot.name for robot in trace.robots]
+    robot_legend(figure, names, _symbols(trace, bool(marked)), patterns=True)
     return figure
 
 
@@ -66,7 +75,7 @@ def _draw_path(axes: Axes, number: int, robot: RobotTrace, scale: float) -> None
     if len(robot.times_s) == 0:
         return
     x_m, y_m = robot.positions_m[:, 0], robot.positions_m[:, 1]
-    axes.plot(x_m, y_m, color=colour(number), lw=1.7 * scale, zorder=4)
+    axes.plot(x_m, y_m, color=colour(number), ls=line_style(number), lw=1.7 * scale, zorder=4)
     for goal in robot.goals:
         _draw_direction(axes, number, robot, 0.5 * (goal.sent_s + goal_end_s(goal, robot)), scale)
     axes.plot(x_m[0], y_m[0], "s", ms=12 * scale, color=colour(number), mec="white", zorder=8)
@@ -116,7 +125,7 @@ def _draw_goals(axes: Axes, number: int, robot: RobotTrace, scale: float) -> Non
             goal.pose.x_m,
             goal.pose.y_m,
             "o",
-            ms=15 * scale,
+            ms=17 * scale,
             color=face,
             mec=colour(number),
             mew=1.8 * scale,
@@ -125,9 +134,9 @@ def _draw_goals(axes: Axes, number: int, robot: RobotTrace, scale: float) -> Non
         axes.text(
             goal.pose.x_m,
             goal.pose.y_m,
-            str(goal.index + 1),
+            f"{number}.{goal.index + 1}",
             color=ink,
-            fontsize=9 * scale,
+            fontsize=7.5 * scale,
             fontweight="bold",
             ha="center",
             va="center_baseline",
@@ -150,13 +159,16 @@ def _symbols(trace: FlightTrace, lettered: bool) -> List[Any]:
     goals = [goal for robot in trace.robots for goal in robot.goals]
     found = [symbol("s", "start")]
     if any(goal.reached for goal in goals):
-        found.append(symbol("o", "goal"))
+        found.append(symbol("o", "goal (0.2: second of quadcopter 0)"))
     if any(not goal.reached for goal in goals):
         found.append(symbol("o", "goal not reached", color="white", mew=1.5))
     if lettered:
         found.append(symbol(_letter(LETTERS[0]), "close encounter"))
     if trace.contacts:
         found.append(symbol("X", "contact", color=ALARM, mec="white", ms=10))
+    if trace.scene is not None and outlines(trace.scene)[1]:
+        label = "below or above the flying altitude"
+        found.append(Line2D([], [], ls=":", lw=1.0, color=QUIET, label=label))
     return found
 
 

@@ -24,6 +24,7 @@ from quad_nav.report.plot import (
     sample,
 )
 from quad_nav.report.scene_drawing import Extent, extent, outlines
+from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
 
 MOST_FRAMES = 200
@@ -39,7 +40,7 @@ def paths_plot(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter]) 
     count = len(trace.robots)
     for k, robot in enumerate(trace.robots):
         traces += _robot_traces(k, robot, count)
-    traces += _contacts(trace) + _letters(marked)
+    traces += contact_traces(trace.contacts) + _letters(marked)
     first = len(traces)
     frames, traces_now = _animation(trace, tracks, first)
     traces += traces_now
@@ -200,20 +201,21 @@ def _marks(
     }
 
 
-def _contacts(trace: FlightTrace) -> List[Json]:
-    if not trace.contacts:
+def contact_traces(contacts: Sequence[Contact]) -> List[Json]:
+    """Return a trace with a cross for each contact, or none."""
+    if not contacts:
         return []
     return [
         {
             "type": "scatter",
             "mode": "markers",
             "name": "contact",
-            "x": numbers([contact.x_m for contact in trace.contacts]),
-            "y": numbers([contact.y_m for contact in trace.contacts]),
+            "x": numbers([contact.x_m for contact in contacts]),
+            "y": numbers([contact.y_m for contact in contacts]),
             "text": [
                 f"{plot_text(contact.robot)} touches {plot_text(contact.other)}<br>"
                 f"{contact.time_s:.1f} s"
-                for contact in trace.contacts
+                for contact in contacts
             ],
             "hovertemplate": "%{text}<br>(%{x:.2f}, %{y:.2f}) m<extra></extra>",
             "marker": {

@@ -102,6 +102,11 @@ def _outline(solid: Obstacle) -> Patch:
 
 def extent(scene: Optional[Scene], tracks: Tracks) -> Extent:
     """Return (x from, x to, y from, y to) in ``map``: the scene, or without one the paths."""
+    return scene_extent(scene, tracks.positions_m.reshape(-1, 2))
+
+
+def scene_extent(scene: Optional[Scene], flown: NDArray[np.float64]) -> Extent:
+    """Return ``extent`` for positions ``flown``, shape (k, 2), NaN if unknown."""
     if scene is not None:
         west, east, south, north = scene.wall_boxes()
         return (
@@ -110,7 +115,6 @@ def extent(scene: Optional[Scene], tracks: Tracks) -> Extent:
             south.y_m - south.size_y_m / 2,
             north.y_m + north.size_y_m / 2,
         )
-    flown = tracks.positions_m.reshape(-1, 2)
     flown = flown[np.isfinite(flown).all(axis=1)]
     if len(flown) == 0:
         return (0.0, 1.0, 0.0, 1.0)

@@ -13,15 +13,24 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from quad_nav.report.plot import DASHES
 from quad_nav.sim.colours import robot_rgba
 
 WIDTH_IN = 8.0
 _DPI = 140
 ALARM = "#c01020"  # contacts, failures, limits
 QUIET = "#667080"  # labels and lines that only help
-MAX_ROWS = 16
+MAX_ROWS = 8
 """Pictures with a row for each quadcopter have no more rows than this."""
 _MOST_IN_LEGEND = 24
+_LINE_STYLES: Dict[str, Any] = {
+    "solid": "-",
+    "dash": (0, (5, 2)),
+    "dot": (0, (1, 1.2)),
+    "dashdot": (0, (5, 1.5, 1, 1.5)),
+    "longdash": (0, (9, 2)),
+    "longdashdot": (0, (9, 1.5, 1, 1.5)),
+}
 
 RC: Dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -92,18 +101,33 @@ def colour(robot: int) -> Tuple[float, float, float]:
     return robot_rgba(robot)[:3]
 
 
-def robot_legend(figure: Figure, names: Sequence[str], more: Sequence[Any] = ()) -> None:
+def line_style(robot: int) -> Any:
+    """Return a robot's line pattern, the one of interactive plots."""
+    return _LINE_STYLES[DASHES[robot % len(DASHES)]]
+
+
+def robot_legend(
+    figure: Figure,
+    names: Sequence[str],
+    more: Sequence[Any] = (),
+    columns: int = 6,
+    patterns: bool = False,
+) -> None:
     """Add a legend of the robots below the axes.
 
     Args:
         figure: Figure to add it to.
         names: Names of the robots. More than 24 cannot be told apart and are left out.
         more: Further labelled artists.
+        columns: Largest number of columns.
+        patterns: Whether the lines in the picture have the robots' patterns.
     """
     handles = []
     if 1 < len(names) <= _MOST_IN_LEGEND:
         handles = [
-            matplotlib.lines.Line2D([], [], color=colour(k), lw=3, label=name)
+            matplotlib.lines.Line2D(
+                [], [], color=colour(k), lw=2, ls=line_style(k) if patterns else "-", label=name
+            )
             for k, name in enumerate(names)
         ]
     handles += more
@@ -111,10 +135,10 @@ def robot_legend(figure: Figure, names: Sequence[str], more: Sequence[Any] = ())
         figure.legend(
             handles=handles,
             loc="outside lower center",
-            ncols=min(len(handles), 6),
+            ncols=min(len(handles), columns),
             fontsize=8.5,
             columnspacing=1.4,
-            handlelength=1.6,
+            handlelength=2.6 if patterns else 1.6,
         )
 
 

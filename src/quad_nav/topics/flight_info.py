@@ -30,11 +30,12 @@ START_S = 1.0
 """Time on `/clock` when a simulation starts: rospy treats 0 as a clock without messages."""
 
 
-def simulation_info(scene: Scene, seed: int) -> Dict[str, Any]:
-    """Return the facts that the simulator publishes: scene, seed, start time, versions."""
+def simulation_info(scene: Scene, seed: int, jitter_m: float = 0.0) -> Dict[str, Any]:
+    """Return the facts that the simulator publishes: scene, seed, jitter, start time, versions."""
     return {
         "scene": scene_document(scene),
         "seed": seed,
+        "jitter_m": jitter_m,
         "start_s": START_S,
         "versions": versions(),
     }

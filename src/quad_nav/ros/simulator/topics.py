@@ -74,7 +74,8 @@ class SimulatorTopics:
             "/simulation/quadcopters", MarkerArray, queue_size=1, latch=True
         )
         self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
-        self._flight.publish(to_text(simulation_info(simulation.scene, simulation.seed)))
+        jitter_m = simulation.params.jitter_m
+        self._flight.publish(to_text(simulation_info(simulation.scene, simulation.seed, jitter_m)))
         self._scene.publish(marker_array(scene_markers(simulation.scene)))
         count = simulation.n_robots
         self._quadcopters.publish(
