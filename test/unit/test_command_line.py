@@ -12,7 +12,9 @@ from click.testing import CliRunner
 
 from quad_nav.cli import COMMANDS, main
 from quad_nav.cli.fly import LIDAR_CASTERS, MAX_DRIFT
+from quad_nav.files.shipped import shipped
 from quad_nav.sim import odometry, simulation
+from quad_nav.tuning.courses import Mission, MissionCourse, MissionOptions
 
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 ENGINE = ("numpy", "numba", "pybullet", "scipy", "matplotlib", "joblib", "optuna", "rich.progress")
@@ -76,3 +78,41 @@ def test_engine_prints_nothing_when_it_is_imported():
 def test_engine_is_imported_without_standard_error():
     done = python("import os; os.close(2); import quad_nav.sim.body; print(1)")
     assert (done.returncode, done.stdout) == (0, "1\n")
+
+
+@pytest.mark.parametrize(
+    "command", ["fly", "tune", "sweep --over TrajectoryPlannerROS/vx_samples=3"]
+)
+@pytest.mark.parametrize(
+    "parameter, fault",
+    [
+        ("TrajectoryPlannerROS/max_vel_xx=0.2", "did you mean max_vel_x?"),
+        ("global_costmap/inflation_radus=0.5", "did you mean inflation_radius?"),
+        ("nowhere/width=3", "/nowhere"),
+        ("DWAPlannerROS/max_vel_x=0.3", "unused: base_local_planner is"),
+    ],
+)
+def test_parameters_without_effect_are_refused(command, parameter, fault):
+    done = CliRunner().invoke(main, [*command.split(), "--set", parameter, "-q"])
+    assert done.exit_code == 2, done.output
+    assert fault in done.output and "flight not started" in done.output
+
+
+def test_candidates_may_set_parameters_of_planners_that_others_choose():
+    """A study may search the planner and the parameters of each."""
+    course = MissionCourse(MissionOptions((Mission(None, shipped("goals")),), robots=1))
+    (case,) = course.search_cases(1)
+    setup = course.setup(case, (("DWAPlannerROS/max_vel_x", 0.3),))
+    assert len(setup.robots) == 1
+
+
+def test_too_many_quadcopters_are_refused_before_a_mission_is_made():
+    done = CliRunner().invoke(main, ["fly", "--robots", "1000"])
+    assert done.exit_code == 2
+    assert "robots: is 1000; expected a whole number, 1 to 100" in done.output
+
+
+def test_an_arena_that_takes_minutes_to_fill_is_refused():
+    done = CliRunner().invoke(main, ["fly", "--robots", "3", "--size", "10000"])
+    assert done.exit_code == 2
+    assert "size: is 10000.0; expected a number of metres, 0 to 250" in done.output

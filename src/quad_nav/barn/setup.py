@@ -51,6 +51,7 @@ class BarnOptions:
         runs: Flights through each world.
         seed: Seed of the first run.
         body_radius_m: Radius of the robot's hull.
+        strict: Refuse ``parameters`` that have no effect.
     """
 
     worlds: Path
@@ -61,6 +62,7 @@ class BarnOptions:
     runs: int = 1
     seed: int = 0
     body_radius_m: float = 0.20
+    strict: bool = True
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,7 @@ def _contestant(options: BarnOptions) -> Contestant:
         ]
 
     (configuration,) = read_configurations(
-        options.config, 1, parameters=options.parameters, check=faults
+        options.config, 1, parameters=options.parameters, check=faults, strict=options.strict
     )
     simulation = SimulationParams(
         LIDAR,

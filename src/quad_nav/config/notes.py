@@ -16,6 +16,8 @@ UNUSED = "unused"  # of a planner that is not chosen
 CLAMPED = "clamped"  # the value in force differs
 RENAMED = "renamed"  # an old name that still works
 CAUTION = "caution"  # legal, but probably a mistake
+NO_EFFECT = (UNKNOWN, UNSUPPORTED, IGNORED, UNUSED, CLAMPED)
+"""Kinds of remarks on values that do not do what they say."""
 
 
 @dataclass(frozen=True)
@@ -114,3 +116,19 @@ class Notes:
 def join(*parts: str) -> str:
     """Join the parts of a path; empty parts are left out."""
     return "/".join(part for part in parts if part)
+
+
+def without_effect(remarks: Iterable[Remark], paths: Sequence[str], where: str) -> List[str]:
+    """Return a line for each of some parameters that does not do what it says.
+
+    Args:
+        remarks: Remarks on the whole configuration.
+        paths: Paths of the parameters.
+        where: Name of the configuration that they are set on top of.
+    """
+    own = [f"/{path.strip('/')}/" for path in paths]
+    return [
+        f"{remark}; expected a parameter that has an effect in {where}"
+        for remark in remarks
+        if remark.kind in NO_EFFECT and any(path.startswith(f"{remark.place}/") for path in own)
+    ]

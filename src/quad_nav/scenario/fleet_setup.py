@@ -7,11 +7,10 @@ from typing import Any, Dict, Mapping
 
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError
-from quad_nav.files.values import unknown_names, value_faults, whole
+from quad_nav.files.values import unknown_names, value_faults
 from quad_nav.scenario.rules import RANDOM, RULES
 from quad_nav.scenario.scenario import mission_of, read_configurations
 
-_MAX_ROBOTS = 100
 DEFAULTS: Dict[str, Any] = {
     "robots": 8,
     "config": "",  # folder of the navigators' YAML
@@ -21,7 +20,7 @@ DEFAULTS: Dict[str, Any] = {
     "hosts": 1,  # processes that share the navigators
     "host": 0,  # which of them this is
 }
-_RULES = {**{name: RULES[name] for name in DEFAULTS}, "robots": whole(1, _MAX_ROBOTS)}
+_RULES = {name: RULES[name] for name in DEFAULTS}
 
 
 @dataclass(frozen=True)

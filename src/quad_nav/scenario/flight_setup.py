@@ -43,6 +43,7 @@ class FlightOptions:
         simulation: Bodies and LIDARs.
         configurations: Configurations of the robots, if they are there already, instead of those
             that ``config`` and ``parameters`` name.
+        strict: Refuse ``parameters`` that have no effect.
     """
 
     scene: Optional[Path]
@@ -56,6 +57,7 @@ class FlightOptions:
     scans_per_s: float = 20.0
     simulation: SimulationParams = field(default_factory=SimulationParams)
     configurations: Tuple[Configuration, ...] = ()
+    strict: bool = True
 
 
 @dataclass(frozen=True)
@@ -200,6 +202,7 @@ def _configurations(
         mission,
         options.parameters,
         partial(_input_faults, config_folder(options.config)),
+        strict=options.strict,
     )
 
 

@@ -19,7 +19,9 @@ from quad_nav.sim.simulation import LIDAR_CASTERS, STEPS_PER_S
 
 RANDOM = "random"
 """Value of ``scene`` and ``goals`` that asks for a random mission."""
-MAX_SIZE_M = 10_000
+MAX_SIZE_M = 250  # a larger random arena takes minutes to fill with obstacles
+MAX_ROBOTS = 100
+"""Each has costmaps of its own: a thousand need more memory than most machines have."""
 
 
 def steps_per_scan(scans_per_s: float) -> int:
@@ -54,7 +56,7 @@ RULES: Dict[str, Rule] = {
         _is_path_or_paths, "a folder with quad0_goals.json and so on, or a list of files"
     ),
     "config": text("a folder of YAML files, or the name of a shipped one"),
-    "robots": whole(at_least=1),
+    "robots": whole(at_least=1, at_most=MAX_ROBOTS),
     "seed": whole(at_least=0),
     "size": Rule(
         number(at_least=0, at_most=MAX_SIZE_M).accepts,

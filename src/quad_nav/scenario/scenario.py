@@ -15,6 +15,7 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.config.files import set_value
+from quad_nav.config.notes import without_effect
 from quad_nav.config.robot_tree import COMMAND_LINE, RobotSource, robot_tree
 from quad_nav.errors import InputError
 from quad_nav.files.values import value_faults
@@ -146,6 +147,7 @@ def read_configurations(
     parameters: Parameters = (),
     check: Callable[[Configuration, int], List[str]] = lambda *_: [],
     numbered: bool = False,
+    strict: bool = True,
 ) -> List[Configuration]:
     """Read every robot's configuration from the files of a folder.
 
@@ -156,6 +158,7 @@ def read_configurations(
         parameters: Parameters on top of the files, from the command line.
         check: Returns further faults of a robot's configuration.
         numbered: Set the parameters ``robot`` and ``robots``, as the launch files do.
+        strict: Refuse ``parameters`` that have no effect.
 
     Raises:
         InputError: Every fault in any robot's files; a fault in a shared file is listed once.
@@ -170,6 +173,9 @@ def read_configurations(
             problems += error.problems
             continue
         problems += check(configuration, number)
+        if strict:
+            paths = [path for path, _ in parameters]
+            problems += without_effect(configuration.remarks, paths, folder)
         configurations.append(configuration)
     if problems:
         raise InputError(list(dict.fromkeys(problems)))

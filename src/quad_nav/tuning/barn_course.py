@@ -89,6 +89,7 @@ class BarnCourse:
                 self.options,
                 only=(self._worlds[case.course].number,),
                 parameters=(*self.options.parameters, *assignments),
+                strict=False,  # a candidate may choose a planner, and set another one's
             )
             self._contestants[assignments] = read_barn_setup(options).contestant
         contestant = replace(self._contestants[assignments], seed=case.seed)

@@ -130,6 +130,7 @@ class MissionCourse:
             given.time_limit_s,
             given.scans_per_s,
             _simulation(given.simulation, world),
+            strict=not assignments,  # a candidate may choose a planner, and set another one's
         )
         return _without_files(read_setup(options))
 

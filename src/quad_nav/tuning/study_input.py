@@ -9,14 +9,12 @@ from typing import Any, List, Sequence, Tuple, Union
 from quad_nav import config
 from quad_nav.barn.setup import BarnOptions
 from quad_nav.config.files import set_value
-from quad_nav.config.notes import CLAMPED, IGNORED, UNKNOWN, UNSUPPORTED, UNUSED
+from quad_nav.config.notes import without_effect
 from quad_nav.errors import InputError
 from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.courses import MissionCourse, MissionOptions, check_missions
 from quad_nav.tuning.evaluation import Course
 from quad_nav.tuning.space import costmap_paths
-
-_NO_EFFECT = (UNKNOWN, UNSUPPORTED, IGNORED, UNUSED, CLAMPED)
 
 CourseOptions = Union[MissionOptions, BarnOptions]
 
@@ -53,14 +51,9 @@ def parameter_faults(parameters: Sequence[Tuple[str, Any]], folder: Path, name: 
     for path, value in parameters:
         for single in costmap_paths(path):
             set_value(tree, single, value, name)
-            paths.append(f"/{single}/")
+            paths.append(single)
     try:
         remarks = config.load(tree).remarks
     except InputError as error:
         return list(error.problems)
-    return [
-        f"{remark}; expected a parameter that has an effect in {folder}"
-        for remark in remarks
-        if remark.kind in _NO_EFFECT
-        and (remark.origin == name or any(path.startswith(f"{remark.place}/") for path in paths))
-    ]
+    return without_effect(remarks, paths, str(folder))
