@@ -1,11 +1,16 @@
 #!/usr/bin/env python3
-"""A flight on ROS and the same one offline: equal outcome, goal times within 5 %."""
+"""A flight on ROS and the same one offline: equal outcome, goal times within 5 %.
 
+Two goals of the second quadcopter have a yaw, and it stays at the first.
+"""
+
+import json
 from pathlib import Path
 
 import rospy
 import rostest
 from flight_case import FlightCase
+from std_msgs.msg import String
 
 from quad_nav.mission.summary import to_json
 from quad_nav.offline.run import fly
@@ -14,6 +19,21 @@ from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 
 
 class Offline(FlightCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.events = []
+        cls.subscriber = rospy.Subscriber(
+            "/quad/events", String, lambda message: cls.events.append(json.loads(message.data))
+        )
+
+    def check_the_stay(self):
+        """The second goal of the second quadcopter is sent 5 s after the first was reached."""
+        of_robot = [event for event in self.events if event["robot"] == 1]
+        ended = next(one for one in of_robot if (one["event"], one["goal"]) == ("ended", 0))
+        sent = next(one for one in of_robot if (one["event"], one["goal"]) == ("sent", 1))
+        self.assertAlmostEqual(sent["time_s"] - ended["time_s"], 5.0, delta=0.5)
+
     def test_goal_times_are_those_of_the_flight_on_ros(self):
         goals = Path(rospy.get_param("~goals"))
         options = FlightOptions(None, goals)
@@ -28,6 +48,14 @@ class Offline(FlightCase):
             self.assertEqual(on_ros["configuration"][part], facts["configuration"][part])
         self.assertEqual(on_ros["scene"]["size_m"], facts["scene"]["size_m"])
         self.assertEqual(on_ros["lidar"], facts["lidar"])
+        self.assertAlmostEqual(
+            on_ros["sim_time_s"], offline["sim_time_s"], delta=0.05 * offline["sim_time_s"]
+        )
+        first, _, last = on_ros["robots"][1]["goals"]
+        self.assertEqual((first["wait_s"], first["yaw_rad"], last["yaw_rad"]), (5.0, 0.0, 1.0))
+        for goal in (first, last):
+            self.assertLessEqual(abs(goal["yaw_error_rad"]), 0.1, goal)
+        self.check_the_stay()
         for robot, twin in zip(on_ros["robots"], offline["robots"]):
             for goal, other in zip(robot["goals"], twin["goals"]):
                 where = f"{robot['robot']} goal {goal['goal']}"
