@@ -63,6 +63,17 @@ def test_unknown_names_are_refused():
         quad_nav.flie  # noqa: B018
 
 
+def test_goals_keep_their_settings():
+    goals = (
+        quad_nav.Goal(2.1, 1.9, 0.5, wait_s=3.0, tolerance_m=0.2, yaw_tolerance_rad=0.3),
+        quad_nav.Goal(2.6, 2.3),
+    )
+    settings = quad_nav.SequenceSettings(retries=0, yaw_tolerance_rad=0.15)
+    whole = quad_nav.prepare(goals=[quad_nav.GoalSequence(goals, settings), list(goals)])
+    assert [robot.sequence.goals for robot in whole.robots] == [goals, goals]
+    assert whole.robots[0].sequence.settings == settings
+
+
 def test_result_has_summary_and_trajectories(flown, setup):
     assert flown.success
     assert [len(robot.legs) for robot in flown.summary.robots] == [2, 1]

@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Mapping, Optional, Sequence, Union
 
 from quad_nav import config as ros_config
 from quad_nav.api.flight import Command, Flight, Observation
@@ -29,7 +29,8 @@ from quad_nav.config.files import set_value
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import config_folder, shipped
 from quad_nav.geometry import Pose2D, Scan
-from quad_nav.mission.goal_file import SETTINGS, Goal, GoalSequence, SequenceSettings, load_goals
+from quad_nav.mission.goal import Goal, goal_entry
+from quad_nav.mission.goal_file import SETTINGS, GoalSequence, SequenceSettings, load_goals
 from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
@@ -216,17 +217,20 @@ def _with_files(
     )
 
 
+def _entry(goal: Any) -> Any:
+    if isinstance(goal, Goal):
+        return goal_entry(goal)
+    return list(goal) if isinstance(goal, tuple) else goal
+
+
 def _document(goals: Goals) -> Mapping[str, Any]:
     """Return goals as a goal file has them."""
     if isinstance(goals, Mapping):
         return goals
     if not isinstance(goals, GoalSequence):
-        return {"goals": [list(goal) if isinstance(goal, tuple) else goal for goal in goals]}
+        return {"goals": [_entry(goal) for goal in goals]}
     settings: Dict[str, Any] = {
         key: getattr(goals.settings, setting.field) for key, setting in SETTINGS.items()
     }
-    entries: List[Tuple[float, ...]] = [
-        (goal.x_m, goal.y_m) if goal.yaw_rad is None else (goal.x_m, goal.y_m, goal.yaw_rad)
-        for goal in goals.goals
-    ]
+    entries = [goal_entry(goal) for goal in goals.goals]
     return {"goals": entries, **{key: one for key, one in settings.items() if one is not None}}
