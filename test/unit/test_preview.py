@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -111,6 +112,25 @@ def test_a_goal_without_a_path_is_warned_about(hall):
     assert [len(plan) > 0 for plan in robot.plans] == [True, False]
     assert len(robot.warnings) == 1
     assert robot.warnings[0].startswith("quad0: goal 2 (7, 3.5): no path from goal 1 ")
+
+
+def test_a_scene_with_too_many_cells_is_shown_without_its_costmap(hall):
+    hall.scene.write_text(SCENE.replace("[8.0, 6.0]", "[80000.0, 60000.0]"))
+    rolling = replace(hall, parameters=(("global_costmap/rolling_window", True),))
+    preview = MissionPreview(rolling)
+    assert preview.costmap(0) is None
+    assert preview.robot(0).warnings == (
+        "quad0: no costmap and no plans: the scene has too many cells",
+    )
+
+
+def test_a_rolling_costmap_covers_the_scene(hall):
+    rolling = replace(hall, parameters=(("global_costmap/rolling_window", True),))
+    spec = MissionPreview(rolling).costmap(0).spec
+    assert (spec.origin_x_m, spec.origin_y_m) == (-0.1, -0.1)
+    assert (spec.size_x * spec.resolution_m, spec.size_y * spec.resolution_m) == pytest.approx(
+        (8.2, 6.2)
+    )
 
 
 def test_what_cannot_be_read_is_left_out(hall):

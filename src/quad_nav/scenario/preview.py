@@ -25,7 +25,7 @@ from quad_nav.scenario.flight_setup import (
     with_default_files,
 )
 from quad_nav.scenario.goal_checks import place_check
-from quad_nav.scenario.scene_map import scene_map, scene_occupancy
+from quad_nav.scenario.scene_map import scene_map, scene_map_problem, scene_occupancy
 from quad_nav.sim.scene import Scene
 
 _ROUNDING_M = 1e-9
@@ -137,6 +137,8 @@ class MissionPreview:
         plans = [NO_PLAN for _ in sequence.goals]
         warnings: List[str] = []
         costmap, configuration = self.costmap(number), self._configurations.get(number)
+        if costmap is None and configuration is not None and self.scene is not None:
+            warnings.append(f"quad{number}: no costmap and no plans: the scene has too many cells")
         if costmap is None or configuration is None or start is None:
             return plans, warnings
         planner = build_global_planner(configuration.global_planner, costmap.footprint)
@@ -162,9 +164,11 @@ class MissionPreview:
         configuration = self._configurations.get(number)
         if configuration is None or self.scene is None:
             return None
-        params = _without_sensors(configuration.global_costmap)
+        params, follows = _without_sensors(configuration.global_costmap), _follows(configuration)
+        if follows and scene_map_problem(self.scene, params):
+            return None  # a scene of kilometres in cells of centimetres
         if params not in self._costmaps:
-            self._costmaps[params] = _costmap(params, self.scene, _follows(configuration))
+            self._costmaps[params] = _costmap(params, self.scene, follows)
         return self._costmaps[params]
 
 

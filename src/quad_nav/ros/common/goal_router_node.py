@@ -61,8 +61,18 @@ class GoalRouterNode:
                     " base_link{i}"
                 )
                 return
+            goals = self._goals[route.robot]
+            if not goals.get_num_connections():
+                rospy.logerr(
+                    "quad%d: goal (%.2f, %.2f) m dropped: no node subscribes to %s, expected its"
+                    " navigator",
+                    route.robot,
+                    *place,
+                    goals.resolved_name,
+                )
+                return
             rospy.loginfo("quad%d: goal (%.2f, %.2f) m: %s", route.robot, *place, route.reason)
-            self._goals[route.robot].publish(message)
+            goals.publish(message)
 
     def _on_click(self, message: PointStamped) -> None:
         with self._lock:
