@@ -67,7 +67,7 @@ def paths_picture(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter
         )
     axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x (m)", ylabel="y (m)")
     names = [robot.name for robot in trace.robots]
-    robot_legend(figure, names, _symbols(trace, bool(marked)), patterns=True)
+    robot_legend(figure, names, _symbols(trace, bool(marked)), columns=4, patterns=True)
     return figure
 
 
@@ -159,7 +159,7 @@ def _symbols(trace: FlightTrace, lettered: bool) -> List[Any]:
     goals = [goal for robot in trace.robots for goal in robot.goals]
     found = [symbol("s", "start")]
     if any(goal.reached for goal in goals):
-        found.append(symbol("o", "goal (0.2: second of quadcopter 0)"))
+        found.append(symbol("o", "goal (robot.number)"))
     if any(not goal.reached for goal in goals):
         found.append(symbol("o", "goal not reached", color="white", mew=1.5))
     if lettered:
@@ -167,7 +167,7 @@ def _symbols(trace: FlightTrace, lettered: bool) -> List[Any]:
     if trace.contacts:
         found.append(symbol("X", "contact", color=ALARM, mec="white", ms=10))
     if trace.scene is not None and outlines(trace.scene)[1]:
-        label = "below or above the flying altitude"
+        label = "not at the flying altitude"
         found.append(Line2D([], [], ls=":", lw=1.0, color=QUIET, label=label))
     return found
 

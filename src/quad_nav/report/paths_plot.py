@@ -31,6 +31,7 @@ MOST_FRAMES = 200
 """Number of frames of an animation."""
 _FRAME_S = 0.1  # shortest time between two frames, in simulated time
 _FRAME_MS = 60  # wall time between two frames
+_FULL_SIZE_UP_TO = 10  # robots; with more, symbols are smaller
 
 
 def paths_plot(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter]) -> Plot:
@@ -139,7 +140,7 @@ def _robot_traces(number: int, robot: RobotTrace, count: int) -> List[Json]:
     found = [path_trace(number, robot, count, robot.name, **group)]
     found.append(
         {
-            **_marks(number, robot.positions_m[:1, :2], [str(number)], "square", 15),
+            **_marks(number, robot.positions_m[:1, :2], [str(number)], "square", 15, count),
             **group,
             "hovertemplate": f"<b>{plot_text(robot.name)}</b><br>start<extra></extra>",
         }
@@ -153,6 +154,7 @@ def _robot_traces(number: int, robot: RobotTrace, count: int) -> List[Json]:
             [f"{number}.{goal.index + 1}" for goal in goals],
             "circle",
             24,
+            count,
         )
         reached = [goal.reached for goal in goals]
         marks["marker"]["color"] = [rgb(number) if good else "#fff" for good in reached]
@@ -172,7 +174,8 @@ def _robot_traces(number: int, robot: RobotTrace, count: int) -> List[Json]:
 def _goal_text(goal: GoalTrace, robot: RobotTrace) -> str:
     spent = f"{goal_end_s(goal, robot) - goal.sent_s:.1f} s"
     if goal.reached:
-        return f"reached in {spent}"
+        error = goal.yaw_error_rad
+        return f"reached in {spent}" + (f", yaw error {error:.2f} rad" if error is not None else "")
     return f"{plot_text(goal.reason or 'not ended')} after {spent}"
 
 
@@ -182,18 +185,20 @@ def _marks(
     texts: Sequence[str],
     symbol: str,
     size: float,
+    count: int,
     alpha: float = 1.0,
 ) -> Json:
+    scale = min(1.0, (_FULL_SIZE_UP_TO / count) ** 0.25)
     return {
         "type": "scatter",
         "mode": "markers+text",
         "x": numbers(places_m[:, 0]),
         "y": numbers(places_m[:, 1]),
         "text": list(texts),
-        "textfont": {"size": 10, "color": "#fff"},
+        "textfont": {"size": round(10 * scale**0.7, 1), "color": "#fff"},
         "marker": {
             "symbol": symbol,
-            "size": size,
+            "size": round(size * scale, 1),
             "color": rgb(number, alpha),
             "line": {"color": rgb(number), "width": 2},
         },
@@ -263,7 +268,9 @@ def _animation(trace: FlightTrace, tracks: Tracks, first: int) -> Tuple[List[Jso
     shown = [tracks.index_at(time_s) for time_s in np.linspace(begin_s, end_s, count)]
     moving = [
         {
-            **_marks(k, tracks.positions_m[k, -1:], [f"<b>{k}</b>"], "circle", 28, 0.25),
+            **_marks(
+                k, tracks.positions_m[k, -1:], [f"<b>{k}</b>"], "circle", 28, len(flown), 0.25
+            ),
             "legendgroup": f"robot{k}",
             "textposition": "top center",
             "textfont": {"size": 13, "color": rgb(k)},
