@@ -9,12 +9,14 @@ from click.testing import CliRunner
 
 from quad_nav.cli import main
 from quad_nav.config import Remark
-from quad_nav.config.check import Report, check_files, check_folder, report_text
+from quad_nav.config.check import Report, check_files, check_source, report_text
 from quad_nav.config.file_sets import FileSet, file_sets
 from quad_nav.config.files import PlacedFile
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
-SEEING = "observation_sources: scan\nscan: {data_type: LaserScan}\n"
+SEEING = (
+    "observation_sources: scan\nscan: {data_type: LaserScan}\nrobot_base_frame: base_link$(arg i)\n"
+)
 STANDARD = {
     "costmap_common_params.yaml": SEEING,
     "local_costmap_params.yaml": "local_costmap: {width: 3.0}\n",
@@ -227,7 +229,7 @@ TrajectoryPlannerROS/max_vel_x      clamped  25 clamped to 20.0, the
   base_local_planner_params.yaml:3           largest that move_base
                                              allows
 *_costmap/zzz                       unknown  nothing reads it
-  costmap_common_params.yaml:3"""
+  costmap_common_params.yaml:4"""
     )
 
 
@@ -261,7 +263,7 @@ def test_files_that_cannot_be_read_hide_no_other_errors(tmp_path):
             "global_costmap_params.yaml": "global_costmap: {width: three, q: 1}\n",
         },
     )
-    ((report,), left) = check_folder(tmp_path)
+    ((report,), left) = check_source(tmp_path)
     assert [line.kind for line in report.lines] == ["error", "error"]
     assert report.lines[0].origin == f"{tmp_path / 'local_costmap_params.yaml'}:2:1"
     assert report.lines[0].text.startswith("not YAML: ")
@@ -324,7 +326,7 @@ def test_remarks_that_differ_between_the_costmaps_are_not_merged(tmp_path):
             "global_costmap_params.yaml": "global_costmap: {colour: 1}\n",
         },
     )
-    ((report,), _) = check_folder(tmp_path)
+    ((report,), _) = check_source(tmp_path)
     assert [line.place for line in report.lines] == [
         "/global_costmap/colour",
         "/local_costmap/colour",
@@ -333,4 +335,4 @@ def test_remarks_that_differ_between_the_costmaps_are_not_merged(tmp_path):
 
 def test_usage():
     assert quad()[0] == 2
-    assert "FOLDER | [COSTMAP=]FILE..." in quad("--help")[1]
+    assert "SOURCE | [COSTMAP=]FILE..." in quad("--help")[1]

@@ -84,12 +84,14 @@ def test_carrot_has_the_footprint_in_force():
         (
             {"GlobalPlanner": {"anything": 1}},
             "unused",
-            "GlobalPlanner: unused: base_global_planner is navfn/NavfnROS",
+            "GlobalPlanner: unused: base_global_planner is navfn/NavfnROS; expected"
+            " base_global_planner=global_planner/GlobalPlanner to fly with it",
         ),
         (
             {**SEARCH, "NavfnROS": {"allow_unknown": 3}},
             "unused",
-            "NavfnROS: unused: base_global_planner is global_planner/GlobalPlanner",
+            "NavfnROS: unused: base_global_planner is global_planner/GlobalPlanner; expected"
+            " base_global_planner=navfn/NavfnROS to fly with it",
         ),
         (
             {**SEARCH, "GlobalPlanner": {"default_tolerance": 0.5}},
@@ -106,12 +108,6 @@ def test_carrot_has_the_footprint_in_force():
             {"base_global_planner": "GlobalPlanner"},
             "renamed",
             "base_global_planner: GlobalPlanner is an old name of global_planner/GlobalPlanner",
-        ),
-        (
-            {"base_global_planner": "sbpl/SBPLLatticePlanner"},
-            "unsupported",
-            "base_global_planner: sbpl/SBPLLatticePlanner is not supported; using"
-            " navfn/NavfnROS instead",
         ),
         (
             {"TebLocalPlannerROS": {}},
@@ -156,7 +152,9 @@ def test_rotations_read_limits_of_the_trajectory_planner_when_it_is_not_chosen()
         (
             "unused",
             "/nav/TrajectoryPlannerROS: unused: base_local_planner is"
-            " dwa_local_planner/DWAPlannerROS; rotate_recovery still reads its limits",
+            " dwa_local_planner/DWAPlannerROS; expected"
+            " base_local_planner=base_local_planner/TrajectoryPlannerROS to fly with it;"
+            " rotate_recovery still reads its limits",
         )
     ]
     assert "TrajectoryPlannerROS" not in reconfigurable(configuration)
@@ -210,6 +208,35 @@ def test_planners_cannot_change_in_flight():
         updated(load(SEARCH), "", {"base_global_planner": "navfn/NavfnROS"})
     same = updated(load(SEARCH), "", {**SEARCH, "planner_frequency": 1.0})
     assert same.navigator.planner_frequency_hz == 1.0
+
+
+@pytest.mark.parametrize(
+    "tree, fault",
+    [
+        (
+            {"base_global_planner": "sbpl/SBPLLatticePlanner"},
+            "base_global_planner: sbpl/SBPLLatticePlanner is not supported; expected --set"
+            " base_global_planner=navfn/NavfnROS or global_planner/GlobalPlanner or"
+            " carrot_planner/CarrotPlanner",
+        ),
+        (
+            {"base_local_planner": "teb_local_planner/TebLocalPlannerROS"},
+            "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported; expected"
+            " --set base_local_planner=dwa_local_planner/DWAPlannerROS or"
+            " base_local_planner/TrajectoryPlannerROS",
+        ),
+        (
+            {"base_local_planner": "teb", "TrajectoryPlannerROS": {"max_vel_x": 0.5}},
+            "base_local_planner: teb is not supported; expected"
+            " --set base_local_planner=base_local_planner/TrajectoryPlannerROS or"
+            " dwa_local_planner/DWAPlannerROS",
+        ),
+    ],
+)
+def test_planner_that_is_not_supported_is_refused_with_one_that_has_parameters(tree, fault):
+    with pytest.raises(InputError) as caught:
+        load(tree)
+    assert caught.value.problems == [f"/{fault}"]
 
 
 def test_invalid_choice():

@@ -114,13 +114,8 @@ def slow(**parameters):
         (
             {"DWAPlannerROS": {"max_vel_x": 1.0}},
             "unused",
-            "DWAPlannerROS: unused: base_local_planner is base_local_planner/TrajectoryPlannerROS",
-        ),
-        (
-            {"base_local_planner": "teb_local_planner/TebLocalPlannerROS"},
-            "unsupported",
-            "base_local_planner: teb_local_planner/TebLocalPlannerROS is not supported; using"
-            " base_local_planner/TrajectoryPlannerROS instead",
+            "DWAPlannerROS: unused: base_local_planner is base_local_planner/TrajectoryPlannerROS;"
+            " expected base_local_planner=dwa_local_planner/DWAPlannerROS to fly with it",
         ),
         (
             {"base_global_planner": "NavfnROS"},
@@ -183,6 +178,11 @@ def slow(**parameters):
             {"local_costmap": {"plugins": [], "inflater": {"inflation_radius": 1.0}}},
             "ignored",
             "local_costmap/inflater: ignored by move_base: plugins has no layer of this name",
+        ),
+        (
+            {"local_costmap": {"plugins": [], "map_type": "costmap"}},
+            "ignored",
+            "local_costmap/map_type: ignored by move_base: it is unused beside plugins",
         ),
         (
             {"local_costmap": {"plugins": [], "static_map": True}},

@@ -59,7 +59,7 @@ PLACES = {
     "sqlalchemy": "tuning/study.py",
     "numba": "kernels/",
     "pybullet": "sim/body.py",
-    "defusedxml": "sim/xml_tree.py",
+    "defusedxml": "files/xml_tree.py",
     "rospy": "ros/",
     "rosgraph": "ros/",
     "actionlib": "ros/",

@@ -14,7 +14,7 @@ from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.costmap.voxel import VoxelLayerParams
 from quad_nav.errors import InputError
-from quad_nav.files import document, plain_yaml, values
+from quad_nav.files import document, plain_yaml, values, xml_tree
 from quad_nav.mission import goal, goal_file
 from quad_nav.recording import bag_info, bag_trace
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
@@ -24,7 +24,6 @@ from quad_nav.sim import (
     map_image,
     scene_file,
     world_file,
-    xml_tree,
 )
 from quad_nav.topics import validation
 

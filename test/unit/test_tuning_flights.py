@@ -246,7 +246,10 @@ def test_tune_from_the_command_line_and_again(tmp_path):
     "arguments, words",
     [
         (["--set", "a"], "expected PATH=VALUE"),
-        (["--config", "nowhere"], "expected a folder or the name of a shipped one"),
+        (
+            ["--config", "nowhere"],
+            "or the name of a shipped one",
+        ),
         (["--worlds", "none.npz"], "none.npz"),
         (["--worlds", "none.npz", "--robots", "2"], "cannot be combined with"),
         (["--scene", "a.yaml", "--scene", "b.yaml", "--goals", "g"], "a folder of goals for each"),

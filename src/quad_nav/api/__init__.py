@@ -26,8 +26,9 @@ from quad_nav.api.flight import Command, Flight, Observation
 from quad_nav.api.result import TRAJECTORY_COLUMNS, FlightResult, TrajectoryObserver
 from quad_nav.config import Configuration
 from quad_nav.config.files import set_value
+from quad_nav.config.robot_tree import RobotSource, fitted, unfitted_tree
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import config_folder, shipped
+from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Scan
 from quad_nav.mission.goal import Goal, goal_entry
 from quad_nav.mission.goal_file import SETTINGS, GoalSequence, SequenceSettings, load_goals
@@ -84,17 +85,17 @@ def load_configuration(
     """Read a configuration of move_base.
 
     Args:
-        name: "default", "tutorial", another shipped one, or a folder of YAML files.
+        name: "default", "tutorial", another shipped one, a folder or files of any robot.
         parameters: Values on top of it by their paths, as {"global_costmap/width": 60.0}.
         robot: Number of the robot that it is for; frames and topics have it in their names.
 
     Raises:
         InputError: Every fault in files and values.
     """
-    tree = ros_config.load_files(config_folder(str(name)), {"i": str(robot)})
+    tree = unfitted_tree(RobotSource(str(name), robot))
     for path, value in parameters.items():
         set_value(tree, path, value, "parameters")
-    return ros_config.load(tree)
+    return ros_config.load(fitted(tree, robot))
 
 
 def prepare(

@@ -10,16 +10,17 @@ from typing import Any, List, Tuple
 from quad_nav.barn.protocol import GOAL_M, GOAL_TOLERANCE_M, SAMPLE_STEP, START, TIME_LIMIT_S
 from quad_nav.barn.worlds import BarnWorld, load_worlds
 from quad_nav.config import Configuration
+from quad_nav.config.other_robots import sensor_faults
+from quad_nav.config.sources import split_source
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import config_folder
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, WatchedGoalFile
-from quad_nav.scenario.flight_setup import FlightSetup, sensor_faults
+from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.scenario.goal_checks import goals_off_the_costmap
 from quad_nav.scenario.rules import steps_per_scan
 from quad_nav.scenario.scenario import read_configurations
@@ -142,13 +143,16 @@ _GOALS = GoalSequence((Goal(*GOAL_M),), SequenceSettings(GOAL_TOLERANCE_M, TIME_
 
 
 def _contestant(options: BarnOptions) -> Contestant:
-    folder = config_folder(options.config)
+    folder, _ = split_source(options.config)
     goals = RobotGoals("quad0", WatchedGoalFile(folder), _GOALS)
 
     def faults(configuration: Configuration, _number: int) -> List[str]:
         return [
             *_static_layer_faults(configuration, folder),
-            *sensor_faults(configuration, str(folder)),
+            *(
+                f"{folder}: {path}: {problem}"
+                for path, problem in sensor_faults(configuration.costmaps)
+            ),
             *goals_off_the_costmap([goals], [configuration]),
         ]
 

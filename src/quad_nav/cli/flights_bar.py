@@ -12,7 +12,6 @@ from quad_nav.cli import EXIT_INTERRUPTED
 from quad_nav.cli.options import echo, raise_on_signals
 from quad_nav.cli.progress import FlightPace, flights_progress
 from quad_nav.errors import printable
-from quad_nav.files.shipped import config_folder
 from quad_nav.scenario.warm_up import simulate, warm_up
 from quad_nav.tuning.evaluation import Course, StudyObserver
 from quad_nav.tuning.flight_result import FlightResult
@@ -139,7 +138,7 @@ def run_with_bar(
     raise_on_signals()
     with FlightsBar(command, processes, quiet) as bar:
         try:
-            warm_up(base_configuration(config_folder(course.config), course.fixed))
+            warm_up(base_configuration(course.config, course.fixed))
             simulate()
             bar.start()
             result = run(bar)

@@ -11,10 +11,13 @@ from typing import Dict, List, Optional, Sequence, Tuple
 
 import tabulate
 
-from quad_nav.config import Remark, load, load_files
-from quad_nav.config.file_sets import FileSet, file_sets
-from quad_nav.config.files import PlacedFile
-from quad_nav.config.notes import ERROR, ParameterError
+from quad_nav.config import Configuration, Remark, load
+from quad_nav.config.file_sets import FileSet
+from quad_nav.config.files import ParameterTree, PlacedFile
+from quad_nav.config.notes import ERROR, MAPPED, ParameterError
+from quad_nav.config.other_robots import input_faults
+from quad_nav.config.robot_tree import fitted
+from quad_nav.config.sources import load_set, sets_of
 from quad_nav.errors import InputError, printable
 
 _COSTMAPS = ("global_costmap/", "local_costmap/")
@@ -40,31 +43,24 @@ class Report:
 
     @property
     def warnings(self) -> int:
-        """Number of warnings."""
-        return len(self.lines) - self.errors
+        """Number of warnings; that something of another robot is mapped is none."""
+        return sum(line.kind not in (ERROR, MAPPED) for line in self.lines)
 
 
-def check_folder(folder: Path, number: Optional[str] = None) -> Tuple[List[Report], List[Path]]:
-    """Check every set of files in a folder.
+def check_source(name: str, number: Optional[str] = None) -> Tuple[List[Report], List[Path]]:
+    """Check every set of files that a name stands for; see ``sources``.
 
     Args:
-        folder: The folder; folders below it are searched too.
+        name: A shipped configuration, a folder with the folders below it, or files.
         number: Number of the robot; None for every robot that has files of its own.
 
     Returns:
-        A report for each set, and the YAML files that are in none of them.
+        A report for each set, and the YAML files of a folder that are in none of them.
 
     Raises:
-        InputError: The folder has no move_base parameters.
+        InputError: There is no such file or folder, or it has no move_base parameters.
     """
-    sets, left = file_sets(folder, number)
-    if not sets:
-        raise InputError(
-            [
-                f"{folder}: no move_base parameters found; expected files such as"
-                " costmap_common_params.yaml"
-            ]
-        )
+    sets, left = sets_of(name, number)
     return [check_set(file_set) for file_set in sets], left
 
 
@@ -74,24 +70,41 @@ def check_files(files: Sequence[PlacedFile], number: Optional[str] = None) -> Re
 
 
 def check_set(file_set: FileSet) -> Report:
-    """Load a set as a navigator does and collect the faults and remarks."""
-    substitutions = {"i": file_set.number}
+    """Load a set as a simulated quadcopter does and collect the faults and remarks."""
     faults: List[Remark] = []
-    readable = []
-    for file in file_set.files:
-        try:
-            load_files([file], substitutions)
-            readable.append(file)
-        except InputError as error:
-            faults += [_fault_of_file(problem) for problem in error.problems]
+    remarks: Sequence[Remark] = ()
+    number = int(file_set.number)
+    readable = _readable(file_set, faults)
+    complete = len(readable.files) == len(file_set.files)
     try:
-        remarks = load(load_files(readable, substitutions)).remarks
+        tree = load_set(readable) if readable.files else ParameterTree()
+        configuration = load(fitted(tree, number))
+        remarks = configuration.remarks
+        faults += _input_faults(configuration, number) if complete else []
     except ParameterError as error:
         faults += error.faults
         remarks = error.remarks
     # Remarks mean nothing while some of the files are missing from the tree.
-    lines = faults if len(readable) < len(file_set.files) else [*faults, *remarks]
+    lines = [*faults, *remarks] if complete else faults
     return Report(file_set, tuple(map(_in_one_line, _merged(lines))))
+
+
+def _readable(file_set: FileSet, faults: List[Remark]) -> FileSet:
+    """Return the set without the files that cannot be read, and add their faults."""
+    readable = []
+    for file in file_set.files:
+        try:
+            load_set(replace(file_set, files=(file,)))
+            readable.append(file)
+        except InputError as error:
+            faults += [_fault_of_file(problem) for problem in error.problems]
+    return replace(file_set, files=tuple(readable))
+
+
+def _input_faults(configuration: Configuration, number: int) -> List[Remark]:
+    """Return the frames and sensors that the simulation does not have: no flight starts."""
+    found = input_faults(configuration.costmaps, number)
+    return [Remark(path, ERROR, problem) for path, problem in dict.fromkeys(found)]
 
 
 def _in_one_line(line: Remark) -> Remark:

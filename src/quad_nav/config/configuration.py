@@ -52,6 +52,7 @@ class Configuration:
         local_planner_period_s: Control period that rollouts assume; as in move_base it may differ
             from the period of the control loop.
         clearing_radius_m: Half the side of the square that ``make_plan`` clears around the robot.
+        body_radius_m: Radius of the simulated body; None for a quadcopter's own.
         robot: Number of the robot among the ``robots`` that fly together.
         remarks: Remarks on parameters that are legal and odd.
         tree: The normalised tree, with ROS spellings.
@@ -68,6 +69,7 @@ class Configuration:
     recoveries: Tuple[Tuple[str, RecoveryParams], ...]
     local_planner_period_s: float
     clearing_radius_m: float
+    body_radius_m: Optional[float] = None
     robot: int = 0
     robots: int = 1
     remarks: Tuple[Remark, ...] = ()
@@ -78,6 +80,11 @@ class Configuration:
     def warnings(self) -> Tuple[str, ...]:
         """Remarks as lines of text."""
         return tuple(map(str, self.remarks))
+
+    @property
+    def costmaps(self) -> Dict[str, CostmapParams]:
+        """Both costmaps by name."""
+        return {name: getattr(self, name) for name in COSTMAPS}
 
     def to_tree(self) -> Dict[str, Any]:
         """Return the parameter tree with ROS spellings, as move_base leaves it on the server.
@@ -143,6 +150,7 @@ def _made(
         recoveries=recoveries(tree, listed),
         local_planner_period_s=local_planner_period_s(tree),
         clearing_radius_m=tree.get("clearing_radius", circumscribed_radius_m(tree)),
+        body_radius_m=tree.get("body_radius"),
         robot=tree.get("robot", 0),
         robots=tree.get("robots", 1),
         tree=pruned,

@@ -37,10 +37,12 @@ def normalise_costmap(tree: Namespace, name: str, notes: Notes) -> None:
     """
     costmap = subtree(tree, name, "", notes)
     _normalise_footprint(costmap, name, tree, notes)
-    if "plugins" not in costmap:
+    is_old_style = "plugins" not in costmap
+    if is_old_style:
         _normalise_old_style(costmap, name, notes)
     plugins = _checked_plugins(costmap, name, notes)
-    _remark_on_old_style(costmap, name, [layer_type for _, layer_type in plugins], notes)
+    if not is_old_style and plugins != _old_style_layers(costmap):
+        _remark_on_old_style(costmap, name, [layer_type for _, layer_type in plugins], notes)
     for layer, _ in plugins:
         if layer in _OLD_STYLE and not isinstance(costmap.get(layer), dict):
             costmap.pop(layer, None)  # the layer's namespace replaces it
@@ -103,18 +105,13 @@ def _normalise_footprint(costmap: Namespace, name: str, tree: Namespace, notes: 
 
 def _normalise_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
     """Add the plugins list to a costmap without one, and move the layers' parameters."""
-    plugins: List[Tuple[str, str]] = []
     static_map = costmap.get("static_map", False)
     if not isinstance(static_map, bool):
         notes.problem(
             join(name, "static_map"),
             f"{static_map!r} is not a boolean; expected true or false",
         )
-    elif static_map:
-        plugins.append(("static_layer", STATIC))
-    voxels = costmap.get("map_type") == "voxel"
-    plugins.append(("obstacle_layer", VOXEL if voxels else OBSTACLE))
-    plugins.append(("inflation_layer", INFLATION))
+    plugins = _old_style_layers(costmap)
     for layer, layer_type in plugins:
         keys = list(PARENT_PARAMETERS[layer_type])
         if layer == "obstacle_layer":
@@ -127,15 +124,23 @@ def _normalise_old_style(costmap: Namespace, name: str, notes: Notes) -> None:
     costmap["plugins"] = [{"name": layer, "type": kind} for layer, kind in plugins]
 
 
+def _old_style_layers(costmap: Namespace) -> List[Tuple[str, str]]:
+    """Return (name, type) of the layers that move_base adds to a costmap without ``plugins``."""
+    static = [("static_layer", STATIC)] if costmap.get("static_map") is True else []
+    obstacles = VOXEL if costmap.get("map_type") == "voxel" else OBSTACLE
+    return [*static, ("obstacle_layer", obstacles), ("inflation_layer", INFLATION)]
+
+
 def _remark_on_old_style(costmap: Namespace, name: str, types: List[str], notes: Notes) -> None:
-    """Add remarks on old switches for layers that ``plugins`` does not list."""
+    """Add remarks on old switches for layers beside ``plugins``; move_base warns about them too."""
     for key, value, promised in (("static_map", True, STATIC), ("map_type", "voxel", VOXEL)):
-        if costmap.get(key) == value and promised not in types:
-            notes.remark(
-                join(name, key),
-                IGNORED,
-                f"ignored by move_base: plugins has no {promised}",
-            )
+        if key not in costmap or isinstance(costmap[key], dict):
+            continue
+        if costmap[key] == value and promised not in types:
+            reason = f"plugins has no {promised}"
+        else:
+            reason = "it is unused beside plugins"
+        notes.remark(join(name, key), IGNORED, f"ignored by move_base: {reason}")
 
 
 def _copy_parent_parameters(

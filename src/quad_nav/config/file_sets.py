@@ -3,17 +3,19 @@
 A folder with the four files of this package's launch files is one set, or one for each robot that
 has files of its own. Other folders have other file names, a file for each of several robots or
 maps, and folders of changes below a common one. Their files are classified by name and content.
-Files of the same kind in one folder are alternatives: each set has one of them. A folder's files
-are loaded after those of the folders above it.
+Files of the same kind in one folder that set the same parameters are alternatives: each set has one
+of them. ``planner_slow.yaml`` beside ``planner.yaml`` changes it and is loaded after it. A folder's
+files are loaded after those of the folders above it.
 """
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
 
 from quad_nav.config.files import (
     OPTIONAL,
@@ -21,9 +23,10 @@ from quad_nav.config.files import (
     PlacedFile,
     costmaps_named,
     files_of,
+    leaves,
     top_level,
 )
-from quad_nav.config.planners import planner_keys
+from quad_nav.config.planners import SLOTS, planner_keys
 from quad_nav.config.tables.costmap import COSTMAP_TABLE
 from quad_nav.config.tables.layers import INFLATION_LAYER_TABLE, OBSTACLE_LAYER_TABLE
 from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
@@ -55,9 +58,10 @@ _OF_COSTMAP_ONLY = {
 _OF_ONE_COSTMAP = {"rolling_window", "static_map", "global_frame", "width"}
 _NUMBERED = re.compile(f"(?:{'|'.join(REQUIRED + OPTIONAL)}|robot)([0-9]+)")
 
-# A kind is (order of loading, more).
+# A kind is (order of loading, its costmaps, the keys of a file of the node).
 _COMMON, _ONE_COSTMAP, _NODE = 0, 1, 2
-Kind = Tuple[int, Tuple[str, ...]]
+Kind = Tuple[int, Tuple[str, ...], Tuple[str, ...]]
+_MOST_SETS = 50
 
 
 @dataclass(frozen=True)
@@ -69,26 +73,50 @@ class FileSet:
         name: Name of the set in its folder, "" for the only one.
         files: The files.
         number: Number of the robot, for ``$(arg i)``.
+        arguments: (name, value) of a launch file's arguments.
     """
 
     folder: Optional[Path]
     name: str
     files: Tuple[PlacedFile, ...]
     number: str
+    arguments: Tuple[Tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)
 class _KnownFile:
     file: PlacedFile
     kind: Kind
+    leaves: Mapping[str, Any]
+
+    @property
+    def stem(self) -> str:
+        return self.file.path.stem
+
+    def changes(self, other: _KnownFile) -> bool:
+        """True if this file changes a few parameters of another: ``planner_slow``, ``planner``."""
+        return self.stem.startswith(f"{other.stem}_") and not set(other.leaves) <= set(self.leaves)
+
+    def is_alternative_to(self, other: _KnownFile) -> bool:
+        """True if both set the same parameters, or choose different planners."""
+        if (self.kind[:2], self.file.path.parent) != (other.kind[:2], other.file.path.parent):
+            return False
+        mine, others = self.leaves, other.leaves
+        if any(key in mine and key in others and mine[key] != others[key] for key in SLOTS):
+            return True
+        shared = len(set(mine) & set(others))
+        return shared > 0 and 2 * shared >= min(len(mine), len(others))
 
 
-def file_sets(top: Path, number: Optional[str] = None) -> Tuple[List[FileSet], List[Path]]:
+def file_sets(
+    top: Path, number: Optional[str] = None, only: Optional[Path] = None
+) -> Tuple[List[FileSet], List[Path]]:
     """Find the sets in a folder and in the folders below it.
 
     Args:
         top: The folder.
         number: Number of the robot; None for every robot that has files of its own.
+        only: The only folder below it to search; None for all.
 
     Returns:
         The sets, and the YAML files that are in none of them.
@@ -96,7 +124,7 @@ def file_sets(top: Path, number: Optional[str] = None) -> Tuple[List[FileSet], L
     sets: List[FileSet] = []
     left: List[Path] = []
     above: Dict[Path, List[_KnownFile]] = {}  # with the files of the enclosing folders
-    for folder, paths in _folders(top):
+    for folder, paths in _folders(top, only):
         standard = _standard_sets(folder, number)
         if standard:
             sets += standard
@@ -114,11 +142,13 @@ def file_sets(top: Path, number: Optional[str] = None) -> Tuple[List[FileSet], L
     return sorted(sets, key=lambda one: (str(one.folder), one.name)), left
 
 
-def _folders(top: Path) -> List[Tuple[Path, List[Path]]]:
+def _folders(top: Path, only: Optional[Path]) -> List[Tuple[Path, List[Path]]]:
     """List every folder that is not hidden, parents first, with its YAML files."""
     found = []
     for name, below, files in os.walk(top):
         below[:] = sorted(folder for folder in below if not folder.startswith("."))
+        if only is not None:
+            below[:] = [one for one in below if Path(name, one) in (only, *only.parents)]
         paths = [
             Path(name, file)
             for file in sorted(files)
@@ -128,20 +158,43 @@ def _folders(top: Path) -> List[Tuple[Path, List[Path]]]:
     return found
 
 
-def _standard_sets(folder: Path, number: Optional[str]) -> List[FileSet]:
+def is_standard(folder: Path, number: str) -> bool:
+    """True for a folder with the four files of the launch files, or with a robot's own of them."""
+    if _numbers(folder):
+        return True
+    try:
+        return bool(files_of(folder, number))
+    except InputError:
+        return False
+
+
+def standard_set(folder: Path, number: str, name: str = "") -> FileSet:
+    """Return the set of a folder with the four files of the launch files.
+
+    Raises:
+        InputError: One of them is missing.
+    """
+    files = tuple(
+        PlacedFile(path, _COSTMAPS if path.name.startswith(REQUIRED[0]) else ("",))
+        for path in files_of(folder, number)
+    )
+    return FileSet(folder, name, files, number)
+
+
+def _numbers(folder: Path) -> List[str]:
+    """List the robots with files of their own beside or instead of the four files."""
     matches = [_NUMBERED.fullmatch(path.stem) for path in folder.glob("*.yaml")]
-    numbers = sorted({match.group(1) for match in matches if match}, key=int)
+    return sorted({match.group(1) for match in matches if match}, key=int)
+
+
+def _standard_sets(folder: Path, number: Optional[str]) -> List[FileSet]:
+    numbers = _numbers(folder)
     sets = []
     for one in [number] if number is not None else numbers or ["0"]:
         try:
-            paths = files_of(folder, one)
+            sets.append(standard_set(folder, one, f"robot {one}" if numbers else ""))
         except InputError:
             continue
-        files = tuple(
-            PlacedFile(path, _COSTMAPS if path.name.startswith(REQUIRED[0]) else ("",))
-            for path in paths
-        )
-        sets.append(FileSet(folder, f"robot {one}" if numbers else "", files, one))
     return sets
 
 
@@ -159,29 +212,32 @@ def _placed(path: Path, number: str) -> Optional[_KnownFile]:
     named = costmaps_named(path)
     try:
         values = top_level(path, {"i": number})
+        found = leaves(path, {"i": number})
     except InputError:  # check_set reports its faults
         by_name = named or "move_base" in path.stem or "planner" in path.stem
-        return _known_file(path, named, {path.stem}) if by_name else None
+        return _known_file(path, named, {path.stem}, {}) if by_name else None
     keys = set(values)
     costmaps = tuple(name for name in _COSTMAPS if name in keys)
     if costmaps:
         kind = _kind_of(costmaps if keys == set(costmaps) else (), keys)
-        return _KnownFile(PlacedFile(path, ("",)), kind)
+        return _KnownFile(PlacedFile(path, ("",)), kind, found)
     if not named and not keys & _OF_NODE:
         if not keys & (_OF_COSTMAP if "costmap" in path.stem else _OF_COSTMAP_ONLY):
             return None
         named = _costmaps_meant(values)
-    return _known_file(path, named, keys)
+    return _known_file(path, named, keys, found)
 
 
-def _known_file(path: Path, costmaps: Tuple[str, ...], keys: Set[str]) -> _KnownFile:
-    return _KnownFile(PlacedFile(path, costmaps or ("",)), _kind_of(costmaps, keys))
+def _known_file(
+    path: Path, costmaps: Tuple[str, ...], keys: Set[str], found: Mapping[str, Any]
+) -> _KnownFile:
+    return _KnownFile(PlacedFile(path, costmaps or ("",)), _kind_of(costmaps, keys), found)
 
 
 def _kind_of(costmaps: Tuple[str, ...], keys: Set[str]) -> Kind:
     if not costmaps:
-        return (_NODE, tuple(sorted(keys)))
-    return (_COMMON, ()) if len(costmaps) > 1 else (_ONE_COSTMAP, costmaps)
+        return (_NODE, (), tuple(sorted(keys)))
+    return (_COMMON if len(costmaps) > 1 else _ONE_COSTMAP, costmaps, ())
 
 
 def _costmaps_meant(values: Mapping[str, Any]) -> Tuple[str, ...]:
@@ -191,31 +247,63 @@ def _costmaps_meant(values: Mapping[str, Any]) -> Tuple[str, ...]:
     return ("local_costmap",) if values.get("rolling_window") is True else ("global_costmap",)
 
 
+Choice = Dict[str, Tuple[PlacedFile, ...]]
+"""Alternatives: name -> files; one without a choice has one name."""
+
+
 def _sets_of(folder: Path, files: Sequence[_KnownFile], number: Optional[str]) -> List[FileSet]:
-    """Make one set for each name of alternatives."""
-    groups: Dict[Tuple[Kind, Path], List[PlacedFile]] = {}
-    for one in files:
-        groups.setdefault((one.kind, one.file.path.parent), []).append(one.file)
-    ordered = sorted(groups, key=lambda group: (group[0], len(group[1].parts)))
-    choices = [_alternatives(groups[group]) for group in ordered]
-    names = list(dict.fromkeys(name for choice in choices if len(choice) > 1 for name in choice))
-    if number in names:
-        names = [number]
+    """Make one set for each combination of alternatives; those of one name belong together."""
+    choices = [_alternatives(group) for group in _groups(files)]
+    classes: List[List[str]] = []  # names that belong together
+    for choice in choices:
+        if len(choice) == 1:
+            continue
+        linked = [one for one in classes if set(one) & set(choice)]
+        place = classes.index(linked[0]) if linked else len(classes)
+        classes = [one for one in classes if one not in linked]
+        merged = dict.fromkeys(name for names in (*linked, choice) for name in names)
+        classes.insert(place, list(merged))
+    classes = [[number] if number in names else names for names in classes]
+    combinations = itertools.islice(itertools.product(*classes), _MOST_SETS)
     return [
         FileSet(
             folder,
-            name,
-            tuple(choice.get(name, next(iter(choice.values()))) for choice in choices),
+            ",".join(names),
+            tuple(file for choice in choices for file in _chosen(choice, names)),
             number or "0",
         )
-        for name in names or [""]
+        for names in combinations
     ]
 
 
-def _alternatives(files: Sequence[PlacedFile]) -> Dict[str, PlacedFile]:
-    """Return name -> file; a name is the part of whole words or numbers that differs."""
-    stems = [file.path.stem for file in files]
+def _chosen(choice: Choice, names: Sequence[str]) -> Tuple[PlacedFile, ...]:
+    """Return the files of the name that fits best: ``waffle`` fits ``waffle_pi``."""
+    for name in names:
+        if name in choice:
+            return choice[name]
+    near = [one for one in choice for name in names if name.startswith(one)]
+    return choice[max(near, key=len)] if near else next(iter(choice.values()))
+
+
+def _groups(files: Sequence[_KnownFile]) -> Iterator[List[_KnownFile]]:
+    """Yield files that are alternatives to each other, in the order of loading."""
+    left = sorted(files, key=lambda one: (one.kind, len(one.file.path.parts), str(one.file.path)))
+    while left:
+        group = [left.pop(0)]
+        for one in group:
+            more = [other for other in left if one.is_alternative_to(other)]
+            group += more
+            left = [other for other in left if other not in more]
+        yield group
+
+
+def _alternatives(group: Sequence[_KnownFile]) -> Choice:
+    """Return name -> files; a name is the part of whole words or numbers that differs."""
+    stems = [one.stem for one in group]
     cut = len(os.path.commonprefix(stems))
     if not all(stem[cut:].isdigit() for stem in stems):
         cut = stems[0].rfind("_", 0, cut) + 1
-    return {stem[cut:]: file for stem, file in zip(stems, files)}
+    return {
+        one.stem[cut:]: (*(other.file for other in group if one.changes(other)), one.file)
+        for one in group
+    }

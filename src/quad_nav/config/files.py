@@ -24,8 +24,8 @@ from quad_nav.files.user_files import read_text
 COMMON = "costmap_common_params"
 REQUIRED = (COMMON, "local_costmap_params", "global_costmap_params", "base_local_planner_params")
 OPTIONAL = ("move_base_params",)
-_COSTMAPS = ("global_costmap", "local_costmap")
-_NODE = re.compile(r"/?move_base\d*")
+COSTMAPS = ("global_costmap", "local_costmap")
+_NODE = re.compile(r"/?move_base(_node)?\d*")
 _SUBSTITUTION = re.compile(r"\$\(([^)]*)\)")
 
 
@@ -92,6 +92,58 @@ def load_files(
     return tree
 
 
+def merge_tree(tree: ParameterTree, other: ParameterTree) -> None:
+    """Merge another tree key by key; ``tree`` is changed in place."""
+    _merge_namespace(tree, other)
+    tree.origins.update(other.origins)
+    tree.remarks += other.remarks
+
+
+def _merge_namespace(namespace: Dict[str, Any], other: Mapping[str, Any]) -> None:
+    for key, value in other.items():
+        if isinstance(value, dict) and isinstance(namespace.get(key), dict):
+            _merge_namespace(namespace[key], value)
+        elif isinstance(value, dict) and (value or key not in namespace):
+            namespace[key] = {}
+            _merge_namespace(namespace[key], value)
+        elif not isinstance(value, dict):
+            namespace[key] = value
+
+
+def merge_file(
+    tree: ParameterTree, path: Path, namespace: str, substitutions: Optional[Mapping[str, str]]
+) -> None:
+    """Load a file into a namespace as ``<rosparam>`` does.
+
+    Args:
+        tree: The tree, changed in place.
+        path: The file.
+        namespace: Names with / between them; "" for the top.
+        substitutions: Values of ``$(arg name)``; None leaves ``$( )`` as it is.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    text = read_text(path, MAX_BYTES)
+    if substitutions is not None:
+        text = _substituted(text, path, substitutions)
+    merge_text(tree, text, path, namespace)
+
+
+def merge_text(tree: ParameterTree, text: str, path: Path, namespace: str) -> None:
+    """Load YAML into a namespace; ``path`` is the file that has it, for messages.
+
+    Raises:
+        InputError: The text is not YAML.
+    """
+    document = _parsed(text, path)
+    _merge(tree, document, namespace)
+    for line, key in document.duplicates:
+        tree.remarks.append(
+            Remark(key, CAUTION, "set twice; YAML uses the last value", f"{path}:{line}")
+        )
+
+
 def placed_files(
     source: Union[str, Path, Sequence[FileName]],
     arguments: Mapping[str, str],
@@ -109,7 +161,7 @@ def placed_files(
     """
     if isinstance(source, (str, Path)):
         return [
-            PlacedFile(path, _COSTMAPS if path.name.startswith(COMMON) else ("",))
+            PlacedFile(path, COSTMAPS if path.name.startswith(COMMON) else ("",))
             for path in files_of(Path(source), arguments.get("i"), numbered)
         ]
     return [file if isinstance(file, PlacedFile) else PlacedFile(Path(file), ()) for file in source]
@@ -164,17 +216,31 @@ def top_level(path: Path, substitutions: Mapping[str, str]) -> Dict[str, Any]:
     return {key: values.get(key, {}) for key in document.keys}
 
 
+def leaves(path: Path, substitutions: Mapping[str, str]) -> Dict[str, Any]:
+    """Return path -> value of every parameter in a file.
+
+    Raises:
+        InputError: The file cannot be read.
+    """
+    document = _read(path, substitutions)
+    return {
+        "/".join(names): value
+        for names, value in document.values
+        if not isinstance(value, dict) or value
+    }
+
+
 def costmaps_named(path: Path) -> Tuple[str, ...]:
     """Return the costmaps that a file without their namespaces is for, by its name."""
     stem = path.stem.lower()
     if "costmap" not in stem:
         return ()
-    named = tuple(name for name in _COSTMAPS if name.split("_")[0] in stem)
-    return _COSTMAPS if not named and "common" in stem else named
+    named = tuple(name for name in COSTMAPS if name.split("_")[0] in stem)
+    return COSTMAPS if not named and "common" in stem else named
 
 
 def _namespaces(document: _Document) -> Tuple[str, ...]:
-    if set(_COSTMAPS).intersection(document.keys):
+    if set(COSTMAPS).intersection(document.keys):
         return ("",)
     return costmaps_named(document.path) or ("",)
 
@@ -198,11 +264,19 @@ class _Document:
         self.values = [
             (path[1:], value) for path, value in self.values if path[0] == node and len(path) > 1
         ]
-        self.lines = {path[1:]: line for path, line in self.lines.items() if path[0] == node}
+        self.lines = {
+            path[1:]: line for path, line in self.lines.items() if path[0] == node and len(path) > 1
+        }
 
 
 def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
     text = _substituted(read_text(path, MAX_BYTES), path, arguments)
+    document = _parsed(text, path)
+    _enter_node(document, f"move_base{arguments.get('i', '')}")
+    return document
+
+
+def _parsed(text: str, path: Path) -> _Document:
     document = _Document(path)
     try:
         loader = PlainLoader(text)
@@ -219,11 +293,23 @@ def _read(path: Path, arguments: Mapping[str, str]) -> _Document:
         raise InputError([_syntax_error(error, path)]) from error
     finally:
         loader.dispose()
-    nodes = [key for key in document.keys if _NODE.fullmatch(key)]
-    if nodes:
-        own = f"move_base{arguments.get('i', '')}"
-        document.enter(own if own in nodes else nodes[0])
     return document
+
+
+def _enter_node(document: _Document, own: str) -> None:
+    """Enter the namespace of a move_base node, which may be in that of a robot.
+
+    Args:
+        document: A file, or a dump of a parameter server.
+        own: Name of the node, if there are several.
+    """
+    for depth in (1, 2):
+        paths = {path[:depth] for path, _ in document.values if len(path) > depth}
+        nodes = {path[-1]: path for path in sorted(paths) if _NODE.fullmatch(path[-1])}
+        if nodes:
+            for name in nodes.get(own, next(iter(nodes.values()))):
+                document.enter(name)
+            return
 
 
 def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
@@ -280,7 +366,7 @@ def _collect(
 
 def _merge(tree: ParameterTree, document: _Document, prefix: str) -> None:
     """Merge a file into the tree key by key."""
-    above = (prefix,) if prefix else ()
+    above = tuple(filter(None, prefix.split("/")))
     for below, value in document.values:
         path = above + below
         namespace = _namespace(tree, path[:-1])

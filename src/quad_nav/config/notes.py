@@ -16,6 +16,8 @@ UNUSED = "unused"  # of a planner that is not chosen
 CLAMPED = "clamped"  # the value in force differs
 RENAMED = "renamed"  # an old name that still works
 CAUTION = "caution"  # legal, but probably a mistake
+MAPPED = "mapped"  # of another robot: flown with the quadcopter's own
+LEFT_OUT = "left out"  # of another robot: the quadcopter has none
 NO_EFFECT = (UNKNOWN, UNSUPPORTED, IGNORED, UNUSED, CLAMPED)
 """Kinds of remarks on values that do not do what they say."""
 

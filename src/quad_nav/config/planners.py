@@ -71,7 +71,6 @@ def _plain(plugin: str, table: Table, params: Callable[..., Any]) -> PlannerType
     )
 
 
-# The first of each replaces planners that are not supported.
 GLOBAL_PLANNERS: Dict[str, PlannerType] = {
     DEFAULT_GLOBAL_PLANNER: _plain(DEFAULT_GLOBAL_PLANNER, NAVFN_TABLE, NavfnParams),
     SEARCH_PLANNER: _plain(SEARCH_PLANNER, GLOBAL_PLANNER_TABLE, SearchPlannerParams),
@@ -115,7 +114,7 @@ def planner_keys(tree: Mapping[str, Any]) -> List[str]:
 
 
 def normalise_planner_names(tree: Namespace, notes: Notes) -> None:
-    """Replace unsupported planners by the defaults, with a remark."""
+    """Complete old names of planners, and report planners that are not supported."""
     for key, slot in SLOTS.items():
         name = tree.get(key)
         if not isinstance(name, str) or name in slot.types:
@@ -127,8 +126,20 @@ def normalise_planner_names(tree: Namespace, notes: Notes) -> None:
         if tree[key] is not None:
             notes.remark(key, RENAMED, f"{name} is an old name of {tree[key]}")
         else:
-            tree[key] = next(iter(slot.types))
-            notes.remark(key, UNSUPPORTED, f"{name} is not supported; using {tree[key]} instead")
+            tree[key] = _substitute(tree, slot)
+            expected = f"--set {key}={tree[key]} or {_others(tree, key)}"
+            notes.problem(key, f"{name} is not supported; expected {expected}")
+
+
+def _substitute(tree: Namespace, slot: Slot) -> str:
+    """Return a supported planner, one that has parameters if there is any."""
+    known = list(slot.types)
+    preferred = [known[0] if slot is SLOTS["base_global_planner"] else DWA_PLANNER, *known]
+    return next((one for one in preferred if tree.get(plugin_name(one))), preferred[0])
+
+
+def _others(tree: Namespace, key: str) -> str:
+    return " or ".join(one for one in SLOTS[key].types if one != tree[key])
 
 
 def normalise_planners(tree: Namespace, notes: Notes) -> None:
@@ -144,7 +155,9 @@ def normalise_planners(tree: Namespace, notes: Notes) -> None:
     for name in [name for name in tree if name not in chosen]:
         if name in flyable:
             key = flyable[name]
-            _normalise_unused(tree, name, f"unused: {key} is {tree[key]}", notes)
+            planner = next(one for one in SLOTS[key].types if plugin_name(one) == name)
+            reason = f"unused: {key} is {tree[key]}; expected {key}={planner} to fly with it"
+            _normalise_unused(tree, name, reason, notes)
         elif name in _OTHER_PLANNERS:
             notes.remark(name, UNSUPPORTED, "planner not supported; its parameters are not read")
 

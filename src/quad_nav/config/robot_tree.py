@@ -2,27 +2,34 @@
 
 Both shells read configurations here: ``quad fly`` and the nodes of a fleet call ``robot_tree``,
 and ``launch/quad.launch`` runs ``quad_nav.scenario.robot_parameters``, which prints its result.
+Layouts other than that of the launch files, and configurations of other robots, need modules that
+load slowly; those are imported when they are needed.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.config.files import (
-    FileName,
+    COSTMAPS,
     ParameterTree,
     PlacedFile,
     load_files,
+    merge_tree,
     placed_files,
     set_value,
 )
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import config_folder
+from quad_nav.files.shipped import config_folder, is_shipped
 
 COMMAND_LINE = "the command line"
 """Origin of a parameter that the user gives with ``--set``."""
+BASE_FRAME = "base_link"
+"""Frame of the robot if a configuration does not name it."""
+_QUADCOPTER = re.compile(r"/*base_link\d+")
 
 
 @dataclass(frozen=True)
@@ -30,7 +37,7 @@ class RobotSource:
     """Sources of one robot's parameters; a later one overrides an earlier one.
 
     Attributes:
-        config: A folder's path, or the name of a shipped configuration.
+        config: A shipped configuration, a folder or files, see ``sources``.
         number: Number of the robot.
         robots: Number of robots that fly together; None if they are not to be told.
         numbered: Read only files with the robot's number in their names.
@@ -47,26 +54,34 @@ class RobotSource:
 
 
 def robot_tree(source: RobotSource) -> ParameterTree:
-    """Read the parameter tree of one robot.
+    """Read the parameter tree of one robot, fitted to a quadcopter.
 
     ``$(arg i)`` in a file is the robot's number.
 
     Raises:
         InputError: One line for every file that is missing or cannot be read.
     """
-    substitutions = {"i": str(source.number)}
-    files: List[FileName] = []
+    return fitted(unfitted_tree(source), source.number)
+
+
+def unfitted_tree(source: RobotSource) -> ParameterTree:
+    """Read the parameter tree of one robot, as its files have it.
+
+    Raises:
+        InputError: One line for every file that is missing or cannot be read.
+    """
+    tree = ParameterTree()
     problems: List[str] = []
     try:
-        files += placed_files(config_folder(source.config), substitutions, source.numbered)
+        merge_tree(tree, _configuration(source))
     except InputError as error:
         problems += error.problems
     if source.override is not None:
-        files.append(PlacedFile(source.override.expanduser(), ("",)))
-    try:
-        tree = load_files(files, substitutions)
-    except InputError as error:
-        problems += error.problems
+        try:
+            file = PlacedFile(source.override.expanduser(), ("",))
+            merge_tree(tree, load_files([file], {"i": str(source.number)}))
+        except InputError as error:
+            problems += error.problems
     if problems:
         raise InputError(problems)
     if source.robots is not None:
@@ -75,6 +90,38 @@ def robot_tree(source: RobotSource) -> ParameterTree:
     for path, value in source.parameters:
         set_value(tree, path, value, COMMAND_LINE)
     return tree
+
+
+def fitted(tree: ParameterTree, number: int) -> ParameterTree:
+    """Return a tree made for quadcopters as it is, and that of another robot adapted."""
+    if is_of_quadcopter(tree):
+        return tree
+    from quad_nav.config.other_robots import adapted
+
+    return adapted(tree, number)
+
+
+def is_of_quadcopter(tree: Mapping[str, Any]) -> bool:
+    """Tell by ``robot_base_frame`` if a configuration was made for quadcopters."""
+    frames = [
+        costmap.get("robot_base_frame", BASE_FRAME)
+        for costmap in map(tree.get, COSTMAPS)
+        if isinstance(costmap, dict)
+    ]
+    return any(isinstance(frame, str) and _QUADCOPTER.fullmatch(frame) for frame in frames)
+
+
+def _configuration(source: RobotSource) -> ParameterTree:
+    """Load the files of a configuration."""
+    name, number = source.config, str(source.number)
+    folder = Path(name).expanduser()
+    if source.numbered or (not folder.exists() and is_shipped(name)):
+        return load_files(
+            placed_files(config_folder(name), {"i": number}, source.numbered), {"i": number}
+        )
+    from quad_nav.config.sources import load_set, robot_set
+
+    return load_set(robot_set(name, number))
 
 
 def is_users(origin: str, number: int, override: Optional[Path]) -> bool:

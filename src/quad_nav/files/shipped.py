@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import List
 
 from quad_nav.errors import InputError
 from quad_nav.files.values import nearest
@@ -38,6 +39,15 @@ def shipped(folder: str, name: str = "") -> Path:
     )
 
 
+def is_shipped(name: str) -> bool:
+    """Return whether a configuration of this name comes with the package."""
+    return name in _config_names()
+
+
+def _config_names() -> List[str]:
+    return sorted(folder.name for folder in shipped("config").iterdir() if folder.is_dir())
+
+
 def config_folder(name: str) -> Path:
     """Folder of a configuration: a folder's path or the name of a shipped configuration.
 
@@ -47,9 +57,14 @@ def config_folder(name: str) -> Path:
     path = Path(name).expanduser()
     if path.is_dir():
         return path
-    names = sorted(folder.name for folder in shipped("config").iterdir() if folder.is_dir())
+    names = _config_names()
     if name in names:
         return shipped("config", name)
     near = nearest(name, names)
     hint = f"did you mean {near}?" if near else f"there are {', '.join(names)}"
-    raise InputError([f"config: {name}: expected a folder or the name of a shipped one; {hint}"])
+    raise InputError(
+        [
+            f"config: {name}: expected a folder, a YAML file, a launch file, or the name of a"
+            f" shipped one; {hint}"
+        ]
+    )

@@ -6,14 +6,13 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.config import Configuration
-from quad_nav.costmap.layered import CostmapParams
-from quad_nav.costmap.observation import SourceParams
-from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.config.other_robots import input_faults
+from quad_nav.config.sources import config_label
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import config_folder, shipped
+from quad_nav.files.shipped import shipped
 from quad_nav.files.values import value_faults
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.random_mission import RandomMission
@@ -33,7 +32,7 @@ class FlightOptions:
     Attributes:
         scene: Scene file; None for the shipped arena, or a random mission if ``goals`` is None.
         goals: Folder of goal files; None for the shipped ones, or a random mission.
-        config: Name of a shipped configuration, or a folder's path.
+        config: A shipped configuration, a folder or files, see ``config.sources``.
         parameters: (path, value) on top of it, as ("global_costmap/width", 60.0).
         robots: Number of robots; None for as many as ``goals`` has files.
         seed: Of jitter, noise and the random mission.
@@ -92,10 +91,11 @@ def read_setup(options: FlightOptions) -> FlightSetup:
     """
     options = with_default_files(options)
     problems = value_faults(_values(options), _RULES, "")
-    simulation = options.simulation
     scenario, faults = read_scenario(_request(options), partial(_configurations, options))
     problems += faults
     scene, robots = scenario.scene, scenario.robots
+    airframe = replace(options.simulation.airframe, radius_m=scenario.robot_radius_m)
+    simulation = replace(options.simulation, airframe=airframe)
     if scene is not None and not problems:
         try:
             start_poses(
@@ -115,7 +115,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         scene,
         robots,
         configurations,
-        Path(options.config).name,
+        config_label(options.config),
         replace(simulation, controller_period_s=longest_s),
         steps_per_scan(options.scans_per_s),
         options.seed,
@@ -139,22 +139,6 @@ def _map_faults(scene: Scene, configurations: Sequence[Configuration]) -> List[s
         if scene_map_problem(scene, getattr(one, name))
     }
     return list(found)
-
-
-def sensor_faults(configuration: Configuration, place: str) -> List[str]:
-    """A message for each source of an obstacle layer that is not a LaserScan.
-
-    Args:
-        configuration: A robot's configuration.
-        place: Its folder, for messages.
-    """
-    return [
-        f"{place}: {layer}/{source.name}: data_type {source.data_type}; expected LaserScan, the "
-        "only sensor of the simulated robots"
-        for costmap in (configuration.global_costmap, configuration.local_costmap)
-        for layer, source in _sources(costmap)
-        if source.data_type != "LaserScan"
-    ]
 
 
 def _values(options: FlightOptions) -> Dict[str, Any]:
@@ -201,7 +185,7 @@ def _configurations(
         robots,
         mission,
         options.parameters,
-        partial(_input_faults, config_folder(options.config)),
+        partial(_input_faults, options.config),
         strict=options.strict,
     )
 
@@ -218,38 +202,14 @@ def _given_configurations(
     if len(configurations) != robots:
         problems = [f"config: {len(configurations)} configurations; expected {robots}, the robots"]
     for number, one in enumerate(configurations):
-        problems += _input_faults(Path("config"), one, number)
+        problems += _input_faults("config", one, number)
     if problems:
         raise InputError(problems)
     return list(configurations)
 
 
-def _input_faults(folder: Path, configuration: Configuration, number: int) -> List[str]:
-    """A message for each frame and sensor that the simulation does not have.
-
-    Under ROS another node may publish them.
-    """
-    place = f"{folder}: quad{number}"
-    problems = sensor_faults(configuration, place)
-    known = {"global_frame": ("map", f"odom{number}"), "robot_base_frame": (f"base_link{number}",)}
-    lidar = f"Lidar{number}"
-    for costmap in (configuration.global_costmap, configuration.local_costmap):
-        problems += [
-            f"{place}: {key}: {getattr(costmap, key)}; expected {' or '.join(names)}"
-            for key, names in known.items()
-            if getattr(costmap, key).lstrip("/") not in names
-        ]
-        problems += [
-            f"{place}: {layer}/{source.name}: sensor_frame {source.sensor_frame}; "
-            f"expected {lidar} or none"
-            for layer, source in _sources(costmap)
-            if source.sensor_frame.lstrip("/") not in ("", lidar)
-        ]
-    return problems
-
-
-def _sources(costmap: CostmapParams) -> Iterator[Tuple[str, SourceParams]]:
-    """Yield the obstacle layers' sources, with the layers' names."""
-    for name, layer in costmap.layers:
-        for source in layer.sources if isinstance(layer, ObstacleLayerParams) else ():
-            yield name, source
+def _input_faults(source: str, configuration: Configuration, number: int) -> List[str]:
+    return [
+        f"{source}: quad{number}: {path}: {problem}"
+        for path, problem in input_faults(configuration.costmaps, number)
+    ]

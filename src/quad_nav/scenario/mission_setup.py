@@ -145,7 +145,7 @@ def _mission_setup(
     scene = scenario.scene
     return MissionSetup(
         scenario.robots,
-        float(values["robot_radius"]),
+        scenario.robot_radius_m,
         scene.altitude_m if scene else None,
         scene.flight_surface_distances_m if scene else None,
         values["simulation"],

@@ -56,6 +56,8 @@ RULES: Dict[str, Rule] = {
         _is_path_or_paths, "a folder with quad0_goals.json and so on, or a list of files"
     ),
     "config": text("a folder of YAML files, or the name of a shipped one"),
+    "body_radius": number(above=0, unit="metres"),
+    "map_resolution": number(at_least=0, unit="metres"),
     "robots": whole(at_least=1, at_most=MAX_ROBOTS),
     "seed": whole(at_least=0),
     "size": Rule(

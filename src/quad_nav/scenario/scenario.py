@@ -87,6 +87,7 @@ class Scenario:
     robots: Tuple[RobotGoals, ...] = ()
     configurations: Tuple[Optional[Configuration], ...] = ()
     warnings: Tuple[str, ...] = ()
+    robot_radius_m: float = BODY_RADIUS_M
 
 
 def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scenario, List[str]]:
@@ -104,6 +105,9 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
     values = vars(request)
     mission, scene = _tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
     configurations = _tried(lambda: tuple(configure(request.robots, mission)), problems) or ()
+    if configurations:
+        radius_m = body_radius_m(configurations, request.robot_radius)
+        request = replace(request, robot_radius=radius_m)
     located = [one if _is_located(one, request.simulated) else None for one in configurations]
     if request.goals == RANDOM:
         robots, faults = _random_goals(request, mission, located)
@@ -115,8 +119,21 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
         *tolerance_warnings(robots, configurations),
         *(cover_warnings(scene, located) if scene else ()),
     ]
-    scenario = Scenario(scene, tuple(robots), configurations, tuple(warnings))
+    scenario = Scenario(
+        scene, tuple(robots), configurations, tuple(warnings), float(request.robot_radius)
+    )
     return scenario, list(dict.fromkeys(problems))
+
+
+def body_radius_m(configurations: Sequence[Optional[Configuration]], own_m: float) -> float:
+    """Return the radius of the simulated bodies, the largest that the configurations ask for.
+
+    Args:
+        configurations: Those of all robots.
+        own_m: Radius of a quadcopter without ``body_radius``.
+    """
+    radii = [one.body_radius_m if one else None for one in configurations]
+    return max((own_m if one is None else one for one in radii), default=own_m)
 
 
 def mission_of(values: Mapping[str, Any]) -> Optional[RandomMission]:
@@ -141,7 +158,7 @@ def scene_of(values: Mapping[str, Any]) -> Scene:
 
 
 def read_configurations(
-    folder: str,
+    name: str,
     robots: int,
     mission: Optional[RandomMission] = None,
     parameters: Parameters = (),
@@ -149,10 +166,10 @@ def read_configurations(
     numbered: bool = False,
     strict: bool = True,
 ) -> List[Configuration]:
-    """Read every robot's configuration from the files of a folder.
+    """Read every robot's configuration.
 
     Args:
-        folder: Path, or name of a shipped configuration.
+        name: A shipped configuration, a folder or files, see ``config.sources``.
         robots: Number of robots.
         mission: A random mission, whose arena the global costmaps cover.
         parameters: Parameters on top of the files, from the command line.
@@ -166,7 +183,7 @@ def read_configurations(
     configurations: List[Configuration] = []
     problems: List[str] = []
     for number in range(robots):
-        source = RobotSource(folder, number, robots if numbered else None, parameters=parameters)
+        source = RobotSource(name, number, robots if numbered else None, parameters=parameters)
         try:
             configuration = _read_configuration(source, mission)
         except InputError as error:
@@ -175,7 +192,7 @@ def read_configurations(
         problems += check(configuration, number)
         if strict:
             paths = [path for path, _ in parameters]
-            problems += without_effect(configuration.remarks, paths, folder)
+            problems += without_effect(configuration.remarks, paths, name)
         configurations.append(configuration)
     if problems:
         raise InputError(list(dict.fromkeys(problems)))
@@ -184,11 +201,10 @@ def read_configurations(
 
 def _read_configuration(source: RobotSource, mission: Optional[RandomMission]) -> Configuration:
     """Read a robot's files and set the scenario's parameters and the command line's on top."""
-    tree = robot_tree(replace(source, parameters=()))
+    tree = robot_tree(source)
     for name, value in _arena_size(mission):
-        set_value(tree, name, value, "the scenario")
-    for name, value in source.parameters:
-        set_value(tree, name, value, COMMAND_LINE)
+        if tree.origins.get(name) != COMMAND_LINE:
+            set_value(tree, name, value, "the scenario")
     return config.load(tree)
 
 

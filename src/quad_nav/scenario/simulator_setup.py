@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Dict, Mapping
+from typing import Any, Dict, List, Mapping, Optional, Sequence
 
+from quad_nav.config import Configuration, load
+from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
 from quad_nav.files.values import is_number, is_whole, unknown_names, value_faults
 from quad_nav.scenario.rules import RULES, optional, steps_per_scan
-from quad_nav.scenario.scenario import mission_of, read_configurations, scene_of
+from quad_nav.scenario.scenario import (
+    body_radius_m,
+    mission_of,
+    read_configurations,
+    scene_of,
+)
+from quad_nav.sim.flight import Airframe
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift
-from quad_nav.sim.scene import Scene
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.simulation import SimulationParams, start_poses
 
 DEFAULT_BEAMS = 512
@@ -34,6 +42,8 @@ DEFAULTS: Dict[str, Any] = {
     "jitter": 0.0,  # radius of the disc in which starts are displaced, m
     "command_timeout": 0.5,  # s; a robot hovers after command_timeout plus
     "controller_period": 0.05,  # controller_period without commands; the node asks the navigators
+    "body_radius": BODY_RADIUS_M,  # m, of the quadcopters' guards; the navigators may have another
+    "map_resolution": 0.0,  # m, cells of the scene's map on the topic map; 0: no map
 }
 _RULES = {**{name: RULES[name] for name in DEFAULTS}, "config": optional(RULES["config"])}
 
@@ -50,6 +60,7 @@ class SimulatorSetup:
     gui: bool
     start_paused: bool
     steps_per_scan: int
+    map_resolution_m: float = 0.0
 
 
 def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
@@ -68,11 +79,16 @@ def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
     if problems:
         raise InputError(problems)
     scene = scene_of(values)
-    if values["config"] and "controller_period" not in parameters:
-        values["controller_period"] = _controller_period_of_fleet_s(values)
+    if values["config"]:
+        fleet = read_configurations(
+            values["config"], values["robots"], mission_of(values), numbered=True
+        )
+        values = {**DEFAULTS, **_asked_for(fleet), **parameters}
     try:
         params = _simulation_params(values)
-        start_poses(scene, values["robots"], params.jitter_m, values["seed"])
+        start_poses(
+            scene, values["robots"], params.jitter_m, values["seed"], params.airframe.radius_m
+        )
     except InputError as error:
         raise InputError([f"{name}: {problem}" for problem in error.problems]) from error
     return SimulatorSetup(
@@ -84,7 +100,50 @@ def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
         values["gui"],
         values["start_paused"],
         steps_per_scan(values["lidar_rate"]),
+        float(values["map_resolution"]),
     )
+
+
+def asked_for_by_navigators(all_parameters: Mapping[str, Any], robots: Any) -> Dict[str, Any]:
+    """Return parameters of the simulator that follow from those of navigators on the server.
+
+    Navigators with faults are left out; they name their faults themselves.
+
+    Args:
+        all_parameters: The whole parameter tree, with those of ``move_base{i}``.
+        robots: Number of robots.
+    """
+    configurations: List[Optional[Configuration]] = []
+    for number in range(robots if is_whole(robots) else 0):
+        tree = all_parameters.get(f"move_base{number}")
+        if isinstance(tree, Mapping) and "body_radius" in tree:
+            try:
+                configurations.append(load(tree))
+            except InputError:
+                continue
+    period_s = longest_controller_period_s(all_parameters, robots)
+    return {**_asked_for(configurations), "controller_period": period_s}
+
+
+def _asked_for(configurations: Sequence[Optional[Configuration]]) -> Dict[str, Any]:
+    """Return parameters of the simulator that follow from its robots' configurations.
+
+    Other robots, which have a ``body_radius``, get the scene's map where they need a map: nothing
+    else publishes it. The cells are as small as the smallest that are asked for.
+    """
+    found = [one for one in configurations if one is not None]
+    periods = [1.0 / one.navigator.controller_frequency_hz for one in found]
+    cells = [
+        costmap.resolution_m
+        for one in found
+        for costmap in one.costmaps.values()
+        if one.body_radius_m and any(isinstance(p, StaticLayerParams) for _, p in costmap.layers)
+    ]
+    return {
+        "body_radius": body_radius_m(found, BODY_RADIUS_M),
+        "map_resolution": min(cells, default=0.0),
+        "controller_period": max(periods, default=DEFAULTS["controller_period"]),
+    }
 
 
 def longest_controller_period_s(all_parameters: Mapping[str, Any], robots: Any) -> float:
@@ -99,16 +158,6 @@ def longest_controller_period_s(all_parameters: Mapping[str, Any], robots: Any) 
     return max((1.0 / f for f in frequencies if is_number(f) and f > 0), default=default)
 
 
-def _controller_period_of_fleet_s(values: Mapping[str, Any]) -> float:
-    """Return the longest control period of a fleet that is configured from files."""
-    return max(
-        1.0 / one.navigator.controller_frequency_hz
-        for one in read_configurations(
-            values["config"], values["robots"], mission_of(values), numbered=True
-        )
-    )
-
-
 def _simulation_params(values: Mapping[str, Any]) -> SimulationParams:
     scan_range = float(values["scan_range"])
     lidar = LidarParams(
@@ -119,6 +168,7 @@ def _simulation_params(values: Mapping[str, Any]) -> SimulationParams:
     return SimulationParams(
         lidar,
         command_timeout_s=float(values["command_timeout"]),
+        airframe=Airframe(radius_m=float(values["body_radius"])),
         controller_period_s=float(values["controller_period"]),
         jitter_m=float(values["jitter"]),
         lidar_caster=values["lidar"],

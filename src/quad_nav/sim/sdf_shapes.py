@@ -9,10 +9,10 @@ from typing import Optional, Union
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.files.xml_tree import Element
 from quad_nav.geometry import Pose3D
 from quad_nav.sim.scene import Box, Cylinder, Obstacle, Sphere
 from quad_nav.sim.sdf_values import NotRepresented, SdfReader
-from quad_nav.sim.xml_tree import Element
 
 UPRIGHT_RAD = 1e-3
 """Tilt up to which an axis counts as vertical: saved worlds have numerical errors."""

@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 from typing import List, Optional
 
+from quad_nav.files.xml_tree import Element
 from quad_nav.geometry import Pose3D, quaternion_from_euler
-from quad_nav.sim.xml_tree import Element
 
 MAX_LENGTH_M = 1e5
 IDENTITY = Pose3D(0.0, 0.0, 0.0)

@@ -16,11 +16,11 @@ from typing import Dict, List, Optional, Sequence, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import referenced_file
+from quad_nav.files.xml_tree import Element, read_xml
 from quad_nav.geometry import Pose3D
 from quad_nav.sim.scene import Obstacle
 from quad_nav.sim.sdf_shapes import obstacle_of
 from quad_nav.sim.sdf_values import IDENTITY, NotRepresented, SdfReader, is_true
-from quad_nav.sim.xml_tree import Element, read_xml
 
 MAX_OBSTACLES = 100_000
 MAX_INCLUDES = 16

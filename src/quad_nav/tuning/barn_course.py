@@ -10,8 +10,8 @@ from quad_nav.barn.protocol import SAMPLE_STEP, TIME_LIMIT_S, Outcome, Run, metr
 from quad_nav.barn.setup import BarnOptions, Contestant, flight_setup, read_barn_setup
 from quad_nav.barn.statistics import BarnStatistics, barn_statistics
 from quad_nav.barn.worlds import BarnWorld
+from quad_nav.config.sources import source_paths
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import config_folder
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.tuning.courses import HELD_OUT_SEED, LIDAR, Case, files_digest
 from quad_nav.tuning.flight_result import FlightResult
@@ -99,7 +99,7 @@ class BarnCourse:
         """Return what flights depend on besides candidate and case, as plain JSON."""
         given = self.options
         return {
-            "config": {"name": given.config, "files": files_digest(config_folder(given.config))},
+            "config": {"name": given.config, "files": files_digest(*source_paths(given.config))},
             "parameters": dict(given.parameters),
             "worlds": {"name": Path(given.worlds).name, "files": files_digest(Path(given.worlds))},
             "body_radius_m": given.body_radius_m,

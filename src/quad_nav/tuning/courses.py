@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
+from quad_nav.config.sources import source_paths
 from quad_nav.errors import InputError
-from quad_nav.files.shipped import config_folder
 from quad_nav.mission.robot_goals import WatchedGoalFile
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.simulation import SimulationParams
@@ -138,7 +138,7 @@ class MissionCourse:
         """Return what flights depend on besides candidate and case, as plain JSON."""
         given = self.options
         return {
-            "config": {"name": given.config, "files": files_digest(config_folder(given.config))},
+            "config": {"name": given.config, "files": files_digest(*source_paths(given.config))},
             "parameters": dict(given.parameters),
             "missions": [_described(mission) for mission in given.missions],
             "held_out": [_described(mission) for mission in given.held_out],

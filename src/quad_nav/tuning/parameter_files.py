@@ -7,15 +7,21 @@ import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+import yaml
 
 from quad_nav import config
-from quad_nav.config.files import COMMON, OPTIONAL, REQUIRED, set_value
+from quad_nav.config.file_sets import is_standard
+from quad_nav.config.files import COMMON, OPTIONAL, REQUIRED, ParameterTree, set_value
+from quad_nav.config.robot_tree import RobotSource, fitted, plain_tree, unfitted_tree
+from quad_nav.config.sources import split_source
 from quad_nav.errors import QuadError
 from quad_nav.files.output import make_folder, write_text
 from quad_nav.tuning.space import BOTH, COSTMAPS, costmap_paths
 from quad_nav.tuning.yaml_edit import inserted, replaced
 
+Source = Union[str, Path]
 _FILE = re.compile(rf"({'|'.join((*REQUIRED, *OPTIONAL))}|robot)(\d*)\.yaml")
 _PLANNERS = "base_local_planner_params"
 _NODE = "move_base_params"
@@ -36,14 +42,14 @@ class Change:
 
 
 def base_configuration(
-    folder: Path, fixed: Sequence[Tuple[str, Any]], robot: int = 0
+    source: Source, fixed: Sequence[Tuple[str, Any]], robot: int = 0
 ) -> config.Configuration:
     """Load the configuration of the base.
 
     Raises:
         InputError: The configuration is invalid.
     """
-    return config.load(_tree(folder, fixed, robot))
+    return config.load(fitted(_tree(source, fixed, robot), robot))
 
 
 def base_value(tree: Mapping[str, Any], path: str) -> Any:
@@ -61,18 +67,16 @@ def base_value(tree: Mapping[str, Any], path: str) -> Any:
     return value
 
 
-def write_parameters(base: Path, target: Path, changes: Sequence[Change]) -> None:
+def write_parameters(base: Source, target: Path, changes: Sequence[Change]) -> None:
     """Write the base's files with ``changes`` into a folder.
+
+    A base in another layout than that of the launch files is written in theirs.
 
     Raises:
         FilesDiffer: The files would not load as the base with these changes. Nothing is written.
         OSError: A file cannot be written. The folder keeps what it had.
     """
-    files = {
-        path.name: path.read_text(encoding="utf-8")
-        for path in sorted(base.glob("*.yaml"))
-        if _FILE.fullmatch(path.name)
-    }
+    files = _files_of(base)
     for change in changes:
         _change(files, change)
     partial = target.with_name(f"{target.name}.partial")
@@ -89,6 +93,26 @@ def write_parameters(base: Path, target: Path, changes: Sequence[Change]) -> Non
             os.replace(partial / name, target / name)
     finally:
         shutil.rmtree(partial)
+
+
+def _files_of(base: Source) -> Dict[str, str]:
+    """Return name -> text of the base's files."""
+    folder, choice = split_source(str(base))
+    if not choice and folder.is_dir() and is_standard(folder, "0"):
+        return {
+            path.name: path.read_text(encoding="utf-8")
+            for path in sorted(folder.glob("*.yaml"))
+            if _FILE.fullmatch(path.name)
+        }
+    tree = plain_tree(_tree(base, (), 0))
+    contents: Dict[str, Dict[str, Any]] = {f"{stem}.yaml": {} for stem in REQUIRED}
+    for key, value in tree.items():
+        stem, _ = _home(f"{key}/x" if isinstance(value, dict) else key)
+        contents.setdefault(f"{stem}.yaml", {})[key] = value
+    return {
+        name: yaml.safe_dump(content, sort_keys=False) if content else f"# Read from {base}.\n"
+        for name, content in contents.items()
+    }
 
 
 def _change(files: Dict[str, str], change: Change) -> None:
@@ -126,17 +150,17 @@ def _stem(name: str) -> str:
     return match.group(1) if match else ""
 
 
-def _check(base: Path, written: Path, changes: Sequence[Change]) -> None:
+def _check(base: Source, written: Path, changes: Sequence[Change]) -> None:
     """Load base and result, for every robot with files of its own and for one without."""
     numbers = {
         int(match.group(2))
-        for match in map(_FILE.fullmatch, (path.name for path in base.glob("*.yaml")))
+        for match in map(_FILE.fullmatch, (path.name for path in written.glob("*.yaml")))
         if match and match.group(2)
     }
     assignments = [(change.path, change.value) for change in changes]
     for robot in sorted({0, 1, *numbers}):
-        meant = config.load(_tree(base, assignments, robot)).to_tree()
-        found = config.load(_tree(written, (), robot)).to_tree()
+        meant = config.load(fitted(_tree(base, assignments, robot), robot)).to_tree()
+        found = config.load(fitted(_tree(written, (), robot), robot)).to_tree()
         if meant != found:
             raise FilesDiffer(
                 f"{base}: cannot edit its files: robot {robot} would "
@@ -144,8 +168,8 @@ def _check(base: Path, written: Path, changes: Sequence[Change]) -> None:
             )
 
 
-def _tree(folder: Path, assignments: Sequence[Tuple[str, Any]], robot: int) -> Dict[str, Any]:
-    tree = config.load_files(folder, {"i": str(robot)})
+def _tree(source: Source, assignments: Sequence[Tuple[str, Any]], robot: int) -> ParameterTree:
+    tree = unfitted_tree(RobotSource(str(source), robot))
     for path, value in assignments:
         for single in costmap_paths(path):
             set_value(tree, single, value, "tuned")

@@ -36,7 +36,7 @@ def write_result(result: TuneResult, command: str) -> Iterator[Path]:
     """
     folder = result.setup.options.output
     parameters = folder / PARAMETERS
-    write_parameters(result.setup.base_folder, parameters, changes(result))
+    write_parameters(result.setup.base_source, parameters, changes(result))
     write_text(parameters / RECORD, markdown(result, command))
     yield parameters
     text = json.dumps(to_json(result, command), indent=2, allow_nan=False, default=str)

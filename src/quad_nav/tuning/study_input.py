@@ -10,6 +10,7 @@ from quad_nav import config
 from quad_nav.barn.setup import BarnOptions
 from quad_nav.config.files import set_value
 from quad_nav.config.notes import without_effect
+from quad_nav.config.robot_tree import RobotSource, fitted, unfitted_tree
 from quad_nav.errors import InputError
 from quad_nav.tuning.barn_course import BarnCourse
 from quad_nav.tuning.courses import MissionCourse, MissionOptions, check_missions
@@ -38,22 +39,24 @@ def with_config(given: CourseOptions, name: str) -> CourseOptions:
     return replace(given, config=name, parameters=())
 
 
-def parameter_faults(parameters: Sequence[Tuple[str, Any]], folder: Path, name: str) -> List[str]:
+def parameter_faults(
+    parameters: Sequence[Tuple[str, Any]], source: Union[str, Path], name: str
+) -> List[str]:
     """Return invalid values, and parameters that have no effect.
 
     Args:
-        parameters: (path, value) pairs on top of the folder's.
-        folder: Folder of the base configuration.
+        parameters: (path, value) pairs on top of the base configuration.
+        source: The base configuration.
         name: Origin of the parameters, for the messages.
     """
-    tree = config.load_files(folder, {"i": "0"})
+    tree = unfitted_tree(RobotSource(str(source), 0))
     paths = []
     for path, value in parameters:
         for single in costmap_paths(path):
             set_value(tree, single, value, name)
             paths.append(single)
     try:
-        remarks = config.load(tree).remarks
+        remarks = config.load(fitted(tree, 0)).remarks
     except InputError as error:
         return list(error.problems)
-    return without_effect(remarks, paths, str(folder))
+    return without_effect(remarks, paths, str(source))

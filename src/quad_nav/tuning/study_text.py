@@ -245,7 +245,7 @@ def _flights(count: int) -> str:
 def changes(result: TuneResult) -> List[Change]:
     """Return all changes of the base's files with their remarks."""
     gains = {gain.path: gain for gain in result.refined.gains}
-    base = base_configuration(result.setup.base_folder, ()).to_tree()
+    base = base_configuration(result.setup.base_source, ()).to_tree()
     found = [
         Change(path, value, "set with --set")
         for path, value in result.setup.course.fixed

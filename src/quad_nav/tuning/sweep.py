@@ -15,7 +15,6 @@ import yaml
 from quad_nav.errors import InputError
 from quad_nav.files import plain_yaml
 from quad_nav.files.document import yaml_fault
-from quad_nav.files.shipped import config_folder
 from quad_nav.files.user_files import read_text
 from quad_nav.offline.workers import Workers
 from quad_nav.tuning.courses import LIDAR, Case, identity_text
@@ -130,7 +129,6 @@ def read_sweep_setup(options: SweepOptions) -> SweepSetup:
     """
     course, warnings = read_course(options.course)
     space = space_of(options.points)
-    folder = config_folder(course.config)
     (case,) = course.search_cases(1)
     problems: List[str] = []
     for point in options.points:
@@ -140,7 +138,9 @@ def read_sweep_setup(options: SweepOptions) -> SweepSetup:
             [f"{_point_text(point)}: {refused}"]
             if refused
             else parameter_faults(
-                [pair for pair in assignments if not pair[0].startswith(f"{LIDAR}/")], folder, _NAME
+                [pair for pair in assignments if not pair[0].startswith(f"{LIDAR}/")],
+                course.config,
+                _NAME,
             )
         )
     if problems:

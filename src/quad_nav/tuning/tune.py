@@ -13,7 +13,7 @@ from quad_nav import config
 from quad_nav.barn.setup import BarnOptions
 from quad_nav.config.plugins import plugin_name
 from quad_nav.errors import InputError, QuadError
-from quad_nav.files.shipped import config_folder, shipped
+from quad_nav.files.shipped import shipped
 from quad_nav.offline.workers import Workers
 from quad_nav.tuning.courses import Case
 from quad_nav.tuning.evaluation import Course, Evaluation, StudyObserver
@@ -87,9 +87,9 @@ class TuneSetup:
     warnings: Tuple[str, ...]
 
     @property
-    def base_folder(self) -> Path:
-        """Folder of the base configuration."""
-        return config_folder(self.course.config)
+    def base_source(self) -> str:
+        """The base configuration, as the user names it."""
+        return self.course.config
 
     @property
     def planned_flights(self) -> int:
@@ -167,8 +167,7 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
     against = tuple(
         (name, read_course(with_config(options.course, name))[0]) for name in options.against
     )
-    folder = config_folder(course.config)
-    configuration = base_configuration(folder, course.fixed)
+    configuration = base_configuration(course.config, course.fixed)
     given = load_space(options.space or _shipped_space(options.course, configuration)).without(
         [path for path, _ in course.fixed]
     )
@@ -177,7 +176,7 @@ def read_tune_setup(options: TuneOptions) -> TuneSetup:
         line
         for values in given.corners()
         for line in parameter_faults(
-            (*course.fixed, *given.assignments(values)), folder, given.name
+            (*course.fixed, *given.assignments(values)), course.config, given.name
         )
     ]
     if not space.dimensions:

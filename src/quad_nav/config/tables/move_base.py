@@ -149,6 +149,15 @@ MOVE_BASE_TABLE = Table(
             "Half the side of the square that make_plan clears around the robot;"
             " local_costmap/circumscribed_radius if unset.",
         ),
+        double(
+            "body_radius",
+            0.30,
+            "",
+            "metres",
+            "Radius of the simulated robot's body, the disc that collides; the fit of another"
+            " robot's configuration sets it. Not in upstream move_base; see other_robots.md.",
+            _POSITIVE,
+        ),
         integer(
             "robot",
             0,

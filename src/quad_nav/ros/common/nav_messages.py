@@ -12,6 +12,7 @@ from nav_msgs.msg import OccupancyGrid, Path
 from sensor_msgs.msg import PointCloud2, PointField
 
 from quad_nav.costmap.cost_grid import occupancy
+from quad_nav.costmap.static import StaticMap
 from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
@@ -94,6 +95,11 @@ def grid_message(spec: GridSpec, costs: np.ndarray, frame: str, stamp: rospy.Tim
         stamp: Time of the grid.
     """
     return _occupancy_grid(spec, occupancy(costs), frame, stamp)
+
+
+def map_message(static_map: StaticMap, stamp: rospy.Time) -> OccupancyGrid:
+    """Convert a map."""
+    return _occupancy_grid(static_map.spec, static_map.occupancy, static_map.frame, stamp)
 
 
 def potential_message(

@@ -38,7 +38,7 @@ from quad_nav.ros.simulator.topics import SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
     DEFAULTS,
     SimulatorSetup,
-    longest_controller_period_s,
+    asked_for_by_navigators,
     read_setup,
 )
 from quad_nav.sim.body import GoalSphere
@@ -65,7 +65,7 @@ class SimulatorNode:
         self._simulation = Simulation(
             setup.scene, setup.robots, setup.params, setup.seed, setup.gui, _START_STEP
         )
-        self._topics = SimulatorTopics(self._simulation)
+        self._topics = SimulatorTopics(self._simulation, setup.map_resolution_m)
         self._pacer = Pacer(setup.rate, STEP_S)
         self._meter = RateMeter()
         # Faster than real time, the clock is published with the odometry, which is often enough.
@@ -299,12 +299,9 @@ def main() -> int:
     try:
         parameters = rospy.get_param("~", {})
         if not parameters.get("config"):
-            parameters.setdefault(
-                "controller_period",
-                longest_controller_period_s(
-                    rospy.get_param("/", {}), parameters.get("robots", DEFAULTS["robots"])
-                ),
-            )
+            robots = parameters.get("robots", DEFAULTS["robots"])
+            asked_for = asked_for_by_navigators(rospy.get_param("/", {}), robots)
+            parameters = {**asked_for, **parameters}
         setup = read_setup(parameters, name)
         node = SimulatorNode(setup)
     except InputError as error:

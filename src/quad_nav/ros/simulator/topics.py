@@ -7,7 +7,7 @@ from typing import List, Mapping, Sequence
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import TransformStamped
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String, Time
 from tf2_msgs.msg import TFMessage
@@ -23,6 +23,8 @@ from quad_nav.ros.common.conversions import (
     transform_message,
 )
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
+from quad_nav.ros.common.nav_messages import map_message
+from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import pose_in
@@ -56,8 +58,13 @@ class SimulatorTopics:
         lidar_enabled: Whether each LIDAR is on; services change it.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
-        """Advertise the topics, and publish the scene and the flight info."""
+    def __init__(self, simulation: Simulation, map_resolution_m: float = 0.0) -> None:
+        """Advertise the topics, and publish the scene and the flight info.
+
+        Args:
+            simulation: The simulation.
+            map_resolution_m: Size of the cells of the scene's map; 0 for no map.
+        """
         self._simulation = simulation
         robots = range(simulation.n_robots)
         self.lidar_enabled = [True for _ in robots]
@@ -81,6 +88,11 @@ class SimulatorTopics:
         self._quadcopters.publish(
             marker_array(quadcopter_markers(count) + number_markers(count, simulation.scene))
         )
+
+        if map_resolution_m > 0.0:
+            self._map = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
+            scene = scene_map(simulation.scene, map_resolution_m)
+            self._map.publish(map_message(scene, time_message(simulation.now_s)))
 
     def publish_clock(self) -> None:
         """Publish the simulated time."""

@@ -1,0 +1,258 @@
+"""Read the parameters of a move_base node from a launch file, without ROS.
+
+``<arg>``, ``<include>``, ``<group>``, ``<param>``, ``<rosparam>`` and ``<node>`` are read as
+roslaunch reads them, in their order. ``$(find package)`` is looked for around the launch file.
+What cannot be resolved is a remark if the parameters can be complete without it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Sequence, Tuple
+
+import yaml
+
+from quad_nav.config.files import ParameterTree, merge_file, merge_text, set_value
+from quad_nav.config.notes import CAUTION, Remark
+from quad_nav.config.substitution import Substitution, Unresolved
+from quad_nav.errors import InputError
+from quad_nav.files import plain_yaml
+from quad_nav.files.xml_tree import Element, read_xml
+
+MAX_FILES = 100
+_TRUE, _FALSE = ("true", "1"), ("false", "0")
+_TYPES = ("move_base", "fleet")
+
+
+def is_launch_file(path: Path) -> bool:
+    """Tell by the name if a file is one of roslaunch."""
+    return path.suffix in (".launch", ".xml")
+
+
+def load_launch_file(
+    path: Path, number: str = "0", arguments: Sequence[Tuple[str, str]] = ()
+) -> ParameterTree:
+    """Load the parameter tree of a launch file's move_base node.
+
+    Args:
+        path: The launch file.
+        number: Number of the robot, if there is a node for each.
+        arguments: (name, value) of arguments, as on roslaunch's command line.
+
+    Raises:
+        InputError: One line for everything without which there are no parameters.
+    """
+    reader = _Reader(number)
+    reader.read(path, _Scope(path, Substitution(path, dict(arguments)), given=dict(arguments)))
+    if reader.problems:
+        raise InputError(reader.problems)
+    tree = reader.tree_of_node(path)
+    tree.remarks += [Remark("", CAUTION, text, origin) for origin, text in reader.unread]
+    return tree
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """What holds inside an element: the file, its arguments and the namespace."""
+
+    path: Path
+    words: Substitution
+    namespace: str = ""
+    given: Mapping[str, str] = field(default_factory=dict)
+
+    def below(self, namespace: str) -> _Scope:
+        return replace(self, namespace=_joined(self.namespace, namespace))
+
+
+class _Reader:
+    """Collects a parameter server's tree from launch files."""
+
+    def __init__(self, number: str) -> None:
+        self._number = number
+        self._server = ParameterTree()
+        self._nodes: List[str] = []
+        self._files = 0
+        self.problems: List[str] = []
+        self.unread: List[Tuple[str, str]] = []
+
+    def read(self, path: Path, scope: _Scope) -> None:
+        """Read a file's elements into the tree."""
+        self._files += 1
+        if self._files > MAX_FILES:
+            raise InputError([f"{path}: more than {MAX_FILES} included files"])
+        root = read_xml(path)
+        if root.tag != "launch":
+            raise InputError([f"{path}:{root.line}: <{root.tag}>; expected <launch>"])
+        self._children(root, scope)
+
+    def tree_of_node(self, path: Path) -> ParameterTree:
+        """Return the parameters of the node with this robot's number, or of the only one.
+
+        Raises:
+            InputError: There is no move_base node, or there are several without this number.
+        """
+        names = list(dict.fromkeys(self._nodes))
+        own = [name for name in names if name.endswith(self._number)] if len(names) > 1 else names
+        if len(own) != 1:
+            found = ", ".join(names) if names else "none"
+            expected = "one, or one for each robot" if names else "one, or an <include> with one"
+            unread = [f"{origin}: {text}" for origin, text in self.unread]
+            raise InputError(
+                [f"{path}: nodes of type move_base: {found}; expected {expected}", *unread]
+            )
+        tree = ParameterTree()
+        values: Any = self._server
+        for name in own[0].split("/"):
+            values = values.get(name) if isinstance(values, dict) else None
+        tree.update(values if isinstance(values, dict) else {})
+        prefix = f"{own[0]}/"
+        tree.origins = {
+            place[len(prefix) :]: origin
+            for place, origin in self._server.origins.items()
+            if place.startswith(prefix)
+        }
+        tree.remarks += self._server.remarks
+        return tree
+
+    def _children(self, parent: Element, scope: _Scope) -> None:
+        readers = {
+            "arg": self._arg,
+            "include": self._include,
+            "group": self._group,
+            "param": self._param,
+            "rosparam": self._rosparam,
+            "node": self._node,
+        }
+        for element in parent.children:
+            reader = readers.get(element.tag)
+            if reader is None:
+                continue
+            try:
+                if self._applies(element, scope):
+                    reader(element, scope)
+            except Unresolved as error:
+                self._note_unread(element, scope, str(error))
+            except InputError as error:
+                self.problems += error.problems
+
+    def _note_unread(self, element: Element, scope: _Scope, reason: str) -> None:
+        """Note what cannot be resolved; a fault in the node itself, where roslaunch ends too."""
+        name = element.attributes.get("name") or element.attributes.get("file", "")
+        text = f"<{element.tag}> {name} not read: {reason}"
+        origin = f"{scope.path}:{element.line}"
+        if scope.namespace in self._nodes:
+            self.problems.append(f"{origin}: {text}")
+        else:
+            self.unread.append((origin, text))
+
+    def _applies(self, element: Element, scope: _Scope) -> bool:
+        for key, wanted in (("if", True), ("unless", False)):
+            if key in element.attributes:
+                word = scope.words.text(element.attributes[key]).strip().lower()
+                if word not in _TRUE + _FALSE:
+                    raise Unresolved(f'{key}="{word}"; expected true or false')
+                if (word in _TRUE) is not wanted:
+                    return False
+        return True
+
+    def _arg(self, element: Element, scope: _Scope) -> None:
+        attributes = element.attributes
+        name = attributes.get("name", "")
+        known = scope.words.arguments
+        if "value" in attributes:
+            known[name] = scope.words.text(attributes["value"])
+        elif name in scope.given:
+            known[name] = scope.given[name]
+        elif "default" in attributes:
+            known[name] = scope.words.text(attributes["default"])
+
+    def _include(self, element: Element, scope: _Scope) -> None:
+        path = Path(scope.words.text(element.attributes.get("file", "")))
+        if not path.is_file():
+            raise Unresolved(f"{path}: no such file")
+        passed = element.attributes.get("pass_all_args", "").lower() in _TRUE
+        given = dict(scope.words.arguments) if passed else {}
+        for arg in element.all("arg"):
+            if self._applies(arg, scope):
+                value = arg.attributes.get("value", arg.attributes.get("default", ""))
+                given[arg.attributes.get("name", "")] = scope.words.text(value)
+        inner = scope.below(scope.words.text(element.attributes.get("ns", "")))
+        words = Substitution(path, {})
+        self.read(path, replace(inner, path=path, words=words, given=given))
+
+    def _group(self, element: Element, scope: _Scope) -> None:
+        inner = scope.below(scope.words.text(element.attributes.get("ns", "")))
+        words = replace(scope.words, arguments=dict(scope.words.arguments))
+        self._children(element, replace(inner, words=words))
+
+    def _node(self, element: Element, scope: _Scope) -> None:
+        if element.attributes.get("type", "") not in _TYPES:
+            return
+        inner = scope.below(scope.words.text(element.attributes.get("ns", "")))
+        inner = inner.below(scope.words.text(element.attributes.get("name", "")))
+        self._nodes.append(inner.namespace)
+        self._children(element, inner)
+
+    def _param(self, element: Element, scope: _Scope) -> None:
+        attributes = element.attributes
+        place = _place(scope, attributes.get("name", ""))
+        if not self._is_of_navigation(place):
+            return
+        if "value" not in attributes:
+            raise Unresolved("expected value=, commands and files are not run or read")
+        text = scope.words.text(attributes["value"])
+        kind = attributes.get("type", "auto")
+        value = _value(text, kind)
+        set_value(self._server, place, value, f"{scope.path}:{element.line}")
+
+    def _is_of_navigation(self, place: str) -> bool:
+        """False for robot descriptions and the like, which are other nodes' parameters."""
+        return any(place.startswith(f"{node}/") for node in self._nodes) or "move_base" in place
+
+    def _rosparam(self, element: Element, scope: _Scope) -> None:
+        attributes = element.attributes
+        if attributes.get("command", "load") != "load":
+            return
+        place = _place(scope, scope.words.text(attributes.get("ns", "")))
+        place = _joined(place, scope.words.text(attributes.get("param", "")))
+        if "file" not in attributes:
+            substituted = attributes.get("subst_value", "").lower() in _TRUE
+            text = scope.words.text(element.text) if substituted else element.text
+            merge_text(self._server, text, scope.path, place)
+            return
+        path = Path(scope.words.text(attributes["file"]))
+        if not path.is_file():
+            raise Unresolved(f"{path}: no such file")
+        words = scope.words.arguments if "subst_value" in attributes else None
+        try:
+            merge_file(self._server, path, place, words)
+        except InputError:
+            if self._is_of_navigation(f"{place}/"):
+                raise
+
+
+def _place(scope: _Scope, name: str) -> str:
+    return name.strip("/") if name.startswith("/") else _joined(scope.namespace, name)
+
+
+def _joined(above: str, below: str) -> str:
+    if below.startswith("/"):
+        return below.strip("/")
+    return "/".join(part for part in (above, below.strip("~/")) if part)
+
+
+def _value(text: str, kind: str) -> Any:
+    """Convert a ``<param>`` as roslaunch does."""
+    if kind in ("str", "string"):
+        return text
+    if kind in ("auto", "yaml"):
+        try:
+            return plain_yaml.load(text) if text.strip() else text
+        except yaml.YAMLError:
+            return text
+    convert: Dict[str, Any] = {"int": int, "double": float, "bool": lambda word: word in _TRUE}
+    try:
+        return convert[kind](text.strip().lower())
+    except (KeyError, ValueError):
+        raise Unresolved(f"{text!r} is not of type {kind}") from None

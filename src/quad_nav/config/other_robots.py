@@ -1,0 +1,352 @@
+"""Fit the configuration of another robot to a simulated quadcopter.
+
+A quadcopter has the frames ``map``, ``odom{i}``, ``base_link{i}`` and ``Lidar{i}``, one LIDAR on
+``/scan{i}``, and no other sensor. A configuration with another ``robot_base_frame`` was made for
+another robot: its frames and topics are mapped, sensors that a quadcopter has not got are left
+out, and each kind of change is one remark. A configuration made for quadcopters stays as it is.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple
+
+from quad_nav.config.files import COSTMAPS, ParameterTree, set_value
+from quad_nav.config.layers import LAYERS
+from quad_nav.config.notes import CAUTION, LEFT_OUT, MAPPED, Remark
+from quad_nav.config.plugins import is_dotted, plugin_name
+from quad_nav.config.tables.costmap import COSTMAP_TABLE
+from quad_nav.config.tables.move_base import DEFAULT_GLOBAL_PLANNER, DEFAULT_LOCAL_PLANNER
+from quad_nav.config.texts import polygon_from_list, polygon_from_text
+from quad_nav.costmap.layered import CostmapParams
+from quad_nav.costmap.observation import SourceParams
+from quad_nav.costmap.obstacle import ObstacleLayerParams
+from quad_nav.footprint import radii
+
+_OWN_NAME = re.compile(r"/*(?:odom|base_link|Lidar|scan)(\d+)")
+_OWN_TOPICS = ("scan", "/scan")  # move_base{i} has a remap from /scan to /scan{i}
+_CLOUDS = ("PointCloud", "PointCloud2")
+_PLANNERS = {
+    "base_local_planner": (
+        DEFAULT_LOCAL_PLANNER,
+        (
+            "dwa_local_planner/DWAPlannerROS",
+            "teb_local_planner/TebLocalPlannerROS",
+            "eband_local_planner/EBandPlannerROS",
+            "mpc_local_planner/MpcLocalPlannerROS",
+        ),
+    ),
+    "base_global_planner": (DEFAULT_GLOBAL_PLANNER, ("global_planner/GlobalPlanner",)),
+}
+# Heights of points that the LIDAR marks: above the floor that a tilted LIDAR sees, and as high as
+# the voxels of costmap_2d reach by default. Quadcopters fly between them.
+_LOWEST_M, _HIGHEST_M = 0.3, 2.0
+_SMALLEST_BODY_M = 0.05
+_VOXELS = 10
+
+
+def adapted(tree: ParameterTree, number: int) -> ParameterTree:
+    """Adapt the parameters of another robot to quadcopter ``number``.
+
+    Args:
+        tree: The parameters as the files have them; unchanged.
+        number: Number of the quadcopter.
+
+    Returns:
+        A copy with the changes, and a remark for each kind of change.
+    """
+    fit = _Fit(copy.deepcopy(tree), number)
+    fit.run()
+    return fit.tree
+
+
+def input_faults(costmaps: Mapping[str, CostmapParams], number: int) -> Iterator[Tuple[str, str]]:
+    """Yield (path, problem) of each frame and sensor that the simulation does not have.
+
+    Under ROS another node may publish them.
+    """
+    yield from sensor_faults(costmaps)
+    known = {"global_frame": ("map", f"odom{number}"), "robot_base_frame": (f"base_link{number}",)}
+    lidar = f"Lidar{number}"
+    for costmap in costmaps.values():
+        for key, names in known.items():
+            if getattr(costmap, key).lstrip("/") not in names:
+                yield key, f"{getattr(costmap, key)}; expected {' or '.join(names)}"
+        for layer, source in _sources(costmap):
+            if source.sensor_frame.lstrip("/") not in ("", lidar):
+                yield (
+                    f"{layer}/{source.name}",
+                    f"sensor_frame {source.sensor_frame}; expected {lidar} or none",
+                )
+
+
+def sensor_faults(costmaps: Mapping[str, CostmapParams]) -> Iterator[Tuple[str, str]]:
+    """Yield (path, problem) of each source of an obstacle layer that is not a LaserScan."""
+    for costmap in costmaps.values():
+        for layer, source in _sources(costmap):
+            if source.data_type != "LaserScan":
+                yield (
+                    f"{layer}/{source.name}",
+                    f"data_type {source.data_type}; expected LaserScan, the only sensor of the "
+                    "simulated robots",
+                )
+
+
+def _sources(costmap: CostmapParams) -> Iterator[Tuple[str, SourceParams]]:
+    """Yield the obstacle layers' sources, with the layers' names."""
+    for name, layer in costmap.layers:
+        for source in layer.sources if isinstance(layer, ObstacleLayerParams) else ():
+            yield name, source
+
+
+class _Fit:
+    """One fit: the tree, and what was changed of each kind."""
+
+    def __init__(self, tree: ParameterTree, number: int) -> None:
+        self.tree = tree
+        self._number = number
+        self._frames: Dict[str, str] = {}
+        self._slashes: Dict[str, None] = {}
+        self._topics: Dict[str, None] = {}
+        self._maps: Dict[str, None] = {}
+        self._sensors: Dict[str, None] = {}
+        self._standing_in: Dict[str, None] = {}
+        self._lasers: Dict[str, None] = {}
+        self._layers: Dict[str, str] = {}
+        self._heights: Dict[str, None] = {}
+
+    def run(self) -> None:
+        """Change the tree and add the remarks."""
+        self._choose_planners()
+        for name in COSTMAPS:
+            costmap = self._costmap(name)
+            self._map_frames(costmap)
+            self._replace_layers(costmap)
+            self._map_sources(costmap, name)
+            for namespace in (costmap, *_below(costmap)):
+                self._map_map_topic(namespace)
+                self._raise_heights(namespace)
+        body = self._body()
+        self._add_remarks(body)
+
+    def _choose_planners(self) -> None:
+        """Choose the only planner with parameters: launch files name it beside the YAML."""
+        for key, (default, others) in _PLANNERS.items():
+            found = [name for name in others if isinstance(self.tree.get(plugin_name(name)), dict)]
+            if key not in self.tree and plugin_name(default) not in self.tree and len(found) == 1:
+                set_value(self.tree, key, found[0], "")
+                text = f"{found[0]}, the only one with parameters"
+                self.tree.remarks.append(Remark(key, MAPPED, text))
+
+    def _costmap(self, name: str) -> Dict[str, Any]:
+        if self.tree.get(name) is None:
+            self.tree[name] = {}
+        costmap = self.tree[name]
+        return costmap if isinstance(costmap, dict) else {}  # a fault that ``load`` reports
+
+    def _map_frames(self, costmap: Dict[str, Any]) -> None:
+        default = COSTMAP_TABLE["global_frame"].default
+        frame = costmap.get("global_frame", default)
+        if isinstance(frame, str):
+            is_odometry = "odom" in frame.rpartition("/")[2]
+            costmap["global_frame"] = self._frame(
+                frame, f"odom{self._number}" if is_odometry else "map"
+            )
+        frame = costmap.get("robot_base_frame", COSTMAP_TABLE["robot_base_frame"].default)
+        if isinstance(frame, str):
+            costmap["robot_base_frame"] = self._frame(frame, f"base_link{self._number}")
+
+    def _frame(self, given: str, own: str) -> str:
+        """Return the quadcopter's frame, or the given one if it is of another quadcopter."""
+        if given.startswith("/"):
+            self._slashes[given] = None
+        if _OWN_NAME.fullmatch(given):
+            return given
+        if given.lstrip("/") != own:
+            self._frames[given] = own.replace(str(self._number), "{i}")
+        return own
+
+    def _map_map_topic(self, namespace: Dict[str, Any]) -> None:
+        topic = namespace.get("map_topic")
+        if isinstance(topic, str) and topic.lstrip("/") != "map":
+            self._maps[topic] = None
+            namespace["map_topic"] = "/map"
+
+    def _replace_layers(self, costmap: Dict[str, Any]) -> None:
+        """Replace layers that have no like here by the obstacle layer, if they have sources."""
+        plugins = costmap.get("plugins")
+        for entry in plugins if isinstance(plugins, list) else ():
+            if not isinstance(entry, dict):
+                continue
+            name, kind = entry.get("name"), entry.get("type")
+            if not isinstance(name, str) or not isinstance(kind, str):
+                continue
+            if kind in LAYERS or is_dotted(kind):
+                continue
+            own = next((known for known in LAYERS if plugin_name(known) == plugin_name(kind)), "")
+            below = costmap.get(name)
+            if not own and isinstance(below, dict) and "observation_sources" in below:
+                own = "costmap_2d::ObstacleLayer"
+            if own:
+                entry["type"] = self._layers[kind] = own
+
+    def _map_sources(self, costmap: Dict[str, Any], name: str) -> None:
+        """Map the lasers of all layers; a costmap without one gets the LIDAR for another sensor."""
+        lists = [
+            namespace
+            for namespace in (costmap, *_below(costmap))
+            if isinstance(namespace.get("observation_sources"), str)
+        ]
+        clouds: List[Tuple[Dict[str, Any], str]] = []
+        seen = False
+        for namespace in lists:
+            names = namespace["observation_sources"].split()
+            kept = self._kept(namespace, names)
+            clouds += [(namespace, one) for one in names if _is_cloud(namespace, one)]
+            namespace["observation_sources"] = " ".join(kept)
+            seen = seen or bool(kept)
+        if clouds and not seen:
+            namespace, stand_in = clouds.pop(0)
+            namespace["observation_sources"] = stand_in
+            source = namespace.setdefault(stand_in, {}) or {}
+            namespace[stand_in] = {
+                **source,
+                "data_type": "LaserScan",
+                "marking": True,
+                "clearing": True,
+            }
+            self._standing_in[stand_in] = None
+            self._map_source(namespace[stand_in], stand_in)
+        for namespace, left in clouds:
+            data_type = _source(namespace, left).get("data_type", "PointCloud")
+            self._sensors[f"{left} ({data_type})"] = None
+
+    def _kept(self, namespace: Dict[str, Any], names: List[str]) -> List[str]:
+        """Return the sources of a layer that the LIDAR serves, mapped.
+
+        A further laser is left out: the LIDAR sees all around, and has done what it does.
+        """
+        kept: List[str] = []
+        done: set[str] = set()
+        for name in names:
+            if _is_cloud(namespace, name):
+                continue
+            source = _source(namespace, name)
+            purposes = {key for key in ("marking", "clearing") if source.get(key, key == "marking")}
+            if kept and purposes <= done:
+                self._lasers[name] = None
+                continue
+            done |= purposes
+            kept.append(name)
+            self._map_source(source, name)
+        return kept
+
+    def _map_source(self, source: Dict[str, Any], name: str) -> None:
+        topic = source.get("topic", name)
+        own = f"scan{self._number}"
+        if isinstance(topic, str) and topic not in (*_OWN_TOPICS, own, f"/{own}"):
+            self._topics[topic] = None
+            source["topic"] = f"/{own}"
+        frame = source.get("sensor_frame", "")
+        if isinstance(frame, str) and frame:
+            source["sensor_frame"] = self._frame(frame, f"Lidar{self._number}")
+        self._set_height(source, "min_obstacle_height", _LOWEST_M)
+        if _is_below(source.get("max_obstacle_height"), _HIGHEST_M):
+            self._set_height(source, "max_obstacle_height", _HIGHEST_M)
+
+    def _set_height(self, namespace: Dict[str, Any], key: str, value: float) -> None:
+        if key in namespace and namespace[key] != value:
+            self._heights[key] = None
+        namespace[key] = value
+
+    def _raise_heights(self, namespace: Dict[str, Any]) -> None:
+        """Make layers and their voxels as high as the LIDAR flies."""
+        if _is_below(namespace.get("max_obstacle_height"), _HIGHEST_M):
+            self._set_height(namespace, "max_obstacle_height", _HIGHEST_M)
+        voxels = namespace.get("z_voxels", _VOXELS)
+        bottom, size = namespace.get("origin_z", 0.0), namespace.get("z_resolution", 0.2)
+        numbers = [one for one in (voxels, bottom, size) if isinstance(one, (int, float))]
+        if len(numbers) == 3 and voxels > 0:
+            if bottom > _LOWEST_M:
+                self._set_height(namespace, "origin_z", 0.0)
+            if bottom + voxels * size < _HIGHEST_M - 1e-6:
+                self._set_height(
+                    namespace, "z_resolution", (_HIGHEST_M - min(bottom, 0.0)) / voxels
+                )
+        if namespace.get("mark_threshold", 0) != 0:
+            self._set_height(namespace, "mark_threshold", 0)
+
+    def _body(self) -> Optional[float]:
+        """Set and return the body's radius: the circle that move_base keeps free of obstacles."""
+        costmap = self._costmap("local_costmap")
+        if "body_radius" in self.tree:
+            return None
+        footprint = costmap.get("footprint", self.tree.get("footprint", []))
+        try:
+            polygon = (
+                polygon_from_text(footprint)
+                if isinstance(footprint, str)
+                else polygon_from_list(footprint)
+            )
+        except ValueError:  # a fault that ``load`` reports
+            return None
+        default = COSTMAP_TABLE["robot_radius"].default
+        radius_m = costmap.get("robot_radius", self.tree.get("robot_radius", default))
+        if polygon is not None:
+            radius_m = radii(polygon)[0]
+        if isinstance(radius_m, bool) or not isinstance(radius_m, (int, float)):
+            return None
+        body_m = max(round(float(radius_m), 3), _SMALLEST_BODY_M)
+        set_value(self.tree, "body_radius", body_m, "")
+        return body_m
+
+    def _add_remarks(self, body_m: Optional[float]) -> None:
+        add = self.tree.remarks.append
+        if self._slashes:
+            names = ", ".join(self._slashes)
+            text = f"{names}: tf2 refuses the leading slash, move_base in C++ does not run with it"
+            add(Remark("frames", CAUTION, text))
+        pairs = [f"{given} is {own}" for given, own in self._frames.items()]
+        topics = [f"{topic} is /scan{{i}}" for topic in self._topics]
+        topics += [f"{topic} is /map" for topic in self._maps]
+        layers = [f"{kind} is {own}" for kind, own in self._layers.items()]
+        for place, changes in (("frames", pairs), ("topics", topics), ("layers", layers)):
+            if changes:
+                add(Remark(place, MAPPED, ", ".join(changes)))
+        if self._standing_in:
+            text = f"the LIDAR stands in for {', '.join(self._standing_in)}"
+            add(Remark("sensors", MAPPED, text))
+        if self._sensors:
+            text = f"{', '.join(self._sensors)}: left out, a quadcopter has none"
+            add(Remark("sensors", LEFT_OUT, text))
+        if self._lasers:
+            text = f"{', '.join(self._lasers)}: left out, the one LIDAR sees all around"
+            add(Remark("sensors", LEFT_OUT, text))
+        if self._heights:
+            text = f"{', '.join(self._heights)}: raised to the LIDAR of a flying robot"
+            add(Remark("heights", MAPPED, text))
+        if body_m is not None:
+            text = (
+                f"the simulated body is a disc of {body_m:g} m radius, which fits into the "
+                "robot's footprint; set body_radius for another"
+            )
+            add(Remark("body_radius", MAPPED, text))
+
+
+def _below(costmap: Mapping[str, Any]) -> List[Dict[str, Any]]:
+    return [value for value in costmap.values() if isinstance(value, dict)]
+
+
+def _source(namespace: Dict[str, Any], name: str) -> Dict[str, Any]:
+    source = namespace.get(name)
+    return source if isinstance(source, dict) else {}
+
+
+def _is_cloud(namespace: Dict[str, Any], name: str) -> bool:
+    """True for a point cloud, which is also what a source without a type is."""
+    return _source(namespace, name).get("data_type", "PointCloud") in _CLOUDS
+
+
+def _is_below(value: Any, limit_m: float) -> bool:
+    return isinstance(value, (int, float)) and value < limit_m

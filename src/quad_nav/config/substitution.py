@@ -1,0 +1,172 @@
+"""Substitutions of roslaunch: ``$(arg name)``, ``$(find package)``, ``$(env NAME)`` and others.
+
+Expressions are evaluated without Python's ``eval``: comparisons, ``and``, ``or``, ``not``,
+conditions, sums, lists, constants, and the functions that roslaunch offers.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable, Dict, Optional
+
+from quad_nav.errors import InputError, QuadError
+from quad_nav.files.xml_tree import read_xml
+
+_SUBSTITUTION = re.compile(r"\$\(([^()]*(?:\([^()]*\)[^()]*)*)\)")
+_LEVELS = 6  # folders above a launch file in which packages are looked for
+_COMPARISONS: Dict[type, Callable[[Any, Any], Any]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.In: lambda a, b: a in b,
+    ast.NotIn: lambda a, b: a not in b,
+}
+
+
+class Unresolved(QuadError):
+    """Something in a launch file that cannot be resolved here."""
+
+
+@dataclass(frozen=True)
+class Substitution:
+    """Substitutions in one launch file.
+
+    Attributes:
+        path: The launch file.
+        arguments: Values of ``<arg>``, which grow while the file is read.
+    """
+
+    path: Path
+    arguments: Dict[str, str]
+
+    def text(self, text: str) -> str:
+        """Replace every ``$(...)`` in a text.
+
+        Raises:
+            Unresolved: One of them cannot be resolved.
+        """
+        if text.startswith("$(eval ") and text.endswith(")"):
+            return str(self._evaluated(text[len("$(eval ") : -1]))
+        return _SUBSTITUTION.sub(lambda match: self._word(match.group(1)), text)
+
+    def _word(self, inner: str) -> str:
+        name, _, rest = inner.strip().partition(" ")
+        rest = rest.strip()
+        if name == "arg":
+            return self._arg(rest)
+        if name == "find":
+            return str(self._package(rest))
+        if name == "dirname":
+            return str(self.path.parent)
+        if name == "anon":
+            return rest
+        if name in ("env", "optenv"):
+            variable, _, default = rest.partition(" ")
+            return self._env(variable, default if name == "optenv" else None)
+        if name == "eval":
+            return str(self._evaluated(rest))
+        raise Unresolved(f"unknown $({inner})")
+
+    def _arg(self, name: str) -> str:
+        if name not in self.arguments:
+            raise Unresolved(f"$(arg {name}) has no value; add {name}=VALUE after the file and :")
+        return self.arguments[name]
+
+    def _env(self, name: str, default: Optional[str]) -> str:
+        value = os.environ.get(name, default)
+        if value is None:
+            raise Unresolved(f"the environment variable {name} is not set")
+        return value
+
+    def _package(self, name: str) -> Path:
+        """Return the folder of a package: around the launch file, then ROS's package path."""
+        above = list(self.path.resolve().parents)[:_LEVELS]
+        for folder in above:
+            if folder.name == name or _package_name(folder) == name:
+                return folder
+        roots = [*above, *map(Path, filter(None, _package_path().split(os.pathsep)))]
+        for root in roots:
+            for found in (root / name, *sorted(root.glob(f"*/{name}"))):
+                if found.is_dir():
+                    return found
+        raise Unresolved(f"$(find {name}): no folder of this name around {self.path.parent}")
+
+    def _evaluated(self, expression: str) -> Any:
+        try:
+            return self._value(ast.parse(expression.strip(), mode="eval").body)
+        except (SyntaxError, ValueError, TypeError, KeyError, RecursionError) as error:
+            raise Unresolved(f"$(eval {expression}): {error}") from error
+
+    def _value(self, node: ast.expr) -> Any:
+        """Evaluate one node of an expression."""
+        if isinstance(node, ast.Constant):
+            return node.value
+        if isinstance(node, ast.Name):
+            return _converted(self._arg(node.id))
+        if isinstance(node, (ast.List, ast.Tuple)):
+            return [self._value(one) for one in node.elts]
+        if isinstance(node, ast.BoolOp):
+            together = all if isinstance(node.op, ast.And) else any
+            return together(self._value(one) for one in node.values)
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            return not self._value(node.operand)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+            return self._value(node.left) + self._value(node.right)
+        if isinstance(node, ast.IfExp):
+            return self._value(node.body if self._value(node.test) else node.orelse)
+        if isinstance(node, ast.Compare) and len(node.ops) == 1:
+            compare = _COMPARISONS[type(node.ops[0])]
+            return compare(self._value(node.left), self._value(node.comparators[0]))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+            return self._call(node.func.id, [self._value(one) for one in node.args])
+        raise ValueError(f"{type(node).__name__} is not supported")
+
+    def _call(self, name: str, arguments: Any) -> Any:
+        plain: Dict[str, Callable[..., Any]] = {
+            "int": int,
+            "float": float,
+            "str": str,
+            "bool": bool,
+        }
+        if name in plain:
+            return plain[name](*arguments)
+        if name == "arg":
+            return _converted(self._arg(*arguments))
+        if name in ("find", "env", "optenv", "dirname", "anon"):
+            return self._word(" ".join((name, *map(str, arguments))))
+        raise ValueError(f"{name}() is not supported")
+
+
+def _converted(word: str) -> Any:
+    """Convert an argument as roslaunch does for expressions."""
+    if word.lower() in ("true", "false"):
+        return word.lower() == "true"
+    for convert in (int, float):
+        try:
+            return convert(word)
+        except ValueError:
+            continue
+    return word
+
+
+def _package_path() -> str:
+    return os.environ.get("ROS_PACKAGE_PATH", "")
+
+
+def _package_name(folder: Path) -> str:
+    """Return the name in a folder's ``package.xml``, "" without one."""
+    path = folder / "package.xml"
+    if not path.is_file():
+        return ""
+    try:
+        return read_xml(path).text_of("name")
+    except InputError:  # then the folder's name counts
+        return ""
