@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
+import signal
+import subprocess
+import sys
 import threading
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +26,7 @@ from quad_nav.report.preview_picture import cost_colours
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.scenario.preview import MissionPreview
 
+SOURCES = Path(__file__).resolve().parents[2] / "src"
 SCENE = """
 name: hall
 size: [8.0, 6.0]
@@ -369,6 +375,19 @@ def test_the_address_has_a_secret_part(server):
     assert ask(server, "GET", f"/{server.token}/", Origin=None, Host="localhost")[0].status == 403
     assert server.url.startswith("http://127.0.0.1:")
     assert len(server.token) >= 32
+
+
+def test_ctrl_c_ends_the_server_without_a_fault(hall):
+    words = ["preview", "--edit", "--scene", str(hall.scene), "--goals", str(hall.goals)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "quad_nav.cli", *words],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(SOURCES)},
+    ) as process:
+        assert b"edit the goals at http://127.0.0.1:" in process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.read() == b"preview: ended\n"
+    assert process.returncode == 0
 
 
 def test_random_missions_have_no_files_to_edit():

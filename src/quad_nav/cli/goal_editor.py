@@ -302,9 +302,9 @@ def serve(editor: GoalEditor, show: Callable[[str], None]) -> None:
     """
     raise_on_signals()
     with GoalServer(editor) as server:
-        echo(f"preview: edit the goals at {server.url} (Ctrl-C ends it)")
-        show(server.url)
         try:
+            echo(f"preview: edit the goals at {server.url} (Ctrl-C ends it)")
+            show(server.url)
             server.serve_forever()
         except KeyboardInterrupt:
             with editor.lock:  # a file that is being saved is saved
