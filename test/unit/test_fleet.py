@@ -7,6 +7,7 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
+from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.fleet_setup import read_setup
 from quad_nav.scenario.random_mission import random_mission
 from quad_nav.scenario.scenario import read_configurations, scene_of
@@ -60,7 +61,8 @@ def test_hosts_share_the_robots():
 def test_global_costmaps_cover_the_random_arena():
     mission = random_mission(30, 4)
     assert mission.scene == scene_of({"robots": 30, "seed": 4, "size": 0.0, "scene": "random"})
-    costmap = read_configurations(CONFIG, 30, mission)[29].global_costmap
+    area = scene_bounds(mission.scene)
+    costmap = read_configurations(CONFIG, 30, area)[29].global_costmap
     assert (costmap.width_m, costmap.height_m) == (33.0, 33.0)  # 30 x 36 m2
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any, Dict, List, NamedTuple, Sequence
+from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 import pytest
 
@@ -22,7 +22,7 @@ GOAL = [1.5, 6.0]
 DWA = "dwa_local_planner/DWAPlannerROS"
 GLOBAL = "global_costmap:\n"
 LOW = GLOBAL + "  height: 3.0\n"
-OFF = "(1.5, 6) is off the global costmap, x 0 to 12 m, y 0 to 3 m; expected a larger"
+OFF = "(1.5, 6) is off the global costmap, x 0 to 12 m, y 0 to 3 m; expected a position on it"
 
 
 class Case(NamedTuple):
@@ -118,16 +118,23 @@ def under_ros(folder: Path, case: Case, fleet: bool) -> List[str]:
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_both_shells_refuse_the_same_with_the_same_words(tmp_path, case):
     write(tmp_path, case)
-    problems = offline(tmp_path, case)
+    problems, options = without_sizes(offline(tmp_path, case), "--set global_costmap/width=12 ")
     assert len(problems) == len(case.faults)
     assert all(fault in problem for fault, problem in zip(case.faults, problems))
-    assert under_ros(tmp_path, case, fleet=True) == problems
-    assert under_ros(tmp_path, case, fleet=False) == problems
+    for fleet in (True, False):
+        same, lines = without_sizes(under_ros(tmp_path, case, fleet), "{width: 12, height: 12, ")
+        assert same == problems
+        assert len(lines) == len(options) == ("off the global costmap" in "".join(problems))
+
+
+def without_sizes(problems: List[str], size: str) -> Tuple[List[str], List[str]]:
+    """The problems without the lines to copy, and these lines."""
+    lines = [problem for problem in problems if size in problem]
+    return [problem for problem in problems if problem not in lines], lines
 
 
 def test_faulty_values_do_not_hide_faults_in_files(tmp_path):
-    case = CASES["off the global costmap"]
-    write(tmp_path, case)
+    write(tmp_path, Case([{"goals": [GOAL, "x"]}], 1, LOW))
     parameters = {
         "scene": "/nowhere.yaml",
         "goals": str(tmp_path / "goals"),
@@ -138,7 +145,7 @@ def test_faulty_values_do_not_hide_faults_in_files(tmp_path):
     problems = problems_of(
         mission_setup.read_setup, parameters, "sequencer", tmp_path / "result.json", tmp_path
     )
-    expected = ("sequencer: size: is -1.0", "nowhere.yaml: cannot be read", OFF)
+    expected = ("sequencer: size: is -1.0", "nowhere.yaml: cannot be read", "goals[1] (goal 2)")
     assert len(problems) == 3
     assert all(fault in problem for fault, problem in zip(expected, problems))
 
@@ -276,7 +283,7 @@ HELD = {"origin_x": -6.0, "origin_y": 0.0, "width": 12.0, "height": 8.0, "static
 
 def warnings(**changes) -> list:
     tree = {"global_costmap": {**HELD, **changes}, "local_costmap": {"rolling_window": True}}
-    return cover_warnings(SCENE, [config.load(tree), None])
+    return cover_warnings(SCENE, [config.load(tree), None], in_a_file=False)
 
 
 @pytest.mark.parametrize(
@@ -308,7 +315,8 @@ def test_costmaps_that_end_within_the_arena(changes):
 
 def test_the_warning_names_both_areas():
     assert warnings(origin_x=0.0) == [
-        "quad0: global_costmap covers x 0 to 12 m, y 0 to 8 m, but the arena is "
-        "x -6 to 6 m, y 0 to 8 m: no plan leads beyond the costmap; "
-        "expected origin_x, origin_y, width and height that cover the arena"
+        "quad0: global_costmap covers x 0 to 12 m, y 0 to 8 m, but the scene is "
+        "x -6 to 6 m, y 0 to 8 m: no plan leads beyond the costmap; expected "
+        "--set global_costmap/width=12 --set global_costmap/height=8 "
+        "--set global_costmap/origin_x=-6 --set global_costmap/origin_y=0"
     ]

@@ -133,9 +133,8 @@ def is_users(origin: str, number: int, override: Optional[Path]) -> bool:
         override: The robot's file of overrides.
     """
     path = origin.rpartition(":")[0]
-    return origin == COMMAND_LINE or (
-        path != "" and (Path(path).name == f"robot{number}.yaml" or path == str(override))
-    )
+    own = [] if override is None else [str(override.expanduser())]
+    return origin == COMMAND_LINE or Path(path).name == f"robot{number}.yaml" or path in own
 
 
 def plain_tree(tree: Mapping[str, Any]) -> Dict[str, Any]:

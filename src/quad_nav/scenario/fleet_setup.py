@@ -9,7 +9,7 @@ from quad_nav.config import Configuration
 from quad_nav.errors import InputError
 from quad_nav.files.values import unknown_names, value_faults
 from quad_nav.scenario.rules import RANDOM, RULES
-from quad_nav.scenario.scenario import mission_of, read_configurations
+from quad_nav.scenario.scenario import area_of, read_configurations
 
 DEFAULTS: Dict[str, Any] = {
     "robots": 8,
@@ -56,7 +56,7 @@ def read_setup(parameters: Mapping[str, Any], name: str) -> FleetSetup:
     if problems:
         raise InputError(problems)
     configurations = read_configurations(
-        values["config"], values["robots"], mission_of(values), numbered=True
+        values["config"], values["robots"], area_of(values), numbered=True
     )
     share = range(values["host"], values["robots"], values["hosts"])
     return FleetSetup({number: configurations[number] for number in share})

@@ -15,7 +15,7 @@ from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import value_faults
 from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.scenario.random_mission import RandomMission
+from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.rules import RANDOM, RULES, steps_per_scan
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
 from quad_nav.scenario.scene_map import scene_map_problem
@@ -120,7 +120,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         steps_per_scan(options.scans_per_s),
         options.seed,
         options.time_limit_s,
-        warnings=(*scene.remarks, *scenario.warnings, *warnings),
+        warnings=(*scene.remarks, *scenario.notes, *scenario.warnings, *warnings),
     )
 
 
@@ -176,14 +176,14 @@ def _request(options: FlightOptions) -> ScenarioRequest:
 
 
 def _configurations(
-    options: FlightOptions, robots: int, mission: Optional[RandomMission]
+    options: FlightOptions, robots: int, scene: Optional[Scene]
 ) -> List[Configuration]:
     if options.configurations:
         return _given_configurations(options.configurations, robots)
     return read_configurations(
         options.config,
         robots,
-        mission,
+        scene_bounds(scene) if scene else None,
         options.parameters,
         partial(_input_faults, options.config),
         strict=options.strict,

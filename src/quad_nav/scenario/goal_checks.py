@@ -4,24 +4,40 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence
 
 from quad_nav.config import Configuration
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.static import StaticLayerParams
+from quad_nav.files.values import MAX_MEMORY_BYTES
 from quad_nav.mission.goal_file import PlaceCheck, SequenceSettings, clearance_check
 from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.scenario.coverage import (
+    BYTES_PER_CELL,
+    SIZE_FROM_SCENE,
+    Bounds,
+    area_text,
+    covers,
+    grouped,
+    is_feasible,
+    robots_text,
+    scene_bounds,
+    size_line,
+)
 from quad_nav.sim.scene import Scene
 
 _YAW_FIELD = "yaw_goal_tolerance_rad"  # of both local planners
-Bounds = Tuple[float, float, float, float]
-"""low x, low y, high x, high y of an area, m in ``map``."""
+OFF_COSTMAP = "is off the global costmap"
+"""Beginning of the fault of a goal to which no plan can lead."""
 
 
 def scene_check(scene: Scene, robot_radius_m: float) -> PlaceCheck:
     """Check for positions in the arena, at least ``robot_radius_m`` from walls and obstacles."""
     return clearance_check(
-        scene.contains, scene.flight_surface_distance_m, robot_radius_m, arena_text(scene)
+        scene.contains,
+        scene.flight_surface_distance_m,
+        robot_radius_m,
+        area_text(scene_bounds(scene)),
     )
 
 
@@ -36,8 +52,8 @@ def costmap_check(costmap: CostmapParams) -> Optional[PlaceCheck]:
         if low_x <= x_m < high_x and low_y <= y_m < high_y:
             return None
         return (
-            f"is off the global costmap, {_area_text(bounds)}; "
-            "expected a larger global_costmap/width and height"
+            f"{OFF_COSTMAP}, {area_text(bounds)}; expected a position on it, or a global_costmap "
+            "that covers it"
         )
 
     return check
@@ -124,28 +140,65 @@ def tolerance_warnings(
     return warnings
 
 
-def cover_warnings(scene: Scene, configurations: Sequence[Optional[Configuration]]) -> List[str]:
-    """A warning for each global costmap that ends within the arena, with the robots that use it.
-
-    It is no fault: the mission may stay in the part that is covered.
-    """
-    robots_of: Dict[Bounds, List[str]] = {}
-    for number, configuration in enumerate(configurations):
-        costmap = configuration.global_costmap if configuration else None
-        bounds = _bounds(costmap) if costmap else None
-        if costmap and bounds and not _covers(bounds, scene, costmap.resolution_m):
-            robots_of.setdefault(bounds, []).append(f"quad{number}")
+def coverage_notes(configurations: Sequence[Optional[Configuration]]) -> List[str]:
+    """A line for each size of global costmaps that is the scene's, with the robots' names."""
+    sizes = [
+        _bounds(one.global_costmap) if one and one.tree.get(SIZE_FROM_SCENE) else None
+        for one in configurations
+    ]
     return [
-        f"{', '.join(robots)}: global_costmap covers {_area_text(bounds)}, but the arena is "
-        f"{arena_text(scene)}: no plan leads beyond the costmap; expected origin_x, origin_y, "
-        "width and height that cover the arena"
-        for bounds, robots in robots_of.items()
+        f"{robots_text(robots)}: global_costmap covers the scene, {area_text(bounds)}; its size in "
+        "the configuration does not"
+        for bounds, robots in grouped(sizes).items()
     ]
 
 
-def arena_text(scene: Scene) -> str:
-    """The arena's area, for messages."""
-    return _area_text((scene.origin_x_m, scene.origin_y_m, scene.end_x_m, scene.end_y_m))
+def cover_warnings(
+    scene: Scene, configurations: Sequence[Optional[Configuration]], in_a_file: bool
+) -> List[str]:
+    """A warning for each global costmap that ends within the arena, with the robots that use it.
+
+    It is no fault: the mission may stay in the part that is covered.
+
+    Args:
+        scene: The scene.
+        configurations: The robots' configurations, as far as they are known.
+        in_a_file: The user sets parameters in files, not on the command line.
+    """
+    area = scene_bounds(scene)
+    small = [_bounds_if_small(one, area) for one in configurations]
+    lines = []
+    for bounds, robots in grouped(small).items():
+        costmap = next(one for one, own in zip(configurations, small) if own == bounds)
+        lines.append(
+            f"{robots_text(robots)}: global_costmap covers {area_text(bounds)}, but the scene is "
+            f"{area_text(area)}: no plan leads beyond the costmap; "
+            + _expected_size(area, costmap, in_a_file)
+        )
+    return lines
+
+
+def _bounds_if_small(configuration: Optional[Configuration], area: Bounds) -> Optional[Bounds]:
+    costmap = configuration.global_costmap if configuration else None
+    bounds = _bounds(costmap) if costmap else None
+    return bounds if costmap and bounds and not covers(bounds, area, costmap.resolution_m) else None
+
+
+def _expected_size(area: Bounds, configuration: Optional[Configuration], in_a_file: bool) -> str:
+    """The end of a message on a global costmap that does not cover an area."""
+    assert configuration is not None
+    resolution_m = configuration.global_costmap.resolution_m
+    width_m, height_m = area[2] - area[0], area[3] - area[1]
+    if is_feasible(width_m, height_m, resolution_m):
+        place = " in the file of override0:= or in robot0.yaml" if in_a_file else ""
+        return f"expected{place} {size_line(area, resolution_m, in_a_file)}"
+    cells_m = math.sqrt(width_m * height_m * BYTES_PER_CELL / MAX_MEMORY_BYTES)
+    coarse_m = math.ceil(cells_m * 10.5) / 10
+    return (
+        f"with cells of {resolution_m:g} m a costmap of the scene takes more than "
+        f"{MAX_MEMORY_BYTES / 1e9:g} GB; expected a smaller scene, or "
+        + size_line(area, coarse_m, in_a_file, with_resolution=True)
+    )
 
 
 def _bounds(costmap: CostmapParams) -> Optional[Bounds]:
@@ -155,18 +208,3 @@ def _bounds(costmap: CostmapParams) -> Optional[Bounds]:
         return None
     x, y = costmap.origin_x_m, costmap.origin_y_m
     return x, y, x + costmap.width_m, y + costmap.height_m
-
-
-def _covers(bounds: Bounds, scene: Scene, slack_m: float) -> bool:
-    low_x, low_y, high_x, high_y = bounds
-    return (
-        low_x <= scene.origin_x_m + slack_m
-        and low_y <= scene.origin_y_m + slack_m
-        and high_x >= scene.end_x_m - slack_m
-        and high_y >= scene.end_y_m - slack_m
-    )
-
-
-def _area_text(bounds: Bounds) -> str:
-    low_x, low_y, high_x, high_y = bounds
-    return f"x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m"

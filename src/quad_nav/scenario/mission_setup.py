@@ -20,11 +20,11 @@ from quad_nav.files.values import Rule, expected_name, value_faults
 from quad_nav.mission.distances import SurfaceDistance
 from quad_nav.mission.goal_file import SETTINGS, SequenceSettings, read_settings
 from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.flight_facts import ros_facts
-from quad_nav.scenario.random_mission import RandomMission
 from quad_nav.scenario.rules import RANDOM, RULES, optional
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
-from quad_nav.sim.scene import BODY_RADIUS_M
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 DEFAULTS: Dict[str, Any] = {
     "robots": 2,
@@ -79,6 +79,7 @@ class MissionSetup:
     resume: bool
     parameters: Tuple[Mapping[str, Any], ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
+    notes: Tuple[str, ...] = ()
 
 
 def read_setup(
@@ -155,6 +156,7 @@ def _mission_setup(
         _journal_path(values, journals),
         values["resume"],
         tuple(one.to_tree() if one else {} for one in scenario.configurations),
+        notes=scenario.notes,
     )
 
 
@@ -165,11 +167,10 @@ class _Navigators:
         self._folder = values["config"]
         self._all_parameters = all_parameters
 
-    def __call__(
-        self, robots: int, mission: Optional[RandomMission]
-    ) -> Sequence[Optional[Configuration]]:
+    def __call__(self, robots: int, scene: Optional[Scene]) -> Sequence[Optional[Configuration]]:
         if self._folder and isinstance(self._folder, str):
-            return read_configurations(self._folder, robots, mission, numbered=True)
+            area = scene_bounds(scene) if scene else None
+            return read_configurations(self._folder, robots, area, numbered=True)
         configurations: List[Optional[Configuration]] = []
         problems: List[str] = []
         for number in range(robots):

@@ -20,7 +20,10 @@ import yaml
 
 from quad_nav.config.robot_tree import RobotSource, plain_tree, robot_tree
 from quad_nav.errors import InputError, printable
+from quad_nav.scenario.coverage import Bounds, cover_area, scene_bounds
+from quad_nav.sim.scene_file import load_scene
 
+RANDOM = "random"  # as in scenario.rules, which imports the engine
 COLLECT = "QUAD_COLLECT_FAULTS"
 FAULTS = "files_with_faults"
 """Parameter that has the faults while they are collected."""
@@ -28,14 +31,16 @@ EXIT_BAD_INPUT = 2
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
-    """Print the parameters of the robot that the command line names.
+    """Print the parameters of the robot that the command line names, sized to the scene.
 
     Returns:
         Exit status: 0, or 2 for files that cannot be read.
     """
     given = _parser().parse_args(arguments)
+    source = _source(given)
     try:
-        tree = robot_tree(_source(given))
+        tree = robot_tree(source)
+        area = _area(given.scene)
     except InputError as error:
         if os.environ.get(COLLECT):
             print(printable(_yaml({FAULTS: error.problems}), "\n"))
@@ -46,6 +51,8 @@ def main(arguments: Optional[List[str]] = None) -> int:
             file=sys.stderr,
         )
         return EXIT_BAD_INPUT
+    if area is not None:
+        cover_area(tree, area, source.number, source.override)
     print(printable(_yaml(plain_tree(tree)), "\n"))
     return 0
 
@@ -64,7 +71,23 @@ def _parser() -> argparse.ArgumentParser:
         "--numbered", default="false", help="true: read only files with the robot's number"
     )
     parser.add_argument("--override", default="", help="file that is loaded last")
+    parser.add_argument("--scene", default="", help="file of the scene that the costmap covers")
     return parser
+
+
+def _area(scene: str) -> Optional[Bounds]:
+    """Return the area of a scene file, None for "" and a random scene.
+
+    Raises:
+        InputError: The file cannot be read or has faults. While faults are collected, they are
+            left to the simulator's.
+    """
+    try:
+        return None if scene in ("", RANDOM) else scene_bounds(load_scene(scene))
+    except InputError:
+        if os.environ.get(COLLECT):
+            return None
+        raise
 
 
 def _source(given: argparse.Namespace) -> RobotSource:

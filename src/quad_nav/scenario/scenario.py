@@ -14,9 +14,8 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav import config
 from quad_nav.config import Configuration
-from quad_nav.config.files import set_value
 from quad_nav.config.notes import without_effect
-from quad_nav.config.robot_tree import COMMAND_LINE, RobotSource, robot_tree
+from quad_nav.config.robot_tree import RobotSource, robot_tree
 from quad_nav.errors import InputError
 from quad_nav.files.values import value_faults
 from quad_nav.mission.goal_file import DEFAULT_SETTINGS, SequenceSettings
@@ -26,8 +25,11 @@ from quad_nav.mission.robot_goals import (
     last_goal_conflicts,
     load_robot_goals,
 )
+from quad_nav.scenario.coverage import Bounds, cover_area, scene_bounds
 from quad_nav.scenario.goal_checks import (
+    OFF_COSTMAP,
     cover_warnings,
+    coverage_notes,
     goals_off_the_costmap,
     place_check,
     tolerance_warnings,
@@ -53,8 +55,11 @@ _HARMLESS: Dict[str, Any] = {
 }
 Parameters = Sequence[Tuple[str, Any]]
 """Parameters on top of files: (path, value), as ("global_costmap/width", 60.0)."""
-Configure = Callable[[int, Optional[RandomMission]], Sequence[Optional[Configuration]]]
-"""Reads the configurations of so many robots; None for a robot whose parameters are unknown."""
+Configure = Callable[[int, Optional[Scene]], Sequence[Optional[Configuration]]]
+"""Reads the configurations of so many robots, whose global costmaps are to cover a scene.
+
+None stands for a robot whose parameters are unknown.
+"""
 
 
 @dataclass(frozen=True)
@@ -81,13 +86,17 @@ class ScenarioRequest:
 
 @dataclass(frozen=True)
 class Scenario:
-    """The readable parts of a scenario; complete if there were no faults."""
+    """The readable parts of a scenario; complete if there were no faults.
+
+    ``notes`` tell what the user did not ask for, ``warnings`` what may be a mistake.
+    """
 
     scene: Optional[Scene]
     robots: Tuple[RobotGoals, ...] = ()
     configurations: Tuple[Optional[Configuration], ...] = ()
     warnings: Tuple[str, ...] = ()
     robot_radius_m: float = BODY_RADIUS_M
+    notes: Tuple[str, ...] = ()
 
 
 def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scenario, List[str]]:
@@ -104,25 +113,29 @@ def read_scenario(request: ScenarioRequest, configure: Configure) -> Tuple[Scena
     request = _without_faulty_values(request)
     values = vars(request)
     mission, scene = _tried(lambda: (mission_of(values), _scene(values)), problems) or (None, None)
-    configurations = _tried(lambda: tuple(configure(request.robots, mission)), problems) or ()
+    configurations = _tried(lambda: tuple(configure(request.robots, scene)), problems) or ()
     if configurations:
-        radius_m = body_radius_m(configurations, request.robot_radius)
-        request = replace(request, robot_radius=radius_m)
+        radius = body_radius_m(configurations, request.robot_radius)
+        request = replace(request, robot_radius=radius)
     located = [one if _is_located(one, request.simulated) else None for one in configurations]
+    if values["scene"] and scene is None:
+        located = []  # an unreadable scene may be what gives the costmaps their size
     if request.goals == RANDOM:
         robots, faults = _random_goals(request, mission, located)
     else:
         robots, faults = _read_goals(request, scene, located, configurations)
-    problems += faults
-    warnings = [
+    small = cover_warnings(scene, located, bool(request.source)) if scene else []
+    if any(OFF_COSTMAP in fault for fault in faults):
+        faults += small
+    warnings = (
         *last_goal_conflicts(robots, request.robot_radius),
         *tolerance_warnings(robots, configurations),
-        *(cover_warnings(scene, located) if scene else ()),
-    ]
-    scenario = Scenario(
-        scene, tuple(robots), configurations, tuple(warnings), float(request.robot_radius)
+        *small,
     )
-    return scenario, list(dict.fromkeys(problems))
+    notes = tuple(coverage_notes(configurations))
+    radius_m = float(request.robot_radius)
+    scenario = Scenario(scene, tuple(robots), configurations, warnings, radius_m, notes)
+    return scenario, list(dict.fromkeys(problems + faults))
 
 
 def body_radius_m(configurations: Sequence[Optional[Configuration]], own_m: float) -> float:
@@ -157,10 +170,19 @@ def scene_of(values: Mapping[str, Any]) -> Scene:
     return load_scene(values["scene"]) if mission is None else mission.scene
 
 
+def area_of(values: Mapping[str, Any]) -> Optional[Bounds]:
+    """Return the area of the scene that ``scene`` asks for, None if it is unknown.
+
+    Raises:
+        InputError: The file cannot be read or has faults, or a random arena is too small.
+    """
+    return scene_bounds(scene_of(values)) if values["scene"] else None
+
+
 def read_configurations(
     name: str,
     robots: int,
-    mission: Optional[RandomMission] = None,
+    area: Optional[Bounds] = None,
     parameters: Parameters = (),
     check: Callable[[Configuration, int], List[str]] = lambda *_: [],
     numbered: bool = False,
@@ -171,7 +193,7 @@ def read_configurations(
     Args:
         name: A shipped configuration, a folder or files, see ``config.sources``.
         robots: Number of robots.
-        mission: A random mission, whose arena the global costmaps cover.
+        area: Area that the global costmaps cover.
         parameters: Parameters on top of the files, from the command line.
         check: Returns further faults of a robot's configuration.
         numbered: Set the parameters ``robot`` and ``robots``, as the launch files do.
@@ -185,7 +207,7 @@ def read_configurations(
     for number in range(robots):
         source = RobotSource(name, number, robots if numbered else None, parameters=parameters)
         try:
-            configuration = _read_configuration(source, mission)
+            configuration = _read_configuration(source, area)
         except InputError as error:
             problems += error.problems
             continue
@@ -199,12 +221,11 @@ def read_configurations(
     return configurations
 
 
-def _read_configuration(source: RobotSource, mission: Optional[RandomMission]) -> Configuration:
-    """Read a robot's files and set the scenario's parameters and the command line's on top."""
+def _read_configuration(source: RobotSource, area: Optional[Bounds]) -> Configuration:
+    """Read a robot's parameters, with a global costmap that covers an area."""
     tree = robot_tree(source)
-    for name, value in _arena_size(mission):
-        if tree.origins.get(name) != COMMAND_LINE:
-            set_value(tree, name, value, "the scenario")
+    if area is not None:
+        cover_area(tree, area, source.number)
     return config.load(tree)
 
 
@@ -227,15 +248,6 @@ def _scene(values: Mapping[str, Any]) -> Optional[Scene]:
 @functools.lru_cache(maxsize=1)
 def _cached_mission(robots: int, seed: int, size_m: float) -> RandomMission:
     return random_mission(robots, seed, size_m)
-
-
-def _arena_size(mission: Optional[RandomMission]) -> Parameters:
-    if mission is None:
-        return ()
-    return (
-        ("global_costmap/width", mission.scene.size_x_m),
-        ("global_costmap/height", mission.scene.size_y_m),
-    )
 
 
 def _is_located(configuration: Optional[Configuration], simulated: bool) -> bool:

@@ -12,8 +12,8 @@ from quad_nav.errors import InputError
 from quad_nav.files.values import is_number, is_whole, unknown_names, value_faults
 from quad_nav.scenario.rules import RULES, optional, steps_per_scan
 from quad_nav.scenario.scenario import (
+    area_of,
     body_radius_m,
-    mission_of,
     read_configurations,
     scene_of,
 )
@@ -81,7 +81,7 @@ def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
     scene = scene_of(values)
     if values["config"]:
         fleet = read_configurations(
-            values["config"], values["robots"], mission_of(values), numbered=True
+            values["config"], values["robots"], area_of(values), numbered=True
         )
         values = {**DEFAULTS, **_asked_for(fleet), **parameters}
     try:

@@ -27,7 +27,6 @@ from quad_nav.errors import InputError
 from quad_nav.files.document import Checker, describe
 from quad_nav.files.user_files import referenced_file
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.rectangles import cover
 from quad_nav.sim.map_image import Pixels, read_pixels
 from quad_nav.sim.scene import Box
 
@@ -203,6 +202,8 @@ def rectangles_of(marked: NDArray[np.bool_]) -> NDArray[np.int64]:
     Returns:
         int64[n, 4]: first column, first row, width and height in cells.
     """
+    from quad_nav.kernels.rectangles import cover  # here: scenes load without numba otherwise
+
     left = marked.copy()
     parts, row = [], 0
     while row < len(left):

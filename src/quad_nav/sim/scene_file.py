@@ -68,7 +68,7 @@ def load_scene(path: Union[str, Path]) -> Scene:
     Raises:
         InputError: The file cannot be read, or has faults; lists all of them.
     """
-    path = Path(path)
+    path = Path(os.path.expanduser(path))
     place = path.resolve() if path.is_symlink() else path  # other files are relative to the target
     if path.suffix in _WORLD_SUFFIXES:
         document: Any = {"world": place.name}

@@ -175,5 +175,12 @@ MOVE_BASE_TABLE = Table(
             " upstream move_base; see peers.md.",
             low=1,
         ),
+        flag(
+            "size_from_scene",
+            False,
+            "",
+            "The global costmap has the size of the scene instead of the configuration's. Set"
+            " by the launch files, to be logged; not in upstream move_base.",
+        ),
     ),
 )

@@ -10,7 +10,7 @@ import threading
 import time
 from dataclasses import dataclass
 from types import FrameType
-from typing import Callable, Dict, List, Optional, Sequence
+from typing import Any, Callable, Dict, List, Optional, Sequence
 
 import rosgraph
 import rosgraph.network
@@ -55,6 +55,15 @@ def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, shut_down)
+
+
+def server_parameters() -> Dict[str, Any]:
+    """Return the whole tree of the parameter server.
+
+    `rospy.get_param("/")` returns the parameters that rospy has cached, once it has cached one.
+    """
+    tree: Dict[str, Any] = rosgraph.Master(rospy.get_name()).getParam("/")
+    return tree
 
 
 def escape_log_messages() -> None:

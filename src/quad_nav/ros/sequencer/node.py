@@ -29,7 +29,7 @@ from quad_nav.mission.summary import (
 from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.preflight import read_mission_setup, result_path
-from quad_nav.ros.common.readiness import init_node
+from quad_nav.ros.common.readiness import init_node, server_parameters
 from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
 from quad_nav.scenario.mission_setup import MissionSetup
 
@@ -169,7 +169,7 @@ def main() -> int:
     parameters = rospy.get_param("~", {})
     result = result_path(parameters)
     try:
-        setup = read_mission_setup(parameters, name, result, rospy.get_param("/", {}))
+        setup = read_mission_setup(parameters, name, result, server_parameters())
         setup = replace(setup, facts={**setup.facts, "command": launch_command()})
         mission = MissionRunner(setup, RESPAWNED in sys.argv)
     except InputError as error:
@@ -187,6 +187,8 @@ def main() -> int:
         )
         return EXIT_BAD_INPUT
     stop.simulation = setup.simulation
+    for note in setup.notes:
+        rospy.loginfo("%s", note)
     for warning in setup.warnings:
         rospy.logwarn("%s", warning)
     return fly(mission, setup, result, stop)

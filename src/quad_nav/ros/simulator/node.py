@@ -33,7 +33,11 @@ from visualization_msgs.msg import Marker, MarkerArray
 from quad_nav.errors import InputError, excerpt, printable
 from quad_nav.kernels.jit import cache_warnings
 from quad_nav.ros.common.conversions import twist_from_message
-from quad_nav.ros.common.readiness import escape_log_messages, log_without_master
+from quad_nav.ros.common.readiness import (
+    escape_log_messages,
+    log_without_master,
+    server_parameters,
+)
 from quad_nav.ros.simulator.topics import SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
     DEFAULTS,
@@ -300,7 +304,7 @@ def main() -> int:
         parameters = rospy.get_param("~", {})
         if not parameters.get("config"):
             robots = parameters.get("robots", DEFAULTS["robots"])
-            asked_for = asked_for_by_navigators(rospy.get_param("/", {}), robots)
+            asked_for = asked_for_by_navigators(server_parameters(), robots)
             parameters = {**asked_for, **parameters}
         setup = read_setup(parameters, name)
         node = SimulatorNode(setup)
