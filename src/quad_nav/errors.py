@@ -6,7 +6,7 @@ that ends in one of them is aborted, with its message.
 
 from __future__ import annotations
 
-from typing import List, Sequence
+from typing import Any, List, Sequence
 
 MAX_PROBLEMS = 100
 _MAX_LENGTH = 2000
@@ -36,6 +36,16 @@ class InputError(QuadError):
 
 class NavigationError(QuadError):
     """Failure while navigating."""
+
+
+class PluginError(QuadError):
+    """Mistake in a plugin of a user, with its file and line.
+
+    Attributes:
+        summary: Summary of the flight that it ended, if any: a ``MissionSummary``.
+    """
+
+    summary: Any = None
 
 
 class PlanningError(NavigationError):

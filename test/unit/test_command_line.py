@@ -116,3 +116,15 @@ def test_an_arena_that_takes_minutes_to_fill_is_refused():
     done = CliRunner().invoke(main, ["fly", "--robots", "3", "--size", "10000"])
     assert done.exit_code == 2
     assert "size: is 10000.0; expected a number of metres, 0 to 250" in done.output
+
+
+@pytest.mark.parametrize("quiet", [[], ["-q"]])
+def test_every_output_is_announced(tmp_path, quiet):
+    summary, recording = tmp_path / "flight.json", tmp_path / "flight.bag"
+    command = ["fly", "--time-limit", "0.1", "--json", str(summary), "--record", str(recording)]
+    done = CliRunner().invoke(main, [*command, *quiet])
+    assert summary.exists() and recording.exists()
+    lines = done.output.splitlines()
+    announced = [f"json: {summary}", f"record: {recording}"]
+    assert [line for line in lines if line in announced] == ([] if quiet else announced)
+    assert lines == ["time limit of 0.1 s"] or not quiet

@@ -123,7 +123,7 @@ def barn(
     130 after Ctrl-C.
     """
     with exit_on_faults():
-        outputs = Outputs({"--json": json_path, "--csv": csv_path})
+        outputs = Outputs({"--json": json_path, "--csv": csv_path}, quiet=quiet)
         setup = read_barn_setup(_options(**given))
         workers = min(workers, setup.wanted)
         if not quiet:

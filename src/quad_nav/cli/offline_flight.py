@@ -22,9 +22,10 @@ from quad_nav.cli.options import (
 from quad_nav.cli.outputs import Outputs
 from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
+from quad_nav.errors import PluginError
 from quad_nav.files.shipped import shipped
 from quad_nav.mission.flight_log import INTERRUPTED
-from quad_nav.mission.summary import to_json
+from quad_nav.mission.summary import MissionSummary, to_json
 from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
@@ -56,6 +57,7 @@ def fly_mission(
             {"--json": json_path, "--report": report},
             {"--record": record, "--view": saved_view, "--animate": animate},
             {"--pictures": pictures},
+            quiet=quiet,
         )
         options = _options(**given)
         setup = read_setup(options)
@@ -65,7 +67,9 @@ def fly_mission(
         show_warnings(setup.warnings)
     processes = processes or processes_for(len(setup.robots))
     facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
-    sys.exit(_fly(setup, facts, observers, outputs, drawn, quiet, processes))
+    with exit_on_faults():
+        status = _fly(setup, facts, observers, outputs, drawn, quiet, processes)
+    sys.exit(status)
 
 
 def _options(
@@ -122,21 +126,36 @@ def _fly(
 ) -> int:
     bar = [] if quiet else [ProgressBar()]
     with _StopOnSignal() as stop:
-        flown = fly_setup(setup, [*observers, *pictures.observers, *bar, stop], processes)
+        flown = _summary(setup, [*observers, *pictures.observers, *bar, stop], processes)
     summary = replace(flown, facts=facts)
     width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
     overview = table(summary, width)
     if not quiet:
         echo_lines(overview, err=outputs.use_stdout)
-    else:  # the table has the reason to end early, such as a recording on a full disk
-        for line in filter(None, (observer.stop_reason for observer in observers)):
-            echo(line, err=True)
+    elif summary.reason not in ("", INTERRUPTED):  # such as a recording on a full disk
+        echo(summary.reason, err=True)
     outputs.write("--json", json.dumps(to_json(summary), indent=2, allow_nan=False))
     for line in pictures.write(summary, outputs, overview if quiet else ""):
-        echo(line, err=True)
+        if not quiet:
+            echo(line, err=True)
+    if not any(observer.stop_reason for observer in observers):
+        outputs.announce_files("--record", "--view")
     if summary.reason == INTERRUPTED:
         return EXIT_INTERRUPTED
     return outputs.exit_status(summary.exit_status)
+
+
+def _summary(
+    setup: FlightSetup, observers: Sequence[FlightObserver], processes: int
+) -> MissionSummary:
+    """Fly; a plugin's mistake is the reason of the summary."""
+    try:
+        return fly_setup(setup, observers, processes)
+    except PluginError as error:
+        if error.summary is None:  # it cannot even be made
+            raise
+        summary: MissionSummary = error.summary
+        return summary
 
 
 class _StopOnSignal(FlightObserver):

@@ -24,6 +24,7 @@ class Outputs:
         texts: Texts, which may go to standard output, to devices and to pipes.
         files: Files that are read back while they are written.
         folders: Folders for several files.
+        quiet: Do not say which files were written.
 
     Attributes:
         has_failed: True after a file could not be written.
@@ -32,8 +33,14 @@ class Outputs:
         InputError: A file or folder cannot be written; lists all of them.
     """
 
-    def __init__(self, texts: _Paths, files: _Paths = _NONE, folders: _Paths = _NONE) -> None:
-        self._texts = texts
+    def __init__(
+        self,
+        texts: _Paths,
+        files: _Paths = _NONE,
+        folders: _Paths = _NONE,
+        quiet: bool = False,
+    ) -> None:
+        self._texts, self._files, self._quiet = texts, files, quiet
         self.has_failed = False
         faults: List[str] = []
         for option, path in texts.items():
@@ -62,6 +69,19 @@ class Outputs:
         elif path is not None:
             with self.attempt(option, path, text):
                 write_text(path, text + "\n")
+                self.announce(option.lstrip("-"), path)
+
+    def announce(self, kind: str, path: Path) -> None:
+        """Say that an output was written."""
+        if not self._quiet:
+            echo(f"{kind}: {path}", err=True)
+
+    def announce_files(self, *options: str) -> None:
+        """Say that the files of these options were written, if they are given."""
+        for option in options:
+            path = self._files.get(option)
+            if path is not None:
+                self.announce(option.lstrip("-"), path)
 
     @contextmanager
     def attempt(self, option: str, path: Path, instead: str = "") -> Iterator[None]:

@@ -114,7 +114,9 @@ def sweep(
     """
     with exit_on_faults():
         outputs = Outputs(
-            {"--json": json_path, "--csv": csv_path, "--report": report}, folders={"--png": png}
+            {"--json": json_path, "--csv": csv_path, "--report": report},
+            folders={"--png": png},
+            quiet=quiet,
         )
         setup, rows, is_stored = _fly(quiet=quiet, **given)
     if not quiet:
@@ -201,8 +203,8 @@ def _draw(
     if report is not None:
         with outputs.attempt("--report", report):
             write_page(page, report)
-            echo(f"written: {report}", err=True)
+            outputs.announce("report", report)
     if png is not None:
         with outputs.attempt("--png", png):
             write_pictures(page, png)
-            echo(f"written: {png}", err=True)
+            outputs.announce("pictures", png)

@@ -173,7 +173,9 @@ def planner_params(tree: Mapping[str, Any], key: str) -> Any:
     if own is not None:
         return with_fixes(own.params(tree), tree)
     name = plugin_name(tree[key])
-    return Plugin(load_class(tree[key], SLOTS[key].interface), Parameters(tree.get(name, {}), name))
+    interface = SLOTS[key].interface
+    parameters = Parameters(tree.get(name, {}), name)
+    return Plugin(load_class(tree[key], interface), parameters, interface.methods_of)
 
 
 def reconfigurable_planners(tree: Mapping[str, Any]) -> Dict[str, Table]:

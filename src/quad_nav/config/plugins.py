@@ -13,6 +13,7 @@ import traceback
 from dataclasses import dataclass, field
 from typing import Any, Dict, Iterator, Mapping, Tuple
 
+from quad_nav.config.plugin_calls import call_constructor
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.errors import InputError
@@ -65,14 +66,21 @@ class Parameters(Dict[str, Any]):
 
 @dataclass(frozen=True)
 class Plugin:
-    """Class of a plugin and its parameters."""
+    """Class of a plugin, its parameters, and the class with the methods that it has to have."""
 
     plugin_class: Any
     parameters: Parameters
+    methods_of: type
 
     def make(self, *arguments: Any) -> Any:
-        """Make an object of the class; ``arguments`` follow the parameters."""
-        return self.plugin_class(self.parameters, *arguments)
+        """Make an object of the class; ``arguments`` follow the parameters.
+
+        Raises:
+            InputError: The class refuses its parameters.
+            PluginError: The constructor fails otherwise. All methods raise it, too.
+        """
+        arguments = (self.parameters, *arguments)
+        return call_constructor(self.plugin_class, self.methods_of, *arguments)
 
 
 @dataclass(frozen=True)
@@ -83,8 +91,15 @@ class PluginLayerParams(LayerParams):
     parameters: Parameters = field(default_factory=lambda: Parameters({}, ""))
 
     def make_layer(self, spec: GridSpec, rolling_window: bool, default_cost: int) -> Layer:
-        """Make the layer."""
-        return self.plugin_class(self, spec, rolling_window, default_cost)
+        """Make the layer.
+
+        Raises:
+            InputError: The class refuses its parameters.
+            PluginError: The constructor fails otherwise. All methods raise it, too.
+        """
+        arguments = (self, spec, rolling_window, default_cost)
+        layer: Layer = call_constructor(self.plugin_class, Layer, *arguments)
+        return layer
 
     def __getitem__(self, name: str) -> Any:
         return self.parameters[name]
@@ -153,9 +168,12 @@ def _imported(module_name: str) -> Any:
 
 def _failure(module_name: str, error: Exception) -> str:
     last = traceback.extract_tb(error.__traceback__)[-1]
+    file, line, text = last.filename, last.lineno, str(error)
+    if isinstance(error, SyntaxError) and error.filename:
+        file, line, text = error.filename, error.lineno, error.msg
     return (
-        f"cannot import {module_name}: {type(error).__name__}: {error}"
-        f" ({last.filename}:{last.lineno}); expected a module that imports without errors"
+        f"cannot import {module_name}: {type(error).__name__}: {text}"
+        f" ({file}:{line}); expected a module that imports without errors"
     )
 
 

@@ -178,7 +178,7 @@ def _params(name: str, kind: str, tree: Mapping[str, Any]) -> RecoveryParams:
         return slow_params(namespace, tree["base_local_planner"])
     if kind == ROTATE:
         return _rotate_params(namespace, tree.get(TRAJECTORY_PLANNER, {}))
-    return Plugin(load_class(kind, RECOVERY), Parameters(namespace, name))
+    return Plugin(load_class(kind, RECOVERY), Parameters(namespace, name), RECOVERY.methods_of)
 
 
 def _clear_params(namespace: Mapping[str, Any]) -> ClearCostmapParams:

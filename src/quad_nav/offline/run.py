@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from typing import List, Sequence
+from typing import List, Optional, Sequence
 
+from quad_nav.errors import PluginError
 from quad_nav.mission.summary import MissionSummary, summarize
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.scenario.flight_setup import FlightSetup
@@ -27,18 +28,29 @@ def fly(
 
     Raises:
         WorkerProcessError: A worker process failed.
+        PluginError: A plugin has a mistake. Its ``summary`` is that of the flight until then.
     """
     flight = Flight(setup, observers, processes)
     start_wall_s = time.perf_counter()
+    mistake: Optional[PluginError] = None
     try:
         reasons = _advance_to_end(flight)
+    except PluginError as error:
+        mistake, reasons = error, [str(error)]
     except BaseException as error:  # recordings keep what was flown
         flight.end(f"ended by {type(error).__name__}")
         raise
     wall_time_s = time.perf_counter() - start_wall_s
     flight.end("; ".join(reasons))
     # Observers may fail at the end, for example a recording that is closed on a full disk.
-    reasons = list(dict.fromkeys([*reasons, *flight.stop_reasons]))
+    summary = _summary(flight, list(dict.fromkeys([*reasons, *flight.stop_reasons])), wall_time_s)
+    if mistake is not None:
+        mistake.summary = summary
+        raise mistake
+    return summary
+
+
+def _summary(flight: Flight, reasons: Sequence[str], wall_time_s: float) -> MissionSummary:
     return summarize(
         flight.log,
         {robot.name: robot.sequencer for robot in flight.robots},
@@ -46,7 +58,7 @@ def fly(
         sim_time_s=flight.now_s,
         wall_time_s=wall_time_s,
         reason="; ".join(reasons),
-        seed=setup.seed,
+        seed=flight.setup.seed,
     )
 
 

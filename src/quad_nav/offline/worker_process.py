@@ -14,6 +14,7 @@ from typing import Any, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.errors import PluginError
 from quad_nav.geometry import Pose2D
 from quad_nav.offline.navigator_group import NavigatorGroup, NavigatorResult
 from quad_nav.peers.peer import Intention
@@ -83,11 +84,14 @@ class WorkerProcess:
 
         Raises:
             WorkerProcessError: The process failed.
+            PluginError: A plugin has a mistake.
         """
         try:
             answer = self._pipe.recv()
         except (EOFError, ConnectionError):
             answer = "it has ended"
+        if isinstance(answer, PluginError):
+            raise answer
         if isinstance(answer, str):
             raise WorkerProcessError(
                 f"a worker process with {len(self.robots)} navigators failed: {answer}"
@@ -134,6 +138,8 @@ def _serve(
                 pipe.send(answer)
     except (EOFError, ConnectionError):
         pass  # the flight is over, or the parent process died
+    except PluginError as error:
+        pipe.send(error)
     except Exception:  # the parent process raises it again
         pipe.send(traceback.format_exc())
 

@@ -14,7 +14,7 @@ import rospy
 
 from quad_nav import config
 from quad_nav.config import Configuration
-from quad_nav.errors import InputError, printable
+from quad_nav.errors import InputError, PluginError, printable
 from quad_nav.kernels.jit import cache_warnings
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms
@@ -25,7 +25,7 @@ from quad_nav.scenario.fleet_setup import read_setup
 from quad_nav.scenario.warm_up import warm_up
 from quad_nav.topics.publishing import Names, in_fleet, own_node
 
-EXIT_BAD_INPUT = 2
+EXIT_FAILURE, EXIT_BAD_INPUT = 1, 2
 FLEET_PERIOD_S = 1.0 / 40.0  # as often as poses arrive
 
 
@@ -105,7 +105,7 @@ def _run(
         for warning in dict.fromkeys((*warnings, *cache_warnings())):
             rospy.logwarn("%s", warning)
         for configuration in _distinct(configurations.values()):
-            warm_up(configuration)
+            _warm_up(configuration)
         group = Fleet(configurations, names)
         if len(group.robots) == 1:
             rospy.loginfo("%s: ready", group.robots[0].name)
@@ -117,11 +117,22 @@ def _run(
         lines = f"{name}: invalid parameters, shutting down:\n{error}"
         print(printable(lines, "\n"), file=sys.stderr)
         return EXIT_BAD_INPUT
+    except PluginError as error:
+        rospy.logfatal("%s: a plugin cannot be made, shutting down: %s", name, error)
+        return EXIT_FAILURE
     except rospy.ROSException:
         # A shutdown interrupts the loop's sleep, and closes topics while the node starts.
         if not rospy.core.is_shutdown_requested():
             raise
     return 0
+
+
+def _warm_up(configuration: Configuration) -> None:
+    """Compile the kernels; a plugin's mistake is logged here, and aborts goals later."""
+    try:
+        warm_up(configuration)
+    except PluginError as error:
+        rospy.logerr("quad%d: warm-up: %s", configuration.robot, error)
 
 
 def _distinct(configurations: Iterable[Configuration]) -> List[Configuration]:

@@ -14,8 +14,9 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from quad_nav import config
+from quad_nav.errors import PluginError
 from quad_nav.geometry import Pose3D, Twist2D
-from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.navigator.tick import Outcome, RobotPoses, Tick
 from quad_nav.ros.common.conversions import odometry_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
@@ -114,9 +115,15 @@ class RobotNavigator:
         )
 
     def step(self, now_s: float) -> None:
-        """Do the work that is due at a time."""
+        """Do the work that is due at a time; a plugin's mistake aborts the goal."""
         with self._lock:
-            self._step(now_s)
+            try:
+                self._step(now_s)
+            except PluginError as error:
+                self._warnings.error(f"{self.name}: {error}")
+                self._topics.stop()
+                self._navigator.cancel()
+                self._goals.finish(Outcome(False, str(error)))
             self.due_s = max(min(self._navigator.next_due_s, now_s + POLL_S), now_s)
 
     def restart(self, now_s: float) -> None:
