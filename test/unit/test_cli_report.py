@@ -78,7 +78,7 @@ def test_several_flights(report, tmp_path):
 
 
 def test_pictures_of_a_flight_as_it_is_flown(tmp_path):
-    arguments = ["fly", "-q", "--time-limit", "0.2", "--beams", "64"]
+    arguments = ["fly", "--time-limit", "0.2", "--beams", "64"]
     result = CliRunner().invoke(main, [*arguments, "--pictures", str(tmp_path / "paper")])
     assert f"pictures: {tmp_path / 'paper'}" in result.output
     names = {path.name for path in (tmp_path / "paper").iterdir()}

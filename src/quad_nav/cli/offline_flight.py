@@ -126,14 +126,15 @@ def _fly(
 ) -> int:
     bar = [] if quiet else [ProgressBar()]
     with _StopOnSignal() as stop:
-        flown = _summary(setup, [*observers, *pictures.observers, *bar, stop], processes)
+        flown = _summary(setup, [*observers, *pictures.observers, *bar, stop], processes, quiet)
     summary = replace(flown, facts=facts)
     width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
     overview = table(summary, width)
     if not quiet:
         echo_lines(overview, err=outputs.use_stdout)
-    elif summary.reason not in ("", INTERRUPTED):  # such as a recording on a full disk
-        echo(summary.reason, err=True)
+    else:  # the table has the reason to end early, such as a recording on a full disk
+        for line in filter(None, (observer.stop_reason for observer in observers)):
+            echo(line, err=True)
     outputs.write("--json", json.dumps(to_json(summary), indent=2, allow_nan=False))
     for line in pictures.write(summary, outputs, overview if quiet else ""):
         if not quiet:
@@ -146,14 +147,16 @@ def _fly(
 
 
 def _summary(
-    setup: FlightSetup, observers: Sequence[FlightObserver], processes: int
+    setup: FlightSetup, observers: Sequence[FlightObserver], processes: int, quiet: bool
 ) -> MissionSummary:
-    """Fly; a plugin's mistake is the reason of the summary."""
+    """Fly; a plugin's mistake is the reason of the summary, and printed if no table is."""
     try:
         return fly_setup(setup, observers, processes)
     except PluginError as error:
         if error.summary is None:  # it cannot even be made
             raise
+        if quiet:
+            echo(error, err=True)
         summary: MissionSummary = error.summary
         return summary
 

@@ -11,7 +11,7 @@ import math
 import sys
 import traceback
 from pathlib import Path
-from typing import Any, Callable, Dict, Optional, Tuple
+from typing import Any, Callable, Dict, Optional, Tuple, Type
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from quad_nav.errors import ControlError, InputError, PlanningError, PluginError
 from quad_nav.geometry import Twist2D
 from quad_nav.recovery import Step
 
-_ALLOWED: Dict[str, Tuple[type, ...]] = {
+_ALLOWED: Dict[str, Tuple[Type[Exception], ...]] = {
     "__init__": (InputError,),
     "make_plan": (PlanningError,),
     "compute_velocity": (ControlError,),
@@ -64,7 +64,7 @@ def _guarded_class(plugin_class: Any, methods_of: type) -> Any:
 def _guarded(plugin_class: Any, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
     what = f"{plugin_class.__module__}.{plugin_class.__qualname__}.{name}"
     wrong = _WRONG.get(name)
-    allowed = (PluginError, *_ALLOWED.get(name, ()))
+    allowed: Tuple[Type[Exception], ...] = (PluginError, *_ALLOWED.get(name, ()))
 
     @functools.wraps(function, updated=())
     def call(*arguments: Any, **named: Any) -> Any:
