@@ -20,7 +20,6 @@ from quad_nav.cli.goal_editor import GoalEditor, GoalServer
 from quad_nav.cli.preview import preview as command
 from quad_nav.errors import InputError
 from quad_nav.grid import INSCRIBED, LETHAL
-from quad_nav.mission.goal_edit import GoalEdit, edited_text
 from quad_nav.mission.goal_file import parse_goals
 from quad_nav.report.preview_picture import cost_colours
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
@@ -106,6 +105,16 @@ def test_faulty_goals_are_shown_with_the_fault_that_fly_reports(hall):
     assert [len(plan) > 0 for plan in robot.plans] == [True, False, False]
 
 
+def test_goals_are_checked_with_the_body_of_the_configuration(hall):
+    write_goals(hall, 0, [[4.0, 3.9]])
+    wide = replace(hall, parameters=(("body_radius", 0.45),))
+    preview = MissionPreview(wide)
+    assert preview.robot_radius_m == 0.45
+    (fault,) = preview.robot(0).faults
+    assert "expected at least the robot's radius, 0.45 m" in fault
+    assert len(preview.problems) == 1 and fault in preview.problems[0]
+
+
 def test_a_goal_without_a_path_is_warned_about(hall):
     walled = SCENE.replace(
         "obstacles:\n",
@@ -174,57 +183,6 @@ def test_command_refuses_other_names(tmp_path):
     result = CliRunner().invoke(command, ["-o", str(tmp_path / "out.jpg")])
     assert result.exit_code == 2
     assert "expected a name in .png, .svg, .html" in result.output
-
-
-# Edits of the text.
-
-
-def test_goals_that_stay_keep_their_text():
-    kept = [GoalEdit(0, 1.0, 5.0), GoalEdit(1, 7.0, 3.5, 1.57)]
-    assert edited_text(GOALS, kept) == GOALS
-    moved = edited_text(GOALS, [GoalEdit(0, 1.0, 5.0), GoalEdit(1, 6.12345, 3.5, 1.57)])
-    assert moved == GOALS.replace("[7.0, 3.50, 1.57]", "[6.123, 3.5, 1.57]")
-
-
-@pytest.mark.parametrize(
-    "text, goals, expected",
-    [
-        (
-            GOALS,
-            [GoalEdit(1, 7.0, 3.5, 1.57), GoalEdit(None, 2.0, -0.0)],
-            GOALS.replace("[1.0, 5.0]", "[7.0, 3.50, 1.57]", 1).replace(
-                "    [7.0, 3.50, 1.57]\n  ]", "    [2.0, 0.0]\n  ]"
-            ),
-        ),
-        (
-            '"goals": [[1,2]]',
-            [GoalEdit(0, 1, 2), GoalEdit(None, 3, 4)],
-            '"goals": [[1,2], [3.0, 4.0]]',
-        ),
-        (
-            '{"goals":[\n [1,2]\n]}',
-            [GoalEdit(0, 1, 2), GoalEdit(None, 3, 4)],
-            '{"goals":[\n [1,2],\n [3.0, 4.0]\n]}',
-        ),
-        (
-            '\ufeff{"loop": false, "goals": [[1, 2, 3]]}',
-            [GoalEdit(0, 1, 2)],
-            '\ufeff{"loop": false, "goals": [[1.0, 2.0]]}',
-        ),
-        (
-            '{"goals": [{"wait_s": 5, "x": 1, "y": 2}]}',
-            [GoalEdit(0, 1, 3, 0.5)],
-            '{"goals": [{"wait_s": 5, "x": 1.0, "y": 3.0, "yaw": 0.5}]}',
-        ),
-        (
-            '{"goals": [{"x": 1, "y": 2, "yaw": 1}]}',
-            [GoalEdit(0, 1, 2)],
-            '{"goals": [{"x": 1.0, "y": 2.0, "yaw": null}]}',
-        ),
-    ],
-)
-def test_edits_keep_the_form_of_the_file(text, goals, expected):
-    assert edited_text(text, goals) == expected
 
 
 # The page that edits.

@@ -73,17 +73,18 @@ class MissionPreview:
     def __init__(self, options: FlightOptions) -> None:
         """Read whatever can be read of the files that a flight needs."""
         self.problems: Tuple[str, ...] = ()
-        self.robot_radius_m = options.simulation.airframe.radius_m
         try:
             setup = read_setup(options)
         except InputError as error:
             parts = read_readable_parts(options)
             self.problems, self.warnings = tuple(error.problems), parts.warnings
             self.scene, robots = parts.scene, parts.robots
+            self.robot_radius_m = parts.robot_radius_m
             configurations: Sequence[Optional[Configuration]] = parts.configurations
         else:
             self.scene, self.warnings, robots = setup.scene, setup.warnings, setup.robots
             configurations = setup.configurations
+            self.robot_radius_m = setup.robot_radius_m
         self._configurations = dict(enumerate(configurations))
         self._sequences = {int(one.name[len("quad") :]): one.sequence for one in robots}
         self._costmaps: Dict[CostmapParams, LayeredCostmap] = {}
