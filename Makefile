@@ -62,6 +62,8 @@ bench: venv  ## How long the navigator's parts take, beside the original, scans 
 	PYTHONPATH=src $(PYTHON) bench/navigation.py
 	PYTHONPATH=src $(PYTHON) bench/lidar.py
 	PYTHONPATH=src $(PYTHON) bench/flight.py
+	@scripts/make_venv .venv requirements-test.txt
+	PYTHONPATH=src $(PYTHON) bench/rl.py
 
 bench-fleets: venv  ## Whether fleets get through without touching: make bench-fleets ARGS="swap 8in12"
 	PYTHONPATH=src $(PYTHON) bench/encounters.py $(ARGS)

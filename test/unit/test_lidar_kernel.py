@@ -266,6 +266,7 @@ def ranges(request) -> Tuple[np.ndarray, ...]:
     """Of 1040 poses: the kernel's, the engine's, the kernel's of thicker, of thinner solids."""
     scene, robots = SCENES[request.param], range(8)
     world = World(scene, scene.starts, Airframe(), 1.0 / 240)
+    world.touches()  # it is built when it is needed
     casters = [
         KernelCaster(PARAMS, scene, 8),
         WorldCaster(PARAMS, world),

@@ -167,7 +167,7 @@ def test_goals_scenes_and_configurations_may_be_objects(flown, setup, tmp_path):
         config=[quad_nav.load_configuration("tutorial", robot=number) for number in range(2)],
     )
     assert again.scene == setup.scene
-    assert again.robots[0].sequence == goals
+    assert again.robots[0].sequence.goals == goals.goals
     assert again.robots[0].sequence.settings.goal_timeout_s == 50.0
     assert again.configurations == quad_nav.prepare(goals=GOALS, config="tutorial").configurations
 

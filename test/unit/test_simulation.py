@@ -10,6 +10,7 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.sim.body import World
 from quad_nav.sim.contacts import CONTACT_GAP_S, ContactLog, Touch
 from quad_nav.sim.flight import Airframe
 from quad_nav.sim.lidar import LidarParams
@@ -19,8 +20,8 @@ from quad_nav.sim.simulation import (
     STEPS_PER_S,
     Simulation,
     SimulationParams,
-    start_poses,
 )
+from quad_nav.sim.start_poses import start_poses
 
 
 def room(*starts: Pose2D, obstacles=(), size_m: float = 20.0) -> Scene:
@@ -359,3 +360,38 @@ def test_starts_are_at_least_the_body_radius_from_obstacles():
 def test_a_body_needs_a_radius(radius_m):
     with pytest.raises(InputError, match="body_radius: .* expected metres above 0"):
         Airframe(radius_m=radius_m)
+
+
+def test_a_reset_with_a_seed_is_a_new_simulation_with_it(make):
+    """Also after contacts, for which the engine moved the robots."""
+    params = SimulationParams(LidarParams(noise_std_m=0.02), jitter_m=0.3)
+    scene = room(Pose2D(1.0, 1.0, 3.0), Pose2D(2.4, 1.0, 0.3))
+    used = make(scene, 2, params, seed=1)
+    fly_into_wall(used)
+    assert used.contacts
+    used.reset(7, start_step=0)
+    new = make(scene, 2, params, seed=7)
+    assert np.array_equal(used.body_state.rows, new.body_state.rows)
+    assert np.array_equal(used.scan(1).ranges_m, new.scan(1).ranges_m)
+    fly_into_wall(used)
+    fly_into_wall(new)
+    assert np.array_equal(used.body_state.rows, new.body_state.rows)
+    assert used.contacts == new.contacts != []
+
+
+def fly_into_wall(simulation: Simulation) -> None:
+    for _ in range(10):
+        simulation.set_command(0, Twist2D(1.0, 0.0, 0.0))
+        simulation.set_command(1, Twist2D(-0.5, 0.0, 0.2))
+        simulation.advance(60)
+
+
+def test_starts_are_those_of_the_engine_to_the_last_bit():
+    """Before the engine has built its world, and after."""
+    random = np.random.default_rng(5)
+    starts = [Pose2D(*random.uniform(1.0, 19.0, 2), random.uniform(-7.0, 7.0)) for _ in range(200)]
+    world = World(room(*starts), starts, Airframe(), 1.0 / STEPS_PER_S)
+    early = world.state().rows
+    world.touches()
+    assert np.array_equal(world.state().rows, early)
+    world.close()

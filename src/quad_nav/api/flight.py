@@ -18,6 +18,7 @@ from quad_nav.offline import flight as offline
 from quad_nav.scenario.assembly import apply_configuration
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
+from quad_nav.sim.flight import BodyState
 from quad_nav.sim.simulation import STEPS_PER_S, RobotState
 
 Command = Twist2D
@@ -169,6 +170,15 @@ class Flight:
     def positions_m(self) -> NDArray[np.float64]:
         """Positions float64[n, 3] in ``map``."""
         return self._loop.simulation.body_state.positions_m.copy()
+
+    @property
+    def bodies(self) -> BodyState:
+        """Poses and velocities of all robots in ``map``, as arrays that must not be changed."""
+        return self._loop.simulation.body_state
+
+    def has_ended(self, robot: int) -> bool:
+        """Return whether every goal of a robot has ended."""
+        return self._loop.robots[robot].sequencer.done
 
     @property
     def contacts(self) -> List[Contact]:

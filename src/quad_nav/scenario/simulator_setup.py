@@ -21,7 +21,8 @@ from quad_nav.sim.flight import Airframe
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
-from quad_nav.sim.simulation import SimulationParams, start_poses
+from quad_nav.sim.simulation import SimulationParams
+from quad_nav.sim.start_poses import start_poses
 
 DEFAULT_BEAMS = 512
 DEFAULTS: Dict[str, Any] = {

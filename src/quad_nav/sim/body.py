@@ -23,6 +23,7 @@ from quad_nav.sim.contacts import Touch
 from quad_nav.sim.flight import GRAVITY_MPS2, Airframe, BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Box, Obstacle, Scene, Sphere
+from quad_nav.sim.solids import grouped
 
 
 @contextmanager
@@ -50,10 +51,6 @@ Floats = NDArray[np.float64]
 
 _MAX_RAYS_PER_CALL = 16383
 """One less than ``pybullet.MAX_RAY_INTERSECTION_BATCH_SIZE``, with which the last is dropped."""
-_MANY_BOXES = 256
-_STRIPE_M = 4.0
-_BOXES_PER_BODY = 16
-"""pybullet's limit for the number of shapes in a body."""
 _PARKED_M = 100.0
 """Depth below the floor at which quadcopters that are not engaged wait without contacts."""
 _LEVEL = [0.0, 0.0, 0.0, 1.0]
@@ -95,8 +92,21 @@ class World:
         self.reset(starts)
 
     def reset(self, starts: Sequence[Pose2D]) -> None:
-        """Rebuild the world, so that the engine keeps nothing of the past."""
-        client = self._client
+        """Rebuild the world, so that the engine keeps nothing of the past.
+
+        Without a window it is rebuilt when the engine is needed, which few short flights do.
+        """
+        self._starts = list(starts)
+        self._is_stale, self._none_engaged = True, False
+        if self._gui:
+            self._rebuild()
+
+    def _rebuild(self) -> None:
+        """Build the world of the last reset, unless it is built."""
+        if not self._is_stale:
+            return
+        self._is_stale = False
+        client, starts = self._client, self._starts
         pybullet.resetSimulation(physicsClientId=client)
         self._draw(False)
         pybullet.setGravity(0.0, 0.0, -GRAVITY_MPS2, physicsClientId=client)
@@ -107,7 +117,7 @@ class World:
         self._names: Dict[int, Optional[str]] = {
             pybullet.createMultiBody(0.0, floor, physicsClientId=client): "floor"
         }
-        single, groups = _grouped((*self._scene.wall_boxes(), *self._scene.obstacles))
+        single, groups = grouped((*self._scene.wall_boxes(), *self._scene.obstacles))
         for solid in single:
             self._names[self._add_obstacle(solid)] = solid.name
         for group in groups:
@@ -130,9 +140,25 @@ class World:
 
     def state(self) -> BodyState:
         """Return the state of all quadcopters."""
-        rows = np.empty((len(self._robots), 13))
-        self._read(range(len(self._robots)), rows)
+        rows = np.zeros((len(self._starts), 13))
+        if self._is_stale:
+            for number, start in enumerate(self._starts):
+                rows[number, :7] = self._pose_at(start)
+        else:
+            self._read(range(len(self._robots)), rows)
         return BodyState(rows)
+
+    def _pose_at(self, start: Pose2D) -> Tuple[float, ...]:
+        """Return position and quaternion at a start, to the last bit as the engine rounds them."""
+        body = pybullet.createMultiBody(
+            1.0,
+            basePosition=[start.x_m, start.y_m, self._scene.altitude_m],
+            baseOrientation=quaternion_from_yaw(start.yaw_rad),
+            physicsClientId=self._client,
+        )
+        position, quaternion = pybullet.getBasePositionAndOrientation(body, self._client)
+        pybullet.removeBody(body, physicsClientId=self._client)
+        return (*position, *quaternion)
 
     def engage(self, robots: Sequence[int], state: BodyState) -> None:
         """Choose the quadcopters that ``step`` moves and that can be touched.
@@ -141,6 +167,13 @@ class World:
             robots: Numbers of the quadcopters, in increasing order.
             state: State that newly engaged quadcopters start from.
         """
+        if self._is_stale:
+            if not len(robots):
+                self._none_engaged = True
+                return
+            self._rebuild()
+            if self._none_engaged:
+                self.engage([], state)
         if list(robots) == self._engaged:
             return
         client = self._client
@@ -163,6 +196,7 @@ class World:
             forces_n: float64[n, 3], forces at the bodies' centres in ``map``.
             torques_nm: float64[n, 3], torques in ``map``.
         """
+        self._rebuild()
         client, in_map = self._client, pybullet.WORLD_FRAME
         positions, forces, torques = (
             rows.tolist() for rows in (state.positions_m, forces_n, torques_nm)
@@ -187,6 +221,7 @@ class World:
     def touches(self) -> List[Touch]:
         """Return what presses on the quadcopters after the last step, in the robots' order."""
         touches = {}
+        self._rebuild()
         for point in pybullet.getContactPoints(physicsClientId=self._client):
             body_a, body_b, position, normal_force = point[1], point[2], point[5], point[9]
             if normal_force <= 0.0:
@@ -197,6 +232,7 @@ class World:
 
     def cast(self, starts_m: Floats, ends_m: Floats) -> Floats:
         """Cast rays; see ``casters.RayWorld``. Beams start inside the robot's own guard."""
+        self._rebuild()
         starts, ends = starts_m.tolist(), ends_m.tolist()
         hits: List[float] = []
         for k in range(0, len(starts), _MAX_RAYS_PER_CALL):
@@ -211,6 +247,7 @@ class World:
 
     def show_goals(self, spheres: Sequence[GoalSphere]) -> None:
         """Replace the drawn goals, which neither collide nor appear in scans."""
+        self._rebuild()
         client = self._client
         for goal in self._goal_ids:
             pybullet.removeBody(goal, physicsClientId=client)
@@ -335,21 +372,6 @@ class World:
             physicsClientId=client,
         )
         return body
-
-
-def _grouped(solids: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], List[List[Box]]]:
-    """Split solids into those with a body each and groups of near boxes with a body per group.
-
-    Only scenes with many boxes have groups.
-    """
-    boxes = [solid for solid in solids if isinstance(solid, Box)]
-    if len(boxes) < _MANY_BOXES:
-        return solids, []
-    boxes.sort(key=lambda b: (b.x_m // _STRIPE_M, b.y_m))
-    return (
-        [solid for solid in solids if not isinstance(solid, Box)],
-        [boxes[k : k + _BOXES_PER_BODY] for k in range(0, len(boxes), _BOXES_PER_BODY)],
-    )
 
 
 def _connect(gui: bool) -> int:

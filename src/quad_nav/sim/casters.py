@@ -97,7 +97,9 @@ class KernelCaster:
         rotations = bodies.rotations
         self._guard_centres[:] = bodies.positions_m + MOUNT_HEIGHT_M * rotations[:, :, 2]
         self._guard_rotations[:] = rotations.transpose(0, 2, 1)
-        origins, rotations = lidar_poses(bodies, robots)
+        origins = self._guard_centres  # the guards are centred on the LIDARs
+        if len(robots) < len(origins):
+            origins, rotations = origins[list(robots)], rotations[list(robots)]
         distances = np.empty((len(robots), len(self._beams.directions)))
         cast_scans(origins, rotations, self._beams, self._solids, self._grid, distances)
         return distances

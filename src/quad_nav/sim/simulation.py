@@ -16,21 +16,20 @@ from numpy.typing import NDArray
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
 from quad_nav.sim.body import GoalSphere, World
-from quad_nav.sim.casters import Lidars, WorldCaster, kernel_lidars
+from quad_nav.sim.casters import Caster, KernelCaster, Lidars, WorldCaster
 from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import Airframe, BodyState, FlightLaw, FlightParams, limit_command
 from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift, OdomFrames
-from quad_nav.sim.scene import BODY_RADIUS_M, Scene
+from quad_nav.sim.scene import Scene
+from quad_nav.sim.start_poses import start_poses
 
 STEPS_PER_S = 240
 STEP_S = 1.0 / STEPS_PER_S
 LIDAR_CASTERS = ("kernel", "bullet")
 _STEPS_NEAR = 12
 """Steps that the engine moves a quadcopter after it came near something, before a new check."""
-_START_GAP_M = 0.05
-_START_TRIES = 1000
 
 
 @dataclass(frozen=True)
@@ -171,6 +170,7 @@ class Simulation:
         # The engine's window and rays need the bodies in the engine.
         self._always_in_engine = gui or params.lidar_caster == "bullet"
         self._odom_frames = OdomFrames(params.odom_drift, n_robots, seed)
+        self._caster = self._new_caster()
         self._begin()
 
     def _begin(self) -> None:
@@ -180,7 +180,7 @@ class Simulation:
         self._hover_step = np.full(n, -math.inf)  # last step for which a command is valid
         self._next_hover_step = math.inf
         self._contact_log = ContactLog()
-        self.lidars = self._new_lidars()
+        self.lidars = Lidars(self.params.lidar, self._caster, n, self.seed)
         self._state = self._world.state()
         self._free_flight = FreeFlight(
             self.scene, n, self.params.airframe.radius_m, self._law, STEP_S
@@ -188,15 +188,11 @@ class Simulation:
         # Step up to which the engine moves a quadcopter.
         self._engine_until = np.full(n, math.inf if self._always_in_engine else -math.inf)
 
-    def _new_lidars(self) -> Lidars:
+    def _new_caster(self) -> Caster:
         params = self.params
         if params.lidar_caster == "kernel":
-            return kernel_lidars(
-                params.lidar, self.scene, self.n_robots, self.seed, params.airframe.radius_m
-            )
-        return Lidars(
-            params.lidar, WorldCaster(params.lidar, self._world), self.n_robots, self.seed
-        )
+            return KernelCaster(params.lidar, self.scene, self.n_robots, params.airframe.radius_m)
+        return WorldCaster(params.lidar, self._world)
 
     @property
     def n_robots(self) -> int:
@@ -213,8 +209,23 @@ class Simulation:
         """Contacts since the start or the last reset, in the order in which they began."""
         return self._contact_log.contacts
 
-    def reset(self) -> None:
-        """Return to the start poses without commands, contacts or drift; the clock continues."""
+    def reset(self, seed: Optional[int] = None, start_step: Optional[int] = None) -> None:
+        """Return to the start poses without commands, contacts or drift.
+
+        Args:
+            seed: New seed, for other starts and noise; None for the same starts again.
+            start_step: Step at which the clock starts; None for a clock that continues.
+
+        Raises:
+            InputError: There is no free position near a start with ``jitter_m``.
+        """
+        if seed is not None and seed != self.seed:
+            radius_m, params, n = self.params.airframe.radius_m, self.params, self.n_robots
+            self._starts = start_poses(self.scene, n, params.jitter_m, seed, radius_m)
+            self._odom_frames = OdomFrames(params.odom_drift, n, seed)
+            self.seed = seed
+        if start_step is not None:
+            self.step_count = start_step
         self._world.reset(self._starts)
         self._begin()
 
@@ -326,71 +337,3 @@ class Simulation:
     def show_goals(self, spheres: Sequence[GoalSphere]) -> None:
         """Replace the goals drawn in the window."""
         self._world.show_goals(spheres)
-
-
-def start_poses(
-    scene: Scene, n_robots: int, jitter_m: float, seed: int, body_radius_m: float = BODY_RADIUS_M
-) -> List[Pose2D]:
-    """Displace the start poses of a scene at random.
-
-    Each keeps clear of obstacles, walls and the starts before it.
-
-    Args:
-        scene: The scene.
-        n_robots: Number of start poses to use.
-        jitter_m: Radius of the disc around a start that it is displaced in.
-        seed: Seed of the displacements.
-        body_radius_m: Radius of the quadcopters' guards.
-
-    Raises:
-        InputError: The scene has too few starts, or a start has no free position around it.
-    """
-    if not 1 <= n_robots <= len(scene.starts):
-        raise InputError(
-            [
-                (
-                    f"robots: {n_robots}, expected 1 to {len(scene.starts)}, "
-                    f"the start poses of scene {scene.name}"
-                )
-            ]
-        )
-    random = np.random.default_rng([seed, 0])
-    starts: List[Pose2D] = []
-    for robot in range(n_robots):
-        starts.append(_displaced(scene, robot, starts, jitter_m, random, body_radius_m))
-    return starts
-
-
-def _displaced(
-    scene: Scene,
-    robot: int,
-    others: Sequence[Pose2D],
-    jitter_m: float,
-    random: np.random.Generator,
-    body_radius_m: float,
-) -> Pose2D:
-    start = scene.starts[robot]
-    if jitter_m == 0.0:
-        return start
-    for _ in range(_START_TRIES):
-        radius_m = jitter_m * math.sqrt(random.random())
-        angle_rad = 2.0 * math.pi * random.random()
-        x_m, y_m = (
-            start.x_m + radius_m * math.cos(angle_rad),
-            start.y_m + radius_m * math.sin(angle_rad),
-        )
-        pose = Pose2D(x_m, y_m, start.yaw_rad)
-        if (
-            scene.contains(x_m, y_m)
-            and scene.surface_distance_m(x_m, y_m, scene.altitude_m) > body_radius_m + _START_GAP_M
-            and all(pose.distance_to(o) > 2 * body_radius_m + _START_GAP_M for o in others)
-        ):
-            return pose
-    raise InputError(
-        [
-            (
-                f"jitter: {jitter_m:g} m leaves no free start for quad{robot} around "
-                f"({start.x_m:g}, {start.y_m:g}), expected a smaller jitter"
-            )
-        ]
-    )

@@ -1,4 +1,4 @@
-"""Obstacles and walls of a scene as arrays for the LIDAR's kernel."""
+"""Obstacles and walls of a scene as arrays for the LIDAR's kernel, and as groups for the engine."""
 
 from __future__ import annotations
 
@@ -20,6 +20,10 @@ _LARGE_CELLS = 32
 _MIN_CELL_M = 0.25
 _PADDING_M = 1e-6
 """More than rounding errors, so that a solid is in every cell that its faces touch."""
+_MANY_BOXES = 256
+_STRIPE_M = 4.0
+_BOXES_PER_BODY = 16
+"""pybullet's limit for the number of shapes in a body."""
 
 
 def split_scene(scene: Scene) -> Tuple[Solids, SolidGrid]:
@@ -38,6 +42,21 @@ def split_scene(scene: Scene) -> Tuple[Solids, SolidGrid]:
     return (
         select(solids, np.flatnonzero(covered > _LARGE_CELLS)),
         grid_of(select(solids, np.flatnonzero(covered <= _LARGE_CELLS)), cell_m),
+    )
+
+
+def grouped(solids: Sequence[Obstacle]) -> Tuple[Sequence[Obstacle], List[List[Box]]]:
+    """Split solids into those with a body each and groups of near boxes with a body per group.
+
+    Only scenes with many boxes have groups.
+    """
+    boxes = [solid for solid in solids if isinstance(solid, Box)]
+    if len(boxes) < _MANY_BOXES:
+        return solids, []
+    boxes.sort(key=lambda b: (b.x_m // _STRIPE_M, b.y_m))
+    return (
+        [solid for solid in solids if not isinstance(solid, Box)],
+        [boxes[k : k + _BOXES_PER_BODY] for k in range(0, len(boxes), _BOXES_PER_BODY)],
     )
 
 
