@@ -21,12 +21,9 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any, Dict, Mapping, Optional, Sequence, Union
 
-from quad_nav import config as ros_config
 from quad_nav.api.flight import Command, Flight, Observation
 from quad_nav.api.result import TRAJECTORY_COLUMNS, FlightResult, TrajectoryObserver
 from quad_nav.config import Configuration
-from quad_nav.config.files import set_value
-from quad_nav.config.robot_tree import RobotSource, fitted, unfitted_tree
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Scan
@@ -37,6 +34,7 @@ from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
 from quad_nav.offline.worker_process import processes_for
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
+from quad_nav.scenario.scenario import read_configurations
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
@@ -92,10 +90,7 @@ def load_configuration(
     Raises:
         InputError: Every fault in files and values.
     """
-    tree = unfitted_tree(RobotSource(str(name), robot))
-    for path, value in parameters.items():
-        set_value(tree, path, value, "parameters")
-    return ros_config.load(fitted(tree, robot))
+    return read_configurations(str(name), robot + 1, None, tuple(parameters.items()))[robot]
 
 
 def prepare(
