@@ -112,6 +112,12 @@ def slow(**parameters):
             "TebLocalPlannerROS: planner not supported; its parameters are not read",
         ),
         (
+            {"TrajectoryPlannerROS": {"y_vels": [-0.3, 0.3]}},
+            "ignored",
+            "TrajectoryPlannerROS/y_vels: ignored by move_base: it is a list; expected a string,"
+            " as in '-0.3, 0.3'",
+        ),
+        (
             {"DWAPlannerROS": {"max_vel_x": 1.0}},
             "unused",
             "DWAPlannerROS: unused: base_local_planner is base_local_planner/TrajectoryPlannerROS;"

@@ -100,6 +100,12 @@ def test_a_flight_needs_a_choice_and_the_refusal_has_it_to_copy(tmp_path):
     assert config_label(f"{tmp_path}:small,static") == f"{tmp_path.name}:small,static"
 
 
+def test_values_of_arguments_in_the_files_of_a_folder(tmp_path):
+    write(tmp_path, {"costmap_common_a.yaml": "robot_base_frame: $(arg prefix)base"})
+    assert tree(f"{tmp_path}:prefix=my_")["local_costmap"] == {"robot_base_frame": "my_base"}
+    assert "unknown $(arg prefix)" in refusal_of_tree(tmp_path)[0]
+
+
 def test_unknown_choice_lists_what_there_is(tmp_path):
     write(tmp_path, LAYOUT)
     assert refusal(f"{tmp_path}:medium") == (

@@ -29,6 +29,10 @@ def normalise_trajectory_planner(tree: Namespace, notes: Notes) -> None:
     for old, new in _RENAMED.items():
         if old in planner:
             _rename(planner, old, new, notes)
+    if isinstance(planner.get("y_vels"), list):
+        text = "ignored by move_base: it is a list; expected a string, as in '-0.3, 0.3'"
+        notes.remark(join(TRAJECTORY_PLANNER, "y_vels"), IGNORED, text)
+        del planner["y_vels"]
     normalise(planner, TRAJECTORY_PLANNER, TRAJECTORY_PLANNER_TABLE, notes, also_known=_RENAMED)
     if planner.get("meter_scoring") is False and not _is_respected(tree):
         notes.remark(

@@ -3,6 +3,7 @@
 default                        a shipped configuration
 my_robot/config                a folder, see ``file_sets``
 my_robot/config:burger         one of the alternatives in a folder, or of its subfolders
+my_robot/config:prefix=a_      with values of $(arg prefix) in its files
 my_robot.yaml                  one file, or a dump of a parameter server
 common.yaml,local_costmap=house.yaml    files in the order of loading
 my_robot.launch:model=burger   a launch file, with values of its arguments
@@ -10,6 +11,7 @@ my_robot.launch:model=burger   a launch file, with values of its arguments
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import List, Optional, Tuple
 
@@ -31,7 +33,7 @@ def load_set(files: FileSet) -> ParameterTree:
     first = files.files[0].path
     if is_launch_file(first):
         return load_launch_file(first, files.number, files.arguments)
-    return load_files(files.files, {"i": files.number})
+    return load_files(files.files, {**dict(files.arguments), "i": files.number})
 
 
 def robot_set(name: str, number: str) -> FileSet:
@@ -75,6 +77,10 @@ def sets_of(name: str, number: Optional[str] = None) -> Tuple[List[FileSet], Lis
         raise InputError([f"{path}: no move_base parameters found; {expected}"])
     if not is_standard(path, number or "0"):
         sets = _with_folder_above(path, number) or sets
+    words = choice.split(",") if choice else []
+    given = _arguments(path, ",".join(word for word in words if "=" in word))
+    sets = [replace(one, arguments=given) for one in sets]
+    choice = ",".join(word for word in words if "=" not in word)
     if choice:
         chosen = [one for one in sets if _is_chosen(one, path, choice)]
         if not chosen:
