@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+import yaml
 
 from quad_nav.config import load
 from quad_nav.config.files import load_files
@@ -10,6 +11,7 @@ from quad_nav.config.other_robots import input_faults
 from quad_nav.config.robot_tree import RobotSource, fitted, robot_tree
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.errors import InputError
+from quad_nav.scenario import robot_parameters
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 
 ROBOT = """\
@@ -94,6 +96,19 @@ def test_one_line_for_each_kind_of_change(robot):
             " set body_radius for another",
         ),
     ]
+
+
+def test_a_navigator_under_ros_logs_the_same_lines(tmp_path, capsys):
+    (tmp_path / "robot.yaml").write_text(ROBOT)
+    config = str(tmp_path / "robot.yaml")
+    assert robot_parameters.main(["--config", config, "--robot", "1", "--robots", "2"]) == 0
+    on_the_server = yaml.safe_load(capsys.readouterr().out)
+    told = [remark.text for remark in load(on_the_server, "/move_base1").remarks]
+    offline = robot_tree(RobotSource(config, 1, 2)).remarks
+    assert [remark.text for remark in offline if remark.kind != "caution"] == told[
+        : len(offline) - 1
+    ]
+    assert load(on_the_server).body_radius_m == 0.2
 
 
 def test_all_robots_have_the_same_lines(robot):

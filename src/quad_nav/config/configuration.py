@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, field, replace
-from typing import Any, Dict, Iterable, Iterator, Mapping, Optional, Tuple
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 from quad_nav.config.costmaps import costmap_params, normalise_costmap, remark_on_blindness
 from quad_nav.config.fixes import FIXES, FIXES_TABLE, with_fixes
-from quad_nav.config.notes import CAUTION, Notes, Remark, join
+from quad_nav.config.notes import CAUTION, MAPPED, OTHER_ROBOT, Notes, Remark, join
 from quad_nav.config.planners import (
     local_planner_frequency,
     local_planner_period_s,
@@ -109,6 +109,7 @@ def load(tree: Mapping[str, Any], place: str = "") -> Configuration:
         raise InputError([f"{place}: {tree!r} is not a parameter tree; expected names with values"])
     notes = Notes(place, getattr(tree, "origins", None))
     notes.remarks.extend(getattr(tree, "remarks", ()))
+    notes.remarks.extend(_of_another_robot(tree.get(OTHER_ROBOT)))
     normalised = copy.deepcopy(dict(tree))
     listed = _normalise(normalised, notes)
     notes.raise_problems()
@@ -182,6 +183,7 @@ def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     known = [
         *COSTMAPS,
         FIXES,
+        OTHER_ROBOT,
         *planner_keys(tree),
         *_INHERITED,
         "recovery_behaviors",
@@ -193,6 +195,13 @@ def _normalise(tree: Dict[str, Any], notes: Notes) -> Optional[NamedTypes]:
     for name in COSTMAPS:
         normalise_costmap(tree, name, notes)
     return normalise_recoveries(tree, notes)
+
+
+def _of_another_robot(lines: Any) -> List[Remark]:
+    """Return the remarks of a configuration that was adapted before it reached the server."""
+    given = map(str, lines) if isinstance(lines, list) else ()
+    parts = [line.partition(": ") for line in given]
+    return [Remark(place, MAPPED, text) for place, _, text in parts]
 
 
 def _remark_on_rates(tree: Mapping[str, Any], notes: Notes) -> None:

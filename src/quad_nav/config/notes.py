@@ -18,6 +18,8 @@ RENAMED = "renamed"  # an old name that still works
 CAUTION = "caution"  # legal, but probably a mistake
 MAPPED = "mapped"  # of another robot: flown with the quadcopter's own
 LEFT_OUT = "left out"  # of another robot: the quadcopter has none
+OTHER_ROBOT = "other_robot"
+"""Parameter with the lines about what was mapped and left out, for a navigator's log."""
 NO_EFFECT = (UNKNOWN, UNSUPPORTED, IGNORED, UNUSED, CLAMPED)
 """Kinds of remarks on values that do not do what they say."""
 

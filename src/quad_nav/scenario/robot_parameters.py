@@ -18,6 +18,8 @@ from typing import Any, Dict, List, Optional
 
 import yaml
 
+from quad_nav.config.files import set_value
+from quad_nav.config.notes import LEFT_OUT, MAPPED, OTHER_ROBOT
 from quad_nav.config.robot_tree import RobotSource, plain_tree, robot_tree
 from quad_nav.errors import InputError, printable
 from quad_nav.scenario.coverage import Bounds, cover_area, scene_bounds
@@ -53,6 +55,9 @@ def main(arguments: Optional[List[str]] = None) -> int:
         return EXIT_BAD_INPUT
     if area is not None:
         cover_area(tree, area, source.number, source.override)
+    told = [str(one) for one in tree.remarks if one.kind in (MAPPED, LEFT_OUT)]
+    if told:
+        set_value(tree, OTHER_ROBOT, told, "")
     print(printable(_yaml(plain_tree(tree)), "\n"))
     return 0
 
