@@ -204,3 +204,12 @@ def test_a_faulty_scene_ends_roslaunch_with_its_faults(tmp_path, capsys, monkeyp
     assert f"{scene}: size: a list of 1, expected a list of 2" in capsys.readouterr().err
     monkeypatch.setenv("QUAD_COLLECT_FAULTS", "1")  # the simulator lists them
     assert main(arguments) == 0
+
+
+def test_goals_that_nobody_gave_are_explained(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("size: [5, 5]\nstarts: [[1, 1], [4, 4]]\n")
+    with pytest.raises(InputError) as refused:
+        read_setup(FlightOptions(scene, None))
+    assert refused.value.problems[-1].startswith("goals: not given, so that the goals of the tut")
+    assert "outside the arena" in refused.value.problems[0]

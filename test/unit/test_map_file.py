@@ -179,8 +179,9 @@ def test_starts_are_chosen_where_the_map_is_known_to_be_free(tmp_path):
 
 def test_a_map_without_free_starts_is_refused(tmp_path):
     assert faults(tmp_path, np.zeros((20, 20))) == [
-        "map.yaml: starts: missing, and no free position was found; "
-        "expected a scene with world or map, and starts"
+        "map.yaml: starts: missing, and no free position was found in an arena of "
+        "10 x 10 m; expected a scene file with world or map, origin and size of a larger "
+        "arena, or starts"
     ]
 
 

@@ -90,6 +90,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
     Raises:
         InputError: Every fault in options, scene, goal files and configurations.
     """
+    given_goals = options.goals
     options = with_default_files(options)
     problems = value_faults(_values(options), _RULES, "")
     scenario, faults = read_scenario(_request(options), partial(_configurations, options))
@@ -108,7 +109,7 @@ def read_setup(options: FlightOptions) -> FlightSetup:
     if scene is not None:
         problems += _map_faults(scene, configurations)
     if problems:
-        raise InputError(problems)
+        raise InputError(problems + ([] if given_goals else _missing_goals(options, problems)))
     assert scene is not None
     longest_s = max(1.0 / one.navigator.controller_frequency_hz for one in configurations)
     warnings = dict.fromkeys(line for one in configurations for line in one.warnings)
@@ -123,6 +124,16 @@ def read_setup(options: FlightOptions) -> FlightSetup:
         options.time_limit_s,
         warnings=(*scene.remarks, *scenario.notes, *scenario.warnings, *warnings),
     )
+
+
+def _missing_goals(options: FlightOptions, problems: Sequence[str]) -> List[str]:
+    """Explain faults of goals that the user did not ask for: the tutorial's."""
+    if options.goals is None or not any(str(options.goals) in problem for problem in problems):
+        return []
+    return [
+        "goals: not given, so that the goals of the tutorial's arena are flown; expected "
+        "--goals FOLDER with quad0_goals.json and so on, for this scene"
+    ]
 
 
 def read_readable_parts(options: FlightOptions) -> Scenario:

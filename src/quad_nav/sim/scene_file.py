@@ -257,8 +257,9 @@ def _with_chosen_starts(check: Checker, scene: Scene, imported: ImportedScene) -
     if not scene.starts:
         check.fault(
             "starts",
-            "missing, and no free position was found; "
-            "expected a scene with world or map, and starts",
+            "missing, and no free position was found in an arena of "
+            f"{scene.size_x_m:g} x {scene.size_y_m:g} m; expected a scene file with world or map, "
+            "origin and size of a larger arena, or starts",
         )
     chosen = ", ".join(f"[{start.x_m:.2f}, {start.y_m:.2f}]" for start in scene.starts)
     remark = f"{check.source}: starts: not given, quadcopters start at {chosen}"
