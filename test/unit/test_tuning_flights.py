@@ -283,7 +283,7 @@ def sweep_arguments(folder):
         str(folder / "s.json"),
         "--report",
         str(folder / "s.html"),
-        "--png",
+        "--pictures",
         str(folder / "png"),
     ]
 
@@ -307,7 +307,9 @@ def test_sweep_from_the_command_line(tmp_path):
     found = json.loads((tmp_path / "s.json").read_text())
     assert [len(row["flights"]) for row in found["rows"]] == [1, 1, 1, 1]
     assert (tmp_path / "png" / "sweep.png").read_bytes().startswith(b"\x89PNG")
-    assert "data:image/png;base64," in (tmp_path / "s.html").read_text()
+    assert (tmp_path / "png" / "sweep.svg").read_bytes().startswith(b"<?xml")
+    page = (tmp_path / "s.html").read_text()
+    assert 'id="figure-plot-sweep"' in page and "<b>Roughness</b>: mean change" in page
 
 
 @pytest.mark.parametrize(

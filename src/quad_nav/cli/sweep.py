@@ -91,17 +91,22 @@ from quad_nav.tuning.sweep_table import table, to_csv, to_json
     help="Write a row for each point to this file.",
 )
 @click.option(
-    "--report", type=A_FILE, metavar="FILE.html", help="Write a report with pictures to this file."
+    "--report", type=A_FILE, metavar="FILE.html", help="Write a report with plots to this file."
 )
 @click.option(
-    "--png", type=A_FOLDER, metavar="FOLDER", help="Write the pictures to this folder as PNG files."
+    "--pictures",
+    "--png",
+    "pictures",
+    type=A_FOLDER,
+    metavar="FOLDER",
+    help="Write the pictures to this folder as PNG and SVG files.",
 )
 @click.option("--quiet", "-q", is_flag=True, help="Show neither progress bar nor table.")
 def sweep(
     json_path: Optional[Path],
     csv_path: Optional[Path],
     report: Optional[Path],
-    png: Optional[Path],
+    pictures: Optional[Path],
     quiet: bool,
     **given: Any,
 ) -> None:
@@ -115,7 +120,7 @@ def sweep(
     with exit_on_faults():
         outputs = Outputs(
             {"--json": json_path, "--csv": csv_path, "--report": report},
-            folders={"--png": png},
+            folders={"--pictures": pictures},
             quiet=quiet,
         )
         setup, rows, is_stored = _fly(quiet=quiet, **given)
@@ -123,7 +128,7 @@ def sweep(
         echo_lines(table(rows), err=outputs.use_stdout)
     outputs.write("--json", json.dumps(to_json(setup, rows), indent=2, allow_nan=False))
     outputs.write("--csv", to_csv(rows))
-    _draw(setup, rows, report, png, outputs)
+    _draw(setup, rows, report, pictures, outputs)
     sys.exit(outputs.exit_status(EXIT_SUCCESS if is_stored else EXIT_FAILURE))
 
 
@@ -190,11 +195,11 @@ def _draw(
     setup: SweepSetup,
     rows: Sequence[SweepRow],
     report: Optional[Path],
-    png: Optional[Path],
+    pictures: Optional[Path],
     outputs: Outputs,
 ) -> None:
     """Write report and pictures; the import is local because matplotlib loads slowly."""
-    if report is None and png is None:
+    if report is None and pictures is None:
         return
     from quad_nav.report.page import write_page, write_pictures
     from quad_nav.tuning.report.sweep_page import sweep_page
@@ -204,7 +209,7 @@ def _draw(
         with outputs.attempt("--report", report):
             write_page(page, report)
             outputs.announce("report", report)
-    if png is not None:
-        with outputs.attempt("--png", png):
-            write_pictures(page, png)
-            outputs.announce("pictures", png)
+    if pictures is not None:
+        with outputs.attempt("--pictures", pictures):
+            write_pictures(page, pictures)
+            outputs.announce("pictures", pictures)

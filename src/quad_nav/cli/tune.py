@@ -121,9 +121,20 @@ from quad_nav.tuning.tune import TuneOptions, TuneSetup, read_tune_setup, run_tu
     metavar="FOLDER",
     help="Folder of the parameters, the study and the report.",
 )
+@click.option(
+    "--pictures",
+    type=A_FOLDER,
+    metavar="FOLDER",
+    help="Also write the report's pictures to this folder as PNG and SVG files.",
+)
 @click.option("--quiet", "-q", is_flag=True, help="Show neither progress bar nor table.")
 def tune(
-    workers: Optional[int], ray_address: Optional[str], output: Path, quiet: bool, **given: Any
+    workers: Optional[int],
+    ray_address: Optional[str],
+    output: Path,
+    pictures: Optional[Path],
+    quiet: bool,
+    **given: Any,
 ) -> None:
     """Search for parameters that fly better, without ROS.
 
@@ -135,7 +146,7 @@ def tune(
     130 after Ctrl-C.
     """
     with exit_on_faults():
-        outputs = Outputs({}, folders={"--output": output})
+        outputs = Outputs({}, folders={"--output": output, "--pictures": pictures})
         setup = read_tune_setup(_options(output, **given))
         pool = workers_of(workers, ray_address)
         if not quiet:
@@ -152,7 +163,7 @@ def tune(
         )
         overview = text(result)
         with outputs.attempt("--output", output, overview if quiet else ""):
-            for path in write_result(result, shlex.join(["quad", *sys.argv[1:]])):
+            for path in write_result(result, shlex.join(["quad", *sys.argv[1:]]), pictures):
                 if not quiet:
                     echo(f"written: {path}", err=True)
     if not quiet:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Iterator
+from typing import Iterator, Optional
 
 from quad_nav.files.output import write_text
 from quad_nav.offline.flight import StopAtContact
@@ -21,15 +21,18 @@ RESULTS = "results.json"
 REPORT = "report.html"
 
 
-def write_result(result: TuneResult, command: str) -> Iterator[Path]:
+def write_result(
+    result: TuneResult, command: str, pictures: Optional[Path] = None
+) -> Iterator[Path]:
     """Write the outputs of a study into its folder.
 
     Args:
         result: Outcome of the study.
         command: Command line of the study, for the documentation.
+        pictures: Folder that gets the report's pictures as PNG and SVG files, or None.
 
     Yields:
-        Each path when it is written: tuned parameters, results and report.
+        Each path when it is written: tuned parameters, results, report and pictures.
 
     Raises:
         OSError: A file cannot be written.
@@ -42,10 +45,12 @@ def write_result(result: TuneResult, command: str) -> Iterator[Path]:
     text = json.dumps(to_json(result, command), indent=2, allow_nan=False, default=str)
     write_text(folder / RESULTS, text + "\n")
     yield folder / RESULTS
-    yield _write_report(result, command)
+    yield _write_report(result, command, pictures)
+    if pictures is not None:
+        yield pictures
 
 
-def _write_report(result: TuneResult, command: str) -> Path:
+def _write_report(result: TuneResult, command: str, pictures: Optional[Path]) -> Path:
     """Write the report; the import is local because matplotlib loads slowly."""
     from quad_nav.report.page import write_page
     from quad_nav.tuning.report.tune_page import tune_page
@@ -55,7 +60,7 @@ def _write_report(result: TuneResult, command: str) -> Path:
         _traced(result, name, assignments)
         for name, assignments in (("base", ()), ("tuned", result.assignments))
     )
-    write_page(tune_page(result, before, after, command), path)
+    write_page(tune_page(result, before, after, command), path, pictures)
     return path
 
 

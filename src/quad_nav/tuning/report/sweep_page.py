@@ -3,52 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, List, Optional, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from quad_nav.report import style
 from quad_nav.report.page import Page, Section, picture, render
-from quad_nav.report.style import ALARM, QUIET, colour, new_figure
-from quad_nav.tuning.statistics import FlightStatistics
+from quad_nav.report.style import ALARM, QUIET, colour, label_log, new_figure
+from quad_nav.tuning.report.sweep_measures import (
+    EXPLANATIONS,
+    MEASURES,
+    Estimate,
+    Measure,
+    axis_note,
+    is_log,
+    is_numeric,
+    point_text,
+    starts_at_zero,
+)
+from quad_nav.tuning.report.sweep_plot import sweep_plot
 from quad_nav.tuning.study_text import format_value
 from quad_nav.tuning.sweep import SweepRow, SweepSetup
 from quad_nav.versions import versions
 
-
-class Measure(NamedTuple):
-    """Measure of a panel; ``decimals`` is that of the numbers in a map."""
-
-    title: str
-    more_is_better: bool
-    decimals: int
-    value: Callable[[FlightStatistics], Optional[float]]
-
-    @property
-    def is_percentage(self) -> bool:
-        """True if the values are percentages."""
-        return self.title.endswith("(%)")
-
-
-MEASURES: Tuple[Measure, ...] = (
-    Measure(
-        "Completed missions (%)",
-        True,
-        0,
-        lambda flights: 100.0 * flights.completed / flights.flights,
-    ),
-    Measure(
-        "Flights with contacts (%)",
-        False,
-        0,
-        lambda flights: 100.0 * flights.touched / flights.flights,
-    ),
-    Measure("Mean mission time (s)", False, 1, lambda flights: flights.mean_time_s),
-    Measure("Min gap (m)", True, 2, lambda flights: flights.least_gap_m),
-)
+_COLUMNS = 2
 _MAX_NUMBERS = 100  # largest map with numbers in its cells
 _MAX_LABELS = 30
 _MAX_LETTERS = 36  # longest label of a point
@@ -58,41 +38,59 @@ def sweep_picture(rows: Sequence[SweepRow]) -> Figure:
     """Draw one panel for each measure."""
     paths = list(rows[0].point)
     axis_values = [list(dict.fromkeys(row.point[path] for row in rows)) for path in paths]
-    if len(paths) == 1:
-        figure = new_figure(4.6)
-        for axes, measure in zip(figure.subplots(2, 2, sharex=True).flat, MEASURES):
+    lines = -(-len(MEASURES) // _COLUMNS)
+    if len(paths) == 1 and is_numeric(axis_values[0]):
+        figure = new_figure(2.3 * lines)
+        for axes, measure in zip(figure.subplots(lines, _COLUMNS, sharex=True).flat, MEASURES):
             _draw_curve(axes, rows, paths[0], measure)
+        for axes in figure.axes[-_COLUMNS:]:
+            axes.set_xlabel(paths[0])
     elif len(paths) == 2 and len(rows) == len(axis_values[0]) * len(axis_values[1]):
-        figure = new_figure(1.6 + 0.75 * max(len(axis_values[0]), 4))
-        for axes, measure in zip(figure.subplots(2, 2).flat, MEASURES):
+        figure = new_figure(0.6 + lines * (0.7 + 0.4 * max(len(axis_values[0]), 3)))
+        for axes, measure in zip(figure.subplots(lines, _COLUMNS).flat, MEASURES):
             _draw_map(figure, axes, rows, axis_values, measure)
         figure.supxlabel(paths[1], fontsize=9)
         figure.supylabel(paths[0], fontsize=9)
     else:
-        figure = new_figure(1.4 + 0.24 * len(rows))
-        panels = figure.subplots(1, len(MEASURES), sharey=True)
-        for axes, measure in zip(panels, MEASURES):
+        figure = new_figure(lines * (0.6 + 0.2 * len(rows)))
+        for axes, measure in zip(figure.subplots(lines, _COLUMNS, sharey=True).flat, MEASURES):
             _draw_list(axes, rows, measure)
     return figure
 
 
 def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measure) -> None:
-    places, labels = _places([row.point[path] for row in rows])
-    found = [measure.value(row.statistics) for row in rows]
-    axes.plot(
-        places, [np.nan if value is None else value for value in found], "o-", color=colour(0)
-    )
-    if measure.title.startswith("Mean"):  # also each flight
-        for place, row in zip(places, rows):
-            times_s = [flight.time_s for flight in row.flights if flight.completed]
-            axes.plot([place] * len(times_s), times_s, ".", ms=4, color=QUIET, alpha=0.6, zorder=1)
+    """Draw the flights, and the measure with its interval, over numbers."""
+    places = [float(row.point[path]) for row in rows]
+    for place, row in zip(places, rows):
+        each = measure.of_flights(row.flights)
+        axes.plot([place] * len(each), each, ".", ms=4, color=QUIET, alpha=0.6, zorder=1)
+    found = [measure.estimate(row.flights) for row in rows]
+    shown = [(place, one) for place, one in zip(places, found) if one.value is not None]
+    if shown:
+        axes.errorbar(
+            [place for place, _ in shown],
+            [one.value for _, one in shown],
+            yerr=_errors([one for _, one in shown]),
+            fmt="o-",
+            capsize=3,
+            elinewidth=1.0,
+            color=colour(0),
+            zorder=3,
+        )
     axes.set_title(measure.title)
-    axes.set_xlabel(path)
-    if labels:
-        axes.set_xticks(places)
-        axes.set_xticklabels(labels)
-    if measure.is_percentage:
-        axes.set_ylim(-5, 105)
+    axes.set_ylim(0.0, 105.0 if measure.is_percentage else None)
+    if is_log(places):
+        axes.set_xscale("log")
+        label_log(axes.xaxis)
+    elif starts_at_zero(places):
+        axes.set_xlim(left=0.0)
+
+
+def _errors(found: Sequence[Estimate]) -> Optional[NDArray[np.float64]]:
+    """Return how far the intervals reach below and above the values, shape (2, k), if any."""
+    if all(one.low is None for one in found):
+        return None
+    return np.array([one.reach() for one in found]).T
 
 
 def _draw_map(
@@ -103,12 +101,13 @@ def _draw_map(
     measure: Measure,
 ) -> None:
     cells = _cells(rows, values, measure)
-    low, high = (0.0, 100.0) if measure.is_percentage else (None, None)
+    known = cells[np.isfinite(cells)]
+    high = 100.0 if measure.is_percentage else float(known.max(initial=1e-9))
     image = axes.imshow(
         cells,
         aspect="auto",
         origin="lower",
-        vmin=low,
+        vmin=0.0,
         vmax=high,
         cmap="RdYlGn" if measure.more_is_better else "RdYlGn_r",
         alpha=0.85,
@@ -135,7 +134,7 @@ def _cells(
     cells = np.full((len(values[0]), len(values[1])), np.nan)
     first, second = list(rows[0].point)
     for row in rows:
-        value = measure.value(row.statistics)
+        value = measure.estimate(row.flights).value
         place = (values[0].index(row.point[first]), values[1].index(row.point[second]))
         cells[place] = np.nan if value is None else value
     return cells
@@ -148,43 +147,38 @@ def _ink(rgba: NDArray[Any]) -> str:
 
 
 def _draw_list(axes: Axes, rows: Sequence[SweepRow], measure: Measure) -> None:
-    found = [measure.value(row.statistics) for row in rows]
+    found = [measure.estimate(row.flights) for row in rows]
     is_alarming = measure.title.startswith("Flights with")
     axes.barh(
         range(len(rows)),
-        [0.0 if value is None else value for value in found],
+        [one.value or 0.0 for one in found],
+        xerr=_errors(found),
         height=0.65,
+        capsize=2,
+        error_kw={"elinewidth": 0.9},
         color=ALARM if is_alarming else colour(0),
     )
     axes.set_title(measure.title, fontsize=8)
     axes.set(ylim=(len(rows) - 0.4, -0.6), yticks=range(len(rows)))
-    labels = [", ".join(map(format_value, row.point.values()))[:_MAX_LETTERS] for row in rows]
+    labels = [point_text(list(row.point.values()))[:_MAX_LETTERS] for row in rows]
     axes.set_yticklabels(labels if len(rows) <= _MAX_LABELS else [""] * len(rows))
     axes.grid(axis="y", visible=False)
-    if measure.is_percentage:
-        axes.set_xlim(0, 105)
-
-
-def _places(values: Sequence[Any]) -> Tuple[List[float], List[str]]:
-    """Return positions on the axis, and labels unless the values are numbers."""
-    if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
-        return [float(value) for value in values], []
-    return [float(k) for k in range(len(values))], list(map(format_value, values))
+    axes.set_xlim(0.0, 105.0 if measure.is_percentage else None)
 
 
 _FOLDER = Path(__file__).parent
 
 
 def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
-    """Build the page with pictures and table."""
-    with style.styled():
-        section = Section(
-            "sweep",
-            "Comparison",
-            f"Flights per point: {setup.flights}, equal for all points. A gap is the smaller of "
-            "clearance and separation. Times are those of completed missions.",
-            (picture("sweep", "Statistics over the values", sweep_picture(rows)),),
-        )
+    """Build the page with plot and table."""
+    section = Section(
+        "sweep",
+        "Comparison",
+        f"Flights per point: {setup.flights}, with the same missions and seeds at each point. "
+        f"{_drawn(rows)}",
+        plots=(sweep_plot(rows),),
+        paper=(picture("sweep", "Measures over the values", lambda: sweep_picture(rows)),),
+    )
     return render(
         "sweep.html.jinja",
         [section],
@@ -192,5 +186,29 @@ def sweep_page(setup: SweepSetup, rows: Sequence[SweepRow]) -> Page:
         setup=setup,
         rows=rows,
         words=format_value,
+        explanations=EXPLANATIONS,
         versions=versions(),
     )
+
+
+def _drawn(rows: Sequence[SweepRow]) -> str:
+    """Say what the panels show, and where their axes start."""
+    intervals = (
+        "95 % intervals, Wilson's for shares and the bootstrap's for means. Values whose intervals "
+        "overlap may differ by chance."
+    )
+    paths = list(rows[0].point)
+    values = [
+        list({repr(row.point[path]): row.point[path] for row in rows}.values()) for path in paths
+    ]
+    if len(paths) == 1 and is_numeric(values[0]):
+        return (
+            f"Vertical axes start at 0. {axis_note(paths[0], values[0])} Grey dots are single "
+            f"flights, thin lines are {intervals}"
+        )
+    if len(paths) == 2 and len(rows) == len(values[0]) * len(values[1]):
+        return (
+            "Colours start at 0, green is better. A cell has the value above its interval; an "
+            f"empty cell has no completed mission. These are {intervals}"
+        )
+    return f"Bars start at 0, thin lines are {intervals}"
