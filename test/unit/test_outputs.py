@@ -163,12 +163,12 @@ def test_a_full_disk_names_what_is_kept_of_an_mcap_file(tmp_path):
                 ("--json", "x.json"),
                 ("--csv", "x.csv"),
                 ("--report", "x.html"),
-                ("--png", "x"),
+                ("--pictures", "x"),
             )
         ),
         ("tune", "--output", "x"),
         ("report flight.bag", "--output", "x.html"),
-        ("report flight.bag", "--png", "x"),
+        ("report flight.bag", "--pictures", "x"),
         ("report flight.bag", "--animate", "x.gif"),
     ],
 )
@@ -254,7 +254,7 @@ def on_paper(tmp_path, monkeypatch):
 
 def test_a_sweep_prints_what_it_cannot_write(tmp_path, on_paper, full_disk):
     over = ("--over", "TrajectoryPlannerROS/max_vel_x=0.3,0.4", "--flights", "2")
-    files = [("--json", "x.json"), ("--csv", "x.csv"), ("--report", "x.html"), ("--png", "x")]
+    files = [("--json", "x.json"), ("--csv", "x.csv"), ("--report", "x.html"), ("--pictures", "x")]
     given = [word for option, name in files for word in (option, tmp_path / name)]
     done = run("sweep", *on_paper, *over, *given)
     assert done.exit_code == 1

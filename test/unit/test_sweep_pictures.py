@@ -61,7 +61,7 @@ def test_map_over_two_parameters():
         "Mean mission time (s)": ["20.5", "31.0", "10.5", "–"],
         "Min gap (m)": ["0.13", "0.20", "0.05", "0.00"],
         "Roughness (m/s²)": ["0.00"] * 4,
-        # The third: 30 s, 32 s and 50 s over 6 m, 0.333 for each gap, 7500 for a goal, 50 for a contact.
+        # (1, 2): 30, 32 and 50 s over 6 m, 1/3 for each gap, 7500 for a goal, 50 for a contact.
         "Cost": ["3.71", "2523.22", "2.33", "10085.99"],
     }
     for axes in shown.values():
