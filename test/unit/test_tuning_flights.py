@@ -23,6 +23,7 @@ from study_flights import (
     tune_setup,
     write_mission,
 )
+from test_report_page import assert_loads_nothing
 
 from quad_nav import config
 from quad_nav.barn.protocol import Outcome
@@ -212,6 +213,8 @@ def tune_arguments(folder):
         "1",
         "--output",
         str(folder / "out"),
+        "--pictures",
+        str(folder / "pictures"),
     ]
 
 
@@ -227,8 +230,12 @@ def test_tune_from_the_command_line_and_again(tmp_path):
     assert written["TrajectoryPlannerROS"]["vtheta_samples"] == 8  # the value of --set
     assert "quad" in (tmp_path / "out" / "config" / "STUDY.md").read_text()
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") >= 7
-    assert "http://" not in page and "https://" not in page
+    assert page.count("data:image/png;base64,") >= 5
+    for name in ("held_out", "history", "pareto"):
+        assert f'id="figure-plot-{name}"' in page
+        assert (tmp_path / "pictures" / f"{name}.svg").exists()
+    assert "Not distinguishable from chance with 1 flight" in page or "Base kept" in page
+    assert_loads_nothing(page)
 
     again = CliRunner().invoke(tune, arguments)
     assert again.exit_code == 0

@@ -134,8 +134,13 @@ def _draw_pairs(
         shift_k = -0.16 + 0.32 * k / max(len(pairs) - 1, 1)
         axes.plot([shift_k, 1 + shift_k], pair, color=QUIET, lw=0.5, alpha=0.5, zorder=2)
     axes.set(xticks=(0, 1), xlim=(-0.5, 1.5))
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]) if _has_negative(pairs) else 0.0)
     axes.set_xticklabels(["base", "tuned"])
     axes.grid(axis="x", visible=False)
+
+
+def _has_negative(pairs: Sequence[Tuple[float, float]]) -> bool:
+    return any(value < 0.0 for pair in pairs for value in pair)
 
 
 def _symbol(marker: str, label: str, face: Any, edge: Any = "white", size: float = 6) -> Line2D:

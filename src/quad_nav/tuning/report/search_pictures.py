@@ -121,6 +121,16 @@ def slice_picture(
     return figure
 
 
+def cost_axis(trials: Sequence[FrozenTrial], reference: float) -> Tuple[float, float]:
+    """Return the ends of the axis of costs, which does not start at 0."""
+    return _bottom(trials, reference), _top(trials, reference)
+
+
+def is_off_scale(trial: FrozenTrial, top: float) -> bool:
+    """Return true if a cost is drawn at the axis's upper end."""
+    return _value(trial) >= top
+
+
 def _draw_costs(
     axes: Axes, places: Sequence[float], trials: Sequence[FrozenTrial], top: float
 ) -> None:

@@ -65,12 +65,12 @@ def _draw_curve(axes: Axes, rows: Sequence[SweepRow], path: str, measure: Measur
         each = measure.of_flights(row.flights)
         axes.plot([place] * len(each), each, ".", ms=4, color=QUIET, alpha=0.6, zorder=1)
     found = [measure.estimate(row.flights) for row in rows]
-    shown = [(place, one) for place, one in zip(places, found) if one.value is not None]
+    shown = [(place, one.value, one) for place, one in zip(places, found) if one.value is not None]
     if shown:
         axes.errorbar(
-            [place for place, _ in shown],
-            [one.value for _, one in shown],
-            yerr=_errors([one for _, one in shown]),
+            [place for place, _, _ in shown],
+            [value for _, value, _ in shown],
+            yerr=_errors([one for _, _, one in shown]),
             fmt="o-",
             capsize=3,
             elinewidth=1.0,

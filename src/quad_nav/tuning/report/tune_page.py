@@ -21,6 +21,7 @@ from quad_nav.tuning.report.search_pictures import (
     importances,
     slice_picture,
 )
+from quad_nav.tuning.report.tune_plots import held_out_plot, history_plot, pareto_plot
 from quad_nav.tuning.score import TERMS
 from quad_nav.tuning.search import is_complete
 from quad_nav.tuning.statistics import STATISTICS, FlightStatistics, flight_statistics
@@ -65,9 +66,10 @@ def _held_out(result: TuneResult) -> Section:
         "held-out",
         "Held-out flights",
         f"{len(held_out.cases)} flights with each set of parameters. A line connects flights of "
-        "the same mission and seed, thick bars are means. A gap is the smaller of clearance and "
-        "separation.",
-        (
+        "the same mission and seed, black bars are means with their 95 % intervals. Vertical axes "
+        "start at 0. A gap is the smaller of clearance and separation.",
+        plots=(held_out_plot(result),),
+        paper=(
             picture(
                 "held_out",
                 "Times and gaps of the base and the tuned parameters",
@@ -114,8 +116,10 @@ def _history(result: TuneResult, reference: FlightStatistics) -> Section:
     return Section(
         "history",
         "Search",
-        "Mean cost of each candidate; lower is better. Pruned candidates did not fly all flights.",
-        (picture("history", "Cost of each candidate", plot),),
+        "Mean cost of each candidate; lower is better. Pruned candidates did not fly all flights. "
+        "The vertical axis does not start at 0; costs above it, of failed missions, are red.",
+        plots=(history_plot(result, reference.cost),),
+        paper=(picture("history", "Cost of each candidate", plot),),
     )
 
 
@@ -147,14 +151,16 @@ def _slices(result: TuneResult, reference: FlightStatistics, order: Sequence[str
         "slices",
         "Values",
         "Value and cost of each candidate, for each searched parameter. There is no line for the "
-        "tuned value where the base's value was kept.",
+        "tuned value where the base's value was kept. Axes do not start at 0.",
         (picture("slices", "Cost over the values of each parameter", plot),),
     )
 
 
 def _pareto(result: TuneResult, reference: FlightStatistics) -> Section:
     complete = [trial for trial in result.trials if is_complete(trial)]
-    candidates = [FlightStatistics(**trial.user_attrs[STATISTICS]) for trial in complete]
+    candidates = {
+        trial.number: FlightStatistics(**trial.user_attrs[STATISTICS]) for trial in complete
+    }
     gains = result.refined.gains
     tuned = gains[0].with_it if gains else reference
     return Section(
@@ -162,12 +168,14 @@ def _pareto(result: TuneResult, reference: FlightStatistics) -> Section:
         "Time against gap",
         f"{len(candidates)} candidates completed all flights. The plot shows those that reached "
         "every goal without contact. No candidate beats one of the front in both time and gap. "
-        "The tuned parameters have flown more flights than the others.",
-        (
+        "The tuned parameters have flown more flights than the others. The axis of the time does "
+        "not start at 0.",
+        plots=(pareto_plot(candidates, reference, tuned),),
+        paper=(
             picture(
                 "pareto",
                 "Mean time and smallest gap of candidates",
-                pareto_picture(candidates, reference, tuned),
+                pareto_picture(list(candidates.values()), reference, tuned),
             ),
         ),
     )
