@@ -139,8 +139,7 @@ def tune(
     """Search for parameters that fly better, without ROS.
 
     Every candidate flies the same flights. The best parameters are written to --output as
-    move_base's files, with the study and a report. The same command resumes an interrupted study;
-    no flight is flown twice.
+    move_base's files, with the study and a report. The same command resumes an interrupted study.
 
     Exit status: 0, 1 if workers die repeatedly or an output cannot be written, 2 for invalid input,
     130 after Ctrl-C.

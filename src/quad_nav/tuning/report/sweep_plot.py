@@ -55,18 +55,7 @@ def _panels(rows: Sequence[SweepRow], draw: Any, panel_px: int, xlabel: str) -> 
             "anchor": f"x{suffix}",
         }
         traces += [{**trace, "xaxis": f"x{suffix}", "yaxis": f"y{suffix}"} for trace in found]
-        titles.append(
-            {
-                "text": f"<b>{measure.title}</b>",
-                "xref": "paper",
-                "yref": "paper",
-                "x": _COLUMNS[column][0],
-                "y": top,
-                "xanchor": "left",
-                "yanchor": "bottom",
-                "showarrow": False,
-            }
-        )
+        titles.append(_title(measure, _COLUMNS[column][0], top))
     margin = {"l": 56, "r": 12, "t": _TOP_PX, "b": _BOTTOM_PX}
     return Plot(
         "sweep",
@@ -75,6 +64,20 @@ def _panels(rows: Sequence[SweepRow], draw: Any, panel_px: int, xlabel: str) -> 
         layout(**axes, annotations=titles, showlegend=False, margin=margin),
         height_px=plot_px + _TOP_PX + _BOTTOM_PX,
     )
+
+
+def _title(measure: Measure, x: float, y: float) -> Json:
+    """Return the title of a panel whose upper left corner is at (x, y) of the paper."""
+    return {
+        "text": f"<b>{measure.title}</b>",
+        "xref": "paper",
+        "yref": "paper",
+        "x": x,
+        "y": y,
+        "xanchor": "left",
+        "yanchor": "bottom",
+        "showarrow": False,
+    }
 
 
 def _curve(

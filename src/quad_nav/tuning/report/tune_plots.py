@@ -192,10 +192,7 @@ def pareto_plot(
 ) -> Plot:
     """Build mean time against smallest gap, of candidates without a failed flight.
 
-    Args:
-        candidates: Statistics by the number of the candidate.
-        base: Statistics of the base.
-        tuned: Statistics of the tuned parameters.
+    ``candidates`` holds statistics by the number of the candidate.
     """
     clean: List[Tuple[int, Place]] = [
         (number, found)
