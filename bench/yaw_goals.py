@@ -73,6 +73,21 @@ class YawResult:
     contacts: int
     faults: Tuple[str, ...]
 
+    def __str__(self) -> str:
+        yaws = [one.yaw_rad for one in self.reached if one.yaw_rad is not None]
+        distance_m = max((one.distance_m for one in self.reached), default=math.nan)
+        parts = [
+            f"{sum(one.is_within for one in self.reached)} of {len(self.leg_s)} in tolerance",
+            f"{self.time_s:.1f} s",
+            f"{sum(self.leg_s) / len(self.leg_s):.2f} s per goal",
+            f"at most {distance_m:.3f} m",
+            *([f"{max(yaws):.4f} rad"] if yaws else []),
+            f"{self.resent} sent again",
+            f"{self.contacts} contacts",
+            *self.faults,
+        ]
+        return f"seed {self.seed}{' with yaws' * self.has_yaws}: {', '.join(parts)}"
+
 
 class Errors(FlightObserver):
     """Measures the bodies whenever a goal counts as reached."""
@@ -201,8 +216,8 @@ def main(config: str, seeds: int, first_seed: int, jobs: int) -> None:
     results = fly_all(LocalWorkers(jobs), fly_mission, tasks)
     for _, one in track(results, "flights", total=len(tasks), disable=not sys.stderr.isatty()):
         flights.append(one)
-        for fault in one.faults:
-            print(f"seed {one.seed}: {fault}", file=sys.stderr, flush=True)
+        if one.faults or not sys.stderr.isatty():
+            print(one, file=sys.stderr, flush=True)
     rows = [row([one for one in flights if one.has_yaws is yaws]) for yaws in (True, False)]
     print(f"Yaws offline, config {config}, seeds {first_seed} to {first_seed + seeds - 1}")
     print(tabulate.tabulate(rows, HEADER, disable_numparse=True, stralign="right"))
