@@ -78,6 +78,15 @@ def test_a_good_flight():
     html = flight_page(good).html
     assert "Mission completed" in html and "real-time factor" not in html
     assert "No contact with an obstacle" in html
+    assert "yaw error" not in html
+
+
+def test_goals_with_a_yaw_have_its_error():
+    turned = replace(goal(0, (4.0, 1.0), 0.0, 10.0), yaw_error_rad=-0.12)
+    both = (turned, goal(1, (4.0, 1.0), 10.0, 12.0))
+    html = flight_page(flight(robot(0, (1.0, 1.0), (0.3, 0.0), goals=both))).html
+    assert '<th class="n">yaw error (rad)</th>' in html
+    assert '<td class="n">-0.12</td>' in html
 
 
 @pytest.mark.parametrize(
