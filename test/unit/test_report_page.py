@@ -172,6 +172,13 @@ def test_animation_in_the_page():
     assert [step["args"][0] for step in steps] == [[frame["name"]] for frame in figure["frames"]]
 
 
+def test_no_button_uploads_a_plot():
+    """plotly.js 4 has one, on by default."""
+    config = json.loads(re.search(r"const config = ({.*?});", plot_scripts().texts[1]).group(1))
+    assert config["showSendToCloud"] is False and config["plotlyServerURL"] == ""
+    assert "sendChartToCloud" in config["modeBarButtonsToRemove"]
+
+
 def test_names_of_others_stay_text():
     """A name cannot end the script, add tags to a plot, or use plotly's own templates."""
     odd = "</script><b>%{x}<!--"

@@ -192,10 +192,13 @@ def _hash(text: str) -> str:
 
 
 _CONFIG: Mapping[str, Any] = {
+    # plotly.js 4 has a button that uploads the plot, which is on by default.
+    "showSendToCloud": False,
+    "plotlyServerURL": "",
     "responsive": True,
     "displaylogo": False,
     "displayModeBar": True,
-    "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+    "modeBarButtonsToRemove": ["sendChartToCloud", "select2d", "lasso2d", "autoScale2d"],
     "toImageButtonOptions": {"format": "svg"},
 }
 # The paper is narrower than the screen; a plot has to be drawn again before it is printed.
