@@ -44,7 +44,7 @@ class Offline(FlightCase):
         self.assertEqual((offline["success"], len(offline["contacts"])), (True, 0), offline)
         facts = offline_facts(options, setup)
         self.assertEqual(on_ros["command"][0], "rostest")
-        # A launch file also sets how many robots there are.
+        # A launch file also sets the robot's number and how many robots there are.
         offline_values, ros_values = (
             {
                 (one["parameter"], str(one["value"]))
@@ -54,7 +54,8 @@ class Offline(FlightCase):
         )
         self.assertEqual(offline_values - ros_values, set())
         self.assertEqual(
-            {name for name, _ in ros_values} - {name for name, _ in offline_values}, {"robots"}
+            {name for name, _ in ros_values} - {name for name, _ in offline_values},
+            {"robot", "robots"},
         )
         self.assertEqual(on_ros["configuration"]["name"], "default")
         self.assertEqual(on_ros["scene"]["size_m"], facts["scene"]["size_m"])
