@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint docs rostest ray conformance fuzz bench bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 lint docs rostest first-hour ray conformance fuzz bench bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
@@ -18,7 +18,7 @@ help:  ## List the targets
 fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
 	@scripts/ros_env scripts/fly $(ARGS)
 
-test: unit unit38 lint docs rostest  ## Run every test and static check
+test: unit unit38 lint docs rostest first-hour  ## Run every test and static check
 	@echo "quad: all tests passed"
 
 unit: venv  ## The unit tests
@@ -43,6 +43,9 @@ docs: venv  ## The documentation as a site, in site/; warnings are errors
 
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 	@scripts/ros_env scripts/rostests $(TEST)
+
+first-hour: workspace  ## What a user does first: an own scene, map, robot, goals and report
+	@test/first_hour.sh
 
 # Not in `make test`: Ray is an extra, 70 MB. The cluster is on this machine.
 ray: packages  ## The tests with a Ray cluster, in an environment of their own

@@ -1,0 +1,54 @@
+#!/usr/bin/env bash
+# first_hour.sh
+#
+# Runs what a user does in the first hour with an own scene, world, map, robot and goals: one command
+# for each, as in the README. Flights with ROS have a roscore of their own. Ends at the first
+# command that fails.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+
+quad() {
+    echo "+ quad $*"
+    .venv/bin/quad "$@" >"$out/log" 2>&1 || { local status=$?; cat "$out/log"; return $status; }
+}
+
+fly_with_ros() {
+    echo "+ make fly ARGS=\"$*\""
+    scripts/ros_env scripts/fly rviz:=false rate:=8 "$@" >"$out/log" 2>&1 ||
+        { local status=$?; cat "$out/log"; return $status; }
+}
+
+# Before anything flies
+quad preview --scene scenes/examples/workshop.yaml --goals goals/examples/workshop -o "$out/mission.png"
+quad preview --robots 8 -o "$out/fleet.html"
+
+# A scene, a Gazebo world and a map
+quad fly --scene scenes/examples/workshop.yaml --goals goals/examples/workshop
+quad fly --scene scenes/examples/depot.world --goals goals/examples/depot
+quad fly --scene scenes/examples/office.yaml --goals goals/examples/office
+fly_with_ros scene:=scenes/examples/depot.world goals:=goals/examples/depot
+
+# Configurations of four robots: alternatives, other names, variants in folders, a launch file
+for robot in compact:small outdoor/config:map service:tall field/launch/navigation.launch; do
+    quad check "test/robots/$robot"
+    quad fly --config "test/robots/$robot" --goals goals/examples/arena
+done
+fly_with_ros config:="$PWD/test/robots/compact:small" goals:=goals/examples/arena
+
+# Goals with yaws and stays
+mkdir "$out/goals"
+echo '{"goals": [[3.0, 4.5, 1.57], {"x": 3.0, "y": 6.5, "yaw": -1.57, "wait_s": 2}]}' \
+    >"$out/goals/quad0_goals.json"
+echo '{"goals": [[9.0, 3.5, 0.0], {"x": 9.0, "y": 5.0, "yaw": null}]}' >"$out/goals/quad1_goals.json"
+quad fly --goals "$out/goals" --json "$out/yaws.json"
+
+# Reports of a flight and of a comparison
+quad fly --goals goals/examples/arena --record "$out/default.bag" --report "$out/default.html"
+quad fly --goals goals/examples/arena --config tutorial --record "$out/tutorial.bag"
+quad report "$out/default.bag" "$out/tutorial.bag" -o "$out/comparison.html" --pictures "$out/pictures"
+for file in mission.png fleet.html yaws.json default.html comparison.html pictures; do
+    [ -s "$out/$file" ] || { echo "quad: $file was not written" >&2; exit 1; }
+done
+echo "quad: the first hour works"
