@@ -3,7 +3,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import tempfile
 import unittest
@@ -53,24 +52,27 @@ class Preflight(unittest.TestCase):
 
     def test_goals_off_the_global_costmap_are_refused(self):
         with tempfile.TemporaryDirectory() as folder:
-            config = os.path.join(folder, "config")
-            shutil.copytree(os.path.join(QUAD, "config", "default"), config)
-            path = os.path.join(config, "global_costmap_params.yaml")
-            with open(path, encoding="utf-8") as file:
-                text = file.read()
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(text.replace("height: 12.0", "height: 3.0"))
+            own = os.path.join(folder, "own.yaml")
+            with open(own, "w", encoding="utf-8") as file:
+                file.write("global_costmap: {height: 3.0}\n")
             for nav in ("quad", "move_base"):
-                status, errors = preflight(f"config:={config}", f"nav:={nav}")
+                status, errors = preflight(f"override0:={own}", f"nav:={nav}")
                 self.assertEqual(status, 2)
                 self.assertIn("quad0_goals.json: goals[0] (goal 1)", errors)
                 self.assertIn("is off the global costmap, x 0 to 12 m, y 0 to 3 m", errors)
+                size = "{width: 12, height: 12, origin_x: 0, origin_y: 0}\n"
+                self.assertTrue(errors.endswith(f"robot0.yaml global_costmap: {size}"), errors)
+                with open(own, "w", encoding="utf-8") as file:
+                    file.write(f"global_costmap: {size}")
+                self.assertEqual(preflight(f"override0:={own}", f"nav:={nav}")[0], 0)
+                with open(own, "w", encoding="utf-8") as file:
+                    file.write("global_costmap: {height: 3.0}\n")
 
     def test_unreadable_parameters_are_listed_with_the_other_faults(self):
         with tempfile.TemporaryDirectory() as folder:
             status, errors = preflight(f"config:={folder}", "goals:=/nowhere")
         self.assertEqual(status, 2)
-        self.assertIn(f"{folder}: missing local_costmap_params.yaml or ", errors)
+        self.assertEqual(errors.count(f"{folder}: no move_base parameters found"), 1)
         self.assertIn("goals: folder /nowhere does not exist", errors)
         self.assertNotIn("costmap, x", errors)
 
