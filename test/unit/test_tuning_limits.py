@@ -138,7 +138,7 @@ def test_the_tuned_files_keep_the_robots_limits(tmp_path):
     setup, result = study(tmp_path, free_speed=False)
     assert setup.held["TrajectoryPlannerROS/max_vel_x"] == 0.22
     assert "TrajectoryPlannerROS/vx_samples" in result.refined.values
-    write_parameters(setup.base_folder, tmp_path / "tuned", changes(result))
+    write_parameters(setup.base_source, tmp_path / "tuned", changes(result))
     before, after = (
         config.load_files(folder, {"i": "0"})["TrajectoryPlannerROS"]
         for folder in (tmp_path / "robot", tmp_path / "tuned")
