@@ -72,11 +72,6 @@ def problems(tree):
             "max_planning_retries: 'many' is not a number; expected a whole number",
         ),
         (
-            {"TrajectoryPlannerROS": {"y_vels": [-0.3, 0.3]}},
-            "TrajectoryPlannerROS/y_vels: [-0.3, 0.3] is not a string; expected numbers of m/s"
-            " separated by commas",
-        ),
-        (
             {"TrajectoryPlannerROS": {"pdist_scale": "high"}},
             "TrajectoryPlannerROS/pdist_scale: 'high' is not a number; expected a number, 0 or"
             " more",

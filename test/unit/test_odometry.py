@@ -219,7 +219,7 @@ def test_a_flight_that_drifts_is_the_same_in_two_processes(tmp_path):
 def test_goals_off_a_costmap_that_drifts_are_not_refused(tmp_path):
     """The costmap moves in the map, so its bounds in the map are not fixed."""
     config = configuration(tmp_path / "config", "odom$(arg i)", "map")
-    small = (("global_costmap/width", 2.5), ("global_costmap/height", 2.5))
+    small = (("global_costmap/width", 2), ("global_costmap/height", 2))
     with pytest.raises(InputError, match="is off the global costmap"):
         setup(tmp_path, config=config, parameters=small)
     setup(

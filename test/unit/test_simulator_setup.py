@@ -56,7 +56,7 @@ def test_every_fault_is_listed():
     "parameters, problem",
     [
         ({"robots": 9}, "simulator: robots: 9, expected 1 to 8, the start poses of scene arena"),
-        ({"robots": True}, "simulator: robots: is True; expected a whole number, 1 or more"),
+        ({"robots": True}, "simulator: robots: is True; expected a whole number, 1 to 100"),
         ({"lidar": "gazebo"}, "simulator: lidar: is 'gazebo'; expected kernel or bullet"),
         (
             {"scan_range": 3.0, "step_size": 4.0},
