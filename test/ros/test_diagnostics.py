@@ -66,9 +66,9 @@ class Diagnostics(FlightCase):
         changes = [
             line
             for line in self.log
-            if line.startswith("move_base0: inputs: ")
+            if line.startswith("quad0: inputs: ")
             and "/scan0" in line
-            or line.startswith("move_base0: inputs: ERROR -> OK")
+            or line.startswith("quad0: inputs: ERROR -> OK")
         ]
         down = [line for line in changes if "OK -> ERROR: no message on /scan0" in line]
         self.assertEqual((len(down), len([x for x in changes if "ERROR -> OK" in x])), (1, 1))
