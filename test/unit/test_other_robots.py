@@ -204,7 +204,17 @@ def test_the_only_planner_with_parameters_is_flown(tmp_path):
         "mapped: dwa_local_planner/DWAPlannerROS, the only one with parameters"
     )
     both = "{DWAPlannerROS: {max_vel_x: 0.4}, TrajectoryPlannerROS: {max_vel_x: 0.4}}"
-    assert "base_local_planner" not in fitted(tree_of(tmp_path, both), 0)
+    tree = fitted(tree_of(tmp_path, both), 0)
+    assert tree["base_local_planner"] == "dwa_local_planner/DWAPlannerROS"
+    assert lines(tree)["base_local_planner"].endswith(
+        "; set base_local_planner=base_local_planner/TrajectoryPlannerROS for the other"
+    )
+    chosen = both[:-1] + ", base_local_planner: base_local_planner/TrajectoryPlannerROS}"
+    assert fitted(tree_of(tmp_path, chosen), 0)["base_local_planner"].endswith(
+        "TrajectoryPlannerROS"
+    )
+    with_teb = both.replace("DWAPlannerROS", "TebLocalPlannerROS")
+    assert "base_local_planner" not in fitted(tree_of(tmp_path, with_teb), 0)
     teb = fitted(tree_of(tmp_path, "TebLocalPlannerROS: {max_vel_x: 0.4}"), 0)
     with pytest.raises(InputError, match="TebLocalPlannerROS is not supported; expected --set"):
         load(teb)

@@ -27,11 +27,12 @@ from quad_nav.footprint import radii
 _OWN_NAME = re.compile(r"/*(?:odom|base_link|Lidar|scan)(\d+)")
 _OWN_TOPICS = ("scan", "/scan")  # move_base{i} has a remap from /scan to /scan{i}
 _CLOUDS = ("PointCloud", "PointCloud2")
+_DWA = "dwa_local_planner/DWAPlannerROS"
 _PLANNERS = {
     "base_local_planner": (
         DEFAULT_LOCAL_PLANNER,
         (
-            "dwa_local_planner/DWAPlannerROS",
+            _DWA,
             "teb_local_planner/TebLocalPlannerROS",
             "eband_local_planner/EBandPlannerROS",
             "mpc_local_planner/MpcLocalPlannerROS",
@@ -131,13 +132,25 @@ class _Fit:
         self._add_remarks(body)
 
     def _choose_planners(self) -> None:
-        """Choose the only planner with parameters: launch files name it beside the YAML."""
+        """Choose the planners that the YAML has parameters for: launch files name them beside it.
+
+        Of both local planners, files have parameters for DWAPlannerROS because it is flown; those
+        for TrajectoryPlannerROS, which is upstream's default, are older ones.
+        """
         for key, (default, others) in _PLANNERS.items():
             found = [name for name in others if isinstance(self.tree.get(plugin_name(name)), dict)]
-            if key not in self.tree and plugin_name(default) not in self.tree and len(found) == 1:
-                set_value(self.tree, key, found[0], "")
-                text = f"{found[0]}, the only one with parameters"
-                self.tree.remarks.append(Remark(key, MAPPED, text))
+            if key in self.tree or len(found) != 1:
+                continue
+            text = f"{found[0]}, the only one with parameters"
+            if plugin_name(default) in self.tree:
+                if found[0] != _DWA:
+                    continue
+                text = (
+                    f"{_DWA}, as launch files of files with parameters for both planners; set "
+                    f"{key}={default} for the other"
+                )
+            set_value(self.tree, key, found[0], "")
+            self.tree.remarks.append(Remark(key, MAPPED, text))
 
     def _costmap(self, name: str) -> Dict[str, Any]:
         if self.tree.get(name) is None:
