@@ -174,12 +174,24 @@ def test_everything_that_cannot_be_flown_is_listed_at_once(tmp_path):
         setup_of(
             write_worlds(tmp_path / "w.npz", w1=cells),
             config="tutorial",
-            parameters=(("local_costmap/base_scan/data_type", "PointCloud2"),),
+            parameters=(
+                ("local_costmap/base_scan/data_type", "PointCloud2"),
+                ("global_costmap/height", 12),
+            ),
         )
     start, sensor, goal = error.value.problems
     assert "world 1: a cylinder is 0.03 m from the start" in start
     assert "data_type PointCloud2; expected LaserScan" in sensor
-    assert "(-2.25, 13) is off the global costmap, x 0 to 12 m" in goal
+    assert "(-2.25, 13) is off the global costmap, x -4.5 to 0.5 m, y 0 to 12 m" in goal
+
+
+def test_the_global_costmap_covers_the_field(tmp_path):
+    path = write_worlds(tmp_path / "w.npz", w1=free())
+    costmap = setup_of(path, config="tutorial").contestant.configuration.global_costmap
+    assert (costmap.origin_x_m, costmap.width_m) == (-4.5, 5.0)  # whole metres
+    assert (costmap.origin_y_m, costmap.height_m) == (2.0, 12.0)
+    own = setup_of(path).contestant.configuration.global_costmap  # config/barn covers it already
+    assert (own.origin_x_m, own.origin_y_m, own.width_m) == (-8.25, 2.0, 12.0)
 
 
 def test_static_maps_are_refused_because_the_worlds_are_unknown(tmp_path):

@@ -16,6 +16,8 @@ from quad_nav.geometry import Pose2D
 START = Pose2D(-2.25, 3.0, math.pi / 2)
 """Start pose in the worlds' frame, which is ``map`` here."""
 GOAL_M: Tuple[float, float] = (-2.25, 13.0)
+AREA: Tuple[float, float, float, float] = (-4.5, 2.0, 0.0, 14.0)
+"""Least x and y, greatest x and y of the field between start and goal, a metre beyond both, m."""
 GOAL_TOLERANCE_M = 1.0
 TIME_LIMIT_S = 100.0
 OPTIMAL_SPEED_MPS = 2.0

@@ -7,7 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, List, Tuple
 
-from quad_nav.barn.protocol import GOAL_M, GOAL_TOLERANCE_M, SAMPLE_STEP, START, TIME_LIMIT_S
+from quad_nav.barn.protocol import (
+    AREA,
+    GOAL_M,
+    GOAL_TOLERANCE_M,
+    SAMPLE_STEP,
+    START,
+    TIME_LIMIT_S,
+)
 from quad_nav.barn.worlds import BarnWorld, load_worlds
 from quad_nav.config import Configuration
 from quad_nav.config.other_robots import sensor_faults
@@ -157,7 +164,7 @@ def _contestant(options: BarnOptions) -> Contestant:
         ]
 
     (configuration,) = read_configurations(
-        options.config, 1, parameters=options.parameters, check=faults, strict=options.strict
+        options.config, 1, AREA, options.parameters, faults, strict=options.strict
     )
     simulation = SimulationParams(
         LIDAR,
