@@ -11,7 +11,9 @@ from quad_nav.topics.health import (
     Control,
     Input,
     Level,
+    LevelChange,
     Loop,
+    change_lines,
     control_health,
     inputs_health,
     logged_name,
@@ -133,3 +135,20 @@ def test_loop_of_one_robot_is_that_robots():
 )
 def test_log_lines_of_a_navigator_begin_with_the_robot(name, hardware_id, logged):
     assert logged_name(name, hardware_id) == logged
+
+
+def test_the_same_change_of_many_robots_is_one_line():
+    slow, blind = "controlling at 6.8 Hz, expected 10 Hz", "no message on /scan1 for 2.0 s"
+    changes = [
+        *(LevelChange(f"quad{n}: control", Level.OK, Level.WARN, slow) for n in range(4)),
+        LevelChange("quad1: inputs", Level.OK, Level.ERROR, blind),
+        LevelChange("fleet0: loop", Level.WARN, Level.OK, "serving 8 robots"),
+        LevelChange("quad7: control", Level.OK, Level.WARN, slow),
+        LevelChange("quad8: control", Level.ERROR, Level.WARN, slow),
+    ]
+    assert change_lines(changes) == [
+        (Level.WARN, f"quad0 to quad3, quad7: control: OK -> WARN: {slow}"),
+        (Level.ERROR, f"quad1: inputs: OK -> ERROR: {blind}"),
+        (Level.OK, "fleet0: loop: WARN -> OK: serving 8 robots"),
+        (Level.WARN, f"quad8: control: ERROR -> WARN: {slow}"),
+    ]

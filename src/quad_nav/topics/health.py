@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Dict, Mapping, Optional, Sequence
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from quad_nav.navigator.tick import State
+from quad_nav.scenario.coverage import robots_text
 
 SLOW_BELOW = 0.8
 """A second is slow if the control rate is below this part of the configured one."""
@@ -167,6 +168,39 @@ def logged_name(name: str, hardware_id: str) -> str:
     """Return a status's name for the log: that of a navigator begins with the robot's name."""
     node, colon, part = name.partition(": ")
     return f"{hardware_id}: {part}" if colon and node.startswith("move_base") else name
+
+
+class LevelChange(NamedTuple):
+    """Change of the level of a status: its name for the log, and its message."""
+
+    name: str
+    before: Level
+    level: Level
+    message: str
+
+
+def change_lines(changes: Sequence[LevelChange]) -> List[Tuple[Level, str]]:
+    """Format changes for the log, one line for all robots with the same change.
+
+    Returns:
+        New level and line of each, in the order of their first robots.
+    """
+    robots: Dict[Tuple[str, LevelChange], List[int]] = {}
+    for change in changes:
+        robot, _, part = change.name.partition(": ")
+        number = robot[len("quad") :] if robot.startswith("quad") else ""
+        name = part if number.isdigit() else change.name
+        alike = robots.setdefault((name, change._replace(name="")), [])
+        if number.isdigit():
+            alike.append(int(number))
+    return [
+        (
+            change.level,
+            f"{robots_text(numbers) + ': ' if numbers else ''}{name}: {change.before.name} -> "
+            f"{change.level.name}: {change.message}",
+        )
+        for (name, change), numbers in robots.items()
+    ]
 
 
 def loop_health(node: str, loop: Loop, robot: str = "") -> Health:

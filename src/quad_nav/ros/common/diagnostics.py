@@ -15,7 +15,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from quad_nav.errors import excerpt
-from quad_nav.topics.health import Health, Level, logged_name
+from quad_nav.topics.health import Health, Level, LevelChange, change_lines, logged_name
 
 PERIOD_S = 1.0  # wall time
 REPEAT_S = 5.0  # wall time
@@ -40,18 +40,16 @@ class DiagnosticsTopic:
 
     def publish(self, array: DiagnosticArray) -> None:
         """Publish all statuses and log those whose level has changed."""
+        changes = []
         for status in array.status:
             before = self._levels.get(status.name)
             self._levels[status.name] = status.level
             if before is not None and before != status.level:
+                name = logged_name(status.name, status.hardware_id)
                 level = Level(status.level)
-                _LOG[level](
-                    "%s: %s -> %s: %s",
-                    logged_name(status.name, status.hardware_id),
-                    Level(before).name,
-                    level.name,
-                    status.message,
-                )
+                changes.append(LevelChange(name, Level(before), level, status.message))
+        for level, line in change_lines(changes):
+            _LOG[level]("%s", line)
         self._publisher.publish(array)
 
 
