@@ -49,7 +49,8 @@ def cost_colours(costs: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def cost_png(costmap: LayeredCostmap) -> bytes:
     """Encode a costmap in RViz's colours as PNG, with y upwards and one pixel for each cell."""
     buffer = io.BytesIO()
-    matplotlib.image.imsave(buffer, cost_colours(costmap.costs)[::-1], format="png")
+    colours = np.ascontiguousarray(cost_colours(costmap.costs)[::-1])  # older matplotlib needs it
+    matplotlib.image.imsave(buffer, colours, format="png")
     return buffer.getvalue()
 
 
