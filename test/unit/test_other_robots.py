@@ -237,3 +237,8 @@ def test_a_body_too_large_for_a_goal_is_refused(tmp_path):
     (tmp_path / "quad0_goals.json").write_text('{"goals": [[1.0, 6.0]]}')
     with pytest.raises(InputError, match="1.00 m from"):
         read_setup(FlightOptions(None, tmp_path, str(tmp_path / "robot.yaml"), robots=1))
+
+
+def test_what_is_left_out_is_told_once(robot):
+    remarks = load(fitted(robot, 0)).remarks
+    assert not [one for one in remarks if "looks like a source" in one.text]

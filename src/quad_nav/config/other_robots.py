@@ -215,8 +215,8 @@ class _Fit:
         seen = False
         for namespace in lists:
             names = namespace["observation_sources"].split()
-            kept = self._kept(namespace, names)
             clouds += [(namespace, one) for one in names if _is_cloud(namespace, one)]
+            kept = self._kept(namespace, names)
             namespace["observation_sources"] = " ".join(kept)
             seen = seen or bool(kept)
         if clouds and not seen:
@@ -234,6 +234,7 @@ class _Fit:
         for namespace, left in clouds:
             data_type = _source(namespace, left).get("data_type", "PointCloud")
             self._sensors[f"{left} ({data_type})"] = None
+            namespace.pop(left, None)
 
     def _kept(self, namespace: Dict[str, Any], names: List[str]) -> List[str]:
         """Return the sources of a layer that the LIDAR serves, mapped.
@@ -249,6 +250,7 @@ class _Fit:
             purposes = {key for key in ("marking", "clearing") if source.get(key, key == "marking")}
             if kept and purposes <= done:
                 self._lasers[name] = None
+                namespace.pop(name, None)
                 continue
             done |= purposes
             kept.append(name)
