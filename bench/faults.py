@@ -279,30 +279,21 @@ def small_disk(folder: Path) -> Iterator[None]:
         subprocess.run(["umount", str(folder)], check=True)
 
 
-def goals_ended(watch: Watch) -> int:
-    """Return the number of goals that have ended so far."""
-    return sum(event["event"] == "ended" for event in watch.events)
-
-
 def fill(disk: Path, watch: Watch, outcome: Outcome) -> None:
-    """Fill the disk for a while; afterwards the journal must be complete.
-
-    A mission that ends on the full disk ends with the journal of the goals before, at least.
-    """
-    before = goals_ended(watch)
+    """Fill the disk for a while; afterwards the journal must be complete if the mission goes on."""
+    before = watch.ended
     with (disk / "other").open("wb", buffering=0) as other, contextlib.suppress(OSError):
         while True:
             other.write(bytes(4096))
     time.sleep(FULL_S)
-    on_full_disk = goals_ended(watch)
+    on_full_disk = watch.ended
     (disk / "other").unlink()
     time.sleep(FULL_S)
     lines = (disk / "journal").read_text().splitlines()
     legs = sum(json.loads(line).get("leg") is not None for line in lines)
-    ended = goals_ended(watch)
-    is_over = len(watch.done) == 2 and on_full_disk == ended
-    if legs != ended and not (is_over and legs >= before):
-        outcome.problems.append(f"{legs} goals in the journal, {ended} flown")
+    is_over = len(watch.done) == 2 and on_full_disk == watch.ended
+    if legs != watch.ended and not (is_over and legs >= before):
+        outcome.problems.append(f"{legs} goals in the journal, {watch.ended} flown")
 
 
 def read(result: Path, outcome: Outcome) -> Dict[str, Any]:

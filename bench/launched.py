@@ -52,6 +52,11 @@ class Watch:
         """Robots without further goals."""
         return {event["robot"] for event in self.events if event["event"] == "done"}
 
+    @property
+    def ended(self) -> int:
+        """Number of goals that have ended."""
+        return sum(event["event"] == "ended" for event in self.events)
+
     def remaining_m(self, robot: int) -> float:
         """Distance of a robot to the goal that was sent last; inf before the first one."""
         sent = [e for e in self.events if e["event"] == "sent" and e["robot"] == robot]

@@ -1,4 +1,4 @@
-"""What pages of reports hold, for their tests."""
+"""Contents of report pages, for their tests."""
 
 from __future__ import annotations
 

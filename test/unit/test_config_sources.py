@@ -7,6 +7,7 @@ from click.testing import CliRunner
 
 from quad_nav.cli import main
 from quad_nav.config.check import check_source
+from quad_nav.config.launch_file import load_launch_file
 from quad_nav.config.robot_tree import RobotSource, unfitted_tree
 from quad_nav.config.sources import config_label, robot_set, sets_of
 from quad_nav.config.substitution import Substitution, Unresolved
@@ -218,7 +219,16 @@ def test_substitutions(tmp_path, text, expected):
 
 @pytest.mark.parametrize(
     "text",
-    ["$(eval __import__('os').getcwd())", "$(eval a.b)", "$(env NO_SUCH_VARIABLE)", "$(c d)"],
+    [
+        "$(eval __import__('os').getcwd())",
+        "$(eval a.b)",
+        "$(eval int(1e999))",
+        "$(eval " + "(" * 500 + ")" * 500 + ")",
+        "$(env NO_SUCH_VARIABLE)",
+        "$(find ../..)",
+        "$(find /etc)",
+        "$(c d)",
+    ],
 )
 def test_substitutions_that_are_not_resolved(tmp_path, text):
     with pytest.raises(Unresolved):
@@ -241,3 +251,20 @@ def test_check_lists_what_to_fly(tmp_path):
     write(tmp_path, LAYOUT)
     output = CliRunner().invoke(main, ["check", str(tmp_path)]).output
     assert f"To fly, choose one: --config {tmp_path}:big,laser or " in output.replace("\n", " ")
+
+
+def test_a_launch_file_with_twelve_nodes_has_one_for_each_robot(tmp_path):
+    node = '<node pkg="move_base" type="move_base" name="move_base{i}">{text}</node>'
+    param = '<param name="controller_frequency" value="{i}.5" />'
+    nodes = "".join(node.format(i=i, text=param.format(i=i)) for i in range(12))
+    (tmp_path / "fleet.launch").write_text(f"<launch>{nodes}</launch>")
+    for number in (0, 1, 10, 11):
+        tree = load_launch_file(tmp_path / "fleet.launch", str(number))
+        assert tree["controller_frequency"] == number + 0.5
+
+
+def test_a_file_name_that_is_too_long_is_a_file_that_is_missing(tmp_path):
+    include = f'<include file="{"x" * 5000}" />'
+    (tmp_path / "nav.launch").write_text(f"<launch>{include}</launch>")
+    with pytest.raises(InputError, match="no such file"):
+        load_launch_file(tmp_path / "nav.launch")

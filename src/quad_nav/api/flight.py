@@ -30,7 +30,7 @@ NO_COMMANDS: Mapping[int, Optional[Command]] = {}
 
 @dataclass(frozen=True)
 class Observation:
-    """What a robot knows at an instant.
+    """Knowledge of a robot at an instant.
 
     Attributes:
         time_s: Simulated time.
@@ -105,7 +105,7 @@ class Flight:
             self._loop.advance()
 
     def observe(self, robot: int) -> Observation:
-        """Return what a robot knows now."""
+        """Return a robot's scan, pose, velocity, goal and contacts of now."""
         state = self.state(robot)
         return Observation(
             self.now_s,

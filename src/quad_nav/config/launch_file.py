@@ -16,7 +16,7 @@ import yaml
 from quad_nav.config.files import ParameterTree, merge_file, merge_text, set_value
 from quad_nav.config.notes import CAUTION, Remark
 from quad_nav.config.substitution import Substitution, Unresolved
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, excerpt
 from quad_nav.files import plain_yaml
 from quad_nav.files.xml_tree import Element, read_xml
 
@@ -54,7 +54,7 @@ def load_launch_file(
 
 @dataclass(frozen=True)
 class _Scope:
-    """What holds inside an element: the file, its arguments and the namespace."""
+    """Scope of an element: the file, its arguments and the namespace."""
 
     path: Path
     words: Substitution
@@ -93,7 +93,9 @@ class _Reader:
             InputError: There is no move_base node, or there are several without this number.
         """
         names = list(dict.fromkeys(self._nodes))
-        own = [name for name in names if name.endswith(self._number)] if len(names) > 1 else names
+        own = names
+        if len(names) > 1:
+            own = [name for name in names if _number_of(name) == self._number]
         if len(own) != 1:
             found = ", ".join(names) if names else "none"
             expected = "one, or one for each robot" if names else "one, or an <include> with one"
@@ -139,7 +141,7 @@ class _Reader:
     def _note_unread(self, element: Element, scope: _Scope, reason: str) -> None:
         """Note what cannot be resolved; a fault in the node itself, where roslaunch ends too."""
         name = element.attributes.get("name") or element.attributes.get("file", "")
-        text = f"<{element.tag}> {name} not read: {reason}"
+        text = f"<{element.tag}> {excerpt(name)} not read: {reason}"
         origin = f"{scope.path}:{element.line}"
         if scope.namespace in self._nodes:
             self.problems.append(f"{origin}: {text}")
@@ -169,8 +171,8 @@ class _Reader:
 
     def _include(self, element: Element, scope: _Scope) -> None:
         path = Path(scope.words.text(element.attributes.get("file", "")))
-        if not path.is_file():
-            raise Unresolved(f"{path}: no such file")
+        if not _is_file(path):
+            raise Unresolved(f"{excerpt(str(path))}: no such file")
         passed = element.attributes.get("pass_all_args", "").lower() in _TRUE
         given = dict(scope.words.arguments) if passed else {}
         for arg in element.all("arg"):
@@ -222,14 +224,27 @@ class _Reader:
             merge_text(self._server, text, scope.path, place)
             return
         path = Path(scope.words.text(attributes["file"]))
-        if not path.is_file():
-            raise Unresolved(f"{path}: no such file")
+        if not _is_file(path):
+            raise Unresolved(f"{excerpt(str(path))}: no such file")
         words = scope.words.arguments if "subst_value" in attributes else None
         try:
             merge_file(self._server, path, place, words)
         except InputError:
             if self._is_of_navigation(f"{place}/"):
                 raise
+
+
+def _number_of(node: str) -> str:
+    """Return the digits at the end of a node's name, "" without any."""
+    return node[len(node.rstrip("0123456789")) :]
+
+
+def _is_file(path: Path) -> bool:
+    """Tell whether a file exists; a name that no file can have is that of none."""
+    try:
+        return path.is_file()
+    except OSError:  # the name is too long, or its folder cannot be read
+        return False
 
 
 def _place(scope: _Scope, name: str) -> str:

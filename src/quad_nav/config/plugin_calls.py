@@ -152,4 +152,4 @@ _WRONG: Dict[str, Callable[[Any], str]] = {
     "step": _wrong_step,
     "period_s": _wrong_kind(float, int, np.floating),
 }
-"""What is wrong with a method's result, "" if nothing is."""
+"""Checks of results by method; each returns the fault, "" without one."""

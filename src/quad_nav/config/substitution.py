@@ -18,6 +18,7 @@ from quad_nav.errors import InputError, QuadError
 from quad_nav.files.xml_tree import read_xml
 
 _SUBSTITUTION = re.compile(r"\$\(([^()]*(?:\([^()]*\)[^()]*)*)\)")
+_PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
 _LEVELS = 6  # folders above a launch file in which packages are looked for
 _COMPARISONS: Dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
@@ -29,6 +30,12 @@ _COMPARISONS: Dict[type, Callable[[Any, Any], Any]] = {
     ast.In: lambda a, b: a in b,
     ast.NotIn: lambda a, b: a not in b,
 }
+
+
+_FAULTS = (
+    *(SyntaxError, ValueError, TypeError, KeyError, ArithmeticError),
+    *(RecursionError, MemoryError),  # of expressions that are nested too deeply
+)
 
 
 class Unresolved(QuadError):
@@ -88,6 +95,8 @@ class Substitution:
 
     def _package(self, name: str) -> Path:
         """Return the folder of a package: around the launch file, then ROS's package path."""
+        if not _PACKAGE.fullmatch(name):
+            raise Unresolved(f"$(find {name}): expected the name of a package")
         above = list(self.path.resolve().parents)[:_LEVELS]
         for folder in above:
             if folder.name == name or _package_name(folder) == name:
@@ -102,7 +111,7 @@ class Substitution:
     def _evaluated(self, expression: str) -> Any:
         try:
             return self._value(ast.parse(expression.strip(), mode="eval").body)
-        except (SyntaxError, ValueError, TypeError, KeyError, RecursionError) as error:
+        except _FAULTS as error:
             raise Unresolved(f"$(eval {expression}): {error}") from error
 
     def _value(self, node: ast.expr) -> Any:

@@ -1,4 +1,4 @@
-"""What the environments share: actions, observations and rewards of one robot in a world."""
+"""Actions, observations and rewards of one robot, for both environments."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _FASTER = 1.5
 
 @dataclass(frozen=True)
 class Progress:
-    """What a step changed for a robot; rewards are made of it.
+    """Changes of a robot in one step; rewards are computed from them.
 
     Attributes:
-        approach_m: How much nearer the robot is to its goal, 0 if the goal changed.
+        approach_m: Decrease of the distance to the goal, 0 if the goal changed.
         reached: Number of goals that it reached.
         contacts: Number of its contacts that began.
         is_done: All its goals have ended.
