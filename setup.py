@@ -32,8 +32,10 @@ setuptools.setup(
     package_data={
         "quad_nav": ["py.typed", "*.pyi"],
         "quad_nav.config": ["*.pyi"],
+        "quad_nav.kernels": ["*.c"],
         "quad_nav.report": ["*.jinja"],
         "quad_nav.tuning.report": ["*.jinja"],
+        "quad_nav.web": ["static/*"],
     },
     data_files=[
         (f"share/quad/{folder}", list(map(str, paths)))

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from local_planner_cases import ORIGIN, REST, SQUARE, WINDOW, boxed_in, free, line
 
-from quad_nav.control.dwa_critics import NO_LEGAL_TRAJECTORY, Critics, footprint_scales
+from quad_nav.control.dwa_critics import NO_LEGAL_TRAJECTORY, Critics
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner import DwaParams
-from quad_nav.control.dwa_samples import spaced, velocity_samples
+from quad_nav.control.dwa_samples import velocity_samples
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
-from quad_nav.kernels.dwa import obstacle_cost, travel
+from quad_nav.kernels.dwa import is_within_reach, obstacle_cost, spaced, step_count
+from quad_nav.kernels.dwa_search import TERMS, fill_terms, footprint_scale
 
 PERIOD_S = 0.2
 PARAMS = DwaParams(max_vel_y_mps=0.0, min_vel_y_mps=0.0, predict_goal_turn=False)
@@ -66,7 +67,7 @@ def chosen(params, **state):
     ],
 )
 def test_spaced(start, end, count, values):
-    assert spaced(start, end, count) == values
+    assert spaced(start, end, count).tolist() == values
 
 
 def test_samples_span_what_one_period_reaches():
@@ -169,11 +170,7 @@ def test_without_dwa_the_command_is_the_first_step():
     ],
 )
 def test_speed_limits(velocity, legal):
-    state = critics()
-    _, _, is_legal = travel(
-        state.motion, state.map_grids, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.array([velocity])
-    )
-    assert is_legal.tolist() == [legal]
+    assert (step_count(critics().motion, np.array(velocity)) > 0) == legal
 
 
 # Critics
@@ -252,8 +249,9 @@ def test_costs_on_the_way_count_by_the_highest_or_are_summed():
 
 
 def test_footprint_grows_with_the_speed():
-    commands = np.array([[0.25, 0.0, 0.0], [0.4, 0.0, 0.0], [0.33, 0.44, 0.0], [-0.55, 0.0, 1.0]])
-    np.testing.assert_allclose(footprint_scales(PARAMS, commands), [1.0, 1.1, 1.2, 1.2])
+    commands = (0.25, 0.0, 0.0), (0.4, 0.0, 0.0), (0.33, 0.44, 0.0), (-0.55, 0.0, 1.0)
+    scales = [footprint_scale(critics().weights, command) for command in commands]
+    np.testing.assert_allclose(scales, [1.0, 1.1, 1.2, 1.2])
 
 
 def test_fast_robot_keeps_off_what_a_slow_one_passes():
@@ -320,33 +318,58 @@ def test_first_of_equals_wins():
     assert best.sample == pytest.approx((0.0, 0.0, -0.64))
 
 
-@pytest.mark.parametrize("sum_scores", [False, True])
-@pytest.mark.parametrize("seed", range(5))
-def test_search_finds_what_scoring_every_sample_finds(seed, sum_scores):
-    random = np.random.default_rng(seed)
-    costs = random.integers(0, 30, WINDOW.shape).astype(np.uint8)
-    costs[random.integers(0, 60, 12), random.integers(0, 60, 12)] = LETHAL
-    costs[24:37, 24:37] = 0
-    params = replace(DwaParams(), sum_scores=sum_scores)
-    state = critics(params, costs, velocity=Twist2D(0.3, 0.0, 0.2))
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"sum_scores": True},
+        {"use_dwa": False},
+        {"twirling_scale": 0.3},
+        {"occdist_scale": 0.0},
+        {"path_distance_bias": 0.0},
+        {"goal_distance_bias": 0.0, "max_vel_y_mps": 0.1},
+        {"angular_sim_granularity_rad": 2.0},  # turns too far in a step for a bound of its end
+    ],
+)
+def test_search_finds_what_scoring_every_sample_finds(change):
+    legal = 0
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        costs = random.integers(0, 30, WINDOW.shape).astype(np.uint8)
+        costs[random.integers(0, 60, 12), random.integers(0, 60, 12)] = LETHAL
+        costs[24:37, 24:37] = 0
+        params = replace(PARAMS, vx_samples=4, vth_samples=9, **change)
+        pose = Pose2D(*random.uniform(-0.1, 0.1, 2), random.uniform(-1.0, 1.0))
+        state = critics(params, costs, pose, Twist2D(0.3, 0.0, 0.2))
 
-    best = state.choose(OscillationCritic(), PERIOD_S)
+        best = state.choose(OscillationCritic(), PERIOD_S)
 
-    samples = velocity_samples(params, state.pose, state.velocity, state.goal, PERIOD_S)
-    commands, distances, legal = travel(
-        state.motion, state.map_grids, state.start, state.velocity, samples
-    )
-    scales = footprint_scales(params, commands)
-    obstacles = state.obstacles(scales)._replace(
-        highest_near=np.full(WINDOW.shape, 255, np.uint8)
-    )  # no short cut
-    scored = np.full(len(samples), np.inf)
-    for k in np.flatnonzero(legal):
-        points, _ = state.simulate(samples[k])
-        obstacle = obstacle_cost(obstacles, scales[k], points, len(points))
-        if obstacle >= 0.0:
-            scored[k] = 0.01 * obstacle
-            for term in state.terms(commands, distances)[k]:
-                scored[k] += term
-    assert best.cost == scored.min() < math.inf
-    assert best.sample == tuple(commands[np.argmin(scored)])
+        cost, command = scored_one_by_one(state)
+        assert best.cost == (cost if cost < math.inf else NO_LEGAL_TRAJECTORY)
+        if cost < math.inf:
+            assert best.sample == command
+            legal += 1
+    assert legal >= 4
+
+
+def scored_one_by_one(state):
+    """The lowest cost of all samples, inf without a legal one, and its command."""
+    best, best_command = math.inf, None
+    samples = velocity_samples(state.params, state.pose, state.velocity, state.goal, PERIOD_S)
+    obstacles = state.obstacles(1.2)._replace(highest_near=np.full(WINDOW.shape, 255, np.uint8))
+    for sample in samples:
+        points, command = state.simulate(sample)
+        distances, terms = np.zeros(4), np.empty(TERMS)
+        if not len(points) or not is_within_reach(state.map_grids, points, len(points), distances):
+            continue
+        fill_terms(state.weights, distances, command, terms)
+        scale = footprint_scale(state.weights, command)
+        obstacle = obstacle_cost(obstacles, scale, points, len(points), terms, math.inf)
+        if obstacle < 0.0 and state.params.occdist_scale:
+            continue
+        cost = state.params.occdist_scale * obstacle
+        for term in terms:
+            cost += term
+        if cost < best:
+            best, best_command = cost, command
+    return best, best_command

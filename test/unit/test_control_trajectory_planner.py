@@ -52,6 +52,22 @@ def test_poses_passed_are_those_a_metre_behind():
     assert count_passed(plan, Pose2D(9.0, 0.0)) == 8
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_the_part_in_the_window_is_that_of_the_transformed_plan(seed):
+    random = np.random.default_rng(seed)
+    plan = np.cumsum(random.normal(0.0, 0.2, (60, 3)), axis=0)
+    pose, frame = Pose2D(*random.normal(0.0, 1.0, 3)), Pose2D(*random.normal(0.0, 1.0, 3))
+
+    part = plan_in_window(plan, WINDOW, pose, frame)
+
+    robot = pose.relative_to(frame)
+    near = (robot.x_m - plan[:, 0]) ** 2 + (robot.y_m - plan[:, 1]) ** 2 <= 1.5**2
+    first = int(np.argmax(near)) if near.any() else len(plan)
+    far = np.flatnonzero(~near[first:])
+    end = first + far[0] + 1 if len(far) else len(plan)
+    np.testing.assert_array_equal(part, frame.transform_poses(plan[first:end]))  # bit for bit
+
+
 # At the goal
 
 

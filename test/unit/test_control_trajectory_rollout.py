@@ -12,9 +12,11 @@ from local_planner_cases import ORIGIN, REST, SQUARE, WINDOW, boxed_in, free, li
 from quad_nav.control.map_grid import distance_grids
 from quad_nav.control.rollout import Rollout, costmap_view, footprint_cost
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
-from quad_nav.control.velocity_search import spaced, velocity_window
+from quad_nav.control.velocity_search import velocity_window
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
+from quad_nav.kernels.collision import highest_near
+from quad_nav.kernels.velocity_search import spaced
 
 PARAMS = TrajectoryPlannerParams(
     holonomic_robot=False, reject_colliding_escape=False, predict_goal_turn=False
@@ -108,6 +110,26 @@ def test_obstacle_inside_the_outline_is_not_seen():
 @pytest.mark.parametrize("x_m", [-1.4, 1.4, 5.0])
 def test_footprint_off_the_map(x_m):
     assert footprint_cost(WINDOW, free(), SQUARE, Pose2D(x_m, 0.0)) == -3
+
+
+@pytest.mark.parametrize("reach_m, travel_m", [(0.2, 0.3), (0.02, 0.5), (0.9, 5.0), (9.0, 0.1)])
+def test_highest_near_is_the_highest_in_a_square(reach_m, travel_m):
+    random = np.random.default_rng(0)
+    costs = random.integers(0, 250, WINDOW.shape).astype(np.uint8)
+    costs[random.random(WINDOW.shape) < 0.9] = 0
+    x, y = 0.6, -1.3
+
+    needle = np.array([[0.0, 0.0], [-0.5 * reach_m, 0.0]])
+    found = highest_near(costmap_view(WINDOW, costs), needle, 2.0, x, y, travel_m)
+
+    reach = min(int(reach_m / 0.05), 60) + 1
+    padded = np.pad(costs, reach, constant_values=UNKNOWN)
+    squares = np.lib.stride_tricks.sliding_window_view(padded, (2 * reach + 1,) * 2)
+    centres = -1.475 + 0.05 * np.arange(60)
+    travelled = (abs(centres - y)[:, None] <= travel_m) & (abs(centres - x) <= travel_m)
+    expected = squares.max(axis=(2, 3))
+    assert (found[travelled] == expected[travelled]).all()
+    assert ((found == expected) | (found == UNKNOWN)).all()
 
 
 # Rollout

@@ -14,7 +14,8 @@ from numba.core import caching
 from quad_nav.cli.options import show_warnings
 from quad_nav.files import cache_folder
 from quad_nav.files.cache_folder import user_cache_folder
-from quad_nav.kernels import jit
+from quad_nav.kernels import jit, library
+from quad_nav.kernels.numba_cache import compile_with_numba
 
 
 def doubled(x):
@@ -23,12 +24,12 @@ def doubled(x):
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch) -> Path:
-    monkeypatch.setattr(jit, "FOLDER", tmp_path)
+    monkeypatch.setattr(library, "FOLDER", tmp_path)
     return tmp_path
 
 
 def kernel():
-    return jit.njit(cache=True, nogil=True)(doubled)
+    return compile_with_numba(doubled, True, {"nogil": True})
 
 
 def cached() -> bool:
@@ -45,7 +46,7 @@ def test_kernels_are_cached(cache):
 def test_kernels_are_compiled_anew_when_any_kernel_changes(cache, monkeypatch):
     """numba's own stamp covers the module of the kernel, not those that the kernel calls."""
     assert not cached()
-    monkeypatch.setattr(jit, "_DIGEST", "another")
+    monkeypatch.setattr(library, "DIGEST", "another")
     assert [cached(), cached()] == [False, True]
 
 
@@ -55,11 +56,11 @@ def test_digest_covers_every_kernel(tmp_path, monkeypatch):
     (sources.parent / "grid.py").write_text("FREE = 0")
     for name in ("a.py", "b.py"):
         (sources / name).write_text("")
-    monkeypatch.setattr(jit, "_SOURCES", sources)
-    digests = {jit._digest()}
+    monkeypatch.setattr(library, "SOURCES", sources)
+    digests = {library.find_digest()}
     for path in (sources / "a.py", sources / "b.py", sources.parent / "grid.py"):
         path.write_text("CHANGED = 1")
-        digests.add(jit._digest())
+        digests.add(library.find_digest())
     assert len(digests) == 4
 
 
@@ -98,8 +99,11 @@ def test_full_disk_does_not_end_a_flight(cache, monkeypatch):
 
 
 def test_without_a_folder_kernels_run_and_the_cost_is_told(monkeypatch, capsys):
-    monkeypatch.setattr(jit, "FOLDER", None)
-    monkeypatch.setattr(jit, "_PROBLEMS", ["/a: Permission denied", "/b: is open to other users"])
+    monkeypatch.setattr(library, "FOLDER", None)
+    monkeypatch.setattr(jit, "_LIBRARY", None)
+    monkeypatch.setattr(
+        library, "PROBLEMS", ["/a: Permission denied", "/b: is open to other users"]
+    )
     assert [cached(), cached()] == [False, False]
     show_warnings(["robot0: odd"])
     first, second = capsys.readouterr().err.splitlines()
@@ -127,21 +131,21 @@ def temporary(places) -> Path:
 
 
 def test_sources_come_first(tmp_path, monkeypatch):
-    monkeypatch.setattr(jit, "_SOURCES", tmp_path)
-    monkeypatch.setattr(jit.numba.config, "CACHE_DIR", "")
-    assert jit._cache_folder() == (tmp_path / "__pycache__", [])
+    monkeypatch.setattr(library, "SOURCES", tmp_path)
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    assert library.find_cache_folder() == (tmp_path / "__pycache__", [])
 
 
 def test_folder_of_numba_is_used(tmp_path, monkeypatch):
-    monkeypatch.setattr(jit.numba.config, "CACHE_DIR", str(tmp_path / "given"))
-    assert jit._cache_folder() == (tmp_path / "given", [])
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "given"))
+    assert library.find_cache_folder() == (tmp_path / "given", [])
 
 
 def test_read_only_sources_and_no_home_use_the_temporary_folder(places, monkeypatch):
     (places / "sources").write_text("a file: no folder can be made in it, even by root")
-    monkeypatch.setattr(jit, "_SOURCES", places / "sources")
-    monkeypatch.setattr(jit.numba.config, "CACHE_DIR", "")
-    folder, problems = jit._cache_folder()
+    monkeypatch.setattr(library, "SOURCES", places / "sources")
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    folder, problems = library.find_cache_folder()
     assert folder.parent == temporary(places)
     assert stat.S_IMODE(folder.parent.stat().st_mode) == 0o700
     assert len(problems) == 2 and "Not a directory" in problems[0]

@@ -13,7 +13,7 @@ from quad_nav.plan.global_planner import (
     SearchPlanner,
     SearchPlannerParams,
     byte_costs,
-    wave_costs,
+    wave_params,
 )
 from quad_nav.plan.orientations import OrientationMode
 
@@ -75,21 +75,24 @@ def plan_of(costs: np.ndarray, start, goal, offset_m=0.5, **params) -> np.ndarra
     return planned(costs, start, goal, offset_m, **params)[1]
 
 
-def test_wave_costs_are_scaled_and_end_one_below_lethal():
-    costs = np.zeros((3, 8), dtype=np.uint8)
-    costs[1] = [0, 0, 60, 100, 252, INSCRIBED, UNKNOWN, 0]
+def test_wave_prices_are_scaled_and_end_one_below_lethal():
+    costs = [0, 60, 100, 252, INSCRIBED, UNKNOWN]
 
-    assert wave_costs(costs, SearchPlannerParams())[1, 1:-1].tolist() == [
-        50,
-        230,
-        252,
-        253,
-        253,
-        252,
-    ]  # 252 is lethal - 1, and that an obstacle
-    assert wave_costs(costs, SearchPlannerParams(allow_unknown=False))[1, 6] == 253
-    weaker = SearchPlannerParams(neutral_cost=66, cost_factor=0.55)
-    assert wave_costs(costs, weaker)[1, 1:4].tolist() == pytest.approx([66, 99, 121])
+    params = wave_params(SearchPlannerParams())
+
+    assert params.price[costs].tolist() == [50, 230, 252, 253, 253, 252]
+    assert np.isfinite(params.crossing[costs]).tolist() == [True, True, True, False, False, True]
+    assert params.crossing[0] == np.float32(50 * 0.707106781)
+    # 252 is lethal - 1, and that an obstacle
+    assert wave_params(SearchPlannerParams(allow_unknown=False)).price[UNKNOWN] == 253
+
+
+def test_wave_adds_whole_prices_and_compares_exact_ones():
+    params = wave_params(SearchPlannerParams(neutral_cost=66, cost_factor=0.55))
+
+    assert params.price[[0, 60, 100]].tolist() == [66, 99, 121]
+    assert params.price[1] == 66
+    assert params.crossing[1] == pytest.approx(66.55 * 0.707106781)
 
 
 def test_step_costs_of_a_star_are_bytes():

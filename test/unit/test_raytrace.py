@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from quad_nav.costmap.observation import _make_stack
 from quad_nav.kernels.cost_grid import CostmapView
+from quad_nav.kernels.observations import Ranges, include_rays, store_observation
 from quad_nav.kernels.obstructed_cells import MAX_OBSTRUCTED, SECTORS, find_obstructed, sector_of
-from quad_nav.kernels.raytrace import ObservationStack, clear_all_rays, clear_rays
+from quad_nav.kernels.raytrace import clear_all_rays, clear_rays, mark_all_points
 
 RESOLUTION_M = 0.05
 NOWHERE = (1e30, 1e30, -1e30, -1e30)
@@ -31,19 +33,28 @@ def scans(random, count, size_m):
     return sensors, np.concatenate(clouds).astype(np.float32), len(directions)
 
 
-def cleared_by_all_lines(costs, sensors, points, per_scan, range_m):
-    bounds = np.array(NOWHERE)
+def view(costs, moved_cells=0):
+    return CostmapView(costs, -1.0 + moved_cells * RESOLUTION_M, 2.0, RESOLUTION_M)
+
+
+def stack_of(sensors, points, per_scan, range_m):
+    """Put the observations into a ring so that the first is the newest."""
+    seen = _make_stack(len(sensors) + 3, per_scan)
     for k, sensor in enumerate(sensors):
-        clear_rays(
-            CostmapView(costs, -1.0, 2.0, RESOLUTION_M),
-            sensor[0],
-            sensor[1],
-            points[k * per_scan : (k + 1) * per_scan],
-            range_m,
-            np.ones(SECTORS, bool),
-            np.empty(0, np.int64),
-            bounds,
-        )
+        own = points[k * per_scan : (k + 1) * per_scan]
+        store_observation(seen, -2 - k, sensor, own, Ranges(range_m, 1.5, 1.0))
+    return seen, len(sensors) + 1
+
+
+def cleared_by_all_lines(costmap, seen, newest, count, range_m):
+    """Trace every line, and include every ray."""
+    bounds = np.array(NOWHERE)
+    lines, everywhere = np.empty(0, np.int64), np.ones(SECTORS, bool)
+    for k in range(count):
+        slot = (newest - k) % len(seen.sensors)
+        seen.drawn[slot] = np.nan  # else bounds of an earlier update count
+        include_rays(costmap, seen, slot, range_m, bounds)
+        clear_rays(costmap, seen, slot, range_m, everywhere, lines)
     return bounds
 
 
@@ -58,17 +69,36 @@ def test_the_outcome_is_that_of_all_lines(obstructed, range_m):
         sensors, points, per_scan = scans(random, 6, 4.0)
         sensors += (-1.0, 2.0, 0.0)
         points += np.array((-1.0, 2.0, 0.0), np.float32)
-        expected = costs.copy()
-        expected_bounds = cleared_by_all_lines(expected, sensors, points, per_scan, range_m)
-        ends = per_scan * np.arange(1, len(sensors) + 1)
-        bounds = np.array(NOWHERE)
-        before = np.count_nonzero(costs)
-        seen = ObservationStack(sensors, points, ends - per_scan, ends)
-        clear_all_rays(CostmapView(costs, -1.0, 2.0, RESOLUTION_M), seen, range_m, bounds)
-        np.testing.assert_array_equal(costs, expected)
-        # The last millimetre before the grid's border is in the same cell.
-        np.testing.assert_allclose(bounds, expected_bounds, atol=1.01e-3)
-        assert obstructed < 40 or np.count_nonzero(costs) < before
+        seen, newest = stack_of(sensors, points, per_scan, range_m)
+        # The third update finds the bounds of the second, the others another grid.
+        for update, moved_cells in enumerate((0, 2, 2, 1)):
+            before = np.count_nonzero(costs)
+            expected, bounds = costs.copy(), np.array(NOWHERE)
+            clear_all_rays(view(costs, moved_cells), seen, newest, len(sensors), range_m, bounds)
+            expected_bounds = cleared_by_all_lines(
+                view(expected, moved_cells),
+                *stack_of(sensors, points, per_scan, range_m),
+                len(sensors),
+                range_m,
+            )
+            np.testing.assert_array_equal(costs, expected)
+            # The last millimetre before the grid's border is in the same cell.
+            np.testing.assert_allclose(bounds, expected_bounds, atol=1.01e-3)
+            assert update or obstructed < 40 or np.count_nonzero(costs) < before
+            costs.reshape(-1)[filled] = random.choice([1, 254, 255])
+
+
+def test_points_within_range_and_height_mark():
+    points = np.array(
+        [[0.5, 2.5, 0.2], [0.51, 2.5, 0.2], [0.5, 3.5, 0.2], [0.0, 2.5, 1.5], [-2.0, 2.0, 0.2]],
+        np.float32,
+    )
+    seen, newest = stack_of(np.array([[0.0, 2.0, 0.2]]), points, 5, 10.0)
+    costs, bounds = np.zeros((80, 90), np.uint8), np.array(NOWHERE)
+    mark_all_points(view(costs), seen, newest, 1, bounds)
+    # The third is 1.58 m away, the fourth too high; the last is off the map and 2 m away.
+    assert list(zip(*np.nonzero(costs))) == [(10, 30)]
+    np.testing.assert_allclose(bounds, [0.5, 2.5, 0.51, 2.5], atol=1e-6)
 
 
 def test_sectors_go_round_once():

@@ -1,4 +1,4 @@
-"""The cheapest sample is found without scoring all; it is the one that scoring all gives."""
+"""The best sample is found without scoring all; it is the one that scoring all gives."""
 
 from __future__ import annotations
 
@@ -12,6 +12,15 @@ from quad_nav.control.rollout import Rollout
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import FREE, LETHAL, GridSpec
+from quad_nav.kernels.cost_grid import CostmapView
+from quad_nav.kernels.lanes import OFF_MAP, UNCERTAIN
+from quad_nav.kernels.motion import (
+    RolloutParams,
+    last_cells,
+    longest,
+    travel,
+)
+from quad_nav.kernels.velocity_search import NO_SAMPLE, SampleRules, VelocityWindow, spaced
 
 PARAMS = TrajectoryPlannerParams(holonomic_robot=False)
 FOOTPRINT = np.array([[0.2, 0.15], [-0.2, 0.15], [-0.2, -0.15], [0.2, -0.15]])
@@ -72,17 +81,91 @@ def test_the_cheapest_is_that_of_all_scores(variant):
     assert illegal > 50
 
 
-def test_costs_up_to_a_limit_are_those_without_one():
-    left_out = 0
-    for seed in range(12):
+@pytest.mark.parametrize("holonomic", [False, True])
+@pytest.mark.parametrize("forwards", [False, True])
+def test_the_search_finds_what_scoring_every_sample_finds(holonomic, forwards):
+    rules = SampleRules(
+        vx_samples=5,
+        vtheta_samples=9,
+        holonomic=holonomic,
+        goes_forward=forwards,
+        slowest_turn_radps=0.4,
+        lookahead_m=0.3,
+        stuck_left=False,
+        stuck_right=holonomic,
+    )
+    turned = 0
+    for seed in range(20):
         rollout = random_rollout(seed, PARAMS)
-        costs, ends = rollout.score(samples())
-        limit = float(np.median(costs))
-        limited, limited_ends = rollout.score(samples(), limit)
-        scored = np.isfinite(limited)
-        np.testing.assert_array_equal(limited[scored], costs[scored])
-        np.testing.assert_array_equal(limited_ends[scored], ends[scored])
-        # Those that collide would have cost more than the limit if they did not.
-        assert ((costs[~scored] > limit) | (costs[~scored] < 0.0)).all()
-        left_out += np.count_nonzero(~scored)
-    assert left_out > 250
+        window = VelocityWindow(0.05, 0.5 if seed % 2 else 0.05, -1.0, 1.0)
+        found = rollout.search(window, rules)
+        assert found == scored_one_by_one(rollout, window, rules)
+        turned += found[0][0] == 0.0 and found[1] != NO_SAMPLE
+    assert turned > 5
+
+
+def scored_one_by_one(rollout, window, rules):
+    """The rules of ``control/velocity_search.py``, sample by sample."""
+    thetas, step = spaced(window.min_vtheta_radps, window.max_vtheta_radps, rules.vtheta_samples)
+    speeds, _ = spaced(window.min_vx_mps, window.max_vx_mps, rules.vx_samples)
+    sample, cost, facing = (0.0, 0.0, 0.0), NO_SAMPLE, math.inf
+    forward = [(vx, 0.0, vtheta) for vx in speeds for vtheta in [0.0, *thetas[:-1]]]
+    forward += [(0.1, 0.1, 0.0), (0.1, -0.1, 0.0)] if rules.holonomic else []
+    for tried in forward if rules.goes_forward else []:
+        of_this = rollout.trajectory(tried).cost
+        if of_this >= 0.0 and (cost == NO_SAMPLE or of_this < cost):
+            sample, cost = tried, of_this
+    for theta in thetas:
+        if (rules.stuck_left if theta < 0.0 else rules.stuck_right) or abs(theta) <= step:
+            continue
+        turn = (0.0, 0.0, math.copysign(max(abs(theta), rules.slowest_turn_radps), theta))
+        trajectory = rollout.trajectory(turn)
+        if trajectory.cost < 0.0 or (
+            cost != NO_SAMPLE and sample[1] == 0.0 < trajectory.cost - cost
+        ):
+            continue
+        ahead = Pose2D(*trajectory.points[-1]).transform(rules.lookahead_m, 0.0)
+        distance = rollout.goal_distance_at(*ahead)
+        if distance is not None and distance < facing:
+            sample, cost, facing = turn, trajectory.cost, float(distance)
+    return sample, cost, facing
+
+
+def test_last_cells_are_those_of_the_trajectories():
+    random = np.random.default_rng(3)
+    size_y, size_x = WINDOW.shape
+    costmap = CostmapView(np.zeros(WINDOW.shape, np.uint8), -1.5, -1.5, 0.05)
+    found = []
+    for _ in range(60):
+        params = RolloutParams(
+            *random.uniform((0.5, 0.01, 0.01, 0.0, 0.0, 0.0), (3.0, 0.1, 0.2, 4.0, 4.0, 4.0)),
+            *(1.0, 1.0, 1.0, False, 0.1, False),
+        )
+        pose = tuple(random.uniform((-1.5, -1.5, -4.0), (1.5, 1.5, 4.0)))
+        velocity = tuple(random.uniform(-0.6, 0.6, 3))
+        tried = random.uniform(-1.0, 1.0, (21, 3))
+        tried[::3, 1] = 0.0
+        points = np.empty((longest(params, tried), 3))
+        cells = last_cells(params, costmap, pose, velocity, tried)
+        for sample, cell in zip(tried, cells):
+            last = points[travel(params, pose, velocity, sample, points) - 1]
+            x, y = np.floor((last[:2] + 1.5) / 0.05).astype(int)
+            on_map = 0 <= x < size_x and 0 <= y < size_y
+            assert cell in (UNCERTAIN, y * size_x + x if on_map else OFF_MAP)
+        found.extend(cells)
+    assert np.count_nonzero(np.equal(found, UNCERTAIN)) < 0.01 * len(found)
+    assert np.count_nonzero(np.equal(found, OFF_MAP)) > 50
+
+
+def test_last_cells_are_uncertain_at_a_border_and_in_sharp_turns():
+    params = RolloutParams(1.0, 0.05, 2.0, 9.0, 9.0, 9.0, 1.0, 1.0, 1.0, False, 0.1, False)
+    costmap = CostmapView(np.zeros(WINDOW.shape, np.uint8), -1.5, -1.5, 0.05)
+    tried = np.array([[0.2, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    at_rest = (0.0, 0.0, 0.0)
+
+    # On the border y = 0 of two rows, and 1 rad in the only step
+    cells = last_cells(params, costmap, (0.02, 0.0, 0.0), at_rest, tried)
+    assert cells.tolist() == [UNCERTAIN, UNCERTAIN]
+    # 0.15 m in 3 of 4 steps: x = 0.17, column 33
+    cells = last_cells(params, costmap, (0.02, 0.02, 0.0), (0.2, 0.0, 0.0), tried)
+    assert cells.tolist() == [30 * 60 + 33, UNCERTAIN]

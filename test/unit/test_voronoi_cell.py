@@ -136,3 +136,18 @@ def test_point_masses_inside_their_cells_never_collide(seed, stagger, lost_m):
         gaps = [np.hypot(*(at[i] - at[j])) for i in range(4) for j in range(i)]
         assert min(gaps) >= 2 * (SAFETY_RADIUS_M - lost_m) - 1e-6
     assert min(gaps) < 1.0  # they did come as near as they may
+
+
+def test_peers_out_of_reach_make_no_difference():
+    rng = np.random.default_rng(2)
+    limited = 0
+    for _ in range(300):
+        near = [peer(*rng.normal(0.0, 1.2, 2), name=str(k)) for k in range(3)]
+        far = [peer(*(rng.normal(0.0, 0.1, 2) + 3.0), name="far")]
+        command = Twist2D(rng.normal(0.0, 0.4), 0.0, rng.normal())
+        arguments = (Pose2D(0.0, 0.0, rng.normal()), Twist2D(0.2), command)
+        alone = limit_to_cell(*arguments, near, SAFETY_RADIUS_M, 0.25)
+        assert limit_to_cell(*arguments, far + near, SAFETY_RADIUS_M, 0.25) == alone
+        assert limit_to_cell(*arguments, far, SAFETY_RADIUS_M, 0.25).command == command
+        limited += bool(alone.limited_by)
+    assert 30 < limited < 270

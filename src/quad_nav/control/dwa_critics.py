@@ -22,6 +22,9 @@ Distances are those of the trajectory's last pose over the free cells, in metres
 (``map_grid``); unlike in trajectory rollout, obstacles under the robot are
 obstacles. No pose and no nose may be off the map. A critic of weight 0 is not
 used at all, not even to tell whether a trajectory is legal.
+
+The search is that of trajectory rollout: where a sample ends, and what is under the footprint where
+all of them begin, give the least that it can cost, and samples are tried in that order.
 """
 
 from __future__ import annotations
@@ -39,14 +42,14 @@ from quad_nav.control.rollout import (
     Trajectory,
     Triple,
     costmap_view,
-    footprint_reach_m,
-    highest_near,
     single,
 )
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.kernels import dwa as kernel
-from quad_nav.kernels.map_grid import cells_on_plan, spread
+from quad_nav.kernels import dwa_search
+from quad_nav.kernels.collision import highest_near
+from quad_nav.kernels.map_grid import distances_ahead
 
 NO_LEGAL_TRAJECTORY = -7.0
 
@@ -92,31 +95,45 @@ class Critics:
         self.costmap = costmap_view(spec, costs)
         self.footprint = footprint
         self.grids = self._measure(plan) if grids is None else grids
-        self.path_scale = params.path_distance_bias * spec.resolution_m  # per cell
-        self.goal_scale = params.goal_distance_bias * spec.resolution_m
+        self.path_scale = float(params.path_distance_bias * spec.resolution_m)  # per cell
+        self.goal_scale = float(params.goal_distance_bias * spec.resolution_m)
         self.motion = _motion(params)
         self.map_grids = self._weighed_grids()
+        self.weights = dwa_search.Weights(
+            path_scale=self.path_scale,
+            goal_scale=self.goal_scale,
+            twirling_scale=float(params.twirling_scale),
+            scaling_speed_mps=float(params.scaling_speed_mps),
+            max_scaling_factor=float(params.max_scaling_factor),
+            max_vel_trans_mps=float(params.max_vel_trans_mps),
+        )
 
     def choose(self, oscillation: OscillationCritic, control_period_s: float) -> Trajectory:
         """Return the cheapest sampled trajectory, of cost NO_LEGAL_TRAJECTORY if none is legal."""
         goal = Pose2D(*single(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad))
         samples = velocity_samples(self.params, self.pose, self.velocity, goal, control_period_s)
-        commands, distances, legal = kernel.travel(
-            self.motion, self.map_grids, self.start, self.velocity, samples
-        )
-        legal &= ~oscillation.forbids(commands)
-        scales = footprint_scales(self.params, commands)
-        k, cost = kernel.cheapest(
-            self.motion,
-            self.obstacles(scales[legal]),
-            self.start,
-            self.velocity,
-            kernel.Candidates(samples, self.terms(commands, distances), legal, scales),
+        k, cost = dwa_search.cheapest(
+            self.critics(samples, oscillation), self.start, self.velocity, samples
         )
         if k < 0:
             return Trajectory((0.0, 0.0, 0.0), NO_LEGAL_TRAJECTORY, np.zeros((0, 3)))
         points, command = self.simulate(samples[k])
         return Trajectory(command, float(cost), points)
+
+    def critics(
+        self, samples: NDArray[np.float64], oscillation: OscillationCritic
+    ) -> dwa_search.Critics:
+        """Return what the kernels score samples, float64[n, 3], against."""
+        scale = dwa_search.largest_footprint_scale(
+            self.motion, self.weights, self.velocity, samples
+        )
+        return dwa_search.Critics(
+            self.motion,
+            self.map_grids,
+            self.obstacles(scale),
+            self.weights,
+            oscillation.directions,
+        )
 
     def is_legal(self, sample: Triple) -> bool:
         """Tell whether a sample hits nothing and stays in reach of path and goal.
@@ -124,13 +141,15 @@ class Critics:
         A sample outside of the speed limits is not simulated, and counts as legal.
         """
         points, command = self.simulate(np.array(single(*sample)))
-        scale = footprint_scales(self.params, np.array([command]))
+        scale = dwa_search.footprint_scale(self.weights, command)
+        obstacles = self.obstacles(scale)
+        no_terms = np.zeros(0)
         if (
-            self.params.occdist_scale != 0.0
-            and kernel.obstacle_cost(self.obstacles(scale), scale[0], points, len(points)) < 0.0
+            obstacles.scale != 0.0
+            and kernel.obstacle_cost(obstacles, scale, points, len(points), no_terms, np.inf) < 0.0
         ):
             return False
-        return kernel.is_within_reach(self.map_grids, points, len(points), np.zeros(4))
+        return bool(kernel.is_within_reach(self.map_grids, points, len(points), np.zeros(4)))
 
     @property
     def start(self) -> Triple:
@@ -144,19 +163,17 @@ class Critics:
         return points, command
 
     def _measure(self, plan: NDArray[np.float64]) -> DwaGrids:
-        plan_xy = np.ascontiguousarray(plan[:, :2])
-        front_xy = plan_xy.copy()
         ahead_rad = math.atan2(self.goal.y_m - self.pose.y_m, self.goal.x_m - self.pose.x_m)
         forward_m = self.params.forward_point_distance_m
-        front_xy[-1] += Pose2D(0.0, 0.0, ahead_rad).rotate(forward_m, 0.0)
-        nowhere = np.zeros(self.costmap.costs.shape, dtype=np.bool_)
-        cells = cells_on_plan(self.costmap, plan_xy)
-        front_cells = cells_on_plan(self.costmap, front_xy)
-        path, goal, goal_front = (
-            spread(self.costmap.costs, nowhere, sources)
-            for sources in (cells, cells[-1:], front_cells[-1:])
+        ahead_x_m, ahead_y_m = Pose2D(0.0, 0.0, ahead_rad).rotate(forward_m, 0.0)
+        return DwaGrids(
+            *distances_ahead(
+                self.costmap,
+                np.ascontiguousarray(plan),
+                self.goal.x_m + ahead_x_m,
+                self.goal.y_m + ahead_y_m,
+            )
         )
-        return DwaGrids(path, goal, goal_front)
 
     def _weighed_grids(self) -> kernel.MapGrids:
         follows_path = self.params.path_distance_bias != 0.0
@@ -171,37 +188,25 @@ class Critics:
             aligns=follows_path and to_goal_m2 > near_m2,
         )
 
-    def terms(
-        self, commands: NDArray[np.float64], distances: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return the critics' costs but the obstacles', float64[n, 5], in their order."""
-        scales = np.zeros(4)
-        scales[[kernel.GOAL_FRONT, kernel.GOAL]] = self.goal_scale
-        scales[[kernel.ALIGNMENT, kernel.PATH]] = self.path_scale
-        twirling = self.params.twirling_scale * np.abs(commands[:, 2])
-        return np.column_stack((distances * scales, twirling))
+    @property
+    def _travel_m(self) -> float:
+        """Distance that no sample of the planner exceeds."""
+        params, (vx, vy, _) = self.params, self.velocity
+        fastest_x = max(map(abs, (params.max_vel_x_mps, params.min_vel_x_mps, vx)))
+        fastest_y = max(map(abs, (params.max_vel_y_mps, params.min_vel_y_mps, vy)))
+        return float(params.sim_time_s * math.hypot(fastest_x, fastest_y))
 
-    def obstacles(self, scales: NDArray[np.float64]) -> kernel.Obstacles:
-        """Return the obstacle critic's input for trajectories with footprint scales, float64[n]."""
-        largest = float(np.max(np.abs(scales[np.isfinite(scales)]), initial=1.0))
-        reach_m = footprint_reach_m(self.footprint) * largest
+    def obstacles(self, footprint_scale: float) -> kernel.Obstacles:
+        """Return the obstacle critic's input for footprints up to a factor of their size."""
+        largest = max(abs(footprint_scale), 1.0) if math.isfinite(footprint_scale) else 1.0
+        x_m, y_m, _ = self.start
         return kernel.Obstacles(
             self.costmap,
-            highest_near(self.costmap, reach_m),
+            highest_near(self.costmap, self.footprint, largest, x_m, y_m, self._travel_m),
             self.footprint,
             scale=float(self.params.occdist_scale),
             sums=bool(self.params.sum_scores),
         )
-
-
-def footprint_scales(params: DwaParams, commands: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the factors, float64[n], of the footprint's size at commands, float64[n, 3]."""
-    speeds = np.hypot(commands[:, 0], commands[:, 1])
-    room_mps = params.max_vel_trans_mps - params.scaling_speed_mps
-    if room_mps == 0.0:
-        return np.where(speeds > params.scaling_speed_mps, np.inf, 1.0)
-    share = (speeds - params.scaling_speed_mps) / room_mps
-    return np.where(speeds > params.scaling_speed_mps, params.max_scaling_factor * share + 1.0, 1.0)
 
 
 def _motion(params: DwaParams) -> kernel.Motion:

@@ -10,11 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Tuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from quad_nav.control.rollout import Triple
 from quad_nav.geometry import Pose2D
+from quad_nav.kernels.dwa_search import Directions
 
 
 @dataclass
@@ -49,10 +47,6 @@ class Axis:
         """True if a direction is forbidden."""
         return self.positive_only or self.negative_only
 
-    def forbids(self, velocities: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return True for forbidden velocities, float64[n]: bool[n]."""
-        return ((velocities < 0.0) & self.positive_only) | ((velocities > 0.0) & self.negative_only)
-
 
 class OscillationCritic:
     """State of the critic; every chosen trajectory changes it, a new plan and a goal reset it."""
@@ -70,10 +64,14 @@ class OscillationCritic:
         """Forward, sideways and turning axis."""
         return self.forward, self.strafe, self.turn
 
-    def forbids(self, commands: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return True for commands, float64[n, 3], in a forbidden direction: bool[n]."""
-        forbidden = [axis.forbids(commands[:, k]) for k, axis in enumerate(self.axes)]
-        return np.logical_or.reduce(forbidden)
+    @property
+    def directions(self) -> Directions:
+        """Directions that are allowed."""
+        x, y, theta = self.axes
+        return Directions(
+            (x.positive_only, y.positive_only, theta.positive_only),
+            (x.negative_only, y.negative_only, theta.negative_only),
+        )
 
     def record(
         self,

@@ -9,7 +9,7 @@ Robotics & Automation Magazine 4(1), 1997.
 
 from __future__ import annotations
 
-from typing import List, Tuple
+from typing import Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.rollout import Triple, single
 from quad_nav.geometry import Pose2D
+from quad_nav.kernels.dwa import sample_grid
 
 
 def velocity_samples(
@@ -35,25 +36,8 @@ def velocity_samples(
         float64[n, 3], rows vx, vy, vtheta of single precision; vtheta varies fastest.
     """
     lowest, highest = _velocity_window(params, pose, velocity, goal, control_period_s)
-    counts = params.vx_samples, params.vy_samples, params.vth_samples
-    axes = [np.array(spaced(*ends), dtype=np.float32) for ends in zip(lowest, highest, counts)]
-    grid = np.meshgrid(*axes, indexing="ij")
-    return np.stack(grid, axis=-1).reshape(-1, 3).astype(np.float64)
-
-
-def spaced(start: float, end: float, count: int) -> List[float]:
-    """Return ``count`` values from start to end, at least both ends, and 0 if stepped over."""
-    if start == end:
-        return [start]
-    count = max(count, 2)
-    step = (end - start) / (count - 1)
-    values, value = [], start
-    for _ in range(count - 1):
-        values.append(value)
-        if value < 0.0 < value + step:
-            values.append(0.0)
-        value += step  # summed up: the last bit of a sample can decide between equal costs
-    return [*values, end]
+    counts = int(params.vx_samples), int(params.vy_samples), int(params.vth_samples)
+    return sample_grid(lowest, highest, counts)
 
 
 def acceleration_limits(params: DwaParams) -> Triple:

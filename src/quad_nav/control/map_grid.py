@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.collision import mark_footprint
 from quad_nav.kernels.cost_grid import CostmapView
-from quad_nav.kernels.map_grid import cells_on_plan, spread
+from quad_nav.kernels.map_grid import distances
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class DistanceGrids:
 
 
 def distance_grids(
-    costmap: CostmapView, plan_xy: NDArray[np.float64], footprint: NDArray[np.float64], pose: Pose2D
+    costmap: CostmapView, plan: NDArray[np.float64], footprint: NDArray[np.float64], pose: Pose2D
 ) -> DistanceGrids:
     """Compute the distance grids of a plan.
 
@@ -44,19 +43,14 @@ def distance_grids(
 
     Args:
         costmap: The local costmap.
-        plan_xy: float64[m, 2], the plan, metres in the costmap's frame.
+        plan: float64[m, 2 or more], columns x, y of the plan, metres in the costmap's frame.
         footprint: float64[n, 2], metres in the robot's frame.
         pose: Pose of the robot in the costmap's frame.
     """
-    nowhere = np.zeros(costmap.costs.shape, dtype=np.bool_)
-    within_robot = nowhere.copy()
-    mark_footprint(costmap, footprint, pose.x_m, pose.y_m, pose.yaw_rad, within_robot)
-    cells = cells_on_plan(costmap, plan_xy)
-    return DistanceGrids(
-        path=spread(costmap.costs, within_robot, cells),
-        goal=spread(costmap.costs, nowhere, cells[-1:]),
-        within_robot=within_robot,
+    path, goal, within_robot = distances(
+        costmap, plan, footprint, float(pose.x_m), float(pose.y_m), float(pose.yaw_rad)
     )
+    return DistanceGrids(path, goal, within_robot)
 
 
 def cost_cloud(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from quad_nav.errors import NoLocalPlan
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import GridSpec
+from quad_nav.kernels.plan_follower import count_farther, stretch_near
 
 NO_POSES = np.zeros((0, 3))
 _PASSED_BEYOND_M = 1.0
@@ -48,11 +50,11 @@ class PlanFollower:
 
     def set_footprint(self, footprint: NDArray[np.float64]) -> None:
         """Take another padded footprint, float64[n, 2] in the robot's frame."""
-        self.footprint = np.array(footprint, dtype=np.float64)
+        self.footprint = np.array(footprint, dtype=np.float64, order="C")
 
     def set_plan(self, plan: NDArray[np.float64]) -> None:
         """Take a new global plan, float64[n, 3] rows x, y, yaw; its goal is not reached."""
-        self.plan = np.array(plan, dtype=np.float64).reshape(-1, 3)
+        self.plan = np.array(plan, dtype=np.float64, order="C").reshape(-1, 3)
         self.xy_tolerance_latch = False
         self._goal_reached = False
 
@@ -101,15 +103,18 @@ def plan_in_window(
     Returns:
         float64[m, 3], in the local costmap's frame; empty if no pose is near.
     """
-    radius_m = max(spec.size_x * spec.resolution_m / 2.0, spec.size_y * spec.resolution_m / 2.0)
+    radius_m = float(max(spec.size_x, spec.size_y) * spec.resolution_m / 2.0)
     robot = pose.relative_to(local_from_plan)
-    near = _distance2(plan, robot) <= radius_m * radius_m
-    if not near.any():
-        return np.zeros((0, 3))
-    first = int(np.argmax(near))
-    far_after = np.flatnonzero(~near[first:])
-    end = first + int(far_after[0]) + 1 if len(far_after) else len(plan)
-    return local_from_plan.transform_poses(plan[first:end])
+    yaw_rad = float(local_from_plan.yaw_rad)
+    return stretch_near(
+        plan,
+        float(robot.x_m),
+        float(robot.y_m),
+        radius_m,
+        (float(local_from_plan.x_m), float(local_from_plan.y_m)),
+        (math.cos(yaw_rad), math.sin(yaw_rad)),
+        yaw_rad,
+    )
 
 
 def plan_end(plan: NDArray[np.float64], local_from_plan: Pose2D) -> Pose2D:
@@ -119,12 +124,4 @@ def plan_end(plan: NDArray[np.float64], local_from_plan: Pose2D) -> Pose2D:
 
 def count_passed(plan: NDArray[np.float64], pose: Pose2D) -> int:
     """Count the poses at a plan's beginning that are 1 m or more away from the robot."""
-    near = _distance2(plan, pose) < _PASSED_BEYOND_M
-    return int(np.argmax(near)) if near.any() else len(plan)
-
-
-def _distance2(plan: NDArray[np.float64], pose: Pose2D) -> NDArray[np.float64]:
-    """Return the squared distances of plan points from a pose, float64[n]."""
-    dx: NDArray[np.float64] = np.subtract(pose.x_m, plan[:, 0])
-    dy: NDArray[np.float64] = np.subtract(pose.y_m, plan[:, 1])
-    return dx * dx + dy * dy
+    return count_farther(plan, float(pose.x_m), float(pose.y_m), _PASSED_BEYOND_M)

@@ -13,6 +13,12 @@ The cost is negative when the footprint touches a lethal or unknown cell or leav
 the farthest visible plan point counts as well. With ``simple_attractor``, only the squared
 distance to the plan's end counts.
 
+The search for the best sample draws few footprints. Where a sample ends gives the least that it
+can cost: path and goal distance of the last cell, and the cost of that cell alone. Samples are
+tried in that order until the least is more than the best cost so far. The last cells of all
+samples are found at once, with headings turned by series instead of cosines; within rounding of
+a cell's border, and for every sample that is tried, the poses are computed as upstream does.
+
 Source: B. Gerkey, K. Konolige, "Planning and control in unstructured terrain", ICRA Workshop on
 Path Planning on Costmaps, 2008.
 """
@@ -29,10 +35,12 @@ from numpy.typing import NDArray
 from quad_nav.control.map_grid import cost_cloud, distance_grids
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import INSCRIBED, LETHAL, UNKNOWN, GridSpec
+from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
 from quad_nav.kernels import collision
 from quad_nav.kernels import rollout as kernel
 from quad_nav.kernels.cost_grid import CostmapView
+from quad_nav.kernels.motion import RolloutParams
+from quad_nav.kernels.velocity_search import SampleRules, VelocityWindow, search
 
 Triple = Tuple[float, float, float]
 
@@ -80,52 +88,64 @@ class Rollout:
         self.pose = Pose2D(*single(pose.x_m, pose.y_m, pose.yaw_rad))
         self.velocity = single(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps)
         costmap = costmap_view(spec, costs)
-        plan_xy = np.ascontiguousarray(plan[:, :2])
-        self.goal_x_m, self.goal_y_m = plan_xy[-1]
-        self.grids = distance_grids(costmap, plan_xy, footprint, self.pose)
+        plan = np.ascontiguousarray(plan)
+        self.goal_x_m, self.goal_y_m = plan[-1, :2].tolist()
+        self.grids = distance_grids(costmap, plan, footprint, self.pose)
         self.inputs = kernel.RolloutInputs(
             costmap,
-            highest_near(costmap, footprint_reach_m(footprint)),
+            collision.highest_near(
+                costmap,
+                footprint,
+                1.0,
+                self.pose.x_m,
+                self.pose.y_m,
+                _travel_m(params, self.velocity),
+            ),
             footprint,
             self.grids.path,
             self.grids.goal,
-            plan_xy,
+            plan,
         )
         self.kernel_params = _kernel_params(params, spec.resolution_m)
 
     def score(
-        self, samples: NDArray[np.float64], limit: float = math.inf
+        self, samples: NDArray[np.float64]
     ) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Score samples.
-
-        Args:
-            samples: float64[n, 3], rows vx, vy, vtheta.
-            limit: Costs above it may be returned as infinite.
+        """Score samples, float64[n, 3], rows vx, vy, vtheta.
 
         Returns:
             Costs, float64[n], and last poses, float64[n, 3].
         """
-        return kernel.score(
-            self.inputs, self.kernel_params, _triple(self.pose), self.velocity, samples, limit
-        )
+        return kernel.score(self.inputs, self.kernel_params, *self._start, samples)
 
     def cheapest(self, samples: NDArray[np.float64]) -> Optional[Tuple[int, float]]:
         """Return index and cost of the cheapest legal sample, the first of equals, or None."""
-        k, cost = kernel.cheapest(
-            self.inputs, self.kernel_params, _triple(self.pose), self.velocity, samples
-        )
+        k, cost = kernel.cheapest(self.inputs, self.kernel_params, *self._start, samples)
         return (k, cost) if k >= 0 else None
+
+    def search(self, window: VelocityWindow, rules: SampleRules) -> Tuple[Triple, float, float]:
+        """Return the best forward sample or turn in place; see ``velocity_search.search``."""
+        return search(self.inputs, self.kernel_params, *self._start, window, rules)
+
+    @property
+    def _start(self) -> Tuple[Triple, Triple]:
+        return _triple(self.pose), self.velocity
 
     def trajectory(self, sample: Triple) -> Trajectory:
         """Simulate a sample from the robot's state."""
-        return self._simulate(_triple(self.pose), self.velocity, sample)
+        cost, points = kernel.trajectory(self.inputs, self.kernel_params, *self._start, sample)
+        return Trajectory(sample, cost, points)
 
     def is_valid(self, pose: Pose2D, velocity: Twist2D, command: Twist2D) -> bool:
         """Tell whether a command from a state, in double precision, is legal."""
-        return (
-            self._simulate(_triple(pose), _twist_triple(velocity), _twist_triple(command)).cost
-            >= 0.0
+        cost, _ = kernel.trajectory(
+            self.inputs,
+            self.kernel_params,
+            _triple(pose),
+            _twist_triple(velocity),
+            _twist_triple(command),
         )
+        return bool(cost >= 0.0)
 
     def is_free(self, pose: Pose2D) -> bool:
         """Tell whether no obstacle is under or inside of the footprint at a pose."""
@@ -136,16 +156,6 @@ class Rollout:
         if len(footprint) > 2:
             collision.mark_footprint(costmap, footprint, *_triple(pose), inside)
         return not bool((costmap.costs[inside] >= LETHAL).any())
-
-    def _simulate(self, pose: Triple, velocity: Triple, sample: Triple) -> Trajectory:
-        row = np.array(sample)
-        headings = np.empty((kernel.step_count(self.kernel_params, row), 3))
-        kernel.turn(self.kernel_params, pose[2], velocity[2], sample[2], headings)
-        points = np.empty_like(headings)
-        cost, count = kernel.simulate(
-            self.inputs, self.kernel_params, pose, velocity, row, headings, points
-        )
-        return Trajectory(sample, cost, points[:count])
 
     def goal_distance_at(self, x_m: float, y_m: float) -> Optional[int]:
         """Return the goal distance of a point in cells, None off the map."""
@@ -191,35 +201,18 @@ def footprint_cost(
     return collision.footprint_cost(costmap_view(spec, costs), footprint, *_triple(pose))
 
 
-def footprint_reach_m(footprint: NDArray[np.float64]) -> float:
-    """Return the distance of a footprint's farthest vertex, float64[n, 2]."""
-    return float(np.hypot(footprint[:, 0], footprint[:, 1]).max())
+def _travel_m(params: TrajectoryPlannerParams, velocity: Triple) -> float:
+    """Return the distance that no sample of the planner exceeds."""
+    fastest_x = max(map(abs, (params.max_vel_x_mps, params.min_vel_x_mps, params.escape_vel_mps)))
+    fastest_y = max(map(abs, params.y_vels_mps), default=0.0) if params.holonomic_robot else 0.0
+    fastest_x, fastest_y = max(fastest_x, abs(velocity[0])), max(fastest_y, abs(velocity[1]))
+    return float(params.sim_time_s * math.hypot(fastest_x, fastest_y))
 
 
-def highest_near(costmap: CostmapView, reach_m: float) -> NDArray[np.uint8]:
-    """Return the highest cost in a square around each cell, uint8[H, W].
-
-    The square holds a footprint of a reach; cells off the map count as UNKNOWN. Where the
-    result is low the footprint's outline need not be drawn. The square is built up from maxima
-    over two, four, ... cells.
-    """
-    reach = int(min(reach_m / costmap.resolution_m, max(costmap.costs.shape))) + 1
-    size_y, size_x = costmap.costs.shape
-    highest = np.full((size_y + 2 * reach, size_x + 2 * reach), UNKNOWN, dtype=np.uint8)
-    highest[reach:-reach, reach:-reach] = costmap.costs
-    side, covered = 2 * reach + 1, 1
-    while covered < side:
-        shift = min(covered, side - covered)
-        highest = np.maximum(highest[shift:], highest[:-shift])
-        highest = np.maximum(highest[:, shift:], highest[:, :-shift])
-        covered += shift
-    return highest
-
-
-def _kernel_params(params: TrajectoryPlannerParams, resolution_m: float) -> kernel.RolloutParams:
+def _kernel_params(params: TrajectoryPlannerParams, resolution_m: float) -> RolloutParams:
     # Biases are per metre with meter scoring, distances are in cells.
     per_cell = resolution_m if params.scores_in_metres else 1.0
-    return kernel.RolloutParams(
+    return RolloutParams(
         sim_time_s=float(params.sim_time_s),
         sim_granularity_m=float(params.sim_granularity_m),
         angular_sim_granularity_rad=float(params.angular_sim_granularity_rad),

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Optional
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,19 +25,9 @@ from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.kernels.collision import COLLIDES
 from quad_nav.kernels.rollout import OUT_OF_REACH
+from quad_nav.kernels.velocity_search import NO_SAMPLE, SampleRules, VelocityWindow
 
-_DIAGONALS = ((0.1, 0.1, 0.0), (0.1, -0.1, 0.0))
 _ESCAPE_COST = 1.0
-
-
-@dataclass(frozen=True)
-class VelocityWindow:
-    """Velocities that can be reached."""
-
-    min_vx_mps: float
-    max_vx_mps: float
-    min_vtheta_radps: float
-    max_vtheta_radps: float
 
 
 @dataclass(frozen=True)
@@ -64,21 +54,16 @@ def choose_trajectory(
         The trajectory; its cost is negative if none is legal.
     """
     window = velocity_window(rollout, params, control_period_s)
-    thetas, theta_step = spaced(
-        window.min_vtheta_radps, window.max_vtheta_radps, params.vtheta_samples
-    )
-    best = None
-    if not oscillation.escaping:
-        best = _cheapest(rollout, _forward_samples(window, thetas, params))
-    best, facing = _turn_in_place(rollout, params, oscillation, thetas, theta_step, best)
-    if best is not None:
-        oscillation.record_turn(best.sample, rollout.pose)
-        return _follow(rollout, params, oscillation, best)
+    rules = _sample_rules(params, oscillation)
+    sample, cost, facing = rollout.search(window, rules)
+    if cost != NO_SAMPLE:
+        oscillation.record_turn(sample, rollout.pose)
+        return _follow(rollout, params, oscillation, sample)
     if params.holonomic_robot:
         best = _strafe(rollout, params, oscillation, facing)
         if best is not None:
             oscillation.record_strafe(best.sample, rollout.pose)
-            return _follow(rollout, params, oscillation, best)
+            return _follow(rollout, params, oscillation, best.sample)
     return _escape(rollout, params, oscillation)
 
 
@@ -100,72 +85,24 @@ def velocity_window(
     )
     max_vx = min(params.max_vel_x_mps, to_goal_m / params.sim_time_s, vx + change_x)
     return VelocityWindow(
-        min_vx_mps=max(params.min_vel_x_mps, vx - change_x),
-        max_vx_mps=max(max_vx, params.min_vel_x_mps),
-        min_vtheta_radps=max(params.min_vel_theta_radps, vtheta - change_theta),
-        max_vtheta_radps=min(params.max_vel_theta_radps, vtheta + change_theta),
+        min_vx_mps=float(max(params.min_vel_x_mps, vx - change_x)),
+        max_vx_mps=float(max(max_vx, params.min_vel_x_mps)),
+        min_vtheta_radps=float(max(params.min_vel_theta_radps, vtheta - change_theta)),
+        max_vtheta_radps=float(min(params.max_vel_theta_radps, vtheta + change_theta)),
     )
 
 
-def spaced(start: float, end: float, count: int) -> Tuple[NDArray[np.float64], float]:
-    """Return ``count`` values from start to end, float64[n], and their step.
-
-    The step is infinite for one value. Values are summed step by step, because equal costs are
-    common and the last bit of a sample decides between them.
-    """
-    count = max(count, 1)
-    if count == 1:
-        return np.array([start]), math.inf
-    step = (end - start) / (count - 1)
-    values = np.full(count, step)
-    values[0] = start
-    return np.add.accumulate(values), step
-
-
-def _forward_samples(
-    window: VelocityWindow, thetas: NDArray[np.float64], params: TrajectoryPlannerParams
-) -> NDArray[np.float64]:
-    """Return float64[n, 3]: for each vx straight ahead, then all vtheta but the last."""
-    speeds, _ = spaced(window.min_vx_mps, window.max_vx_mps, params.vx_samples)
-    turns = np.concatenate(([0.0], thetas[:-1]))
-    samples = np.zeros((len(speeds) * len(turns), 3))
-    samples[:, 0] = np.repeat(speeds, len(turns))
-    samples[:, 2] = np.tile(turns, len(speeds))
-    return np.vstack((samples, _DIAGONALS)) if params.holonomic_robot else samples
-
-
-def _cheapest(rollout: Rollout, samples: NDArray[np.float64]) -> Optional[_Candidate]:
-    """Return the legal sample of lowest cost, the first of equals."""
-    found = rollout.cheapest(samples)
-    return _Candidate(_row(samples, found[0]), found[1]) if found is not None else None
-
-
-def _turn_in_place(
-    rollout: Rollout,
-    params: TrajectoryPlannerParams,
-    oscillation: Oscillation,
-    thetas: NDArray[np.float64],
-    theta_step: float,
-    best: Optional[_Candidate],
-) -> Tuple[Optional[_Candidate], float]:
-    """Return the best candidate so far or a turn, and the goal distance that it faces."""
-    slowest = params.min_in_place_vel_theta_radps
-    samples = np.zeros((len(thetas), 3))
-    samples[:, 2] = np.where(
-        thetas > 0.0, np.maximum(thetas, slowest), np.minimum(thetas, -slowest)
+def _sample_rules(params: TrajectoryPlannerParams, oscillation: Oscillation) -> SampleRules:
+    return SampleRules(
+        vx_samples=int(params.vx_samples),
+        vtheta_samples=int(params.vtheta_samples),
+        holonomic=bool(params.holonomic_robot),
+        goes_forward=not oscillation.escaping,
+        slowest_turn_radps=float(params.min_in_place_vel_theta_radps),
+        lookahead_m=float(params.heading_lookahead_m),
+        stuck_left=oscillation.stuck_left,
+        stuck_right=oscillation.stuck_right,
     )
-    must_not_cost_more = best is not None and best.sample[1] == 0.0
-    costs, ends = rollout.score(samples, best.cost if best and must_not_cost_more else math.inf)
-    facing = math.inf
-    for k, theta in enumerate(thetas):
-        stuck = oscillation.stuck_left if theta < 0.0 else oscillation.stuck_right
-        if stuck or not (theta > theta_step or theta < -theta_step):
-            continue
-        if costs[k] >= 0.0 and (best is None or costs[k] <= best.cost or best.sample[1] != 0.0):
-            distance = _distance_ahead(rollout, params, ends[k])
-            if distance is not None and distance < facing:
-                best, facing = _Candidate(_row(samples, k), float(costs[k])), distance
-    return best, facing
 
 
 def _strafe(
@@ -219,11 +156,11 @@ def _leads_out(rollout: Rollout, params: TrajectoryPlannerParams) -> bool:
 
 
 def _follow(
-    rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation, best: _Candidate
+    rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation, sample: Triple
 ) -> Trajectory:
     oscillation.forget_if_moved(rollout.pose, params.oscillation_reset_dist_m)
     _end_escape(rollout, params, oscillation)
-    return rollout.trajectory(best.sample)
+    return rollout.trajectory(sample)
 
 
 def _end_escape(

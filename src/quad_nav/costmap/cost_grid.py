@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.cost_grid import CostmapView, fill_convex_polygon, raise_to
+from quad_nav.kernels.cost_grid import CostmapView, fill_polygon, raise_to
 
 
 @dataclass(frozen=True)
@@ -136,11 +136,8 @@ class CostGrid:
         if move_x == 0 and move_y == 0:
             return 0, 0
         shift(self.costs, move_x, move_y, self.default_cost)
-        self.spec = replace(
-            spec,
-            origin_x_m=spec.origin_x_m + move_x * res,
-            origin_y_m=spec.origin_y_m + move_y * res,
-        )
+        origin_x_m, origin_y_m = spec.origin_x_m + move_x * res, spec.origin_y_m + move_y * res
+        self.spec = GridSpec(spec.size_x, spec.size_y, res, origin_x_m, origin_y_m)
         return move_x, move_y
 
     def window_of(self, bounds: Bounds) -> Window:
@@ -162,12 +159,7 @@ class CostGrid:
         Returns:
             False if a vertex is off the grid and nothing was set.
         """
-        cells = [self.spec.cell_of(x, y) for x, y in vertices.tolist()]
-        if None in cells:
-            return False
-        if len(cells) >= 3:
-            fill_convex_polygon(self.costs, np.array(cells, dtype=np.int64), cost)
-        return True
+        return bool(fill_polygon(self.view, vertices, cost))
 
     def fill_square(self, centre_x_m: float, centre_y_m: float, size_m: float, cost: int) -> bool:
         """Set the cells of a square; return False, and set nothing, if it leaves the grid."""

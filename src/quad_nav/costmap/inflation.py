@@ -6,12 +6,18 @@ cost scaling factor, cut to a whole number. Beyond the inflation radius it is 0.
 
 Obstacles just outside of a window reach into it. Seeds are therefore taken from one inflation
 radius around the window, and cells up to two radii away can change.
+
+Each update spreads all costs of the window again. A new or lost seed changes more than its own
+radius: a cell passes on one seed only, so a cell that it wins no longer passes on the former one,
+and so on from cell to cell. Only regions that are not connected are independent of each other.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +26,7 @@ from quad_nav.costmap.cost_grid import EVERYWHERE, Bounds, CostGrid, Window
 from quad_nav.costmap.layer import Layer, LayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
-from quad_nav.kernels.inflation import inflate
+from quad_nav.kernels.inflation import STEP_BITS, Ranks, inflate
 
 
 @dataclass(frozen=True)
@@ -101,29 +107,58 @@ class InflationLayer(Layer):
             min(spec.size_x, window.xn + reach),
             max(0, window.y0 - reach),
             min(spec.size_y, window.yn + reach),
-            self.cost_table,
-            self._rank_table,
+            self._ranks,
             self.params.inflate_unknown,
         )
 
     def _make_tables(self) -> None:
-        self.radius_cells = int(
-            max(0.0, math.ceil(self.params.inflation_radius_m / self._resolution_m))
+        params = self.params
+        self.radius_cells, self.cost_table, self._ranks = _tables(
+            params.inflation_radius_m,
+            params.cost_scaling_factor,
+            self._resolution_m,
+            self._inscribed_radius_m,
         )
-        n = self.radius_cells + 2
-        squared = np.array([[dx * dx + dy * dy for dx in range(n)] for dy in range(n)])
-        self.cost_table = np.array(
-            [[self.cost_at(math.sqrt(d)) for d in row] for row in squared], dtype=np.uint8
-        )
-        # Everything beyond the radius has one rank, the last.
-        _, ranks = np.unique(np.minimum(squared, self.radius_cells**2 + 1), return_inverse=True)
-        self._rank_table = ranks.reshape(n, n).astype(np.int32)
 
-    def cost_at(self, distance_cells: float) -> int:
-        """Return the cost of a cell at a distance from its obstacle."""
+
+@lru_cache(maxsize=64)  # the robots of a fleet have the same
+def _tables(
+    inflation_radius_m: float,
+    cost_scaling_factor: float,
+    resolution_m: float,
+    inscribed_radius_m: float,
+) -> Tuple[int, NDArray[np.uint8], Ranks]:
+    """Return the radius in cells, the costs at distances and their ranks, all read-only."""
+    radius_cells = int(max(0.0, math.ceil(inflation_radius_m / resolution_m)))
+
+    def cost_at(distance_cells: float) -> int:
         if distance_cells == 0.0:
             return LETHAL
-        beyond_m = distance_cells * self._resolution_m - self._inscribed_radius_m
-        if distance_cells * self._resolution_m <= self._inscribed_radius_m:
+        beyond_m = distance_cells * resolution_m - inscribed_radius_m
+        if distance_cells * resolution_m <= inscribed_radius_m:
             return INSCRIBED
-        return int((INSCRIBED - 1) * math.exp(-1.0 * self.params.cost_scaling_factor * beyond_m))
+        return int((INSCRIBED - 1) * math.exp(-1.0 * cost_scaling_factor * beyond_m))
+
+    n = radius_cells + 2
+    squared = np.array([[dx * dx + dy * dy for dx in range(n)] for dy in range(n)])
+    cost_table = np.array([[cost_at(math.sqrt(d)) for d in row] for row in squared], dtype=np.uint8)
+    return radius_cells, cost_table, _ranked(squared, cost_table, radius_cells)
+
+
+def _ranked(squared: NDArray[np.int64], cost_table: NDArray[np.uint8], radius_cells: int) -> Ranks:
+    """Rank the distances up to the radius that have a cost.
+
+    Args:
+        squared: int64[n, n], squares of the distances in cells.
+        cost_table: uint8[n, n], their costs.
+        radius_cells: Inflation radius.
+    """
+    distances, ranks = np.unique(squared, return_inverse=True)
+    costs = np.zeros(len(distances), np.uint8)
+    costs[ranks] = cost_table.ravel()
+    costs = np.trim_zeros(costs[distances <= radius_cells**2], "b")
+    shift = STEP_BITS + squared.size.bit_length()
+    fits = shift + len(costs).bit_length() < 32
+    ranks = np.minimum(ranks, len(costs)).reshape(squared.shape)
+    states = ((ranks + 1) << shift) - 1
+    return Ranks(costs, states.astype(np.int32 if fits else np.int64), shift)

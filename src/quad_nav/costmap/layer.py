@@ -135,8 +135,9 @@ class GridLayer(Layer):
 
     def update_bounds(self, robot: Pose2D, now_s: float, bounds: Bounds) -> Bounds:
         """Add the areas that were cleared since the last update."""
-        bounds = bounds.union(self._cleared)
-        self._cleared = NOWHERE
+        if self._cleared is not NOWHERE:
+            bounds = bounds.union(self._cleared)
+            self._cleared = NOWHERE
         self._awaits_update = False
         return bounds
 

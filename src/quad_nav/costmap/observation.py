@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import List, Optional
+from dataclasses import dataclass
+from typing import Callable, List, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.raytrace import ObservationStack
+from quad_nav.kernels.observations import ObservationStack, Ranges, store_observation
 
 
 @dataclass(frozen=True)
@@ -38,24 +38,35 @@ class SourceParams:
     inf_is_valid: bool = False
 
 
-@dataclass(frozen=True)
 class Observation:
     """Points of one message, in the global frame.
 
     Attributes:
         stamp_s: When the sensor saw them.
         sensor: float64[3], where the rays start, metres.
-        points: float32[n, 3], metres.
         stamp_ns: The stamp in whole nanoseconds.
     """
 
-    stamp_s: float
-    sensor: NDArray[np.float64]
-    points: NDArray[np.float32]
-    stamp_ns: int = field(init=False)
+    def __init__(
+        self,
+        stamp_s: float,
+        sensor: NDArray[np.float64],
+        points: Union[NDArray[np.float32], Callable[[], NDArray[np.float32]]],
+    ) -> None:
+        """Take points, or a function that makes them when a costmap first needs them.
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "stamp_ns", _nanoseconds(self.stamp_s))
+        Many messages need not be projected: another comes before the costmaps are updated.
+        """
+        self.stamp_s, self.sensor = stamp_s, sensor
+        self.stamp_ns = _nanoseconds(stamp_s)
+        self._points = points
+
+    @property
+    def points(self) -> NDArray[np.float32]:
+        """float32[n, 3], metres."""
+        if callable(self._points):
+            self._points = self._points()
+        return self._points
 
 
 class ObservationBuffer:
@@ -68,33 +79,49 @@ class ObservationBuffer:
     def __init__(self, params: SourceParams) -> None:
         self.params = params
         self.observations: List[Observation] = []
+        self._persistence_ns = _nanoseconds(params.observation_persistence_s)
+        self._in_order = True  # no stamp of an observation is above that of a newer one
         self._last_reception_s: Optional[float] = None
-        self._stack: Optional[ObservationStack] = None
-        self._points = np.empty((0, 3), np.float32)  # those of the observations, and old ones
-        self._begins: List[int] = []  # of the observations' points in that
-        self._end = 0
+        self._stack = _make_stack(0, 0)
+        self._newest = 0  # slot of the stack
+        self._unstored = 0  # newest observations that are not in the stack
+        self._ranges: Optional[Ranges] = None  # of the observations in it
 
-    @property
-    def stack(self) -> ObservationStack:
-        """All observations kept, newest first, for the kernels."""
-        if self._stack is None:
-            count = len(self.observations)
-            begins = np.array(self._begins[:count], np.int64)
-            lengths = np.array([len(one.points) for one in self.observations], np.int64)
-            sensors = [one.sensor for one in self.observations] or [np.empty(0)]
-            self._stack = ObservationStack(
-                np.concatenate(sensors).reshape(count, 3), self._points, begins, begins + lengths
-            )
-        return self._stack
+    def stack(self, ranges: Ranges) -> Tuple[ObservationStack, int, int]:
+        """Return the observations for the kernels.
+
+        Args:
+            ranges: Limits of what an observation clears and marks.
+
+        Returns:
+            A ring that has them, the slot of the newest, and their number.
+        """
+        kept = len(self.observations)
+        if ranges != self._ranges:
+            self._ranges, self._unstored = ranges, kept
+        if self._unstored:
+            slots, width = self._stack.sectors.shape
+            fresh = self.observations[: self._unstored]
+            most = max([len(one.points) for one in fresh], default=0)
+            if kept > slots or most > width:
+                fresh = self.observations
+                self._stack = _make_stack(max(slots, kept + kept // 2), max(width, most))
+            for one in reversed(fresh):
+                self._newest = (self._newest + 1) % len(self._stack.sectors)
+                store_observation(self._stack, self._newest, one.sensor, one.points, ranges)
+            self._unstored = 0
+        return self._stack, self._newest, kept
 
     def add(self, observation: Observation, now_s: float) -> None:
         """Keep an observation that arrived now; drop those that have expired."""
+        if self.observations and observation.stamp_ns < self.observations[0].stamp_ns:
+            self._in_order = False
         self.observations.insert(0, observation)
-        self._begins.insert(0, self._end)
-        self._stack = None
-        self.restart_clock(now_s)
-        if self.observations:  # else it has expired itself
-            self._store(observation.points)
+        self._unstored += 1
+        self._last_reception_s = now_s
+        # Rounding is slow, and mostly a message counts from its stamp on.
+        at_stamp = now_s == observation.stamp_s
+        self._drop_stale(observation.stamp_ns if at_stamp else _nanoseconds(now_s))
 
     def start_clock(self, now_s: float) -> None:
         """Count silence from now if nothing was ever received."""
@@ -104,7 +131,7 @@ class ObservationBuffer:
     def restart_clock(self, now_s: float) -> None:
         """Count silence from now."""
         self._last_reception_s = now_s
-        self._drop_stale(now_s)
+        self._drop_stale(_nanoseconds(now_s))
 
     def silence_s(self, now_s: float) -> float:
         """Return the time since the last message, or since ``start_clock``."""
@@ -115,33 +142,32 @@ class ObservationBuffer:
         period_s = self.params.expected_update_period_s
         return period_s == 0.0 or _nanoseconds(self.silence_s(now_s)) <= _nanoseconds(period_s)
 
-    def _store(self, points: NDArray[np.float32]) -> None:
-        """Append points to the array; if there is no room, move all to a larger one."""
-        if self._end + len(points) <= len(self._points):
-            self._points[self._end : self._end + len(points)] = points
-            self._end += len(points)
+    def _drop_stale(self, reception_ns: int) -> None:
+        if self.params.observation_persistence_s == 0.0:
+            del self.observations[1:]
             return
-        clouds = [one.points for one in reversed(self.observations)]
-        ends = np.cumsum([len(cloud) for cloud in clouds]).tolist()
-        self._begins = [0, *ends[:-1]][::-1]
-        self._end = ends[-1]
-        self._points = np.concatenate([*clouds, np.empty((self._end, 3), np.float32)])
-
-    def _drop_stale(self, reception_s: float) -> None:
-        persistence_s = self.params.observation_persistence_s
-        if persistence_s == 0.0:
-            self._drop_from(1)
+        oldest_ns = reception_ns - self._persistence_ns
+        if self._in_order:
+            while self.observations and self.observations[-1].stamp_ns < oldest_ns:
+                self.observations.pop()
             return
-        oldest_ns = _nanoseconds(reception_s) - _nanoseconds(persistence_s)
         for k, observation in enumerate(self.observations):
             if observation.stamp_ns < oldest_ns:
-                self._drop_from(k)
+                del self.observations[k:]
                 return
 
-    def _drop_from(self, first: int) -> None:
-        del self.observations[first:]
-        del self._begins[first:]
-        self._stack = None
+
+def _make_stack(slots: int, width: int) -> ObservationStack:
+    """Make a ring for so many observations of so many points."""
+    return ObservationStack(
+        np.empty((slots, 3)),
+        np.empty((slots, width, 2), np.float32),
+        np.empty((slots, width), np.int32),
+        np.empty((slots, width, 2), np.float32),
+        np.zeros((slots, 2), np.int64),
+        np.empty((slots, 4)),
+        np.empty((slots, 9)),
+    )
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -6,19 +6,21 @@ newer scan cleared therefore comes back until its own scan expires, as in costma
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav import footprint as footprints
 from quad_nav.costmap.cost_grid import Bounds, CostGrid, Window, merge_known, merge_maximum
 from quad_nav.costmap.layer import GridLayer, LayerParams
 from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceParams
 from quad_nav.costmap.projection import scan_points, transform_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.grid import FREE, UNKNOWN, GridSpec
+from quad_nav.kernels.cost_grid import place_polygon
+from quad_nav.kernels.observations import Ranges
 from quad_nav.kernels.projection import outside_circles
 from quad_nav.kernels.raytrace import clear_all_rays, mark_all_points
 
@@ -137,12 +139,17 @@ class ObstacleLayer(GridLayer):
                 other than the scan's.
 
         Returns:
-            The points within the source's heights, for marking and for clearing.
+            The points within the source's heights, for marking and for clearing; projected
+            when they are first needed.
         """
-        points = scan_points(scan, self.buffers[source_name].params.inf_is_valid)
-        return self.observe_cloud(
-            source_name, points, global_from_sensor, scan.stamp_s, global_from_origin
-        )
+        inf_is_valid, low_m, high_m = self.projection_key(source_name)
+        circles = self.excluded_circles
+
+        def project() -> NDArray[np.float32]:
+            return scan_points(scan, inf_is_valid, global_from_sensor, (low_m, high_m), circles)
+
+        origin = global_from_origin or global_from_sensor
+        return Observation(scan.stamp_s, origin.translation, project)
 
     def observe_cloud(
         self,
@@ -208,20 +215,22 @@ class ObstacleLayer(GridLayer):
             clearing = []
         touched = np.array([bounds.min_x_m, bounds.min_y_m, bounds.max_x_m, bounds.max_y_m])
         for buffer in clearing:
-            self._clear(buffer, self._raytrace_range(buffer.params), touched)
+            self._clear(buffer, touched)
         for buffer in marking:
-            self._mark(buffer, self._obstacle_range(buffer.params), touched)
-        bounds = Bounds(*touched.tolist())
-        self._footprint_now = footprints.oriented(self._footprint, robot)
-        if self.params.footprint_clearing_enabled and len(self._footprint_now):
-            bounds = bounds.including(self._footprint_now)
-        return bounds
+            self._mark(buffer, touched)
+        if self.params.footprint_clearing_enabled:
+            cos, sin = math.cos(robot.yaw_rad), math.sin(robot.yaw_rad)
+            self._footprint_now = place_polygon(
+                self._footprint, robot.x_m, robot.y_m, cos, sin, touched
+            )
+        return Bounds(*touched.tolist())
 
     def update_costs(self, master: CostGrid, window: Window) -> None:
         """Free the cells under the footprint and combine with the master grid."""
         if self.params.footprint_clearing_enabled:
             self.grid.fill_polygon(self._footprint_now, FREE)
-        below, above = master.costs[window.slices], self.grid.costs[window.slices]
+        cells = window.slices
+        below, above = master.costs[cells], self.grid.costs[cells]
         if self.params.combination_method == COMBINE_OVERWRITE:
             merge_known(below, above)
         elif self.params.combination_method == COMBINE_MAXIMUM:
@@ -230,21 +239,19 @@ class ObstacleLayer(GridLayer):
     def _centre_on(self, robot: Pose2D) -> None:
         self.grid.centre_on(robot.x_m, robot.y_m)
 
-    def _clear(
-        self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
-    ) -> None:
-        clear_all_rays(self.grid.view, buffer.stack, range_m, touched)
+    def _clear(self, buffer: ObservationBuffer, touched: NDArray[np.float64]) -> None:
+        ranges = self._ranges(buffer.params)
+        clear_all_rays(self.grid.view, *buffer.stack(ranges), ranges.clear_m, touched)
 
-    def _mark(
-        self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
-    ) -> None:
-        max_height_m = self.params.max_obstacle_height_m
-        mark_all_points(self.grid.view, buffer.stack, range_m, max_height_m, touched)
+    def _mark(self, buffer: ObservationBuffer, touched: NDArray[np.float64]) -> None:
+        mark_all_points(self.grid.view, *buffer.stack(self._ranges(buffer.params)), touched)
 
-    def _raytrace_range(self, source: SourceParams) -> float:
-        range_m = source.raytrace_range_m
-        return self.params.raytrace_range_m if range_m is None else range_m
-
-    def _obstacle_range(self, source: SourceParams) -> float:
-        range_m = source.obstacle_range_m
-        return self.params.obstacle_range_m if range_m is None else range_m
+    def _ranges(self, source: SourceParams) -> Ranges:
+        """Return a source's ranges; the layer's where it sets none."""
+        params = self.params
+        clear_m, mark_m = source.raytrace_range_m, source.obstacle_range_m
+        return Ranges(
+            params.raytrace_range_m if clear_m is None else clear_m,
+            params.obstacle_range_m if mark_m is None else mark_m,
+            params.max_obstacle_height_m,
+        )

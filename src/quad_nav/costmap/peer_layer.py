@@ -65,7 +65,12 @@ class PeerLayer(Layer):
         """Add the areas of now and those written last."""
         now = NOWHERE
         for area in self._areas:
-            now = now.union(NOWHERE.including(area.points).grown(area.radius_m))
+            if len(area.points) == 1:
+                x_m, y_m = area.points[0].tolist()
+                around = Bounds(x_m, y_m, x_m, y_m)
+            else:
+                around = NOWHERE.including(area.points)
+            now = now.union(around.grown(area.radius_m))
         before, self._written = self._written, now
         return bounds.union(before).union(now)
 

@@ -9,23 +9,36 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.kernels.projection import project_ranges, transform_between_heights
+from quad_nav.kernels.projection import project_scan, transform_between_heights
+
+_IDENTITY, _NO_CIRCLES = Pose3D(0.0, 0.0, 0.0), np.empty((0, 3))
 
 
-def scan_points(scan: Scan, inf_is_valid: bool) -> NDArray[np.float32]:
-    """Convert a scan to points.
+def scan_points(
+    scan: Scan,
+    inf_is_valid: bool,
+    a_from_sensor: Pose3D = _IDENTITY,
+    heights_m: Tuple[float, float] = (-math.inf, math.inf),
+    excluded_circles: NDArray[np.float64] = _NO_CIRCLES,
+) -> NDArray[np.float32]:
+    """Convert a scan to points in frame a.
 
     Args:
         scan: The scan. A beam counts when ``range_min_m <= range < range_max_m``.
         inf_is_valid: Beams without a return count as ending 0.1 mm before ``range_max_m``.
+        a_from_sensor: Pose of the sensor in frame a.
+        heights_m: Lowest and greatest height in frame a of points that are kept.
+        excluded_circles: float64[n, 3], rows x, y, radius in frame a; points within them are
+            left out.
 
     Returns:
-        float32[m, 3], metres in the sensor's frame, in the order of the beams.
+        float32[m, 3], metres in frame a, in the order of the beams.
     """
     ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
     directions = _directions(
@@ -35,7 +48,15 @@ def scan_points(scan: Scan, inf_is_valid: bool) -> NDArray[np.float32]:
     )
     range_max = np.float32(scan.range_max_m)
     inf_range = range_max - np.float32(0.0001) if inf_is_valid else np.float32(np.inf)
-    return project_ranges(ranges, directions, np.float32(scan.range_min_m), range_max, inf_range)
+    return project_scan(
+        ranges,
+        directions,
+        (np.float32(scan.range_min_m), range_max, inf_range),
+        a_from_sensor.quaternion,
+        (a_from_sensor.x_m, a_from_sensor.y_m, a_from_sensor.z_m),
+        heights_m,
+        excluded_circles,
+    )
 
 
 def transform_points(

@@ -1,14 +1,14 @@
 """Hand a sensor's messages to the obstacle layers that take them.
 
 Both shells use it: ``ros/navigator/sensors.py`` has one ``ScanIntake`` for each topic,
-``offline/offline_robot.py`` one for the LIDAR. The shell knows where the sensor was; the intake
+``loop/navigator_group.py`` one for the LIDAR. The shell knows where the sensor was; the intake
 decides whether a scan counts and lets layers that see a message alike share its projection.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, List, NamedTuple, Sequence, Tuple
+from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +42,8 @@ class SensorPose(NamedTuple):
     origin: Pose3D
 
 
-_Key = Tuple[SensorPose, Tuple[bool, float, float]]
+_Key = Tuple[bool, float, float]  # as ObstacleLayer.projection_key returns it
+_Made = Tuple[_Key, SensorPose, Observation]
 _MakeObservation = Callable[[Sink, SensorPose], Observation]
 
 
@@ -66,6 +67,7 @@ class ScanIntake:
 
     def __init__(self, sinks: Sequence[Sink], params: ScanValidatorParams) -> None:
         self.sinks = tuple(sinks)
+        self._keys = [sink.layer.projection_key(sink.source.name) for sink in self.sinks]
         self._params = params
         self._validator = ScanValidator(sink.source for sink in self.sinks)
 
@@ -135,13 +137,21 @@ class ScanIntake:
     ) -> None:
         if self._params.reject_implausible_scans:
             received_s = min(received_s, stamp_s)
-        # Equal keys are found by comparison: mostly the poses are the same objects, and hashing
-        # them costs more than all other steps here.
-        made: List[Tuple[_Key, Observation]] = []
-        for sink, pose in zip(self.sinks, poses):
-            key = (pose, sink.layer.projection_key(sink.source.name))
-            observation = next((one for other, one in made if other == key), None)
+        made: List[_Made] = []
+        for sink, key, pose in zip(self.sinks, self._keys, poses):
+            observation = _find_equal(made, key, pose)
             if observation is None:
                 observation = make(sink, pose)
-                made.append((key, observation))
+                made.append((key, pose, observation))
             sink.layer.add_observation(sink.source.name, observation, received_s)
+
+
+def _find_equal(made: Sequence[_Made], key: _Key, pose: SensorPose) -> Optional[Observation]:
+    """Find an observation by comparison: mostly the poses are the same objects.
+
+    Hashing them costs more than all other steps of an intake.
+    """
+    for other_key, other_pose, observation in made:
+        if other_key == key and (other_pose is pose or other_pose == pose):
+            return observation
+    return None

@@ -143,20 +143,16 @@ class VoxelLayer(ObstacleLayer):
         if move_x or move_y:
             shift(self.voxels, move_x, move_y, UNKNOWN)
 
-    def _clear(
-        self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
-    ) -> None:
-        grid, params = self._voxel_grid(), self.params
-        limits = RayLimits(range_m, params.max_obstacle_height_m, params.clip_voxel_rays)
+    def _clear(self, buffer: ObservationBuffer, touched: NDArray[np.float64]) -> None:
+        grid, ranges = self._voxel_grid(), self._ranges(buffer.params)
+        limits = RayLimits(ranges.clear_m, ranges.max_height_m, self.params.clip_voxel_rays)
         for seen in buffer.observations:
             clear_voxel_rays(grid, seen.sensor, seen.points, limits, touched)
 
-    def _mark(
-        self, buffer: ObservationBuffer, range_m: float, touched: NDArray[np.float64]
-    ) -> None:
-        grid, max_height_m = self._voxel_grid(), self.params.max_obstacle_height_m
+    def _mark(self, buffer: ObservationBuffer, touched: NDArray[np.float64]) -> None:
+        grid, ranges = self._voxel_grid(), self._ranges(buffer.params)
         for seen in buffer.observations:
-            mark_voxels(grid, seen.sensor, seen.points, range_m, max_height_m, touched)
+            mark_voxels(grid, seen.sensor, seen.points, ranges.mark_m, ranges.max_height_m, touched)
 
     def _voxel_grid(self) -> VoxelGrid:
         return VoxelGrid(

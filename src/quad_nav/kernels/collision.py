@@ -130,6 +130,78 @@ def _vertex_cell(
 
 
 @njit(cache=True, nogil=True)
+def highest_near(
+    costmap: CostmapView,
+    footprint: NDArray[np.float64],
+    scale: float,
+    x: float,
+    y: float,
+    travel_m: float,
+) -> NDArray[np.uint8]:
+    """Return the highest cost in a square around each cell that the robot may get to.
+
+    The square holds a footprint; where the result is low its outline need not be drawn. It is
+    built up from maxima over two, four, ... cells.
+
+    Args:
+        costmap: The costmap; cells off the map count as UNKNOWN.
+        footprint: float64[n, 2], metres in the robot's frame.
+        scale: Factor of its size.
+        x: x of the robot in the costmap's frame, metres.
+        y: y of the robot.
+        travel_m: Distance that the robot may travel.
+
+    Returns:
+        uint8[H, W]; UNKNOWN farther away than that.
+    """
+    size_y, size_x = costmap.costs.shape
+    highest = np.full((size_y, size_x), UNKNOWN, np.uint8)
+    reach_m = 0.0
+    for k in range(footprint.shape[0]):
+        reach_m = max(reach_m, scale * math.hypot(footprint[k, 0], footprint[k, 1]))
+    reach = int(min(reach_m / costmap.resolution_m, max(size_x, size_y))) + 1
+    x0, xn = _cells_within(x - costmap.origin_x_m, travel_m, costmap.resolution_m, size_x)
+    y0, yn = _cells_within(y - costmap.origin_y_m, travel_m, costmap.resolution_m, size_y)
+    if xn <= x0 or yn <= y0:
+        return highest
+    width, height = xn - x0 + 2 * reach, yn - y0 + 2 * reach
+    first_x, first_y = max(x0 - reach, 0), max(y0 - reach, 0)
+    end_x, end_y = min(xn + reach, size_x), min(yn + reach, size_y)
+    around = np.full((height, width), UNKNOWN, np.uint8)
+    around[first_y - y0 + reach : end_y - y0 + reach, first_x - x0 + reach : end_x - x0 + reach] = (
+        costmap.costs[first_y:end_y, first_x:end_x]
+    )
+    square, taller = around.reshape(-1), np.empty(height * width, np.uint8)
+    side, covered = 2 * reach + 1, 1
+    while covered < side:
+        # Rows run on into the next one: what is wrong then is in the columns that are left out.
+        shift = min(covered, side - covered)
+        _fill_higher(square, shift * width, taller)
+        _fill_higher(taller, shift, square)
+        covered += shift
+    highest[y0:yn, x0:xn] = around[: yn - y0, : xn - x0]
+    return highest
+
+
+@njit(cache=True, nogil=True)
+def _fill_higher(costs: NDArray[np.uint8], shift: int, higher: NDArray[np.uint8]) -> None:
+    """Fill uint8[n] with the higher of each cost, uint8[n], and the one so far after it."""
+    after = costs[shift:]
+    for k in range(after.size):
+        higher[k] = costs[k] if costs[k] > after[k] else after[k]
+
+
+@njit(cache=True, nogil=True)
+def _cells_within(
+    centre_m: float, distance_m: float, resolution_m: float, size: int
+) -> Tuple[int, int]:
+    """Return the first cell of an axis within a distance of a point, and the one after the last."""
+    first = max((centre_m - distance_m) / resolution_m - 1.0, 0.0)
+    end = min((centre_m + distance_m) / resolution_m + 2.0, float(size))
+    return (int(first), int(end)) if first < end else (0, 0)
+
+
+@njit(cache=True, nogil=True)
 def mark_footprint(
     costmap: CostmapView,
     footprint: NDArray[np.float64],

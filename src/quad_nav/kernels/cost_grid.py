@@ -56,6 +56,65 @@ def cell_of(costmap: CostmapView, x: float, y: float) -> Tuple[int, int]:
 
 
 @njit(cache=True, nogil=True)
+def include(bounds: NDArray[np.float64], x: float, y: float) -> None:
+    """Grow bounds, float64[4] min x, min y, max x, max y in metres, to hold a point."""
+    bounds[0] = min(bounds[0], x)
+    bounds[1] = min(bounds[1], y)
+    bounds[2] = max(bounds[2], x)
+    bounds[3] = max(bounds[3], y)
+
+
+@njit(cache=True, nogil=True)
+def place_polygon(
+    vertices: NDArray[np.float64],
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    bounds: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Turn a polygon, then move it; grow bounds by it.
+
+    Args:
+        vertices: float64[n, 2], metres.
+        x: Displacement along x, metres.
+        y: Displacement along y.
+        cos: Cosine of the angle to turn by.
+        sin: Its sine.
+        bounds: float64[4], as for ``include``.
+
+    Returns:
+        float64[n, 2], the order of operations as in ``Pose2D.transform``.
+    """
+    placed = np.empty_like(vertices)
+    for k in range(vertices.shape[0]):
+        placed[k, 0] = cos * vertices[k, 0] - sin * vertices[k, 1] + x
+        placed[k, 1] = sin * vertices[k, 0] + cos * vertices[k, 1] + y
+        include(bounds, placed[k, 0], placed[k, 1])
+    return placed
+
+
+@njit(cache=True, nogil=True)
+def fill_polygon(costmap: CostmapView, vertices: NDArray[np.float64], value: int) -> bool:
+    """Set the cells of a convex polygon, float64[n, 2] metres in the costmap's frame.
+
+    Returns:
+        False if a vertex is off the grid and nothing was set. Fewer than three vertices set
+        nothing either.
+    """
+    n = vertices.shape[0]
+    cells = np.empty((n, 2), np.int64)
+    for k in range(n):
+        x, y = cell_of(costmap, vertices[k, 0], vertices[k, 1])
+        if x < 0 or y < 0:
+            return False
+        cells[k, 0], cells[k, 1] = x, y
+    if n >= 3:
+        fill_convex_polygon(costmap.costs, cells, value)
+    return True
+
+
+@njit(cache=True, nogil=True)
 def fill_convex_polygon(costs: NDArray[Any], vertices: NDArray[np.int64], value: int) -> None:
     """Set every cell of a convex polygon, outline included.
 

@@ -7,7 +7,7 @@ centre, float32, in cells to the right (dx) and up (dy).
 from __future__ import annotations
 
 import math
-from typing import Any, Tuple
+from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,25 @@ OBSTACLE = 254  # NavFn never enters cells of this cost
 NEUTRAL = 50  # NavFn's cost of a free cell
 _OBSTACLE_SLOPE = 254  # of cells inside an obstacle, beside a reached one
 _STEP_CELLS = 0.5
+
+
+class Surroundings(NamedTuple):
+    """Cells around one of a potential; most steps of a descent stay in the same cell.
+
+    The gradients are float32, of length 1 or 0, at the cell (00), right of it (10), above it (01)
+    and both (11). They are 0 unless all cells are reached.
+    """
+
+    lowest: int  # flat index of the lowest of the cell and its eight neighbours
+    all_reached: bool  # all nine
+    x00: np.float32
+    y00: np.float32
+    x10: np.float32
+    y10: np.float32
+    x01: np.float32
+    y01: np.float32
+    x11: np.float32
+    y11: np.float32
 
 
 @njit(cache=True, nogil=True)
@@ -58,19 +77,6 @@ def _unit_gradient(
 
 
 @njit(cache=True, nogil=True)
-def _interpolated_gradient(
-    potential: NDArray[np.float32], size_x: int, cell: int, dx: np.float32, dy: np.float32
-) -> Tuple[np.float32, np.float32]:
-    x00, y00 = _unit_gradient(potential, size_x, cell)
-    x10, y10 = _unit_gradient(potential, size_x, cell + 1)
-    x01, y01 = _unit_gradient(potential, size_x, cell + size_x)
-    x11, y11 = _unit_gradient(potential, size_x, cell + size_x + 1)
-    gx = (1.0 - dy) * ((1.0 - dx) * x00 + dx * x10) + dy * ((1.0 - dx) * x01 + dx * x11)
-    gy = (1.0 - dy) * ((1.0 - dx) * y00 + dx * y10) + dy * ((1.0 - dx) * y01 + dx * y11)
-    return np.float32(gx), np.float32(gy)
-
-
-@njit(cache=True, nogil=True)
 def _lowest_around(potential: NDArray[np.float32], size_x: int, cell: int) -> Tuple[int, bool]:
     """Return the lowest of a cell and its eight neighbours; True if all nine are reached."""
     lowest, all_reached = cell, True
@@ -82,6 +88,20 @@ def _lowest_around(potential: NDArray[np.float32], size_x: int, cell: int) -> Tu
             elif potential[neighbour] < potential[lowest]:
                 lowest = neighbour
     return lowest, all_reached
+
+
+@njit(cache=True, nogil=True)
+def surroundings(potential: NDArray[np.float32], size_x: int, cell: int) -> Surroundings:
+    """Return what a descent of float32[n] needs to know of a flat cell for its next step."""
+    lowest, all_reached = _lowest_around(potential, size_x, cell)
+    if not all_reached:
+        none = np.float32(0.0)
+        return Surroundings(lowest, False, none, none, none, none, none, none, none, none)
+    x00, y00 = _unit_gradient(potential, size_x, cell)
+    x10, y10 = _unit_gradient(potential, size_x, cell + 1)
+    x01, y01 = _unit_gradient(potential, size_x, cell + size_x)
+    x11, y11 = _unit_gradient(potential, size_x, cell + size_x + 1)
+    return Surroundings(lowest, True, x00, y00, x10, y10, x01, y01, x11, y11)
 
 
 @njit(cache=True, nogil=True)
@@ -104,6 +124,7 @@ def leaves_map(potential: NDArray[np.float32], size_x: int, cell: int) -> bool:
 def step_down(
     potential: NDArray[np.float32],
     size_x: int,
+    around: Surroundings,
     cell: int,
     dx: np.float32,
     dy: np.float32,
@@ -118,6 +139,7 @@ def step_down(
     Args:
         potential: float32[n].
         size_x: Cells in a row.
+        around: ``surroundings`` of the cell.
         cell: Flat cell of the position.
         dx: Offset from the cell's centre to the right, float32, in cells.
         dy: Offset upwards.
@@ -127,13 +149,14 @@ def step_down(
     Returns:
         False if there is no next position, the flat cell and its offset dx, dy.
     """
+    lowest, all_reached, x00, y00, x10, y10, x01, y01, x11, y11 = around
     oscillates = (
         last > 1 and path[last, 0] == path[last - 2, 0] and path[last, 1] == path[last - 2, 1]
     )
-    lowest, all_reached = _lowest_around(potential, size_x, cell)
     if oscillates or not all_reached:
         return potential[lowest] < NOT_REACHED, lowest, np.float32(0.0), np.float32(0.0)
-    gx, gy = _interpolated_gradient(potential, size_x, cell, dx, dy)
+    gx = np.float32((1.0 - dy) * ((1.0 - dx) * x00 + dx * x10) + dy * ((1.0 - dx) * x01 + dx * x11))
+    gy = np.float32((1.0 - dy) * ((1.0 - dx) * y00 + dx * y10) + dy * ((1.0 - dx) * y01 + dx * y11))
     if gx == 0.0 and gy == 0.0:
         return False, cell, dx, dy
     scale = np.float32(_STEP_CELLS / math.hypot(gx, gy))
@@ -167,6 +190,7 @@ def descend(
         The number of points written, and True if the source was reached.
     """
     cell, dx, dy = start, np.float32(0.0), np.float32(0.0)
+    around, known = surroundings(potential, size_x, cell), cell
     for k in range(path.shape[0]):
         if potential[_nearest(cell, dx, dy, size_x, potential.size)] < NEUTRAL:
             path[k, 0], path[k, 1] = source % size_x, source // size_x
@@ -174,7 +198,9 @@ def descend(
         if leaves_map(potential, size_x, cell):
             return k, False
         path[k, 0], path[k, 1] = cell % size_x + dx, cell // size_x + dy
-        goes_on, cell, dx, dy = step_down(potential, size_x, cell, dx, dy, path, k)
+        if cell != known:
+            around, known = surroundings(potential, size_x, cell), cell
+        goes_on, cell, dx, dy = step_down(potential, size_x, around, cell, dx, dy, path, k)
         if not goes_on:
             return k + 1, False
     return path.shape[0], False

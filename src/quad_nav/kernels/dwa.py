@@ -1,8 +1,9 @@
-"""Dynamic window controller: simulate each sample, and take the cheapest.
+"""Dynamic window controller: simulate a sample, and what its obstacles cost.
 
-``control/dwa_critics.py`` has the maths. Poses and velocities are rounded to single precision at
-every step, as upstream keeps them. Poses and velocities of the robot are triples: x, y in metres
-and yaw in the costmap's frame; vx, vy in m/s and vtheta in rad/s in the robot's frame.
+``control/dwa_critics.py`` has the maths, ``dwa_search`` the search for the cheapest sample. Poses
+and velocities are rounded to single precision at every step, as upstream keeps them. Poses and
+velocities of the robot are triples: x, y in metres and yaw in the costmap's frame; vx, vy in m/s
+and vtheta in rad/s in the robot's frame.
 """
 
 from __future__ import annotations
@@ -58,13 +59,46 @@ class Obstacles(NamedTuple):
     sums: bool  # sum costs along the trajectory; else take the highest
 
 
-class Candidates(NamedTuple):
-    """Samples, and their costs without obstacles."""
+@njit(cache=True, nogil=True)
+def sample_grid(
+    lowest: Triple, highest: Triple, counts: Tuple[int, int, int]
+) -> NDArray[np.float64]:
+    """Return samples between two velocities, float64[n, 3]; vtheta varies fastest.
 
-    samples: NDArray[np.float64]  # [n, 3]
-    terms: NDArray[np.float64]  # [n, 5], the other critics' parts of the cost
-    legal: NDArray[np.bool_]  # [n]
-    footprint_scales: NDArray[np.float64]  # [n]
+    Values along each axis are those of ``spaced``, of single precision.
+    """
+    of_x = spaced(lowest[0], highest[0], counts[0])
+    of_y = spaced(lowest[1], highest[1], counts[1])
+    of_theta = spaced(lowest[2], highest[2], counts[2])
+    samples = np.empty((of_x.size * of_y.size * of_theta.size, 3))
+    k = 0
+    for vx in of_x:
+        for vy in of_y:
+            for vtheta in of_theta:
+                samples[k, 0], samples[k, 1] = _single(vx), _single(vy)
+                samples[k, 2] = _single(vtheta)
+                k += 1
+    return samples
+
+
+@njit(cache=True, nogil=True)
+def spaced(start: float, end: float, count: int) -> NDArray[np.float64]:
+    """Return ``count`` values from start to end, at least both ends, and 0 if stepped over."""
+    values = np.empty(max(count, 2) + 1)
+    values[0] = start
+    if start == end:
+        return values[:1]
+    step = (end - start) / (max(count, 2) - 1)
+    value, filled = start, 0
+    for _ in range(max(count, 2) - 1):
+        values[filled] = value
+        filled += 1
+        if value < 0.0 < value + step:
+            values[filled] = 0.0
+            filled += 1
+        value += step  # summed up: the last bit of a sample can decide between equal costs
+    values[filled] = end
+    return values[: filled + 1]
 
 
 @njit(cache=True, nogil=True)
@@ -112,14 +146,11 @@ def simulate(
         one step.
     """
     steps = step_count(motion, sample)
-    vx, vy, vtheta = sample[0], sample[1], sample[2]
-    command = (vx, vy, vtheta)
+    command = command_of(motion, velocity, sample, steps)
     if steps == 0:
         return 0, command
     dt = motion.sim_time_s / steps
-    if motion.accelerates:
-        vx, vy, vtheta = _accelerated(motion, sample, velocity[0], velocity[1], velocity[2], dt)
-        command = (vx, vy, vtheta)
+    vx, vy, vtheta = command
     x, y, theta = pose
     for k in range(steps):
         points[k, 0], points[k, 1], points[k, 2] = x, y, theta
@@ -131,6 +162,15 @@ def simulate(
             dx, dy = dx + vy * math.cos(side), dy + vy * math.sin(side)
         x, y, theta = _single(x + dx * dt), _single(y + dy * dt), _single(theta + vtheta * dt)
     return steps, command
+
+
+@njit(cache=True, nogil=True)
+def command_of(motion: Motion, velocity: Triple, sample: NDArray[np.float64], steps: int) -> Triple:
+    """Return the command of a sample: itself, or what comes nearest to it after one step."""
+    if steps == 0 or not motion.accelerates:
+        return sample[0], sample[1], sample[2]
+    vx, vy, vtheta = velocity
+    return _accelerated(motion, sample, vx, vy, vtheta, motion.sim_time_s / steps)
 
 
 @njit(cache=True, nogil=True)
@@ -215,33 +255,6 @@ def _has_nose_on_map(
 
 
 @njit(cache=True, nogil=True)
-def travel(
-    motion: Motion, grids: MapGrids, pose: Triple, velocity: Triple, samples: NDArray[np.float64]
-) -> Tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Simulate samples without the obstacle critic.
-
-    Args:
-        motion: Parameters of the simulation.
-        grids: Distance grids.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        samples: float64[n, 3].
-
-    Returns:
-        Commands, float64[n, 3]; distances at the ends, float64[n, 4]; legal ones, bool[n].
-    """
-    points = np.empty((longest(motion, samples), 3))
-    commands = np.empty((samples.shape[0], 3))
-    distances = np.zeros((samples.shape[0], 4))
-    legal = np.zeros(samples.shape[0], np.bool_)
-    for k in range(samples.shape[0]):
-        count, (vx, vy, vtheta) = simulate(motion, pose, velocity, samples[k], points)
-        commands[k, 0], commands[k, 1], commands[k, 2] = vx, vy, vtheta
-        legal[k] = count > 0 and is_within_reach(grids, points, count, distances[k])
-    return commands, distances, legal
-
-
-@njit(cache=True, nogil=True)
 def longest(motion: Motion, samples: NDArray[np.float64]) -> int:
     """Return the most poses of any sample, float64[n, 3]; at least 1."""
     steps = 1
@@ -252,26 +265,56 @@ def longest(motion: Motion, samples: NDArray[np.float64]) -> int:
 
 @njit(cache=True, nogil=True)
 def obstacle_cost(
-    obstacles: Obstacles, footprint_scale: float, points: NDArray[np.float64], count: int
+    obstacles: Obstacles,
+    footprint_scale: float,
+    points: NDArray[np.float64],
+    count: int,
+    terms: NDArray[np.float64],
+    limit: float,
 ) -> float:
-    """Return the highest cost under the scaled footprint, or their sum; -1 on collision."""
+    """Return the highest cost under the scaled footprint, or their sum; -1 on collision.
+
+    Poses are examined from the last one on, where most trajectories collide that do.
+
+    Args:
+        obstacles: Input of the obstacle critic.
+        footprint_scale: Factor of the footprint's size.
+        points: float64[k, 3], poses.
+        count: Number of poses.
+        terms: float64[n], the other critics' parts of the cost.
+        limit: Highest cost of interest: where the result leads to more, it may be too low.
+    """
     if count > 0 and not math.isfinite(footprint_scale):
         return -1.0
     footprint = obstacles.footprint * footprint_scale
     total = 0.0
-    for k in range(count):
-        x, y, theta = points[k, 0], points[k, 1], points[k, 2]
-        cell_x, cell_y = cell_of(obstacles.costmap, x, y)
-        if cell_x < 0 or cell_y < 0:
-            return -1.0
-        if obstacles.highest_near[cell_y, cell_x] <= (0.0 if obstacles.sums else total):
-            continue  # the footprint changes nothing
-        cost = footprint_cost(obstacles.costmap, footprint, x, y, theta)
+    for k in range(count - 1, -1, -1):
+        pose = points[k, 0], points[k, 1], points[k, 2]
+        cost = cost_of_pose(obstacles, footprint, pose, 0.0 if obstacles.sums else total)
         if cost < 0.0:
             return -1.0
-        cost = max(cost, float(obstacles.costmap.costs[cell_y, cell_x]))
         total = total + cost if obstacles.sums else max(total, cost)
+        if obstacles.scale > 0.0 and total_cost(obstacles.scale * total, terms) > limit:
+            return total
     return total
+
+
+@njit(cache=True, nogil=True)
+def cost_of_pose(
+    obstacles: Obstacles, footprint: NDArray[np.float64], pose: Triple, known: float
+) -> float:
+    """Return the highest cost under a footprint, float64[n, 2], at a pose; -1 on collision.
+
+    It is 0 where the cost is no more than a known one.
+    """
+    x, y, theta = pose
+    cell_x, cell_y = cell_of(obstacles.costmap, x, y)
+    if cell_x < 0 or cell_y < 0:
+        return -1.0
+    if obstacles.highest_near[cell_y, cell_x] <= known:
+        return 0.0
+    cost = footprint_cost(obstacles.costmap, footprint, x, y, theta)
+    return -1.0 if cost < 0.0 else max(cost, float(obstacles.costmap.costs[cell_y, cell_x]))
 
 
 @njit(cache=True, nogil=True)
@@ -281,36 +324,3 @@ def total_cost(obstacle_term: float, terms: NDArray[np.float64]) -> float:
     for term in terms:
         total += term
     return total
-
-
-@njit(cache=True, nogil=True)
-def cheapest(
-    motion: Motion, obstacles: Obstacles, pose: Triple, velocity: Triple, candidates: Candidates
-) -> Tuple[int, float]:
-    """Find the legal sample of lowest cost, the first of equals.
-
-    Samples are tried in the order of their costs without obstacles, as long as one of them can
-    win.
-
-    Returns:
-        Index and cost; (-1, inf) if no sample is legal.
-    """
-    samples, terms, legal = candidates.samples, candidates.terms, candidates.legal
-    floors = np.empty(samples.shape[0])
-    for k in range(samples.shape[0]):
-        floors[k] = total_cost(0.0, terms[k]) if legal[k] else np.inf
-    points = np.empty((longest(motion, samples), 3))
-    best, best_cost = -1, np.inf
-    for k in np.argsort(floors, kind="mergesort"):
-        if not legal[k] or floors[k] > best_cost:
-            break
-        cost = floors[k]
-        if obstacles.scale != 0.0:
-            count, _ = simulate(motion, pose, velocity, samples[k], points)
-            obstacle = obstacle_cost(obstacles, candidates.footprint_scales[k], points, count)
-            if obstacle < 0.0:
-                continue
-            cost = total_cost(obstacles.scale * obstacle, terms[k])
-        if cost < best_cost or (cost == best_cost and k < best):
-            best, best_cost = k, cost
-    return best, best_cost

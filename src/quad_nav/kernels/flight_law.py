@@ -159,3 +159,40 @@ def _horizontal_acceleration(
 @njit(cache=True, nogil=True)
 def _limited(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
+
+
+@njit(cache=True, nogil=True)
+def planar_states(rows: NDArray[np.float64], states: NDArray[np.float64]) -> None:
+    """Project bodies onto the horizontal plane.
+
+    The same operations in the same order as ``geometry.Pose3D.to_2d``, ``geometry.rotate`` and
+    ``Pose2D.rotate``, so that the numbers are the same.
+
+    Args:
+        rows: float64[n, 13], bodies.
+        states: float64[n, 8], filled: pose (x_m, y_m, yaw_rad) in ``map``, velocity (vx_mps,
+            vy_mps, vyaw_radps) in ``base_link``, and (vx_mps, vy_mps) of that turned by the yaw.
+    """
+    for k in range(rows.shape[0]):
+        x, y, z, w = rows[k, 3], rows[k, 4], rows[k, 5], rows[k, 6]
+        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        vx, vy, _ = _rotate_back(x, y, z, w, rows[k, 7], rows[k, 8], rows[k, 9])
+        _, _, vyaw = _rotate_back(x, y, z, w, rows[k, 10], rows[k, 11], rows[k, 12])
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        states[k, 0], states[k, 1], states[k, 2] = rows[k, 0], rows[k, 1], yaw
+        states[k, 3], states[k, 4], states[k, 5] = vx, vy, vyaw
+        states[k, 6], states[k, 7] = cos * vx - sin * vy, sin * vx + cos * vy
+
+
+@njit(cache=True, nogil=True)
+def _rotate_back(
+    qx: float, qy: float, qz: float, qw: float, x: float, y: float, z: float
+) -> Tuple[float, float, float]:
+    """Rotate a vector by the inverse of a unit quaternion, as ``geometry.rotate``."""
+    qx, qy, qz = -qx, -qy, -qz
+    cx, cy, cz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
+    return (
+        x + qw * cx + qy * cz - qz * cy,
+        y + qw * cy + qz * cx - qx * cz,
+        z + qw * cz + qx * cy - qy * cx,
+    )

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.descent import leaves_map, step_down
+from quad_nav.kernels.descent import leaves_map, step_down, surroundings
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.wave import NOT_REACHED, arrival_at
 
@@ -162,6 +162,7 @@ def gradient_path(
     """
     cell = int(goal_y) * size_x + int(goal_x)
     dx, dy = np.float32(goal_x - int(goal_x)), np.float32(goal_y - int(goal_y))
+    around, known = surroundings(potential, size_x, cell), cell
     for k in range(path.shape[0]):
         x, y = np.float32(cell % size_x + dx), np.float32(cell // size_x + dy)
         if abs(x - start_x) < 0.5 and abs(y - start_y) < 0.5:
@@ -170,7 +171,9 @@ def gradient_path(
         if leaves_map(potential, size_x, cell):
             return 0
         path[k, 0], path[k, 1] = x, y
-        goes_on, cell, dx, dy = step_down(potential, size_x, cell, dx, dy, path, k)
+        if cell != known:
+            around, known = surroundings(potential, size_x, cell), cell
+        goes_on, cell, dx, dy = step_down(potential, size_x, around, cell, dx, dy, path, k)
         if not goes_on:
             return 0
     return 0

@@ -5,14 +5,33 @@ Mirrors ``costmap/inflation.py``.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN
 from quad_nav.kernels.jit import njit
 
-_VISITED = -1
-_NEIGHBOURS = ((-1, 0), (0, -1), (1, 0), (0, 1))  # left, lower, right, upper
+_VISITED = -1  # a state below all others
+_LEFT, _LOWER, _RIGHT, _UPPER = 1, 2, 4, 8  # steps that lead away from the seed
+STEP_BITS = 4
+_PART = 64  # cells of a row that are searched for seeds at once
+
+
+class Ranks(NamedTuple):
+    """Distances from a seed, ranked, of those that have a cost.
+
+    A cell's state is one number: the rank of its distance above ``shift`` bits, then its place
+    in the table, then the steps that lead away from its seed. States compare as ranks do.
+    """
+
+    costs: np.ndarray
+    """uint8[ranks], cost at each rank"""
+    states: np.ndarray
+    """int32 or int64[radius + 2, radius + 2], the highest state of the rank at (abs(dx), abs(dy))
+    cells; of rank ``ranks`` where there is no cost"""
+    shift: int
 
 
 @njit(cache=True, nogil=True)
@@ -22,8 +41,7 @@ def inflate(
     xn: int,
     y0: int,
     yn: int,
-    cost_table: NDArray[np.uint8],
-    rank_table: NDArray[np.int32],
+    ranks: Ranks,
     inflate_unknown: bool,
 ) -> None:
     """Spread costs from the lethal cells of a window.
@@ -32,8 +50,10 @@ def inflate(
     their left, lower, right and upper neighbour. A cell keeps the first seed that reaches
     it, so this is close to the exact Euclidean transform and not equal to it.
 
-    A neighbour that already waits at the same or a lower rank is not queued again: it
-    would find itself visited. This keeps queues short and changes nothing.
+    Three short cuts change nothing. A neighbour that already waits at the same or a lower rank
+    is not queued again: it would find itself visited. A step back towards the seed is not
+    tried: its rank is lower, so that the neighbour has been visited. Ranks without a cost are
+    not visited.
 
     Args:
         costs: uint8[H, W], changed in place.
@@ -42,90 +62,116 @@ def inflate(
         xn: Column after the last one.
         y0: First row of the window.
         yn: Row after the last one.
-        cost_table: uint8[radius + 2, radius + 2], cost at (abs(dx), abs(dy)) cells from a seed.
-        rank_table: int32[radius + 2, radius + 2], rank of that distance among all distances.
-            Distances beyond the radius have the highest rank.
+        ranks: Distances and their costs.
         inflate_unknown: Overwrite unknown cells with costs below INSCRIBED, too.
     """
-    radius = rank_table.shape[0] - 2
-    reach = radius + 1  # of the seeds in the window; costs beyond it stay as they are
+    shift, beyond, side = ranks.shift, ranks.costs.shape[0], ranks.states.shape[0]
+    reach = side - 2
     low_x, low_y = max(0, x0 - reach), max(0, y0 - reach)
     high_x, high_y = min(costs.shape[1], xn + reach), min(costs.shape[0], yn + reach)
-    costs = costs[low_y:high_y, low_x:high_x]
-    x0, xn, y0, yn = x0 - low_x, xn - low_x, y0 - low_y, yn - low_y
-    size_y, size_x = costs.shape
-    beyond = rank_table.max()
-    waiting = np.full((size_y, size_x), beyond, np.int32)
-    # next, x, y, dx, dy; memory is taken from the system as far as it is written to.
-    queue = np.empty((_most_entries(costs, x0, xn, y0, yn, radius), 5), np.int32)
-    first = np.full(beyond, -1, np.int64)
-    last = np.full(beyond, -1, np.int64)
-    queued = 0
-    for y in range(y0, yn):
-        for x in range(x0, xn):
-            if costs[y, x] == LETHAL:
-                _append(queue, first, last, queued, 0, x, y, 0, 0)
-                queued += 1
+    # Copies with a border of visited cells save the test for the grid's end.
+    height, pitch = high_y - low_y + 2, high_x - low_x + 2
+    near_2d = np.zeros((height, pitch), np.uint8)
+    states_2d = np.full((height, pitch), _VISITED, ranks.states.dtype)
+    unreached = ranks.states[side - 1, side - 1]
+    for y in range(1, height - 1):
+        _copy(costs[low_y + y - 1, low_x:high_x], near_2d[y, 1 : pitch - 1])
+        states_2d[y, 1 : pitch - 1] = unreached
+    near, states, table = near_2d.reshape(-1), states_2d.reshape(-1), ranks.states.reshape(-1)
+    seeds = _seeds(near_2d, x0 - low_x + 1, xn - low_x + 1, y0 - low_y + 1, yn - low_y + 1)
+    # Next and cell; the first entries are heads of the ranks' lists. Memory is taken from the
+    # system as far as it is written to.
+    most = seeds.size + 4 * min(near.size, seeds.size * (2 * reach + 1) ** 2)
+    queue = np.empty((beyond + most, 2), np.int32)
+    last = np.empty(beyond, np.int32)
     for rank in range(beyond):
-        entry = first[rank]
+        queue[rank, 0], last[rank] = -1, rank
+    end = beyond
+    for cell in seeds:
+        states[cell] = _LEFT | _LOWER | _RIGHT | _UPPER
+        end = _append(queue, last, end, 0, cell)
+    payload = (1 << shift) - 1
+    # Unsigned indices save the test for a negative one.
+    one, row, column = np.uint64(1), np.uint64(pitch), np.uint64(side)
+    for rank in range(beyond):
+        cost = ranks.costs[rank]
+        into_unknown = cost >= INSCRIBED or (inflate_unknown and cost > FREE)
+        entry = queue[rank, 0]
         while entry >= 0:
-            x, y, dx, dy = queue[entry, 1], queue[entry, 2], queue[entry, 3], queue[entry, 4]
-            if waiting[y, x] != _VISITED:
-                waiting[y, x] = _VISITED
-                _raise_cost(costs, x, y, cost_table[abs(dx), abs(dy)], inflate_unknown)
-                for step_x, step_y in _NEIGHBOURS:
-                    nx, ny = x + step_x, y + step_y
-                    if not (0 <= nx < size_x and 0 <= ny < size_y):
-                        continue
-                    n_rank = rank_table[abs(dx + step_x), abs(dy + step_y)]
-                    if rank <= n_rank < waiting[ny, nx]:
-                        waiting[ny, nx] = n_rank
-                        _append(
-                            queue, first, last, queued, n_rank, nx, ny, dx + step_x, dy + step_y
-                        )
-                        queued += 1
-            entry = queue[entry, 0]
+            cell = np.uint64(queue[np.uint64(entry), 1])
+            entry = queue[np.uint64(entry), 0]
+            state = states[cell]
+            if state >> shift == rank:
+                states[cell] = _VISITED
+                if near[cell] == UNKNOWN:
+                    if into_unknown:
+                        near[cell] = cost
+                elif cost > near[cell]:
+                    near[cell] = cost
+                place = np.uint64((state & payload) >> STEP_BITS)
+                limit_x, limit_y = table[place + column], table[place + one]
+                state_x = limit_x - payload + (np.int64(place + column) << STEP_BITS)
+                state_y = limit_y - payload + (np.int64(place + one) << STEP_BITS)
+                if state & _LEFT and limit_x < states[cell - one]:
+                    states[cell - one] = state_x | (state & (_LEFT | _LOWER | _UPPER))
+                    end = _append(queue, last, end, limit_x >> shift, cell - one)
+                if state & _LOWER and limit_y < states[cell - row]:
+                    states[cell - row] = state_y | (state & (_LEFT | _LOWER | _RIGHT))
+                    end = _append(queue, last, end, limit_y >> shift, cell - row)
+                if state & _RIGHT and limit_x < states[cell + one]:
+                    states[cell + one] = state_x | (state & (_LOWER | _RIGHT | _UPPER))
+                    end = _append(queue, last, end, limit_x >> shift, cell + one)
+                if state & _UPPER and limit_y < states[cell + row]:
+                    states[cell + row] = state_y | (state & (_LEFT | _RIGHT | _UPPER))
+                    end = _append(queue, last, end, limit_y >> shift, cell + row)
+    for y in range(1, height - 1):
+        _copy(near_2d[y, 1 : pitch - 1], costs[low_y + y - 1, low_x:high_x])
 
 
 @njit(cache=True, nogil=True)
-def _most_entries(costs: NDArray[np.uint8], x0: int, xn: int, y0: int, yn: int, radius: int) -> int:
-    """Return the most entries of the queue: the seeds and the neighbours of visited cells."""
-    seeds = 0
+def _copy(source: NDArray[np.uint8], target: NDArray[np.uint8]) -> None:
+    for k in range(source.size):  # faster than an assignment of slices
+        target[k] = source[k]
+
+
+@njit(cache=True, nogil=True)
+def _seeds(costs: NDArray[np.uint8], x0: int, xn: int, y0: int, yn: int) -> NDArray[np.int64]:
+    """Return the flat indices, int64[s], of a window's lethal cells, in row order."""
+    in_row = np.zeros(yn - y0, np.int64)
     for y in range(y0, yn):
-        for x in range(x0, xn):
-            seeds += costs[y, x] == LETHAL
-    return seeds + len(_NEIGHBOURS) * min(costs.size, seeds * (2 * radius + 1) ** 2)
+        in_row[y - y0] = _count_lethal(costs[y, x0:xn])
+    seeds = np.empty(in_row.sum(), np.int64)
+    count = 0
+    for y in range(y0, yn):
+        if in_row[y - y0] == 0:
+            continue
+        for begin in range(x0, xn, _PART):
+            part = costs[y, begin : min(begin + _PART, xn)]
+            if _count_lethal(part) == 0:
+                continue
+            for x in range(part.size):
+                if part[x] == LETHAL:
+                    seeds[count] = y * costs.shape[1] + begin + x
+                    count += 1
+    return seeds
+
+
+@njit(cache=True, nogil=True)
+def _count_lethal(costs: NDArray[np.uint8]) -> int:
+    count = 0
+    for x in range(costs.size):  # a loop that the compiler makes vectors of
+        count += costs[x] == LETHAL
+    return count
 
 
 @njit(cache=True, nogil=True, inline="always")
 def _append(
-    queue: NDArray[np.int32],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    entry: int,
-    rank: int,
-    x: int,
-    y: int,
-    dx: int,
-    dy: int,
-) -> None:
+    queue: NDArray[np.int32], last: NDArray[np.int32], end: int, rank: int, cell: int
+) -> int:
+    """Append a cell to a rank's list; return the end of the entries."""
+    entry, index = np.uint64(end), np.uint64(rank)
     queue[entry, 0] = -1
-    queue[entry, 1] = x
-    queue[entry, 2] = y
-    queue[entry, 3] = dx
-    queue[entry, 4] = dy
-    if first[rank] < 0:
-        first[rank] = entry
-    else:
-        queue[last[rank], 0] = entry
-    last[rank] = entry
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _raise_cost(costs: NDArray[np.uint8], x: int, y: int, cost: int, inflate_unknown: bool) -> None:
-    old = costs[y, x]
-    if old == UNKNOWN:
-        if cost >= INSCRIBED or (inflate_unknown and cost > FREE):
-            costs[y, x] = cost
-    elif cost > old:
-        costs[y, x] = cost
+    queue[entry, 1] = cell
+    queue[np.uint64(last[index]), 0] = end
+    last[index] = end
+    return end + 1

@@ -1,27 +1,24 @@
-"""Compile kernels with numba, and cache the result where this user can write it.
+"""Compile kernels: from the library, or with numba.
 
-``njit`` is numba's, with another cache. numba's own raises where neither the sources nor the home
-can be written, when the disk is full, and when a cached file is damaged or refers to types of an
-earlier version; and it does not notice that a kernel calls a changed kernel of another module.
+``njit`` takes numba's place. A kernel in the library is called without numba, whose import takes
+longer than all else that a node loads; it is imported when a kernel is called with types that the
+library does not hold. Without a library, kernels are numba's own.
 """
 
 from __future__ import annotations
 
-import hashlib
+import functools
 import os
-from pathlib import Path
-from typing import Any, Callable, List, Optional, Tuple
+from typing import Any, Callable, List, Mapping
 
-import numba
-from numba.core import caching
-from numba.core.dispatcher import Dispatcher
-
-import quad_nav
-from quad_nav.files.cache_folder import require_writable, user_cache_folder
+from quad_nav.kernels import library
 
 COMPILE_S = 30
 """Wall time, about, in which one core compiles the kernels of a flight."""
-_SOURCES = Path(__file__).resolve().parent
+_LIBRARY, _NO_LIBRARY = library.load_library()
+_IS_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+_numba_kernels: List[Any] = []
+_missing: List[str] = []  # kernels that were called with types that the library does not hold
 
 
 def njit(cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -31,107 +28,80 @@ def njit(cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], 
         cache: Keep the result for later processes, if there is a place for it.
         options: Options of ``numba.njit``.
     """
-    compiled = numba.njit(**options)
 
     def decorate(function: Callable[..., Any]) -> Any:
-        kernel: Any = compiled(function)
-        is_compiled = isinstance(kernel, Dispatcher)  # else NUMBA_DISABLE_JIT=1 is set
-        if cache and FOLDER is not None and is_compiled:
-            kernel._cache = KernelCache(function)
+        if _IS_DISABLED:
+            return function
+        if _LIBRARY is not None:
+            name = f"{function.__module__}.{function.__qualname__}"
+            return _LIBRARY.kernel(name, _LazyKernel(function, cache, options))
+        kernel = _with_numba(function, cache, options)
+        _numba_kernels.append(kernel)
         return kernel
 
     return decorate
 
 
+def numba_kernels() -> List[Any]:
+    """Return the kernels that numba compiles, in the order of their definition."""
+    return [*_numba_kernels]
+
+
 def cache_warnings() -> List[str]:
     """Return a line that says what it costs that nothing is cached, [] if kernels are cached."""
-    if FOLDER is not None:
+    if library.FOLDER is not None or _LIBRARY is not None:
         return []
     return [
-        f"kernels: no folder for compiled kernels can be written ({'; '.join(_PROBLEMS)}); each "
-        f"process compiles them anew, which takes about {COMPILE_S} s; expected one of these, or "
-        "NUMBA_CACHE_DIR with a folder of your own"
+        "kernels: no folder for compiled kernels can be written "
+        f"({'; '.join(library.PROBLEMS)}); each process compiles them anew, which takes about "
+        f"{COMPILE_S} s; expected one of these, or NUMBA_CACHE_DIR with a folder of your own"
     ]
 
 
-class _Locator(caching._SourceFileBackedLocatorMixin, caching._CacheLocator):
-    """Location of a function's cached files, valid for the present sources of all kernels."""
-
-    def __init__(self, py_func: Any, py_file: str) -> None:
-        self._py_file, self._lineno = py_file, py_func.__code__.co_firstlineno
-
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> _Locator:
-        """Return the location without writing to it: ``_cache_folder`` has."""
-        return cls(py_func, py_file)
-
-    def get_cache_path(self) -> str:
-        return str(FOLDER)
-
-    def get_source_stamp(self) -> str:
-        return _DIGEST
-
-
-class _Results(caching.CompileResultCacheImpl):
-    _locator_classes = [_Locator]
+def library_remarks() -> List[str]:
+    """Return lines that say why numba is loaded, [] if all kernels are the library's."""
+    if _IS_DISABLED:
+        return []
+    if _LIBRARY is None:
+        return [
+            f"kernels: no library of compiled kernels: {_NO_LIBRARY}; numba loads them, which "
+            "takes about 1 s and 70 MB for each process"
+        ]
+    if not _missing:
+        return []
+    return [
+        f"kernels: numba loads {', '.join(_missing)}: called with types that are not in the "
+        "library of compiled kernels"
+    ]
 
 
-class KernelCache(caching.FunctionCache):
-    """Cache of one kernel, of which no fault ends a flight: the kernel is compiled instead."""
+def _with_numba(function: Callable[..., Any], cache: bool, options: Mapping[str, Any]) -> Any:
+    from quad_nav.kernels.numba_cache import compile_with_numba  # here: numba loads slowly
 
-    _impl_class = _Results
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the cached result for a signature, None without a usable one."""
-        try:
-            return super().load_overload(sig, target_context)
-        except Exception:  # pickle raises whatever a damaged file or a missing type leads to
-            self._forget()
-            return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Cache a result, if the disk has space for it."""
-        try:
-            super().save_overload(sig, data)
-        except OSError:
-            self.disable()
-
-    def _forget(self) -> None:
-        """Empty the index, or do without the cache if it cannot be written."""
-        try:
-            self.flush()
-        except OSError:
-            self.disable()
+    return compile_with_numba(function, cache, options)
 
 
-def _cache_folder() -> Tuple[Optional[Path], List[str]]:
-    """Return the folder of the cache, None if none can be written, and what is wrong with others.
+class _LazyKernel:
+    """numba's kernel, made when it is called, or when numba compiles a kernel that calls it."""
 
-    The first of: ``NUMBA_CACHE_DIR``; ``__pycache__`` beside the kernels, with the trust that the
-    sources have; a folder of this user.
-    """
-    given = getattr(numba.config, "CACHE_DIR", "")
-    problems = []
-    for folder in ([Path(given)] if given else []) + [_SOURCES / "__pycache__"]:
-        try:
-            os.makedirs(folder, exist_ok=True)
-            require_writable(folder)
-        except OSError as error:
-            problems.append(f"{folder}: {error.strerror or error}")
-        else:
-            return folder, problems
-    name = hashlib.sha256(os.fsencode(_SOURCES)).hexdigest()[:12]  # of this installation
-    own, others = user_cache_folder(name)
-    return own, problems + others
+    def __init__(
+        self, function: Callable[..., Any], cache: bool, options: Mapping[str, Any]
+    ) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._options = (cache, options)
 
+    def __call__(self, *args: Any, **keywords: Any) -> Any:
+        name = self.py_func.__name__
+        if name not in _missing:
+            _missing.append(name)
+        return self._kernel(*args, **keywords)
 
-def _digest() -> str:
-    """Return a hash of everything that compiled kernels hold: they call each other."""
-    digest = hashlib.sha256(quad_nav.__version__.encode())
-    for path in [*sorted(_SOURCES.glob("*.py")), _SOURCES.parent / "grid.py"]:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+    @functools.cached_property
+    def _kernel(self) -> Any:
+        return _with_numba(self.py_func, *self._options)
 
-
-FOLDER, _PROBLEMS = _cache_folder()
-_DIGEST = _digest()
+    @property
+    def _numba_type_(self) -> Any:
+        """Numba's type of this kernel, for kernels that call it."""
+        return self._kernel._numba_type_

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.rays import Triple, dot, enter_solid, through_slab, triple, turn
-from quad_nav.kernels.sectors import sector_of
+from quad_nav.kernels.sectors import Axes, disc_around, rough_disc_sector, sector_of
 
 _ROUNDING = 1e-6  # of a beam's number
+_RING_M, _RINGS = 1.0, 64  # rings around a LIDAR; the last one has no outer limit
 
 
 class Solids(NamedTuple):
@@ -89,8 +90,7 @@ def cast_scans(
         row, origin, rotation = ranges[k], triple(origins[k]), rotations[k]
         row[:] = math.inf
         _cast_at_floor(row, origin, rotation, beams)
-        for solid in range(solids.kinds.shape[0]):
-            _cast_at_solid(row, origin, rotation, beams, solids, solid)
+        _cast_at_solids(row, origin, rotation, beams, solids)
         if grid.members.shape[0] > 0:
             for beam in range(row.shape[0]):
                 direction = _in_map(rotation, beams.directions[beam])
@@ -130,10 +130,97 @@ def _cast_at_floor(
 
 
 @njit(cache=True, nogil=True)
-def _cast_at_solid(
+def _cast_at_solids(
     row: NDArray[np.float64],
     origin: Triple,
     rotation: NDArray[np.float64],
+    beams: Beams,
+    solids: Solids,
+) -> None:
+    """Shorten the beams, float64[m], to where they enter solids, near ones first.
+
+    Most others are hidden behind the near ones, which a rough sector is enough to tell.
+    """
+    count = solids.kinds.shape[0]
+    axes = (
+        (rotation[0, 0], rotation[1, 0], rotation[2, 0]),
+        (rotation[0, 1], rotation[1, 1], rotation[2, 1]),
+        (rotation[0, 2], rotation[1, 2], rotation[2, 2]),
+    )
+    discs = np.empty((count, 4))  # x, y, distance and radius
+    firsts, nexts = np.full(_RINGS, -1), np.empty(count, np.int64)  # lists of each ring's solids
+    for solid in range(count):
+        centre, sizes = triple(solids.centres[solid]), triple(solids.sizes[solid])
+        offset = (centre[0] - origin[0], centre[1] - origin[1], centre[2] - origin[2])
+        axis = triple(solids.rotations[solid, 2])
+        x, y, radius = disc_around(solids.kinds[solid], offset, axis, sizes, axes)
+        distance = math.sqrt(x * x + y * y)
+        if distance - radius > beams.far_m:
+            continue
+        discs[solid, 0], discs[solid, 1] = x, y
+        discs[solid, 2], discs[solid, 3] = distance, radius
+        ring = min(int(max(distance - radius, 0.0) / _RING_M), _RINGS - 1)
+        nexts[solid] = firsts[ring]
+        firsts[ring] = solid
+    solid = firsts[0]
+    while solid >= 0:
+        _cast_at_solid(row, origin, axes, beams, solids, solid)
+        solid = nexts[solid]
+    for ring in range(1, _RINGS):
+        solid = firsts[ring]
+        while solid >= 0:
+            x, y, distance, radius = discs[solid]
+            limit = distance - radius - _ROUNDING
+            first_rad, width_rad = rough_disc_sector(x, y, distance, radius)
+            first, last = _beams_of(first_rad, width_rad, beams)
+            first_beam = int(math.ceil(first))
+            begin, end = _trim(row, first_beam, int(math.floor(last)), limit)
+            if begin <= end:
+                _cast_at_visible(row, begin, end, origin, axes, beams, solids, solid)
+            last -= 2.0 * math.pi / beams.step_rad  # the rest after a full turn
+            if last >= 0.0:
+                begin, end = _trim(row, 0, min(int(math.floor(last)), first_beam - 1), limit)
+                if begin <= end:
+                    _cast_at_visible(row, begin, end, origin, axes, beams, solids, solid)
+            solid = nexts[solid]
+
+
+@njit(cache=True, nogil=True)
+def _trim(row: NDArray[np.float64], first: int, last: int, limit: float) -> Tuple[int, int]:
+    """Leave out beams first .. last at both ends that are not longer than ``limit``."""
+    last = min(last, row.shape[0] - 1)
+    while first <= last and row[first] <= limit:
+        first += 1
+    while first <= last and row[last] <= limit:
+        last -= 1
+    return first, last
+
+
+@njit(cache=True, nogil=True)
+def _cast_at_visible(
+    row: NDArray[np.float64],
+    first: int,
+    last: int,
+    origin: Triple,
+    axes: Axes,
+    beams: Beams,
+    solids: Solids,
+    solid: int,
+) -> None:
+    """Shorten the beams first .. last to where they enter a solid that is not around the LIDAR."""
+    centre, to_solid = solids.centres[solid], solids.rotations[solid]
+    offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
+    eye = turn(to_solid, offset)
+    ahead, left = turn(to_solid, axes[0]), turn(to_solid, axes[1])
+    kind, sizes = solids.kinds[solid], triple(solids.sizes[solid])
+    _shorten(row, first, last, kind, eye, ahead, left, sizes, beams)
+
+
+@njit(cache=True, nogil=True)
+def _cast_at_solid(
+    row: NDArray[np.float64],
+    origin: Triple,
+    axes: Axes,
     beams: Beams,
     solids: Solids,
     solid: int,
@@ -143,16 +230,13 @@ def _cast_at_solid(
     sizes = triple(solids.sizes[solid])
     offset = (origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2])
     radius = math.sqrt(dot(sizes, sizes))  # of a ball around any kind
-    above = rotation[0, 2] * offset[0] + rotation[1, 2] * offset[1] + rotation[2, 2] * offset[2]
-    if abs(above) > radius or dot(offset, offset) > (beams.far_m + radius) ** 2:
+    if abs(dot(axes[2], offset)) > radius or dot(offset, offset) > (beams.far_m + radius) ** 2:
         return
     kind, to_solid = solids.kinds[solid], solids.rotations[solid]
     eye = turn(to_solid, offset)
     if _surrounds(sizes, eye, beams.near_m):
         return
-    ahead = turn(to_solid, (rotation[0, 0], rotation[1, 0], rotation[2, 0]))
-    left = turn(to_solid, (rotation[0, 1], rotation[1, 1], rotation[2, 1]))
-    up = turn(to_solid, (rotation[0, 2], rotation[1, 2], rotation[2, 2]))
+    ahead, left, up = turn(to_solid, axes[0]), turn(to_solid, axes[1]), turn(to_solid, axes[2])
     first_rad, width_rad = sector_of(kind, eye, ahead, left, up, sizes)
     if width_rad < 0.0:
         return

@@ -6,13 +6,72 @@ Mirrors ``control/map_grid.py``.
 from __future__ import annotations
 
 import math
+from typing import Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import INSCRIBED, UNKNOWN
+from quad_nav.kernels.collision import mark_footprint
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
 from quad_nav.kernels.jit import njit
+
+
+@njit(cache=True, nogil=True)
+def distances(
+    costmap: CostmapView,
+    plan: NDArray[np.float64],
+    footprint: NDArray[np.float64],
+    x: float,
+    y: float,
+    theta: float,
+) -> Tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
+    """Measure the distances to a plan and its local goal, in cells.
+
+    Args:
+        costmap: The costmap.
+        plan: float64[m, 2 or more], columns x, y in the costmap's frame, metres.
+        footprint: float64[n, 2], metres in the robot's frame.
+        x: x of the robot in the costmap's frame, metres.
+        y: y of the robot.
+        theta: Heading of the robot, radians.
+
+    Returns:
+        Distances to the plan and to the local goal, int32[H, W] as from ``spread``, and the
+        cells inside of the footprint, bool[H, W].
+    """
+    within_robot = np.zeros(costmap.costs.shape, np.bool_)
+    cells = cells_on_plan(costmap, plan)
+    to_goal = spread(costmap.costs, within_robot, cells[-1:])
+    mark_footprint(costmap, footprint, x, y, theta, within_robot)
+    return spread(costmap.costs, within_robot, cells), to_goal, within_robot
+
+
+@njit(cache=True, nogil=True)
+def distances_ahead(
+    costmap: CostmapView, plan: NDArray[np.float64], front_x: float, front_y: float
+) -> Tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """Measure the distances to a plan, to its local goal, and to that moved ahead, in cells.
+
+    Args:
+        costmap: The costmap.
+        plan: float64[m, 2 or more], columns x, y in the costmap's frame, metres.
+        front_x: x of the plan's end moved ahead.
+        front_y: y of it.
+
+    Returns:
+        int32[H, W] each, as from ``spread``.
+    """
+    nowhere = np.zeros(costmap.costs.shape, np.bool_)
+    cells = cells_on_plan(costmap, plan)
+    front = plan.copy()
+    front[-1, 0], front[-1, 1] = front_x, front_y
+    ahead = cells_on_plan(costmap, front)
+    return (
+        spread(costmap.costs, nowhere, cells),
+        spread(costmap.costs, nowhere, cells[-1:]),
+        spread(costmap.costs, nowhere, ahead[-1:]),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -24,7 +83,7 @@ def cells_on_plan(costmap: CostmapView, points: NDArray[np.float64]) -> NDArray[
 
     Args:
         costmap: The costmap.
-        points: float64[m, 2], the plan, metres in the costmap's frame.
+        points: float64[m, 2 or more], columns x, y of the plan, metres in the costmap's frame.
 
     Returns:
         int64[n], flat cells in the plan's order, repeated where the plan is dense.
@@ -73,11 +132,10 @@ def spread(
     size_y, size_x = costs.shape
     obstacle, unreached, blocked = costs.size, costs.size + 1, costs.size + 2
     width = size_x + 2  # a border that is neither free nor blocked ends the wave
-    distance = np.full((size_y + 2) * width, -1, np.int32)
+    grid = np.full((size_y + 2, width), -1, np.int32)
     for y in range(size_y):
-        for x in range(size_x):
-            is_blocked = costs[y, x] >= INSCRIBED and not passable[y, x]
-            distance[(y + 1) * width + x + 1] = blocked if is_blocked else unreached
+        _fill_unreached(costs[y], passable[y], grid[y + 1, 1:-1], unreached, blocked)
+    distance = grid.reshape(-1)
     queue = np.empty(costs.size, np.int32)
     count = 0
     for source in sources:
@@ -93,15 +151,38 @@ def spread(
         further = distance[cell] + 1
         for offset in (-1, 1, -width, width):
             neighbour = np.uint64(cell + offset)
+            if distance[neighbour] <= obstacle:
+                continue  # most of them
             if distance[neighbour] == unreached:
                 distance[neighbour] = further
                 queue[count] = neighbour
                 count += 1
-            elif distance[neighbour] == blocked:
+            else:
                 distance[neighbour] = obstacle
-    inner = distance.reshape(size_y + 2, width)[1:-1, 1:-1].copy()
+    inner = np.empty((size_y, size_x), np.int32)
     for y in range(size_y):
-        for x in range(size_x):
-            if inner[y, x] == blocked:
-                inner[y, x] = unreached
+        _fill_lower(grid[y + 1, 1:-1], unreached, inner[y])
     return inner
+
+
+@njit(cache=True, nogil=True)
+def _fill_unreached(
+    costs: NDArray[np.uint8],
+    passable: NDArray[np.bool_],
+    distance: NDArray[np.int32],
+    unreached: int,
+    blocked: int,
+) -> None:
+    """Fill a row of distances before the wave; without branches, for vectors."""
+    of_free, of_blocked = np.int32(unreached), np.int32(blocked)
+    for x in range(costs.size):
+        is_blocked = (costs[x] >= INSCRIBED) & (passable[x] == 0)
+        distance[x] = of_blocked if is_blocked else of_free
+
+
+@njit(cache=True, nogil=True)
+def _fill_lower(distance: NDArray[np.int32], most: int, lower: NDArray[np.int32]) -> None:
+    """Fill a row with distances up to a highest one."""
+    highest = np.int32(most)
+    for x in range(distance.size):
+        lower[x] = min(distance[x], highest)

@@ -17,6 +17,7 @@ from quad_nav.kernels.jit import njit
 
 SECTORS = 1024
 MAX_OBSTRUCTED = 512  # cells that are worth looking for lines towards them
+_PART = 64  # cells of a row that are searched at once
 
 
 @njit(cache=True, nogil=True)
@@ -53,18 +54,19 @@ def find_obstructed(
     size_x = costs.shape[1]
     count = 0
     for y in range(y0, yn):
-        row = costs[y]
-        any_cost = np.uint8(0)
-        for x in range(x0, xn):  # a loop that the compiler makes vectors of
-            any_cost |= row[x]
-        if any_cost == FREE:
-            continue
-        for x in range(x0, xn):
-            if row[x] != FREE:
-                if count == obstructed.size:
-                    return count + 1
-                obstructed[count] = y * size_x + x
-                count += 1
+        for begin in range(x0, xn, _PART):
+            part = costs[y, begin : min(begin + _PART, xn)]
+            any_cost = np.uint8(0)
+            for x in range(part.size):  # a loop that the compiler makes vectors of
+                any_cost |= part[x]
+            if any_cost == FREE:
+                continue
+            for x in range(part.size):
+                if part[x] != FREE:
+                    if count == obstructed.size:
+                        return count + 1
+                    obstructed[count] = y * size_x + begin + x
+                    count += 1
     return count
 
 

@@ -36,21 +36,44 @@ def sample_path(
         if distance2 < nearest2:
             nearest, nearest2 = k, distance2
     first = min(nearest + 1, path.shape[0] - 1)
+    lengths = np.empty(path.shape[0])  # of the stretch to each point
+    x, y = start[0], start[1]
+    for k in range(first, path.shape[0]):
+        dx, dy = path[k, 0] - x, path[k, 1] - y
+        lengths[k] = math.sqrt(dx * dx + dy * dy)
+        x, y = path[k, 0], path[k, 1]
     points = np.empty((travelled.shape[0], 2))
     for i in range(travelled.shape[0]):
         left = travelled[i]
         x, y = start[0], start[1]
         for k in range(first, path.shape[0]):
-            dx, dy = path[k, 0] - x, path[k, 1] - y
-            length = math.sqrt(dx * dx + dy * dy)
-            if left < length:
-                x += dx * (left / length)
-                y += dy * (left / length)
+            if left < lengths[k]:
+                x += (path[k, 0] - x) * (left / lengths[k])
+                y += (path[k, 1] - y) * (left / lengths[k])
                 break
-            left -= length
+            left -= lengths[k]
             x, y = path[k, 0], path[k, 1]
         points[i, 0], points[i, 1] = x, y
     return points
+
+
+@njit(cache=True, nogil=True)
+def nearest_in_time(
+    one: NDArray[np.float64], other: NDArray[np.float64], steps_apart: int
+) -> float:
+    """Return the least distance of two tracks at about the same time.
+
+    Args:
+        one: float64[k, 2], metres, positions at equal steps of time.
+        other: float64[k, 2], positions at the same times.
+        steps_apart: Most steps between two positions that count.
+    """
+    nearest_m = np.inf
+    for i in range(one.shape[0]):
+        for j in range(max(0, i - steps_apart), min(other.shape[0], i + steps_apart + 1)):
+            distance_m = math.hypot(one[i, 0] - other[j, 0], one[i, 1] - other[j, 1])
+            nearest_m = min(nearest_m, distance_m)
+    return nearest_m
 
 
 @njit(cache=True, nogil=True)
@@ -84,8 +107,7 @@ def raise_discs(
             for column in range(
                 max(0, math.ceil(x - half)), min(size_x - 1, math.floor(x + half)) + 1
             ):
-                if cells[row, column] < value:
-                    cells[row, column] = value
+                cells[row, column] = max(cells[row, column], np.uint8(value))
 
 
 @njit(cache=True, nogil=True)

@@ -133,6 +133,35 @@ def outside_circles(
 
 
 @njit(cache=True, nogil=True)
+def project_scan(
+    ranges: NDArray[np.float32],
+    directions: NDArray[np.float64],
+    limits: Tuple[np.float32, np.float32, np.float32],
+    quaternion: Tuple[float, float, float, float],
+    translation: Tuple[float, float, float],
+    heights: Tuple[float, float],
+    circles: NDArray[np.float64],
+) -> NDArray[np.float32]:
+    """Convert ranges to points in another frame, within heights and in no circle.
+
+    Args:
+        ranges: float32[n], as for ``project_ranges``.
+        directions: float64[n, 2], as for ``project_ranges``.
+        limits: float32, range_min, range_max and inf_range of ``project_ranges``.
+        quaternion: As for ``transform_between_heights``.
+        translation: As for ``transform_between_heights``.
+        heights: min_z and max_z of ``transform_between_heights``.
+        circles: float64[c, 3], as for ``outside_circles``.
+
+    Returns:
+        float32[m, 3], metres in the other frame, in the order of the beams.
+    """
+    points = project_ranges(ranges, directions, limits[0], limits[1], limits[2])
+    points = transform_between_heights(points, quaternion, translation, heights[0], heights[1])
+    return outside_circles(points, circles) if circles.shape[0] > 0 else points
+
+
+@njit(cache=True, nogil=True)
 def count_returns(
     ranges: NDArray[np.float32], range_min: np.float32, range_max: np.float32, near: np.float32
 ) -> Tuple[int, int]:

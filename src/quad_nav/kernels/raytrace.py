@@ -6,36 +6,24 @@ Mirrors ``costmap/obstacle.py``.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Tuple
+from typing import Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL
-from quad_nav.kernels.cost_grid import CostmapView, cell_index
+from quad_nav.kernels.cost_grid import CostmapView, cell_index, cell_of, include
 from quad_nav.kernels.jit import njit
+from quad_nav.kernels.observations import ObservationStack, clip_to_grid, include_rays
 from quad_nav.kernels.obstructed_cells import (
     MAX_OBSTRUCTED,
     SECTORS,
     find_obstructed,
     find_sectors,
     keep_obstructed,
-    sector_of,
 )
 
 MAX_LINES = 2**16  # that an update remembers: in grids up to 256 x 256 one to each cell
-
-
-class ObservationStack(NamedTuple):
-    """Observations of one source, newest first, metres in the frame of the costmap.
-
-    Observation k has the points from ``begins[k]`` to ``ends[k]``; other points are old.
-    """
-
-    sensors: NDArray[np.float64]  # [k, 3], where the rays start
-    points: NDArray[np.float32]  # [n, 3]
-    begins: NDArray[np.int64]  # [k]
-    ends: NDArray[np.int64]  # [k]
 
 
 @njit(cache=True, nogil=True)
@@ -76,192 +64,126 @@ def clear_line(
 
 
 @njit(cache=True, nogil=True)
-def clip_to_grid(
-    sensor_x: float,
-    sensor_y: float,
-    x: float,
-    y: float,
-    low_x: float,
-    low_y: float,
-    high_x: float,
-    high_y: float,
-) -> Tuple[float, float]:
-    """Pull the end (x, y) of a ray back along the ray to the grid's border.
-
-    Ends beyond the high borders land 1 mm inside, so that they fall into a cell. All
-    numbers are metres in the frame of the grid.
-    """
-    dx, dy = x - sensor_x, y - sensor_y
-    if x < low_x:
-        t = (low_x - sensor_x) / dx
-        x, y = low_x, sensor_y + dy * t
-    if y < low_y:
-        t = (low_y - sensor_y) / dy
-        x, y = sensor_x + dx * t, low_y
-    if x > high_x:
-        t = (high_x - sensor_x) / dx
-        x, y = high_x - 0.001, sensor_y + dy * t
-    if y > high_y:
-        t = (high_y - sensor_y) / dy
-        x, y = sensor_x + dx * t, high_y - 0.001
-    return x, y
-
-
-@njit(cache=True, nogil=True)
 def clear_rays(
     costmap: CostmapView,
-    sensor_x: float,
-    sensor_y: float,
-    points: NDArray[np.float32],
+    seen: ObservationStack,
+    slot: int,
     range_m: float,
-    sectors: NDArray[np.bool_],
+    wanted: NDArray[np.bool_],
     cleared: NDArray[np.int64],
-    bounds: NDArray[np.float64],
-) -> bool:
-    """Free the cells between a sensor and each of its points.
+) -> None:
+    """Free the cells between a sensor on the costmap and each of its points.
 
     Args:
         costmap: The costmap, changed in place.
-        sensor_x: x of the sensor in the frame of the costmap, metres.
-        sensor_y: y of the sensor.
-        points: float32[n, 3], metres in the frame of the costmap.
+        seen: Observations.
+        slot: Slot of the one whose rays clear.
         range_m: Length to which rays are cleared.
-        sectors: bool[SECTORS]; lines into sectors that are False are skipped. Empty skips all.
+        wanted: bool[SECTORS]; lines into sectors that are False are skipped.
         cleared: int64[2 ** b], -1 at first; remembers the last line that was cleared to each
             cell, or to one of several cells of a large grid. A slow robot's scans have most
             lines in common. May be empty.
-        bounds: float64[4], min x, min y, max x, max y in metres, grown by what rays reach.
-
-    Returns:
-        False if the sensor is off the costmap and nothing was cleared.
     """
     costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
+    sensor_x, sensor_y = seen.sensors[slot, 0], seen.sensors[slot, 1]
     x0 = cell_index(sensor_x, origin_x, resolution, size_x)
     y0 = cell_index(sensor_y, origin_y, resolution, size_y)
-    if x0 < 0 or y0 < 0:
-        return False
-    include(bounds, sensor_x, sensor_y)
     high_x, high_y = origin_x + size_x * resolution, origin_y + size_y * resolution
-    # A ray that leaves the grid ends in it. The last millimetre makes no other cell.
-    whole = (
-        bounds[0] <= origin_x
-        and bounds[1] <= origin_y
-        and bounds[2] >= high_x - 0.001
-        and bounds[3] >= high_y - 0.001
-    )
     max_cells = max(0.0, math.ceil(range_m / resolution))
     flat_costs = costs.reshape(-1)
     start = y0 * size_x + x0
     places = np.uint64(max(cleared.size - 1, 0))
-    surely_near, surely_far = (1.0 - 1e-9) * range_m * range_m, (1.0 + 1e-9) * range_m * range_m
-    for k in range(points.shape[0]):
-        x, y = float(points[k, 0]), float(points[k, 1])
-        wanted = sectors.size > 0 and sectors[sector_of(x - sensor_x, y - sensor_y)]
-        if not wanted:
-            if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]:
-                continue
-            if whole and not (origin_x <= x <= high_x and origin_y <= y <= high_y):
-                continue
-            if _range_ends_inside(
-                bounds, sensor_x, sensor_y, x - sensor_x, y - sensor_y, surely_far
-            ):
-                continue
+    ends, sectors = seen.ends[slot], seen.sectors[slot]
+    for k in range(seen.counts[slot, 0]):
+        if not wanted[sectors[k]]:
+            continue
+        x, y = float(ends[k, 0]), float(ends[k, 1])
         x, y = clip_to_grid(sensor_x, sensor_y, x, y, origin_x, origin_y, high_x, high_y)
         x1 = cell_index(x, origin_x, resolution, size_x)
         y1 = cell_index(y, origin_y, resolution, size_y)
         if x1 < 0 or y1 < 0:
             continue
-        dx, dy = x - sensor_x, y - sensor_y
-        if wanted:
+        if cleared.size > 0:
             line = start * costs.size + y1 * size_x + x1
             place = np.uint64(y1 * size_x + x1) & places
-            if cleared.size == 0 or cleared[place] != line:
-                if cleared.size > 0:
-                    cleared[place] = line
-                clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
-        scale = 1.0
-        if dx * dx + dy * dy > surely_near:  # hypot is slow, and most points are near
-            length = math.hypot(dx, dy)
-            scale = range_m / length if length > range_m else 1.0
-        include(bounds, sensor_x + dx * scale, sensor_y + dy * scale)
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _range_ends_inside(
-    bounds: NDArray[np.float64], x: float, y: float, dx: float, dy: float, square_m2: float
-) -> bool:
-    """Tell whether the point of a ray in direction (dx, dy) is inside the bounds, as (x, y) is.
-
-    ``square_m2`` is the square of its distance.
-    """
-    to_x = bounds[2] - x if dx > 0.0 else x - bounds[0]
-    to_y = bounds[3] - y if dy > 0.0 else y - bounds[1]
-    length = dx * dx + dy * dy
-    return (
-        length * to_x * to_x >= square_m2 * dx * dx and length * to_y * to_y >= square_m2 * dy * dy
-    )
+            if cleared[place] == line:
+                continue
+            cleared[place] = line
+        clear_line(flat_costs, size_x, x0, y0, x1, y1, max_cells)
 
 
 @njit(cache=True, nogil=True)
 def clear_all_rays(
-    costmap: CostmapView, seen: ObservationStack, range_m: float, bounds: NDArray[np.float64]
+    costmap: CostmapView,
+    seen: ObservationStack,
+    newest: int,
+    count: int,
+    range_m: float,
+    bounds: NDArray[np.float64],
 ) -> None:
-    """Apply ``clear_rays`` to several observations, in order.
+    """Apply ``clear_rays`` and ``include_rays`` to observations, the newest first.
 
     A line through nothing but free cells changes nothing. Mostly the first observation
     leaves few cells that are not free; from then on only lines towards those are cleared.
+    A sensor off the costmap clears nothing.
 
     Args:
         costmap: The costmap, changed in place.
         seen: The observations.
+        newest: Slot of the newest one.
+        count: Number of observations.
         range_m: Length to which rays are cleared.
-        bounds: float64[4], as for ``clear_rays``.
+        bounds: float64[4], min x, min y, max x, max y in metres, grown by what rays reach.
     """
     no_lines = np.empty(0, dtype=np.int64)
     lines = no_lines
     everywhere = np.ones(SECTORS, dtype=np.bool_)
-    sectors = np.empty(SECTORS, dtype=np.bool_)
+    wanted = np.empty(SECTORS, dtype=np.bool_)
     obstructed = np.empty(MAX_OBSTRUCTED, dtype=np.int64)
     costs, resolution = costmap.costs, costmap.resolution_m
-    window = _reached(costmap, seen.sensors, range_m)
-    count = find_obstructed(costs, window, obstructed)
-    for k in range(len(seen.ends)):
-        points = seen.points[seen.begins[k] : seen.ends[k]]
-        x, y = seen.sensors[k, 0], seen.sensors[k, 1]
-        if count == 0:
-            clear_rays(costmap, x, y, points, range_m, everywhere[:0], no_lines, bounds)
-        elif count <= MAX_OBSTRUCTED:
+    window = _reached(costmap, seen.sensors, newest, count, range_m)
+    left = find_obstructed(costs, window, obstructed)
+    for k in range(count):
+        slot = (newest - k) % seen.sensors.shape[0]
+        x, y = seen.sensors[slot, 0], seen.sensors[slot, 1]
+        cell_x, cell_y = cell_of(costmap, x, y)
+        if cell_x < 0 or cell_y < 0:
+            continue
+        include_rays(costmap, seen, slot, range_m, bounds)
+        if left == 0:
+            continue
+        if left <= MAX_OBSTRUCTED:
             find_sectors(
-                obstructed[:count],
+                obstructed[:left],
                 costs.shape[1],
                 (x - costmap.origin_x_m) / resolution,
                 (y - costmap.origin_y_m) / resolution,
-                sectors,
+                wanted,
             )
-            clear_rays(costmap, x, y, points, range_m, sectors, no_lines, bounds)
-            count = keep_obstructed(costs.reshape(-1), obstructed, count)
+            clear_rays(costmap, seen, slot, range_m, wanted, no_lines)
+            left = keep_obstructed(costs.reshape(-1), obstructed, left)
         else:
             if lines.size == 0:
                 lines = np.full(_power_of_two(costs.size), -1, dtype=np.int64)
-            clear_rays(costmap, x, y, points, range_m, everywhere, lines, bounds)
+            clear_rays(costmap, seen, slot, range_m, everywhere, lines)
             if k == 0:  # what is still much after the first mostly stays so
-                count = find_obstructed(costs, window, obstructed)
+                left = find_obstructed(costs, window, obstructed)
 
 
 @njit(cache=True, nogil=True)
 def _reached(
-    costmap: CostmapView, sensors: NDArray[np.float64], range_m: float
+    costmap: CostmapView, sensors: NDArray[np.float64], newest: int, count: int, range_m: float
 ) -> Tuple[int, int, int, int]:
-    """Window of the cells that rays of a length from any of float64[k, 3] sensors reach."""
+    """Window of the cells that rays of a length reach from any of the sensors of a ring."""
     costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
     reach = range_m + 2 * resolution
     low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
-    for k in range(sensors.shape[0]):
-        low_x, high_x = min(low_x, sensors[k, 0]), max(high_x, sensors[k, 0])
-        low_y, high_y = min(low_y, sensors[k, 1]), max(high_y, sensors[k, 1])
+    for k in range(count):
+        x, y = sensors[(newest - k) % sensors.shape[0], :2]
+        low_x, high_x = min(low_x, x), max(high_x, x)
+        low_y, high_y = min(low_y, y), max(high_y, y)
     x0 = min(max((low_x - reach - origin_x) / resolution, 0.0), float(size_x))
     xn = min(max((high_x + reach - origin_x) / resolution + 1, 0.0), float(size_x))
     y0 = min(max((low_y - reach - origin_y) / resolution, 0.0), float(size_y))
@@ -282,64 +204,27 @@ def _power_of_two(cells: int) -> int:
 def mark_all_points(
     costmap: CostmapView,
     seen: ObservationStack,
-    range_m: float,
-    max_height_m: float,
+    newest: int,
+    count: int,
     bounds: NDArray[np.float64],
 ) -> None:
-    """Apply ``mark_points`` to several observations, in order.
+    """Make the cells of the points that mark lethal.
 
     Args:
         costmap: The costmap, changed in place.
         seen: The observations.
-        range_m: As for ``mark_points``.
-        max_height_m: As for ``mark_points``.
-        bounds: float64[4], as for ``clear_rays``.
-    """
-    for k in range(len(seen.ends)):
-        points = seen.points[seen.begins[k] : seen.ends[k]]
-        mark_points(costmap, seen.sensors[k], points, range_m, max_height_m, bounds)
-
-
-@njit(cache=True, nogil=True)
-def mark_points(
-    costmap: CostmapView,
-    sensor: NDArray[np.float64],
-    points: NDArray[np.float32],
-    range_m: float,
-    max_height_m: float,
-    bounds: NDArray[np.float64],
-) -> None:
-    """Make the cells of points lethal.
-
-    Args:
-        costmap: The costmap, changed in place.
-        sensor: float64[3], position of the sensor in the frame of the costmap, metres.
-        points: float32[n, 3], metres in the frame of the costmap.
-        range_m: Points at this distance from the sensor, or farther, are ignored.
-        max_height_m: Points with a higher z are ignored.
-        bounds: float64[4], as for ``clear_rays``, grown by the marked points.
+        newest: Slot of the newest one.
+        count: Number of observations.
+        bounds: float64[4], as for ``clear_all_rays``, grown by the marked points.
     """
     costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
-    for k in range(points.shape[0]):
-        x, y, z = float(points[k, 0]), float(points[k, 1]), float(points[k, 2])
-        if z > max_height_m:
-            continue
-        dx, dy, dz = x - sensor[0], y - sensor[1], z - sensor[2]
-        if dx * dx + dy * dy + dz * dz >= range_m * range_m:
-            continue
-        cell_x = cell_index(x, origin_x, resolution, size_x)
-        cell_y = cell_index(y, origin_y, resolution, size_y)
-        if cell_x < 0 or cell_y < 0:
-            continue
-        costs[cell_y, cell_x] = LETHAL
-        include(bounds, x, y)
-
-
-@njit(cache=True, nogil=True)
-def include(bounds: NDArray[np.float64], x: float, y: float) -> None:
-    """Grow bounds, float64[4] min x, min y, max x, max y in metres, to hold a point."""
-    bounds[0] = min(bounds[0], x)
-    bounds[1] = min(bounds[1], y)
-    bounds[2] = max(bounds[2], x)
-    bounds[3] = max(bounds[3], y)
+    for one in range(count):
+        slot = (newest - one) % seen.sensors.shape[0]
+        for k in range(seen.counts[slot, 1]):
+            x, y = float(seen.marks[slot, k, 0]), float(seen.marks[slot, k, 1])
+            cell_x = cell_index(x, origin_x, resolution, size_x)
+            cell_y = cell_index(y, origin_y, resolution, size_y)
+            if cell_x >= 0 and cell_y >= 0:
+                costs[cell_y, cell_x] = LETHAL
+                include(bounds, x, y)

@@ -15,6 +15,8 @@ from quad_nav.kernels.flight_law import BodyConstants, FlightGains, fly, rotatio
 from quad_nav.kernels.jit import njit
 
 NOBODY = -1
+MOVING = -2
+"""Instead of another quadcopter's number: a solid that moves by itself."""
 
 
 class FreeSpace(NamedTuple):
@@ -33,6 +35,19 @@ class FreeSpace(NamedTuple):
     centres_m: NDArray[np.float64]  # [n, 3], the hulls' centres, filled by ``find_near``
 
 
+class MovingSolids(NamedTuple):
+    """Solids that move by themselves, as upright cylinders that hold them, in ``map``."""
+
+    poses: NDArray[np.float64]
+    """[steps, m, 3], (x_m, y_m, yaw_rad) at the end of each step"""
+    reaches_m: NDArray[np.float64]
+    """[m], a hull with its centre nearer than this, seen from above, may touch"""
+    lows_m: NDArray[np.float64]
+    """[m], least height of the centre of a hull that may touch"""
+    highs_m: NDArray[np.float64]
+    """[m], greatest height"""
+
+
 @njit(cache=True, nogil=True)
 def fly_freely(
     rows: NDArray[np.float64],
@@ -44,6 +59,7 @@ def fly_freely(
     constants: BodyConstants,
     gains: FlightGains,
     space: FreeSpace,
+    moving: MovingSolids,
 ) -> Tuple[int, int, int]:
     """Fly as long as nothing may be touched.
 
@@ -57,15 +73,20 @@ def fly_freely(
         constants: Mass properties and limits.
         gains: Gains and limits of the flight law.
         space: Space in which nothing is touched.
+        moving: Solids that move by themselves, at ``steps`` steps.
 
     Returns:
-        The steps flown, and the two numbers that ``find_near`` returned before the next one.
+        The steps flown, and the two numbers that ``find_near`` returned before the next one. The
+        second is ``MOVING`` if the quadcopter may touch a solid that moves by itself.
     """
     forces, torques = np.empty_like(commands), np.empty_like(commands)
     for done in range(steps):
         found, other = find_near(rows, excluded, space)
         if found != NOBODY:
             return done, found, other
+        found = find_near_moving(excluded, space, moving, done)
+        if found != NOBODY:
+            return done, found, MOVING
         fly(rows, commands, altitude_m, constants, gains, forces, torques)
         step_freely(rows, excluded, forces, torques, constants, step_s)
     return steps, NOBODY, NOBODY
@@ -175,6 +196,33 @@ def find_near(
             ):
                 return (other, k) if excluded[k] else (k, other)
     return NOBODY, NOBODY
+
+
+@njit(cache=True, nogil=True)
+def find_near_moving(
+    excluded: NDArray[np.bool_], space: FreeSpace, moving: MovingSolids, step: int
+) -> int:
+    """Find a quadcopter that is not excluded and that may touch a solid that moves by itself.
+
+    Args:
+        excluded: bool[n], bodies that something else moves.
+        space: Its ``centres_m`` are those of the quadcopters' hulls.
+        moving: The solids.
+        step: Number of the next step.
+
+    Returns:
+        Its number, or ``NOBODY``.
+    """
+    for k in range(excluded.shape[0] if moving.reaches_m.shape[0] > 0 else 0):
+        x, y, z = space.centres_m[k]
+        for solid in range(0 if excluded[k] else moving.reaches_m.shape[0]):
+            dx, dy = x - moving.poses[step, solid, 0], y - moving.poses[step, solid, 1]
+            if (
+                dx * dx + dy * dy < moving.reaches_m[solid] * moving.reaches_m[solid]
+                and moving.lows_m[solid] < z < moving.highs_m[solid]
+            ):
+                return k
+    return NOBODY
 
 
 @njit(cache=True, nogil=True)

@@ -1,7 +1,8 @@
 """Trajectory rollout: simulate velocity samples and score them.
 
-``control/rollout.py`` has the maths. Poses and velocities of the robot are triples: x, y in metres
-and yaw in the costmap's frame; vx, vy in m/s and vtheta in rad/s in the robot's frame.
+``control/rollout.py`` has the maths, ``motion`` the poses. Poses and velocities of the robot are
+triples: x, y in metres and yaw in the costmap's frame; vx, vy in m/s and vtheta in rad/s in the
+robot's frame.
 """
 
 from __future__ import annotations
@@ -16,6 +17,14 @@ from quad_nav.grid import INSCRIBED
 from quad_nav.kernels.collision import COLLIDES, Triple, footprint_cost, line_cost
 from quad_nav.kernels.cost_grid import CostmapView, cell_of
 from quad_nav.kernels.jit import njit
+from quad_nav.kernels.lanes import OFF_MAP, UNCERTAIN
+from quad_nav.kernels.motion import (
+    RolloutParams,
+    last_cells,
+    longest,
+    step_count,
+    travel,
+)
 
 OUT_OF_REACH = -2.0  # the cost of a trajectory that leaves the reach of path or goal
 _NO_LINE_OF_SIGHT = 1.7976931348623157e308
@@ -30,54 +39,7 @@ class RolloutInputs(NamedTuple):
     footprint: NDArray[np.float64]  # [n, 2], robot frame
     path_distance: NDArray[np.int32]  # [H, W]
     goal_distance: NDArray[np.int32]  # [H, W]
-    plan: NDArray[np.float64]  # [m, 2], m >= 1
-
-
-class RolloutParams(NamedTuple):
-    """Parameters of simulation and scoring."""
-
-    sim_time_s: float
-    sim_granularity_m: float
-    angular_sim_granularity_rad: float
-    acc_lim_x_mps2: float
-    acc_lim_y_mps2: float
-    acc_lim_theta_radps2: float
-    path_scale: float
-    goal_scale: float
-    occupancy_scale: float
-    heading_scoring: bool
-    heading_scoring_timestep_s: float
-    simple_attractor: bool
-
-
-@njit(cache=True, nogil=True)
-def step_count(params: RolloutParams, sample: NDArray[np.float64]) -> int:
-    """Count the steps of the simulation of a sample, float64[3]; at least 1."""
-    if params.heading_scoring:
-        steps = int(params.sim_time_s / params.sim_granularity_m + 0.5)
-    else:
-        speed = math.hypot(sample[0], sample[1])
-        steps = int(
-            max(
-                speed * params.sim_time_s / params.sim_granularity_m,
-                abs(sample[2]) / params.angular_sim_granularity_rad,
-            )
-            + 0.5
-        )
-    return max(steps, 1)
-
-
-@njit(cache=True, nogil=True)
-def turn(
-    params: RolloutParams, theta: float, vtheta: float, wanted: float, headings: NDArray[np.float64]
-) -> None:
-    """Fill headings, float64[steps, 3], with the yaw at each step, its cosine and its sine."""
-    steps = headings.shape[0]
-    dt = params.sim_time_s / steps
-    for k in range(steps):
-        headings[k, 0], headings[k, 1], headings[k, 2] = theta, math.cos(theta), math.sin(theta)
-        vtheta = _approach(wanted, vtheta, params.acc_lim_theta_radps2 * dt)
-        theta += vtheta * dt
+    plan: NDArray[np.float64]  # [m, 2 or more], columns x, y, m >= 1
 
 
 @njit(cache=True, nogil=True)
@@ -87,7 +49,6 @@ def simulate(
     pose: Triple,
     velocity: Triple,
     sample: NDArray[np.float64],
-    headings: NDArray[np.float64],
     points: NDArray[np.float64],
     with_footprint: bool = True,
 ) -> Tuple[float, int]:
@@ -99,29 +60,25 @@ def simulate(
         pose: Pose of the robot.
         velocity: Velocity of the robot.
         sample: float64[3], vx, vy, vtheta.
-        headings: float64[steps, 3], filled by ``turn`` for the sample.
-        points: float64[k, 3], filled with poses; ends before a pose that fails.
+        points: float64[k, 3], filled with poses.
         with_footprint: False to leave out the costs under the footprint.
 
     Returns:
-        The cost, COLLIDES (also off the map) or OUT_OF_REACH, and the number of poses.
+        The cost, COLLIDES (also off the map) or OUT_OF_REACH, and the number of poses before one
+        that fails.
     """
-    steps = headings.shape[0]
+    steps = travel(params, pose, velocity, sample, points)
     dt = params.sim_time_s / steps
-    x, y = pose[0], pose[1]
-    vx, vy = velocity[0], velocity[1]
     path_distance, goal_distance, occupancy, heading, time = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(steps):
-        theta, cos, sin = headings[k]
+        x, y, theta = points[k]
         cell_x, cell_y = cell_of(inputs.costmap, x, y)
         if cell_x < 0 or cell_y < 0:
             return COLLIDES, k
-        # Where nothing near costs more than what is known the footprint changes nothing.
-        if with_footprint and inputs.highest_near[cell_y, cell_x] > occupancy:
-            cost = footprint_cost(inputs.costmap, inputs.footprint, x, y, theta)
-            if cost < 0.0:
+        if with_footprint:
+            occupancy = _occupancy(inputs, x, y, theta, cell_x, cell_y, occupancy)
+            if occupancy < 0.0:
                 return COLLIDES, k
-            occupancy = max(occupancy, cost, float(inputs.costmap.costs[cell_y, cell_x]))
         if params.simple_attractor:
             goal_distance = (x - inputs.plan[-1, 0]) ** 2 + (y - inputs.plan[-1, 1]) ** 2
         elif not params.heading_scoring or _is_heading_step(params, time, dt):
@@ -131,16 +88,6 @@ def simulate(
             goal_distance = float(inputs.goal_distance[cell_y, cell_x])
             if max(path_distance, goal_distance) >= inputs.path_distance.size:
                 return OUT_OF_REACH, k
-        points[k, 0], points[k, 1], points[k, 2] = x, y, theta
-        vx = _approach(sample[0], vx, params.acc_lim_x_mps2 * dt)
-        vy = _approach(sample[1], vy, params.acc_lim_y_mps2 * dt)
-        speed_x, speed_y = vx * cos, vx * sin
-        if vy != 0.0:
-            side = math.pi / 2 + theta
-            speed_x += vy * math.cos(side)
-            speed_y += vy * math.sin(side)
-        x += speed_x * dt
-        y += speed_y * dt
         time += dt
     if params.heading_scoring:
         return (
@@ -157,10 +104,22 @@ def simulate(
 
 
 @njit(cache=True, nogil=True)
-def _approach(wanted: float, current: float, max_change: float) -> float:
-    if wanted >= current:
-        return min(wanted, current + max_change)
-    return max(wanted, current - max_change)
+def _occupancy(
+    inputs: RolloutInputs,
+    x: float,
+    y: float,
+    theta: float,
+    cell_x: int,
+    cell_y: int,
+    occupancy: float,
+) -> float:
+    """Return the higher of an occupancy and that of a pose, COLLIDES where the footprint does."""
+    if inputs.highest_near[cell_y, cell_x] <= occupancy:
+        return occupancy  # the footprint changes nothing
+    cost = footprint_cost(inputs.costmap, inputs.footprint, x, y, theta)
+    if cost < 0.0:
+        return COLLIDES
+    return max(occupancy, cost, float(inputs.costmap.costs[cell_y, cell_x]))
 
 
 @njit(cache=True, nogil=True)
@@ -188,38 +147,38 @@ def _heading_difference(
 
 
 @njit(cache=True, nogil=True)
+def trajectory(
+    inputs: RolloutInputs,
+    params: RolloutParams,
+    pose: Triple,
+    velocity: Triple,
+    sample: Triple,
+) -> Tuple[float, NDArray[np.float64]]:
+    """Return the cost of a sample and its poses, float64[k, 3]; see ``simulate``."""
+    row = np.array(sample)
+    points = np.empty((step_count(params, row[0], row[1], row[2]), 3))
+    cost, count = simulate(inputs, params, pose, velocity, row, points)
+    return cost, points[:count]
+
+
+@njit(cache=True, nogil=True)
 def score(
     inputs: RolloutInputs,
     params: RolloutParams,
     pose: Triple,
     velocity: Triple,
     samples: NDArray[np.float64],
-    limit: float,
 ) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Score samples.
-
-    Args:
-        inputs: Costmap, footprint and plan.
-        params: Parameters.
-        pose: Pose of the robot.
-        velocity: Velocity of the robot.
-        samples: float64[n, 3].
-        limit: Samples known to cost more get an infinite cost.
+    """Score samples, float64[n, 3].
 
     Returns:
         Costs, float64[n], and last poses, float64[n, 3], nan where the first pose fails.
     """
-    headings, places = _all_turns(params, pose, velocity, samples)
-    points = np.empty((headings.shape[1], 3))
-    bounds = _lower_bounds(inputs, params, pose, velocity, samples, headings, places, points)
+    points = np.empty((longest(params, samples), 3))
     costs = np.empty(samples.shape[0])
     ends = np.full((samples.shape[0], 3), np.nan)
     for k in range(samples.shape[0]):
-        if bounds[k] > limit:
-            costs[k] = np.inf
-            continue
-        turned = headings[places[k], : step_count(params, samples[k])]
-        costs[k], count = simulate(inputs, params, pose, velocity, samples[k], turned, points)
+        costs[k], count = simulate(inputs, params, pose, velocity, samples[k], points)
         if count > 0:
             ends[k] = points[count - 1]
     return costs, ends
@@ -235,76 +194,163 @@ def cheapest(
 ) -> Tuple[int, float]:
     """Find the legal sample of lowest cost, the first of equals.
 
-    Samples, float64[n, 3], are tried in the order of their costs without the footprint, which is
-    the slow part, until that is more than the best one's cost.
+    Samples, float64[n, 3], are tried in the order of their least costs, until that is more than
+    the best one's cost.
 
     Returns:
         Index and cost; the index is -1 if no sample is legal.
     """
-    headings, places = _all_turns(params, pose, velocity, samples)
-    points = np.empty((headings.shape[1], 3))
-    bounds = _lower_bounds(inputs, params, pose, velocity, samples, headings, places, points)
+    points = np.empty((longest(params, samples), 3))
+    at_start = occupancy_at(inputs, pose)
     best, best_cost = -1, np.inf
-    for k in np.argsort(bounds, kind="mergesort"):
-        if bounds[k] > best_cost:
+    if at_start < 0.0:
+        return best, best_cost
+    bounds = least_costs(inputs, params, pose, velocity, samples, at_start, points)
+    for _ in range(samples.shape[0]):
+        k = int(np.argmin(bounds))
+        if bounds[k] == np.inf or bounds[k] > best_cost:
             break
-        if bounds[k] == COLLIDES or bounds[k] == OUT_OF_REACH:
-            continue
-        turned = headings[places[k], : step_count(params, samples[k])]
-        cost, _ = simulate(inputs, params, pose, velocity, samples[k], turned, points)
-        if cost >= 0.0 and (cost < best_cost or (cost == best_cost and k < best)):
+        cost = cost_up_to(inputs, params, pose, velocity, samples[k], at_start, best_cost, points)[
+            0
+        ]
+        bounds[k] = np.inf
+        if 0.0 <= cost < best_cost or (cost == best_cost and k < best):
             best, best_cost = k, cost
     return best, best_cost
 
 
 @njit(cache=True, nogil=True)
-def _lower_bounds(
+def occupancy_at(inputs: RolloutInputs, pose: Triple) -> float:
+    """Return the occupancy at a pose, COLLIDES where the footprint does or off the map."""
+    x, y, theta = pose
+    cell_x, cell_y = cell_of(inputs.costmap, x, y)
+    if cell_x < 0 or cell_y < 0:
+        return COLLIDES
+    return _occupancy(inputs, x, y, theta, cell_x, cell_y, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _ends_decide(params: RolloutParams) -> bool:
+    """Tell whether the cost is that of the last cell, plus no less than 0 for the occupancy."""
+    return (
+        params.occupancy_scale >= 0.0
+        and not params.heading_scoring
+        and not params.simple_attractor
+        and min(params.acc_lim_x_mps2, params.acc_lim_y_mps2, params.acc_lim_theta_radps2) >= 0.0
+    )
+
+
+@njit(cache=True, nogil=True)
+def least_costs(
     inputs: RolloutInputs,
     params: RolloutParams,
     pose: Triple,
     velocity: Triple,
     samples: NDArray[np.float64],
-    headings: NDArray[np.float64],
-    places: NDArray[np.int64],
+    at_start: float,
     points: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Return the least costs of samples, float64[n]: without the footprint, if that only adds."""
+    """Return the least that samples cost if they are legal, infinite for some that are not.
+
+    That is the cost with the occupancy of the last cell alone, or without the footprint if other
+    poses count as well; -inf if the footprint makes a sample cheaper.
+
+    Args:
+        inputs: Costmap, footprint and plan.
+        params: Parameters.
+        pose: Pose of the robot.
+        velocity: Velocity of the robot.
+        samples: float64[n, 3].
+        at_start: Occupancy at the pose.
+        points: float64[k, 3], overwritten.
+
+    Returns:
+        float64[n].
+    """
     bounds = np.full(samples.shape[0], -np.inf)
-    if params.occupancy_scale >= 0.0:
+    if not params.occupancy_scale >= 0.0:
+        return bounds
+    if not _ends_decide(params):
         for k in range(samples.shape[0]):
-            turned = headings[places[k], : step_count(params, samples[k])]
-            bounds[k], _ = simulate(
-                inputs, params, pose, velocity, samples[k], turned, points, False
-            )
+            cost, _ = simulate(inputs, params, pose, velocity, samples[k], points, False)
+            bounds[k] = np.inf if cost == COLLIDES or cost == OUT_OF_REACH else cost
+        return bounds
+    size_x = inputs.costmap.costs.shape[1]
+    cells = last_cells(params, inputs.costmap, pose, velocity, samples)
+    for k in range(samples.shape[0]):
+        cell = cells[k]
+        if cell == UNCERTAIN:
+            steps = travel(params, pose, velocity, samples[k], points)
+            x, y = cell_of(inputs.costmap, points[steps - 1, 0], points[steps - 1, 1])
+            cell = y * size_x + x if x >= 0 and y >= 0 else OFF_MAP
+        bounds[k] = np.inf
+        if cell != OFF_MAP:
+            y, x = cell // size_x, cell % size_x
+            occupancy = max(at_start, float(inputs.costmap.costs[y, x]))
+            bounds[k] = _cost_of_end(inputs, params, x, y, occupancy)
     return bounds
 
 
 @njit(cache=True, nogil=True)
-def _all_turns(
-    params: RolloutParams, pose: Triple, velocity: Triple, samples: NDArray[np.float64]
-) -> Tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return ``turn`` of all samples, float64[m, longest, 3], and the row of each, int64[n].
+def _cost_of_end(
+    inputs: RolloutInputs, params: RolloutParams, cell_x: int, cell_y: int, occupancy: float
+) -> float:
+    """Return the cost of trajectories that end in a cell, infinite out of reach."""
+    path_distance = float(inputs.path_distance[cell_y, cell_x])
+    goal_distance = float(inputs.goal_distance[cell_y, cell_x])
+    if max(path_distance, goal_distance) >= inputs.path_distance.size:
+        return np.inf
+    return (
+        params.path_scale * path_distance
+        + goal_distance * params.goal_scale
+        + params.occupancy_scale * occupancy
+    )
 
-    Many samples turn in the same way, with as many steps.
+
+@njit(cache=True, nogil=True)
+def cost_up_to(
+    inputs: RolloutInputs,
+    params: RolloutParams,
+    pose: Triple,
+    velocity: Triple,
+    sample: NDArray[np.float64],
+    at_start: float,
+    limit: float,
+    points: NDArray[np.float64],
+) -> Tuple[float, int]:
+    """Return the cost of a sample as ``simulate`` does, or inf if it is more than a limit.
+
+    Poses are examined from the last one on, where most trajectories fail that do.
+
+    Args:
+        inputs: Costmap, footprint and plan.
+        params: Parameters.
+        pose: Pose of the robot.
+        velocity: Velocity of the robot.
+        sample: float64[3], vx, vy, vtheta.
+        at_start: Occupancy at the pose, 0 or more.
+        limit: Highest cost of interest.
+        points: float64[k, 3], filled with poses.
+
+    Returns:
+        The cost, negative or infinite if it is illegal, and the number of poses.
     """
-    longest = 1
-    for k in range(samples.shape[0]):
-        longest = max(longest, step_count(params, samples[k]))
-    turns = np.empty((samples.shape[0], 2))
-    places = np.empty(samples.shape[0], dtype=np.int64)
-    known = 0
-    for k in range(samples.shape[0]):
-        steps, vtheta = step_count(params, samples[k]), samples[k, 2]
-        places[k] = -1
-        for place in range(known):
-            if turns[place, 0] == steps and turns[place, 1] == vtheta:
-                places[k] = place
-                break
-        if places[k] < 0:
-            places[k] = known
-            turns[known, 0], turns[known, 1] = steps, vtheta
-            known += 1
-    headings = np.empty((known, longest, 3))
-    for place in range(known):
-        turn(params, pose[2], velocity[2], turns[place, 1], headings[place, : int(turns[place, 0])])
-    return headings, places
+    if not _ends_decide(params):
+        return simulate(inputs, params, pose, velocity, sample, points)
+    steps = travel(params, pose, velocity, sample, points)
+    occupancy, last_x, last_y = at_start, 0, 0
+    for k in range(steps - 1, -1, -1):
+        x, y, theta = points[k]
+        cell_x, cell_y = cell_of(inputs.costmap, x, y)
+        if cell_x < 0 or cell_y < 0:
+            return np.inf, steps
+        if k == steps - 1:
+            last_x, last_y = cell_x, cell_y
+        reach = max(inputs.path_distance[cell_y, cell_x], inputs.goal_distance[cell_y, cell_x])
+        if reach >= inputs.path_distance.size:
+            return np.inf, steps
+        if k > 0 and inputs.highest_near[cell_y, cell_x] > occupancy:
+            occupancy = _occupancy(inputs, x, y, theta, cell_x, cell_y, occupancy)
+            if occupancy < 0.0 or _cost_of_end(inputs, params, last_x, last_y, occupancy) > limit:
+                return np.inf, steps
+    return _cost_of_end(inputs, params, last_x, last_y, occupancy), steps

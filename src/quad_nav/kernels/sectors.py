@@ -17,9 +17,12 @@ from typing import Tuple
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.rays import BOX, CYLINDER, Triple, dot, enter_box
 
+Axes = Tuple[Triple, Triple, Triple]  # a LIDAR's x, y and z in ``map``
+
 EMPTY = (0.0, -1.0)
 FULL = (-math.pi, 2.0 * math.pi)
 _STANDING = 0.5  # cosine of the angle between its axis and the plane's normal
+_ROUGH_RAD = 0.005  # more than the error of a rough bearing
 
 
 @njit(cache=True, nogil=True)
@@ -97,3 +100,55 @@ def _disc_sector(x: float, y: float, radius: float) -> Tuple[float, float]:
         return FULL
     half = math.asin(radius / distance)
     return math.atan2(y, x) - half, 2.0 * half
+
+
+@njit(cache=True, nogil=True)
+def disc_around(kind: int, offset: Triple, axis: Triple, sizes: Triple, axes: Axes) -> Triple:
+    """Return x, y and radius of a disc in a LIDAR's plane that holds all of a solid in the plane.
+
+    The plane cuts the tube around a standing solid in an ellipse with the long half
+    radius / cos(tilt). Around a lying solid there is a ball.
+
+    Args:
+        kind: Kind of the solid.
+        offset: From the LIDAR to the solid's centre in ``map``, metres.
+        axis: The solid's z axis in ``map``.
+        sizes: Sizes of the solid.
+        axes: Axes of the LIDAR.
+    """
+    ahead, left, up = axes
+    square = sizes[0] * sizes[0]
+    if kind == BOX:
+        square += sizes[1] * sizes[1]
+    cosine = dot(up, axis)
+    if abs(cosine) <= _STANDING:
+        square += sizes[2] * sizes[2]
+        return dot(ahead, offset), dot(left, offset), math.sqrt(square)
+    along = -dot(up, offset) / cosine  # to where the axis meets the plane
+    x = dot(ahead, offset) + along * dot(ahead, axis)
+    y = dot(left, offset) + along * dot(left, axis)
+    return x, y, math.sqrt(square) / abs(cosine)
+
+
+@njit(cache=True, nogil=True)
+def rough_disc_sector(x: float, y: float, distance: float, radius: float) -> Tuple[float, float]:
+    """Return a sector that holds that of a disc around (x, y), ``distance`` > 0 away."""
+    sine = radius / distance
+    if sine >= 1.0:
+        return FULL
+    # The arcsine is convex: below 1/2 at most pi/3 times its sine.
+    half_rad = (1.05 if sine < 0.5 else 0.5 * math.pi) * sine + _ROUGH_RAD
+    return _rough_bearing(x, y) - half_rad, 2.0 * half_rad
+
+
+@njit(cache=True, nogil=True)
+def _rough_bearing(x: float, y: float) -> float:
+    """Return atan2(y, x) to 0.004 rad (Rajan et al., IEEE Signal Processing Magazine, 2006)."""
+    along, across = max(abs(x), abs(y)), min(abs(x), abs(y))
+    z = across / along if along > 0.0 else 0.0
+    angle = z * (math.pi / 4.0 + 0.273 * (1.0 - z))
+    if abs(y) > abs(x):
+        angle = math.pi / 2.0 - angle
+    if x < 0.0:
+        angle = math.pi - angle
+    return -angle if y < 0.0 else angle

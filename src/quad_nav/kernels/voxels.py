@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL, UNKNOWN
 from quad_nav.kernels.collision import Triple
-from quad_nav.kernels.cost_grid import cell_index
+from quad_nav.kernels.cost_grid import cell_index, include
 from quad_nav.kernels.jit import njit
-from quad_nav.kernels.raytrace import include
 
 
 class VoxelGrid(NamedTuple):

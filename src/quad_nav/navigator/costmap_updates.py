@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Dict, Tuple
 
 from quad_nav.costmap.layered import LayeredCostmap
@@ -29,7 +28,8 @@ class CostmapUpdates:
     @property
     def due_s(self) -> float:
         """Time of the next update."""
-        return min((schedule.due_s for _, schedule in self._costmaps.values()), default=math.inf)
+        (_, of_global), (_, of_local) = self._costmaps["global"], self._costmaps["local"]
+        return min(of_global.due_s, of_local.due_s)
 
     def update(self, tick: Tick, poses: RobotPoses) -> None:
         """Run the updates that are due; the changed windows go into the tick."""

@@ -98,6 +98,11 @@ class Navigator:
         return self._machine.recovery.recoveries
 
     @property
+    def recoveries_done(self) -> int:
+        """Number of recovery behaviours that have run for what fails now."""
+        return self._machine.recovery.done
+
+    @property
     def state(self) -> State:
         """State of the state machine."""
         return self._machine.state

@@ -72,10 +72,14 @@ class ParameterLimiter:
     @property
     def due_s(self) -> float:
         """Time of the next check of a limit with a check period, +inf without one."""
-        return min((imposed.checks.due_s for imposed in self._limits.values()), default=math.inf)
+        if not self._limits:
+            return math.inf
+        return min(imposed.checks.due_s for imposed in self._limits.values())
 
     def track(self, pose: Pose2D) -> None:
         """Lift the limits from which the robot has moved away; to be called in every cycle."""
+        if not self._limits:
+            return
         self._lift(
             [
                 fields
@@ -86,6 +90,8 @@ class ParameterLimiter:
 
     def check(self, now_s: float, pose: Pose2D) -> None:
         """Lift those with a check period, if that is over; to be called at ``due_s``."""
+        if not self._limits:
+            return
         self._lift(
             [
                 fields

@@ -56,6 +56,11 @@ class RecoverySequence:
         """True while a behaviour runs."""
         return self._active is not None
 
+    @property
+    def done(self) -> int:
+        """Number of behaviours that have run for what fails now."""
+        return self._index
+
     def reset_after(self, trigger: Trigger) -> None:
         """Start with the first behaviour again if what triggered the last one has succeeded."""
         if self.trigger is trigger:

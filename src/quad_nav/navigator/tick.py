@@ -14,6 +14,8 @@ from quad_nav.costmap.cost_grid import Window
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.peers.right_of_way import YieldDecision
 
+_SAME_FRAME = Pose2D(0.0, 0.0, 0.0)
+
 
 class State(enum.Enum):
     """States of move_base."""
@@ -52,8 +54,8 @@ class RobotPoses:
         a, b = self.in_local, self.in_global
         if a is None or b is None:
             return None
-        if a == b:
-            return Pose2D(0.0, 0.0, 0.0)
+        if a is b or a == b:
+            return _SAME_FRAME
         rotation = Pose2D(0.0, 0.0, a.yaw_rad - b.yaw_rad)
         x_m, y_m = rotation.rotate(b.x_m, b.y_m)
         return Pose2D(a.x_m - x_m, a.y_m - y_m, rotation.yaw_rad)

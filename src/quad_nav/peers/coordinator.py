@@ -115,6 +115,11 @@ class PeerCoordinator:
         return self._tracker.peers
 
     @property
+    def safety_radius_m(self) -> float:
+        """Robot radius plus the margin to peers."""
+        return self._tracker.safety_radius_m
+
+    @property
     def reach_m(self) -> float:
         """Distance up to which peers matter; ``observe`` ignores the others."""
         return self._tracker.reach_m
@@ -204,7 +209,7 @@ class PeerCoordinator:
         )
         changed = had_peers or bool(self._tracker.peers)
         if changed and pose is not None and local_from_global is not None:
-            self._costs.update(now_s, pose, local_from_global, self.priority)
+            self._costs.update(pose, local_from_global, self.priority)
         return messages
 
     # -- decide --------------------------------------------------------------------------

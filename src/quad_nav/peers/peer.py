@@ -53,6 +53,12 @@ class Intention:
     priority: float = IDLE_PRIORITY
     path: NDArray[np.float64] = field(default_factory=lambda: NO_PATH)
 
+    def is_same(self, other: Intention) -> bool:
+        """Return whether two intentions are equal."""
+        return self.priority == other.priority and (
+            self.path is other.path or np.array_equal(self.path, other.path)
+        )
+
     def transformed(self, a_from_b: Pose2D) -> Intention:
         """Return an intention in frame b in frame a."""
         return replace(self, path=a_from_b.transform_points(self.path))
@@ -88,12 +94,10 @@ class Peer:
     def extrapolated(self, now_s: float) -> Peer:
         """Return the peer at another time, moved at its velocity."""
         age_s = now_s - self.stamp_s
-        return replace(
-            self,
-            x_m=self.x_m + self.vx_mps * age_s,
-            y_m=self.y_m + self.vy_mps * age_s,
-            stamp_s=now_s,
-        )
+        if age_s == 0.0:
+            return self
+        x_m, y_m = self.x_m + self.vx_mps * age_s, self.y_m + self.vy_mps * age_s
+        return Peer(self.name, x_m, y_m, self.vx_mps, self.vy_mps, now_s, self.intention)
 
     def relative_to(self, map_from_frame: Pose2D) -> Peer:
         """Return a peer and its intention in ``map`` in another frame, as if that stood still."""

@@ -11,6 +11,7 @@ import math
 from typing import List
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayer
@@ -20,6 +21,7 @@ from quad_nav.grid import LETHAL
 from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
 from quad_nav.peers.right_of_way import HORIZON_S, TIME_TOLERANCE_S, predict_peer
 
+_SAME_FRAME = Pose2D(0.0, 0.0, 0.0)
 _LIDAR_TOLERANCE_M = 0.15  # points so far outside of a peer's circle still belong to it
 _OUTSIDE_M = 0.05
 _STATIONARY_COST, _PATH_COST = 120, 100
@@ -36,65 +38,71 @@ class PeerCosts:
         self._tracker = tracker
         self._global, self._local = global_costmap, local_costmap
 
-    def update(
-        self, now_s: float, pose: Pose2D, local_from_global: Pose2D, priority: float
-    ) -> None:
+    def update(self, pose: Pose2D, local_from_global: Pose2D, priority: float) -> None:
         """Update the layers; they take effect with the costmaps' next update.
 
         Args:
-            now_s: Time of the update.
             pose: Pose of the robot in ``map``.
             local_from_global: Transform from ``map`` to the frame of the local costmap.
             priority: Priority of the robot.
         """
         peers = self._tracker.peers
-        positions = np.array([peer.position for peer in peers]).reshape(-1, 2)
         newcomers = [k for k, peer in enumerate(peers) if peer.name in self._tracker.newcomers]
         self._tracker.newcomers = []
         radius_m = self._tracker.radius_m + _LIDAR_TOLERANCE_M
-        for costmap, points, areas in (
-            (self._global, positions, self._areas(now_s, priority)),
-            (
-                self._local,
-                local_from_global.transform_points(positions),
-                self._obstacles(now_s, pose, local_from_global),
-            ),
+        in_global = np.array([(peer.x_m, peer.y_m, radius_m) for peer in peers]).reshape(-1, 3)
+        in_local = in_global
+        if local_from_global != _SAME_FRAME:
+            in_local = in_global.copy()
+            in_local[:, :2] = local_from_global.transform_points(in_global[:, :2])
+        for costmap, circles, areas in (
+            (self._global, in_global, self._areas(in_global[:, :2], priority)),
+            (self._local, in_local, self._obstacles(in_local[:, :2], pose)),
         ):
+            points = circles[:, :2]
             for layer in costmap.layers.values():
                 if isinstance(layer, PeerLayer):
                     layer.set_areas(areas)
                 elif isinstance(layer, ObstacleLayer):
-                    layer.excluded_circles = np.column_stack(
-                        (points, np.full(len(points), radius_m))
-                    )
+                    layer.excluded_circles = circles
                     for x_m, y_m in points[newcomers]:  # marked as obstacles until now
                         layer.free_square(float(x_m), float(y_m), 2.0 * radius_m)
 
-    def _areas(self, now_s: float, priority: float) -> List[PeerArea]:
-        """Return the areas of the global costmap: stationary peers, and paths that go first."""
+    def _areas(self, positions: NDArray[np.float64], priority: float) -> List[PeerArea]:
+        """Return the areas of the global costmap: stationary peers, and paths that go first.
+
+        Args:
+            positions: Of the peers, float64[n, 2] in ``map``.
+            priority: Priority of the robot.
+        """
         tracker = self._tracker
         radius_m = tracker.min_separation_m + TOLERANCE_M
         areas: List[PeerArea] = []
-        for peer in tracker.peers:
-            if tracker.is_stationary(peer, now_s):
-                areas.append(PeerArea(peer.position[None, :], radius_m, _STATIONARY_COST))
+        for k, peer in enumerate(tracker.peers):
+            if peer.name in tracker.stationary:
+                areas.append(PeerArea(positions[k : k + 1], radius_m, _STATIONARY_COST))
             elif peer.intention.priority > priority:
                 path = predict_peer(peer, tracker.cruise_mps, _PATH_TIMES_S)
                 areas.append(PeerArea(path, radius_m, _PATH_COST))
         return areas
 
-    def _obstacles(self, now_s: float, pose: Pose2D, local_from_global: Pose2D) -> List[PeerArea]:
+    def _obstacles(self, positions: NDArray[np.float64], pose: Pose2D) -> List[PeerArea]:
         """Return the obstacles of the local costmap: stationary peers with their safety radius.
 
         No area contains the robot itself, because then no trajectory would be legal.
+
+        Args:
+            positions: Of the peers, float64[n, 2] in the frame of the local costmap.
+            pose: Pose of the robot in ``map``.
         """
         tracker = self._tracker
         obstacles = []
-        for peer in tracker.peers:
+        for k, peer in enumerate(tracker.peers):
+            if peer.name not in tracker.stationary:
+                continue
             distance_m = math.hypot(peer.x_m - pose.x_m, peer.y_m - pose.y_m)
             radius_m = min(2.0 * tracker.safety_radius_m, distance_m - _OUTSIDE_M)
             radius_m = radius_m - tracker.radius_m
-            if tracker.is_stationary(peer, now_s) and radius_m > 0.0:
-                position = local_from_global.transform_points(peer.position[None, :])
-                obstacles.append(PeerArea(position, radius_m, LETHAL))
+            if radius_m > 0.0:
+                obstacles.append(PeerArea(positions[k : k + 1], radius_m, LETHAL))
         return obstacles

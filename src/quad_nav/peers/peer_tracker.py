@@ -24,6 +24,7 @@ class PeerTracker:
     Attributes:
         peers: Peers within reach whose state is fresh, extrapolated to now.
         newcomers: Names of peers that came into reach and are not yet in the costmaps.
+        stationary: Names of peers that stay: they intend to, or have not moved for long.
         cruise_mps: Speed at which robots are expected to fly.
         margin_m: Distance from footprint to bisector; 0 until a peer is observed.
     """
@@ -44,6 +45,7 @@ class PeerTracker:
         """Forget all peers, after a jump of the clock."""
         self.peers: List[Peer] = []
         self.newcomers: List[str] = []
+        self.stationary: Set[str] = set()
         self._lost: List[str] = []
         self._stall_timers: Dict[str, StallTimer] = {}
 
@@ -96,16 +98,16 @@ class PeerTracker:
         return messages
 
     def _update_stall_timers(self, now_s: float) -> None:
-        self.newcomers += [p.name for p in self.peers if p.name not in self._stall_timers]
-        self._stall_timers = {
-            peer.name: self._stall_timers.get(peer.name, StallTimer()) for peer in self.peers
-        }
+        before, self._stall_timers, self.stationary = self._stall_timers, {}, set()
         for peer in self.peers:
-            self._stall_timers[peer.name].has_moved(now_s, Pose2D(peer.x_m, peer.y_m), _MOVED_M)
-
-    def is_stationary(self, peer: Peer, now_s: float) -> bool:
-        """Return whether a peer stays: it intends to, or it has not moved for long."""
-        return peer.is_parked or self._stall_timers[peer.name].exceeds(now_s, STATIONARY_AFTER_S)
+            timer = before.get(peer.name)
+            if timer is None:
+                self.newcomers.append(peer.name)
+                timer = StallTimer()
+            self._stall_timers[peer.name] = timer
+            timer.has_moved(now_s, Pose2D(peer.x_m, peer.y_m), _MOVED_M)
+            if peer.is_parked or timer.exceeds(now_s, STATIONARY_AFTER_S):
+                self.stationary.add(peer.name)
 
     @property
     def radius_m(self) -> float:
@@ -130,19 +132,15 @@ class PeerTracker:
 
     def _obstacle_range_m(self) -> float:
         """Return the largest range at which an obstacle layer marks points."""
-        layers = [
-            layer.params
-            for costmap in (self._global, self._local)
-            for layer in costmap.layers.values()
-            if isinstance(layer, ObstacleLayer)
-        ]
-        return max(
-            (
-                layer.obstacle_range_m
-                if source.obstacle_range_m is None
-                else source.obstacle_range_m
-                for layer in layers
-                for source in layer.sources
-            ),
-            default=0.0,
-        )
+        longest_m: Optional[float] = None
+        for costmap in (self._global, self._local):
+            for layer in costmap.layers.values():
+                if isinstance(layer, ObstacleLayer):
+                    params = layer.params
+                    for source in params.sources:
+                        range_m = source.obstacle_range_m
+                        if range_m is None:
+                            range_m = params.obstacle_range_m
+                        if longest_m is None or range_m > longest_m:
+                            longest_m = range_m
+        return 0.0 if longest_m is None else longest_m

@@ -19,15 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
-from quad_nav.kernels.peers import sample_path
+from quad_nav.kernels.peers import nearest_in_time, sample_path
 from quad_nav.peers.peer import Peer
 
 HORIZON_S = 7.0
 TIME_TOLERANCE_S = 1.5
 _STEP_S = 0.25
 _TIMES_S = np.arange(0.0, HORIZON_S + 1e-9, _STEP_S)
-_STEPS_APART = np.abs(np.subtract.outer(np.arange(len(_TIMES_S)), np.arange(len(_TIMES_S))))
-_SIMULTANEOUS = _STEPS_APART * _STEP_S <= TIME_TOLERANCE_S + 1e-9
+_STEPS_APART = int(TIME_TOLERANCE_S / _STEP_S + 1e-9)
 _NEARER_M = 0.05  # an approach by less does not count
 _BLOCKING_FACTOR = 2.0  # a robot beyond this times the separation does not block a peer
 
@@ -86,10 +85,11 @@ def find_conflict(
     Returns:
         The peer and how to yield to it, None to go on.
     """
+    before = [p for p in peers if p.intention.priority > priority and not p.is_parked]
+    if not before:
+        return None
     own = predict_positions(position, path, cruise_mps, _TIMES_S)
-    for peer in sorted(peers, key=lambda peer: -peer.intention.priority):
-        if peer.intention.priority <= priority or peer.is_parked:
-            continue
+    for peer in sorted(before, key=lambda peer: -peer.intention.priority):
         stands = peer.name in stationary
         if stands and np.hypot(*(peer.position - position)) > _BLOCKING_FACTOR * min_separation_m:
             continue
@@ -139,14 +139,16 @@ def approaches(
     position: NDArray[np.float64], track: NDArray[np.float64], min_separation_m: float
 ) -> bool:
     """Return whether a track, float64[k, 2], comes nearer to a position than it may."""
-    distances = np.hypot(*(track - position).T)
-    return bool(distances.min() < min(min_separation_m, distances[0] - _NEARER_M))
+    place = position.reshape(1, 2)
+    now_m = nearest_in_time(place, track[:1], 0)
+    nearest_m = nearest_in_time(place, track, len(track))
+    return bool(nearest_m < min(min_separation_m, now_m - _NEARER_M))
 
 
 def _conflict(
     own: NDArray[np.float64], theirs: NDArray[np.float64], min_separation_m: float
 ) -> bool:
     """Return whether two tracks come nearer than they may, and nearer than they are now."""
-    distances = np.hypot(*np.moveaxis(own[:, None] - theirs[None], 2, 0))
-    nearest = distances[_SIMULTANEOUS].min()
-    return bool(nearest < min(min_separation_m, distances[0, 0] - _NEARER_M))
+    now_m = nearest_in_time(own[:1], theirs[:1], 0)
+    nearest_m = nearest_in_time(own, theirs, _STEPS_APART)
+    return bool(nearest_m < min(min_separation_m, now_m - _NEARER_M))

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,12 @@ from quad_nav.peers.peer import Peer
 
 COASTING_S = 0.35
 _PARTS = 20
+_STEPS = np.arange(1, _PARTS + 1)
 _MIN_FRACTION = 0.15  # below this part of the command the robot turns in place
 _TURN_RADPS = 0.4
+
+Arc = Tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Displacements along x and y, float64[_PARTS] each, metres."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,10 @@ def limit_to_cell(
     if not peers or (command.vx_mps == 0.0 and command.vy_mps == 0.0):
         return LimitedCommand(command)
     coasting = COASTING_S * np.array(pose.rotate(velocity.vx_mps, velocity.vy_mps))
-    arc = np.column_stack(pose.rotate(*_arc(command, hold_s).T))
+    peers = _peers_in_reach(command, coasting, pose, peers, safety_radius_m, hold_s)
+    if not peers:
+        return LimitedCommand(command)
+    arc = pose.rotate(*_arc(command, hold_s))
     fraction, nearest = _allowed_by_all(arc, coasting, pose, peers, safety_radius_m)
     if nearest is None:
         return LimitedCommand(command)
@@ -83,6 +90,24 @@ def limit_to_cell(
         return LimitedCommand(_turn_in_place(pose, command, nearest), nearest.name)
     vx_mps, vy_mps = fraction * command.vx_mps, fraction * command.vy_mps
     return LimitedCommand(Twist2D(vx_mps, vy_mps, fraction * command.vyaw_radps), nearest.name)
+
+
+def _peers_in_reach(
+    command: Twist2D,
+    coasting: NDArray[np.float64],
+    pose: Pose2D,
+    peers: Sequence[Peer],
+    safety_radius_m: float,
+    hold_s: float,
+) -> List[Peer]:
+    """Return the peers that can limit a command: no arc is longer than the way that it takes."""
+    way_m = math.hypot(command.vx_mps, command.vy_mps) * hold_s * (1.0 + 1e-9)
+    return [
+        peer
+        for peer in peers
+        if _room_towards(peer.x_m - pose.x_m, peer.y_m - pose.y_m, coasting, safety_radius_m)
+        < way_m
+    ]
 
 
 def _turn_in_place(pose: Pose2D, command: Twist2D, peer: Peer) -> Twist2D:
@@ -109,7 +134,7 @@ def _room_towards(
 
 
 def _allowed_by_all(
-    arc: NDArray[np.float64],
+    arc: Arc,
     coasting: NDArray[np.float64],
     pose: Pose2D,
     peers: Sequence[Peer],
@@ -127,7 +152,7 @@ def _allowed_by_all(
 
 
 def _allowed_fraction(
-    arc: NDArray[np.float64],
+    arc: Arc,
     coasting: NDArray[np.float64],
     dx_m: float,
     dy_m: float,
@@ -138,23 +163,22 @@ def _allowed_fraction(
     if distance_m == 0.0:
         return 0.0
     room_m = _room_towards(dx_m, dy_m, coasting, safety_radius_m)
-    towards_m = (arc[:, 0] * dx_m + arc[:, 1] * dy_m) / distance_m
+    towards_m = (arc[0] * dx_m + arc[1] * dy_m) / distance_m
     outside = towards_m > room_m + 1e-9
-    return float(np.argmax(outside)) / _PARTS if outside.any() else 1.0
+    first = int(outside.argmax())
+    return float(first) / _PARTS if outside[first] else 1.0
 
 
-def _arc(command: Twist2D, hold_s: float) -> NDArray[np.float64]:
-    """Return displacements in the robot's frame at equal steps of time, float64[n, 2]."""
-    times = hold_s * np.arange(1, _PARTS + 1) / _PARTS
+def _arc(command: Twist2D, hold_s: float) -> Arc:
+    """Return displacements in the robot's frame at equal steps of time."""
+    times = hold_s * _STEPS / _PARTS
     turns = command.vyaw_radps * times
     if abs(command.vyaw_radps) < 1e-6:
         ahead, aside = times, np.zeros_like(times)
     else:
         ahead = np.sin(turns) / command.vyaw_radps
         aside = (1.0 - np.cos(turns)) / command.vyaw_radps
-    return np.column_stack(
-        (
-            command.vx_mps * ahead - command.vy_mps * aside,
-            command.vx_mps * aside + command.vy_mps * ahead,
-        )
+    return (
+        command.vx_mps * ahead - command.vy_mps * aside,
+        command.vx_mps * aside + command.vy_mps * ahead,
     )

@@ -100,7 +100,7 @@ class YieldRules:
             tracker.peers,
             tracker.min_separation_m,
             tracker.cruise_mps,
-            {peer.name for peer in tracker.peers if tracker.is_stationary(peer, now_s)},
+            tracker.stationary,
         )
         if conflict is None:
             return None

@@ -33,8 +33,9 @@ from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels import global_planner as kernel
 from quad_nav.kernels import wave as wavefront
-from quad_nav.plan.navfn import NOT_REACHED, goal_cell_of, start_cell_of
+from quad_nav.plan.navfn import goal_cell_of, start_cell_of
 from quad_nav.plan.orientations import OrientationMode, with_headings
+from quad_nav.plan.wavefront import Wavefront
 
 Point = Tuple[float, float]
 _MARGIN = 1  # cells around a map that is not outlined, so that no search leaves it
@@ -74,12 +75,13 @@ class SearchPlanner:
     Attributes:
         params: Parameters.
         potential: Potential of the last plan, float32[H, W], 1e10 where the search did not
-            come; None before the first plan.
+            come; None before the first plan. The next plan overwrites it.
     """
 
     def __init__(self, params: SearchPlannerParams = SearchPlannerParams()) -> None:
         self.params = params
         self.potential: Optional[NDArray[np.float32]] = None
+        self._wave = Wavefront()
 
     def make_plan(
         self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
@@ -166,13 +168,15 @@ class SearchPlanner:
         else:
             potential, arrived = self._a_star(costs, start, goal)
         if not params.old_navfn_behavior:
+            goal_flat = _flat(goal_cell, size_x)
             kernel.fill_around(
                 byte_costs(costs, params),
                 potential,
                 size_x,
-                _flat(goal_cell, size_x),
+                goal_flat,
                 params.use_quadratic,
             )
+            self._wave.note_change(goal_flat, 2)
         self.potential = potential.reshape(costs.shape)
         path = np.empty((4 * costs.size, 2), dtype=np.float32)
         if not arrived:
@@ -185,7 +189,7 @@ class SearchPlanner:
     ) -> Tuple[NDArray[np.float32], bool]:
         params, size_x = self.params, costs.shape[1]
         source = _flat(start, size_x)
-        potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
+        potential = self._wave.begin((costs.shape[0], size_x)).ravel()
         if params.old_navfn_behavior:
             front = wavefront.start_at_cell(potential, source, size_x)
         else:
@@ -197,22 +201,8 @@ class SearchPlanner:
                 _hundredths(start[1]),
                 params.neutral_cost,
             )
-        wave = wavefront.WaveParams(
-            obstacle=params.lethal_cost,
-            neutral=params.neutral_cost,
-            planar=params.use_quadratic,
-            stop_at_target=True,
-            heuristic=False,
-        )
-        arrived = wavefront.propagate(
-            wave_costs(costs, params).ravel(),
-            potential,
-            front,
-            wave,
-            source,
-            _flat(goal, size_x),
-            size_x,
-            2 * costs.size,
+        arrived = self._wave.spread(
+            costs, front, wave_params(params), source, _flat(goal, size_x), 2 * costs.size
         )
         return potential, arrived
 
@@ -220,7 +210,8 @@ class SearchPlanner:
         self, costs: NDArray[np.uint8], start: Point, goal: Point
     ) -> Tuple[NDArray[np.float32], bool]:
         params, size_x = self.params, costs.shape[1]
-        potential = np.full(costs.size, NOT_REACHED, dtype=np.float32)
+        potential = self._wave.begin((costs.shape[0], size_x)).ravel()
+        self._wave.note_change(0, costs.size)
         arrived = kernel.a_star(
             byte_costs(costs, params),
             _enterable(costs, params),
@@ -235,17 +226,24 @@ class SearchPlanner:
         return potential, arrived
 
 
-def wave_costs(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray[np.float32]:
-    """Convert costs, uint8[H, W], to those of Dijkstra's search, float32[H, W]."""
+def wave_params(params: SearchPlannerParams) -> wavefront.WaveParams:
+    """Return the parameters of Dijkstra's search, and its costs of cells."""
     lethal = params.lethal_cost
     table = np.minimum(
         np.arange(256) * np.float32(params.cost_factor) + params.neutral_cost, lethal - 1
     )
     passable = np.arange(256) < lethal - 1
     passable[UNKNOWN] |= params.allow_unknown
-    table = np.where(passable, table, lethal).astype(np.float32)[costs]
-    _outline(table, lethal)
-    return table
+    table = np.where(passable, table, lethal).astype(np.float32)
+    return wavefront.WaveParams(
+        price=np.trunc(table),  # potentials are made of whole costs, as upstream's
+        crossing=wavefront.crossings(table, lethal),
+        obstacle=lethal,
+        neutral=params.neutral_cost,
+        planar=params.use_quadratic,
+        stop_at_target=True,
+        heuristic=False,
+    )
 
 
 def byte_costs(costs: NDArray[np.uint8], params: SearchPlannerParams) -> NDArray[np.uint8]:

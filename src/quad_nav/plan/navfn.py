@@ -30,9 +30,9 @@ from quad_nav.geometry import Pose2D
 from quad_nav.grid import FREE, INSCRIBED, UNKNOWN, GridSpec
 from quad_nav.kernels import descent as kernel
 from quad_nav.kernels import wave as wavefront
+from quad_nav.plan.wavefront import NOT_REACHED, Wavefront
 
 Cell = Tuple[int, int]
-NOT_REACHED = float(wavefront.NOT_REACHED)  # potential of cells that the wave did not reach
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,28 @@ class Navfn:
 
     Attributes:
         params: Parameters.
-        potential: Potential of the last plan, float32[H, W], ``NOT_REACHED`` (1e10) where the
-            wave did not come; None before the first plan.
     """
 
     def __init__(self, params: NavfnParams = NavfnParams()) -> None:
         self.params = params
-        self.potential: Optional[NDArray[np.float32]] = None
+        self._potential: Optional[NDArray[np.float32]] = None
+        self._wave = Wavefront()
+        self._not_spread: Optional[Tuple[NDArray[np.uint8], Cell, Cell]] = None
+
+    @property
+    def potential(self) -> Optional[NDArray[np.float32]]:
+        """Potential of the last plan, float32[H, W], None before the first one.
+
+        It is ``NOT_REACHED`` (1e10) where the wave did not come. The next plan overwrites it.
+        """
+        if self._not_spread is not None:
+            self._potential = self._spread(*self._not_spread)
+        return self._potential
+
+    @potential.setter
+    def potential(self, potential: Optional[NDArray[np.float32]]) -> None:
+        """Replace the potential."""
+        self._potential, self._not_spread = potential, None
 
     def make_plan(
         self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
@@ -79,19 +94,39 @@ class Navfn:
             goal_cell = goal_cell_of(spec, goal)
         else:  # a border cell is never reached, so the wave covers the map
             goal_cell = spec.cell_of(goal.x_m, goal.y_m) or (0, 0)
-        self.potential = potential_from(
-            navigation_costs(costs, self.params.allow_unknown),
-            source=start_cell,
-            target=goal_cell,
-            stop_at_target=True,
-        )
-        end = self._reached_pose_near(spec, goal)
+        end = None
+        if self._never_arrives(costs, start_cell, goal_cell):
+            kept = self._not_spread[0] if self._not_spread is not None else costs[:0]
+            if kept.shape != costs.shape:
+                kept = np.empty_like(costs)
+            kept[...] = costs
+            self._not_spread = kept, start_cell, goal_cell
+        else:
+            self._potential = self._spread(costs, start_cell, goal_cell)
+            end = self._reached_pose_near(spec, goal)
         if end is None:
             raise NoPath(
                 f"no path from ({start.x_m:.2f}, {start.y_m:.2f}) to "
                 f"({goal.x_m:.2f}, {goal.y_m:.2f}) m on the global costmap"
             )
         return self._plan_to(spec, start_cell, end)
+
+    def _never_arrives(self, costs: NDArray[np.uint8], start: Cell, goal: Cell) -> bool:
+        """Return whether the goal is in an obstacle, so that the wave would run over the whole map.
+
+        A robot whose goal is taken searches in every control cycle.
+        """
+        if self.params.default_tolerance_m > 0.0 or goal == start:
+            return False
+        y, x = goal[1], goal[0]
+        is_border = x in (0, costs.shape[1] - 1) or y in (0, costs.shape[0] - 1)
+        nav_costs = _NAVIGATION_COSTS[bool(self.params.allow_unknown)]
+        return is_border or bool(nav_costs[costs[y, x]] >= kernel.OBSTACLE)
+
+    def _spread(self, costs: NDArray[np.uint8], start: Cell, goal: Cell) -> NDArray[np.float32]:
+        """Return the potential, float32[H, W], of a wave from a start to a goal."""
+        self._not_spread = None
+        return _spread(self._wave, costs, _WAVES[bool(self.params.allow_unknown)], start, goal)
 
     def _reached_pose_near(self, spec: GridSpec, goal: Pose2D) -> Optional[Pose2D]:
         """Return the reached point nearest to the goal, on a square lattice around it."""
@@ -109,13 +144,13 @@ class Navfn:
         return best
 
     def _is_reached(self, cell: Optional[Cell]) -> bool:
-        assert self.potential is not None
-        return cell is not None and bool(self.potential[cell[1], cell[0]] < NOT_REACHED)
+        assert self._potential is not None
+        return cell is not None and bool(self._potential[cell[1], cell[0]] < NOT_REACHED)
 
     def _plan_to(self, spec: GridSpec, start_cell: Cell, end: Pose2D) -> NDArray[np.float64]:
         end_cell = spec.cell_of(end.x_m, end.y_m)
-        assert self.potential is not None and end_cell is not None
-        path, _ = path_from(self.potential, end_cell, start_cell)
+        assert self._potential is not None and end_cell is not None
+        path, _ = path_from(self._potential, end_cell, start_cell)
         if not len(path):
             raise NoPath(f"the potential has no descent from ({end.x_m:.2f}, {end.y_m:.2f}) m")
         plan = np.zeros((len(path) + 1, 3))
@@ -134,14 +169,38 @@ def navigation_costs(costs: NDArray[np.uint8], allow_unknown: bool) -> NDArray[n
     A cost below INSCRIBED becomes 50 + 0.8 cost, at most 253; unknown cells are
     253 or obstacles; the outermost ring of cells is always an obstacle.
     """
+    nav_costs: NDArray[np.uint8] = _NAVIGATION_COSTS[bool(allow_unknown)][costs]
+    nav_costs[[0, -1], :] = kernel.OBSTACLE
+    nav_costs[:, [0, -1]] = kernel.OBSTACLE
+    return nav_costs
+
+
+def _navigation_costs(allow_unknown: bool) -> NDArray[np.uint8]:
+    """Return NavFn's cost, uint8[256], of a cell of each cost of the costmap."""
     table = np.full(256, kernel.OBSTACLE, dtype=np.uint8)
     table[:INSCRIBED] = np.minimum(kernel.NEUTRAL + 0.8 * np.arange(INSCRIBED), kernel.OBSTACLE - 1)
     if allow_unknown:
         table[UNKNOWN] = kernel.OBSTACLE - 1
-    nav_costs = table[costs]
-    nav_costs[[0, -1], :] = kernel.OBSTACLE
-    nav_costs[:, [0, -1]] = kernel.OBSTACLE
-    return nav_costs
+    return table
+
+
+def _wave_params(
+    nav_costs: NDArray[np.uint8], stop_at_target: bool = True, heuristic: bool = False
+) -> wavefront.WaveParams:
+    """Return the parameters of a wave over cells with these costs, uint8[256], by their number."""
+    return wavefront.WaveParams(
+        price=nav_costs.astype(np.float32),
+        crossing=wavefront.crossings(nav_costs, kernel.OBSTACLE),
+        obstacle=kernel.OBSTACLE,
+        neutral=kernel.NEUTRAL,
+        planar=True,
+        stop_at_target=stop_at_target,
+        heuristic=heuristic,
+    )
+
+
+_NAVIGATION_COSTS = {allowed: _navigation_costs(allowed) for allowed in (False, True)}
+_WAVES = {allowed: _wave_params(_NAVIGATION_COSTS[allowed]) for allowed in (False, True)}
 
 
 def potential_from(
@@ -163,24 +222,26 @@ def potential_from(
     Returns:
         The potential, float32[H, W].
     """
-    size_y, size_x = nav_costs.shape
-    cells = size_x * size_y
-    source_cell, target_cell = _flat(source, size_x), _flat(target, size_x)
-    potential = np.full(cells, NOT_REACHED, dtype=np.float32)
-    first_front = wavefront.start_at_cell(potential, source_cell, size_x)
-    wavefront.propagate(
-        nav_costs.ravel(),
-        potential,
-        first_front,
-        wavefront.WaveParams(
-            kernel.OBSTACLE, kernel.NEUTRAL, True, bool(stop_at_target), bool(heuristic)
-        ),
-        source_cell,
-        target_cell,
-        size_x,
-        max(cells // 20, size_x + size_y),
-    )
-    return potential.reshape(nav_costs.shape)
+    own = np.arange(256, dtype=np.uint8)
+    params = _wave_params(own, bool(stop_at_target), bool(heuristic))
+    return _spread(Wavefront(), nav_costs, params, source, target)
+
+
+def _spread(
+    wave: Wavefront,
+    costs: NDArray[np.uint8],
+    params: wavefront.WaveParams,
+    source: Cell,
+    target: Cell,
+) -> NDArray[np.float32]:
+    """Return the potential, float32[H, W], that a wave has when it ends."""
+    size_y, size_x = costs.shape
+    potential = wave.begin((size_y, size_x))
+    source_cell = _flat(source, size_x)
+    first_front = wavefront.start_at_cell(potential.ravel(), source_cell, size_x)
+    max_fronts = max(costs.size // 20, size_x + size_y)
+    wave.spread(costs, first_front, params, source_cell, _flat(target, size_x), max_fronts)
+    return potential
 
 
 def path_from(

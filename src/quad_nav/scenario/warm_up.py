@@ -2,20 +2,30 @@
 
 numba compiles a kernel at its first call, which takes seconds, and caches the result beside the
 source, or in the user's cache if that folder is not writable. ``python -m
-quad_nav.scenario.warm_up`` fills the cache at installation. A node warms up its own configuration
-before it accepts goals, which is quick with a filled cache.
+quad_nav.scenario.warm_up`` fills the cache at installation and builds the library of compiled
+kernels, with which no process needs numba. A node warms up its own configuration before it accepts
+goals, which is quick with either.
 """
 
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, Dict, Tuple
 
 import numpy as np
 
 from quad_nav import config
+from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.costmap.scan_validator import ScanValidator
+from quad_nav.errors import printable
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.kernels import jit, library
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
@@ -66,6 +76,8 @@ def warm_up(configuration: config.Configuration) -> None:
         navigator.tick(now_s, RobotPoses(here, here), Twist2D(vx_mps=0.1))
     navigator.tick(1.0, RobotPoses(here, here), Twist2D(vx_mps=0.1), [_oncoming_peer(here, 1.0)])
     _add_scans(navigator, here)  # again, with the points of a peer to remove
+    if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
+        navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
 
 
 def _oncoming_peer(here: Pose2D, now_s: float) -> Peer:
@@ -81,6 +93,7 @@ def _add_scans(navigator: Navigator, here: Pose2D) -> None:
     ranges = np.where(np.abs(angles) > 3.0, 2.0, np.inf).astype(np.float32)
     scan = Scan(0.0, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
     lidar = Pose3D(here.x_m, here.y_m, 1.0)
+    ScanValidator([]).rejection_reason(scan, lidar, 0.0)
     for costmap in (navigator.global_costmap, navigator.local_costmap):
         for layer in costmap.layers.values():
             if isinstance(layer, ObstacleLayer):
@@ -89,18 +102,35 @@ def _add_scans(navigator: Navigator, here: Pose2D) -> None:
 
 
 def simulate() -> None:
-    """Run a step and a scan of the simulator; imported here, because navigators do not need it."""
-    from quad_nav.sim.scene import Scene, Walls
-    from quad_nav.sim.simulation import Simulation
+    """Run steps and scans of one quadcopter and of two, whose rows make other array layouts.
 
-    simulation = Simulation(Scene("warm-up", 10.0, 10.0, 1.0, Walls(), (), (Pose2D(5.0, 5.0),)), 1)
-    simulation.step()
-    simulation.scan(0)
-    simulation.close()
+    The last scenes have an obstacle and people that move. The simulator is imported here, because
+    navigators do not need it.
+    """
+    from quad_nav.sim.map_file import rectangles_of
+    from quad_nav.sim.motion import Motion, Walkers
+    from quad_nav.sim.scene import Cylinder, MovingObstacle, Scene, Walls
+    from quad_nav.sim.simulation import RobotStates, Simulation
+
+    rectangles_of(np.ones((2, 2), np.bool_))
+    starts = (Pose2D(5.0, 5.0), Pose2D(5.2, 5.0))  # so near that the engine moves both
+    resting = Scene("warm-up", 10.0, 10.0, 1.0, Walls(), (), starts)
+    cart = MovingObstacle(
+        Cylinder("cart", 2.0, 2.0, 0.3, 2.0),
+        Motion((0.0, 1.0), ((2.0, 2.0, 0.0), (3.0, 2.0, 0.0))),
+    )
+    moving = replace(resting, moving=(cart,), walkers=Walkers(2))
+    reacting = replace(resting, walkers=Walkers(2, reacting=True))
+    for scene, robots in ((resting, 1), (resting, 2), (moving, 2), (reacting, 2)):
+        simulation = Simulation(scene, robots)
+        simulation.step()
+        simulation.scans(range(robots))
+        assert RobotStates(simulation.body_state).poses.shape == (robots, 3)
+        simulation.close()
 
 
-def main() -> None:
-    """Compile every kernel that any configuration may call."""
+def fly_missions() -> None:
+    """Call every kernel that any configuration may call."""
     simulate()
     for costmap, node in _MISSIONS:
         warm_up(
@@ -117,6 +147,29 @@ def main() -> None:
                 }
             )
         )
+
+
+def main() -> None:
+    """Compile the kernels and build the library of them, unless it is there already."""
+    fly_missions()
+    if jit.numba_kernels():
+        if library.FOLDER is not None:
+            _build(library.library_path(library.FOLDER))
+    elif jit.library_remarks():  # it lacks some types
+        again = [sys.executable, "-m", "quad_nav.scenario.warm_up"]
+        subprocess.run(again, check=True, env={**os.environ, "QUAD_KERNELS": "numba"})
+
+
+def _build(path: Path) -> None:
+    from quad_nav.kernels.build_library import BuildError, build  # here: it imports numba
+
+    try:
+        build(jit.numba_kernels(), path)
+    except BuildError as error:
+        line = f"kernels: the library is not built: {error}; numba loads them"
+        print(printable(line), file=sys.stderr)
+    else:
+        print(printable(f"kernels: built {path}"))
 
 
 if __name__ == "__main__":
