@@ -38,6 +38,7 @@ class FakeSubscriber:
     """Subscriber whose messages come from `receive`."""
 
     all: List[FakeSubscriber] = []
+    impl: Optional[FakeImpl]
 
     def __init__(
         self, name: str, data_class: Any, callback: Any = None, callback_args: Any = None, **_: Any
@@ -51,9 +52,14 @@ class FakeSubscriber:
 
     def unregister(self) -> None:
         FakeSubscriber.all = [one for one in FakeSubscriber.all if one is not self]
+        self.impl = None
 
     def receive(self, message: genpy.Message, sender: str = "/hostile") -> None:
         """Call the callbacks as rospy does."""
+        if not isinstance(message, self.data_class):
+            buff = io.BytesIO()
+            message.serialize(buff)
+            message = self.data_class().deserialize(buff.getvalue())
         message._connection_header = {"callerid": sender}
         for callback, args in list(self.impl.callbacks):
             callback(message) if args is None else callback(message, args)

@@ -24,16 +24,19 @@ PATIENCE_S = 60.0  # wall time; generous, because a condition that holds ends th
 PUBLISHERS = ("/simulator", "/move_base0", "/move_base1")
 
 
-def topics_sent_here():
-    """The topics that the simulator and the navigators send to this node.
+def topics_sent_here(nodes=PUBLISHERS):
+    """The topics that nodes, by default simulator and navigators, send to this node.
 
     Taken from the publishers' own lists. A subscriber's number of connections includes unfinished
     ones; many at once take a second or more, and messages published before that are lost.
     """
     here, master = rospy.get_name(), rosgraph.Master("/test")
     topics = set()
-    for name in PUBLISHERS:
-        with ServerProxy(rosnode.get_api_uri(master, name)) as node:
+    for name in nodes:
+        uri = rosnode.get_api_uri(master, name)
+        if uri is None:
+            continue  # a navigator in the simulator's process is no node
+        with ServerProxy(uri) as node:
             _, _, connections = node.getBusInfo(here)
         topics.update(
             topic
@@ -149,10 +152,10 @@ class FlightCase(unittest.TestCase):
             time.sleep(0.02)
         raise AssertionError(f"not within {patience_s:g} s: {what() if callable(what) else what}")
 
-    def record(self, topic, message_type):
+    def record(self, topic, message_type, nodes=PUBLISHERS):
         record = Record(topic, message_type)
         self.addCleanup(record.close)
-        self.wait(lambda: topic in topics_sent_here(), f"a publisher that sends {topic}")
+        self.wait(lambda: topic in topics_sent_here(nodes), f"a publisher that sends {topic}")
         return record
 
     def simulated_seconds(self, seconds):

@@ -13,9 +13,13 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from flight_case import goal_pose
 from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Twist
 from move_base_msgs.msg import MoveBaseActionGoal
-from nav_msgs.msg import Odometry, Path
-from sensor_msgs.msg import LaserScan
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan, MultiDOFJointState, PointCloud2
 from tf2_msgs.msg import TFMessage
+
+from quad_nav.peers.peer import Intention
+from quad_nav.ros.common.packed_messages import STATES_TOPIC
+from quad_nav.ros.navigator.intention_topics import INTENTIONS_TOPIC, intentions_message
 
 FLOOD = 30  # messages; ten for each simulated second
 FEW = (3, 1.0)  # number and period of goals: each replaces the sequencer's goal
@@ -105,11 +109,17 @@ def rotated_goal():
     return message
 
 
-def intention(x=NAN, stamp=None):
+def intention():
     """Intention of robot 0, for robot 1."""
-    message = Path(poses=[goal_pose(x, 5.0)])
+    path = np.array([[NAN, 5.0], [1.0, 5.0]])
+    return intentions_message({0: Intention(-1.0, path)}, "map", rospy.get_time())
+
+
+def states(x=NAN, stamp=None):
+    """State of robot 0 in the message for many robots."""
+    message = MultiDOFJointState(joint_names=["quad0"], twist=[Twist()])
     message.header.frame_id, message.header.stamp = "map", stamp or rospy.Time.now()
-    message.poses[0].header.stamp = message.header.stamp
+    message.transforms = [transform(rospy.Time.now(), x).transforms[0].transform]
     return message
 
 
@@ -134,12 +144,15 @@ def everyone(text):
 
 # Kinds with the same warning are not next to each other: the test waits for the throttle.
 KINDS: Dict[str, Kind] = {
-    "NaN odometry": Kind("/odom0", Odometry, odometry, everyone("odom.* dropped.*nan")),
+    "NaN odometry": Kind("/odom0", Odometry, odometry, {"/move_base0": "odom.* dropped.*nan"}),
+    "NaN states": Kind(
+        STATES_TOPIC, MultiDOFJointState, states, everyone("states: state dropped: quad0.*nan")
+    ),
     "transform at the end of time": Kind(
         "/tf",
         TFMessage,
         lambda: transform(END_OF_TIME),
-        everyone("tf: transform dropped.*ahead"),
+        {"/move_base0": "tf: transform dropped.*ahead"},
         1,
     ),
     "scan at the end of time": Kind(
@@ -159,11 +172,11 @@ KINDS: Dict[str, Kind] = {
         {"/move_base0": "not finite"},
         *FEW,
     ),
-    "odometry at x = 1e5 m": Kind(
-        "/odom0",
-        Odometry,
-        lambda: odometry(1e5, 0.0),
-        {SEQUENCER: "odom0: message dropped.*jump"},
+    "states at x = 1e5 m": Kind(
+        STATES_TOPIC,
+        MultiDOFJointState,
+        lambda: states(1e5),
+        {SEQUENCER: "states: message dropped.*jump"},
         1,
     ),
     "scan without an increment": Kind(
@@ -179,7 +192,7 @@ KINDS: Dict[str, Kind] = {
         "/tf",
         TFMessage,
         lambda: transform(rospy.Time.now(), NAN),
-        everyone("tf: transform dropped.*finite"),
+        {"/move_base0": "tf: transform dropped.*finite"},
     ),
     "cancel with a long id": Kind(
         "/move_base0/cancel", GoalID, lambda: GoalID(id=LONG_ID), {"/move_base0": "cancel"}
@@ -191,20 +204,20 @@ KINDS: Dict[str, Kind] = {
         "/tf",
         TFMessage,
         lambda: transform(rospy.Time.now() + rospy.Duration(AHEAD_S)),
-        everyone("tf: transform dropped.*ahead"),
+        {"/move_base0": "tf: transform dropped.*ahead"},
         1,
     ),
     "scan with a huge increment": Kind(
         "/scan0", LaserScan, lambda: scan(1e30), {"/move_base0": "scan0.*increment 1e"}
     ),
-    "odometry at the end of time": Kind(
-        "/odom0",
-        Odometry,
-        lambda: odometry(1.0, 0.0, END_OF_TIME),
-        {SEQUENCER: "odom0: message dropped: stamp"},
+    "states at the end of time": Kind(
+        STATES_TOPIC,
+        MultiDOFJointState,
+        lambda: states(1.0, END_OF_TIME),
+        everyone("states: state dropped.*ahead"),
     ),
     "NaN intention": Kind(
-        "/move_base0/intention", Path, intention, {"/move_base1": "intention dropped"}
+        INTENTIONS_TOPIC, PointCloud2, intention, {"/move_base1": "intention dropped"}
     ),
     "contact of an unknown robot": Kind(
         "/simulation/contacts",

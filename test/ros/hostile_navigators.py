@@ -13,19 +13,23 @@ import rospy
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 from fake_ros import FakeRos, FakeService, deliver
-from geometry_msgs.msg import Point32, Pose, PoseStamped, Quaternion
+from geometry_msgs.msg import Point32, Pose, PoseStamped, Quaternion, Twist, Vector3
 from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseActionGoal
 from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.msg import Path as PathMessage
 from nav_msgs.srv import GetPlanRequest
-from sensor_msgs.msg import ChannelFloat32, PointCloud, PointCloud2, PointField
+from sensor_msgs.msg import ChannelFloat32, MultiDOFJointState, PointCloud, PointCloud2, PointField
 from tf2_msgs.msg import TFMessage
 
 from quad_nav import config
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.navigator.tick import State
-from quad_nav.ros.common import conversions
+from quad_nav.peers.peer import Intention
+from quad_nav.ros.common import conversions, state_topics
+from quad_nav.ros.common.packed_messages import STATES_TOPIC
+from quad_nav.ros.common.state_topics import OwnTopics
+from quad_nav.ros.navigator.intention_topics import INTENTIONS_TOPIC, intentions_message
 from quad_nav.ros.navigator.loop import NavigatorLoop
 from quad_nav.ros.navigator.nodes import Fleet
 from quad_nav.topics.publishing import in_fleet, own_node
@@ -37,6 +41,13 @@ GOALS = [(4.0, 2.0), (7.0, 9.0)]
 CLOUD = np.array([[4.0, 0.0, 0.0], [0.0, 4.0, 0.0]], np.float32)
 
 Valid = Callable[[], genpy.Message]
+
+
+def hear_own_topics(*choices: OwnTopics) -> None:
+    """Let a node hear each robot's own topics beside the messages for many robots."""
+    state_topics.MISSING_AFTER_S = -1.0
+    for one in choices:
+        one._change(one._heard, ())
 
 
 def configuration(number: int, robots: int) -> config.Configuration:
@@ -77,6 +88,8 @@ class Navigators:
         names = in_fleet if robots > 1 else lambda _: own_node
         self._names = {k: names(k) for k in own}
         self.fleet = Fleet({k: configuration(k, 2) for k in own}, names)
+        hear_own_topics(*(peers._topics._own for peers in self.fleet.peers))
+        hear_own_topics(*(peers._intentions._own_topics for peers in self.fleet.peers))
         self._loop = NavigatorLoop(self.fleet.robots, self.fleet.peers, 0.0)
         self.valid: Dict[str, Valid] = {
             **{
@@ -86,6 +99,8 @@ class Navigators:
             },
             **{f"/odom{k}": lambda k=k: self._odometry(k) for k in (0, 1)},
             **{f"/move_base{k}/intention": lambda k=k: self._intention(k) for k in (0, 1)},
+            STATES_TOPIC: self._states,
+            INTENTIONS_TOPIC: self._intentions,
             "/tf": self._transforms,
             "/tf_static": self._static_transforms,
             "/map": self._map,
@@ -113,7 +128,7 @@ class Navigators:
         for robot in self.fleet.robots:
             for sensor in robot._sensors:
                 sensor.deliver(robot._transforms)
-            robot._goals.poll(robot._navigator, self.now_s)
+            robot._interface.poll(self.now_s)
 
     def fly(self, seconds: float = 0.1) -> None:
         """Advance the clock with good messages at 20 Hz, and run what is due."""
@@ -128,7 +143,7 @@ class Navigators:
     def _good_topics(self) -> List[str]:
         sensors = [f"/{name}{k}" for name in ("scan", "cloud", "cloud2_") for k in self._names]
         odometry = [rospy.resolve_name(names("odom")) for names in self._names.values()]
-        return ["/tf", *odometry, *sensors]
+        return ["/tf", STATES_TOPIC, *odometry, *sensors]
 
     def recover(self) -> None:
         """Send good messages on every topic; each robot flies to its goal again."""
@@ -141,7 +156,7 @@ class Navigators:
         self._hand_on_goals()
         self.fly(1.5)
         for k, robot in enumerate(self.fleet.robots):
-            state, command = robot._navigator.state, robot._topics._command.last
+            state, command = robot._navigator.state, robot._interface._topics._command.last
             assert state in (State.CONTROLLING, State.PLANNING), f"robot {k} is {state}"
             assert command is not None and math.isfinite(command.linear.x), command
             speed = abs(command.linear.x) + abs(command.angular.z)
@@ -173,6 +188,17 @@ class Navigators:
             (f"odom{k}", f"base_link{k}"),
             self._stamp(),
         )
+
+    def _states(self) -> MultiDOFJointState:
+        twist = Twist(linear=Vector3(0.1, 0.0, 0.0))
+        message = MultiDOFJointState(joint_names=["quad0", "quad1"], twist=[twist, twist])
+        message.transforms = [conversions.transform(pose) for pose in STARTS]
+        message.header.frame_id, message.header.stamp = "map", self._stamp()
+        return message
+
+    def _intentions(self) -> PointCloud2:
+        intention = Intention(-self.now_s, np.array(GOALS))
+        return intentions_message({0: intention, 1: intention}, "map", self.now_s)
 
     def _scan(self, k: int) -> genpy.Message:
         ranges = np.full(BEAMS, 2.5, np.float32)

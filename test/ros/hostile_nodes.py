@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Dict
@@ -15,12 +14,14 @@ from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from fake_ros import FakeRos, FakeService, deliver
 from geometry_msgs.msg import Twist, Vector3
-from hostile_navigators import ROOT, STARTS, Navigators
+from hostile_navigators import ROOT, STARTS, Navigators, hear_own_topics
 from move_base_msgs.msg import MoveBaseActionResult, RecoveryStatus
 from std_msgs.msg import ColorRGBA, Time
 from visualization_msgs.msg import Marker, MarkerArray
 
 from quad_nav.mission.summary import write_json
+from quad_nav.ros.common.packed_messages import STATES_TOPIC
+from quad_nav.ros.composed.own_nodes import OwnNodes
 from quad_nav.ros.sequencer.mission import MissionRunner
 from quad_nav.ros.simulator.node import SimulatorNode
 from quad_nav.scenario import mission_setup, simulator_setup
@@ -37,10 +38,8 @@ class Simulator:
         """Start the node, without threads."""
         self._ros = ros
         setup = simulator_setup.read_setup({"robots": 2, "scene": SCENE}, "simulator")
-        self._node = SimulatorNode(setup)
-        self._node._setup = replace(setup, gui=True)
-        FakeRos.forget_subscribers()
-        self._node._subscribe()
+        self._node = SimulatorNode(setup, OwnNodes())
+        rospy.Subscriber("/goals", MarkerArray, self._node._store_goals)
         self._node._start()
         self._before = self._place(1)
         self.valid = {
@@ -55,13 +54,14 @@ class Simulator:
 
     def settle(self) -> None:
         """Take the commands."""
-        self._node._take_commands()
+        self._node._commands.take()
 
     def fly(self) -> None:
         """Show the goals, and advance by one scan."""
         self._node._show_goals()
         for _ in range(12):
-            self._node._step()
+            self._node._commands.take()
+            self._node._step(1)
         self._ros.set_time(self.now_s)
 
     def recover(self) -> None:
@@ -115,11 +115,14 @@ class SequencerNode:
         setup = mission_setup.read_setup(parameters, "sequencer", folder / "result.json", folder)
         self.mission = MissionRunner(setup)
         self.mission._start_simulation = lambda: None
+        hear_own_topics(self.mission._feed._topics._own)
+        self.mission._feed.transforms()  # which odometry needs
         self.mission._begin(self.now_s)
         self._attempts = [0, 0]
         self.valid = {
             "/simulation/contacts": self._contact,
             "/simulation/last_reset": lambda: Time(rospy.Time.from_sec(0.5)),
+            STATES_TOPIC: partial(Navigators._states, self),
             "/tf": partial(Navigators._transforms, self),
             "/tf_static": partial(Navigators._static_transforms, self),
         }

@@ -14,7 +14,7 @@ from quad_nav.geometry import Pose3D, Scan, Twist2D, quaternion_from_euler
 from quad_nav.peers.peer import Intention, idle_priority, priority_of
 from quad_nav.ros.common import conversions
 from quad_nav.ros.common.readiness import escape_log_messages
-from quad_nav.ros.navigator.peer_topics import intention_from_message, intention_message
+from quad_nav.ros.navigator.intention_topics import intention_from_message, intention_message
 
 POSE = Pose3D(1.0, -2.0, 0.5, quaternion_from_euler(0.1, -0.2, 2.0))
 TWIST = Twist2D(0.3, -0.1, 0.7)

@@ -8,6 +8,7 @@ local costmaps know them from their static layers alone.
 import math
 
 import numpy as np
+import rosnode
 import rospy
 import rostest
 import tf2_ros
@@ -91,13 +92,23 @@ class DriftingOdometry(FlightCase):
         self.map_topic.publish(map_with_pillars())
         # Not `self.record`: the navigators may not have started yet.
         grids = [Record(f"/move_base{i}/local_costmap/costmap", OccupancyGrid) for i in (0, 1)]
+        known_since = [self.first_transform(f"odom{i}") for i in (0, 1)]
         result = self.read_result(rospy.get_param("~result"), patience_s=380.0)
         self.assertEqual(result["contacts"], [])
         goals = [goal for robot in result["robots"] for goal in robot["goals"]]
         self.assertEqual([goal["reached"] for goal in goals], 6 * [True], goals)
         self.check_drift()
         for i, record in enumerate(grids):
-            self.check_walls(f"odom{i}", list(record.messages))
+            known = [g for g in record.messages if g.header.stamp >= known_since[i]]
+            self.check_walls(f"odom{i}", known)
+
+    def first_transform(self, frame):
+        """Return the stamp of a transform of the frame, once one has come.
+
+        Costmaps may come before it. They cannot be placed.
+        """
+        self.wait(lambda: self.buffer.can_transform("map", frame, rospy.Time(0)), frame)
+        return self.buffer.lookup_transform("map", frame, rospy.Time(0)).header.stamp
 
     def check_drift(self):
         """At the end both frames are far from the map's, and they are different."""
@@ -143,6 +154,11 @@ class DriftingOdometry(FlightCase):
 
     def test_3_a_peer_and_its_intention_are_transformed_to_the_global_frame(self):
         """A robot with its global costmap in `odom0` hears of one with `odom1` and `map`."""
+        if "/move_base0" not in rosnode.get_node_names():
+            self.skipTest("composed navigators have no topics of peers")
+        odom0_from_map = self.located("odom0", "map")
+        odom0_from_odom1 = odom0_from_map.compose(self.located("map", "odom1"))
+        self.listener.unregister()  # rospy has one type for all subscribers of a topic
         peers = PeerTopics({0: in_fleet(0)}, 6, Transforms(), "odom0")
         odometry = rospy.Publisher("/odom5", Odometry, queue_size=1, latch=True)
         intention = rospy.Publisher("/move_base5/intention", Path, queue_size=1, latch=True)
@@ -157,8 +173,7 @@ class DriftingOdometry(FlightCase):
             return next((p for p in peers.near(0, None, 1.0) if p.name == "quad5"), None)
 
         self.wait(lambda: found() and len(found().intention.path) == 2, "the peer's intention")
-        peer, odom0_from_map = found(), self.located("odom0", "map")
-        odom0_from_odom1 = odom0_from_map.compose(self.located("map", "odom1"))
+        peer = found()
         here = odom0_from_odom1.transform(1.0, 2.0)
         # The frames have moved on since the messages; they are metres apart.
         self.assertLess(math.dist(here, (peer.x_m, peer.y_m)), 0.5)

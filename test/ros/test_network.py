@@ -17,7 +17,7 @@ import rostest
 
 FLY = Path(__file__).resolve().parents[2] / "scripts" / "fly"
 PATIENCE_S = 90.0
-NODES = {"rosmaster", "rosout", "simulator", "move_base", "sequencer", "quiet_roslaunch"}
+NODES = {"rosmaster", "rosout", "simulator", "move_base", "sequencer", "web", "quiet_roslaunch"}
 LOOPBACK = ("0100007F", "00000000000000000000000001000000")  # as in /proc/net: little endian
 TCP_LISTENS, UDP_IS_BOUND = "0A", "07"
 
@@ -77,7 +77,13 @@ class Network(unittest.TestCase):
         printed = open(Path(folder.name) / "printed", "w+")
         self.addCleanup(printed.close)
         flight = subprocess.Popen(
-            [str(FLY), "rviz:=false", f"result:={folder.name}/result.json", *arguments],
+            [
+                str(FLY),
+                "rviz:=false",
+                "web:=true",
+                f"result:={folder.name}/result.json",
+                *arguments,
+            ],
             env={**os.environ, **environment},
             stdout=printed,
             stderr=subprocess.STDOUT,
@@ -116,6 +122,10 @@ class Network(unittest.TestCase):
             printed.read_text(),
             r"open to the network at http://127\.0\.1\.1:\d+ .*everyone who reaches",
         )
+        end = time.monotonic() + PATIENCE_S
+        while "quad: the page is at http://127.0.1.1:" not in printed.read_text():
+            self.assertLess(time.monotonic(), end, printed.read_text())
+            time.sleep(0.2)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,9 @@ Intended differences:
 """
 
 import math
+import re
 
+import numpy as np
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
@@ -67,6 +69,17 @@ class UpstreamBehaviour(UpstreamCase):
         ]
         return [at for at in centres if nearest_m < self.distance(0, *at) < farthest_m]
 
+    def obstacle_cell(self):
+        """Return the centre of the cell of an obstacle with most such cells around it.
+
+        It is farther than 1 m away. A beam that grazes the obstacle may clear a cell, but not all
+        around it, whose inflation then keeps the place lethal.
+        """
+        self.wait(lambda: self.obstacle_cells(1.0), "an obstacle")
+        cells = np.array(self.obstacle_cells(1.0))
+        distances_m = np.hypot(*(cells[:, np.newaxis] - cells).transpose(2, 0, 1))
+        return cells[np.argmax((distances_m < 0.3).sum(axis=1))]
+
     def end_distance(self, path, x, y):
         last = path.poses[-1].pose.position
         return math.hypot(last.x - x, last.y - y)
@@ -90,8 +103,7 @@ class UpstreamBehaviour(UpstreamCase):
         self.assertEqual(self.make_plan(*OFF_THE_MAP).poses, [])
 
     def test_make_plan_into_an_obstacle_needs_a_tolerance(self):
-        self.wait(lambda: self.obstacle_cells(1.0), "an obstacle")
-        x, y = self.obstacle_cells(1.0)[0]
+        x, y = self.obstacle_cell()
         self.assertEqual(self.make_plan(x, y).poses, [])
         with_goal = self.make_plan(x, y, tolerance=1.0)  # make_plan_add_unreachable_goal
         self.assertEqual(self.end_distance(with_goal, x, y), 0.0)
@@ -225,16 +237,20 @@ class UpstreamBehaviour(UpstreamCase):
         self.assert_two_turns(commands.messages)
 
     def assert_two_turns(self, commands):
-        """At ``max_vel_theta``, on the spot, each followed by a stop."""
-        turning = [command.angular.z != 0.0 for command in commands]
+        """At ``max_vel_theta``, on the spot, each followed by a stop of half a second or more.
+
+        On a loaded machine a late costmap may stop a turn for a moment.
+        """
         self.assertEqual({(c.linear.x, c.angular.z) for c in commands}, {(0.0, 0.0), (0.0, 0.7)})
-        ends = [before and not after for before, after in zip(turning, turning[1:])]
-        self.assertEqual(sum(ends), 2)
+        turning = "".join("t" if command.angular.z else "-" for command in commands)
+        turns = [turn for turn in re.split("-{5,}", turning) if turn]
+        self.assertEqual(len(turns), 2, turning)
+        self.assertTrue(turning.endswith("-"), turning)
 
     def test_goal_in_an_obstacle_has_empty_plans(self):
-        self.wait(lambda: self.obstacle_cells(1.0), "an obstacle")
+        place = self.obstacle_cell()
         plans = self.record("/move_base0/NavfnROS/plan", Path)
-        self.send(0, goal_pose(*self.obstacle_cells(1.0)[0]))
+        self.send(0, goal_pose(*place))
         self.wait(lambda: len(plans.messages) >= 3, "three plans")
         for path in plans.messages:
             self.assertEqual((path.header.frame_id, path.poses), ("map", []))

@@ -9,16 +9,16 @@ reports compute them with the functions of this module.
 from __future__ import annotations
 
 import math
-from typing import Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-SurfaceDistance = Callable[[Floats], Floats]
-"""Distance in m from positions in ``map``, float64[..., 2], to the nearest surface, float64[...];
-negative inside."""
+SurfaceDistance = Callable[[Floats, Floats], Floats]
+"""Distance in m from positions in ``map``, float64[..., t, 2], to the nearest surface at their
+times, float64[t] in s; float64[..., t], negative inside."""
 
 BLOCK_S = 10.0
 """Poses are compared in blocks of this length: arrays cost about as much as two numbers."""
@@ -28,9 +28,18 @@ MAX_DELAY_S = 1.0
 _ROUNDING_M = 1e-9
 
 
-def clearances_m(positions_m: Floats, surface_distance: SurfaceDistance, radius_m: float) -> Floats:
-    """Return the clearances float64[...] of a robot at positions float64[..., 2] in ``map``."""
-    return surface_distance(positions_m) - radius_m
+def clearances_m(
+    positions_m: Floats, times_s: Floats, surface_distance: SurfaceDistance, radius_m: float
+) -> Floats:
+    """Return the clearances float64[..., t] of robots.
+
+    Args:
+        positions_m: float64[..., t, 2], positions in ``map``.
+        times_s: float64[t], their times.
+        surface_distance: Distance to the nearest surface.
+        radius_m: Radius of each hull.
+    """
+    return surface_distance(positions_m, times_s) - radius_m
 
 
 def separations_m(positions_m: Floats, others_m: Floats, radius_m: float) -> Floats:
@@ -102,8 +111,14 @@ class DistanceLog:
 
     def add(self, name: str, stamp_s: float, x_m: float, y_m: float) -> None:
         """Add a robot's position in ``map``; the stamps of one robot increase."""
-        self._samples[name].append((stamp_s, x_m, y_m))
+        self.add_tracks({name: [(stamp_s, x_m, y_m)]})
+
+    def add_tracks(self, tracks: Mapping[str, Sequence[Tuple[float, float, float]]]) -> None:
+        """Add many positions (stamp_s, x_m, y_m) in ``map`` of some robots, one or more of each."""
+        for name, track in tracks.items():
+            self._samples[name].extend(track)
         self._is_compared = False
+        stamp_s = max(track[-1][0] for track in tracks.values())
         self._newest_s = max(self._newest_s, stamp_s)
         if stamp_s >= self._next_block_s:
             if self._next_block_s > -math.inf:
@@ -148,7 +163,9 @@ class DistanceLog:
         tracks = [(name, np.array(samples)) for name, samples in self._samples.items() if samples]
         if self._surface_distance is not None:
             for name, track in tracks:
-                clearance_m = clearances_m(track[:, 1:], self._surface_distance, self._radius_m)
+                clearance_m = clearances_m(
+                    track[:, 1:], track[:, 0], self._surface_distance, self._radius_m
+                )
                 self._min_clearance_m[name] = min(
                     self._min_clearance_m[name], float(clearance_m.min())
                 )

@@ -9,7 +9,10 @@ simulation is not guessed from odometry; the simulator reports it.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Optional
+from typing import NamedTuple, Optional, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 STEP_M, JUMP_MPS = 0.25, 5.0
 """A step that is longer than this distance, and faster than this speed, is a jump."""
@@ -64,3 +67,35 @@ class OdometryFilter:
             self.has_relocated = True
         self._last, self._elsewhere = sample, None
         return True
+
+    def accepts_track(
+        self, stamps_s: NDArray[np.float64], frame: str, positions_m: NDArray[np.float64]
+    ) -> Tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Apply `accepts` to samples in the order in which they arrived.
+
+        Args:
+            stamps_s: float64[n], times of the samples.
+            frame: Frame of all samples.
+            positions_m: float64[n, 2], positions in the frame.
+
+        Returns:
+            Masks bool[n] of the accepted samples and of those that ended a jump.
+        """
+        accepted = np.ones(len(stamps_s), np.bool_)
+        relocated = np.zeros(len(stamps_s), np.bool_)
+        steps_m = np.diff(positions_m, axis=0)
+        most_m = np.maximum(STEP_M, JUMP_MPS * np.diff(stamps_s))
+        is_continuous = bool((np.hypot(steps_m[:, 0], steps_m[:, 1]) <= most_m).all())
+        last = len(stamps_s) - 1
+        for n in range(last + 1):
+            accepted[n] = self.accepts(_sample(stamps_s[n], frame, positions_m[n]))
+            relocated[n] = self.has_relocated
+            if is_continuous and accepted[n] and n < last:  # so are all that follow
+                self._last = _sample(stamps_s[last], frame, positions_m[last])
+                self.has_relocated = False
+                break
+        return accepted, relocated
+
+
+def _sample(stamp_s: np.float64, frame: str, position_m: NDArray[np.float64]) -> OdometrySample:
+    return OdometrySample(float(stamp_s), frame, *position_m.tolist())

@@ -149,14 +149,21 @@ class Sequencer:
     """Decides which goal to send next, and when to send, retry or skip it.
 
     ``progress`` is the snapshot of an earlier sequencer to resume from. Its active goal is sent
-    again without counting an attempt, unless the robot has reached it meanwhile.
+    again for ``resume_reason`` without counting an attempt, unless the robot has reached it
+    meanwhile.
     """
 
-    def __init__(self, sequence: GoalSequence, progress: SequenceProgress = START) -> None:
+    def __init__(
+        self,
+        sequence: GoalSequence,
+        progress: SequenceProgress = START,
+        resume_reason: str = "the sequencer or the clock restarted",
+    ) -> None:
         self._sequence = sequence
         self._index, self._lap, self._active = progress.index, progress.lap, progress.active_goal
         self._dwell = progress.dwell
         self._is_resumed = progress.active_goal is not None
+        self._resume_reason = resume_reason
         self._busy_s = 0.0  # the last time at which the navigator was not known to be idle
         self._stopped_s: Optional[float] = None  # since when it reports the goal as reached
         self._done = False
@@ -196,6 +203,25 @@ class Sequencer:
     def done(self) -> bool:
         """True when all goals have ended."""
         return self._done
+
+    def due_s(self, navigator_idle: bool) -> float:
+        """Return the time before which ``tick`` returns no action.
+
+        That holds while the robot is not within the tolerance of its goal, the navigator reports
+        nothing and stays idle or busy as it is, and nothing else changes the sequencer.
+        """
+        if self._done:
+            return math.inf
+        if self._dwell is not None:
+            return self._dwell.until_s
+        if self._active is None or self._is_resumed or self._stopped_s is not None:
+            return -math.inf
+        timeout_s = self._active.sent_s + self._sequence.settings.goal_timeout_s
+        return min(timeout_s, self._busy_s + GOAL_LOST_AFTER_S) if navigator_idle else timeout_s
+
+    def note_busy(self, now_s: float) -> None:
+        """Know that the navigator has had a goal until now, without a tick."""
+        self._busy_s = now_s
 
     def replace_sequence(self, sequence: GoalSequence) -> None:
         """Follow an edited goal file from the next tick on.
@@ -282,7 +308,7 @@ class Sequencer:
     ) -> str:
         """Return why the navigator has not got the goal any more, "" if it has."""
         if self._is_resumed:
-            return "the sequencer or the clock restarted"
+            return self._resume_reason
         if active.replaced and any(report.verdict in _ENDED for report in reports):
             return "the navigator has finished another node's goal"
         if now_s - self._busy_s >= GOAL_LOST_AFTER_S:

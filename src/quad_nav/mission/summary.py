@@ -85,6 +85,7 @@ class MissionSummary:
         seed: Seed of the simulation.
         versions: Versions of the software that flew.
         facts: Facts about the set-up, by the keys of ``FACTS``; see ``scenario.flight_facts``.
+        interventions: What people did that changed the mission, one line each.
     """
 
     robots: Tuple[RobotSummary, ...]
@@ -98,6 +99,7 @@ class MissionSummary:
     seed: Optional[int] = None
     versions: Mapping[str, str] = field(default_factory=dict)
     facts: Mapping[str, Any] = field(default_factory=dict)
+    interventions: Tuple[str, ...] = ()
 
     @property
     def success(self) -> bool:
@@ -225,6 +227,7 @@ def to_json(summary: MissionSummary) -> Dict[str, Any]:
             for contact in summary.contacts
         ],
         "contacts_reported": summary.contacts_reported,
+        "interventions": list(summary.interventions),
         "min_separation_m": _rounded(summary.min_separation_m),
         "seed": summary.seed,
         "versions": dict(summary.versions),

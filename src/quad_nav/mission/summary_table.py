@@ -204,6 +204,9 @@ def _verdict(summary: MissionSummary) -> str:
     for robot in summary.robots:
         if robot.reason:
             reason += f"\n{robot.robot} ended early: {printable(robot.reason)}."
+    if summary.interventions:
+        reason += "\nPeople steered the mission:"
+        reason += "".join(f"\n  {printable(line)}" for line in summary.interventions)
     return (
         f"Mission {'succeeded' if summary.success else 'FAILED'}: {reached} of {len(legs)} goals "
         f"reached{contacts} in {summary.sim_time_s:.1f} s "

@@ -1,14 +1,13 @@
-"""The loop scan -> costmap -> plan -> velocity -> body -> scan in one process.
+"""A mission flown by the loop on a virtual clock: sequencers, log and observers around it.
 
-Time advances in the simulation's steps of 1/240 s. Scans are taken and delivered at their own
-steps. Every 1/40 s there is odometry: the sequencers read it, and the navigators run what is due.
-The ROS nodes do the same, with topics in between. Equal set-ups give equal flights, bit for bit.
+Every 1/40 s there is odometry: the sequencers read it and send goals, and the navigators run what
+is due. Equal set-ups give equal flights, bit for bit.
 """
 
 from __future__ import annotations
 
-from operator import attrgetter
-from typing import Dict, List, Mapping, Sequence
+from functools import partial
+from typing import List, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,18 +15,18 @@ from numpy.typing import NDArray
 from quad_nav.config import Configuration
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.loop import inspection, offline_setup, shares_of
+from quad_nav.loop.flight_loop import FlightLoop
+from quad_nav.loop.navigator_group import LocatedScan, LoopRobot
 from quad_nav.mission.flight_log import FlightLog
-from quad_nav.mission.robot_goals import RobotGoals
-from quad_nav.mission.sequencer import Action, NavigatorReport, SendGoal, Sequencer, Verdict
-from quad_nav.navigator.tick import RobotPoses, State, Tick
-from quad_nav.offline.navigator_group import NavigatorGroup, NavigatorResult, OfflineRobot
-from quad_nav.offline.worker_process import WorkerProcess
-from quad_nav.peers.peer import Intention
+from quad_nav.mission.goal_file import GoalSequence
+from quad_nav.mission.sequencer import Action, SendGoal
+from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.offline.flight_robot import FlightRobot, GoalWatch
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.simulation import STEPS_PER_S, RobotStates, Simulation
 
-STEPS_PER_ODOMETRY = STEPS_PER_S // 40
+_POSES_AT_ONCE = 400
 CONTACT = "contact"
 """Stop reason of a flight that ends at its first contact."""
 
@@ -85,47 +84,6 @@ class StopAtContact(FlightObserver):
         self._touched = True
 
 
-class FlightRobot:
-    """One robot's sequencer, its log, and the last known state of its navigator.
-
-    ``goal_waits`` while the navigator has not taken the last goal that was sent.
-    """
-
-    def __init__(self, goals: RobotGoals, configuration: Configuration, log: FlightLog) -> None:
-        self.name = goals.name
-        self.configuration = configuration
-        self.sequencer = Sequencer(goals.sequence)
-        self._log = log
-        self.goal_waits = False
-        self._is_idle = True
-        self._reports: List[NavigatorReport] = []
-
-    def tick_sequencer(self, now_s: float, pose: Pose2D) -> List[Action]:
-        """Pass the odometry to the sequencer and return its actions."""
-        self._log.add_pose(self.name, now_s, pose)
-        actions = self.sequencer.tick(
-            now_s, pose, self._reports, self._is_idle and not self.goal_waits
-        )
-        self._reports = []
-        for action in actions:
-            self._log.robots[self.name].add_action(action)
-            self.goal_waits = self.goal_waits or isinstance(action, SendGoal)
-        return actions
-
-    def update(self, tick: Tick, goal_waits: bool) -> None:
-        """Store the result of the navigator's tick for the log and the sequencer."""
-        self.goal_waits, self._is_idle = goal_waits, tick.state is State.IDLE
-        if tick.recovery is not None:
-            self._log.robots[self.name].recoveries += 1
-        if tick.outcome is None:
-            return
-        self._log.robots[self.name].aborts += not tick.outcome.succeeded
-        # A goal that waits has replaced the one that ended here.
-        if not goal_waits:
-            verdict = Verdict.SUCCEEDED if tick.outcome.succeeded else Verdict.ABORTED
-            self._reports.append(NavigatorReport(verdict, tick.outcome.text))
-
-
 class Flight:
     """A mission from its start, advanced by one period of odometry at a time.
 
@@ -143,38 +101,49 @@ class Flight:
     ) -> None:
         self.setup = setup
         self._observers = tuple(observers)
-        if (
-            any(observer.needs_single_process for observer in self._observers)
-            or setup.simulation.lidar_caster != "kernel"
-        ):
-            processes = 1
-        self.log = FlightLog(
+        self._log = FlightLog(
             [goals.name for goals in setup.robots],
             setup.robot_radius_m,
-            setup.scene.flight_surface_distances_m,
+            lambda *places: self.simulation.movers.flight_surface_distances_m(*places),
         )
         self.robots = [
-            FlightRobot(goals, configuration, self.log)
+            FlightRobot(goals, configuration, self._log)
             for goals, configuration in zip(setup.robots, setup.configurations)
         ]
-        count = len(self.robots) if navigators else 0
-        shares = [range(first, count, processes) for first in range(max(1, min(processes, count)))]
-        # Before the engine is created: forked processes must not inherit it.
-        self._workers = [WorkerProcess(setup, share) for share in shares[1:]]
-        self.simulation = Simulation(setup.scene, len(setup.robots), setup.simulation, setup.seed)
-        self._group = NavigatorGroup(setup, shares[0], self.simulation.lidars)
-        self._new_goals: Dict[int, Pose2D] = {}
-        self._updates: Dict[int, Intention] = {}  # intentions that the last ticks changed
+        self._watch = GoalWatch(self.robots)
+        self._stamps_s: List[float] = []  # poses that are not in the log yet
+        self._poses: List[NDArray[np.float64]] = []
+        self.loop = self._new_loop(len(self.robots) if navigators else 0, processes)
+        self.simulation = self.loop.simulation
         self.reason = ""  # why it ended early; "" after all goals
-        self.states = RobotStates(self.simulation.body_state)
+        self.states = self.loop.states
         for observer in self._observers:
             observer.on_start(self)
-        self._scan()
+        self._report_scans(self.loop.start())
+
+    def _new_loop(self, hosted: int, processes: int) -> FlightLoop:
+        if (
+            any(observer.needs_single_process for observer in self._observers)
+            or self.setup.simulation.lidar_caster != "kernel"
+        ):
+            processes = 1
+        reads_ticks = any(
+            type(observer).on_tick is not FlightObserver.on_tick for observer in self._observers
+        )
+        # The last share is the smallest; the process that moves the bodies takes it.
+        shares = shares_of(range(hosted), processes)[::-1]
+        return FlightLoop(offline_setup(self.setup), shares, whole_ticks=reads_ticks)
 
     @property
-    def offline_robots(self) -> Mapping[int, OfflineRobot]:
+    def offline_robots(self) -> Mapping[int, LoopRobot]:
         """The robots of this process, by number."""
-        return self._group.robots
+        return self.loop.group.robots
+
+    @property
+    def log(self) -> FlightLog:
+        """The log, up to the last odometry."""
+        self._log_poses()
+        return self._log
 
     @property
     def now_s(self) -> float:
@@ -184,12 +153,12 @@ class Flight:
     @property
     def contacts(self) -> List[Contact]:
         """All contacts, oldest first."""
-        return self.log.contacts
+        return self._log.contacts
 
     @property
     def is_done(self) -> bool:
-        """True when every sequencer is done."""
-        return all(robot.sequencer.done for robot in self.robots)
+        """True when every sequencer is done, and no robot flies to a person's goal."""
+        return all(robot.is_done for robot in self.robots)
 
     @property
     def stop_reasons(self) -> List[str]:
@@ -210,10 +179,16 @@ class Flight:
         Raises:
             WorkerProcessError: A worker process failed.
         """
-        end = self.simulation.step_count + STEPS_PER_ODOMETRY
-        while self.simulation.step_count < end:
-            self._step(end)
-        self.states = RobotStates(self.simulation.body_state)
+        is_odometry = False
+        while not is_odometry:
+            progress = self.loop.advance()
+            for contact in progress.contacts:
+                self._log.add_contact(contact)
+                for observer in self._observers:
+                    observer.on_contact(contact)
+            self._report_scans(progress.scans)
+            is_odometry = progress.is_odometry
+        self.states = self.loop.states
         for observer in self._observers:
             observer.on_move(self)
         self._sequence()
@@ -221,73 +196,78 @@ class Flight:
 
     def command(self, robot: int, tick: Tick) -> None:
         """Pass the command of a navigator's tick to the simulation, if there is one."""
-        if tick.command is not None:
-            self.simulation.set_command(robot, tick.command)
+        self.loop.command(robot, tick.command)
+
+    # -- a person's doing ----------------------------------------------------------------
+
+    def send_goal(self, robot: int, pose: Pose2D) -> None:
+        """Send a robot to a pose in ``map``; the sequencer sends its own goal again afterwards."""
+        self.loop.send_goal(robot, pose)
+        self.robots[robot].replace_goal()
+        self._watch.update(robot)
+
+    def cancel_goal(self, robot: int) -> None:
+        """Cancel the goal of a robot; the sequencer skips it if it is its own."""
+        self.loop.cancel_goal(robot)
+        self.robots[robot].cancel_goal()
+        self._watch.update(robot)
+
+    def replace_goals(self, robot: int, sequence: GoalSequence) -> None:
+        """Follow other goals from now on, see ``Sequencer.replace_sequence``."""
+        self.robots[robot].sequencer.replace_sequence(sequence)
+        self._watch.update(robot)
+
+    def clear_costmaps(self, robot: int) -> None:
+        """Clear both costmaps of a robot."""
+        change = partial(inspection.clear_costmaps, robot=robot, now_s=self.now_s)
+        self.loop.change(robot, change)
+
+    def reconfigure(self, robot: int, configuration: Configuration) -> None:
+        """Change the parameters of a robot's navigator that may change in flight."""
+        self.robots[robot].configuration = configuration
+        change = partial(inspection.reconfigure, robot=robot, configuration=configuration)
+        self.loop.change(robot, change)
 
     def end(self, reason: str = "") -> None:
         """Call every observer's ``on_end``, then close the simulation and the processes."""
         self.reason = reason
         for observer in self._observers:
             observer.on_end(self)
-        self.simulation.close()
-        for worker in self._workers:
-            worker.close()
+        self.loop.close()
 
-    def _step(self, end: int) -> None:
-        """Advance to step ``end``, or to the next scan if that comes first, and take the scan."""
-        count, per_scan = self.simulation.step_count, self.setup.steps_per_scan
-        next_scan = (count // per_scan + 1) * per_scan
-        for contact in self.simulation.advance(min(end, next_scan) - count):
-            self.log.add_contact(contact)
-            for observer in self._observers:
-                observer.on_contact(contact)
-        if self.simulation.step_count == next_scan:
-            self._scan()
-
-    def _scan(self) -> None:
-        states, now_s = RobotStates(self.simulation.body_state), self.now_s
-        for worker in self._workers:
-            worker.scan(now_s, states)
-        for index, (scan, map_from_lidar) in self._group.scan(now_s, states).items():
+    def _report_scans(self, scans: Mapping[int, LocatedScan]) -> None:
+        for index, (scan, map_from_lidar) in scans.items():
             for observer in self._observers:
                 observer.on_scan(index, scan, map_from_lidar)
 
     def _sequence(self) -> None:
-        now_s = self.now_s
-        for index, (robot, state) in enumerate(zip(self.robots, self.states)):
-            for action in robot.tick_sequencer(now_s, state.map_from_base.to_2d()):
+        now_s, poses = self.now_s, self.states.poses
+        self._stamps_s.append(now_s)
+        self._poses.append(poses)
+        if len(self._stamps_s) == _POSES_AT_ONCE:
+            self._log_poses()
+        for index in self._watch.due(now_s, poses):
+            robot = self.robots[index]
+            actions = robot.tick_sequencer(now_s, Pose2D(*poses[index].tolist()))
+            for action in actions:
+                self.log.robots[robot.name].add_action(action)
+            for action in actions:
                 if isinstance(action, SendGoal):
-                    self._new_goals[index] = action.pose
+                    self.loop.send_goal(index, action.pose)
                 for observer in self._observers:
                     observer.on_action(index, now_s, action)
+            self._watch.update(index)
+
+    def _log_poses(self) -> None:
+        if self._stamps_s:
+            self._log.add_tracks(self._stamps_s, np.array(self._poses))
+            self._stamps_s, self._poses = [], []
 
     def _navigate(self) -> None:
-        for result in sorted(self._tick_navigators(), key=attrgetter("robot")):
+        for result in self.loop.navigate():
             index = result.robot
-            self.robots[index].update(result.tick, result.goal_waits)
+            if self.robots[index].update(result.tick, result.goal_waits):
+                self._watch.update(index)
             self.command(index, result.tick)
             for observer in self._observers:
                 observer.on_tick(index, result.tick, result.located, result.wall_s)
-
-    def _tick_navigators(self) -> List[NavigatorResult]:
-        """Tick the navigators that are due, in all processes at the same time."""
-        goals, updates = self._new_goals, self._updates
-        now_s, states = self.now_s, self.states
-        for worker in self._workers:
-            worker.begin_navigating(
-                now_s,
-                states,
-                {robot: goals[robot] for robot in worker.robots if robot in goals},
-                updates,
-            )
-        results = self._group.navigate(
-            now_s,
-            states,
-            {robot: goals[robot] for robot in self._group.robots if robot in goals},
-            updates,
-        )
-        for worker in self._workers:
-            results += worker.results()
-        self._new_goals = {}
-        self._updates = {result.robot: result.intention for result in results}
-        return results

@@ -14,6 +14,7 @@ from typing import Any, Dict, Mapping, Optional, Sequence
 from quad_nav.mission.goal import goal_entry
 from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
+from quad_nav.scenario.rules import START_S
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_writer import scene_document
@@ -26,8 +27,6 @@ RESET_TOPIC = "/simulation/last_reset"
 """`std_msgs/Time`, latched: time on `/clock` of the simulation's last reset, if there was one."""
 
 _MAX_DIGITS = 100
-START_S = 1.0
-"""Time on `/clock` when a simulation starts: rospy treats 0 as a clock without messages."""
 
 
 def simulation_info(scene: Scene, seed: int, jitter_m: float = 0.0) -> Dict[str, Any]:

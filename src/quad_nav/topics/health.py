@@ -81,6 +81,7 @@ class Control:
         is_stopped: Whether the robot stops because of the fault.
         reason: The last fault, present or past.
         reason_s: Time of the last fault.
+        cycle_s: Wall time that the slowest control cycle of the last second took.
     """
 
     state: State
@@ -91,6 +92,7 @@ class Control:
     is_stopped: bool
     reason: str
     reason_s: float
+    cycle_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,7 @@ def control_health(node: str, robot: str, control: Control) -> Health:
             "state": control.state.value,
             "cycles per s": f"{control.rate_hz:.1f}",
             "controller_frequency": f"{control.expected_hz:g}",
+            "cycle ms": f"{1e3 * control.cycle_s:.2f}",
             "last reason": control.reason,
             "last reason at s": f"{control.reason_s:.2f}",
         },

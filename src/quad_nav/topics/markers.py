@@ -8,12 +8,16 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from dataclasses import dataclass
-from typing import Dict, List, Sequence, Tuple
+from typing import Any, Dict, List, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
+from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene, Sphere
 
 # Shapes, numbered as in visualization_msgs/Marker.
@@ -22,6 +26,7 @@ CUBE, SPHERE, CYLINDER, CUBE_LIST, TEXT = 1, 2, 3, 6, 9
 
 _WALL_RGBA = (0.55, 0.60, 0.65, 0.35)
 _OBSTACLE_RGBA = (0.62, 0.50, 0.38, 1.0)
+_MOVING_RGBA = (0.80, 0.36, 0.20, 1.0)
 _DARK_RGBA = (0.15, 0.15, 0.17, 1.0)
 _REAR_ROTOR_RGBA = (0.3, 0.3, 0.32, 0.7)
 _ARM_M = 0.19
@@ -77,6 +82,43 @@ def scene_markers(scene: Scene) -> List[Marker]:
         _solid(obstacle, "obstacles", k, _OBSTACLE_RGBA) for k, obstacle in enumerate(single)
     ]
     return [*walls, *obstacles, *_box_lists(listed)]
+
+
+OBSTACLES_TOPIC = "/simulation/obstacles"
+"""`MarkerArray` of what moves by itself, every `OBSTACLES_PERIOD_S`."""
+OBSTACLES_PERIOD_S = 0.1
+
+
+def moving_markers(movers: Movers, now_s: float) -> List[Marker]:
+    """Return walkers and other moving obstacles where they are at a time, in `map`."""
+    return [
+        _solid(obstacle, "moving", k, _MOVING_RGBA) for k, obstacle in enumerate(movers.at(now_s))
+    ]
+
+
+def moving_poses(markers: Sequence[Any], count: int) -> NDArray[np.float64]:
+    """Return what a message on ``OBSTACLES_TOPIC`` says, the inverse of ``moving_markers``.
+
+    Args:
+        markers: Of type `visualization_msgs/Marker`.
+        count: Number of moving obstacles.
+
+    Returns:
+        float64[count, 3], (x_m, y_m, yaw_rad) in `map`; NaN for obstacles without a marker.
+
+    Raises:
+        ValueError: A marker is not of such an obstacle, or is nowhere.
+    """
+    poses = np.full((count, 3), np.nan)
+    for marker in markers:
+        place, turn = marker.pose.position, marker.pose.orientation
+        if not 0 <= marker.id < count:
+            raise ValueError(f"marker {marker.id}; expected 0 to {count - 1}")
+        yaw_rad = 2.0 * math.atan2(turn.z, turn.w)  # they turn about z only
+        if not np.isfinite((place.x, place.y, yaw_rad)).all():
+            raise ValueError(f"marker {marker.id} at ({place.x}, {place.y}), yaw {yaw_rad}")
+        poses[marker.id] = place.x, place.y, yaw_rad
+    return poses
 
 
 def quadcopter_markers(n_robots: int) -> List[Marker]:

@@ -35,6 +35,7 @@ MAX_LEAD_S = 1.0
 MAX_STAMP_S = 2.0**31 - 3600.0
 """Largest accepted stamp, in 2038: tf2 aborts when two stamps are 2**31 s apart."""
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-3, 100.0
+_PLANAR = [0, 1, 5]  # vx, vy and vyaw of a twist
 
 
 def stamp_problem(stamp_s: float, now_s: float) -> str:
@@ -112,6 +113,34 @@ def odometry_problem(frame: str, odom_from_base: Pose3D, velocity: Twist2D) -> s
     return (
         frame_problem(frame.lstrip("/")) or pose_problem(odom_from_base) or twist_problem(velocity)
     )
+
+
+def valid_states(
+    poses: NDArray[np.float64], twists: NDArray[np.float64]
+) -> Tuple[NDArray[np.bool_], str]:
+    """Check the states of many robots, as `pose_problem` and `twist_problem` check one.
+
+    Args:
+        poses: float64[n, 7], positions in m and quaternions (x, y, z, w).
+        twists: float64[n, 6], velocities in m/s and angular velocities in rad/s.
+
+    Returns:
+        Mask bool[n] of the valid states, and what is wrong with the first invalid one.
+    """
+    planar = twists[:, _PLANAR]
+    lengths = np.sqrt(np.einsum("ij,ij->i", poses[:, 3:], poses[:, 3:]))
+    valid = (
+        (np.abs(poses[:, :3]) <= MAX_MAGNITUDE).all(axis=1)
+        & (lengths > 0.9)
+        & (lengths < 1.1)
+        & (np.abs(planar) <= MAX_MAGNITUDE).all(axis=1)
+    )
+    if valid.all():
+        return valid, ""
+    row = int(np.argmin(valid))
+    x, y, z, *quaternion = poses[row].tolist()
+    pose = Pose3D(x, y, z, (quaternion[0], quaternion[1], quaternion[2], quaternion[3]))
+    return valid, pose_problem(pose) or twist_problem(Twist2D(*planar[row].tolist()))
 
 
 def contact_problem(contact: Contact) -> str:

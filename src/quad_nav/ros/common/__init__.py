@@ -1,6 +1,5 @@
 """Parts that several nodes share: start, messages, transforms, diagnostics.
 
 Reading order: `readiness`, `conversions`, `nav_messages`, `transforms`,
-`diagnostics`, `preflight`, `rviz_node`,
-`goal_router_node`.
+`diagnostics`, `preflight`, `rviz_nodes`.
 """

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Sequence, Tuple
+from typing import List, Mapping, Sequence, Tuple
 
 import numpy as np
 import rospy
+from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import (
     Point,
     Pose,
@@ -34,6 +35,11 @@ def time_message(seconds: float) -> rospy.Time:
     """Round seconds to the nearest nanosecond."""
     whole = int(seconds)
     return rospy.Time(whole, round((seconds - whole) * 1e9))
+
+
+def key_values(values: Mapping[str, str]) -> List[KeyValue]:
+    """Convert the values of a diagnostic status."""
+    return [KeyValue(key, value) for key, value in values.items()]
 
 
 def twist_message(twist: Twist2D) -> Twist:

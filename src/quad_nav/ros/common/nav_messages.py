@@ -16,7 +16,7 @@ from quad_nav.costmap.static import StaticMap
 from quad_nav.errors import InvalidGoal
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
 from quad_nav.grid import GridSpec
-from quad_nav.plan.navfn import NOT_REACHED
+from quad_nav.plan.wavefront import NOT_REACHED
 from quad_nav.ros.common.conversions import pose_from_message, pose_message
 from quad_nav.topics.validation import MAX_MAGNITUDE
 

@@ -46,7 +46,7 @@ def faults(tree: Mapping[str, Any]) -> List[str]:
     """Return the faults that simulator, sequencer and fleet would report, each once."""
     result = result_path(tree.get("sequencer", {}))
     readers: Dict[str, Callable[[Mapping[str, Any], str], object]] = {
-        "simulator": simulator_setup.read_setup,
+        "simulator": partial(simulator_setup.read_setup, all_parameters=tree),
         "sequencer": partial(read_mission_setup, result=result, all_parameters=tree),
     }
     fleets = sorted(name for name in tree if _FLEET.fullmatch(name))

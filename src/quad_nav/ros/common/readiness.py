@@ -10,7 +10,7 @@ import threading
 import time
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any, Callable, Dict, List, Optional, Sequence
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rosgraph
 import rosgraph.network
@@ -147,16 +147,21 @@ class TopicWatch:
     covers `/clock` itself.
     """
 
-    def __init__(self, subscribers: Sequence[rospy.Subscriber]) -> None:
+    def __init__(self, subscribers: Sequence[rospy.Subscriber] = ()) -> None:
         """Watch the topics of subscribers; the first check is due after `SILENT_AFTER_S`."""
-        self._silent: Dict[str, rospy.Subscriber] = {s.resolved_name: s for s in subscribers}
+        self._silent: Dict[str, Tuple[rospy.Subscriber, float]] = {}
         self._next_check_s = time.monotonic() + SILENT_AFTER_S
         for subscriber in subscribers:
-            subscriber.impl.add_callback(self._on_message, subscriber.resolved_name)
+            self.add(subscriber)
+
+    def add(self, subscriber: rospy.Subscriber) -> None:
+        """Watch the topic of a subscriber too, until it unregisters."""
+        self._silent[subscriber.resolved_name] = subscriber, time.monotonic()
+        subscriber.impl.add_callback(self._on_message, subscriber.resolved_name)
 
     def _on_message(self, _: rospy.Message, name: str) -> None:
-        subscriber = self._silent.pop(name, None)
-        if subscriber is not None:
+        subscriber, _since_s = self._silent.pop(name, (None, 0.0))
+        if subscriber is not None and subscriber.impl is not None:
             subscriber.impl.remove_callback(self._on_message, name)
 
     def check_clock(self) -> None:
@@ -168,8 +173,12 @@ class TopicWatch:
 
     def check(self) -> None:
         """Log the topics without a message."""
-        if self._silent and self._is_due():
-            for name, subscriber in list(self._silent.items()):
+        if not self._silent or not self._is_due():
+            return
+        for name, (subscriber, since_s) in list(self._silent.items()):
+            if subscriber.impl is None:  # it has unregistered
+                self._silent.pop(name, None)
+            elif time.monotonic() - since_s >= SILENT_AFTER_S:
                 rospy.logwarn("%s", missing_topic(name, subscriber.type))
 
     def _is_due(self) -> bool:

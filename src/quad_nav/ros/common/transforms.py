@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import threading
-from typing import List, Optional, Sequence, Tuple
+from typing import Iterable, List, Optional, Sequence, Tuple
 
 import rospy
 import tf2_ros
@@ -14,10 +15,12 @@ from quad_nav.errors import NavigationError, excerpt
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.conversions import pose_from_transform
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.packed_messages import TransformReader, TransformsMessage
 from quad_nav.topics.transform_filter import TransformFilter
 from quad_nav.topics.validation import MAX_STAMP_S, frame_problem
 
 MAX_HELD = 1000  # transforms that wait for the clock to start
+_ROBOT_FRAME = re.compile(r"/?(?:odom|base_link|Lidar)(\d{1,4})")
 
 
 class TransformUnavailable(NavigationError):
@@ -39,8 +42,16 @@ class Transforms:
     It takes the place of `tf2_ros.TransformListener`, which hands every transform to tf2.
     """
 
-    def __init__(self) -> None:
-        """Subscribe to `/tf` and `/tf_static`."""
+    def __init__(self, others: Iterable[int] = ()) -> None:
+        """Subscribe to `/tf` and `/tf_static`.
+
+        Args:
+            others: Numbers of robots whose frames on `/tf` are left out until they are looked up:
+                `odom{j}`, `base_link{j}` and `Lidar{j}`.
+        """
+        self._left_out = set(others)
+        self._reader = TransformReader(lambda frame: _robot_of(frame) not in self._left_out)
+        self._newest: Optional[TransformsMessage] = None
         self._buffer = tf2_ros.Buffer()
         self._filter = TransformFilter(self._buffer.clear)
         self._warnings = ThrottledWarnings()
@@ -48,7 +59,7 @@ class Transforms:
         self._now_s = 0.0
         self._held: List[TransformStamped] = []
         self._subscribers = [
-            rospy.Subscriber("/tf", TFMessage, self._on_transforms),
+            rospy.Subscriber("/tf", TransformsMessage, self._on_transforms),
             rospy.Subscriber("/tf_static", TFMessage, self._on_static_transforms),
         ]
 
@@ -57,13 +68,33 @@ class Transforms:
         for subscriber in self._subscribers:
             subscriber.unregister()
 
-    def _on_transforms(self, message: TFMessage) -> None:
+    def _on_transforms(self, message: TransformsMessage) -> None:
         with self._lock:
-            if not self._update_time():
-                self._held += message.transforms[: MAX_HELD - len(self._held)]
-                return
-            for transform in message.transforms:
-                self._store(transform, is_static=False)
+            self._newest = message
+            self._read(message)
+
+    def _read(self, message: TransformsMessage) -> None:
+        try:
+            transforms = self._reader.read(message)
+        except ValueError as error:
+            self._warnings.warn(f"/tf: message dropped: {error}")
+            return
+        if not self._update_time():
+            self._held += transforms[: MAX_HELD - len(self._held)]
+            return
+        for transform in transforms:
+            self._store(transform, is_static=False)
+
+    def _include(self, frame: str) -> None:
+        """Receive the frames of a robot that were left out, if this is one of them."""
+        robot = _robot_of(frame)
+        if robot not in self._left_out:
+            return
+        with self._lock:
+            self._left_out.discard(robot)
+            self._reader.forget()
+            if self._newest is not None:
+                self._read(self._newest)
 
     def _on_static_transforms(self, message: TFMessage) -> None:
         with self._lock:
@@ -162,6 +193,8 @@ class Transforms:
             with self._lock:
                 self._update_time()
         to_frame, from_frame = to_frame.lstrip("/"), from_frame.lstrip("/")
+        for frame in (to_frame, from_frame) if self._left_out else ():
+            self._include(frame)
         problem = frame_problem(to_frame) or frame_problem(from_frame)
         if problem:
             raise TransformUnavailable(f"{problem}, such as '{to_frame or 'map'}'")
@@ -177,3 +210,9 @@ class Transforms:
         except (tf2_ros.TransformException, ValueError) as error:
             raise TransformUnavailable(str(error)) from error
         return pose_from_transform(message), message.header.stamp.to_sec()
+
+
+def _robot_of(frame: str) -> Optional[int]:
+    """Return the number of the robot that has a frame by its name; None for another frame."""
+    found = _ROBOT_FRAME.fullmatch(frame)
+    return int(found[1]) if found else None

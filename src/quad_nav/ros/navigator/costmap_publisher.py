@@ -26,19 +26,22 @@ from quad_nav.topics.publishing import CostmapSchedule, Names, own_node
 
 _VOXEL_COLOUR = ColorRGBA(0.8, 0.3, 0.1, 0.6)
 
-_Publish = Callable[[Any], None]
+Publish = Callable[[Any], None]
+"""Sends a message to one subscriber or to all."""
 
 
-class _NewSubscriber(rospy.SubscribeListener):
+class NewSubscriber(rospy.SubscribeListener):
     """Call a function with the `publish` of each new subscriber."""
 
-    def __init__(self, send: Callable[[_Publish], None]) -> None:
+    def __init__(self, send: Callable[[Publish], None]) -> None:
+        """Start with the function."""
         super().__init__()
         self._send = send
 
     def peer_subscribe(
-        self, topic_name: str, topic_publish: _Publish, peer_publish: _Publish
+        self, topic_name: str, topic_publish: Publish, peer_publish: Publish
     ) -> None:
+        """Handle a new subscriber; rospy calls this in a thread of its own."""
         self._send(peer_publish)
 
 
@@ -67,7 +70,7 @@ class CostmapPublisher:
             names(f"~{name}/costmap"),
             OccupancyGrid,
             queue_size=1,
-            subscriber_listener=_NewSubscriber(self._send_full),
+            subscriber_listener=NewSubscriber(self._send_full),
         )
         self._voxels = voxel_publishers(names(f"~{name}"), costmap)
 
@@ -109,7 +112,7 @@ class CostmapPublisher:
         costmap = self._costmap
         return grid_message(costmap.spec, costmap.costs, costmap.params.global_frame, stamp)
 
-    def _send_full(self, send: _Publish) -> None:
+    def _send_full(self, send: Publish) -> None:
         with self._lock:
             message = self._full(rospy.Time.now())
         send(message)

@@ -17,20 +17,29 @@ FAULT_LASTS_S = 1.5  # simulated time after the last warning
 
 
 class InputMeter:
-    """Measure rate, silence and latency of a topic."""
+    """Measure rate, silence and latency of an input."""
 
-    def __init__(self, subscriber: rospy.Subscriber, timeout_s: float = 0.0) -> None:
-        """Count the messages of a subscriber; a timeout of 0 stands for `TIMEOUT_S`."""
-        self._topic, self._timeout_s = subscriber.resolved_name, timeout_s or TIMEOUT_S
+    def __init__(self, topic: str, timeout_s: float = 0.0) -> None:
+        """Start without messages; a timeout of 0 stands for `TIMEOUT_S`."""
+        self._topic, self._timeout_s = topic, timeout_s or TIMEOUT_S
         self._count = self._read = 0
         self._received_s = self._late_s = 0.0
         self._read_wall_s = time.monotonic()
-        subscriber.impl.add_callback(self._on_message, None)
+
+    @classmethod
+    def of(cls, subscriber: rospy.Subscriber, timeout_s: float = 0.0) -> InputMeter:
+        """Count the messages of a subscriber."""
+        meter = cls(subscriber.resolved_name, timeout_s)
+        subscriber.impl.add_callback(meter._on_message, None)
+        return meter
 
     def _on_message(self, message: Any) -> None:
+        self.add(message.header.stamp.to_sec(), rospy.get_time())
+
+    def add(self, stamp_s: float, now_s: float) -> None:
+        """Count a message that arrives now."""
         self._count += 1
-        self._received_s = rospy.get_time()
-        self._late_s = self._received_s - message.header.stamp.to_sec()
+        self._received_s, self._late_s = now_s, now_s - stamp_s
 
     def read(self, now_s: float) -> health.Input:
         """Return the figures since the last call."""
@@ -61,18 +70,21 @@ class NavigatorHealth:
         self._node, self._robot, self._inputs = node, robot, inputs
         self._state, self._is_localized = State.IDLE, False
         self._cycles = self._cycles_read = 0
+        self._cycle_s = 0.0
         self._busy_since_s = self._read_s = self._fault_s = self._reason_s = 0.0
         self._fault = self._reason = ""
         self._is_stopped = False  # by the fault
         self._slow_seconds = 0
         self.expected_hz = 0.0
 
-    def update(self, tick: Tick, poses: RobotPoses) -> None:
-        """Add a tick of the navigator."""
+    def update(self, tick: Tick, poses: RobotPoses, wall_s: float) -> None:
+        """Add a tick of the navigator, which took some wall time."""
         if self._state is State.IDLE and tick.state is not State.IDLE:
             self._busy_since_s = tick.now_s
         self._state, self._is_localized = tick.state, poses.in_global is not None
         self._cycles += tick.cycle
+        if tick.cycle:
+            self._cycle_s = max(self._cycle_s, wall_s)
         if tick.warnings or tick.planning_failed:
             self._fault = (tick.warnings or [f"no plan: {tick.planning_failed}"])[0]
             self._fault_s = self._reason_s = tick.now_s
@@ -88,6 +100,7 @@ class NavigatorHealth:
         is_slow = was_busy and elapsed_s > 0.0 and rate_hz < health.SLOW_BELOW * self.expected_hz
         self._slow_seconds = self._slow_seconds + 1 if is_slow else 0
         self._cycles_read, self._read_s = self._cycles, now_s
+        cycle_s, self._cycle_s = self._cycle_s, 0.0
         fault = self._fault if 0.0 <= now_s - self._fault_s < FAULT_LASTS_S else ""
         control = health.Control(
             self._state,
@@ -98,6 +111,7 @@ class NavigatorHealth:
             self._is_stopped,
             self._reason,
             self._reason_s,
+            cycle_s,
         )
         return [
             health.control_health(self._node, self._robot, control),

@@ -40,10 +40,7 @@ class NavigatorLoop:
         self._robots, self._peers, self._period_s = robots, peers, period_s
         self._name = robots[0].name if len(robots) == 1 else rospy.get_name().lstrip("/")
         self._topic_watch = TopicWatch(
-            [
-                *(subscriber for one in peers for subscriber in one.subscribers),
-                *(subscriber for one in robots for subscriber in one.subscribers),
-            ]
+            [subscriber for one in robots for subscriber in one.subscribers]
         )
         self._health = LoopHealth([robot.name for robot in robots])
         self._start_s = self._now_s = 0.0

@@ -8,20 +8,19 @@ those of a `move_base` started by `launch/quad.launch`.
 from __future__ import annotations
 
 import sys
-from typing import Callable, Dict, Iterable, List, Mapping, Tuple
+from typing import Callable, Collection, Dict, Iterable, List, Mapping, Tuple
 
 import rospy
 
 from quad_nav import config
 from quad_nav.config import Configuration
 from quad_nav.errors import InputError, PluginError, printable
-from quad_nav.kernels.jit import cache_warnings
+from quad_nav.kernels.jit import cache_warnings, library_remarks
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.loop import NavigatorLoop
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_navigator import RobotNavigator
-from quad_nav.scenario.fleet_setup import read_setup
 from quad_nav.scenario.warm_up import warm_up
 from quad_nav.topics.publishing import Names, in_fleet, own_node
 
@@ -44,7 +43,8 @@ class Fleet:
         Raises:
             InputError: If a plugin refuses its parameters.
         """
-        transforms = Transforms()
+        robots = max(one.robots for one in configurations.values())
+        transforms = Transforms(set(range(robots)) - set(configurations))
         frames: Dict[str, List[Configuration]] = {}
         for one in configurations.values():
             frames.setdefault(one.global_costmap.global_frame, []).append(one)
@@ -84,6 +84,8 @@ def fleet() -> int:
     Returns:
         Exit status: 0 at shutdown, 2 for parameters that are not valid.
     """
+    from quad_nav.scenario.fleet_setup import read_setup  # here: it reads scenes
+
     init_node("fleet")
     name = rospy.get_name().lstrip("/")
     return _run(
@@ -101,11 +103,7 @@ def _run(
     name = rospy.get_name().lstrip("/")
     try:
         configurations = read()
-        warnings = [line for one in configurations.values() for line in one.warnings]
-        for warning in dict.fromkeys((*warnings, *cache_warnings())):
-            rospy.logwarn("%s", warning)
-        for configuration in _distinct(configurations.values()):
-            _warm_up(configuration)
+        prepare(configurations.values())
         group = Fleet(configurations, names)
         if len(group.robots) == 1:
             rospy.loginfo("%s: ready", group.robots[0].name)
@@ -113,9 +111,7 @@ def _run(
             rospy.loginfo("%s: ready, robots: %d", name, len(group.robots))
         NavigatorLoop(group.robots, group.peers, period_s).run()
     except InputError as error:
-        rospy.logfatal("%s: invalid parameters, shutting down:\n%s", name, error)
-        lines = f"{name}: invalid parameters, shutting down:\n{error}"
-        print(printable(lines, "\n"), file=sys.stderr)
+        log_invalid(name, error)
         return EXIT_BAD_INPUT
     except PluginError as error:
         rospy.logfatal("%s: a plugin cannot be made, shutting down: %s", name, error)
@@ -125,6 +121,28 @@ def _run(
         if not rospy.core.is_shutdown_requested():
             raise
     return 0
+
+
+def log_invalid(name: str, error: InputError) -> None:
+    """Log and print the faults in a node's parameters."""
+    rospy.logfatal("%s: invalid parameters, shutting down:\n%s", name, error)
+    lines = f"{name}: invalid parameters, shutting down:\n{error}"
+    print(printable(lines, "\n"), file=sys.stderr)
+
+
+def prepare(configurations: Collection[Configuration]) -> None:
+    """Log the warnings of configurations, and compile the kernels that they use.
+
+    Raises:
+        InputError: If a plugin refuses its parameters.
+    """
+    warnings = [line for one in configurations for line in one.warnings]
+    for warning in dict.fromkeys((*warnings, *cache_warnings())):
+        rospy.logwarn("%s", warning)
+    for configuration in _distinct(configurations):
+        _warm_up(configuration)
+    for remark in library_remarks():
+        rospy.loginfo("%s", remark)
 
 
 def _warm_up(configuration: Configuration) -> None:

@@ -1,42 +1,54 @@
 """Receive the states and intentions of peers, and publish those of this node's robots.
 
-`/odom{j}` and tf carry the pose of robot j. `/move_base{j}/intention` is a `nav_msgs/Path` with
-its intention: `header.stamp` is the time of publication, the poses are the path, and the stamps
-of the poses hold the negated priority (`peers.peer.priority_of`), the time at which the goal was
-set. An empty path means that the robot stays where it is.
+`state_topics` describes where states come from, `intention_topics` where intentions do. States of
+this node's robots that come from odometry, as those of real quadcopters do, are published for the
+other hosts in one message.
 """
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Dict, List, Mapping, Optional, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 import rospy
-from nav_msgs.msg import Odometry, Path
+from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
 
-from quad_nav.geometry import Pose2D
-from quad_nav.peers.peer import Intention, Peer, assumed_intention, idle_priority, peer_at
-from quad_nav.ros.common.conversions import odometry_from_message, time_message
-from quad_nav.ros.common.nav_messages import path_message
-from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.topics.publishing import Names
-from quad_nav.topics.validation import (
-    MAX_LEAD_S,
-    MAX_POSES,
-    odometry_problem,
-    path_problem,
-    stamp_problem,
+from quad_nav.geometry import Pose2D, yaws_from_quaternions
+from quad_nav.peers.peer import Intention, Peer
+from quad_nav.ros.common.conversions import odometry_from_message
+from quad_nav.ros.common.packed_messages import (
+    STATES_TOPIC,
+    Floats,
+    States,
+    StatesMessage,
+    pose_row,
+    states_message,
 )
+from quad_nav.ros.common.readiness import TopicWatch
+from quad_nav.ros.common.state_topics import StateTopics
+from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.ros.navigator.intention_topics import (
+    FleetIntentionPublisher,
+    IntentionListener,
+    IntentionPublisher,
+)
+from quad_nav.topics.publishing import Names
+from quad_nav.topics.validation import odometry_problem, stamp_problem
 
-REPEAT_S = 0.25
-INTENTION_VALID_S = 2.0  # the navigator that published an older intention has died
+
+class _Located(NamedTuple):
+    """A state in the global frame: pose float64[7] and velocities float64[6] as in `States`."""
+
+    stamp_s: float
+    pose: Floats
+    twist: Floats
 
 
 class PeerTopics:
     """Track all robots for those that this node flies.
 
-    The node subscribes once to each robot's odometry. Robots of the same node exchange their
+    The robots of a node share one subscription to the states of all. They exchange their
     intentions without a topic.
     """
 
@@ -48,64 +60,96 @@ class PeerTopics:
         Args:
             own: Names of the topics of the robots that this node flies, by their numbers.
             robots: Number of all robots, numbered from 0.
-            transforms: Converts odometry to the global frame.
+            transforms: Converts states to the global frame.
             global_frame: Frame of the peers' states.
         """
-        self._transforms = transforms
-        self._frame = global_frame
+        self._own, self._transforms, self._frame = frozenset(own), transforms, global_frame
         self._odometry: Dict[int, Odometry] = {}
-        self._peers: Dict[int, Tuple[Odometry, Peer]] = {}
-        self._intentions: Dict[int, Tuple[float, Intention]] = {}  # with the time
-        others = [j for j in range(robots) if list(own) != [j]]
-        self.subscribers = [
-            rospy.Subscriber(f"/odom{j}", Odometry, partial(self._on_odometry, j), queue_size=1)
-            for j in others
-        ]
-        self._intention_subscribers = [
-            rospy.Subscriber(
-                f"/move_base{j}/intention", Path, partial(self._on_intention, j), queue_size=1
-            )
-            for j in others
-            if j not in own
-        ]
+        self._states = np.full((robots, 5), np.nan)  # x, y, vx, vy in the frame, and the stamp
+        self._peers: Dict[int, Peer] = {}  # of the last refresh, those that were asked for
+        self._snapshot, self._now_s = self._states.copy(), 0.0
+        self._topic_watch = TopicWatch()
+        # Alone there is no peer to hear, and none that listens.
+        self._topics = (
+            StateTopics(robots, self._on_states, self._on_odometry, self._watch)
+            if robots > 1
+            else None
+        )
+        self._publisher = rospy.Publisher(STATES_TOPIC, StatesMessage, queue_size=10)
+        self._intentions = IntentionListener(
+            (j for j in range(robots) if j not in own), transforms, global_frame
+        )
         self._publishers = {
-            number: rospy.Publisher(names("~intention"), Path, queue_size=1)
-            for number, names in own.items()
+            number: IntentionPublisher(names, global_frame) for number, names in own.items()
         }
-        self._published: Dict[int, Tuple[float, Intention]] = {}
+        self._fleet_publisher = FleetIntentionPublisher(
+            own, global_frame, len(self._intentions.subscribers)
+        )
 
-    def _on_odometry(self, number: int, message: Odometry) -> None:
-        self._odometry[number] = message
+    def _watch(self, robot: int, subscriber: rospy.Subscriber) -> None:
+        if robot not in self._own:  # whose topics are watched by their navigators
+            self._topic_watch.add(subscriber)
 
-    def _on_intention(self, number: int, message: Path) -> None:
-        intention, frame = intention_from_message(message, number), message.header.frame_id
-        if len(intention.path) and frame.lstrip("/") != self._frame.lstrip("/"):
-            try:
-                global_from_frame = self._transforms.lookup(self._frame, frame)
-            except TransformUnavailable as error:
-                rospy.logwarn_throttle(
-                    5.0,
-                    f"quad{number}: intention dropped, expecting straight flight: frame '{frame}':"
-                    f" {error}",
-                )
-                self._intentions.pop(number, None)
-                return
-            intention = intention.transformed(global_from_frame.to_2d())
-        self._intentions[number] = message.header.stamp.to_sec(), intention
+    def _on_odometry(self, robot: int, message: Odometry) -> None:
+        self._odometry[robot] = message
+
+    def _on_states(self, states: States) -> bool:
+        if states.frame.lstrip("/") == self._frame.lstrip("/"):
+            self._store(states, Pose2D(0.0, 0.0))
+            return True
+        try:
+            pose = self._transforms.lookup_near(self._frame, states.frame, states.stamp_s)
+        except TransformUnavailable as error:
+            rospy.logwarn_throttle(
+                5.0, f"{STATES_TOPIC}: states dropped: pose in {self._frame} unknown: {error}"
+            )
+            return False
+        self._store(states, pose.to_2d())
+        return True
+
+    def _store(self, states: States, global_from_frame: Pose2D) -> None:
+        """Store the planar part of states in a frame."""
+        rows = np.empty((len(states.robots), 5))
+        rows[:, :2] = global_from_frame.transform_points(states.poses[:, :2])
+        yaw_rad = yaws_from_quaternions(states.poses[:, 3:]) + global_from_frame.yaw_rad
+        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+        vx_mps, vy_mps = states.twists[:, 0], states.twists[:, 1]
+        rows[:, 2], rows[:, 3] = cos * vx_mps - sin * vy_mps, sin * vx_mps + cos * vy_mps
+        rows[:, 4] = states.stamp_s
+        self._states[states.robots] = rows
 
     def refresh(self, now_s: float) -> None:
-        """Update the peers from the messages that have arrived."""
-        for number, odometry in list(self._odometry.items()):
-            before, peer = self._peers.get(number, (None, None))
-            if odometry is not before:
-                peer = self._located(number, odometry)
-            if peer is None:
-                self._peers.pop(number, None)
-                continue
-            intention = self._intention(number, peer, now_s)
-            if intention is not peer.intention:
-                peer = peer.with_intention(intention)
-            self._peers[number] = odometry, peer
+        """Update the peers from the messages that have arrived, and publish what is due."""
+        if self._topics is not None:
+            self._topics.check()
+            self._topic_watch.check()
+        self._take_odometry()
+        self._now_s, self._snapshot = now_s, self._states.copy()
+        self._peers.clear()
+        self._fleet_publisher.publish(now_s)
+
+    def _take_odometry(self) -> None:
+        """Locate the robots that are in no state message; publish those of this node."""
+        if not self._odometry:
+            return
+        messages, self._odometry = self._odometry, {}
+        by_stamp: Dict[float, List[Tuple[int, _Located]]] = {}
+        for number, message in messages.items():
+            state = self._located(number, message)
+            if state is not None:
+                by_stamp.setdefault(state.stamp_s, []).append((number, state))
+        for stamp_s, group in by_stamp.items():
+            states = States(
+                stamp_s,
+                self._frame,
+                np.array([number for number, _ in group], np.int64),
+                np.array([state.pose for _, state in group]),
+                np.array([state.twist for _, state in group]),
+            )
+            self._store(states, Pose2D(0.0, 0.0))
+            own = states.of(np.isin(states.robots, list(self._own)))
+            if len(own.robots) and self._publisher.get_num_connections() > 1:  # one is its own
+                self._publisher.publish(states_message(own))
 
     def near(self, number: int, here: Optional[Pose2D], reach_m: float) -> List[Peer]:
         """Return the peers of a robot, without regard to the age of their states.
@@ -115,20 +159,27 @@ class PeerTopics:
             here: Pose of the robot; None returns all peers.
             reach_m: Peers beyond this distance may be left out.
         """
-        others = [peer for other, (_, peer) in self._peers.items() if other != number]
+        x_m, y_m = self._snapshot[:, 0], self._snapshot[:, 1]
         if here is None:
-            return others
-        return [
-            peer
-            for peer in others
-            if abs(peer.x_m - here.x_m) < reach_m and abs(peer.y_m - here.y_m) < reach_m
-        ]
+            is_near: NDArray[np.bool_] = ~np.isnan(x_m)
+        else:
+            is_near = (np.abs(x_m - here.x_m) < reach_m) & (np.abs(y_m - here.y_m) < reach_m)
+        return [self._peer(other) for other in np.flatnonzero(is_near).tolist() if other != number]
 
-    def _located(self, number: int, odometry: Odometry) -> Optional[Peer]:
-        name = f"quad{number}"
+    def _peer(self, number: int) -> Peer:
+        peer = self._peers.get(number)
+        if peer is None:
+            peer = Peer(f"quad{number}", *self._snapshot[number].tolist())
+            peer = peer.with_intention(self._intentions.of(number, peer, self._now_s))
+            self._peers[number] = peer
+        return peer
+
+    def _located(self, number: int, odometry: Odometry) -> Optional[_Located]:
+        """Return a state from odometry in the global frame; None if it is not valid."""
+        name, stamp_s = f"quad{number}", odometry.header.stamp.to_sec()
         try:
             global_from_odom = self._transforms.lookup_near(
-                self._frame, odometry.header.frame_id, odometry.header.stamp.to_sec()
+                self._frame, odometry.header.frame_id, stamp_s
             )
         except TransformUnavailable as error:
             rospy.logwarn_throttle(
@@ -136,59 +187,22 @@ class PeerTopics:
             )
             return None
         odom_from_base, velocity = odometry_from_message(odometry)
-        stamp_s = odometry.header.stamp.to_sec()
         problem = odometry_problem(
             odometry.header.frame_id, odom_from_base, velocity
         ) or stamp_problem(stamp_s, rospy.get_time())
         if problem:
             rospy.logwarn_throttle(5.0, f"{name}: odometry dropped, ignoring this peer: {problem}")
             return None
-        pose = global_from_odom.compose(odom_from_base).to_2d()
-        return peer_at(name, pose, velocity, stamp_s)
-
-    def _intention(self, number: int, peer: Peer, now_s: float) -> Intention:
-        received = self._intentions.get(number)
-        if received is None:
-            return assumed_intention(peer)
-        sent_s, intention = received
-        if not -MAX_LEAD_S <= now_s - sent_s <= INTENTION_VALID_S:
-            return Intention(idle_priority(number))
-        return intention
+        twist = odometry.twist.twist
+        linear, angular = twist.linear, twist.angular
+        return _Located(
+            stamp_s,
+            pose_row(global_from_odom.compose(odom_from_base)),
+            np.array((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)),
+        )
 
     def publish(self, number: int, intention: Intention, now_s: float) -> None:
-        """Publish a robot's intention: at once when it changes, else every `REPEAT_S`."""
-        self._intentions[number] = now_s, intention
-        if self._publishers[number].get_num_connections() == 0:
-            return
-        published_s, published = self._published.get(number, (0.0, None))
-        is_same = (
-            published is not None
-            and published.path is intention.path
-            and published.priority == intention.priority
-        )
-        if is_same and 0.0 <= now_s - published_s < REPEAT_S:
-            return
-        self._published[number] = now_s, intention
-        self._publishers[number].publish(intention_message(intention, self._frame, now_s))
-
-
-def intention_message(intention: Intention, frame: str, now_s: float) -> Path:
-    """Convert an intention in `frame` to a message."""
-    path = np.column_stack((intention.path, np.zeros(len(intention.path))))
-    message = path_message(path, frame, time_message(-intention.priority))
-    message.header.stamp = time_message(now_s)
-    return message
-
-
-def intention_from_message(message: Path, number: int) -> Intention:
-    """Convert the message of robot `number`; an invalid one counts as "stays where it is"."""
-    if not message.poses:
-        return Intention(idle_priority(number))
-    path = np.array(
-        [(p.pose.position.x, p.pose.position.y) for p in message.poses[: MAX_POSES + 1]]
-    )
-    problem = path_problem(path)
-    if problem:
-        rospy.logwarn_throttle(5.0, f"quad{number}: intention dropped: {problem}")
-        return Intention(idle_priority(number))
-    return Intention(-message.poses[0].header.stamp.to_sec(), path)
+        """Publish a robot's intention: at once when it changes, else from time to time."""
+        self._intentions.set(number, intention, now_s)
+        self._fleet_publisher.set(number, intention)
+        self._publishers[number].publish(intention, now_s)

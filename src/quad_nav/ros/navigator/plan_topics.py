@@ -1,4 +1,4 @@
-"""Publish the command, the plans and the scores of a tick on the topics of move_base."""
+"""Publish the results of a tick on the topics of move_base: command, plans, scores, state."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Optional
 
 import numpy as np
 import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Twist
 from move_base_msgs.msg import RecoveryStatus
 from nav_msgs.msg import OccupancyGrid, Path
@@ -19,7 +20,7 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import State, Tick
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
-from quad_nav.ros.common.conversions import twist_message
+from quad_nav.ros.common.conversions import key_values, twist_message
 from quad_nav.ros.common.nav_messages import (
     cost_cloud_message,
     path_message,
@@ -27,14 +28,15 @@ from quad_nav.ros.common.nav_messages import (
     potential_message,
 )
 from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWay, RightOfWaySchedule
 
 
 class PlanTopics:
-    """Publish command, plans, scores and recoveries."""
+    """Publish command, plans, scores, state, right of way and recoveries."""
 
-    def __init__(self, navigator: Navigator, names: Names = own_node) -> None:
-        """Advertise the topics of a navigator."""
-        self._navigator = navigator
+    def __init__(self, robot: str, navigator: Navigator, names: Names = own_node) -> None:
+        """Advertise the topics of a navigator; ``robot`` is the robot's name."""
+        self._robot, self._navigator = robot, navigator
         planner = plugin_name(navigator.params.base_global_planner)
         controller = plugin_name(navigator.params.base_local_planner)
         self._command = rospy.Publisher(names("cmd_vel"), Twist, queue_size=1)
@@ -49,6 +51,10 @@ class PlanTopics:
         self._cost_cloud = rospy.Publisher(f"{of_controller}/cost_cloud", PointCloud2, queue_size=1)
         self._state = rospy.Publisher(names("~state"), String, queue_size=10, latch=True)
         self._published_state: Optional[State] = None
+        self._right_of_way = rospy.Publisher(
+            names("~right_of_way"), DiagnosticStatus, queue_size=10, latch=True
+        )
+        self._right_of_way_schedule = RightOfWaySchedule()
         self._recovery = rospy.Publisher(
             names("move_base/recovery_status"), RecoveryStatus, queue_size=1
         )
@@ -67,6 +73,7 @@ class PlanTopics:
         if tick.state is not self._published_state:
             self._published_state = tick.state
             self._state.publish(tick.state.value)
+        self._publish_right_of_way(self._right_of_way_schedule.pop(tick))
         if tick.command is not None:
             self._command.publish(twist_message(tick.command))
         if tick.plan is not None:
@@ -86,6 +93,18 @@ class PlanTopics:
             )
         if tick.control is not None:
             self._publish_control(tick.control, now)
+
+    def _publish_right_of_way(self, changed: Optional[RightOfWay]) -> None:
+        if changed is not None:
+            self._right_of_way.publish(
+                DiagnosticStatus(
+                    level=DiagnosticStatus.OK,
+                    name=RIGHT_OF_WAY_STATUS,
+                    hardware_id=self._robot,
+                    message=changed.text,
+                    values=key_values(changed.values),
+                )
+            )
 
     def publish_plan(self, plan: np.ndarray, now: rospy.Time) -> None:
         """Publish a plan.

@@ -1,4 +1,4 @@
-"""Provide the dynamic_reconfigure services and topics of move_base's namespaces.
+"""Provide the dynamic_reconfigure services and topics of move_base's namespaces, and of others.
 
 C++ move_base generates its `...Config` modules from `.cfg` files at build time. This module makes
 the same objects from the tables of `quad_nav.config`.
@@ -92,18 +92,13 @@ def serve_namespaces(
     for namespace, parameters in config.reconfigurable(configuration).items():
         name = (namespace or "move_base").replace("/", "_") + "_config"
         callback = _Callback(robot, namespace, configuration, on_reconfigure)
-        servers.append(
-            _Server(
-                config_type(name, parameters),
-                callback,
-                names(f"~{namespace}"),
-                config.values(configuration, namespace),
-            )
-        )
+        values = config.values(configuration, namespace)
+        type_ = config_type(name, parameters)
+        servers.append(ParameterServer(type_, callback, names(f"~{namespace}"), values))
     return servers
 
 
-class _Server(Server):
+class ParameterServer(Server):
     """dynamic_reconfigure's server without its calls for every single parameter.
 
     The parameters were stored just before, so only changed ones are stored again. This saves a
@@ -111,6 +106,14 @@ class _Server(Server):
     """
 
     def __init__(self, type_: Any, callback: Any, namespace: str, values: Dict[str, Any]) -> None:
+        """Serve parameters.
+
+        Args:
+            type_: Result of `config_type`.
+            callback: Called with the requested values and a level; returns those then in force.
+            namespace: Their namespace; "~" is the node's own one.
+            values: The present values, which are on the parameter server.
+        """
         self._stored = dict(values)
         self._warnings = ThrottledWarnings()
         super().__init__(type_, callback, "" if namespace == "~" else namespace)

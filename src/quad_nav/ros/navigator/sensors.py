@@ -8,21 +8,21 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Deque, Dict, Iterable, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud, PointCloud2, PointField
 
-from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, Sink, sinks_of
+from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, Sink
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import excerpt
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.ros.common.conversions import ScanMessage, scan_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.ros.navigator.health_meters import InputMeter
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import MAX_MAGNITUDE, MAX_POINTS, scan_problem, stamp_problem
 
@@ -77,6 +77,10 @@ class Sensor:
             return
         with self._lock:
             self._waiting.append((message, now_s))
+
+    def meter(self) -> InputMeter:
+        """Return a meter of the topic's messages."""
+        return InputMeter.of(self.subscriber, self.intake.expected_period_s)
 
     def reset(self) -> None:
         """Forget waiting messages and earlier scans, after the clock has jumped."""
@@ -171,9 +175,14 @@ class Sensor:
             self._warn_dropped(str(error))
 
     def _warn_rejected(self, reason: str) -> None:
-        period_s = self.intake.expected_period_s
-        then = f"; hovering after {period_s:g} s without a valid scan" if period_s > 0.0 else ""
-        self._warnings.warn(f"{self._robot}: scan rejected: {reason}{then}")
+        self._warnings.warn(rejection(self._robot, reason, self.intake))
+
+
+def rejection(robot: str, reason: str, intake: ScanIntake) -> str:
+    """Say that a scan was rejected, and what happens next."""
+    period_s = intake.expected_period_s
+    then = f"; hovering after {period_s:g} s without a valid scan" if period_s > 0.0 else ""
+    return f"{robot}: scan rejected: {reason}{then}"
 
 
 def _checked_scan(message: Any) -> Scan:
@@ -243,23 +252,23 @@ def _column(message: PointCloud2, name: str) -> NDArray[Any]:
     )
 
 
+def topic_of(sink: Sink, names: Names) -> Tuple[str, str]:
+    """Return the name of a sink's topic and its kind of messages, a key of `MESSAGE_TYPES`."""
+    return names(sink.source.topic or sink.source.name), sink.source.data_type
+
+
 def connect(
-    robot: str,
-    costmaps: Sequence[LayeredCostmap],
-    params: ScanValidatorParams,
-    names: Names = own_node,
+    robot: str, sinks: Iterable[Sink], params: ScanValidatorParams, names: Names = own_node
 ) -> List[Sensor]:
-    """Subscribe to every source of every obstacle layer, to each topic once.
+    """Subscribe to the topics of sources of obstacle layers, to each topic once.
 
     Args:
         robot: Name with which log lines begin.
-        costmaps: The robot's costmaps.
+        sinks: The sources.
         params: Parameters of the scan validation.
         names: Resolves the names of topics.
     """
-    sinks: Dict[Tuple[str, str], List[Sink]] = {}
-    for sink in sinks_of(costmaps):
-        source = sink.source
-        key = (names(source.topic or source.name), source.data_type)
-        sinks.setdefault(key, []).append(sink)
-    return [Sensor(robot, *key, takers, params) for key, takers in sinks.items()]
+    takers: Dict[Tuple[str, str], List[Sink]] = {}
+    for sink in sinks:
+        takers.setdefault(topic_of(sink, names), []).append(sink)
+    return [Sensor(robot, *key, those, params) for key, those in takers.items()]

@@ -110,11 +110,20 @@ def connect(
 def place_maps(
     robot: str, costmap: LayeredCostmap, transforms: Transforms, warnings: ThrottledWarnings
 ) -> None:
-    """Give a costmap the latest transforms to the frames of its maps, and warn of missing ones.
+    """Give a costmap the poses of its frame in those of its maps; see `map_poses`."""
+    poses = map_poses(robot, costmap, transforms, warnings)
+    if poses:
+        costmap.set_map_poses(poses)
+
+
+def map_poses(
+    robot: str, costmap: LayeredCostmap, transforms: Transforms, warnings: ThrottledWarnings
+) -> Dict[str, Optional[Pose3D]]:
+    """Return the latest poses of a costmap's frame in those of its maps; warn of missing ones.
 
     Args:
         robot: Name with which the warning begins.
-        costmap: The costmap; one that needs no transform is left alone.
+        costmap: The costmap; one that needs no transform gets none.
         transforms: Transform tree.
         warnings: Takes the warning.
     """
@@ -129,5 +138,4 @@ def place_maps(
                 f"{robot}: static map in frame '{excerpt(frame)}' left out of the costmap in"
                 f" '{wanted}' until tf connects the frames: {error}"
             )
-    if poses:
-        costmap.set_map_poses(poses)
+    return poses

@@ -9,6 +9,8 @@ import threading
 from dataclasses import replace
 from typing import Callable, List, Optional, Sequence
 
+import numpy as np
+
 from quad_nav.mission.checkpoint import (
     MissionCheckpoint,
     RobotCheckpoint,
@@ -18,7 +20,7 @@ from quad_nav.mission.checkpoint import (
 from quad_nav.mission.flight_log import FlightLog, Leg
 from quad_nav.mission.sequencer import Action, NavigatorReport, SequenceProgress, Sequencer, Verdict
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
-from quad_nav.ros.sequencer.odometry import LocatedPose
+from quad_nav.ros.sequencer.odometry import Track
 from quad_nav.sim.contacts import Contact
 
 
@@ -52,7 +54,7 @@ class FlightRecord:
     def add_flight(
         self,
         name: str,
-        poses: Sequence[LocatedPose],
+        track: Track,
         reports: Sequence[NavigatorReport],
         recoveries: int,
     ) -> None:
@@ -62,10 +64,12 @@ class FlightRecord:
             log = self.log.robots[name]
             log.recoveries += recoveries
             log.aborts += aborts
-            for one in poses:
-                if one.relocated:
+            starts = np.flatnonzero(track.relocated).tolist()
+            ends = [*starts, len(track.stamps_s)]
+            for start, end in zip([0, *starts], ends):
+                if start in starts:
                     log.relocate()
-                self.log.add_pose(name, one.stamp_s, one.planar)
+                self.log.add_track(name, track.stamps_s[start:end], track.planar[start:end])
 
     def add_actions(
         self, name: str, sequencer: Sequencer, actions: Sequence[Action], now_s: float

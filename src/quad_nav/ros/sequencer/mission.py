@@ -14,6 +14,7 @@ from typing import Dict, Iterator, List, Optional
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
+from nav_msgs.msg import Odometry
 from std_msgs.msg import String, Time
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
@@ -25,12 +26,14 @@ from quad_nav.ros.common import readiness
 from quad_nav.ros.common.conversions import replacing_markers
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic, ThrottledWarnings
 from quad_nav.ros.common.readiness import Need
-from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.ros.common.transforms import TransformUnavailable
 from quad_nav.ros.sequencer.flight_record import FlightRecord
 from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress_message
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
+from quad_nav.ros.sequencer.mission_stop import MissionStop
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.ros.sequencer.robot_thread import RobotThread
+from quad_nav.ros.sequencer.state_feed import StateFeed
 from quad_nav.scenario.mission_setup import MissionSetup
 from quad_nav.topics.flight_info import (
     CONTACT_STATUS,
@@ -70,9 +73,9 @@ class MissionRunner:
             journal.begin(0.0)  # removes the journal of an older mission
         self._record = FlightRecord(self._new_log, journal)
         self._news = threading.Event()
-        transforms = Transforms()
+        self._feed = StateFeed(len(setup.robots))
         self.robots = [
-            MissionRobot(index, goals, transforms) for index, goals in enumerate(setup.robots)
+            MissionRobot(index, goals, self._feed) for index, goals in enumerate(setup.robots)
         ]
         self._threads = [
             RobotThread(robot, self._record, self._news, len(self.robots)) for robot in self.robots
@@ -84,6 +87,7 @@ class MissionRunner:
         self._next_goals_s = 0.0
         self._warnings = ThrottledWarnings()
         self._connect()
+        self._stop = MissionStop(self.robots, respawned)
 
     def _connect(self) -> None:
         setup = self._setup
@@ -117,7 +121,7 @@ class MissionRunner:
             else []
         )
         for robot in self.robots:
-            needs += _robot_needs(robot)
+            needs += _robot_needs(robot, self._feed)
         return needs
 
     def start(self) -> None:
@@ -145,6 +149,7 @@ class MissionRunner:
         """Wait for news of the robots, and process them."""
         self._news.wait(WAIT_S)
         self._news.clear()
+        self._feed.check()
         with _topics_may_close():
             self._watch_clock(rospy.get_time())
             now_s = time.monotonic()
@@ -312,22 +317,26 @@ def _topics_may_close() -> Iterator[None]:
             raise
 
 
-def _robot_needs(robot: MissionRobot) -> List[Need]:
+def _robot_needs(robot: MissionRobot, feed: StateFeed) -> List[Need]:
     link = robot.link
 
+    def has_pose() -> bool:
+        feed.check()
+        return link.pose_frame is not None
+
     def missing_pose() -> str:
-        if link.odometry_frame is None:
+        if link.pose_frame is None:
             return ""
         try:
-            robot.odometry.map_from(link.odometry_frame)
+            robot.odometry.map_from(link.pose_frame)
         except TransformUnavailable as error:
             return f"/tf: {error}"
         return ""
 
     return [
         Need(
-            lambda: link.odometry_frame is not None,
-            lambda: readiness.missing_topic(link.odometry.resolved_name, link.odometry.type),
+            has_pose,
+            lambda: readiness.missing_topic(link.odometry_topic, Odometry._type),
         ),
         Need(lambda: not missing_pose(), missing_pose),
         Need(

@@ -8,7 +8,6 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from quad_nav.mission.flight_log import FlightLog
-from quad_nav.mission.sequencer import Sequencer
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.sim.contacts import Contact
 from quad_nav.topics.flight_info import contact_from_values
@@ -40,7 +39,7 @@ def _robot_status(robot: MissionRobot, log: FlightLog, failure: str) -> Diagnost
     distance_m = None
     if active is not None and pose is not None:
         distance_m = pose.to_2d().distance_to(active.pose)
-    level, message = DiagnosticStatus.OK, _state(sequencer, distance_m)
+    level, message = DiagnosticStatus.OK, _state(robot, distance_m)
     if skipped or contacts or (active is not None and active.attempt > 1):
         level = DiagnosticStatus.WARN
     if odometry.is_silent:
@@ -61,6 +60,7 @@ def _robot_status(robot: MissionRobot, log: FlightLog, failure: str) -> Diagnost
         "odometry silent s": f"{odometry.silent_s:.2f}",
         "recoveries": flown.recoveries,
         "path_length_m": f"{flown.path_length_m:.2f}",
+        "stopped": robot.is_stopped,
     }
     return DiagnosticStatus(
         level=level,
@@ -71,7 +71,10 @@ def _robot_status(robot: MissionRobot, log: FlightLog, failure: str) -> Diagnost
     )
 
 
-def _state(sequencer: Sequencer, distance_m: Optional[float]) -> str:
+def _state(robot: MissionRobot, distance_m: Optional[float]) -> str:
+    if robot.is_stopped:
+        return "stopped, /mission/resume resumes it"
+    sequencer = robot.sequencer
     count = len(sequencer.sequence.goals)
     if distance_m is not None:
         return f"flying to goal {sequencer.index + 1} of {count}, {distance_m:.2f} m away"

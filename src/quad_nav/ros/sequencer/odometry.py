@@ -1,44 +1,68 @@
-"""Validate a robot's odometry, place it in `map` and notice when it stops."""
+"""Validate a robot's states or odometry, place them in `map` and notice when they stop."""
 
 from __future__ import annotations
 
-from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
+import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
 
-from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.geometry import Pose3D, yaws_from_quaternions
 from quad_nav.mission.odometry_filter import JUMP_RECOVERY_S, OdometryFilter, OdometrySample
 from quad_nav.ros.common.conversions import odometry_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.packed_messages import STATES_TOPIC
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.validation import odometry_problem, pose_problem, stamp_problem
 
 ODOMETRY_SILENT_S = 3.0
+TimedPose = Tuple[float, NDArray[np.float64]]
+"""Time and pose in `map`, float64[7]: position in m and quaternion (x, y, z, w)."""
 
 
-class LocatedPose(NamedTuple):
-    """Pose of the robot in `map` at a time; no path leads to one that is `relocated`."""
+class Track(NamedTuple):
+    """Poses of the robot in `map`, in the order in which they arrived.
 
-    stamp_s: float
-    pose: Pose3D
-    planar: Pose2D
-    relocated: bool
+    Attributes:
+        stamps_s: float64[n], times.
+        poses: float64[n, 4], x, y and z in m and yaw in rad.
+        relocated: bool[n], True where no path leads from the pose before.
+    """
+
+    stamps_s: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    relocated: NDArray[np.bool_]
+
+    @property
+    def planar(self) -> NDArray[np.float64]:
+        """Poses float64[n, 3], x and y in m and yaw in rad."""
+        return self.poses[:, [0, 1, 3]]
+
+
+_NO_POSES = Track(np.empty(0), np.empty((0, 4)), np.empty(0, np.bool_))
 
 
 class OdometryIntake:
-    """Turn the odometry messages of one robot into poses.
+    """Turn the states or the odometry messages of one robot into poses.
 
     Attributes:
         is_silent: Whether valid odometry has timed out.
         silent_s: Time since the last valid odometry.
     """
 
-    def __init__(self, name: str, topic: str, transforms: Transforms) -> None:
-        """Name the robot and its topic, for the log."""
+    def __init__(self, name: str, topic: str, transforms: Callable[[], Transforms]) -> None:
+        """Name the robot and its topic, for the log.
+
+        Args:
+            name: Name of the robot.
+            topic: Topic of its odometry.
+            transforms: Returns the transform tree, which odometry needs.
+        """
         self._name, self._topic, self._transforms = name, topic, transforms
         self._warnings = ThrottledWarnings()
-        self._filter = OdometryFilter()
+        self._filter, self._is_in_bulk = OdometryFilter(), True
         self._latest: Dict[str, Optional[Pose3D]] = {}  # poses of frames in the last step
         self._start_s = self._odometry_s = 0.0
         self.is_silent, self.silent_s = False, 0.0
@@ -63,22 +87,63 @@ class OdometryIntake:
         if frame == "map":
             return Pose3D(0.0, 0.0, 0.0)
         if stamp_s is None:
-            return self._transforms.lookup("map", frame)
-        return self._transforms.lookup_near("map", frame, stamp_s)
+            return self._transforms().lookup("map", frame)
+        return self._transforms().lookup_near("map", frame, stamp_s)
 
-    def take(self, messages: Iterable[Odometry], now_s: float) -> List[LocatedPose]:
-        """Return the poses of the valid messages, oldest first, and log why others are dropped."""
+    def take(
+        self, states: Sequence[TimedPose], messages: Sequence[Odometry], now_s: float
+    ) -> Track:
+        """Return the valid poses, oldest first, and log why others are dropped.
+
+        Args:
+            states: States, which are valid.
+            messages: Odometry messages.
+            now_s: Present time.
+        """
+        tracks = [_NO_POSES]
+        if messages:
+            tracks.append(self._take_odometry(messages, now_s))
+        if states:
+            tracks.append(self._take_states(states))
+        longest = max(tracks, key=lambda track: len(track.stamps_s))
+        track = longest if len(tracks) < 3 else Track(*map(np.concatenate, zip(*tracks)))
+        if len(track.stamps_s):
+            self._odometry_s = now_s
+        self._watch(now_s)
+        return track
+
+    def _set_source(self, is_in_bulk: bool) -> None:
+        """Start a new filter if the poses come from another topic, in another frame."""
+        if is_in_bulk != self._is_in_bulk:
+            self._filter, self._is_in_bulk = OdometryFilter(), is_in_bulk
+
+    def _take_states(self, states: Sequence[TimedPose]) -> Track:
+        self._set_source(True)
+        stamps_s = np.array([stamp_s for stamp_s, _ in states])
+        poses = np.array([pose for _, pose in states])
+        if stamps_s[0] < self._start_s:
+            is_new = stamps_s >= self._start_s
+            stamps_s, poses = stamps_s[is_new], poses[is_new]
+        accepted, relocated = self._filter.accepts_track(stamps_s, "map", poses[:, :2])
+        rows = np.column_stack((poses[:, :3], yaws_from_quaternions(poses[:, 3:])))
+        if accepted.all() and not relocated.any():
+            return Track(stamps_s, rows, relocated)
+        for row in np.flatnonzero(~accepted).tolist():
+            self._warn_jump(STATES_TOPIC, "map", *rows[row, :2].tolist())
+        self._log_relocations(relocated)
+        return Track(stamps_s[accepted], rows[accepted], relocated[accepted])
+
+    def _take_odometry(self, messages: Iterable[Odometry], now_s: float) -> Track:
+        self._set_source(False)
         valid = self._valid(messages, now_s)
         located = []
         for (message, stamp_s, odom_from_base), origin in zip(valid, self._origins(valid)):
             if origin is not None and self._is_continuous(message, stamp_s):
                 pose = origin.compose(odom_from_base)
-                relocated = self._filter.has_relocated
-                located.append(LocatedPose(stamp_s, pose, pose.to_2d(), relocated))
-        if located:
-            self._odometry_s = now_s
-        self._watch(now_s)
-        return located
+                row = (stamp_s, pose.x_m, pose.y_m, pose.z_m, pose.yaw_rad)
+                located.append((*row, self._filter.has_relocated))
+        table = np.array(located, np.float64).reshape(-1, 6)
+        return Track(table[:, 0], table[:, 1:5], table[:, 5] > 0.0)
 
     def _valid(
         self, messages: Iterable[Odometry], now_s: float
@@ -135,18 +200,23 @@ class OdometryIntake:
         return None
 
     def _is_continuous(self, message: Odometry, stamp_s: float) -> bool:
-        place = message.pose.pose.position
-        if self._filter.accepts(OdometrySample(stamp_s, message.header.frame_id, place.x, place.y)):
-            if self._filter.has_relocated:
-                rospy.logwarn("%s: odometry continues at another position", self._name)
+        place, frame = message.pose.pose.position, message.header.frame_id
+        if self._filter.accepts(OdometrySample(stamp_s, frame, place.x, place.y)):
+            self._log_relocations(self._filter.has_relocated)
             return True
+        self._warn_jump(self._topic, frame, place.x, place.y)
+        return False
+
+    def _log_relocations(self, relocated: Any) -> None:
+        if np.any(relocated):
+            rospy.logwarn("%s: odometry continues at another position", self._name)
+
+    def _warn_jump(self, topic: str, frame: str, x_m: float, y_m: float) -> None:
         self._warnings.warn(
-            f"{self._name}: {self._topic}: message dropped: position ({place.x:.2f}, {place.y:.2f})"
-            f" m in {message.header.frame_id!r} is a jump; it counts if it lasts"
-            f" {JUMP_RECOVERY_S:g} s",
+            f"{self._name}: {topic}: message dropped: position ({x_m:.2f}, {y_m:.2f}) m in"
+            f" {frame!r} is a jump; it counts if it lasts {JUMP_RECOVERY_S:g} s",
             kind="jump",
         )
-        return False
 
     def _watch(self, now_s: float) -> None:
         self.silent_s = now_s - self._odometry_s

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Iterable, List, Optional, Sequence
+from typing import Iterable, List, Optional
 
+import numpy as np
 import rospy
 from move_base_msgs.msg import RecoveryStatus
+from numpy.typing import NDArray
 from std_msgs.msg import String
 
 from quad_nav.errors import InputError
-from quad_nav.geometry import Pose3D
+from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.mission.checkpoint import shift_to_clock
 from quad_nav.mission.flight_log import Leg
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import (
@@ -24,13 +27,17 @@ from quad_nav.mission.sequencer import (
     Sequencer,
 )
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
-from quad_nav.ros.common.transforms import Transforms
+from quad_nav.ros.common.nav_messages import planar_pose
 from quad_nav.ros.sequencer.flight_record import FlightRecord
-from quad_nav.ros.sequencer.odometry import LocatedPose, OdometryIntake
-from quad_nav.ros.sequencer.robot_link import Inbox, PathPublisher, RobotLink
+from quad_nav.ros.sequencer.odometry import OdometryIntake
+from quad_nav.ros.sequencer.robot_link import Inbox, PathPublisher
+from quad_nav.ros.sequencer.state_feed import StateFeed
 from quad_nav.topics.flight_info import EVENTS_TOPIC, event, to_text
 
 FILE_POLL_S = 0.5  # wall time, because users edit files while the simulation is paused
+STEPS_PER_S = 100.0  # of all robots together, without anything that a step should not wait with
+MIN_PERIOD_S, MAX_PERIOD_S = 0.1, 0.5
+_ROUNDING_M = 1e-6
 MAX_NAME = 80  # characters of a recovery behaviour's name in the log
 
 
@@ -46,18 +53,26 @@ class MissionRobot:
         lock: Held during a step; whoever restarts the mission holds it.
         is_done: Whether all goals have ended and are in the log.
         clock_went_back: Whether a step has seen this; steps do nothing until `begin`.
+        is_stopped: Whether the mission is stopped on request; steps send no goals.
     """
 
-    def __init__(self, index: int, goals: RobotGoals, transforms: Transforms) -> None:
-        """Connect to the topics of robot `index`."""
+    def __init__(self, index: int, goals: RobotGoals, feed: StateFeed) -> None:
+        """Connect the goals of robot `index` to its topics.
+
+        Args:
+            index: Number of the robot.
+            goals: Its goals.
+            feed: Poses of all robots.
+        """
         self.name = goals.name
         self.sequencer = Sequencer(goals.sequence)
-        self.link = RobotLink(index)
-        self.odometry = OdometryIntake(self.name, self.link.odometry.resolved_name, transforms)
+        self.link = feed.links[index]
+        self.odometry = OdometryIntake(self.name, self.link.odometry_topic, feed.transforms)
+        self._period_s = min(max(MIN_PERIOD_S, len(feed.links) / STEPS_PER_S), MAX_PERIOD_S)
         self.pose: Optional[Pose3D] = None
         self.lock = threading.Lock()
-        self.is_done = self.clock_went_back = False
-        self._now_s = 0.0
+        self.is_done = self.clock_went_back = self.is_stopped = False
+        self._now_s = self._held_s = 0.0
         self._reports: List[NavigatorReport] = []  # for the next tick
         self._file = goals.file
         self._next_poll_s = 0.0
@@ -69,11 +84,26 @@ class MissionRobot:
     def begin(self, now_s: float, progress: SequenceProgress = START) -> None:
         """Begin with the first goal, or resume the progress of another sequencer."""
         self.sequencer = Sequencer(self.sequencer.sequence, progress)
-        self.pose, self._reports, self._now_s = None, [], now_s
+        self.pose, self._reports, self._now_s, self._held_s = None, [], now_s, now_s
         self.is_done = self.clock_went_back = False
         self.odometry.begin(now_s)
         self.link.clear()
         self._path.clear()
+
+    def hold(self, now_s: float) -> None:
+        """Forget the goal that was sent last; `is_stopped` has been set."""
+        self.link.clear()
+        self._held_s = now_s
+
+    def release(self, now_s: float) -> None:
+        """Resume a stopped mission: send the goal again, as if no time had passed."""
+        self.is_stopped = False
+        if not self.is_done:
+            progress = shift_to_clock(self.sequencer.progress, now_s - self._held_s)
+            sequence = self.sequencer.sequence
+            self.sequencer = Sequencer(sequence, progress, "the mission was stopped and resumed")
+        self.link.clear()  # what was reported on the goal that the stop has cancelled
+        self.link.received.set()
 
     def step(self, record: FlightRecord) -> bool:
         """Process the messages of the robot and act on them.
@@ -90,35 +120,57 @@ class MissionRobot:
         if self.clock_went_back:
             return False
         self._now_s, inbox = now_s, self.link.pop()
-        located = self.odometry.take(inbox.odometry, now_s)
+        track = self.odometry.take(inbox.states, inbox.odometry, now_s)
         self._log_recoveries(inbox.recoveries)
-        record.add_flight(self.name, located, inbox.reports, len(inbox.recoveries))
-        for one in located:
-            self.pose = one.pose
-            self._path.add(one.stamp_s, one.pose)
+        record.add_flight(self.name, track, inbox.reports, len(inbox.recoveries))
+        if len(track.stamps_s):
+            x_m, y_m, z_m, yaw_rad = track.poses[-1].tolist()
+            self.pose = planar_pose(Pose2D(x_m, y_m, yaw_rad), z_m)
+            self._path.add(track)
         self._serve_subscribers(inbox)
-        self._reports += inbox.reports
-        if self.pose is None or (self.odometry.is_jumping and not located):
+        if self.is_stopped:
             return False
-        actions = self._tick(now_s, self.pose, located)
+        self._reports += inbox.reports
+        if self.pose is None or (self.odometry.is_jumping and not len(track.stamps_s)):
+            return False
+        actions = self._tick(now_s, self.pose.to_2d(), track.planar)
+        self._set_wake(now_s)
         legs = record.add_actions(self.name, self.sequencer, actions, now_s)
         for action, leg in zip(actions, legs):
             self._do(action, leg, now_s)
         self.is_done = self.sequencer.done
         return bool(actions)
 
-    def _tick(self, now_s: float, pose: Pose3D, located: Sequence[LocatedPose]) -> List[Action]:
-        """Pass the new poses to the sequencer until it acts.
+    def _tick(self, now_s: float, pose: Pose2D, poses: NDArray[np.float64]) -> List[Action]:
+        """Pass new poses float64[n, 3] to the sequencer until it acts.
 
-        All of them, because a robot that turns has the goal's yaw only for a short time.
+        All at the goal, because a robot that turns has the goal's yaw only for a short time. The
+        others end no goal.
         """
         reports, self._reports = self._reports, []  # on the goal that an action ends
         idle = self.link.navigator_is_idle(now_s)
-        for one in located[:-1]:
-            actions = self.sequencer.tick(now_s, one.planar, (), idle)
+        active = self.sequencer.active_goal
+        if active is not None and len(poses):
+            offsets_m = poses[:, :2] - (active.goal.x_m, active.goal.y_m)
+            near_m = self.sequencer.sequence.tolerance_m(active.goal) + _ROUNDING_M
+            poses = poses[np.hypot(offsets_m[:, 0], offsets_m[:, 1]) <= near_m]
+        for row in poses.tolist():
+            actions = self.sequencer.tick(now_s, Pose2D(*row), (), idle)
             if actions:
                 return actions
-        return self.sequencer.tick(now_s, pose.to_2d(), reports, idle)
+        return self.sequencer.tick(now_s, pose, reports, idle)
+
+    def _set_wake(self, now_s: float) -> None:
+        """Let states wake the thread at the goal, and when the next step is due."""
+        active, dwell = self.sequencer.active_goal, self.sequencer.dwell
+        at_s = now_s + self._period_s
+        if dwell is not None:
+            at_s = min(at_s, dwell.until_s)
+        if active is None:
+            self.link.wake[:] = (0.0, 0.0, -1.0, at_s)
+        else:
+            near_m = self.sequencer.sequence.tolerance_m(active.goal) + _ROUNDING_M
+            self.link.wake[:] = (active.goal.x_m, active.goal.y_m, near_m, at_s)
 
     def _log_recoveries(self, recoveries: Iterable[RecoveryStatus]) -> None:
         for recovery in recoveries:

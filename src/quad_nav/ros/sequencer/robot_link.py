@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Callable, Deque, List, Optional, Tuple
 
+import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseActionResult, RecoveryStatus
 from nav_msgs.msg import Odometry, Path
+from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.mission.goal_ids import MAX_IDS, GoalIds, Owner
 from quad_nav.mission.sequencer import NavigatorReport, Verdict
 from quad_nav.ros.common.nav_messages import planar_pose, pose_stamped
-from quad_nav.topics.publishing import FlownPath
+from quad_nav.ros.common.packed_messages import PathMessage
+from quad_nav.ros.sequencer.odometry import TimedPose, Track
+from quad_nav.topics.publishing import PATH_SPACING_M, FlownPath
 
 STATUS_FRESH_S = 3.0
 MAX_WAITING = 1000  # messages of a topic that wait for the robot's thread; older ones are dropped
@@ -38,6 +43,7 @@ _VERDICTS = {
 class Inbox:
     """Messages that have arrived since the last `pop`, bounded in number."""
 
+    states: Deque[TimedPose] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
     odometry: Deque[Odometry] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
     reports: Deque[NavigatorReport] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
     recoveries: Deque[RecoveryStatus] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
@@ -45,16 +51,17 @@ class Inbox:
 
 
 class RobotLink(rospy.SubscribeListener):
-    """Receive a robot's odometry and its navigator's results, and send its goals.
+    """Receive a robot's poses and its navigator's results, and send its goals.
 
     Attributes:
         goals: Publisher of the goals.
-        odometry: Subscriber to the odometry.
-        received: Set by each message of odometry.
+        odometry_topic: Name of the topic of odometry.
+        received: Set by what the robot's thread should not wait with.
+        wake: When states wake the thread, as `StateFeed` defines it, float64[4].
     """
 
-    def __init__(self, index: int) -> None:
-        """Connect to the topics of robot `index`."""
+    def __init__(self, index: int, wake: NDArray[np.float64]) -> None:
+        """Connect to the topics of robot `index`, apart from those of its poses."""
         super().__init__()
         self.received = threading.Event()
         self._lock = threading.Lock()
@@ -62,15 +69,14 @@ class RobotLink(rospy.SubscribeListener):
         self._ids = GoalIds()
         self._busy = True
         self._status_s: Optional[float] = None
-        self._odometry_frame: Optional[str] = None
+        self._pose_frame: Optional[str] = None
         self._goal: Optional[PoseStamped] = None
         action = f"/move_base{index}"
         self.goals = rospy.Publisher(
             f"/move_base_simple/goal{index}", PoseStamped, subscriber_listener=self, queue_size=2
         )
-        self.odometry = rospy.Subscriber(
-            f"/odom{index}", Odometry, self._on_odometry, queue_size=100
-        )
+        self.odometry_topic = rospy.resolve_name(f"/odom{index}")
+        self.wake = wake
         self._subscribers = [
             rospy.Subscriber(f"{action}/result", MoveBaseActionResult, self._on_result),
             rospy.Subscriber(f"{action}/status", GoalStatusArray, self._on_status, queue_size=1),
@@ -78,9 +84,9 @@ class RobotLink(rospy.SubscribeListener):
         ]
 
     @property
-    def odometry_frame(self) -> Optional[str]:
-        """Frame of the odometry; None before the first message."""
-        return self._odometry_frame
+    def pose_frame(self) -> Optional[str]:
+        """Frame of the last pose; None before the first message."""
+        return self._pose_frame
 
     def pop(self) -> Inbox:
         """Return the messages that have arrived since the last call."""
@@ -130,9 +136,17 @@ class RobotLink(rospy.SubscribeListener):
         """
         with self._lock:
             self._inbox.subscribers.append(peer_publish)
+        self.received.set()
 
-    def _on_odometry(self, message: Odometry) -> None:
-        self._odometry_frame = message.header.frame_id
+    def receive_state(self, state: TimedPose) -> None:
+        """Store a pose; the thread need not take it at once."""
+        self._pose_frame = "map"
+        with self._lock:
+            self._inbox.states.append(state)
+
+    def receive_odometry(self, message: Odometry) -> None:
+        """Store odometry, and wake the robot's thread."""
+        self._pose_frame = message.header.frame_id
         with self._lock:
             self._inbox.odometry.append(message)
         if not self.received.is_set():
@@ -153,6 +167,7 @@ class RobotLink(rospy.SubscribeListener):
                 self._inbox.reports.append(NavigatorReport(verdict, status.text[:MAX_TEXT]))
             elif owner is Owner.OTHER and verdict is not Verdict.REPLACED:
                 self._inbox.reports.append(NavigatorReport(Verdict.OTHER_ENDED))
+        self.received.set()
 
     def _on_status(self, message: GoalStatusArray) -> None:
         unfinished = [status for status in message.status_list if status.status in _BUSY]
@@ -180,19 +195,22 @@ class PathPublisher:
     def __init__(self, topic: str) -> None:
         """Advertise the topic."""
         self._publisher = rospy.Publisher(topic, Path, queue_size=1, latch=True)
-        self._path: FlownPath[PoseStamped] = FlownPath(_stamped)
+        self._path: FlownPath[Tuple[float, Pose3D]] = FlownPath(lambda *timed: timed)
+        self._last_m = (math.inf, math.inf)
 
     def clear(self) -> None:
         """Start an empty path."""
         self._path.clear()
+        self._last_m = (math.inf, math.inf)
 
-    def add(self, stamp_s: float, pose: Pose3D) -> None:
-        """Add a pose in `map`, and publish if it is due."""
-        if self._path.add(stamp_s, pose):
-            path = Path(poses=list(self._path.poses))
-            path.header.frame_id, path.header.stamp = "map", rospy.Time.from_sec(stamp_s)
-            self._publisher.publish(path)
-
-
-def _stamped(stamp_s: float, pose: Pose3D) -> PoseStamped:
-    return pose_stamped(planar_pose(pose.to_2d(), pose.z_m), "map", rospy.Time.from_sec(stamp_s))
+    def add(self, track: Track) -> None:
+        """Add poses, and publish if it is due."""
+        rows = list(zip(track.stamps_s.tolist(), track.poses.tolist()))
+        for stamp_s, (x_m, y_m, z_m, yaw_rad) in rows:
+            is_far = math.dist(self._last_m, (x_m, y_m)) >= PATH_SPACING_M
+            if not is_far and stamp_s < rows[-1][0]:
+                continue
+            if is_far:
+                self._last_m = (x_m, y_m)
+            if self._path.add(stamp_s, planar_pose(Pose2D(x_m, y_m, yaw_rad), z_m)):
+                self._publisher.publish(PathMessage("map", stamp_s, tuple(self._path.poses)))

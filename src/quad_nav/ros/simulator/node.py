@@ -16,10 +16,9 @@ import time
 import traceback
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import Callable, Deque, List, Tuple
+from typing import Any, Callable, Deque, List, Tuple
 
 import rospy
-from geometry_msgs.msg import Twist
 from std_srvs.srv import (
     SetBool,
     SetBoolRequest,
@@ -30,15 +29,23 @@ from std_srvs.srv import (
 )
 from visualization_msgs.msg import Marker, MarkerArray
 
-from quad_nav.errors import InputError, excerpt, printable
+from quad_nav.config import Parameter
+from quad_nav.errors import InputError, printable
+from quad_nav.files.values import is_number
 from quad_nav.kernels.jit import cache_warnings
-from quad_nav.ros.common.conversions import twist_from_message
+from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.ros.common.readiness import (
     escape_log_messages,
     log_without_master,
     server_parameters,
 )
-from quad_nav.ros.simulator.topics import SimulatorTopics
+from quad_nav.ros.composed.fleet import ComposedFleet
+from quad_nav.ros.composed.group import is_handed_over
+from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers, set_time
+from quad_nav.ros.navigator.nodes import log_invalid, prepare
+from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
+from quad_nav.ros.simulator.commands import Commands
+from quad_nav.ros.simulator.topics import FASTEST_RATE, SimulatorTopics
 from quad_nav.scenario.simulator_setup import (
     DEFAULTS,
     SimulatorSetup,
@@ -47,50 +54,52 @@ from quad_nav.scenario.simulator_setup import (
 )
 from quad_nav.sim.body import GoalSphere
 from quad_nav.sim.pacing import Pacer, RateMeter
-from quad_nav.sim.simulation import STEP_S, STEPS_PER_S, Simulation
-from quad_nav.topics.validation import MAX_MAGNITUDE, CommandLease, twist_problem
+from quad_nav.sim.simulation import STEP_S, STEPS_PER_S
+from quad_nav.topics.validation import MAX_MAGNITUDE
 
-_STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 _STEPS_PER_CLOCK = STEPS_PER_S // 120
 _START_STEP = STEPS_PER_S
-_COMMANDS_PER_ROBOT = 20
 _HEALTH_PERIOD_S = 1.0  # wall time, as the next two
 _PAUSED_PERIOD_S = 0.5
 _PAUSED_SLEEP_S = 0.02
+_MAX_SLEEP_S = 0.1  # at a low rate, to answer requests
 _RESPONSE_TIMEOUT_S = 10.0
 _MAX_MARKERS = 10_000
 
 
 class SimulatorNode:
-    """Topics and services of one simulation."""
+    """Topics and services of one simulation, with the navigators that share its process."""
 
-    def __init__(self, setup: SimulatorSetup) -> None:
+    def __init__(self, setup: SimulatorSetup, own: OwnNodes) -> None:
+        """Start the navigators' processes and advertise topics and services.
+
+        Args:
+            setup: The simulation.
+            own: Gets the names of the processes' nodes.
+        """
         self._setup = setup
-        self._simulation = Simulation(
-            setup.scene, setup.robots, setup.params, setup.seed, setup.gui, _START_STEP
-        )
-        self._topics = SimulatorTopics(self._simulation, setup.map_resolution_m)
-        self._pacer = Pacer(setup.rate, STEP_S)
+        self._fleet = ComposedFleet(setup, _START_STEP, own)
+        self._loop = self._fleet.loop
+        self._simulation = self._loop.simulation
+        others = [i for i in range(setup.robots) if i not in self._fleet.hosted]
+        self._topics = SimulatorTopics(self._simulation, setup.map_resolution_m, others)
+        self._commands = Commands(self._simulation)
         self._meter = RateMeter()
-        # Faster than real time, the clock is published with the odometry, which is often enough.
-        self._steps_per_clock = _STEPS_PER_CLOCK if setup.rate <= 1.0 else _STEPS_PER_ODOMETRY
+        self._is_all_hosted = not others
+        self._set_rate(setup.rate)
         self._paused, self._stopping = True, False
         self._next_health_s = self._next_republish_s = 0.0
-        # Bounds the cost of a node that floods a topic.
-        self._commands: Deque[Tuple[int, Twist]] = collections.deque(
-            maxlen=_COMMANDS_PER_ROBOT * setup.robots
-        )
-        self._lease = CommandLease(
-            setup.params.command_timeout_s + setup.params.controller_period_s
-        )
         self._requests: Deque[Tuple[Callable[[], str], Future]] = collections.deque()
         self._goals, self._goals_are_shown = MarkerArray(), True
-        self._subscribe()
+        if setup.gui:
+            rospy.Subscriber("/goals", MarkerArray, self._store_goals, queue_size=1)
+        self._loop.start()
         self._advertise_services()
 
     def run(self) -> None:
         """Run until `stop` is called, ROS shuts down or the window is closed."""
         self._publish_all()
+        self._navigate()
         if not self._setup.start_paused:
             self._start()
         while not (self._stopping or rospy.is_shutdown()) and self._simulation.is_open:
@@ -101,23 +110,11 @@ class SimulatorNode:
                 self._wait_paused()
             else:
                 self._advance()
-        self._simulation.close()
+        self._loop.close()
 
     def stop(self) -> None:
         """End `run` after the present step."""
         self._stopping = True
-
-    def _subscribe(self) -> None:
-        for i in range(self._setup.robots):
-            rospy.Subscriber(
-                f"/cmd_vel{i}",
-                Twist,
-                functools.partial(self._store_command, i),
-                queue_size=10,
-                tcp_nodelay=True,
-            )
-        if self._setup.gui:
-            rospy.Subscriber("/goals", MarkerArray, self._store_goals, queue_size=1)
 
     def _advertise_services(self) -> None:
         for name, action in (
@@ -130,11 +127,11 @@ class SimulatorNode:
             rospy.Service(
                 f"/simulation/lidar{i}/enable", SetBool, functools.partial(self._enable_lidar, i)
             )
+        rospy.set_param("~rate", self._rate)
+        type_ = config_type("Simulator", [_rate_parameter(self._rate)])
+        self._parameters = ParameterServer(type_, self._reconfigure, "~", {"rate": self._rate})
 
     # Callbacks, in threads of their own.
-
-    def _store_command(self, robot: int, message: Twist) -> None:
-        self._commands.append((robot, message))
 
     def _store_goals(self, message: MarkerArray) -> None:
         self._goals, self._goals_are_shown = message, False
@@ -154,8 +151,22 @@ class SimulatorNode:
 
         return handle
 
+    def _reconfigure(self, requested: Any, _level: int) -> Any:
+        """Let the loop take another rate, and return the values in force."""
+        rate = requested["rate"]
+        if rate != self._rate and is_number(rate) and rate > 0.0:
+            done: Future = Future()
+            self._requests.append((functools.partial(self._set_rate, rate), done))
+            try:
+                done.result(_RESPONSE_TIMEOUT_S)
+            except FutureTimeoutError:
+                rospy.logerr("simulator: rate not changed: the loop did not respond")
+        requested["rate"] = self._rate
+        return requested
+
     def _enable_lidar(self, robot: int, request: SetBoolRequest) -> SetBoolResponse:
         self._topics.lidar_enabled[robot] = request.data
+        self._loop.enable_lidar(robot, request.data)
         return SetBoolResponse(True, f"LIDAR {robot} is {'on' if request.data else 'off'}")
 
     # The loop.
@@ -174,19 +185,28 @@ class SimulatorNode:
             rospy.loginfo("simulator: running")
         return "the simulation is running"
 
+    def _set_rate(self, rate: float) -> str:
+        """Set the simulated seconds per second."""
+        self._rate = rate
+        self._pacer = Pacer(rate, STEP_S)
+        self._pacer.start(time.monotonic())
+        # Often enough faster than real time, and for navigators that do not hear the clock.
+        with_odometry = rate > 1.0 or self._is_all_hosted
+        self._steps_per_clock = STEPS_PER_ODOMETRY if with_odometry else _STEPS_PER_CLOCK
+        return f"the rate is {rate:g}"
+
     def _pause(self) -> str:
         if not self._paused:
             self._paused = True
-            self._topics.publish_clock()
+            self._publish_clock()
             rospy.loginfo("simulator: paused at %.2f s", self._simulation.now_s)
         return "the simulation is paused"
 
     def _reset(self) -> str:
         """Reset all poses; one step gives the new poses another stamp."""
-        self._simulation.reset()
-        self._simulation.step()
+        self._loop.reset()
+        self._loop.advance(1)
         self._commands.clear()
-        self._lease.clear()
         self._goals_are_shown = False
         self._topics.publish_reset()
         self._publish_all()
@@ -195,56 +215,52 @@ class SimulatorNode:
 
     def _advance(self) -> None:
         """Do the steps that are due, then sleep until the clock's next tick."""
-        for _ in range(self._pacer.pop_due(time.monotonic())):
-            self._step()
-        steps = self._steps_per_clock - self._simulation.step_count % self._steps_per_clock
-        time.sleep(self._pacer.wait_s(time.monotonic(), steps))
+        end = self._simulation.step_count + self._pacer.pop_due(time.monotonic())
+        while self._simulation.step_count < end:
+            self._commands.take()
+            self._step(min(end - self._simulation.step_count, self._steps_to_clock()))
+        wait_s = self._pacer.wait_s(time.monotonic(), self._steps_to_clock())
+        time.sleep(min(wait_s, _MAX_SLEEP_S))
 
-    def _step(self) -> None:
-        self._take_commands()
-        for contact in self._simulation.step():
+    def _steps_to_clock(self) -> int:
+        """Return the number of steps until the clock is published."""
+        return self._steps_per_clock - self._simulation.step_count % self._steps_per_clock
+
+    def _step(self, steps: int) -> None:
+        """Do at most so many steps, up to the next scan or odometry, and publish."""
+        progress = self._loop.advance(steps)
+        for contact in progress.contacts:
             self._topics.publish_contact(contact)
         count = self._simulation.step_count
         if count % self._steps_per_clock == 0:
-            self._topics.publish_clock()
-        if count % _STEPS_PER_ODOMETRY == 0:
+            self._publish_clock()
+        if progress.is_odometry:
             self._topics.publish_poses()
         if count % self._setup.steps_per_scan == 0:
             self._topics.publish_scans()
+        if progress.is_odometry:
+            self._navigate()
 
-    def _take_commands(self) -> None:
-        while self._commands:
-            robot, message = self._commands.popleft()
-            twist = twist_from_message(message)
-            problem = twist_problem(twist)
-            if problem:
-                rospy.logwarn_throttle(5.0, "quad%d: command dropped: %s", robot, problem)
-                continue
-            node = excerpt(message._connection_header.get("callerid", "an unnamed node"))
-            holder = self._lease.holder(robot, node, self._simulation.now_s)
-            if holder == node:
-                self._simulation.set_command(robot, twist)
-            else:
-                rospy.logwarn_throttle(
-                    5.0,
-                    "quad%d: command of %s dropped: %s controls this quadcopter, expected one node"
-                    " at a time",
-                    robot,
-                    node,
-                    holder,
-                )
+    def _navigate(self) -> None:
+        for command in self._fleet.navigate():
+            self._commands.give(*command)
 
     def _wait_paused(self) -> None:
         """Republish the state for new subscribers, except tf, which is latched."""
         if time.monotonic() >= self._next_republish_s:
             self._next_republish_s = time.monotonic() + _PAUSED_PERIOD_S
-            self._topics.publish_clock()
+            self._publish_clock()
             self._topics.publish_poses(with_transforms=False)
             self._topics.publish_scans()
         time.sleep(_PAUSED_SLEEP_S)
 
-    def _publish_all(self) -> None:
+    def _publish_clock(self) -> None:
+        if self._fleet.hosted:
+            set_time(self._simulation.now_s)
         self._topics.publish_clock()
+
+    def _publish_all(self) -> None:
+        self._publish_clock()
         self._topics.publish_poses()
         self._topics.publish_scans()
 
@@ -253,12 +269,24 @@ class SimulatorNode:
         if now_s >= self._next_health_s:
             self._next_health_s = now_s + _HEALTH_PERIOD_S
             factor = self._meter.read(now_s, self._simulation.now_s)
-            self._topics.publish_health(self._paused, self._setup.rate, factor)
+            self._topics.publish_health(self._paused, self._rate, factor)
 
     def _show_goals(self) -> None:
         if not self._goals_are_shown:
             self._goals_are_shown = True
             self._simulation.show_goals(_goal_spheres(self._goals))
+
+
+def _rate_parameter(rate: float) -> Parameter:
+    """Describe the rate; the range includes the present one, which the server would clamp."""
+    return Parameter(
+        "rate",
+        "double",
+        1.0,
+        description=f"Simulated seconds per second; {FASTEST_RATE:g} is as fast as it goes.",
+        low=min(0.01, rate),
+        high=max(FASTEST_RATE, rate),
+    )
 
 
 def _goal_spheres(message: MarkerArray) -> List[GoalSphere]:
@@ -296,18 +324,14 @@ def main() -> int:
     Returns:
         0 after a shutdown, 2 if the parameters or the scene are not valid.
     """
+    own = OwnNodes()
+    ignore_publishers(own, is_handed_over)
     rospy.init_node("simulator", disable_signals=True)
     escape_log_messages()
     log_without_master()
     name = rospy.get_name().lstrip("/")
     try:
-        parameters = rospy.get_param("~", {})
-        if not parameters.get("config"):
-            robots = parameters.get("robots", DEFAULTS["robots"])
-            asked_for = asked_for_by_navigators(server_parameters(), robots)
-            parameters = {**asked_for, **parameters}
-        setup = read_setup(parameters, name)
-        node = SimulatorNode(setup)
+        setup = _read_setup(name)
     except InputError as error:
         print(printable(error, "\n"), file=sys.stderr)
         return 2
@@ -318,10 +342,24 @@ def main() -> int:
             "simulator: /use_sim_time is not set, expected true before other nodes start; they"
             " use the wall clock"
         )
+    try:
+        prepare(setup.configurations.values())
+        node = SimulatorNode(setup, own)
+    except InputError as error:
+        log_invalid(name, error)
+        return 2
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: node.stop())
     _run(node)
     return 0
+
+
+def _read_setup(name: str) -> SimulatorSetup:
+    parameters, tree = rospy.get_param("~", {}), server_parameters()
+    if not parameters.get("config"):
+        robots = parameters.get("robots", DEFAULTS["robots"])
+        parameters = {**asked_for_by_navigators(tree, robots), **parameters}
+    return read_setup(parameters, name, tree)
 
 
 def _run(node: SimulatorNode) -> None:

@@ -1,34 +1,30 @@
-"""Publish clock, transforms, odometry, scans, contacts and health of the simulation."""
+"""Publish clock, transforms, states, odometry, scans, contacts and health of the simulation."""
 
 from __future__ import annotations
 
-from typing import List, Mapping, Sequence
+import math
+from typing import List, Sequence
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import TransformStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Header, String, Time
-from tf2_msgs.msg import TFMessage
+from std_msgs.msg import String, Time
 from visualization_msgs.msg import MarkerArray
 
 from quad_nav.ros.common.conversions import (
     ScanMessage,
+    key_values,
     marker_array,
-    odometry_message,
     scan_message,
     time_message,
-    transform,
-    transform_message,
 )
 from quad_nav.ros.common.diagnostics import DiagnosticsTopic
 from quad_nav.ros.common.nav_messages import map_message
+from quad_nav.ros.simulator.pose_topics import PoseTopics
 from quad_nav.scenario.scene_map import scene_map
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.odometry import pose_in
-from quad_nav.sim.simulation import RobotState, Simulation
+from quad_nav.sim.simulation import Simulation
 from quad_nav.topics.flight_info import (
     CONTACT_STATUS,
     FLIGHT_TOPIC,
@@ -38,9 +34,17 @@ from quad_nav.topics.flight_info import (
     text_values,
     to_text,
 )
-from quad_nav.topics.markers import number_markers, quadcopter_markers, scene_markers
+from quad_nav.topics.markers import (
+    OBSTACLES_PERIOD_S,
+    OBSTACLES_TOPIC,
+    moving_markers,
+    number_markers,
+    quadcopter_markers,
+    scene_markers,
+)
 
-_MOUNT = transform(base_from_lidar)
+FASTEST_RATE = 1000.0
+"""From this rate on the simulation goes as fast as it can, and does not lag."""
 _LAGS_BELOW = 0.9
 """The simulation lags if it reaches less than this part of the requested rate."""
 _LAGGING_REPORTS = 3
@@ -50,29 +54,32 @@ _LAGGING_REPORTS = 3
 class SimulatorTopics:
     """Publishers of the simulator.
 
-    Odometry and scans are computed only for subscribers. `/clock` and `/tf` are latched: a node
-    that starts while the simulation is paused receives them, and no transform is sent twice with
-    the same stamp, about which tf2 would warn.
+    States, odometry and scans are computed only for subscribers. `/clock` and `/tf` are latched: a
+    node that starts while the simulation is paused receives them, and no transform is sent twice
+    with the same stamp, about which tf2 would warn.
 
     Attributes:
         lidar_enabled: Whether each LIDAR is on; services change it.
     """
 
-    def __init__(self, simulation: Simulation, map_resolution_m: float = 0.0) -> None:
+    def __init__(
+        self, simulation: Simulation, map_resolution_m: float, scanned: Sequence[int]
+    ) -> None:
         """Advertise the topics, and publish the scene and the flight info.
 
         Args:
             simulation: The simulation.
             map_resolution_m: Size of the cells of the scene's map; 0 for no map.
+            scanned: Numbers of the quadcopters whose scans are published here. Where their
+                navigators share the process, their scans come from there.
         """
         self._simulation = simulation
         robots = range(simulation.n_robots)
         self.lidar_enabled = [True for _ in robots]
         self._lagging_reports = 0
+        self._poses = PoseTopics(simulation)
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
-        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10, latch=True)
-        self._odometry = [rospy.Publisher(f"/odom{i}", Odometry, queue_size=10) for i in robots]
-        self._scans = [rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=10) for i in robots]
+        self._scans = {i: rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=10) for i in scanned}
         self._contacts = rospy.Publisher("/simulation/contacts", DiagnosticStatus, queue_size=100)
         self._reset = rospy.Publisher(RESET_TOPIC, Time, queue_size=1, latch=True)
         self._diagnostics = DiagnosticsTopic()
@@ -80,6 +87,8 @@ class SimulatorTopics:
         self._quadcopters = rospy.Publisher(
             "/simulation/quadcopters", MarkerArray, queue_size=1, latch=True
         )
+        self._obstacles = rospy.Publisher(OBSTACLES_TOPIC, MarkerArray, queue_size=1)
+        self._obstacles_s, self._obstacles_listeners = -math.inf, 0  # at the last message
         self._flight = rospy.Publisher(FLIGHT_TOPIC, String, queue_size=1, latch=True)
         jitter_m = simulation.params.jitter_m
         self._flight.publish(to_text(simulation_info(simulation.scene, simulation.seed, jitter_m)))
@@ -103,47 +112,31 @@ class SimulatorTopics:
         self._reset.publish(Time(time_message(self._simulation.now_s)))
 
     def publish_poses(self, with_transforms: bool = True) -> None:
-        """Publish the transforms in one message, and the odometry that has subscribers."""
-        states = [self._simulation.state(i) for i in range(self._simulation.n_robots)]
-        stamp = time_message(self._simulation.now_s)
-        if with_transforms:
-            self._publish_transforms(states, stamp)
-        self._publish_odometry(states, stamp)
+        """Publish the transforms, and the states and the odometry that have subscribers."""
+        self._poses.publish(with_transforms)
+        self._publish_obstacles()
 
-    def _publish_transforms(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
-        """Publish `map -> odom{i} -> base_link{i} -> Lidar{i}` of all quadcopters."""
-        transforms = []
-        for i, state in enumerate(states):
-            odom, base, lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
-            map_from_odom = self._simulation.map_from_frame(odom, i)
-            odom_from_base = pose_in(map_from_odom, state.map_from_base)
-            transforms += [
-                transform_message(map_from_odom.to_3d(), "map", odom, stamp),
-                transform_message(odom_from_base, odom, base, stamp),
-                TransformStamped(Header(0, stamp, base), lidar, _MOUNT),
-            ]
-        self._tf.publish(TFMessage(transforms))
+    def _publish_obstacles(self) -> None:
+        """Publish the moving obstacles ten times a second, if there are any and subscribers.
 
-    def _publish_odometry(self, states: Sequence[RobotState], stamp: rospy.Time) -> None:
-        for i, (publisher, state) in enumerate(zip(self._odometry, states)):
-            if publisher.get_num_connections():
-                odom = f"odom{i}"
-                map_from_odom = self._simulation.map_from_frame(odom, i)
-                publisher.publish(
-                    odometry_message(
-                        pose_in(map_from_odom, state.map_from_base),
-                        state.linear_mps,
-                        state.angular_radps,
-                        (odom, f"base_link{i}"),
-                        stamp,
-                    )
-                )
+        Who subscribes while the simulation is paused is told where they stand.
+        """
+        movers, now_s = self._simulation.movers, self._simulation.now_s
+        if not movers:
+            return
+        listeners = self._obstacles.get_num_connections()
+        is_due = abs(now_s - self._obstacles_s) >= OBSTACLES_PERIOD_S - 1e-6
+        if is_due or listeners > self._obstacles_listeners:
+            self._obstacles_s = now_s
+            if listeners:
+                self._obstacles.publish(marker_array(moving_markers(movers, now_s)))
+        self._obstacles_listeners = listeners
 
     def publish_scans(self) -> None:
         """Publish the scans of enabled LIDARs that have subscribers."""
         robots = [
             i
-            for i, publisher in enumerate(self._scans)
+            for i, publisher in self._scans.items()
             if self.lidar_enabled[i] and publisher.get_num_connections()
         ]
         for i, scan in zip(robots, self._simulation.scans(robots)):
@@ -160,7 +153,7 @@ class SimulatorTopics:
                 name=CONTACT_STATUS,
                 hardware_id=contact.robot,
                 message=str(contact),
-                values=_pairs(contact_values(contact, contact.time_s)),
+                values=key_values(contact_values(contact, contact.time_s)),
             )
         )
 
@@ -179,7 +172,7 @@ class SimulatorTopics:
         self._diagnostics.publish(array)
 
     def _clock_health(self, paused: bool, rate: float, factor: float) -> DiagnosticStatus:
-        lags = not paused and factor < _LAGS_BELOW * rate
+        lags = not paused and factor < _LAGS_BELOW * rate and rate < FASTEST_RATE
         self._lagging_reports = self._lagging_reports + 1 if lags else 0
         if self._lagging_reports >= _LAGGING_REPORTS:
             rospy.logwarn_throttle(
@@ -199,7 +192,7 @@ class SimulatorTopics:
             name="simulator: clock",
             hardware_id="simulator",
             message=message,
-            values=_pairs(
+            values=key_values(
                 text_values(
                     real_time_factor=factor, rate=rate, contacts=len(self._simulation.contacts)
                 )
@@ -215,7 +208,7 @@ class SimulatorTopics:
                 hardware_id=f"quad{i}",
                 message=("hovering, no command" if hovering else "flying")
                 + ("" if self.lidar_enabled[i] else ", LIDAR off"),
-                values=_pairs(
+                values=key_values(
                     text_values(
                         contacts=sum(c.involves(f"quad{i}") for c in simulation.contacts),
                         lidar=self.lidar_enabled[i],
@@ -224,7 +217,3 @@ class SimulatorTopics:
             )
             for i, hovering in enumerate(simulation.is_hovering)
         ]
-
-
-def _pairs(values: Mapping[str, str]) -> List[KeyValue]:
-    return [KeyValue(key, value) for key, value in values.items()]

@@ -1,30 +1,40 @@
-"""Node `goal_router`: one goal topic for the whole fleet.
+"""Nodes beside RViz: `goal_router`, and `fleet_rviz`, which starts RViz for many quadcopters.
 
-It sends each goal of `/move_base_simple/goal` on to one quadcopter's own topic: the selected one,
-or the nearest one. A point on `/clicked_point` selects the quadcopter there. It subscribes to the
-transforms only while it looks for positions, because those of a fleet are many.
+`goal_router` is one goal topic for the whole fleet. It sends each goal of `/move_base_simple/goal`
+on to one quadcopter's own topic: the selected one, or the nearest one. A point on `/clicked_point`
+selects the quadcopter there. It subscribes to the transforms only while it looks for positions,
+because those of a fleet are many.
 """
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 import time
+from pathlib import Path
 from typing import Dict, Optional, Tuple
 
 import numpy as np
+import rospkg
 import rospy
+import yaml
 from geometry_msgs.msg import PointStamped, PoseStamped
 from visualization_msgs.msg import MarkerArray
 
+from quad_nav.errors import InputError, printable
+from quad_nav.files.output import reason, write_text
 from quad_nav.files.values import is_whole
 from quad_nav.ros.common.conversions import replacing_markers
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.scenario.scenario import scene_of
 from quad_nav.topics.goal_routing import GoalRouter, selection_markers
+from quad_nav.topics.rviz_file import EXIT_BAD_INPUT, arguments, document
 from quad_nav.topics.validation import MAX_MAGNITUDE
 
-EXIT_BAD_INPUT = 2
+EXIT_FAILURE = 1
 PATIENCE_S = 2.0  # wall time to wait for the transforms of all quadcopters
 POLL_S = 0.02
 
@@ -122,8 +132,8 @@ class GoalRouterNode:
         return found
 
 
-def main() -> int:
-    """Run the node; return 0, or 2 if the parameter `robots` is not valid."""
+def route_goals() -> int:
+    """Run the node `goal_router`; return 0, or 2 if the parameter `robots` is not valid."""
     init_node("goal_router")
     robots = rospy.get_param("~robots", 2)
     if not is_whole(robots) or robots < 1:
@@ -134,3 +144,26 @@ def main() -> int:
         time.sleep(0.2)
     del node
     return 0
+
+
+def run_rviz() -> int:
+    """Write RViz's configuration to the ROS log folder and replace this process by RViz.
+
+    Returns:
+        2 if the arguments are not valid, 1 if the file cannot be written; otherwise RViz's exit
+        status is the process's own.
+    """
+    given, others = arguments(sys.argv[1:])
+    try:
+        content = document(given.robots, scene_of(vars(given)))
+    except InputError as error:
+        print(printable(error, "\n"), file=sys.stderr)
+        return EXIT_BAD_INPUT
+    path = Path(rospkg.get_log_dir()) / "quad" / f"fleet-{os.getpid()}.rviz"
+    try:
+        write_text(path, yaml.safe_dump(content, sort_keys=False))
+    except OSError as error:
+        message = f"fleet_rviz: {path}: cannot be written: {reason(error)}"
+        print(printable(message), file=sys.stderr)
+        return EXIT_FAILURE
+    os.execvp("rviz", ["rviz", "-d", str(path), *others])

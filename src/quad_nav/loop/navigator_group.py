@@ -1,0 +1,358 @@
+"""A navigator group: the LIDARs and navigators of the robots that share a process.
+
+The robots of a flight are one group, or several in as many processes. A navigator knows of
+its peers what they publish, and nothing that they publish in the same instant, so that the
+division into groups does not change the flight.
+
+A shell that has more around its navigators, as topics and actions, makes a subclass and passes it
+to the loop as its ``GroupFactory``.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from typing import Callable, Dict, List, Mapping, Optional, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.config import Configuration
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.scan_intake import ScanIntake, SensorPose, sinks_of
+from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.loop import LoopSetup
+from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.peers.peer import Intention, Peer, idle_priority
+from quad_nav.scenario.assembly import build_navigator
+from quad_nav.scenario.scene_map import SceneMaps
+from quad_nav.sim.casters import Lidars
+from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.odometry import OdomFrames, pose_in
+from quad_nav.sim.simulation import STEPS_PER_S, RobotState, RobotStates
+
+LocatedScan = Tuple[Scan, Pose3D]
+"""A scan and ``map_from_lidar``, the LIDAR's pose at its stamp."""
+_IDENTITY = Pose2D(0.0, 0.0)
+SAME_TIME_S = 1e-9
+
+
+@dataclass(frozen=True)
+class NavigatorResult:
+    """The result of one navigator's tick.
+
+    Attributes:
+        robot: Number of the robot.
+        tick: What the navigator did.
+        located: The poses that it was given; unknown if only ``WorkerProcess`` knows them.
+        wall_s: Wall time of the tick.
+        goal_waits: The navigator has not taken the last goal that was sent.
+        intention: Intention in ``map``; None if the tick has not changed it.
+    """
+
+    robot: int
+    tick: Tick
+    located: RobotPoses
+    wall_s: float
+    goal_waits: bool
+    intention: Optional[Intention]
+
+
+class LoopRobot:
+    """One robot's navigator in the loop: scans, poses and goals in, ticks out.
+
+    Attributes:
+        navigator: The navigator.
+        waiting_goal: The last goal that was sent, in ``map``, until the navigator takes it.
+        due_s: Time before which no tick is due, unless a goal waits. Who changes the navigator
+            between ticks sets it to -inf.
+        plan: The last global plan, float64[n, 3] in its costmap's frame, None before the first.
+        local_plan: The last local plan, the same.
+        limited_by: Name of the peer that limited the last command, "" if none did.
+        stopped_reason: Why the robot stops for lack of data, "" if it does not.
+        cycle_wall_s: Wall time of the last tick with a control cycle, None before the first.
+    """
+
+    def __init__(
+        self, configuration: Configuration, number: int, frames: OdomFrames, start_s: float = 0.0
+    ) -> None:
+        """Build the navigator of robot ``number``.
+
+        Args:
+            configuration: Its parameters.
+            number: Number of the robot.
+            frames: Odometry frames of all robots.
+            start_s: Time at which they began to drift.
+        """
+        self.navigator = build_navigator(configuration, number)
+        self.waiting_goal: Optional[Pose2D] = None
+        self.due_s = -math.inf
+        self.plan: Optional[NDArray[np.float64]] = None
+        self.local_plan: Optional[NDArray[np.float64]] = None
+        self.limited_by = self.stopped_reason = ""
+        self.cycle_wall_s: Optional[float] = None
+        self._number, self._frames, self._start_s = number, frames, start_s
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        self._intake = ScanIntake(sinks_of(costmaps), configuration.scan_validator)
+
+    def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> str:
+        """Hand a scan that arrives now to the costmaps; return why not, "" if they have it."""
+        at = {
+            frame: SensorPose(pose, pose)
+            for frame, pose in self._in_costmaps(map_from_lidar, now_s).items()
+        }
+        poses = [at[sink.costmap.params.global_frame] for sink in self._intake.sinks]
+        return self._intake.add_scan(scan, poses, scan.stamp_s, now_s)
+
+    def is_due(self, now_s: float) -> bool:
+        """Set the waiting goal if the navigator accepts it; return True if a tick is due."""
+        navigator = self.navigator
+        if self.waiting_goal is not None and navigator.accepts_goal(now_s):
+            goal, map_from_global = self.waiting_goal, self.map_from_global(now_s)
+            if map_from_global != _IDENTITY:
+                goal = goal.relative_to(map_from_global)
+            navigator.set_goal(goal, now_s)
+            self.waiting_goal = None
+        self.due_s = -math.inf if navigator.has_work else navigator.next_due_s
+        return self.due_s <= now_s + SAME_TIME_S
+
+    def navigate(
+        self, now_s: float, state: RobotState, peers: Sequence[Peer]
+    ) -> Tuple[Tick, RobotPoses]:
+        """Tick the navigator; also return the poses that it was given.
+
+        Args:
+            now_s: Simulated time.
+            state: State of the robot.
+            peers: The other robots, in ``map``.
+        """
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        for costmap in costmaps:
+            if costmap.map_frames:
+                costmap.set_map_poses(self._map_poses(costmap, now_s))
+        poses = self._in_costmaps(state.map_from_base, now_s)
+        in_global, in_local = (poses[one.params.global_frame].to_2d() for one in costmaps)
+        located = RobotPoses(in_global, in_local)
+        map_from_global = self.map_from_global(now_s)
+        if map_from_global != _IDENTITY:
+            peers = [peer.relative_to(map_from_global) for peer in peers]
+        tick = self.navigator.tick(now_s, located, state.twist, peers)
+        self.due_s = -math.inf if self.navigator.has_work else self.navigator.next_due_s
+        self._remember(tick)
+        return tick, located
+
+    def _remember(self, tick: Tick) -> None:
+        """Keep what a tick has only when it is new; see ``loop.inspection``."""
+        if tick.plan is not None or tick.planning_failed:
+            self.plan = tick.plan
+        if tick.cycle:
+            self.local_plan = None if tick.control is None else tick.control.local_plan
+            self.stopped_reason = tick.warnings[0] if tick.is_stopped else ""
+        if tick.command is not None:
+            self.limited_by = tick.limited_by
+
+    def intention(self, now_s: float) -> Intention:
+        """Return the navigator's intention in ``map``."""
+        intention, map_from_global = self.navigator.peers.intention, self.map_from_global(now_s)
+        if map_from_global == _IDENTITY:
+            return intention
+        return intention.transformed(map_from_global)
+
+    def reset(self, frames: OdomFrames, start_s: float, jumped_back: bool) -> None:
+        """Continue with other odometry frames; see ``NavigatorGroup.reset``."""
+        self._frames, self._start_s = frames, start_s
+        self.due_s = -math.inf
+        if jumped_back:
+            self._intake.reset()
+            self.navigator.restart(start_s)
+
+    def map_from_global(self, now_s: float) -> Pose2D:
+        """Return the pose of the global costmap's frame in ``map``."""
+        return self.map_from(self.navigator.global_costmap.params.global_frame, now_s)
+
+    def map_from(self, frame: str, now_s: float) -> Pose2D:
+        """Return the pose of a costmap's frame in ``map``."""
+        return self._frames.map_from_frame(frame, self._number, now_s - self._start_s)
+
+    def _map_poses(self, costmap: LayeredCostmap, now_s: float) -> Dict[str, Optional[Pose3D]]:
+        """Return the pose of a costmap's frame in the frames of its maps, which are ``map``."""
+        frame = costmap.params.global_frame
+        pose = self.map_from(frame, now_s).to_3d()
+        return dict.fromkeys(costmap.map_frames, pose)
+
+    def _in_costmaps(self, map_from_pose: Pose3D, now_s: float) -> Dict[str, Pose3D]:
+        """Express a pose in ``map`` in the frames of the costmaps, by their names."""
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        return {
+            frame: pose_in(self.map_from(frame, now_s), map_from_pose)
+            for frame in dict.fromkeys(costmap.params.global_frame for costmap in costmaps)
+        }
+
+
+class NavigatorGroup:
+    """The LIDARs and navigators of some of a set-up's robots.
+
+    A subclass of a shell may extend ``new_robot``, ``set_maps``, ``scan``, ``due_s``,
+    ``before_ticks``, ``tick``, ``reset`` and ``close``. All of them are called in the group's
+    process, by one thread.
+
+    Attributes:
+        setup: The loop's set-up.
+        robots: The group's robots, by number.
+        intentions: Intentions in ``map`` of all robots of the set-up.
+        lidar_enabled: bool[n], LIDARs that are on, of all robots of the set-up.
+        last_scans: The last scans, by the robots' numbers.
+    """
+
+    def __init__(self, setup: LoopSetup, robots: Sequence[int], lidars: Lidars) -> None:
+        """Build the navigators of ``robots``; ``lidars`` are those of all robots."""
+        self.setup = setup
+        self._lidars = lidars
+        self._start_s = setup.start_step / STEPS_PER_S
+        self._frames = self._frames_of(setup.seed)
+        self.lidar_enabled = np.ones(len(setup.names), dtype=bool)
+        self.intentions = [Intention(idle_priority(n)) for n in range(len(setup.names))]
+        self.last_scans: Dict[int, LocatedScan] = {}
+        self.robots = {number: self.new_robot(number) for number in robots}
+        self.set_maps()
+
+    def set_maps(self) -> None:
+        """Give static layers the scene's map."""
+        maps = SceneMaps(self.setup.scene)
+        for robot in self.robots.values():
+            maps.set_map_of(robot.navigator.global_costmap)
+            maps.set_map_of(robot.navigator.local_costmap)
+
+    def new_robot(self, number: int) -> LoopRobot:
+        """Build a robot's navigator."""
+        return LoopRobot(self.setup.configurations[number], number, self._frames, self._start_s)
+
+    def scan(self, now_s: float, states: RobotStates) -> Dict[int, LocatedScan]:
+        """Take a scan with each LIDAR that is on and pass it to the robot's navigator.
+
+        Returns:
+            The scans, by the robots' numbers.
+        """
+        scans = {}
+        numbers = [number for number in self.robots if self.lidar_enabled[number]]
+        for number, scan in zip(numbers, self._lidars.scan(states.bodies, numbers, now_s)):
+            map_from_lidar = states[number].map_from_base.compose(base_from_lidar)
+            self.robots[number].add_scan(scan, map_from_lidar, now_s)
+            scans[number] = (scan, map_from_lidar)
+        self.last_scans = scans
+        return scans
+
+    @property
+    def due_s(self) -> float:
+        """Time before which ``navigate`` has nothing to do, unless there are new goals."""
+        due_s = math.inf
+        for robot in self.robots.values():
+            if robot.waiting_goal is not None:
+                return -math.inf
+            due_s = min(due_s, robot.due_s)
+        return due_s
+
+    def navigate(
+        self, now_s: float, states: RobotStates, goals: Mapping[int, Pose2D]
+    ) -> List[NavigatorResult]:
+        """Tick the navigators that are due; the loop calls it from ``due_s`` on.
+
+        Args:
+            now_s: Simulated time.
+            states: States of all robots.
+            goals: New goals in ``map`` of robots of this group, by number.
+        """
+        for number, goal in goals.items():
+            self.robots[number].waiting_goal = goal
+        self.before_ticks(now_s)
+        soon_s = now_s + SAME_TIME_S
+        due = [
+            number
+            for number, robot in self.robots.items()
+            if (robot.due_s <= soon_s or robot.waiting_goal is not None) and robot.is_due(now_s)
+        ]
+        peers = self._peers_in_reach(due, now_s, states)
+        results = [self.tick(number, now_s, states, peers[number]) for number in due]
+        for result in results:
+            if result.intention is not None:
+                self.intentions[result.robot] = result.intention
+        return results
+
+    def before_ticks(self, now_s: float) -> None:
+        """Do something before the navigators that are due are chosen, as to set goals."""
+
+    def tick(
+        self, number: int, now_s: float, states: RobotStates, peers: Sequence[Peer]
+    ) -> NavigatorResult:
+        """Tick one navigator.
+
+        Args:
+            number: Number of the robot.
+            now_s: Simulated time.
+            states: States of all robots.
+            peers: The peers in reach, in ``map``.
+        """
+        robot = self.robots[number]
+        start_s = time.perf_counter()
+        tick, located = robot.navigate(now_s, states[number], peers)
+        intention = robot.intention(now_s)
+        wall_s = time.perf_counter() - start_s
+        if tick.cycle:
+            robot.cycle_wall_s = wall_s
+        return NavigatorResult(
+            number,
+            tick,
+            located,
+            wall_s,
+            robot.waiting_goal is not None,
+            None if intention.is_same(self.intentions[number]) else intention,
+        )
+
+    def reset(self, now_s: float, seed: int, jumped_back: bool, lidars: Lidars) -> None:
+        """Continue after a reset of the simulation.
+
+        Args:
+            now_s: Simulated time.
+            seed: Seed of the simulation.
+            jumped_back: The clock has jumped back, so that the navigators restart.
+            lidars: LIDARs of all robots.
+        """
+        self._lidars, self._start_s, self._frames = lidars, now_s, self._frames_of(seed)
+        for robot in self.robots.values():
+            robot.reset(self._frames, now_s, jumped_back)
+
+    def close(self) -> None:
+        """Free what a subclass holds; nothing is called afterwards."""
+
+    def _frames_of(self, seed: int) -> OdomFrames:
+        return OdomFrames(self.setup.simulation.odom_drift, len(self.setup.names), seed)
+
+    def _peers_in_reach(
+        self, robots: List[int], now_s: float, states: RobotStates
+    ) -> Dict[int, List[Peer]]:
+        """The peers within each robot's ``peers.reach_m``, by the robots' numbers."""
+        if len(self.setup.names) == 1 or not robots:
+            return {robot: [] for robot in robots}
+        positions_m = states.bodies.positions_m[:, :2]
+        offsets_m = positions_m - positions_m[robots][:, None]
+        reaches_m = np.array([self.robots[robot].navigator.peers.reach_m for robot in robots])
+        is_near = np.hypot(offsets_m[..., 0], offsets_m[..., 1]) < reaches_m[:, None]
+        is_near[np.arange(len(robots)), robots] = False
+        peers = {
+            robot: self._as_peer(robot, now_s, states)
+            for robot in np.flatnonzero(is_near.any(axis=0)).tolist()
+        }
+        return {
+            robot: [peers[other] for other in np.flatnonzero(row).tolist()]
+            for robot, row in zip(robots, is_near)
+        }
+
+    def _as_peer(self, robot: int, now_s: float, states: RobotStates) -> Peer:
+        x_m, y_m, _, _, _, _, vx_mps, vy_mps = states.planar[robot].tolist()
+        name, intention = self.setup.names[robot], self.intentions[robot]
+        return Peer(name, x_m, y_m, vx_mps, vy_mps, now_s, intention)
+
+
+GroupFactory = Callable[[LoopSetup, Sequence[int], Lidars], NavigatorGroup]
+"""Maker of the group of a process: of the set-up, its robots' numbers, and all robots' LIDARs."""

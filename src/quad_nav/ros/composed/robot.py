@@ -1,0 +1,163 @@
+"""One robot of a composed fleet: its navigator in the loop, and its ROS interface."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Dict, List, Optional, Sequence, Tuple
+
+import rospy
+
+from quad_nav.config import Configuration
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.scan_intake import ScanIntake, Sink, sinks_of
+from quad_nav.errors import PluginError
+from quad_nav.geometry import Pose3D, Scan, Twist2D
+from quad_nav.loop.navigator_group import LoopRobot
+from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.peers.peer import Peer
+from quad_nav.ros.common.transforms import Transforms
+from quad_nav.ros.navigator import sensors, static_maps
+from quad_nav.ros.navigator.health_meters import InputMeter
+from quad_nav.ros.navigator.intention_topics import IntentionPublisher
+from quad_nav.ros.navigator.robot_interface import RobotInterface
+from quad_nav.sim.odometry import OdomFrames
+from quad_nav.sim.simulation import RobotState
+from quad_nav.topics.publishing import Names, in_fleet
+
+_MAP_FRAME = "map"
+
+
+class ComposedRobot(LoopRobot):
+    """A navigator that has its inputs from the loop, and everything else from topics.
+
+    Sensors that the simulation does not have keep their topics, and so do static maps.
+
+    Attributes:
+        interface: Topics, services, action and parameters.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        number: int,
+        frames: OdomFrames,
+        start_s: float,
+        transforms: Transforms,
+    ) -> None:
+        """Build the navigator and its interface.
+
+        Args:
+            configuration: Its parameters.
+            number: Number of the robot.
+            frames: Odometry frames of all robots.
+            start_s: Time at which they began to drift.
+            transforms: Transform tree, for goals, sensors and maps in other frames.
+        """
+        super().__init__(configuration, number, frames, start_s)
+        names = in_fleet(number)
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        sinks = sinks_of(costmaps)
+        lidar = [one for one in sinks if _is_of_lidar(one, number, names)]
+        self._intake = ScanIntake(lidar, configuration.scan_validator)
+        others, validator = [one for one in sinks if one not in lidar], configuration.scan_validator
+        self._sensors = sensors.connect(f"quad{number}", others, validator, names)
+        self._transforms = transforms
+        self._now_s = start_s
+        self._state: Optional[RobotState] = None
+        self.interface = RobotInterface(
+            configuration,
+            self.navigator,
+            transforms,
+            self._located_now,
+            names,
+            [self._intake, *(sensor.intake for sensor in self._sensors)],
+            self._new_meters(names),
+        )
+        self._maps = static_maps.connect(costmaps, self.interface.lock, names)
+        self._intention = IntentionPublisher(names, costmaps[0].params.global_frame)
+
+    def _new_meters(self, names: Names) -> List[InputMeter]:
+        self._odometry_meter = InputMeter(names("odom"))
+        self._scan_meter = InputMeter(names("scan"), self._intake.expected_period_s)
+        has_lidar = bool(self._intake.sinks)
+        return [
+            self._odometry_meter,
+            *([self._scan_meter] if has_lidar else []),
+            *(sensor.meter() for sensor in self._sensors),
+        ]
+
+    @property
+    def needs_transforms(self) -> bool:
+        """True if a sensor of another node delivers messages, with stamps of the past."""
+        return bool(self._sensors)
+
+    @property
+    def subscribers(self) -> List[rospy.Subscriber]:
+        """Subscribers to the topics that the navigator needs."""
+        return [sensor.subscriber for sensor in self._sensors]
+
+    def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> str:
+        """Hand a scan to the costmaps; a plugin's mistake aborts the goal."""
+        self._scan_meter.add(scan.stamp_s, now_s)
+        with self.interface.lock:
+            try:
+                reason = super().add_scan(scan, map_from_lidar, now_s)
+            except PluginError as error:
+                self.interface.abort(error)
+                return ""
+        if reason:
+            self.interface.warnings.warn(
+                sensors.rejection(self.interface.name, reason, self._intake)
+            )
+        return reason
+
+    def poll(self, now_s: float, state: RobotState) -> None:
+        """Take the robot's state, and what has come from topics: goals, messages of sensors."""
+        with self.interface.lock:
+            self._now_s, self._state = now_s, state
+            self._odometry_meter.add(now_s, now_s)
+            for sensor in self._sensors:
+                sensor.deliver(self._transforms)
+            self.interface.poll(now_s)
+            self.due_s = -math.inf  # goals, requests and parameters may have changed it
+        self._intention.publish(self.navigator.peers.intention, now_s)
+
+    def navigate(
+        self, now_s: float, state: RobotState, peers: Sequence[Peer]
+    ) -> Tuple[Tick, RobotPoses]:
+        """Tick the navigator and publish the results; a plugin's mistake aborts the goal."""
+        with self.interface.lock:
+            try:
+                start_s = time.perf_counter()
+                tick, located = super().navigate(now_s, state, peers)
+                wall_s = time.perf_counter() - start_s
+                in_global = self._in_costmaps(state.map_from_base, now_s)
+                frame = self.navigator.global_costmap.params.global_frame
+                self.interface.publish(tick, in_global[frame], located, wall_s)
+            except PluginError as error:
+                self.interface.abort(error)
+                return Tick(now_s, command=Twist2D()), RobotPoses(None, None)
+        return tick, located
+
+    def _map_poses(self, costmap: LayeredCostmap, now_s: float) -> Dict[str, Optional[Pose3D]]:
+        """Return the pose of a costmap's frame in the frames of its maps, of which some are odd."""
+        if set(costmap.map_frames) <= {_MAP_FRAME}:
+            return super()._map_poses(costmap, now_s)
+        interface = self.interface
+        return static_maps.map_poses(interface.name, costmap, self._transforms, interface.warnings)
+
+    def _located_now(self) -> Tuple[float, RobotPoses]:
+        if self._state is None:
+            return self._now_s, RobotPoses(None, None)
+        poses = self._in_costmaps(self._state.map_from_base, self._now_s)
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        in_global, in_local = (poses[one.params.global_frame].to_2d() for one in costmaps)
+        return self._now_s, RobotPoses(in_global, in_local)
+
+
+def _is_of_lidar(sink: Sink, number: int, names: Names) -> bool:
+    """True if a source of a layer is the simulated LIDAR, in its own frame."""
+    return sensors.topic_of(sink, names) == (names("scan"), "LaserScan") and (
+        sink.source.sensor_frame in ("", f"Lidar{number}")
+    )

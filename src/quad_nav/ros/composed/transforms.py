@@ -1,0 +1,65 @@
+"""Transforms of a composed fleet: those of other nodes, and the frames of the simulated robots."""
+
+from __future__ import annotations
+
+from typing import Optional, Tuple
+
+from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.ros.common.conversions import time_message, transform_message
+from quad_nav.ros.common.transforms import Transforms
+from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.odometry import OdomFrames, pose_in
+from quad_nav.sim.simulation import RobotStates
+
+
+class ComposedTransforms(Transforms):
+    """Transform tree to which the robots' frames are added when a lookup needs them.
+
+    Few lookups are needed: a robot's own poses come from the loop.
+    """
+
+    def __init__(self) -> None:
+        """Subscribe to the transforms of other nodes."""
+        super().__init__()
+        self._present: Optional[Tuple[float, RobotStates, OdomFrames, float]] = None
+        self._stored_s = -1.0
+
+    def update(
+        self, now_s: float, states: RobotStates, frames: OdomFrames, elapsed_s: float
+    ) -> None:
+        """Take the states of all robots at a time.
+
+        Args:
+            now_s: Simulated time.
+            states: States of all robots.
+            frames: Odometry frames of all robots.
+            elapsed_s: Time since these began to drift.
+        """
+        self._present = now_s, states, frames, elapsed_s
+
+    def store(self) -> None:
+        """Add the frames of all robots as they are now, once for each time."""
+        present = self._present
+        if present is None or present[0] == self._stored_s:
+            return
+        now_s, states, frames, elapsed_s = present
+        self._stored_s = now_s
+        stamp = time_message(now_s)
+        with self._lock:
+            self._update_time()
+            for robot, state in enumerate(states):
+                map_from_odom: Pose2D = frames.map_from_odom(robot, elapsed_s)
+                odom_from_base = pose_in(map_from_odom, state.map_from_base)
+                odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"
+                for pose, parent, child in (
+                    (map_from_odom.to_3d(), "map", odom),
+                    (odom_from_base, odom, base),
+                    (base_from_lidar, base, lidar),
+                ):
+                    self._store(transform_message(pose, parent, child, stamp), is_static=False)
+
+    def _lookup(
+        self, to_frame: str, from_frame: str, stamp_s: Optional[float]
+    ) -> Tuple[Pose3D, float]:
+        self.store()
+        return super()._lookup(to_frame, from_frame, stamp_s)

@@ -1,0 +1,292 @@
+"""Publish intentions of robots, and receive those of others.
+
+`/move_base{j}/intention` is a `nav_msgs/Path` with the intention of robot j: `header.stamp` is the
+time of publication, the poses are the path, and the stamps of the poses hold the negated priority
+(`peers.peer.priority_of`), the time at which the goal was set. An empty path means that the robot
+stays where it is.
+
+`/quad/intentions` is a `sensor_msgs/PointCloud2` with the intentions of a host's robots. Each point
+is one of a robot's path and has the robot's number and priority. A robot that stays where it is has
+one point, which is NaN. A robot that is in no such message is heard from its own topic.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Dict, Iterable, List, Mapping, Optional, Tuple
+
+import numpy as np
+import rospy
+from nav_msgs.msg import Path
+from numpy.typing import NDArray
+from sensor_msgs.msg import PointCloud2, PointField
+
+from quad_nav.peers.peer import Intention, Peer, assumed_intention, idle_priority
+from quad_nav.ros.common.conversions import time_message
+from quad_nav.ros.common.nav_messages import path_message
+from quad_nav.ros.common.state_topics import OwnTopics
+from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.topics.publishing import Names
+from quad_nav.topics.validation import (
+    MAX_LEAD_S,
+    MAX_POINTS,
+    MAX_POSES,
+    MAX_TIME_S,
+    path_problem,
+    stamp_problem,
+)
+
+INTENTIONS_TOPIC = "/quad/intentions"
+REPEAT_S = 0.25
+INTENTION_VALID_S = 2.0  # the navigator that published an older intention has died
+_POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("robot", "<u4"), ("priority", "<f8")])
+_FIELDS = [
+    PointField("x", 0, PointField.FLOAT32, 1),
+    PointField("y", 4, PointField.FLOAT32, 1),
+    PointField("z", 8, PointField.FLOAT32, 1),
+    PointField("robot", 12, PointField.UINT32, 1),
+    PointField("priority", 16, PointField.FLOAT64, 1),
+]
+
+
+class _Schedule:
+    """Publish an intention at once when it changes, else every `REPEAT_S`."""
+
+    def __init__(self) -> None:
+        self._published_s = 0.0
+        self._published: Optional[Intention] = None
+
+    def is_due(self, intention: Intention, now_s: float) -> bool:
+        published = self._published
+        is_same = (
+            published is not None
+            and published.path is intention.path
+            and published.priority == intention.priority
+        )
+        return not is_same or not 0.0 <= now_s - self._published_s < REPEAT_S
+
+    def note(self, intention: Intention, now_s: float) -> None:
+        self._published_s, self._published = now_s, intention
+
+
+class IntentionPublisher:
+    """Publish the intention of a robot."""
+
+    def __init__(self, names: Names, frame: str) -> None:
+        """Advertise the topic.
+
+        Args:
+            names: Names of the robot's topics.
+            frame: Frame of the robot's intentions.
+        """
+        self._frame = frame
+        self._publisher = rospy.Publisher(names("~intention"), Path, queue_size=1)
+        self._schedule = _Schedule()
+
+    def publish(self, intention: Intention, now_s: float) -> None:
+        """Publish the intention: at once when it changes, else every `REPEAT_S`."""
+        if self._publisher.get_num_connections() and self._schedule.is_due(intention, now_s):
+            self._schedule.note(intention, now_s)
+            self._publisher.publish(intention_message(intention, self._frame, now_s))
+
+
+class FleetIntentionPublisher:
+    """Publish the intentions of all robots of a host in one message."""
+
+    def __init__(self, robots: Iterable[int], frame: str, own_connections: int) -> None:
+        """Advertise the topic.
+
+        Args:
+            robots: Numbers of the robots.
+            frame: Frame of the intentions.
+            own_connections: Number of this node's own subscriptions to the topic.
+        """
+        self._frame, self._own_connections = frame, own_connections
+        self._publisher = rospy.Publisher(INTENTIONS_TOPIC, PointCloud2, queue_size=10)
+        self._schedules = {robot: _Schedule() for robot in robots}
+        self._intentions: Dict[int, Intention] = {}
+
+    def set(self, robot: int, intention: Intention) -> None:
+        """Store the present intention of a robot."""
+        self._intentions[robot] = intention
+
+    def publish(self, now_s: float) -> None:
+        """Publish all intentions if one is due."""
+        if self._publisher.get_num_connections() <= self._own_connections:
+            return
+        intentions = self._intentions
+        if any(self._schedules[robot].is_due(one, now_s) for robot, one in intentions.items()):
+            for robot, one in intentions.items():
+                self._schedules[robot].note(one, now_s)
+            self._publisher.publish(intentions_message(intentions, self._frame, now_s))
+
+
+class IntentionListener:
+    """Receive the intentions of robots."""
+
+    def __init__(self, robots: Iterable[int], transforms: Transforms, frame: str) -> None:
+        """Subscribe to the intentions of hosts.
+
+        Args:
+            robots: Numbers of the robots.
+            transforms: Converts their intentions to `frame`.
+            frame: Frame of the intentions.
+        """
+        self._transforms, self._frame = transforms, frame
+        self._robots = frozenset(robots)
+        self._intentions: Dict[int, Tuple[float, Intention]] = {}  # with the time
+        self._own_topics = OwnTopics(
+            max(self._robots, default=0) + 1, self._robots, self._subscribe
+        )
+        self.subscribers: List[rospy.Subscriber] = []
+        if self._robots:
+            self.subscribers.append(
+                rospy.Subscriber(INTENTIONS_TOPIC, PointCloud2, self._on_intentions, queue_size=10)
+            )
+
+    def _subscribe(self, robot: int) -> rospy.Subscriber:
+        return rospy.Subscriber(
+            f"/move_base{robot}/intention",
+            Path,
+            partial(self._on_intention, robot),
+            queue_size=1,
+        )
+
+    def _on_intentions(self, message: PointCloud2) -> None:
+        sent_s, frame = message.header.stamp.to_sec(), message.header.frame_id
+        try:
+            received = intentions_from_message(message, self._robots)
+            if stamp_problem(sent_s, rospy.get_time()):
+                raise ValueError(stamp_problem(sent_s, rospy.get_time()))
+        except ValueError as error:
+            rospy.logwarn_throttle(5.0, f"{INTENTIONS_TOPIC}: intentions dropped: {error}")
+            return
+        try:
+            received = self._in_own_frame(received, frame)
+        except TransformUnavailable as error:
+            rospy.logwarn_throttle(
+                5.0, f"{INTENTIONS_TOPIC}: intentions dropped: frame '{frame}': {error}"
+            )
+            return
+        self._own_topics.hear(np.array(list(received), np.int64))
+        for robot, intention in received.items():
+            self._intentions[robot] = sent_s, intention
+
+    def _on_intention(self, number: int, message: Path) -> None:
+        if self._own_topics.is_in_bulk(number):
+            return
+        intention, frame = intention_from_message(message, number), message.header.frame_id
+        if len(intention.path):
+            try:
+                intention = self._in_own_frame({number: intention}, frame)[number]
+            except TransformUnavailable as error:
+                rospy.logwarn_throttle(
+                    5.0,
+                    f"quad{number}: intention dropped, expecting straight flight: frame '{frame}':"
+                    f" {error}",
+                )
+                self._intentions.pop(number, None)
+                return
+        self._intentions[number] = message.header.stamp.to_sec(), intention
+
+    def _in_own_frame(self, received: Dict[int, Intention], frame: str) -> Dict[int, Intention]:
+        """Convert intentions, by robot, from another frame.
+
+        Raises:
+            TransformUnavailable: The transform is not known.
+        """
+        if not received or frame.lstrip("/") == self._frame.lstrip("/"):
+            return received
+        own_from_frame = self._transforms.lookup(self._frame, frame).to_2d()
+        return {robot: one.transformed(own_from_frame) for robot, one in received.items()}
+
+    def set(self, number: int, intention: Intention, now_s: float) -> None:
+        """Store the intention of a robot that needs no topic."""
+        self._intentions[number] = now_s, intention
+
+    def of(self, number: int, peer: Peer, now_s: float) -> Intention:
+        """Return the intention of a robot with this state: the last received or an assumed one."""
+        self._own_topics.check()
+        received = self._intentions.get(number)
+        if received is None:
+            return assumed_intention(peer)
+        sent_s, intention = received
+        if not -MAX_LEAD_S <= now_s - sent_s <= INTENTION_VALID_S:
+            return Intention(idle_priority(number))
+        return intention
+
+
+def intention_message(intention: Intention, frame: str, now_s: float) -> Path:
+    """Convert an intention in `frame` to a message."""
+    path = np.column_stack((intention.path, np.zeros(len(intention.path))))
+    message = path_message(path, frame, time_message(-intention.priority))
+    message.header.stamp = time_message(now_s)
+    return message
+
+
+def intention_from_message(message: Path, number: int) -> Intention:
+    """Convert the message of robot `number`; an invalid one counts as "stays where it is"."""
+    if not message.poses:
+        return Intention(idle_priority(number))
+    path = np.array(
+        [(p.pose.position.x, p.pose.position.y) for p in message.poses[: MAX_POSES + 1]]
+    )
+    problem = path_problem(path)
+    if problem:
+        rospy.logwarn_throttle(5.0, f"quad{number}: intention dropped: {problem}")
+        return Intention(idle_priority(number))
+    return Intention(-message.poses[0].header.stamp.to_sec(), path)
+
+
+def intentions_message(
+    intentions: Mapping[int, Intention], frame: str, now_s: float
+) -> PointCloud2:
+    """Convert the intentions of robots in `frame` to one message."""
+    counts = [max(len(one.path), 1) for one in intentions.values()]
+    points = np.zeros(sum(counts), _POINT)
+    start = 0
+    for (robot, one), count in zip(intentions.items(), counts):
+        rows = points[start : start + count]
+        rows["robot"], rows["priority"] = robot, one.priority
+        rows["x"] = one.path[:, 0] if len(one.path) else np.nan
+        rows["y"] = one.path[:, 1] if len(one.path) else np.nan
+        start += count
+    message = PointCloud2(height=1, width=len(points), is_dense=False, fields=_FIELDS)
+    message.header.frame_id, message.header.stamp = frame, time_message(now_s)
+    message.point_step, message.row_step = _POINT.itemsize, points.nbytes
+    message.data = points.tobytes()
+    return message
+
+
+def intentions_from_message(message: PointCloud2, robots: Iterable[int]) -> Dict[int, Intention]:
+    """Convert the message to the intentions of some robots.
+
+    An invalid path counts as "stays where it is".
+
+    Raises:
+        ValueError: If the message has other fields, or not as much data as it says.
+    """
+    if message.fields != _FIELDS or message.point_step != _POINT.itemsize or message.is_bigendian:
+        raise ValueError(f"its fields are not {', '.join(field.name for field in _FIELDS)}")
+    count = message.width * message.height
+    if count > MAX_POINTS or count * _POINT.itemsize != len(message.data):
+        raise ValueError(f"{len(message.data)} bytes for {count} points")
+    points = np.frombuffer(message.data, _POINT)
+    starts = np.flatnonzero(np.diff(points["robot"].astype(np.int64), prepend=-1))
+    parts = zip(points["robot"][starts].tolist(), np.split(points, starts[1:]))
+    return {robot: _intention(robot, part) for robot, part in parts if robot in robots}
+
+
+def _intention(robot: int, points: NDArray[np.void]) -> Intention:
+    """Return the intention of a robot from its points."""
+    priority = float(points["priority"][0])
+    path = np.column_stack((points["x"], points["y"])).astype(np.float64)
+    problem = path_problem(path)
+    if not -MAX_TIME_S <= priority <= 0.0:
+        problem = f"priority {priority:g}, expected a negated time"
+    elif len(path) == 1 and np.isnan(path).all():
+        return Intention(priority)
+    if problem:
+        rospy.logwarn_throttle(5.0, f"quad{robot}: intention dropped: {problem}")
+        return Intention(idle_priority(robot))
+    return Intention(priority, path)

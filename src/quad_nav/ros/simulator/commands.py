@@ -1,0 +1,80 @@
+"""Velocity commands for the quadcopters: which count, and from whom."""
+
+from __future__ import annotations
+
+import collections
+import functools
+from typing import Deque, Tuple
+
+import rospy
+from geometry_msgs.msg import Twist
+
+from quad_nav.errors import excerpt
+from quad_nav.geometry import Twist2D
+from quad_nav.ros.common.conversions import twist_from_message
+from quad_nav.sim.simulation import Simulation
+from quad_nav.topics.validation import CommandLease, twist_problem
+
+_COMMANDS_PER_ROBOT = 20
+
+
+class Commands:
+    """Pass the commands of one node at a time to each quadcopter.
+
+    Commands come from the topics `/cmd_vel{i}`, which callbacks store, and from navigators in the
+    same process.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        """Subscribe to the topics of all quadcopters."""
+        self._simulation = simulation
+        robots, params = simulation.n_robots, simulation.params
+        self._lease = CommandLease(params.command_timeout_s + params.controller_period_s)
+        # Bounds the cost of a node that floods a topic.
+        self._waiting: Deque[Tuple[int, Twist]] = collections.deque(
+            maxlen=_COMMANDS_PER_ROBOT * robots
+        )
+        self._subscribers = [
+            rospy.Subscriber(
+                f"/cmd_vel{i}",
+                Twist,
+                functools.partial(self._store, i),
+                queue_size=10,
+                tcp_nodelay=True,
+            )
+            for i in range(robots)
+        ]
+
+    def _store(self, robot: int, message: Twist) -> None:
+        self._waiting.append((robot, message))
+
+    def take(self) -> None:
+        """Pass on the commands that have come from topics."""
+        while self._waiting:
+            robot, message = self._waiting.popleft()
+            node = excerpt(message._connection_header.get("callerid", "an unnamed node"))
+            self.give(robot, node, twist_from_message(message))
+
+    def give(self, robot: int, node: str, twist: Twist2D) -> None:
+        """Pass on a command of a node, unless another node controls the quadcopter."""
+        problem = twist_problem(twist)
+        if problem:
+            rospy.logwarn_throttle(5.0, "quad%d: command dropped: %s", robot, problem)
+            return
+        holder = self._lease.holder(robot, node, self._simulation.now_s)
+        if holder == node:
+            self._simulation.set_command(robot, twist)
+            return
+        rospy.logwarn_throttle(
+            5.0,
+            "quad%d: command of %s dropped: %s controls this quadcopter, expected one node at a"
+            " time",
+            robot,
+            node,
+            holder,
+        )
+
+    def clear(self) -> None:
+        """Forget all commands and release all leases."""
+        self._waiting.clear()
+        self._lease.clear()

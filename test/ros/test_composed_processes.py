@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""The processes of a composed fleet end together, with the exit status of the simulator."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from flight_case import PATIENCE_S, pid_of
+
+ROOT = Path(__file__).resolve().parents[2]
+NODE, CONFIG = str(ROOT / "nodes" / "simulator"), str(ROOT / "config" / "default")
+
+
+def children(pid):
+    """Numbers of the processes that a process has started, and of those that these have."""
+    found = []
+    for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+        found += [int(child), *children(int(child))]
+    return found
+
+
+def runs(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+class ComposedProcesses(unittest.TestCase):
+    def start(self, **parameters):
+        """The simulator's process."""
+        rospy.set_param("/use_sim_time", True)
+        given = {"robots": 2, "scene": "random", "config": CONFIG, "composed": True, "hosts": 2}
+        rospy.set_param("/simulator", {**given, **parameters})
+        self.addCleanup(rospy.set_param, "/simulator", {})
+        simulator = subprocess.Popen(
+            [sys.executable, NODE], stderr=subprocess.PIPE, start_new_session=True
+        )
+        self.addCleanup(simulator.stderr.close)
+        self.addCleanup(simulator.wait)
+        self.addCleanup(lambda: runs(simulator.pid) and os.killpg(simulator.pid, signal.SIGKILL))
+        return simulator
+
+    def wait(self, condition, what):
+        end = time.monotonic() + PATIENCE_S
+        while not condition():
+            self.assertLess(time.monotonic(), end, f"not in time: {what}")
+            time.sleep(0.02)
+
+    def test_no_worker_outlives_the_simulator(self):
+        for number, status in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 0)):
+            simulator = self.start()
+            self.wait(lambda: pid_of("/fleet1") is not None, "/fleet1")
+            rospy.wait_for_service("/simulation/start", PATIENCE_S)
+            workers = children(simulator.pid)
+            self.assertIn(pid_of("/fleet1"), workers)
+            simulator.send_signal(number)
+            self.assertEqual(simulator.wait(PATIENCE_S), status)
+            self.wait(lambda w=workers: not any(map(runs, w)), "the end of the workers")
+
+    def test_faults_are_listed_and_end_the_simulator(self):
+        simulator = self.start(hosts=3)
+        self.assertEqual(simulator.wait(PATIENCE_S), 2)
+        self.assertIn(b"expected a robot for each host", simulator.stderr.read())
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "composed_processes", ComposedProcesses)
