@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, NamedTuple, Tuple
 
@@ -36,16 +37,27 @@ def read_messages(path: Path, wanted: TopicFilter) -> Iterator[Message]:
     """
     open_file(path).close()  # refuses pipes, on which the libraries would block
     read = _read_mcap if path.suffix == ".mcap" else _read_bag
-    try:
+    with recording_faults(path):
         for topic, kind, stamp_ns, data in read(path, wanted):
             yield Message(topic, kind, stamp_ns, decode(data, kind))
+
+
+@contextmanager
+def recording_faults(path: Path) -> Iterator[None]:
+    """Say what is wrong with a recording whatever the libraries raise while they read it.
+
+    Raises:
+        InputError: The file is not a recording, is damaged or was not completed.
+    """
+    try:
+        yield
     except OSError as error:
         raise InputError(
             [f"{path}: cannot read: {error.strerror or error}; expected a recorded flight"]
         ) from error
     except (ReaderError, McapError) as error:
         raise InputError([f"{path}: {_problem_text(error)}"]) from error
-    except MemoryError:
+    except (MemoryError, InputError):
         raise
     except Exception as error:
         # For damaged files the two libraries also raise errors of struct and lz4, AssertionError
@@ -55,6 +67,11 @@ def read_messages(path: Path, wanted: TopicFilter) -> Iterator[Message]:
         ) from error
 
 
+def message_kind(name: str) -> str:
+    """Return a type as ROS spells it, ``nav_msgs/Path``, from rosbags' ``nav_msgs/msg/Path``."""
+    return name.replace("/msg/", "/")
+
+
 _Raw = Tuple[str, str, int, bytes]
 
 
@@ -62,7 +79,7 @@ def _read_bag(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
     with Reader(path) as reader:
         kinds: Dict[int, str] = {}
         for connection in reader.connections:
-            kind = connection.msgtype.replace("/msg/", "/")
+            kind = message_kind(connection.msgtype)
             if wanted(connection.topic, kind):
                 kinds[connection.id] = kind
         connections = [c for c in reader.connections if c.id in kinds]

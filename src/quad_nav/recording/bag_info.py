@@ -11,12 +11,14 @@ from typing import Any, Dict, Mapping, Optional
 
 from quad_nav.config.differences import differences
 from quad_nav.geometry import Pose3D
+from quad_nav.mission.goal import goal_faults
 
 LARGEST_M = 1e6
 MAX_SECONDS = 1e10
 """Larger than any stamp: stamps hold 32 bits of seconds."""
 LARGEST_HZ = 1e6
 MAX_ROBOTS = 100
+MAX_GOALS = 100_000
 _UNIT_WITHIN = 1e-2
 _MOST_LEVELS = 50
 _LONGEST_TEXT = 10_000
@@ -124,7 +126,18 @@ def _robot(value: Any) -> Dict[str, Any]:
     given: Dict[str, Any] = {"parameters": parameters}
     if "name" in fields:
         given["name"] = _text(fields, "name")
+    if "goals" in fields:
+        given["goals"] = _goals(fields)
     return given
+
+
+def _goals(fields: Mapping[str, Any]) -> Any:
+    goals = _list(fields, "goals", MAX_GOALS)
+    for number, entry in enumerate(goals):
+        fault = next(iter(goal_faults(entry)), "")
+        if fault:
+            raise ValueError(f"goals[{number}]{fault}")
+    return goals
 
 
 def _check_levels(value: Any, left: int) -> None:

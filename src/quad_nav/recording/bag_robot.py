@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Pose3D, yaw_from_quaternion
+from quad_nav.mission.goal import read_goal
 from quad_nav.navigator.tick import State
 from quad_nav.recording.bag_file import Message
 from quad_nav.recording.bag_info import checked_pose, require_finite
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import GoalTrace, RobotTrace
+from quad_nav.topics.right_of_way import RightOfWay, right_of_way_from_values
 
 _STATES = {state.value: state for state in State}
 
@@ -28,6 +30,8 @@ class BagRobot:
     def __init__(self) -> None:
         self.map_from_odom = Pose3D(0.0, 0.0, 0.0)
         self.odom_frame = ""
+        self._odom_frames: List[Tuple[float, Pose2D]] = []
+        self._rights_of_way: List[Tuple[float, RightOfWay]] = []
         self._moves: List[Tuple[float, ...]] = []
         self._commands: List[Tuple[float, float, float, float]] = []
         self._cycles: List[float] = []
@@ -50,6 +54,24 @@ class BagRobot:
     def last_s(self) -> float:
         """Time of the last odometry."""
         return self._moves[-1][0]
+
+    def set_odom_frame(self, time_s: float, frame: str, map_from_odom: Pose3D) -> None:
+        """Place the odometry frame in ``map`` from a time on."""
+        if not self.odom_frame or map_from_odom != self.map_from_odom:
+            self._odom_frames.append((time_s, map_from_odom.to_2d()))
+        self.odom_frame, self.map_from_odom = frame, map_from_odom
+
+    def add_right_of_way(self, message: Message) -> None:
+        """Add a change of what the robot does for its peers.
+
+        Raises:
+            ValueError: A value is missing or invalid.
+        """
+        status = message.content
+        right = right_of_way_from_values(
+            status.message, {pair.key: pair.value for pair in status.values}
+        )
+        self._rights_of_way.append((message.stamp_ns / 1e9, right))
 
     def add_odometry(self, message: Message) -> None:
         """Add a ``nav_msgs/Odometry``.
@@ -166,6 +188,9 @@ class BagRobot:
             tuple((time_s - start_s, name) for time_s, name in self._recoveries),
             tuple(_goal(event, start_s) for event in self._goals),
             info.get("parameters", {}),
+            tuple(map(read_goal, info.get("goals", ()))),
+            tuple((time_s - start_s, pose) for time_s, pose in self._odom_frames),
+            tuple((time_s - start_s, right) for time_s, right in self._rights_of_way),
         )
 
 

@@ -6,6 +6,7 @@ Times are seconds since the flight's start.
 
 from __future__ import annotations
 
+import functools
 import re
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Tuple
@@ -56,6 +57,11 @@ _ROBOT_TOPICS: Tuple[Tuple[str, str, Callable[[BagRobot, Message], None]], ...] 
         "move_base_msgs/RecoveryStatus",
         BagRobot.add_recovery,
     ),
+    (
+        r"/move_base([0-9]{1,4})/right_of_way",
+        "diagnostic_msgs/DiagnosticStatus",
+        BagRobot.add_right_of_way,
+    ),
 )
 
 
@@ -66,6 +72,15 @@ def read_trace(path: Path) -> FlightTrace:
 
     Raises:
         InputError: The file is not a recording, is damaged or has no odometry.
+    """
+    return read_recording(path).trace(path)
+
+
+def read_recording(path: Path) -> TraceReader:
+    """Read what the trace of a recorded flight is made of.
+
+    Raises:
+        InputError: The file is not a recording, or is damaged.
     """
     try:
         with limit_memory(MAX_MEMORY_BYTES):
@@ -79,7 +94,7 @@ def read_trace(path: Path) -> FlightTrace:
         ) from error
 
 
-def _read(path: Path) -> FlightTrace:
+def _read(path: Path) -> TraceReader:
     reader = TraceReader()
     for message in read_messages(path, _is_wanted):
         try:
@@ -91,13 +106,14 @@ def _read(path: Path) -> FlightTrace:
                     "of docs/recording.md"
                 ]
             ) from error
-    return reader.trace(path)
+    return reader
 
 
 def _is_wanted(topic: str, kind: str) -> bool:
     return (topic, kind) in _COMMON_TOPICS or _robot_topic(topic, kind) is not None
 
 
+@functools.lru_cache(maxsize=10_000)
 def _robot_topic(
     topic: str, kind: str
 ) -> Optional[Tuple[int, Callable[[BagRobot, Message], None]]]:
@@ -108,13 +124,28 @@ def _robot_topic(
     return None
 
 
+@functools.lru_cache(maxsize=10_000)
+def _odom_number(frame: str) -> Optional[int]:
+    """Return the number of the robot that an odometry frame belongs to, None for other frames."""
+    match = re.fullmatch(r"/?odom([0-9]{1,4})", frame)
+    return int(match.group(1)) if match else None
+
+
 class TraceReader:
-    """Collects the messages of a recording and builds a ``FlightTrace``."""
+    """Collects the messages of a recording and builds a ``FlightTrace``.
+
+    Attributes:
+        robots: Messages of each robot.
+        info: Facts of ``/quad/flight``.
+        contacts: Contacts, at times on the recording's clock.
+        clocks_ns: Time of recording, and time on ``/clock``, of each of its messages.
+    """
 
     def __init__(self) -> None:
         self.robots: Dict[int, BagRobot] = {}
         self.info: Dict[str, Any] = {}
         self.contacts: List[Contact] = []
+        self.clocks_ns: List[Tuple[int, int]] = []
         self._clock_ns: Optional[int] = None
 
     def add(self, message: Message) -> None:
@@ -126,9 +157,9 @@ class TraceReader:
         Raises:
             ValueError: The message is invalid.
         """
-        if self._clock_ns is not None:
-            message = message._replace(stamp_ns=self._clock_ns)
         common = _COMMON_TOPICS.get((message.topic, message.kind))
+        if self._clock_ns is not None and common is not TraceReader.set_clock:
+            message = message._replace(stamp_ns=self._clock_ns)
         if common is not None:
             common(self, message)
             return
@@ -149,6 +180,7 @@ class TraceReader:
     def set_clock(self, message: Message) -> None:
         """Update the recording's clock from ``/clock``."""
         self._clock_ns = stamp_ns(message.content.clock)
+        self.clocks_ns.append((message.stamp_ns, self._clock_ns))
 
     def add_event(self, message: Message) -> None:
         """Add an event of ``/quad/events``."""
@@ -171,13 +203,14 @@ class TraceReader:
     def add_transforms(self, message: Message) -> None:
         """Update the robots' odometry frames from ``/tf``."""
         for transform in message.content.transforms:
-            match = re.fullmatch(r"/?odom([0-9]{1,4})", transform.child_frame_id)
-            if match and transform.header.frame_id.lstrip("/") == "map":
-                robot = self._robot(int(match.group(1)))
-                robot.odom_frame = transform.child_frame_id.lstrip("/")
-                robot.map_from_odom = checked_pose(
+            number = _odom_number(transform.child_frame_id)
+            if number is not None and transform.header.frame_id.lstrip("/") == "map":
+                robot = self._robot(number)
+                pose = checked_pose(
                     pose_from(transform.transform.translation, transform.transform.rotation)
                 )
+                time_s = stamp_ns(transform.header.stamp) / 1e9
+                robot.set_odom_frame(time_s, transform.child_frame_id.lstrip("/"), pose)
 
     def trace(self, path: Path) -> FlightTrace:
         """Build the trace.
@@ -186,9 +219,7 @@ class TraceReader:
             InputError: The recording has no odometry, too long a flight or an invalid scene.
         """
         robots = self._flown_robots(path)
-        start_s = self.info.get("start_s")
-        if start_s is None:
-            start_s = min(robot.first_s for robot in robots.values())
+        start_s = self.start_s
         infos = self.info.get("robots", [])
         traces = tuple(
             robot.trace(number, start_s, infos[number] if number < len(infos) else {})
@@ -209,6 +240,13 @@ class TraceReader:
             self.info.get("reason", ""),
             self.info.get("jitter_m"),
         )
+
+    @property
+    def start_s(self) -> float:
+        """Start of the flight on the recording's clock; there must be odometry."""
+        firsts_s = (robot.first_s for robot in self.robots.values() if robot.has_odometry)
+        given_s: Optional[float] = self.info.get("start_s")
+        return min(firsts_s) if given_s is None else given_s
 
     def _flown_robots(self, path: Path) -> Dict[int, BagRobot]:
         """Return the robots with odometry, by number, after a check of their times."""

@@ -20,6 +20,7 @@ from quad_nav.recording.action_topics import ActionTopics
 from quad_nav.recording.messages import plan_bytes
 from quad_nav.recording.record_file import TopicWriter, stamp_at
 from quad_nav.topics.publishing import CostmapSchedule
+from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWaySchedule
 
 _NO_PLAN = np.zeros((0, 3))
 
@@ -29,13 +30,14 @@ class NavigatorTopics:
 
     def __init__(self, robot: int, navigator: Navigator, topics: TopicWriter) -> None:
         self.action = ActionTopics(robot, topics, navigator.global_costmap.params.global_frame)
-        self._topics = topics
+        self._robot, self._topics = f"quad{robot}", topics
         self._navigator = navigator
         self._node = f"/move_base{robot}"
         self._command_topic = f"/cmd_vel{robot}"
         self._planner = plugin_name(navigator.params.base_global_planner)
         self._controller = plugin_name(navigator.params.base_local_planner)
         self._state: Optional[State] = None
+        self._right_of_way = RightOfWaySchedule()
         self._costmaps: Dict[str, Tuple[LayeredCostmap, CostmapSchedule]] = {
             name: (costmap, CostmapSchedule(costmap))
             for name, costmap in (
@@ -57,6 +59,7 @@ class NavigatorTopics:
         if tick.state is not self._state:
             self._state = tick.state
             self._write("state", stamp, messages.text(tick.state.value), latched=True)
+        self._write_right_of_way(tick, stamp)
         if tick.command is not None:
             self._topics.write(
                 self._command_topic, stamp, messages.command(tick.command), self._node
@@ -71,6 +74,14 @@ class NavigatorTopics:
             self._write_costmap(name, window, pose_of[name], tick.now_s)
         if tick.outcome is not None:
             self.action.finish(tick.now_s, tick.outcome)
+
+    def _write_right_of_way(self, tick: Tick, stamp: int) -> None:
+        changed = self._right_of_way.pop(tick)
+        if changed is not None:
+            status = messages.diagnostic(
+                0, RIGHT_OF_WAY_STATUS, changed.text, self._robot, changed.values
+            )
+            self._write("right_of_way", stamp, status, latched=True)
 
     def _write_plans(self, tick: Tick, stamp: int) -> None:
         """Write the plans; a failed search publishes an empty plan, which clears the display."""

@@ -19,7 +19,7 @@ from rosbags.rosbag1 import Writer as BagLibraryWriter
 from quad_nav.errors import InputError
 from quad_nav.files.output import make_folder
 from quad_nav.recording.messages import definition, encode, long_name
-from quad_nav.topics.flight_info import START_S
+from quad_nav.scenario.rules import START_S
 
 SUFFIXES = (".bag", ".mcap")
 

@@ -17,6 +17,7 @@ from quad_nav.recording import messages
 from quad_nav.recording.messages import path_bytes, pose_bytes
 from quad_nav.recording.navigator_topics import NavigatorTopics
 from quad_nav.recording.record_file import START_NS, TopicWriter, create, stamp_at
+from quad_nav.scenario.rules import START_S
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import pose_in
@@ -24,7 +25,10 @@ from quad_nav.sim.simulation import RobotState
 from quad_nav.topics import flight_info
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
 from quad_nav.topics.markers import (
+    OBSTACLES_PERIOD_S,
+    OBSTACLES_TOPIC,
     goal_markers,
+    moving_markers,
     number_markers,
     quadcopter_markers,
     scene_markers,
@@ -59,6 +63,7 @@ class Recorder(FlightObserver):
     def on_start(self, flight: Flight) -> None:
         """Write the scene, the goals and the initial state."""
         self._flight = flight
+        self._next_obstacles_s = 0.0
         self._navigators = [
             NavigatorTopics(index, flight.offline_robots[index].navigator, self._topics)
             for index in range(len(flight.robots))
@@ -97,7 +102,7 @@ class Recorder(FlightObserver):
                 CONTACT_STATUS,
                 str(contact),
                 contact.robot,
-                contact_values(contact, contact.time_s + flight_info.START_S),
+                contact_values(contact, contact.time_s + START_S),
             ),
             _SIMULATOR,
         )
@@ -127,6 +132,11 @@ class Recorder(FlightObserver):
             _SIMULATOR,
             latched=True,
         )
+        movers = flight.simulation.movers
+        if movers and now_s >= self._next_obstacles_s - 1e-6:
+            self._next_obstacles_s = now_s + OBSTACLES_PERIOD_S
+            shown = messages.marker_array(moving_markers(movers, now_s))
+            self._write(OBSTACLES_TOPIC, stamp, shown, _SIMULATOR)
         for robot, state in enumerate(flight.states):
             self._write_odometry(robot, state, stamp)
             self._write_flown_path(robot, state, now_s)
@@ -134,7 +144,7 @@ class Recorder(FlightObserver):
 
     def on_action(self, robot: int, now_s: float, action: Action) -> None:
         """Write an action of the sequencer."""
-        info = flight_info.event(robot, now_s + flight_info.START_S, action)
+        info = flight_info.event(robot, now_s + START_S, action)
         self._write(
             flight_info.EVENTS_TOPIC,
             stamp_at(now_s),

@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.goal import Goal
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
+from quad_nav.topics.right_of_way import RightOfWay
 from quad_nav.versions import versions
 
 
@@ -58,6 +60,9 @@ class RobotTrace:
         recoveries: (time, name) pairs.
         goals: Goals in the order of flight.
         parameters: move_base's parameters with ROS names; empty if unknown.
+        mission: The goals of the goal file; empty if unknown.
+        odom_frames: (time, pose in ``map``) pairs of the odometry frame, one for each change.
+        rights_of_way: (time, right of way) pairs, one for each change.
     """
 
     name: str
@@ -74,6 +79,9 @@ class RobotTrace:
     recoveries: Tuple[Tuple[float, str], ...] = ()
     goals: Tuple[GoalTrace, ...] = ()
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    mission: Tuple[Goal, ...] = ()
+    odom_frames: Tuple[Tuple[float, Pose2D], ...] = ()
+    rights_of_way: Tuple[Tuple[float, RightOfWay], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from quad_nav.sim.colours import ROBOT_COLOURS
 from quad_nav.sim.contacts import Contact
 from quad_nav.topics.markers import ARROW, SPHERE, goal_markers, quadcopter_markers, scene_markers
 from quad_nav.topics.publishing import FlownPath
+from quad_nav.view.items import hit_points
 
 SUFFIX = ".rrd"
 _TIMELINE = "flight"
@@ -105,7 +106,7 @@ class View(FlightObserver):
         self._rr.log(
             f"map/quad{robot}/scan",
             self._rr.Points3D(
-                scan_points(scan, map_from_lidar), colors=[_colour(robot)], radii=[0.025]
+                hit_points(scan, map_from_lidar), colors=[_colour(robot)], radii=[0.025]
             ),
         )
 
@@ -192,21 +193,6 @@ class View(FlightObserver):
                 colors=[colour_of(one) for one in arrows],
             ),
         )
-
-
-def scan_points(scan: Scan, map_from_lidar: Pose3D) -> NDArray[np.float64]:
-    """Return the hit points of a scan in ``map``, shape (n, 3), metres.
-
-    Beams without a return are left out.
-    """
-    hits = np.isfinite(scan.ranges_m)
-    ranges_m = scan.ranges_m[hits].astype(np.float64)
-    angles = scan.angle_min_rad + np.nonzero(hits)[0] * scan.angle_increment_rad
-    points = np.column_stack(
-        (ranges_m * np.cos(angles), ranges_m * np.sin(angles), np.zeros(len(angles)))
-    )
-    placed: NDArray[np.float64] = points @ map_from_lidar.rotation.T + map_from_lidar.translation
-    return placed
 
 
 def _rerun() -> Any:
