@@ -114,15 +114,15 @@ def differences(contestant: Contestant) -> str:
         "clock: it starts with the goal instead of after the first 0.1 m; a goal that "
         "the navigator aborts is a time-out",
     ]
-    return "\n".join(
-        [
-            "Differences from the challenge:",
-            *(
-                textwrap.fill(line, _WIDTH, initial_indent="  ", subsequent_indent="    ")
-                for line in lines
-            ),
-        ]
+    return wrapped("Differences from the challenge:", lines)
+
+
+def wrapped(head: str, lines: Sequence[str]) -> str:
+    """Format indented paragraphs below a line for a terminal of 100 columns."""
+    paragraphs = (
+        textwrap.fill(line, _WIDTH, initial_indent="  ", subsequent_indent="    ") for line in lines
     )
+    return "\n".join([head, *paragraphs])
 
 
 def to_json(results: Results) -> Dict[str, Any]:

@@ -124,7 +124,7 @@ def read_barn_setup(options: BarnOptions) -> BarnSetup:
             problems.append(f"{options.worlds}: none of the worlds is in the official sample")
     problems += _blocked_starts(worlds, options.body_radius_m, options.worlds)
     try:
-        contestant = _contestant(options)
+        contestant = read_contestant(options, _GOALS, AREA)
     except InputError as error:
         raise InputError(problems + error.problems) from error
     if problems:
@@ -149,9 +149,21 @@ def flight_setup(contestant: Contestant, world: BarnWorld, run: int) -> FlightSe
 _GOALS = GoalSequence((Goal(*GOAL_M),), SequenceSettings(GOAL_TOLERANCE_M, TIME_LIMIT_S, retries=0))
 
 
-def _contestant(options: BarnOptions) -> Contestant:
+def read_contestant(
+    options: BarnOptions, sequence: GoalSequence, area: Tuple[float, float, float, float]
+) -> Contestant:
+    """Read the configuration, without the worlds.
+
+    Args:
+        options: The options.
+        sequence: Goals, which the global costmap has to cover.
+        area: Least x and y, greatest x and y in m, that a global costmap gets if it does not.
+
+    Raises:
+        InputError: Every fault in the configuration.
+    """
     folder, _ = split_source(options.config)
-    goals = RobotGoals("quad0", WatchedGoalFile(folder), _GOALS)
+    goals = RobotGoals("quad0", WatchedGoalFile(folder), sequence)
 
     def faults(configuration: Configuration, _number: int) -> List[str]:
         return [
@@ -164,7 +176,7 @@ def _contestant(options: BarnOptions) -> Contestant:
         ]
 
     (configuration,) = read_configurations(
-        options.config, 1, AREA, options.parameters, faults, strict=options.strict
+        options.config, 1, area, options.parameters, faults, strict=options.strict
     )
     simulation = SimulationParams(
         LIDAR,

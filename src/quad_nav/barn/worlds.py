@@ -86,7 +86,7 @@ def load_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[BarnWorld, ...]:
     Raises:
         InputError: Lists every fault of the file.
     """
-    arrays = _read(path)
+    arrays = read_arrays(path, "index, occupied and path_<index>")
     numbers = _numbers(arrays, path)
     absent = [str(number) for number in only if number not in numbers]
     if absent:
@@ -107,7 +107,12 @@ def load_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[BarnWorld, ...]:
     return tuple(worlds)
 
 
-def _read(path: Path) -> Dict[str, NDArray[Any]]:
+def read_arrays(path: Path, expected: str) -> Dict[str, NDArray[Any]]:
+    """Read the arrays of an ``.npz`` file that somebody else made.
+
+    Raises:
+        InputError: The file cannot be read, with the ``expected`` arrays.
+    """
     try:
         with open_file(path) as opened, np.load(opened, allow_pickle=False) as file:
             size = sum(member.file_size for member in file.zip.infolist())
@@ -126,10 +131,7 @@ def _read(path: Path) -> Dict[str, NDArray[Any]]:
         zlib.error,
     ) as error:
         raise InputError(
-            [
-                f"{path}: cannot read: {error}; expected an .npz with index, "
-                "occupied and path_<index>"
-            ]
+            [f"{path}: cannot read: {error}; expected an .npz with {expected}"]
         ) from error
 
 
