@@ -1,0 +1,97 @@
+"""Transforms that change slowly, and the clock, without hearing all of `/tf` and `/clock`.
+
+A page needs where an odometry frame is in `map`, and where a LIDAR is on its robot. Hearing each
+message of a fleet for that would cost more than all the rest. So the transforms are looked up from
+time to time while somebody uses them. The node's own subscription to `/clock` ends at its start:
+the time is that of the newest poses.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Dict, Optional, Tuple
+
+import rospy
+import rospy.impl.simtime
+from rosgraph_msgs.msg import Clock
+
+from quad_nav.geometry import Pose3D
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
+from quad_nav.ros.composed.own_nodes import set_time
+
+REFRESH_S = 3.0  # wall time, as the others
+USED_WITHIN_S = 10.0
+PATIENCE_S = 1.0
+_POLL_S = 0.02
+_SAME = Pose3D(0.0, 0.0, 0.0)
+
+
+def leave_clock() -> None:
+    """End this node's subscription to `/clock`, which wakes it at each tick."""
+    clock = getattr(rospy.impl.simtime, "_clock_sub", None)
+    if clock is not None:
+        clock.unregister()
+
+
+class Frames:
+    """Transforms that are in use, looked up every `REFRESH_S` in a thread."""
+
+    def __init__(self, robots: int) -> None:
+        """Start without transforms.
+
+        Args:
+            robots: Number of robots.
+        """
+        self._robots = robots
+        self._found: Dict[Tuple[str, str], Pose3D] = {}
+        self._used_s: Dict[Tuple[str, str], float] = {}
+        self._asked = threading.Event()
+        self._warnings = ThrottledWarnings()
+        threading.Thread(target=self._run, name="frames", daemon=True).start()
+
+    def find(self, to_frame: str, from_frame: str) -> Optional[Pose3D]:
+        """Return the pose of a frame in another one as of some seconds ago; None if unknown yet."""
+        pair = to_frame.lstrip("/"), from_frame.lstrip("/")
+        if pair[0] == pair[1]:
+            return _SAME
+        self._used_s[pair] = time.monotonic()
+        found = self._found.get(pair)
+        if found is None:
+            self._asked.set()
+        return found
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            self._asked.wait(REFRESH_S)
+            used = self._in_use()
+            if used:
+                self._look_up(used)
+            self._asked.clear()
+            if not used.keys() <= self._found.keys():
+                time.sleep(REFRESH_S)  # a transform that is missing is asked for all the time
+
+    def _in_use(self) -> Dict[Tuple[str, str], float]:
+        since_s = time.monotonic() - USED_WITHIN_S
+        return {pair: at_s for pair, at_s in list(self._used_s.items()) if at_s > since_s}
+
+    def _look_up(self, pairs: Dict[Tuple[str, str], float]) -> None:
+        """Hear transforms until all are known, at most for `PATIENCE_S`."""
+        clock = rospy.Subscriber("/clock", Clock, lambda now: set_time(now.clock.to_sec()))
+        transforms = Transforms(range(self._robots))
+        end_s, missing, problem = time.monotonic() + PATIENCE_S, set(pairs), ""
+        try:
+            while missing and time.monotonic() < end_s and not rospy.is_shutdown():
+                time.sleep(_POLL_S)
+                for pair in list(missing):
+                    try:
+                        self._found[pair] = transforms.lookup(*pair)
+                        missing.discard(pair)
+                    except TransformUnavailable as error:
+                        problem = str(error)
+        finally:
+            transforms.close()
+            clock.unregister()
+        if missing:
+            self._warnings.warn(f"web: /tf: {problem}", kind="tf")

@@ -1,0 +1,238 @@
+/**
+ * Marks at places in the arena: goals, yields and contacts. Both views draw them with a function
+ * that gives the pixels of a place.
+ *
+ * @typedef {(x: number, y: number) => [number, number]} ToScreen
+ */
+
+import { INK, mix, textOn, withAlpha } from "./colours.js";
+
+const FONT = "Roboto, system-ui, sans-serif";
+
+const FEW_GOALS = 12;
+
+/** Radius of goals and size of their numbers (0: none), for so many pixels between goals. */
+export const GOAL_SIZES = [
+  { from: 110, radius: 9, font: 11 },
+  { from: 60, radius: 7, font: 9 },
+  { from: 0, radius: 4, font: 0 },
+];
+
+/**
+ * Draw goals: numbered discs, the active one larger, with an arrow for the yaw.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {ToScreen} toScreen
+ * @param {object[]} goals As in `fleet.js`.
+ * @param {boolean} hasSelection Whether a robot is selected; the goals of the others are faint.
+ */
+export function drawGoals(context, toScreen, goals, hasSelection) {
+  drawOrder(context, toScreen, goals.filter((goal) => goal.isOfSelected));
+  const size = sizeFor(goals.map(({ x, y }) => toScreen(x, y)));
+  const rank = (goal) => (goal.isOfSelected ? 2 : 0) + (goal.state === "active" ? 1 : 0);
+  for (const goal of [...goals].sort((a, b) => rank(a) - rank(b))) {
+    const isFaint = hasSelection && !goal.isOfSelected;
+    drawGoal(context, toScreen, goal, goal.isOfSelected ? GOAL_SIZES[0] : size, isFaint);
+  }
+}
+
+/** Return the size for goals at some places, which is smaller where they are close together. */
+function sizeFor(places) {
+  const side = (values) => Math.max(...values) - Math.min(...values);
+  const area = side(places.map(([px]) => px)) * side(places.map(([, py]) => py));
+  const least = places.length > FEW_GOALS ? 0 : GOAL_SIZES[1].from; // few ones have numbers
+  const spacing = Math.max(Math.sqrt(area / places.length), least);
+  return GOAL_SIZES.find(({ from }) => spacing >= from);
+}
+
+/** A dotted line through the goals of one robot. */
+function drawOrder(context, toScreen, goals) {
+  if (goals.length < 2) {
+    return;
+  }
+  context.beginPath();
+  goals.forEach((goal, i) => {
+    const place = toScreen(goal.x, goal.y);
+    i ? context.lineTo(...place) : context.moveTo(...place);
+  });
+  context.setLineDash([2, 5]);
+  context.lineWidth = 1.5;
+  context.strokeStyle = withAlpha(goals[0].colour, 0.8);
+  context.stroke();
+  context.setLineDash([]);
+}
+
+/**
+ * Draw one goal.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {ToScreen} toScreen
+ * @param {object} goal As in `fleet.js`.
+ * @param {{radius: number, font: number}} size One of `GOAL_SIZES`.
+ * @param {boolean} isFaint
+ */
+export function drawGoal(context, toScreen, goal, size, isFaint) {
+  const [px, py] = toScreen(goal.x, goal.y);
+  const isActive = goal.state === "active";
+  const radius = size.radius + (isActive && size.font ? 2 : 0);
+  context.globalAlpha = (goal.state === "reached" ? 0.4 : 1) * (isFaint ? 0.55 : 1);
+  if (goal.yaw !== null && size.font) {
+    drawYaw(context, toScreen, goal, radius, goal.colour);
+  }
+  const edge = size.font ? 2 : 1.5;
+  disc(context, px, py, radius, isActive ? goal.colour : "#ffffff", goal.colour, edge);
+  if (isActive) {
+    context.beginPath();
+    context.arc(px, py, radius + 3, 0, 2 * Math.PI);
+    context.lineWidth = 1.5;
+    context.stroke();
+  }
+  if (size.font) {
+    const ink = isActive ? textOn(goal.colour) : mix(goal.colour, "#000000", 0.35);
+    write(context, String(goal.index + 1), px, py, size.font + (isActive ? 1 : 0), ink);
+  }
+  if (goal.state === "failed") {
+    drawCross(context, px, py, 0.75 * radius, INK.fault);
+  }
+  context.globalAlpha = 1;
+}
+
+/** Draw an arrow from a disc's edge into the direction of a yaw. */
+export function drawYaw(context, toScreen, { x, y, yaw }, radius, colour) {
+  const [px, py] = toScreen(x, y);
+  const [qx, qy] = toScreen(x + 0.1 * Math.cos(yaw), y + 0.1 * Math.sin(yaw));
+  const length = Math.hypot(qx - px, qy - py) || 1;
+  const [ux, uy] = [(qx - px) / length, (qy - py) / length];
+  const tip = radius + 14;
+  drawArrow(context, [px, py], [px + ux * tip, py + uy * tip], colour, 2.5);
+}
+
+/** Draw an arrow between two places in pixels. */
+export function drawArrow(context, [ax, ay], [bx, by], colour, width = 2) {
+  const angle = Math.atan2(by - ay, bx - ax);
+  const head = 3 + 2 * width;
+  context.lineWidth = width;
+  context.strokeStyle = colour;
+  context.fillStyle = colour;
+  context.beginPath();
+  context.moveTo(ax, ay);
+  context.lineTo(bx - 0.7 * head * Math.cos(angle), by - 0.7 * head * Math.sin(angle));
+  context.stroke();
+  context.setLineDash([]);
+  context.beginPath();
+  context.moveTo(bx, by);
+  context.lineTo(bx - head * Math.cos(angle - 0.45), by - head * Math.sin(angle - 0.45));
+  context.lineTo(bx - head * Math.cos(angle + 0.45), by - head * Math.sin(angle + 0.45));
+  context.closePath();
+  context.fill();
+}
+
+/**
+ * Draw who yields to whom, and where a robot that makes room will hold.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {ToScreen} toScreen
+ * @param {object[]} yields As in `fleet.js`.
+ * @param {(robot: object) => number} radiusOf Radius in pixels that a robot is drawn with.
+ */
+export function drawYields(context, toScreen, yields, radiusOf) {
+  context.lineCap = "butt";
+  for (const { robot, peer, kind, hold, colour } of yields) {
+    const from = toScreen(robot.x, robot.y, robot.z);
+    if (peer) {
+      const to = toScreen(peer.x, peer.y, peer.z);
+      const [start, end] = shortened(from, to, radiusOf(robot), radiusOf(peer) + 2);
+      context.setLineDash(kind === "limited" ? [2, 3] : [8, 4]);
+      drawArrow(context, start, end, colour, kind === "limited" ? 1.5 : 2.5);
+    }
+    if (hold) {
+      const place = toScreen(...hold);
+      context.setLineDash([3, 4]);
+      context.beginPath();
+      context.moveTo(...from);
+      context.lineTo(...place);
+      context.lineWidth = 2;
+      context.strokeStyle = colour;
+      context.stroke();
+      context.setLineDash([]);
+      drawCross(context, ...place, 7, colour, 3);
+    }
+  }
+  context.setLineDash([]);
+}
+
+/** Return the ends of a line without the parts within circles around them. */
+function shortened([ax, ay], [bx, by], atStart, atEnd) {
+  const length = Math.hypot(bx - ax, by - ay);
+  const share = length > atStart + atEnd + 8 ? 1 / length : 0;
+  const [ux, uy] = [(bx - ax) * share, (by - ay) * share];
+  return [
+    [ax + ux * atStart, ay + uy * atStart],
+    [bx - ux * atEnd, by - uy * atEnd],
+  ];
+}
+
+/** Draw contacts; recent ones with their time. */
+export function drawContacts(context, toScreen, contacts) {
+  for (const { x, y, time_s, isFresh } of contacts) {
+    const [px, py] = toScreen(x, y);
+    context.globalAlpha = isFresh ? 1 : 0.45;
+    if (isFresh) {
+      context.beginPath();
+      context.arc(px, py, 11, 0, 2 * Math.PI);
+      context.lineWidth = 2;
+      context.strokeStyle = INK.contact;
+      context.stroke();
+    }
+    drawCross(context, px, py, isFresh ? 7 : 5, INK.contact, 2.5);
+    if (isFresh) {
+      tag(context, `${time_s.toFixed(1)} s`, px, py + 20, INK.contact);
+    }
+  }
+  context.globalAlpha = 1;
+}
+
+/** Draw a diagonal cross with a light edge. */
+export function drawCross(context, px, py, radius, colour, width = 2.5) {
+  for (const [thickness, ink] of [[width + 2, "#ffffff"], [width, colour]]) {
+    context.beginPath();
+    context.moveTo(px - radius, py - radius);
+    context.lineTo(px + radius, py + radius);
+    context.moveTo(px - radius, py + radius);
+    context.lineTo(px + radius, py - radius);
+    context.lineWidth = thickness;
+    context.strokeStyle = ink;
+    context.stroke();
+  }
+}
+
+/** Draw a filled disc with an edge. */
+export function disc(context, px, py, radius, fill, edge, width = 2) {
+  context.beginPath();
+  context.arc(px, py, radius, 0, 2 * Math.PI);
+  context.fillStyle = fill;
+  context.fill();
+  context.lineWidth = width;
+  context.strokeStyle = edge;
+  context.stroke();
+}
+
+/** Write a short text around a place. */
+export function write(context, text, px, py, size, ink) {
+  context.font = `600 ${size}px ${FONT}`;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillStyle = ink;
+  context.fillText(text, px, py + 0.5);
+}
+
+/** Write a text on a white plate. */
+export function tag(context, text, px, py, ink) {
+  context.font = `600 11px ${FONT}`;
+  const width = context.measureText(text).width + 8;
+  context.beginPath();
+  context.roundRect(px - width / 2, py - 8, width, 16, 4);
+  context.fillStyle = "rgba(255,255,255,0.92)";
+  context.fill();
+  write(context, text, px, py, 11, ink);
+}

@@ -1,0 +1,192 @@
+/**
+ * Map view: quadcopters from above, with heading, tilt, hull, number and state.
+ */
+
+import { INK, mix, textOn, withAlpha } from "./colours.js";
+import { tiltOf } from "./fleet.js";
+
+const LEAST_RADIUS_PX = 8;
+const ICON_BELOW_PX = 11; // drawn as a dart instead of with rotors
+const TILT_FROM_PX = 13;
+const FULL_TILT = 0.35; // sine of the tilt that moves the mark to the hull
+const FAULTY = { lost: INK.fault, stopped: INK.fault, recovering: INK.waits };
+
+/** Return the radius in pixels that a robot is drawn with. */
+export function drawnRadius(robot, scale) {
+  return Math.max(robot.radius * scale, LEAST_RADIUS_PX);
+}
+
+/**
+ * Draw a quadcopter.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("./viewport.js").Viewport} viewport
+ * @param {object} robot As in `fleet.js`.
+ * @param {boolean} isSelected
+ */
+export function drawRobot(context, viewport, robot, isSelected) {
+  const [px, py] = viewport.toScreen(robot.x, robot.y);
+  const radius = drawnRadius(robot, viewport.scale);
+  if (isSelected) {
+    drawHalo(context, px, py, radius);
+  }
+  drawHull(context, viewport, robot, px, py, radius);
+  context.save();
+  context.translate(px, py);
+  context.rotate(-robot.yaw);
+  (radius < ICON_BELOW_PX ? drawDart : drawAirframe)(context, radius, robot.colour);
+  context.restore();
+  if (radius >= TILT_FROM_PX) {
+    drawTilt(context, robot, px, py, radius);
+  }
+}
+
+function drawHalo(context, px, py, radius) {
+  context.beginPath();
+  context.arc(px, py, radius + 6, 0, 2 * Math.PI);
+  context.fillStyle = withAlpha(INK.accent, 0.16);
+  context.fill();
+  context.lineWidth = 2.5;
+  context.strokeStyle = INK.accent;
+  context.stroke();
+}
+
+/** The hull that collisions are counted with; its colour tells of trouble. */
+function drawHull(context, viewport, robot, px, py, radius) {
+  const trouble = FAULTY[robot.state];
+  context.beginPath();
+  if (robot.footprint && radius >= ICON_BELOW_PX) {
+    const [cos, sin] = [Math.cos(robot.yaw), Math.sin(robot.yaw)];
+    robot.footprint.forEach(([u, v], i) => {
+      const corner = viewport.toScreen(
+        robot.x + cos * u - sin * v,
+        robot.y + sin * u + cos * v,
+      );
+      i ? context.lineTo(...corner) : context.moveTo(...corner);
+    });
+    context.closePath();
+  } else {
+    context.arc(px, py, radius + (trouble ? 2 : 0), 0, 2 * Math.PI);
+  }
+  context.fillStyle = withAlpha(trouble ?? robot.colour, trouble ? 0.25 : 0.1);
+  context.fill();
+  context.lineWidth = trouble ? 2.5 : 1;
+  context.strokeStyle = trouble ?? withAlpha(robot.colour, 0.65);
+  context.stroke();
+}
+
+/** Four rotors, arms and a body with a white nose, within a circle. */
+function drawAirframe(context, radius, colour) {
+  const rotor = 0.36 * radius;
+  const arm = (radius - rotor) * Math.SQRT1_2;
+  const dark = mix(colour, "#000000", 0.45);
+  context.lineCap = "round";
+  context.lineWidth = Math.max(1.5, 0.12 * radius);
+  context.strokeStyle = dark;
+  context.beginPath();
+  context.moveTo(-arm, -arm);
+  context.lineTo(arm, arm);
+  context.moveTo(-arm, arm);
+  context.lineTo(arm, -arm);
+  context.stroke();
+  context.lineWidth = Math.max(1, 0.06 * radius);
+  for (const [x, y] of [[arm, arm], [arm, -arm], [-arm, arm], [-arm, -arm]]) {
+    context.beginPath();
+    context.arc(x, y, rotor, 0, 2 * Math.PI);
+    context.fillStyle = x > 0 ? withAlpha(colour, 0.75) : withAlpha(colour, 0.4);
+    context.fill();
+    context.strokeStyle = dark;
+    context.stroke();
+  }
+  context.beginPath();
+  context.ellipse(0, 0, 0.42 * radius, 0.26 * radius, 0, 0, 2 * Math.PI);
+  context.fillStyle = colour;
+  context.fill();
+  context.stroke();
+  context.beginPath(); // the nose
+  context.moveTo(0.78 * radius, 0);
+  context.lineTo(0.34 * radius, 0.2 * radius);
+  context.lineTo(0.34 * radius, -0.2 * radius);
+  context.closePath();
+  context.fillStyle = "#ffffff";
+  context.fill();
+  context.stroke();
+}
+
+/** A disc with an arrowhead, for robots that are too small for rotors. */
+function drawDart(context, radius, colour) {
+  context.beginPath();
+  context.arc(0, 0, radius, 0, 2 * Math.PI);
+  context.fillStyle = colour;
+  context.fill();
+  context.beginPath();
+  context.moveTo(0.8 * radius, 0);
+  context.lineTo(-0.55 * radius, 0.55 * radius);
+  context.lineTo(-0.25 * radius, 0);
+  context.lineTo(-0.55 * radius, -0.55 * radius);
+  context.closePath();
+  context.fillStyle = "#ffffff";
+  context.fill();
+}
+
+/** A dot that moves to where the quadcopter leans, as the bubble of a level. */
+function drawTilt(context, robot, px, py, radius) {
+  const [east, north] = tiltOf(robot);
+  const reach = (0.85 * radius) / FULL_TILT;
+  const length = Math.hypot(east, north) * reach;
+  const limit = Math.min(1, radius / Math.max(length, 1e-6));
+  const [dx, dy] = [east * reach * limit, -north * reach * limit];
+  context.lineWidth = Math.max(1.5, 0.06 * radius);
+  context.strokeStyle = "#ffffff";
+  context.beginPath();
+  context.moveTo(px, py);
+  context.lineTo(px + dx, py + dy);
+  context.stroke();
+  context.beginPath();
+  context.arc(px + dx, py + dy, Math.max(2, 0.1 * radius), 0, 2 * Math.PI);
+  context.fillStyle = "#ffffff";
+  context.fill();
+  context.lineWidth = 1;
+  context.strokeStyle = INK.text;
+  context.stroke();
+}
+
+/**
+ * Draw numbers beside robots. The selected one comes first; a number that would cover another one
+ * is left out.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {{px: number, py: number, radius: number, index: number, colour: string,
+ *   isSelected: boolean}[]} marks Robots in pixels.
+ */
+export function drawNumbers(context, marks) {
+  const size = marks.length > 40 ? 10 : 12;
+  const height = size + 4;
+  const taken = [];
+  context.font = `600 ${size}px Roboto, system-ui, sans-serif`;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  const ordered = [...marks].sort((a, b) => b.isSelected - a.isSelected);
+  for (const { px, py, radius, index, colour, isSelected } of ordered) {
+    const text = String(index);
+    const width = Math.max(height, context.measureText(text).width + 8);
+    const box = [px + 0.6 * radius, py - 0.6 * radius - height, width, height];
+    if (!isSelected && taken.some((other) => overlap(box, other))) {
+      continue;
+    }
+    taken.push(box);
+    context.beginPath();
+    context.roundRect(...box, height / 2);
+    context.fillStyle = isSelected ? INK.accent : colour;
+    context.fill();
+    context.lineWidth = 1.5;
+    context.strokeStyle = "#ffffff";
+    context.stroke();
+    context.fillStyle = textOn(isSelected ? INK.accent : colour);
+    context.fillText(text, box[0] + width / 2, box[1] + height / 2 + 0.5);
+  }
+}
+
+function overlap([ax, ay, aw, ah], [bx, by, bw, bh]) {
+  return ax < bx + bw && bx < ax + aw && ay < by + bh && by < ay + ah;
+}

@@ -1,0 +1,75 @@
+"""Real sources behind the page: an offline flight, and its recording."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from driver import Driver
+from playwright.sync_api import expect
+
+# The first flight after a change of the kernels compiles them.
+pytestmark = pytest.mark.timeout(300)
+
+QUAD = str(Path(sys.executable).with_name("quad"))
+
+
+@pytest.fixture(scope="module")
+def goals(tmp_path_factory):
+    """A folder of goals: both fly 1.5 m, from (1.5, 1.5) and (10, 2)."""
+    folder = tmp_path_factory.mktemp("goals")
+    (folder / "quad0_goals.json").write_text(json.dumps({"goals": [[1.4, 3.0]]}))
+    (folder / "quad1_goals.json").write_text(json.dumps({"goals": [[10.0, 3.5]]}))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def recording(goals, tmp_path_factory):
+    file = tmp_path_factory.mktemp("recording") / "flight.bag"
+    subprocess.run([QUAD, "fly", "--goals", goals, "--record", file], check=True)
+    return file
+
+
+@pytest.fixture
+def flight(serve, open_page, recording):
+    """A page of the tutorial's mission, in flight; the recording has had the kernels compiled."""
+    server = serve(command=[QUAD, "fly", "--web"])
+    driver = Driver(open_page(server.url)).is_ready()
+    expect(driver.at("time")).not_to_have_text("0:00.0", timeout=60000)
+    return driver
+
+
+def near(robot, x_m, y_m):
+    """Return the condition that a robot is within a goal's tolerance of a place, about."""
+    return f"(({{x, y}}) => Math.hypot(x - {x_m}, y - {y_m}) < 0.6)(arena.fleet.robots[{robot}])"
+
+
+def test_a_quadcopter_arrives_at_a_goal_that_was_clicked(flight):
+    flight.at("robots-row-1").click()
+    flight.use_goal_tool()
+    flight.fit()
+    flight.click_arena(8.0, 1.5)
+    flight.says("quad1")
+    flight.wait_for_arena(near(1, 8.0, 1.5), timeout_s=60)
+
+
+def test_stop_all_ends_a_flight(flight):
+    flight.page.keyboard.press(".")
+    expect(flight.at("flight-state")).to_have_text("ended")
+
+
+def test_a_recording_is_scrubbed(serve, open_page, recording):
+    server = serve(command=[QUAD, "replay", str(recording)])
+    driver = Driver(open_page(server.url)).is_ready()
+    expect(driver.at("flight-state")).to_have_text("running")
+    driver.at("play").click()
+    expect(driver.at("flight-state")).to_have_text("paused")
+    line = driver.at("scrub").bounding_box()
+    driver.page.mouse.click(line["x"] + line["width"] - 9, line["y"] + line["height"] / 2)
+    driver.wait_for_arena(near(0, 1.4, 3.0))
+    driver.page.mouse.click(line["x"] + 9, line["y"] + line["height"] / 2)
+    driver.wait_for_arena(near(0, 1.5, 1.5))
+    expect(driver.at("time")).to_have_text("0:00.0")
