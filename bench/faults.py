@@ -2,6 +2,7 @@
 
     scripts/ros_env python3 bench/faults.py --each 20 --seed 1
     scripts/ros_env python3 bench/faults.py --kinds link --each 3        (as root)
+    scripts/ros_env python3 bench/faults.py --composed --each 20
 
 Each flight is that of test/ros/respawn_goals, two quadcopters with three goals, at three times
 real time. One fault is injected at a moment drawn evenly from the first ``MISSION_S`` simulated
@@ -35,52 +36,16 @@ from typing import Any, Dict, Iterator, List, Optional, Tuple
 
 import tabulate
 from bad_messages import TRUE_ODOMETRY, FutureTransform, OdometryRelay
+from fault_kinds import COMPOSED_KINDS, SEPARATE_KINDS, STOP, Kind
 from launched import Launch, Watch, answers, wait_for
 from link import HERE_IP, THERE_IP, Link, why_no_links
 
-ROOT = Path(__file__).resolve().parents[1]
-GOALS = ROOT / "test" / "ros" / "respawn_goals"
-SCENE = ROOT / "scenes" / "arena.yaml"
-RATE = 3.0
 MISSION_S = 18.0
 STOPPED_S, CUT_S, FULL_S = 5.0, 10.0, 4.0  # wall time
 NAN_S = 3.0  # simulated time, as the next
 BRAKES_S, FLIES_WITHIN_S = 1.5, 8.0  # a half turn on the spot takes 4.5 s
 HOVERS_MPS, FLIES_MPS = 0.05, 0.12
-KILL, STOP = signal.SIGKILL, signal.SIGSTOP
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A fault: ``node`` gets the signal ``number``, and ``flyers`` lose their input.
-
-    ``node`` is "" for the rosmaster; without a signal the fault is another one.
-    """
-
-    name: str
-    node: str = ""
-    number: Optional[signal.Signals] = None
-    flyers: Tuple[int, ...] = ()
-    fleet: bool = False
-    ends_flight: bool = False
-
-
-KINDS = {
-    kind.name: kind
-    for kind in (
-        Kind("sequencer", "/sequencer", KILL),
-        Kind("navigator", "/move_base0", KILL, flyers=(0,)),
-        Kind("fleet", "/fleet0", KILL, flyers=(0, 1), fleet=True),
-        Kind("stopped", "/move_base0", STOP, flyers=(0,)),
-        Kind("simulator", "/simulator", KILL, ends_flight=True),
-        Kind("roscore", "", KILL, ends_flight=True),
-        Kind("link", flyers=(1,), fleet=True),
-        Kind("disk"),
-        Kind("hung", "", STOP),
-        Kind("nan_odometry", flyers=(0,), fleet=True),
-        Kind("future_transform"),
-    )
-}
+HOVERS_WITHIN_S = 5.0  # simulated time; 0.6 s without a command, then braking
 
 
 @dataclass
@@ -94,33 +59,20 @@ class Outcome:
     problems: List[str] = field(default_factory=list)
 
 
-def arguments_of(kind: Kind, result: Path, *more: str) -> List[str]:
-    file = ["fleet.launch", "robots:=2", f"scene:={SCENE}"] if kind.fleet else ["two_quads.launch"]
-    if kind.name == "nan_odometry":
-        file = ["relayed.launch", f"scene:={SCENE}"]
-    return [
-        *file,
-        "rviz:=false",
-        f"rate:={RATE}",
-        f"goals:={GOALS}",
-        "exit_when_done:=true",
-        f"result:={result}",
-        *more,
-    ]
-
-
 def start(kind: Kind, folder: Path, result: Path) -> Tuple[Launch, Optional[Launch]]:
     """Start the flight, and for ``link`` the second host's part of it."""
-    more = {"link": ["hosts:=2", "only_host:=0"], "disk": [f"journal:={folder}/disk/journal"]}.get(
-        kind.name, []
-    )
+    more = {
+        "link": ["hosts:=2", "only_host:=0"],
+        "disk": [f"journal:={folder}/disk/journal"],
+        "fleet": ["composed:=false"],
+    }.get(kind.name, [])
     ip = HERE_IP if kind.name == "link" else "localhost"
-    launch = Launch(arguments_of(kind, result, *more), folder, ip=ip)
+    launch = Launch(kind.arguments(result, *more), folder, ip=ip)
     if kind.name != "link":
         return launch, None
     wait_for(lambda: answers(launch.port), "the roscore")
     there = ("hosts:=2", "only_host:=1", "simulator:=false", "sequencer:=false")
-    arguments = arguments_of(kind, folder / "none", *there)
+    arguments = kind.arguments(folder / "none", *there)
     return launch, Launch(arguments, folder, launch.port, Link.there, THERE_IP)
 
 
@@ -147,7 +99,7 @@ def fly(kind: Kind, at_s: float, folder: Path) -> Outcome:
 def inject(kind: Kind, launch: Launch, watch: Watch, outcome: Outcome) -> None:
     """Wait for the moment of the fault, inject it, and wait until the robots have recovered."""
     relay = OdometryRelay() if kind.name == "nan_odometry" else None
-    future = FutureTransform(listeners=3) if kind.name == "future_transform" else None
+    future = FutureTransform(kind.listeners) if kind.listeners else None
 
     def is_due() -> bool:
         if kind.name == "hung":
@@ -161,6 +113,8 @@ def inject(kind: Kind, launch: Launch, watch: Watch, outcome: Outcome) -> None:
         relay.is_nan = True
         wait_for(lambda: watch.now_s >= fault_s + NAN_S, "the end of the fault")
         relay.is_nan = False
+        if not kind.flyers:
+            check_flight(watch, fault_s + BRAKES_S, outcome)
     elif future is not None:
         future.publish(fault_s)
         check_flight(watch, fault_s + BRAKES_S, outcome)
@@ -216,6 +170,8 @@ def wait_for_recovery(
         "flying again",
     )
     outcome.hover_s = max(map(hover_s, blind)) - fault_s
+    if outcome.hover_s > HOVERS_WITHIN_S:
+        outcome.problems.append(f"hovered after {outcome.hover_s:.1f} s")
     flying_s = [t for t in map(again_s, blind) if t < math.inf]
     outcome.resume_s = max(flying_s, default=over_s) - over_s
 
@@ -225,7 +181,7 @@ def resume(kind: Kind, folder: Path, first: Dict[str, Any], outcome: Outcome) ->
     if not outcome.reason:
         outcome.problems.append("ended without a reason")
     result = folder / "resumed.json"
-    launch = Launch(arguments_of(kind, result, "resume:=true"), folder)
+    launch = Launch(kind.arguments(result, "resume:=true"), folder)
     if not launch.end():
         outcome.problems.append("the resumed flight did not end")
     flown = read(result, outcome)
@@ -359,12 +315,16 @@ def row(kind: Kind, outcomes: List[Outcome]) -> List[str]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--composed", action="store_true", help="the composed fleet")
+    parser.add_argument("--kinds", nargs="+", metavar="KIND", help="all if not given")
     parser.add_argument("--each", type=int, default=20, help="flights of each kind")
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
+    kinds = {kind.name: kind for kind in (COMPOSED_KINDS if given.composed else SEPARATE_KINDS)}
+    for name in set(given.kinds or ()) - set(kinds):
+        parser.error(f"--kinds: no kind {name!r}, expected some of {', '.join(kinds)}")
     draw, rows, failed = random.Random(given.seed), [], False
-    for name in given.kinds:
+    for name in given.kinds or kinds:
         moments_s = [draw.uniform(0.0, MISSION_S) for _ in range(given.each)]
         why_not = why_not_here(name)
         if why_not:
@@ -373,11 +333,11 @@ def main() -> int:
             continue
         outcomes = []
         for at_s in moments_s:
-            outcome = run(KINDS[name], at_s)
+            outcome = run(kinds[name], at_s)
             outcomes.append(outcome)
             print(name, outcome, flush=True)
         failed = failed or any(outcome.problems for outcome in outcomes)
-        rows.append(row(KINDS[name], outcomes))
+        rows.append(row(kinds[name], outcomes))
     print(
         tabulate.tabulate(
             rows,

@@ -5,7 +5,8 @@
 Starts ``fleet.launch`` for each size, waits until all robots fly, and measures for some simulated
 time. CPU is in seconds per simulated second: 1.0 keeps one core busy at real time. If commands per
 simulated second and robot are fewer than the navigators' control rate, the fleet lags behind the
-simulation. The load average counts other users' processes, too.
+simulation. The load average counts other users' processes, too. ``--json`` adds the figures of four
+equal parts of the time to a file.
 """
 
 from __future__ import annotations
@@ -18,11 +19,14 @@ import socket
 import subprocess
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
+
+from figures import JSON_HELP, LARGER, Figures
 
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 SETTLE_S, TIMEOUT_S = 5.0, 120.0
 SAMPLED = 5  # robots whose commands are counted
+PARTS = 4  # of the measured time
 
 
 def main() -> None:
@@ -30,45 +34,92 @@ def main() -> None:
     parser.add_argument("--robots", type=int, nargs="+", default=[2, 4, 8, 16, 20, 32, 50])
     parser.add_argument("--hosts", type=int, help="default of fleet.launch if not given")
     parser.add_argument("--seconds", type=float, default=20.0, help="simulated time for each size")
+    parser.add_argument("--json", type=Path, help=JSON_HELP)
     parser.add_argument("arguments", nargs="*", help="further arguments of the launch file")
     given = parser.parse_args()
     for robots in given.robots:
         context = multiprocessing.get_context("spawn")
-        one = context.Process(
-            target=measure, args=(robots, given.hosts, given.seconds, given.arguments)
-        )
+        one = context.Process(target=measure, args=(robots, given))
         one.start()
         one.join()
 
 
-def measure(robots: int, hosts: Optional[int], seconds: float, arguments: List[str]) -> None:
-    """Measure one size and print its line."""
-    port = free_port()
-    launch = launch_fleet(port, robots, *([f"hosts:={hosts}"] if hosts else []), *arguments)
+class Snapshot(NamedTuple):
+    """Resources that a fleet has used, and its commands, until a moment."""
+
+    now_s: float  # simulated time
+    wall_s: float
+    commands: int
+    nodes: Dict[str, Tuple[float, float]]  # CPU in s, memory in MB
+
+
+def measure(robots: int, given: argparse.Namespace) -> None:
+    """Measure one size, print its line and add its figures to the file."""
+    port, hosts = free_port(), [f"hosts:={given.hosts}"] if given.hosts else []
+    launch = launch_fleet(port, robots, *hosts, *given.arguments)
     try:
         clock = Clock(time.monotonic() + TIMEOUT_S)
         clock.wait_until(1.0 + SETTLE_S)
-        before, wall_s, begin_s = used(port), time.monotonic(), clock.now_s
         commands = Commands(min(robots, SAMPLED))
-        clock.wait_until(begin_s + seconds)
-        flown_s = clock.now_s - begin_s
-        rate_hz = commands.count / flown_s / min(robots, SAMPLED)
-        factor = flown_s / (time.monotonic() - wall_s)
-        after = used(port)
+        begin_s, seen = clock.now_s, []
+        for part in range(PARTS + 1):
+            clock.wait_until(begin_s + given.seconds * part / PARTS)
+            seen.append(Snapshot(clock.now_s, time.monotonic(), commands.count, used(port)))
     finally:
         launch.send_signal(signal.SIGINT)
         launch.wait()
-    cpu = {name: (after[name][0] - before[name][0]) / flown_s for name in sorted(before)}
+    show(robots, seen[0], seen[-1])
+    write(robots, seen, given.json)
+
+
+def cpu_of(before: Snapshot, after: Snapshot) -> Dict[str, float]:
+    """Return the CPU time of each node in seconds per simulated second."""
+    flown_s = after.now_s - before.now_s
+    return {
+        name: (after.nodes[name][0] - before.nodes[name][0]) / flown_s
+        for name in sorted(before.nodes)
+        if name in after.nodes
+    }
+
+
+def rate_hz(robots: int, before: Snapshot, after: Snapshot) -> float:
+    """Return the commands per simulated second of a robot."""
+    flown_s = after.now_s - before.now_s
+    return (after.commands - before.commands) / flown_s / min(robots, SAMPLED)
+
+
+def factor(before: Snapshot, after: Snapshot) -> float:
+    return (after.now_s - before.now_s) / (after.wall_s - before.wall_s)
+
+
+def show(robots: int, before: Snapshot, after: Snapshot) -> None:
+    """Print a size's line."""
+    cpu = cpu_of(before, after)
     total = sum(cpu.values())
-    hosts = sum(name.startswith("fleet") for name in cpu)
+    hosts = sum(name.startswith(("fleet", "simulator worker")) for name in cpu)
     print(
-        f"{robots:4d} robots, {hosts} hosts: real-time factor {factor:.2f}, "
-        f"{rate_hz:.1f} commands/s, CPU {total:.2f} "
+        f"{robots:4d} robots, {hosts} hosts beside the simulator: "
+        f"real-time factor {factor(before, after):.2f}, "
+        f"{rate_hz(robots, before, after):.1f} commands/s, CPU {total:.2f} "
         f"({1000 * total / robots:.0f} ms/robot): "
-        + ", ".join(f"{name} {value:.2f} ({after[name][1]:.0f} MB)" for name, value in cpu.items())
+        + ", ".join(
+            f"{name} {value:.2f} ({after.nodes[name][1]:.0f} MB)" for name, value in cpu.items()
+        )
         + f"; load {os.getloadavg()[0]:.1f}",
         flush=True,
     )
+
+
+def write(robots: int, seen: List[Snapshot], file: Optional[Path]) -> None:
+    """Add the figures of a size, one value for each part of the time."""
+    figures, parts = Figures(f"fleet {robots}"), list(zip(seen, seen[1:]))
+    cost_ms = [1000 * sum(cpu_of(*part).values()) / robots for part in parts]
+    figures.add("CPU per robot and second", "ms", cost_ms)
+    figures.add("real-time factor", "", [factor(*part) for part in parts], LARGER)
+    figures.add("commands", "1/s", [rate_hz(robots, *part) for part in parts], LARGER)
+    memory_mb = sum(one_mb for _, one_mb in seen[-1].nodes.values())
+    figures.add("memory of all nodes", "MB", [memory_mb])
+    figures.write(file)
 
 
 def launch_fleet(port: int, robots: int, *arguments: str) -> subprocess.Popen[bytes]:
@@ -133,19 +184,29 @@ class Commands:
 
 
 def used(port: int) -> Dict[str, Tuple[float, float]]:
-    """Return (CPU in s, memory in MB) of every node whose master listens on a port."""
-    found = {}
+    """Return (CPU in s, memory in MB) of every node whose master listens on a port.
+
+    Worker processes of a node have its name with a number; the fork server is left out.
+    """
+    figures, names, parents = {}, {}, {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             words = (folder / "cmdline").read_bytes().decode().split("\0")
-            names = [word[len("__name:=") :] for word in words if word.startswith("__name:=")]
             environment = (folder / "environ").read_bytes().decode()
-            if names and f"ROS_MASTER_URI=http://localhost:{port}" in environment:
-                fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
-                memory_mb = int((folder / "statm").read_text().split()[1]) * 4096 / 1e6
-                found[names[0]] = ((int(fields[11]) + int(fields[12])) / TICKS_PER_S, memory_mb)
+            if f"ROS_MASTER_URI=http://localhost:{port}" not in environment:
+                continue
+            fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
+            memory_mb = int((folder / "statm").read_text().split()[1]) * 4096 / 1e6
         except (OSError, UnicodeDecodeError):  # it has just ended
             continue
+        pid = int(folder.name)
+        parents[pid] = int(fields[1])
+        figures[pid] = ((int(fields[11]) + int(fields[12])) / TICKS_PER_S, memory_mb)
+        names.update((pid, word[8:]) for word in words if word.startswith("__name:="))
+    found = {name: figures[pid] for pid, name in names.items()}
+    workers = [pid for pid, parent in sorted(parents.items()) if parents.get(parent) in names]
+    for number, pid in enumerate((pid for pid in workers if pid not in names), 1):
+        found[f"{names[parents[parents[pid]]]} worker {number}"] = figures[pid]
     return found
 
 

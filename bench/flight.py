@@ -1,4 +1,11 @@
-"""Measure the real-time factor of offline flights, and the share of each part."""
+"""Measure the real-time factor of offline flights, the cost of a robot, and each part's share.
+
+    PYTHONPATH=src python bench/flight.py --config default --repeat 5
+
+Each mission is flown several times, all of them in turn; the table shows medians. The cost of a
+robot is the CPU time of all processes in milliseconds per robot and simulated second. It is the
+figure to compare on a machine with other users: the real-time factor counts wall time.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +14,17 @@ import os
 import pstats
 import resource
 import sys
-from dataclasses import replace
-from typing import Dict, Tuple
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Dict, List, Optional, Tuple
 
 import click
 import tabulate
+from figures import JSON_HELP, LARGER, Figures
 
 from quad_nav.files.shipped import shipped
+from quad_nav.loop.worker_process import processes_for
 from quad_nav.offline.run import fly
-from quad_nav.offline.worker_process import processes_for
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 
 # Robots, simulated seconds, required factor, factor of a swarm simulator without navigation.
@@ -34,7 +43,7 @@ PARTS: Dict[str, Tuple[str, ...]] = {
     "costmaps": ("layered.py:update",),
     "global plans": ("state_machine.py:_search_plan",),
     "control": ("state_machine.py:_run_control_cycle",),
-    "goals": ("flight.py:tick_sequencer",),
+    "goals": ("flight.py:_sequence",),
 }
 
 
@@ -74,6 +83,64 @@ def shares(setup: FlightSetup) -> Dict[str, float]:
     }
 
 
+@dataclass
+class Measured:
+    """The flights of one mission.
+
+    Attributes:
+        setup: The mission, with its time limit.
+        wanted: Factor that is required.
+        beyond: Factor of a swarm simulator without navigation.
+        factors: Real-time factor of each flight.
+        per_cpu: Simulated seconds per CPU second of each flight.
+    """
+
+    setup: FlightSetup
+    wanted: float
+    beyond: float
+    factors: List[float] = field(default_factory=list)
+    per_cpu: List[float] = field(default_factory=list)
+
+    def fly(self, processes: int) -> None:
+        """Fly the mission and keep its figures."""
+        begin_cpu_s = cpu_time_s()
+        summary = fly(self.setup, processes=processes)
+        self.per_cpu.append(summary.sim_time_s / (cpu_time_s() - begin_cpu_s))
+        self.factors.append(summary.real_time_factor)
+
+
+def missions(config: str, robots: Tuple[int, ...]) -> Dict[int, Measured]:
+    """Return the missions by their number of robots, each flown for a second before."""
+    found = {}
+    for count, sim_s, wanted, beyond in MISSIONS:
+        if not robots or count in robots:
+            setup = replace(setup_of(count, config), time_limit_s=sim_s)
+            fly(replace(setup, time_limit_s=1.0))  # compiled kernels are loaded, caches warm
+            found[count] = Measured(setup, wanted, beyond)
+    return found
+
+
+def row(count: int, one: Measured, config: str, figures: Figures) -> List[str]:
+    """Add a mission's figures; return its row."""
+    case = f"{count} robots, {config}"
+    factor = figures.add(f"real-time factor, {case}", "", one.factors, LARGER)
+    spread = figures.figures[-1].spread
+    cost_ms = figures.add(
+        f"CPU per robot and second, {case}", "ms", [1e3 / count / each for each in one.per_cpu]
+    )
+    parts = shares(replace(one.setup, time_limit_s=min(one.setup.time_limit_s, 20.0)))
+    return [
+        str(count),
+        str(processes_for(count)),
+        f"{factor:.1f}",
+        f"{spread:.1f}",
+        f"{one.wanted:g}",
+        f"{one.beyond:g}",
+        f"{cost_ms:.2f}",
+        *(f"{100 * part:.0f}" for part in parts.values()),
+    ]
+
+
 @click.command()
 @click.option("--config", default="tutorial", show_default=True)
 @click.option(
@@ -82,45 +149,34 @@ def shares(setup: FlightSetup) -> Dict[str, float]:
     multiple=True,
     help="Fly only the mission with so many robots; repeatable.",
 )
-def main(config: str, robots: Tuple[int, ...]) -> None:
+@click.option("--repeat", type=click.IntRange(min=1), default=3, show_default=True)
+@click.option("--json", "file", type=click.Path(path_type=Path), help=JSON_HELP)
+def main(config: str, robots: Tuple[int, ...], repeat: int, file: Optional[Path]) -> None:
     """Print real-time factors with 512 beams at 20 Hz, full navigation and no recording."""
-    rows = []
-    for count, sim_s, wanted, beyond in MISSIONS:
-        if robots and count not in robots:
-            continue
-        setup = replace(setup_of(count, config), time_limit_s=sim_s)
-        fly(replace(setup, time_limit_s=1.0))  # compiled kernels are loaded, caches warm
-        processes = processes_for(count)
-        start_cpu_s = cpu_time_s()
-        summary = fly(setup, processes=processes)
-        cpu_s = cpu_time_s() - start_cpu_s
-        parts = shares(replace(setup, time_limit_s=min(sim_s, 20.0)))
-        memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        rows.append(
-            [
-                count,
-                processes,
-                f"{summary.real_time_factor:.1f}",
-                f"{wanted:g}",
-                f"{beyond:g}",
-                f"{summary.sim_time_s / cpu_s:.1f}",
-                f"{memory_mb:.0f}",
-                *(f"{100 * part:.0f}" for part in parts.values()),
-            ]
-        )
-        print(f"{count} flown", file=sys.stderr)
+    figures, measured = Figures(f"flight {config}"), missions(config, robots)
+    for _ in range(repeat):
+        for count, one in measured.items():
+            one.fly(processes_for(count))
+            print(f"{count} flown", file=sys.stderr)
+    memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    figures.add(f"memory of one process, {config}", "MB", [memory_mb])
+    rows = [row(count, one, config, figures) for count, one in measured.items()]
     header = [
         "robots",
         "processes",
         "real-time\nfactor",
+        "spread",
         "required",
         "swarm\nsimulator",
-        "per CPU\nsecond",
-        "memory\nMB",
+        "CPU per\nrobot, ms/s",
         *(f"{part}\n%".replace(" ", "\n", 1) for part in PARTS),
     ]
-    print(f"Flights offline, config {config}; the percentages under a profiler,\nin one process")
+    print(
+        f"Flights offline, config {config}, medians of {repeat}; the percentages under a profiler,"
+        f"\nin one process. Memory at most {memory_mb:.0f} MB"
+    )
     print(tabulate.tabulate(rows, header, disable_numparse=True, stralign="right"))
+    figures.write(file)
 
 
 if __name__ == "__main__":

@@ -2,17 +2,19 @@
 
     make bench
 
-Medians in microseconds. Several robots scan in one call; the time is for each of them.
+CPU times in microseconds, medians of all calls. Several robots scan in one call; the time is for
+each of them.
 """
 
 from __future__ import annotations
 
-import statistics
 import time
 from pathlib import Path
-from typing import List, Tuple
+from typing import List, Optional, Tuple
 
+import click
 import numpy as np
+from figures import JSON_HELP, Figures
 from tabulate import tabulate
 
 from quad_nav.geometry import Pose2D
@@ -45,21 +47,24 @@ def field(obstacles: int, robots: int, size_m: float = 60.0) -> Scene:
     return Scene("field", size_m, size_m, 1.0, Walls(), tuple(solids), starts)
 
 
-def scan_us(scene: Scene, robots: int, caster: str) -> float:
-    """Return the median time per robot of a call that scans all robots."""
+def scan_us(scene: Scene, robots: int, caster: str) -> List[float]:
+    """Return the times per robot of calls that scan all robots."""
     simulation = Simulation(scene, robots, SimulationParams(lidar_caster=caster))
     everyone = range(robots)
     simulation.scans(everyone)
     times = []
     for _ in range(RUNS[caster]):
-        begin = time.perf_counter()
+        begin_ns = time.process_time_ns()
         simulation.scans(everyone)
-        times.append(time.perf_counter() - begin)
+        times.append(1e-3 * (time.process_time_ns() - begin_ns) / robots)
     simulation.close()
-    return 1e6 * statistics.median(times) / robots
+    return times
 
 
-def main() -> None:
+@click.command()
+@click.option("--json", "file", type=click.Path(path_type=Path), help=JSON_HELP)
+def main(file: Optional[Path]) -> None:
+    """Print the time of a scan with the kernel and with the physics engine."""
     arena = load_scene(ROOT / "scenes" / "arena.yaml")
     cases: List[Tuple[str, Scene, int]] = [
         ("the tutorial's arena, 1 quadcopter", arena, 1),
@@ -68,9 +73,12 @@ def main() -> None:
         ("60 m, 200 obstacles, 100 quadcopters", field(200, 100), 100),
         ("60 m, 10000 obstacles, 10 quadcopters", field(10000, 10), 10),
     ]
-    table = []
+    figures, table = Figures("lidar"), []
     for name, scene, robots in cases:
-        kernel, bullet = (scan_us(scene, robots, caster) for caster in LIDAR_CASTERS)
+        kernel, bullet = (
+            figures.add(f"{caster}, {name}", "us", scan_us(scene, robots, caster))
+            for caster in LIDAR_CASTERS
+        )
         table.append(
             (f"{BEAMS} beams, {name}", f"{kernel:.0f}", f"{bullet:.0f}", f"{bullet / kernel:.0f}")
         )
@@ -82,6 +90,7 @@ def main() -> None:
             colalign=("left", "right", "right", "right"),
         )
     )
+    figures.write(file)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,10 @@
 
     make bench
 
-Parameters and arena are the tutorial's. Times are medians in milliseconds without compilation.
+Parameters and arena are the tutorial's. Times are CPU times in milliseconds without compilation,
+the medians of ten rounds. A round takes the median of 20 calls of each part, so that a slow minute
+of the machine meets all parts and shows in their spread. Two scans come before each update of a
+costmap.
 """
 
 from __future__ import annotations
@@ -11,8 +14,10 @@ import statistics
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Callable, List, Tuple
+from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
+import click
+from figures import JSON_HELP, Figures
 from tabulate import tabulate
 
 from quad_nav import config
@@ -20,43 +25,90 @@ from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.geometry import Pose2D, Pose3D, Twist2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.scenario.assembly import build_navigator
-from quad_nav.sim.lidar import base_from_lidar
+from quad_nav.sim.lidar import Scan, base_from_lidar
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation
 
 ROOT = Path(__file__).resolve().parents[1]
 GOAL = Pose2D(9.0, 5.5)
-SCANS = 20  # kept by observation_persistence 1.0 at 20 Hz
-RUNS = 200
+SCAN_HZ = 20
+SCANS = 20  # kept by observation_persistence 1.0
+SEEN, SCANS_PER_UPDATE = 40, 2  # scans of the repeated flight; costmaps of 10 Hz
+ROUNDS, CALLS = 10, 20
 
-# Milliseconds, navigation 1.17.3, release build, called in-process on two cores of a server.
+# CPU time in ms of C++ navigation 1.17.3 with the same data and the same results: medians of 200
+# calls in-process, release build of gcc 12, on two cores of a server.
 CPP_MS = {
-    "local costmap 120 x 120, 20 kept scans of 512 beams": 0.83,
-    "global costmap 240 x 240, the same scans": 0.71,
-    "NavfnROS, plan over 240 x 240": 1.0,
-    "TrajectoryPlannerROS, 20 x 20 samples of 68 steps": 5.5,
-    "TrajectoryPlannerROS, 6 x 20 samples of 1 s": 2.0,
-    "TrajectoryPlannerROS with dwa: true, 20 x 20 samples": 3.9,
-    "DWAPlannerROS, 20 x 20 samples": 3.9,
+    "local costmap 120 x 120, 20 kept scans of 512 beams": 0.95,
+    "global costmap 240 x 240, the same scans": 0.84,
+    "NavfnROS, plan over 240 x 240": 0.56,
+    "TrajectoryPlannerROS, 20 x 20 samples of 1.7 s": 5.85,
+    "TrajectoryPlannerROS, 6 x 20 samples of 1 s": 2.1,
+    "TrajectoryPlannerROS with dwa: true, 20 x 20 samples": 5.95,
+    "DWAPlannerROS, 20 x 20 samples": 5.4,
 }
 
 
-def median_ms(
-    call: Callable[[], object], prepare: Callable[[], object] = lambda: None, runs: int = RUNS
-) -> float:
-    """Return the median time of ``runs`` calls after a first one that compiles."""
-    prepare()
-    call()
-    times = []
-    for _ in range(runs):
+Seen = Tuple[Scan, Pose3D]  # and the pose map_from_base
+Part = Tuple[Callable[[], object], Callable[[], object]]  # what is measured, what goes before it
+
+
+def no_preparation() -> None:
+    """Prepare nothing."""
+
+
+def median_ms(call: Callable[[], object], prepare: Callable[[], object]) -> float:
+    """Return the median CPU time of ``CALLS`` calls."""
+    times_ns = []
+    for _ in range(CALLS):
         prepare()
-        begin = time.perf_counter()
+        begin_ns = time.process_time_ns()
         call()
-        times.append(time.perf_counter() - begin)
-    return 1e3 * statistics.median(times)
+        times_ns.append(time.process_time_ns() - begin_ns)
+    return 1e-6 * statistics.median(times_ns)
+
+
+class Updates:
+    """Updates of a costmap in flight: two new scans before each, the oldest two are dropped.
+
+    The flight repeats. Stamps go on, so that ``SCANS`` are kept at any time.
+    """
+
+    def __init__(self, costmap: LayeredCostmap, seen: Sequence[Seen]) -> None:
+        self.costmap, self.seen = costmap, seen
+        self.taken = 0
+
+    def take(self, scans: int = SCANS_PER_UPDATE) -> None:
+        """Take the next scans."""
+        for _ in range(scans):
+            scan, map_from_base = self.seen[self.taken % len(self.seen)]
+            self.now_s, self.pose = self.taken / SCAN_HZ, map_from_base.to_2d()
+            map_from_sensor = map_from_base.compose(base_from_lidar)
+            self.costmap.layers["obstacle_layer"].add_scan(
+                "base_scan", replace(scan, stamp_s=self.now_s), map_from_sensor, self.now_s
+            )
+            self.taken += 1
+
+    def update(self) -> None:
+        """Update the costmap."""
+        self.costmap.update(self.now_s, self.pose)
+
+
+def tutorial_flight() -> List[Seen]:
+    """Fly straight with 0.3 m/s; return what the LIDAR sees in two seconds."""
+    simulation = Simulation(load_scene(ROOT / "scenes" / "arena.yaml"), 2)
+    seen = []
+    for k in range(SCANS + SEEN):  # the robot accelerates in the first second
+        simulation.set_command(0, Twist2D(vx_mps=0.3))
+        for _ in range(STEPS_PER_S // SCAN_HZ):
+            simulation.step()
+        if k >= SCANS:
+            seen.append((simulation.scan(0), simulation.state(0).map_from_base))
+    simulation.close()
+    return seen
 
 
 def tutorial_navigator() -> Tuple[Navigator, Pose2D]:
@@ -64,22 +116,12 @@ def tutorial_navigator() -> Tuple[Navigator, Pose2D]:
     navigator = build_navigator(
         config.load(config.load_files(ROOT / "config" / "tutorial", {"i": "0"}))
     )
-    simulation = Simulation(load_scene(ROOT / "scenes" / "arena.yaml"), 2)
-    for k in range(2 * SCANS):  # the robot accelerates in the first second
-        simulation.set_command(0, Twist2D(vx_mps=0.3))
-        for _ in range(STEPS_PER_S // 20):
-            simulation.step()
-        pose = simulation.state(0).map_from_base
-        if k >= SCANS:
-            scan = replace(simulation.scan(0), stamp_s=0.05 * (k - SCANS))
-            for costmap in (navigator.global_costmap, navigator.local_costmap):
-                costmap.layers["obstacle_layer"].add_scan(
-                    "base_scan", scan, pose.compose(base_from_lidar), scan.stamp_s
-                )
-    simulation.close()
+    seen = tutorial_flight()
     for costmap in (navigator.global_costmap, navigator.local_costmap):
-        costmap.update(1.0, pose.to_2d())
-    return navigator, pose.to_2d()
+        updates = Updates(costmap, seen)
+        updates.take(SCANS)
+        updates.update()
+    return navigator, updates.pose
 
 
 def local_planners(tutorial: LocalPlanner) -> List[LocalPlanner]:
@@ -106,44 +148,62 @@ def local_planners(tutorial: LocalPlanner) -> List[LocalPlanner]:
     ]
 
 
-def rows() -> List[Tuple[str, float]]:
-    """Measure the parts; return their names and times in ms."""
+def parts() -> List[Part]:
+    """Return what is measured, in the order of ``CPP_MS``."""
     navigator, pose = tutorial_navigator()
-    local, globe = navigator.local_costmap, navigator.global_costmap
+    spare, seen = tutorial_navigator()[0], tutorial_flight()
+    local = navigator.local_costmap
     plan = navigator.make_plan(pose, GOAL)
     flying = Twist2D(vx_mps=0.2)
 
-    def update(costmap: LayeredCostmap) -> float:
-        return median_ms(lambda: costmap.update(1.0, pose))
+    def update(costmap: LayeredCostmap) -> Part:
+        updates = Updates(costmap, seen)
+        return updates.update, updates.take
 
-    def control(controller: LocalPlanner) -> float:
-        return median_ms(
+    def control(controller: LocalPlanner) -> Part:
+        return (
             lambda: controller.compute_velocity(local.spec, local.costs, pose, flying),
-            prepare=lambda: controller.set_plan(plan),
+            lambda: controller.set_plan(plan),
         )
 
-    measured = [
-        update(local),
-        update(globe),
-        median_ms(lambda: navigator.make_plan(pose, GOAL)),
+    return [
+        update(spare.local_costmap),
+        update(spare.global_costmap),
+        (lambda: navigator.make_plan(pose, GOAL), no_preparation),
         *map(control, local_planners(navigator.controller)),
     ]
-    return list(zip(CPP_MS, measured))
 
 
-def main() -> None:
-    table = [
-        (name, f"{ms:.2f}", f"{CPP_MS[name]:.2f}", f"{ms / CPP_MS[name]:.2f}")
-        for name, ms in rows()
-    ]
+def measure() -> Dict[str, List[float]]:
+    """Return the time of each part in ms, one for each round, after a first one that compiles."""
+    named = dict(zip(CPP_MS, parts()))
+    times_ms: Dict[str, List[float]] = {name: [] for name in named}
+    for k in range(ROUNDS + 1):
+        for name, (call, prepare) in named.items():
+            one_ms = median_ms(call, prepare)
+            if k:
+                times_ms[name].append(one_ms)
+    return times_ms
+
+
+@click.command()
+@click.option("--json", "file", type=click.Path(path_type=Path), help=JSON_HELP)
+def main(file: Optional[Path]) -> None:
+    """Print the time of each part beside the original's."""
+    figures, table = Figures("navigation"), []
+    for name, times_ms in measure().items():
+        ms = figures.add(name, "ms", times_ms)
+        row = (f"{ms:.2f}", f"{figures.figures[-1].spread:.2f}", f"{CPP_MS[name]:.2f}")
+        table.append((name, *row, f"{ms / CPP_MS[name]:.2f}"))
     print(
         tabulate(
             table,
-            ("", "Python, ms", "C++, ms", "ratio"),
+            ("", "Python, ms", "spread", "C++, ms", "ratio"),
             disable_numparse=True,
-            colalign=("left", "right", "right", "right"),
+            colalign=("left", "right", "right", "right", "right"),
         )
     )
+    figures.write(file)
 
 
 if __name__ == "__main__":

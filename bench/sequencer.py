@@ -2,9 +2,11 @@
 
     scripts/ros_env python3 bench/sequencer.py --robots 50 --seconds 20
 
-The stubs publish odometry at 40 Hz, the action's status at 5 Hz and one transform each, and fly
-straight to each goal that they receive. They run in this process; the sequencer is a node of its
-own, under a roscore of its own. Its goals come about every `LEG_M / SPEED_MPS` seconds.
+The stubs publish their states at 40 Hz, the action's status at 5 Hz and one transform each, and fly
+straight to each goal that they receive. States are one message for all, as those of the simulator;
+with --odometry each stub has its own topic, as real quadcopters with C++ move_base have. The stubs
+run in this process; the sequencer is a node of its own, under a roscore of its own. Its goals come
+about every `LEG_M / SPEED_MPS` seconds.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import time
 from pathlib import Path
 from typing import Any, List, Optional
 
+from figures import JSON_HELP, Figures
 from launched import answers, free_port, wait_for
 
 PERIOD_S, STATUS_TICKS = 1 / 40, 8
@@ -32,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[1]
 class Stub:
     """Odometry and action topics of one quadcopter that flies without dynamics."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number: int, has_odometry: bool) -> None:
         import rospy
         from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
         from geometry_msgs.msg import PoseStamped
@@ -45,7 +48,9 @@ class Stub:
         self._goals = 0
         self._make = GoalID, GoalStatus, GoalStatusArray, MoveBaseActionResult
         action = f"/move_base{number}"
-        self._odometry = rospy.Publisher(f"/odom{number}", Odometry, queue_size=10)
+        self._odometry = (
+            rospy.Publisher(f"/odom{number}", Odometry, queue_size=10) if has_odometry else None
+        )
         self._result = rospy.Publisher(f"{action}/result", MoveBaseActionResult, queue_size=10)
         self._statuses = rospy.Publisher(f"{action}/status", GoalStatusArray, queue_size=10)
         self._subscriber = rospy.Subscriber(
@@ -76,12 +81,38 @@ class Stub:
             if part == 1.0:
                 self._status.status, self._status.text = make_status.SUCCEEDED, "Goal reached."
                 self._result.publish(make_result(status=self._status))
-        message = self._message
-        message.header.stamp = stamp
-        message.pose.pose.position.x, message.pose.pose.position.y = self.x_m, self.y_m
-        self._odometry.publish(message)
+        if self._odometry is not None:
+            message = self._message
+            message.header.stamp = stamp
+            message.pose.pose.position.x, message.pose.pose.position.y = self.x_m, self.y_m
+            self._odometry.publish(message)
         if tick % STATUS_TICKS == self._number % STATUS_TICKS:
             self._statuses.publish(make_array(status_list=[self._status] if self._status else []))
+
+
+class States:
+    """States of all stubs in one message."""
+
+    def __init__(self, stubs: List[Stub]) -> None:
+        import rospy
+        from geometry_msgs.msg import Transform, Twist
+        from sensor_msgs.msg import MultiDOFJointState
+
+        self._stubs = stubs
+        self._publisher = rospy.Publisher("/quad/states", MultiDOFJointState, queue_size=10)
+        self._message = MultiDOFJointState()
+        self._message.header.frame_id = "map"
+        self._message.joint_names = [f"quad{number}" for number in range(len(stubs))]
+        self._message.transforms = [Transform() for _ in stubs]
+        self._message.twist = [Twist() for _ in stubs]
+
+    def publish(self, stamp: Any) -> None:
+        """Publish the present states."""
+        self._message.header.stamp = stamp
+        for stub, transform in zip(self._stubs, self._message.transforms):
+            transform.translation.x, transform.translation.y = stub.x_m, stub.y_m
+            transform.rotation.w = 1.0
+        self._publisher.publish(self._message)
 
 
 def goal_files(folder: Path, robots: int, seconds: float) -> None:
@@ -96,7 +127,7 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def fly(robots: int, sequencer: subprocess.Popen) -> List[float]:
+def fly(robots: int, has_odometry: bool, sequencer: subprocess.Popen) -> List[float]:
     """Publish until the sequencer ends; return its processor time at each second of flight."""
     import rospy
     from geometry_msgs.msg import TransformStamped
@@ -107,7 +138,8 @@ def fly(robots: int, sequencer: subprocess.Popen) -> List[float]:
     rospy.init_node("stubs", disable_signals=True)
     clock = rospy.Publisher("/clock", Clock, queue_size=10, latch=True)
     transforms = rospy.Publisher("/tf", TFMessage, queue_size=10, latch=True)
-    stubs = [Stub(number) for number in range(robots)]
+    stubs = [Stub(number, has_odometry) for number in range(robots)]
+    states = None if has_odometry else States(stubs)
     begun: List[bool] = []
     rospy.Service(
         "/simulation/start", Trigger, lambda _: begun.append(True) or TriggerResponse(True, "")
@@ -127,6 +159,8 @@ def fly(robots: int, sequencer: subprocess.Popen) -> List[float]:
                 samples.append(cpu_s(sequencer.pid))
         for stub in stubs:
             stub.step(stamp, tick)
+        if states is not None:
+            states.publish(stamp)
         tick, due_s = tick + 1, due_s + PERIOD_S
         time.sleep(max(due_s - time.monotonic(), 0.0))
     return samples
@@ -136,6 +170,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, default=50)
     parser.add_argument("--seconds", type=float, default=20.0, help="flight of each quadcopter")
+    parser.add_argument("--json", type=Path, help=JSON_HELP)
+    parser.add_argument("--odometry", action="store_true", help="states on topics of their own")
     given = parser.parse_args()
     folder, port = Path(tempfile.mkdtemp(prefix="quad_sequencer_")), free_port()
     goal_files(folder, given.robots, given.seconds)
@@ -152,7 +188,7 @@ def main() -> int:
         parameters += [f"_result:={folder}/result.json", f"_journal:={folder}/journal"]
         command = [sys.executable, str(ROOT / "nodes" / "sequencer"), *parameters]
         sequencer = subprocess.Popen(command, stdout=log, stderr=log)
-        samples = fly(given.robots, sequencer)
+        samples = fly(given.robots, given.odometry, sequencer)
     finally:
         core.send_signal(signal.SIGINT)
         core.wait(20)
@@ -162,6 +198,10 @@ def main() -> int:
         f"{samples[-1] - samples[0]:.2f} s of processor time in {len(samples) - 1} s, "
         f"logs in {folder}"
     )
+    figures = Figures(f"sequencer {given.robots}")
+    used_ms = [1e3 * (after - before) for before, after in zip(samples, samples[1:])]
+    figures.add("CPU in each second", "ms", used_ms)
+    figures.write(given.json)
     sys.stdout.flush()
     os._exit(0 if summary["success"] else 1)  # rospy's threads wait for the dead master
 
