@@ -178,6 +178,26 @@ def test_the_grid_gives_the_same_ranges(span, count):
     assert solids_seen > 1000
 
 
+@pytest.mark.parametrize("span, count", [(2 * math.pi, 512), (2.0, 101)])
+def test_hidden_solids_change_no_range(span, count):
+    """The ranges among solids are the least of those with each solid alone, to the bit."""
+    random = np.random.default_rng(4)
+    solids = solids_of(list(forest(random, 120, 60.0)))
+    pattern = beams(*np.linspace(-span / 2, span / 2, count, endpoint=False))
+    beyond_m = 0.0
+    for _ in range(6):
+        origin = random.uniform((-5.0, -5.0, 0.3), (65.0, 65.0, 1.5))
+        pitch = random.uniform(-0.05, 0.05)
+        alone = [
+            cast(Solids(*(field[k : k + 1] for field in solids)), origin, pattern, pitch_rad=pitch)
+            for k in range(len(solids.kinds))
+        ]
+        ranges = cast(solids, origin, pattern, pitch_rad=pitch)
+        np.testing.assert_array_equal(ranges, np.min(alone, axis=0))
+        beyond_m = max(beyond_m, ranges[np.isfinite(ranges)].max())
+    assert beyond_m > 24.0
+
+
 def test_a_scene_of_many_solids_is_split():
     """Walls reach over many columns and are projected; all of the rest is in the grid."""
     random = np.random.default_rng(4)

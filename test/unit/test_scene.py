@@ -245,7 +245,7 @@ FLOOR_PILLAR = {
         (
             None,
             "missing, expected a mapping with name, size, origin, altitude, walls, obstacles, "
-            "starts, world, map, unknown",
+            "starts, world, map, unknown, motion_phase, walkers",
         ),
         ({"size": [4.0, 4.0]}, "starts: missing, expected a list"),
         (small_document(starts=[]), "starts: no start pose, expected at least one [x, y, yaw]"),

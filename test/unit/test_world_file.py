@@ -65,6 +65,83 @@ def same(obstacle, other) -> None:
     assert values == pytest.approx(expected, abs=1e-9)
 
 
+def actor(script: str, name: str = "ann", pose: str = "") -> str:
+    return f'<actor name="{name}">{pose}<script>{script}</script></actor>'
+
+
+def waypoint(time_s: float, pose: str) -> str:
+    return f"<waypoint><time>{time_s}</time><pose>{pose}</pose></waypoint>"
+
+
+def trajectory(*waypoints: str, more: str = "") -> str:
+    return f'<trajectory id="0" type="walking"{more}>{"".join(waypoints)}</trajectory>'
+
+
+TO_AND_FRO = trajectory(
+    waypoint(0, "1 2 1.0 0 0 0"), waypoint(4, "5 2 1.0 0 0 1.5"), waypoint(8, "1 2 1.0 0 0 0")
+)
+
+
+def test_an_actor_walks_along_its_waypoints(tmp_path):
+    world = load_world(written(tmp_path, actor(TO_AND_FRO)))
+    assert world.obstacles == () and world.remarks == ()
+    (one,) = world.moving
+    assert one.shape == Cylinder("ann", 1.0, 2.0, 0.25, 1.75)
+    assert one.motion.times_s == (0.0, 4.0, 8.0)
+    assert [pose[:2] for pose in one.motion.poses] == [(1.0, 2.0), (5.0, 2.0), (1.0, 2.0)]
+    assert (one.motion.loop, one.motion.interpolation, one.motion.tension) == (True, "spline", 0.0)
+
+
+def test_delay_loop_tension_and_a_second_trajectory(tmp_path):
+    """The second trajectory begins when the first one ends; waypoints are sorted by time."""
+    later = trajectory(waypoint(3, "5 4 0 0 0 0"), waypoint(1, "5 3 0 0 0 0"))
+    script = "<loop>false</loop><delay_start>2</delay_start>"
+    first = trajectory(waypoint(0, "5 1 0 0 0 0"), waypoint(4, "5 2 0 0 0 0"))
+    (one,) = load_world(written(tmp_path, actor(script + first + later))).moving
+    assert one.motion.times_s == (2.0, 6.0, 7.0, 9.0)
+    assert [pose[1] for pose in one.motion.poses] == [1.0, 2.0, 3.0, 4.0]
+    assert not one.motion.loop
+    stiff = TO_AND_FRO.replace('type="walking"', 'type="walking" tension="0.6"')
+    (one,) = load_world(written(tmp_path, actor(stiff))).moving
+    assert one.motion.tension == 0.6
+
+
+@pytest.mark.parametrize("script", ["", "<auto_start>false</auto_start>" + TO_AND_FRO])
+def test_an_actor_without_a_walk_stands(tmp_path, script):
+    pose = "<pose>3 4 1 0 0 0</pose>"
+    assert only(tmp_path, actor(script, pose=pose)) == Cylinder("ann", 3.0, 4.0, 0.25, 1.75)
+
+
+def test_a_scene_of_a_world_has_its_actors(tmp_path):
+    """The arena holds the waypoints; equal names are numbered."""
+    path = written(tmp_path, model(BOX, "0 5 1.5 0 0 0"), actor(TO_AND_FRO), actor(TO_AND_FRO))
+    scene = load_scene(path)
+    assert [one.shape.name for one in scene.moving] == ["ann", "ann_2"]
+    assert scene.end_x_m == pytest.approx(5.25)
+    assert scene.origin_y_m == pytest.approx(1.75)
+
+
+@pytest.mark.parametrize(
+    "script, problem",
+    [
+        (
+            trajectory("<waypoint><pose>1 2 0 0 0 0</pose></waypoint>"),
+            "<waypoint>: <time> is missing, expected seconds",
+        ),
+        (
+            trajectory(waypoint(-1, "1 2 0 0 0 0")),
+            "<time>: '-1', expected seconds, 0 or more",
+        ),
+        (
+            trajectory(waypoint(0, "1 2 0 0 0 0"), more=' tension="nan"'),
+            "<trajectory>: tension 'nan', expected a number from 0 to 1",
+        ),
+    ],
+)
+def test_faults_of_actors(tmp_path, script, problem):
+    assert faults(written(tmp_path, actor(script))) == [f"a.world: line 3: {problem}"]
+
+
 def test_primitives_have_the_poses_that_they_have_in_gazebo(tmp_path):
     same(
         only(tmp_path, model(BOX, "4 5 1.5 0 0 0.3")),
@@ -165,7 +242,11 @@ def test_ground_plane_and_sun_are_floor_and_light(tmp_path):
             '<model name="m"><static>1</static><link name="l"><visual name="v"/></link></model>',
             "left out, looks without a collision: m/l",
         ),
-        ('<actor name="walker"/>', "left out, actor: walker"),
+        (
+            '<actor name="walker"><plugin name="p" filename="p.so"/></actor>',
+            "left out, actor that a plugin moves: walker",
+        ),
+        ('<road name="r"/>', "left out, road: r"),
         (model(BOX, static="false"), "not static in Gazebo, but fixed here: m"),
     ],
 )

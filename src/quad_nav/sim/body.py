@@ -10,13 +10,12 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from contextlib import contextmanager
-from typing import Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.errors import InputError
+from quad_nav.errors import InputError, discarded_stderr
 from quad_nav.geometry import Pose2D, quaternion_from_yaw
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.contacts import Touch
@@ -25,26 +24,7 @@ from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Box, Obstacle, Scene, Sphere
 from quad_nav.sim.solids import grouped
 
-
-@contextmanager
-def _discarded_errors() -> Iterator[None]:
-    """Discard what C code prints to standard error meanwhile; exceptions are not affected."""
-    try:
-        kept = os.dup(2)
-    except OSError:  # standard error is closed
-        yield
-        return
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(null)
-        os.close(kept)
-
-
-with _discarded_errors():  # pybullet prints its build time
+with discarded_stderr():  # pybullet prints its build time
     import pybullet
 
 Floats = NDArray[np.float64]
@@ -89,6 +69,8 @@ class World:
         self._client = _connect(gui)
         self._gui = gui
         self._goal_ids: List[int] = []
+        self._moving_ids: List[int] = []
+        self._obstacle_poses: Floats = np.zeros((0, 3))
         self.reset(starts)
 
     def reset(self, starts: Sequence[Pose2D]) -> None:
@@ -122,6 +104,10 @@ class World:
             self._names[self._add_obstacle(solid)] = solid.name
         for group in groups:
             self._names[self._add_boxes(group)] = None
+        moving = self._scene.moving_shapes
+        self._moving_ids = [self._add_obstacle(solid) for solid in moving]
+        self._names.update(zip(self._moving_ids, (solid.name for solid in moving)))
+        self.place_obstacles(self._obstacle_poses)
         self._robots = [self._add_quadcopter(k, start) for k, start in enumerate(starts)]
         self._engaged = list(range(len(starts)))
         self._goal_ids = []
@@ -187,6 +173,22 @@ class World:
             pybullet.resetBasePositionAndOrientation(body, row[0:3], row[3:7], client)
             pybullet.resetBaseVelocity(body, row[7:10], row[10:13], client)
         self._engaged = list(robots)
+
+    def place_obstacles(self, poses: Floats) -> None:
+        """Set the poses (x_m, y_m, yaw_rad) of the moving obstacles, float64[m, 3].
+
+        They are bodies without mass that are put from pose to pose, as Gazebo does with animated
+        models: nothing stops them, and they push what they overlap.
+        """
+        self._obstacle_poses = poses
+        if self._is_stale:
+            return
+        for body, solid, (x_m, y_m, yaw_rad) in zip(
+            self._moving_ids, self._scene.moving_shapes, poses.tolist()
+        ):
+            place = [x_m, y_m, solid.bottom_m + solid.height_m / 2]
+            turn = quaternion_from_yaw(yaw_rad)
+            pybullet.resetBasePositionAndOrientation(body, place, turn, self._client)
 
     def step(self, state: BodyState, forces_n: Floats, torques_nm: Floats) -> BodyState:
         """Return the state after one step of the engaged quadcopters.
@@ -290,31 +292,16 @@ class World:
         return Touch(numbers[0], name or self._scene.nearest(*position).name, position)
 
     def _add_obstacle(self, solid: Obstacle) -> int:
-        client, height = self._client, solid.height_m
-        if isinstance(solid, Box):
-            yaw = solid.yaw_rad
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_BOX,
-                physicsClientId=client,
-                halfExtents=[solid.size_x_m / 2, solid.size_y_m / 2, height / 2],
-            )
-        elif isinstance(solid, Sphere):
-            yaw = 0.0
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_SPHERE, radius=solid.radius_m, physicsClientId=client
-            )
-        else:
-            yaw = 0.0
-            shape = pybullet.createCollisionShape(
-                pybullet.GEOM_CYLINDER, radius=solid.radius_m, height=height, physicsClientId=client
-            )
+        kind, sizes = _shape(solid)
+        shape = pybullet.createCollisionShape(kind, physicsClientId=self._client, **sizes)
+        yaw_rad = solid.yaw_rad if isinstance(solid, Box) else 0.0
         return int(
             pybullet.createMultiBody(
                 0.0,
                 shape,
-                basePosition=[solid.x_m, solid.y_m, solid.bottom_m + height / 2],
-                baseOrientation=quaternion_from_yaw(yaw),
-                physicsClientId=client,
+                basePosition=[solid.x_m, solid.y_m, solid.bottom_m + solid.height_m / 2],
+                baseOrientation=quaternion_from_yaw(yaw_rad),
+                physicsClientId=self._client,
             )
         )
 
@@ -372,6 +359,16 @@ class World:
             physicsClientId=client,
         )
         return body
+
+
+def _shape(solid: Obstacle) -> Tuple[int, Dict[str, Any]]:
+    """Return the engine's kind and sizes of a shape."""
+    if isinstance(solid, Box):
+        half_m = [solid.size_x_m / 2, solid.size_y_m / 2, solid.height_m / 2]
+        return pybullet.GEOM_BOX, {"halfExtents": half_m}
+    if isinstance(solid, Sphere):
+        return pybullet.GEOM_SPHERE, {"radius": solid.radius_m}
+    return pybullet.GEOM_CYLINDER, {"radius": solid.radius_m, "height": solid.height_m}
 
 
 def _connect(gui: bool) -> int:

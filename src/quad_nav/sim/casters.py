@@ -17,7 +17,7 @@ from quad_nav.kernels.rays import CYLINDER
 from quad_nav.sim.flight import BodyState
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M, LidarParams, beam_directions, lidar_poses, make_scan
 from quad_nav.sim.scene import BODY_RADIUS_M, GUARD_HEIGHT_M, Scene
-from quad_nav.sim.solids import join, split_scene
+from quad_nav.sim.solids import join, place, solids_of, split_scene
 
 Floats = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class Caster(Protocol):
         """Cast the beams of some robots' LIDARs.
 
         Args:
-            bodies: State of all quadcopters.
+            bodies: State of all quadcopters and moving obstacles.
             robots: Numbers of the robots.
 
         Returns:
@@ -74,7 +74,10 @@ class WorldCaster:
 
 
 class KernelCaster:
-    """Caster that computes hits with a scene's solids, the floor and the quadcopters' guards."""
+    """Caster that computes hits with a scene's solids, the floor and the quadcopters' guards.
+
+    Moving obstacles and guards are at the poses in the ``BodyState``.
+    """
 
     def __init__(
         self, params: LidarParams, scene: Scene, n_robots: int, body_radius_m: float = BODY_RADIUS_M
@@ -88,7 +91,11 @@ class KernelCaster:
             params.range_max_m,
         )
         resting, self._grid = split_scene(scene)
+        moving, count = solids_of(scene.moving_shapes), len(resting.kinds)
+        if len(moving.kinds) > 0:
+            resting = join(resting, moving)
         self._solids = join(resting, _guards(n_robots, body_radius_m))
+        self._moving = Solids(*(column[count : len(resting.kinds)] for column in self._solids))
         self._guard_centres = self._solids.centres[len(resting.kinds) :]
         self._guard_rotations = self._solids.rotations[len(resting.kinds) :]
 
@@ -97,6 +104,8 @@ class KernelCaster:
         rotations = bodies.rotations
         self._guard_centres[:] = bodies.positions_m + MOUNT_HEIGHT_M * rotations[:, :, 2]
         self._guard_rotations[:] = rotations.transpose(0, 2, 1)
+        if len(self._moving.kinds) > 0:
+            place(self._moving, bodies.obstacles)
         origins = self._guard_centres  # the guards are centred on the LIDARs
         if len(robots) < len(origins):
             origins, rotations = origins[list(robots)], rotations[list(robots)]

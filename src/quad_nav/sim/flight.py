@@ -24,7 +24,7 @@ The controller has no state: equal states and commands give equal forces.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Tuple
 
@@ -39,6 +39,9 @@ from quad_nav.sim.scene import BODY_RADIUS_M
 Floats = NDArray[np.float64]
 
 GRAVITY_MPS2 = 9.81
+BODY_VALUES = 13
+"""Numbers in the state of a body."""
+NO_OBSTACLES: Floats = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -88,14 +91,16 @@ class FlightParams:
 
 @dataclass(frozen=True)
 class BodyState:
-    """Poses and velocities of all quadcopters in ``map``.
+    """Poses and velocities of all quadcopters in ``map``, and the poses of what moves by itself.
 
     Attributes:
-        rows: float64[n, 13]: position (3) in m, quaternion (x, y, z, w), velocity (3) in m/s,
-            angular velocity (3) in rad/s.
+        rows: float64[n, BODY_VALUES]: position (3) in m, quaternion (x, y, z, w), velocity (3) in
+            m/s, angular velocity (3) in rad/s.
+        obstacles: float64[m, 3], poses (x_m, y_m, yaw_rad) of ``Scene.moving_shapes``.
     """
 
     rows: Floats
+    obstacles: Floats = field(default_factory=lambda: NO_OBSTACLES)
 
     @property
     def positions_m(self) -> Floats:

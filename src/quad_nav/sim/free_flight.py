@@ -1,27 +1,35 @@
 """Free flight: quadcopters that are far from everything move without the physics engine.
 
 While a quadcopter cannot touch anything, only gravity and its own thrust and torque act on it.
-Its distance to the nearest surface changes by at most the distance that it flies, so that this
-distance is computed only now and then.
+Its distance to the nearest surface at rest changes by at most the distance that it flies, so that
+this distance is computed only now and then. What moves by itself may jump, so that its distance is
+checked at every step, from a cylinder that holds it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import List, Tuple
+from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.rigid_body import NOBODY, FreeSpace, fly_freely
+from quad_nav.kernels.rigid_body import MOVING, NOBODY, FreeSpace, MovingSolids, fly_freely
 from quad_nav.sim.flight import BodyState, FlightLaw
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
+from quad_nav.sim.movers import reach_m
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene
 
 Floats = NDArray[np.float64]
 
 _MARGIN_M = 0.03
 """More than two quadcopters approach in a step, plus the engine's collision margin."""
+
+_MOVING_STEPS = 60
+"""Most steps for which the poses of moving obstacles are computed at once."""
+
+MovingPoses = Callable[[int], Floats]
+"""Poses float64[steps, m, 3] of the scene's moving obstacles after each of the next steps."""
 
 
 class FreeFlight:
@@ -42,9 +50,21 @@ class FreeFlight:
             free_m=np.zeros(n_robots),  # not known yet
             centres_m=np.empty((n_robots, 3)),
         )
+        shapes, reach = scene.moving_shapes, self._reach_m
+        self._moving = MovingSolids(
+            np.zeros((1, len(shapes), 3)),
+            np.array([reach_m(shape) + reach for shape in shapes], float),
+            np.array([shape.bottom_m - reach for shape in shapes], float),
+            np.array([shape.bottom_m + shape.height_m + reach for shape in shapes], float),
+        )
 
     def advance(
-        self, bodies: BodyState, commands: Floats, excluded: NDArray[np.bool_], steps: int
+        self,
+        bodies: BodyState,
+        commands: Floats,
+        excluded: NDArray[np.bool_],
+        steps: int,
+        moving_poses: Optional[MovingPoses] = None,
     ) -> Tuple[BodyState, int, List[int]]:
         """Move quadcopters until one may touch something.
 
@@ -53,29 +73,42 @@ class FreeFlight:
             commands: float64[n, 3], as for the flight controller.
             excluded: bool[n], quadcopters that do not move.
             steps: Largest number of steps.
+            moving_poses: Needed if obstacles of the scene move.
 
         Returns:
             The new state, the number of steps, and the robots that may touch something next.
         """
-        rows, done = bodies.rows.copy(), 0
+        rows, done, poses = bodies.rows.copy(), 0, self._moving.poses
+        if moving_poses is not None and len(self._moving.reaches_m) > 0:
+            steps = min(steps, _MOVING_STEPS)
+            poses = moving_poses(steps)
         while done < steps:
-            more, found, other = fly_freely(
-                rows,
-                commands,
-                excluded,
-                steps - done,
-                self._step_s,
-                self._scene.altitude_m,
-                self._law.constants,
-                self._law.gains,
-                self._space,
-            )
+            more, found, other = self._fly(rows, commands, excluded, steps - done, poses[done:])
             done += more
+            if other == MOVING:
+                return BodyState(rows), done, [found]
             if other != NOBODY:
                 return BodyState(rows), done, [found, other]
             if found != NOBODY and not self._is_far(found):
                 return BodyState(rows), done, [found]
         return BodyState(rows), done, []
+
+    def _fly(
+        self, rows: Floats, commands: Floats, excluded: NDArray[np.bool_], steps: int, poses: Floats
+    ) -> Tuple[int, int, int]:
+        moving = self._moving
+        return fly_freely(
+            rows,
+            commands,
+            excluded,
+            steps,
+            self._step_s,
+            self._scene.altitude_m,
+            self._law.constants,
+            self._law.gains,
+            self._space,
+            moving._replace(poses=poses) if len(moving.reaches_m) > 0 else moving,
+        )
 
     def _is_far(self, robot: int) -> bool:
         """Compute a robot's distance to the nearest surface; return whether it is far from it."""

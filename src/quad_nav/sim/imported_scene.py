@@ -11,7 +11,7 @@ from typing import Callable, Iterable, List, Optional, Sequence, Set, Tuple
 from quad_nav.files.document import read_yaml
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.map_file import load_map
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Obstacle, Scene
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, MovingObstacle, Obstacle, Scene, placed
 from quad_nav.sim.world_file import load_world
 
 Extent = Tuple[float, float, float, float]
@@ -36,12 +36,14 @@ class ImportedScene:
         extent: Bounding box of the obstacles, or of the map; None if there is nothing.
         may_start: Returns whether a robot may start at a position (x, y) in ``map``.
         remarks: Notes for the user on content that was left out.
+        moving: The obstacles that move, with unique names, too.
     """
 
     obstacles: Tuple[Obstacle, ...]
     extent: Optional[Extent]
     may_start: Callable[[float, float], bool]
     remarks: Tuple[str, ...]
+    moving: Tuple[MovingObstacle, ...] = ()
 
 
 def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
@@ -55,9 +57,14 @@ def from_world(path: Path, model_path: Sequence[Path]) -> ImportedScene:
         InputError: A file has faults; lists all of them.
     """
     world = load_world(path, model_path)
-    obstacles = _with_unique_names(world.obstacles)
-    corners = [corner for obstacle in obstacles for corner in _corners(obstacle)]
-    return ImportedScene(tuple(obstacles), _extent(corners), lambda x_m, y_m: True, world.remarks)
+    named = _with_unique_names([*world.obstacles, *(one.shape for one in world.moving)])
+    obstacles, shapes = named[: len(world.obstacles)], named[len(world.obstacles) :]
+    moving = [replace(one, shape=shape) for one, shape in zip(world.moving, shapes)]
+    everywhere = (placed(one.shape, pose) for one in moving for pose in one.motion.poses)
+    corners = [corner for solid in (*obstacles, *everywhere) for corner in _corners(solid)]
+    return ImportedScene(
+        tuple(obstacles), _extent(corners), lambda x_m, y_m: True, world.remarks, tuple(moving)
+    )
 
 
 def from_map(path: Path, height_m: float, unknown_is_occupied: bool) -> ImportedScene:

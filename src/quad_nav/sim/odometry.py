@@ -84,6 +84,6 @@ class OdomFrames:
 
 def pose_in(map_from_frame: Pose2D, map_from_base: Pose3D) -> Pose3D:
     """Express a pose in ``map`` in another frame; without drift it is the same object."""
-    if map_from_frame == _IDENTITY:
+    if map_from_frame is _IDENTITY or map_from_frame == _IDENTITY:
         return map_from_base
     return map_from_frame.to_3d().inverse().compose(map_from_base)

@@ -10,14 +10,15 @@ with their inner faces on its border.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, List, Sequence, Tuple, Union
+from typing import Any, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Coordinate, Pose2D, rotate_vectors
+from quad_nav.sim.motion import Motion, Walkers
 
 Floats = NDArray[np.float64]
 Lengths = Union[float, Floats]
@@ -129,6 +130,14 @@ Obstacle = Union[Box, Cylinder, Sphere]
 
 
 @dataclass(frozen=True)
+class MovingObstacle:
+    """Obstacle that moves; its shape's place and yaw are those of the first keyframe."""
+
+    shape: Obstacle
+    motion: Motion
+
+
+@dataclass(frozen=True)
 class Walls:
     """Dimensions of the four walls around the arena."""
 
@@ -152,6 +161,10 @@ class Scene:
         origin_y_m: y of the arena's lower left corner.
         remarks: Notes for the user: content of the file that the scene leaves out, and values
             that were chosen because the file does not give them.
+        moving: Obstacles that move; no method of a scene knows them, see ``movers``.
+        motion_phase_s: Time by which all motions are ahead of the clock; None for a random part of
+            the longest loop.
+        walkers: People who walk, if there are any.
     """
 
     name: str
@@ -164,6 +177,9 @@ class Scene:
     origin_x_m: float = 0.0
     origin_y_m: float = 0.0
     remarks: Tuple[str, ...] = ()
+    moving: Tuple[MovingObstacle, ...] = ()
+    motion_phase_s: Optional[float] = 0.0
+    walkers: Optional[Walkers] = None
 
     @property
     def end_x_m(self) -> float:
@@ -220,6 +236,17 @@ class Scene:
             nearest.append(self._rounds.nearest(x_m, y_m, z_m))
         return min(nearest, key=lambda solid: solid.surface_distance_m(x_m, y_m, z_m))
 
+    @cached_property
+    def moving_shapes(self) -> Tuple[Obstacle, ...]:
+        """Shapes of all obstacles that move and of all walkers, who are called person_0, ..."""
+        people: Tuple[Cylinder, ...] = ()
+        if self.walkers is not None:
+            people = tuple(
+                Cylinder(f"person_{k}", *self.centre, self.walkers.radius_m, self.walkers.height_m)
+                for k in range(self.walkers.count)
+            )
+        return (*(obstacle.shape for obstacle in self.moving), *people)
+
     def wall_boxes(self) -> List[Box]:
         """Return the walls as boxes; the southern and northern ones include the corners."""
         t, h = self.walls.thickness_m, self.walls.height_m
@@ -243,6 +270,14 @@ class Scene:
     @cached_property
     def _rounds(self) -> _Rounds:
         return _Rounds(self._round_obstacles)
+
+
+def placed(shape: Obstacle, pose: Sequence[float]) -> Obstacle:
+    """Return a shape at a pose (x_m, y_m, yaw_rad) in ``map``."""
+    x_m, y_m, yaw_rad = map(float, pose)
+    if isinstance(shape, Box):
+        return replace(shape, x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
+    return replace(shape, x_m=x_m, y_m=y_m)
 
 
 class _Boxes:

@@ -12,7 +12,8 @@
     starts:                        # x, y, yaw of quadcopter 0, 1, ...; yaw may be left out
       - [1.5, 1.5, 0.0]
 
-``bottom`` (default 0) lifts an obstacle off the floor. A scene may also import a world or a map
+``bottom`` (default 0) lifts an obstacle off the floor. Obstacles with ``motion`` move, and
+``walkers`` are people who walk, see ``motion_file``. A scene may also import a world or a map
 and add obstacles to it:
 
     world: depot.world             # or map: office.yaml; in this file's folder or below it
@@ -36,7 +37,24 @@ from quad_nav.files.document import Checker, describe, read_yaml
 from quad_nav.files.user_files import referenced_file
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.imported_scene import ImportedScene, from_map, from_world, with_free_starts
-from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Obstacle, Scene, Sphere, Walls
+from quad_nav.sim.motion_file import (
+    MOTION_KEYS,
+    check_motions,
+    read_motion,
+    read_phase,
+    read_walkers,
+)
+from quad_nav.sim.scene import (
+    BODY_RADIUS_M,
+    Box,
+    Cylinder,
+    MovingObstacle,
+    Obstacle,
+    Scene,
+    Sphere,
+    Walls,
+    placed,
+)
 
 _KEYS = [
     "name",
@@ -49,11 +67,12 @@ _KEYS = [
     "world",
     "map",
     "unknown",
+    *MOTION_KEYS,
 ]
 _SHAPE_KEYS = {
-    "box": ["name", "shape", "centre", "size", "height", "yaw", "bottom"],
-    "cylinder": ["name", "shape", "centre", "radius", "height", "bottom"],
-    "sphere": ["name", "shape", "centre", "radius", "bottom"],
+    "box": ["name", "shape", "centre", "size", "height", "yaw", "bottom", "motion"],
+    "cylinder": ["name", "shape", "centre", "radius", "height", "bottom", "motion"],
+    "sphere": ["name", "shape", "centre", "radius", "bottom", "motion"],
 }
 _WORLD_SUFFIXES = (".world", ".sdf")
 MAX_SIZE_M = 1e5
@@ -110,10 +129,10 @@ def _read_scene(check: Checker, document: Any, default_name: str, folder: Path) 
     imported = _read_import(check, fields, folder, walls.height_m)
     arena = _read_arena(check, fields, imported)
     arena_is_sound = len(check.problems) == faults_before
-    obstacles = [
-        _read_obstacle(check, entry, k)
-        for k, entry in enumerate(check.sequence(fields, "obstacles", []))
-    ]
+    entries = enumerate(check.sequence(fields, "obstacles", []))
+    obstacles = [_read_obstacle(check, entry, k) for k, entry in entries]
+    moving = [one for one in obstacles if isinstance(one, MovingObstacle)]
+    standing = [one for one in obstacles if one and not isinstance(one, MovingObstacle)]
     starts = _read_starts(check, fields, imported)
     scene = Scene(
         check.text(fields, "name", "", default_name),
@@ -121,12 +140,16 @@ def _read_scene(check: Checker, document: Any, default_name: str, folder: Path) 
         arena[3],
         altitude,
         walls,
-        (*(imported.obstacles if imported else ()), *(o for o in obstacles if o is not None)),
+        (*(imported.obstacles if imported else ()), *standing),
         tuple(s for s in starts if s is not None),
         arena[0],
         arena[1],
         imported.remarks if imported else (),
+        (*(imported.moving if imported else ()), *moving),
+        read_phase(check, fields, "motion_phase", ""),
+        read_walkers(check, fields),
     )
+    check_motions(check, scene)
     _check_names(check, scene)
     if arena_is_sound and imported and "starts" not in fields:
         return _with_chosen_starts(check, scene, imported)
@@ -203,7 +226,24 @@ def _read_arena(
     return (*origin, *size)
 
 
-def _read_obstacle(check: Checker, entry: Any, number: int) -> Optional[Obstacle]:
+def _read_obstacle(
+    check: Checker, entry: Any, number: int
+) -> Union[Obstacle, MovingObstacle, None]:
+    """Return an obstacle, None after a fault. One with a motion stands at its first keyframe."""
+    if not isinstance(entry, dict) or "motion" not in entry:
+        return _read_shape(check, entry, number)
+    faults_before, place = len(check.problems), f"obstacles[{number}]"
+    motion = read_motion(check, entry, place)
+    x_m, y_m, yaw_rad = motion.poses[0]
+    if "centre" not in entry:
+        entry = {**entry, "centre": [x_m, y_m]}
+    shape = _read_shape(check, entry, number)
+    if shape is None or len(check.problems) > faults_before:
+        return None
+    return MovingObstacle(placed(shape, (x_m, y_m, yaw_rad)), motion)
+
+
+def _read_shape(check: Checker, entry: Any, number: int) -> Optional[Obstacle]:
     faults_before, place = len(check.problems), f"obstacles[{number}]"
     if not isinstance(entry, dict):
         check.fault(place, f"{describe(entry)}, expected a mapping that describes an obstacle")
@@ -278,7 +318,7 @@ def _read_start(check: Checker, entry: Any, place: str) -> Optional[Pose2D]:
 def _check_names(check: Checker, scene: Scene) -> None:
     """Check that names are unique, because they identify obstacles in contacts."""
     taken = {wall.name for wall in scene.wall_boxes()} | {"floor"}
-    for obstacle in scene.obstacles:
+    for obstacle in (*scene.obstacles, *scene.moving_shapes):
         if obstacle.name in taken:
             check.fault("obstacles", f"name {obstacle.name!r} is taken, expected unique names")
         taken.add(obstacle.name)

@@ -8,6 +8,7 @@ from typing import Any, Dict
 
 import yaml
 
+from quad_nav.sim.motion_file import motion_document, phase_document, walkers_document
 from quad_nav.sim.scene import Box, Obstacle, Scene, Sphere
 
 
@@ -17,6 +18,11 @@ def scene_document(scene: Scene) -> Dict[str, Any]:
     ``scene_file.scene_from_document`` makes an equal scene of it. ``write_scene`` writes it to a
     file, and recordings contain it.
     """
+    extra: Dict[str, Any] = {}
+    if scene.motion_phase_s != 0.0:
+        extra["motion_phase"] = phase_document(scene.motion_phase_s)
+    if scene.walkers is not None:
+        extra["walkers"] = walkers_document(scene.walkers)
     walls = {"height": scene.walls.height_m, "thickness": scene.walls.thickness_m}
     return {
         "name": scene.name,
@@ -24,7 +30,14 @@ def scene_document(scene: Scene) -> Dict[str, Any]:
         "origin": [scene.origin_x_m, scene.origin_y_m],
         "altitude": scene.altitude_m,
         "walls": walls,
-        "obstacles": [_obstacle_document(solid) for solid in scene.obstacles],
+        **extra,
+        "obstacles": [
+            *(_obstacle_document(solid) for solid in scene.obstacles),
+            *(
+                {**_obstacle_document(one.shape), "motion": motion_document(one.motion)}
+                for one in scene.moving
+            ),
+        ],
         "starts": [[pose.x_m, pose.y_m, pose.yaw_rad] for pose in scene.starts],
     }
 
@@ -38,7 +51,7 @@ def write_scene(scene: Scene, path: Path) -> None:
         OSError: The file cannot be written.
     """
     document = scene_document(scene)
-    head = {key: document[key] for key in ("name", "size", "origin", "altitude", "walls")}
+    head = {key: document[key] for key in document if key not in ("obstacles", "starts")}
     if head["origin"] == [0.0, 0.0]:
         del head["origin"]
     lines = [yaml.safe_dump(head, default_flow_style=None, sort_keys=False)]

@@ -6,7 +6,7 @@ Time advances in steps of 1/240 s. Equal arguments and equal calls give bit-iden
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import List, Optional, Sequence, Tuple
 
@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
+from quad_nav.kernels.flight_law import planar_states
 from quad_nav.sim.body import GoalSphere, World
 from quad_nav.sim.casters import Caster, KernelCaster, Lidars, WorldCaster
 from quad_nav.sim.contacts import Contact, ContactLog
 from quad_nav.sim.flight import Airframe, BodyState, FlightLaw, FlightParams, limit_command
 from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.movers import Movers
 from quad_nav.sim.odometry import OdomDrift, OdomFrames
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.start_poses import start_poses
@@ -111,7 +113,11 @@ class RobotState:
 
 
 class RobotStates(Sequence[RobotState]):
-    """States of all quadcopters at one instant; each is computed on its first access."""
+    """States of all quadcopters at one instant; each is computed on its first access.
+
+    Attributes:
+        bodies: The states as arrays.
+    """
 
     def __init__(self, bodies: BodyState) -> None:
         self.bodies = bodies
@@ -126,6 +132,18 @@ class RobotStates(Sequence[RobotState]):
             state = self._states[robot] = _robot_state(self.bodies.rows[robot])
         return state
 
+    @cached_property
+    def planar(self) -> NDArray[np.float64]:
+        """Planar states float64[n, 8], see ``kernels.flight_law.planar_states``."""
+        states = np.empty((len(self._states), 8))
+        planar_states(self.bodies.rows, states)
+        return states
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """Poses float64[n, 3] of (x_m, y_m, yaw_rad) in ``map``."""
+        return self.planar[:, :3]
+
 
 def _robot_state(row: NDArray[np.float64]) -> RobotState:
     x, y, z, qx, qy, qz, qw, *velocities = row.tolist()
@@ -139,7 +157,8 @@ class Simulation:
         scene: The scene.
         n_robots: Number of quadcopters.
         params: Parameters.
-        seed: Seed of the LIDARs' noise, the starts' displacements and the odometry's drift.
+        seed: Seed of the LIDARs' noise, the starts' displacements, the odometry's drift, and the
+            phases of moving obstacles.
         gui: Open the engine's window.
         start_step: Step at which the clock starts.
 
@@ -161,6 +180,7 @@ class Simulation:
         self.params = params
         self.seed = seed
         self.step_count = start_step
+        self.movers = Movers(scene, seed, start_step / STEPS_PER_S)
         self._law = FlightLaw(params.airframe, params.flight)
         self._command_steps = math.floor(
             (params.command_timeout_s + params.controller_period_s) * STEPS_PER_S + 1e-9
@@ -182,11 +202,14 @@ class Simulation:
         self._contact_log = ContactLog()
         self.lidars = Lidars(self.params.lidar, self._caster, n, self.seed)
         self._state = self._world.state()
+        self._place_obstacles()
         self._free_flight = FreeFlight(
             self.scene, n, self.params.airframe.radius_m, self._law, STEP_S
         )
-        # Step up to which the engine moves a quadcopter.
-        self._engine_until = np.full(n, math.inf if self._always_in_engine else -math.inf)
+        # Step up to which the engine moves a quadcopter, and the last of these.
+        self._engine_end = math.inf if self._always_in_engine else -math.inf
+        self._engine_until = np.full(n, self._engine_end)
+        self._none = np.zeros(n, dtype=bool)
 
     def _new_caster(self) -> Caster:
         params = self.params
@@ -212,6 +235,8 @@ class Simulation:
     def reset(self, seed: Optional[int] = None, start_step: Optional[int] = None) -> None:
         """Return to the start poses without commands, contacts or drift.
 
+        Moving obstacles go on, unless there is a new seed or clock, with which they start again.
+
         Args:
             seed: New seed, for other starts and noise; None for the same starts again.
             start_step: Step at which the clock starts; None for a clock that continues.
@@ -226,6 +251,8 @@ class Simulation:
             self.seed = seed
         if start_step is not None:
             self.step_count = start_step
+        if seed is not None or start_step is not None:
+            self.movers = Movers(self.scene, self.seed, self.now_s)
         self._world.reset(self._starts)
         self._begin()
 
@@ -259,14 +286,40 @@ class Simulation:
         end = self.step_count + steps
         contacts: List[Contact] = []
         while self.step_count < end:
+            contacts += self._advance_to(min(end, self._let_people_react()))
+        if self.movers:
+            self._state = replace(self._state, obstacles=self.movers.poses(self.now_s))
+        return contacts
+
+    def _let_people_react(self) -> float:
+        """Return the step up to which the poses of moving obstacles are known then."""
+        radius_m = self.params.airframe.radius_m
+        known_s = self.movers.react(self.now_s, self._state.rows, radius_m)
+        return known_s if known_s == math.inf else round(known_s * STEPS_PER_S)
+
+    def _advance_to(self, end: float) -> List[Contact]:
+        contacts: List[Contact] = []
+        while self.step_count < end:
             if self.step_count > self._next_hover_step:
                 self._hover()
+            if self._engine_end <= self.step_count:
+                self._fly_freely(self._none, int(min(end, self._next_hover_step + 1)))
+                continue
             in_engine = self._engine_until > self.step_count
-            if not in_engine.any():
-                self._fly_freely(in_engine, int(min(end, self._next_hover_step + 1)))
-            elif in_engine.all() or self._fly_freely(in_engine, self.step_count + 1):
+            if in_engine.all() or self._fly_freely(in_engine, self.step_count + 1):
                 contacts += self._step_with_engine(in_engine)
         return contacts
+
+    def _place_obstacles(self) -> None:
+        """Move the obstacles that move to where they are at the present step."""
+        if self.movers:
+            poses = self.movers.poses(self.now_s)
+            self._state = replace(self._state, obstacles=poses)
+            self._world.place_obstacles(poses)
+
+    def _moving_poses(self, steps: int) -> NDArray[np.float64]:
+        """Return the poses float64[steps, m, 3] of the moving obstacles after the next steps."""
+        return self.movers.poses_at((self.step_count + np.arange(1, steps + 1)) / STEPS_PER_S)
 
     def _fly_freely(self, in_engine: NDArray[np.bool_], end: int) -> bool:
         """Move quadcopters that are not in the engine up to a step.
@@ -277,13 +330,18 @@ class Simulation:
             False if a quadcopter came near something before that step and is in the engine now.
         """
         state, done, near = self._free_flight.advance(
-            self._state, self._commands, in_engine, end - self.step_count
+            self._state, self._commands, in_engine, end - self.step_count, self._moving_poses
         )
+        is_all = in_engine is self._none
         if done:
-            self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
-        self._engine_until[near] = self.step_count + done + _STEPS_NEAR
+            engaged = [] if is_all else np.flatnonzero(in_engine).tolist()
+            self._world.engage(engaged, self._state)
+        if near:
+            until = self.step_count + done + _STEPS_NEAR
+            self._engine_until[near] = until
+            self._engine_end = max(self._engine_end, until)
         self._state = state
-        if not in_engine.any():
+        if is_all:
             self.step_count += done
         return not near
 
@@ -292,8 +350,10 @@ class Simulation:
             self._state, self._commands, self.scene.altitude_m
         )
         self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
-        self._state = self._world.step(self._state, forces, torques)
         self.step_count += 1
+        if self.movers:
+            self._world.place_obstacles(self.movers.poses(self.now_s))
+        self._state = self._world.step(self._state, forces, torques)
         return self._contact_log.update(self.now_s, self._world.touches())
 
     def _hover(self) -> None:

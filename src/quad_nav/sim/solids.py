@@ -96,6 +96,13 @@ def join(first: Solids, second: Solids) -> Solids:
     return Solids(*(np.concatenate(columns) for columns in zip(first, second)))
 
 
+def place(solids: Solids, poses: NDArray[np.float64]) -> None:
+    """Move solids in place to poses (x_m, y_m, yaw_rad) in ``map``, float64[s, 3]."""
+    solids.centres[:, :2] = poses[:, :2]
+    boxes = solids.kinds == BOX
+    solids.rotations[boxes] = np.swapaxes(yaw_rotations(poses[boxes, 2]), 1, 2)
+
+
 def extents(solids: Solids) -> Tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return lower and upper corners float64[s, 3] of the solids' bounding boxes in ``map``."""
     reach = np.sum(np.abs(solids.rotations) * solids.sizes[:, :, None], axis=1) + _PADDING_M

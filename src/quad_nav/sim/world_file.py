@@ -1,9 +1,9 @@
 """Gazebo worlds as obstacles: ``.world`` and ``.sdf`` files, and the models that they include.
 
 Boxes, cylinders and spheres of the models' collisions become obstacles. A plane at z = 0 is the
-floor. A remark names every other solid that is left out, with the reason. Poses are composed
-along world, nested models, link and collision. As in Gazebo, a saved ``<state>`` overrides the
-poses of models and links.
+floor. Actors with waypoints become moving obstacles, see ``sdf_actors``. A remark names every other
+solid that is left out, with the reason. Poses are composed along world, nested models, link and
+collision. As in Gazebo, a saved ``<state>`` overrides the poses of models and links.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from quad_nav.errors import InputError
 from quad_nav.files.user_files import referenced_file
 from quad_nav.files.xml_tree import Element, read_xml
 from quad_nav.geometry import Pose3D
-from quad_nav.sim.scene import Obstacle
+from quad_nav.sim.scene import MovingObstacle, Obstacle
+from quad_nav.sim.sdf_actors import actor_of
 from quad_nav.sim.sdf_shapes import obstacle_of
 from quad_nav.sim.sdf_values import IDENTITY, NotRepresented, SdfReader, is_true
 
@@ -32,15 +33,16 @@ MAX_BYTES = 64 * 1024 * 1024
 
 _LONGEST_NAME = 200
 _SCHEME = "model://"
-_OTHER_SOLIDS = ("actor", "population", "road")
+_OTHER_SOLIDS = ("population", "road")
 
 
 @dataclass(frozen=True)
 class GazeboWorld:
-    """Obstacles of a world, and remarks on solids that are left out."""
+    """Obstacles of a world, remarks on solids that are left out, and obstacles that move."""
 
     obstacles: Tuple[Obstacle, ...]
     remarks: Tuple[str, ...]
+    moving: Tuple[MovingObstacle, ...] = ()
 
 
 @dataclass
@@ -48,6 +50,7 @@ class _Findings:
     """Results so far of reading a world and the files that it includes."""
 
     obstacles: List[Obstacle] = field(default_factory=list)
+    moving: List[MovingObstacle] = field(default_factory=list)
     left_out: Dict[str, List[str]] = field(default_factory=dict)
     not_static: List[str] = field(default_factory=list)
     problems: List[str] = field(default_factory=list)
@@ -112,6 +115,8 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
     walk = _Walk(SdfReader(path, findings.problems), findings, folders)
     world = worlds[0] if worlds else root
     walk.models(world, IDENTITY, "", world.first("state"))
+    for actor in world.all("actor"):
+        walk.actor(actor)
     for tag in _OTHER_SOLIDS:
         for element in world.all(tag):
             findings.leave_out(element.attributes.get("name", tag), tag)
@@ -121,7 +126,9 @@ def load_world(path: Path, model_path: Sequence[Path] = ()) -> GazeboWorld:
         )
     if findings.problems:
         raise InputError(findings.problems)
-    return GazeboWorld(tuple(findings.obstacles), tuple(_remarks(path, findings)))
+    return GazeboWorld(
+        tuple(findings.obstacles), tuple(_remarks(path, findings)), tuple(findings.moving)
+    )
 
 
 def _remarks(path: Path, findings: _Findings) -> List[str]:
@@ -161,6 +168,20 @@ class _Walk:
                     self._model(child, map_from_parent, prefix, state)
             except NotRepresented as reason:
                 self.findings.leave_out(name, str(reason))
+
+    def actor(self, actor: Element) -> None:
+        """Read an actor of the world."""
+        name = _name_of(actor)
+        self.findings.count_part(self.reader.path)
+        try:
+            person = actor_of(self.reader, actor, name)
+        except NotRepresented as reason:
+            self.findings.leave_out(name, str(reason))
+            return
+        if isinstance(person, MovingObstacle):
+            self.findings.moving.append(person)
+        elif person is not None:
+            self.findings.obstacles.append(person)
 
     def _model(
         self,

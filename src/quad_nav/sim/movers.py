@@ -1,0 +1,188 @@
+"""Moving obstacles of a scene: where they are at any time of a flight.
+
+Their poses depend on the scene, the seed and the time alone: the simulator, a log and a report
+compute the same ones. Poses of people who react to quadcopters are in the simulation only, which
+calls ``react``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import List, Optional, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.geometry import rotate_vectors
+from quad_nav.kernels.keyframes import Keyframes, fill_poses
+from quad_nav.sim.motion import SPLINE, Motion
+from quad_nav.sim.scene import Box, Obstacle, Scene, placed
+from quad_nav.sim.walkers import REACTION_S, Crowd, round_down, walks
+
+Floats = NDArray[np.float64]
+
+_PHASE_STREAM = 4
+"""Stream of the random phases, beside those of starts, noise, missions and drift."""
+
+
+class Motions:
+    """Poses of many motions at any time.
+
+    Args:
+        motions: The motions.
+        phases_s: Time by which each is ahead; it replaces ``Motion.phase_s``.
+    """
+
+    def __init__(self, motions: Sequence[Motion], phases_s: Sequence[float]) -> None:
+        self.count = len(motions)
+        self._keyframes = Keyframes(
+            np.cumsum([0, *(len(motion.times_s) for motion in motions)]).astype(np.int64),
+            np.array([time_s for motion in motions for time_s in motion.times_s], float),
+            np.array([pose for motion in motions for pose in motion.poses], float).reshape(-1, 3),
+            np.concatenate([np.zeros((0, 3)), *(motion.tangents() for motion in motions)]),
+            np.array([motion.interpolation == SPLINE for motion in motions], bool),
+            np.array([motion.loop for motion in motions], bool),
+            np.array(phases_s, float),
+        )
+
+    def poses(self, times_s: Floats) -> Floats:
+        """Return the poses (x_m, y_m, yaw_rad) in ``map``, float64[t, m, 3], at float64[t]."""
+        poses = np.empty((len(times_s), self.count, 3))
+        fill_poses(self._keyframes, times_s, poses)
+        return poses
+
+
+class Movers:
+    """All obstacles of a scene that move, in the order of ``Scene.moving_shapes``.
+
+    Args:
+        scene: The scene.
+        seed: Seed of the random phases and of the walkers.
+        start_s: Time on the clock at which the motions begin.
+
+    Raises:
+        InputError: The scene has no room for its walkers.
+
+    Attributes:
+        shapes: Shapes of the obstacles.
+        start_s: As given.
+    """
+
+    def __init__(self, scene: Scene, seed: Optional[int] = 0, start_s: float = 0.0) -> None:
+        self.shapes = scene.moving_shapes
+        self.start_s = start_s
+        self._scene = scene
+        motions = [obstacle.motion for obstacle in scene.moving]
+        phases = phases_s(motions, scene.motion_phase_s, seed or 0)
+        reacting = scene.walkers is not None and scene.walkers.reacting
+        self._crowd = Crowd(scene, seed or 0) if reacting else None
+        people = walks(scene, seed or 0) if scene.walkers is not None and not reacting else ()
+        self._motions = Motions([*motions, *people], [*phases, *(0.0 for _ in people)])
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+    def poses(self, now_s: float) -> Floats:
+        """Return the poses (x_m, y_m, yaw_rad) in ``map`` at a time, float64[m, 3]."""
+        return self.poses_at(np.array([now_s]))[0]
+
+    def poses_at(self, times_s: Floats) -> Floats:
+        """Return the poses at many times float64[t] on the clock, float64[t, m, 3].
+
+        Those of people who react are NaN before ``react`` or a minute later.
+        """
+        poses = self._motions.poses(times_s - self.start_s)
+        if self._crowd is None:
+            return poses
+        return np.concatenate([poses, self._crowd.poses(times_s - self.start_s)], axis=1)
+
+    def react(self, now_s: float, rows: Floats, radius_m: float) -> float:
+        """Let people react to quadcopters, at least once in each period.
+
+        Args:
+            now_s: Present time on the clock.
+            rows: float64[n, 13], ``BodyState.rows``.
+            radius_m: Radius of the quadcopters.
+
+        Returns:
+            Time on the clock up to which all poses are known; +inf if nobody reacts.
+        """
+        if self._crowd is None:
+            return math.inf
+        elapsed_s = now_s - self.start_s
+        self._crowd.react(elapsed_s, np.ascontiguousarray(rows[:, [0, 1, 7, 8]]), radius_m)
+        return self.start_s + (round_down(elapsed_s) + 1) * REACTION_S
+
+    def flight_surface_distances_m(self, positions_m: Floats, times_s: Floats) -> Floats:
+        """Return the distances to the nearest surface of the scene, moving or not.
+
+        Args:
+            positions_m: float64[..., t, 2], positions in ``map`` at the flying altitude.
+            times_s: float64[t], their times on the clock.
+
+        Returns:
+            float64[..., t], metres; negative inside.
+        """
+        nearest = self._scene.flight_surface_distances_m(positions_m)
+        if len(self):
+            np.minimum(nearest, self.distances_m(positions_m, times_s), out=nearest)
+        return nearest
+
+    def distances_m(self, positions_m: Floats, times_s: Floats) -> Floats:
+        """Return the distances to the surface of the nearest obstacle that moves.
+
+        Arguments and result are as for ``flight_surface_distances_m``.
+        """
+        nearest = np.full(positions_m.shape[:-1], np.inf)
+        poses = self.poses_at(times_s)
+        for k, shape in enumerate(self.shapes):
+            x_m, y_m, yaw_rad = poses[:, k].T
+            local = rotate_vectors(
+                np.cos(yaw_rad),
+                -np.sin(yaw_rad),
+                positions_m[..., 0] - x_m,
+                positions_m[..., 1] - y_m,
+            )
+            own = at_origin(shape).surface_distance_m(*local, self._scene.altitude_m)
+            np.fmin(nearest, own, out=nearest)  # nobody knows where NaN is
+        return nearest
+
+    def at(self, now_s: float) -> List[Obstacle]:
+        """Return the obstacles where they are at a time, without those of which it is unknown."""
+        poses = self.poses(now_s)
+        known = np.isfinite(poses[:, 0])
+        return [placed(shape, pose) for shape, pose, at in zip(self.shapes, poses, known) if at]
+
+
+def phases_s(motions: Sequence[Motion], common_s: Optional[float], seed: int) -> List[float]:
+    """Return the time by which each motion is ahead of the clock.
+
+    Args:
+        motions: The motions.
+        common_s: Time by which all are ahead; None for a random part of the longest loop.
+        seed: Seed of random phases.
+    """
+    if common_s is None:
+        longest_s = max((motion.length_s for motion in motions), default=0.0)
+        common_s = longest_s * np.random.default_rng([seed, _PHASE_STREAM]).random()
+    return [
+        common_s
+        + (
+            motion.length_s * np.random.default_rng([seed, _PHASE_STREAM, k]).random()
+            if motion.phase_s is None
+            else motion.phase_s
+        )
+        for k, motion in enumerate(motions)
+    ]
+
+
+def at_origin(shape: Obstacle) -> Obstacle:
+    """Return a shape at the origin, which keeps its height."""
+    return placed(shape, (0.0, 0.0, 0.0))
+
+
+def reach_m(shape: Obstacle) -> float:
+    """Return the radius of an upright cylinder around a shape's centre that holds it."""
+    if isinstance(shape, Box):
+        return math.hypot(shape.size_x_m, shape.size_y_m) / 2
+    return shape.radius_m
