@@ -9,27 +9,38 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 lint docs rostest first-hour ray conformance fuzz bench bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance fuzz bench bench-compare bench-startup bench-original bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
-	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 20
+	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
 
+# The page in the browser is an extra. Without a display it takes the place of RViz, if it can be
+# installed; web:=true and web:=false decide otherwise.
+#
 # make itself ends with 2 on any failure and names the sequencer's own exit status in its message.
 fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
+	@$(if $(filter web:=true,$(ARGS)),scripts/make_venv .venv requirements-web.txt,\
+	    $(if $(DISPLAY)$(filter web:=false,$(ARGS)),:,scripts/make_venv .venv requirements-web.txt || \
+	    echo "quad: flying without a page: NiceGUI cannot be installed"))
 	@scripts/ros_env scripts/fly $(ARGS)
 
-test: unit unit38 lint docs rostest first-hour  ## Run every test and static check
+test: unit unit38 web lint docs rostest first-hour  ## Run every test and static check
 	@echo "quad: all tests passed"
 
 unit: venv  ## The unit tests
-	@scripts/make_venv .venv requirements-test.txt
+	@scripts/make_venv .venv requirements-test.txt requirements-web.txt
 	$(PYTHON) -m pytest -n auto --dist loadfile
 
 unit38: packages  ## The unit tests under Python 3.8, where there is one
 	@scripts/unit_tests_38
 
+web: venv  ## The tests of the web page in a real browser: make web TEST=goal
+	@scripts/install_packages --browser
+	@scripts/make_venv .venv requirements-test.txt requirements-web.txt requirements-web-test.txt
+	QUAD_CHROMIUM=$$(scripts/chromium) $(PYTHON) -m pytest --timeout 90 test/web $(if $(TEST),-k $(TEST))
+
 lint: venv  ## ruff, mypy and the structure of the sources
-	@scripts/make_venv .venv requirements-test.txt requirements-lint.txt
+	@scripts/make_venv .venv requirements-test.txt requirements-web.txt requirements-lint.txt
 	$(PYTHON) -m ruff format --check
 	$(PYTHON) -m ruff check
 	$(PYTHON) -m mypy
@@ -42,6 +53,7 @@ docs: venv  ## The documentation as a site, in site/; warnings are errors
 	@echo "quad: open site/index.html"
 
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
+	@scripts/make_venv .venv requirements-web.txt
 	@scripts/ros_env scripts/rostests $(TEST)
 
 first-hour: workspace  ## What a user does first: an own scene, map, robot, goals and report
@@ -61,12 +73,28 @@ fuzz: venv  ## Feed what reads files with made-up bytes: make fuzz TARGET=scene 
 	@scripts/make_venv .venv requirements-fuzz.txt
 	PYTHONPATH=src $(PYTHON) test/fuzz/run.py $(TARGET) $(SECONDS)
 
-bench: venv  ## How long the navigator's parts take, beside the original, scans and flights
-	PYTHONPATH=src $(PYTHON) bench/navigation.py
-	PYTHONPATH=src $(PYTHON) bench/lidar.py
-	PYTHONPATH=src $(PYTHON) bench/flight.py
+bench: NAME := bench-$(shell date +%Y%m%d-%H%M%S)
+bench: venv  ## How long parts, scans and flights take; writes a file: make bench NAME=before
 	@scripts/make_venv .venv requirements-test.txt
-	PYTHONPATH=src $(PYTHON) bench/rl.py
+	@rm -f $(NAME).json
+	PYTHONPATH=src $(PYTHON) -m quad_nav.scenario.warm_up
+	PYTHONPATH=src $(PYTHON) bench/navigation.py --json $(NAME).json
+	PYTHONPATH=src $(PYTHON) bench/lidar.py --json $(NAME).json
+	PYTHONPATH=src $(PYTHON) bench/flight.py --json $(NAME).json
+	PYTHONPATH=src $(PYTHON) bench/flight.py --json $(NAME).json --config default
+	PYTHONPATH=src $(PYTHON) bench/rl.py --json $(NAME).json
+	@echo "quad: the figures are in $(NAME).json"
+
+# make itself ends with 2 on any failure and names the command's own exit status in its message.
+bench-compare: venv  ## What got slower between two runs: make bench-compare A=before.json B=after.json
+	@PYTHONPATH=src $(PYTHON) bench/figures.py $(ARGS) $(A) $(B)
+
+bench-startup: workspace  ## How long a navigator takes to start, and its memory: make bench-startup ARGS="--rate 1"
+	@scripts/ros_env python3 bench/startup.py $(ARGS)
+
+# Where C++ move_base is built in another workspace: ARGS="--workspace ~/navigation_ws".
+bench-original: workspace  ## The same flights with C++ move_base, where it is installed, and with ours
+	@scripts/ros_env python3 bench/against_original.py $(ARGS)
 
 bench-fleets: venv  ## Whether fleets get through without touching: make bench-fleets ARGS="swap 8in12"
 	PYTHONPATH=src $(PYTHON) bench/encounters.py $(ARGS)

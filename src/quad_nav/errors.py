@@ -6,7 +6,9 @@ that ends in one of them is aborted, with its message.
 
 from __future__ import annotations
 
-from typing import Any, List, Sequence
+import os
+from contextlib import contextmanager
+from typing import Any, Iterator, List, Sequence
 
 MAX_PROBLEMS = 100
 _MAX_LENGTH = 2000
@@ -115,3 +117,21 @@ def _line(problem: str) -> str:
     if len(problem) > _MAX_LENGTH:
         problem = problem[:_MAX_LENGTH] + " ..."
     return printable(problem)
+
+
+@contextmanager
+def discarded_stderr() -> Iterator[None]:
+    """Discard what C code prints to standard error meanwhile; exceptions are not affected."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # standard error is closed
+        yield
+        return
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(null)
+        os.close(kept)

@@ -9,9 +9,9 @@ from typing import Callable, Optional
 import numpy as np
 
 from quad_nav.geometry import Pose3D, Scan
+from quad_nav.loop.navigator_group import LocatedScan, LoopRobot
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.offline.flight import Flight, FlightObserver
-from quad_nav.offline.navigator_group import LocatedScan, OfflineRobot
 
 
 def with_ranges(scan: Scan, change: Callable[[np.ndarray], None]) -> Scan:
@@ -31,7 +31,7 @@ class SensorFault(FlightObserver):
         self.begin_s, self.end_s = begin_s, end_s
         self.hover_after_s = 0.0
         self.resume_after_s: Optional[float] = None
-        self._robot: Optional[OfflineRobot] = None
+        self._robot: Optional[LoopRobot] = None
 
     def on_start(self, flight: Flight) -> None:
         self._robot, self._configuration = flight.offline_robots[0], flight.robots[0].configuration

@@ -47,7 +47,7 @@ def test_help_does_not_import_the_engine(arguments):
 def test_every_command_is_listed_with_its_own_text():
     text = CliRunner().invoke(main, []).output
     for name, line in COMMANDS.items():
-        assert f"  {name:7}  {line}\n" in text
+        assert f"  {name:{max(map(len, COMMANDS))}}  {line}\n" in text
         command = main.get_command(click.Context(main), name)
         assert command is not None and command.name == name
 

@@ -5,12 +5,13 @@ import pytest
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.distances import BLOCK_S, DistanceLog, nearest_separations_m
+from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import Cylinder, Scene, Walls
 
 RADIUS_M = 0.3
 
 
-def to_wall(positions_m):
+def to_wall(positions_m, _times_s):
     """A wall along x = 0: the clearance of a centre is its x."""
     return positions_m[:, 0]
 
@@ -88,7 +89,7 @@ def test_distances_in_a_scene():
             "quad0": [(0.0, 10.0, 12.0), (1.0, 13.0, 10.0)],
             "quad1": [(0.0, 10.0, 17.0), (1.0, 17.0, 13.0)],
         },
-        surface_distance=scene.flight_surface_distances_m,
+        surface_distance=Movers(scene).flight_surface_distances_m,
     )
     # To the pillar 2 - 0.5 - 0.3; the second is nearest to the walls, 3 - 0.3 away.
     assert log.min_clearance_m("quad0") == pytest.approx(1.2)
@@ -112,9 +113,9 @@ def test_equal_stamps_and_interpolation_give_the_same_bits():
 def test_minima_are_computed_once_for_all_robots():
     calls = []
 
-    def counted(positions_m):
+    def counted(positions_m, times_s):
         calls.append(len(positions_m))
-        return to_wall(positions_m)
+        return to_wall(positions_m, times_s)
 
     names = [f"quad{k}" for k in range(20)]
     log = DistanceLog(names, RADIUS_M, counted)

@@ -14,8 +14,8 @@ from quad_nav.cli import main
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
+from quad_nav.loop.navigator_group import LoopRobot
 from quad_nav.offline.flight import FlightObserver
-from quad_nav.offline.navigator_group import OfflineRobot
 from quad_nav.offline.run import fly
 from quad_nav.peers.peer import Intention, Peer
 from quad_nav.recording import messages
@@ -145,7 +145,7 @@ def test_a_goal_in_the_map_becomes_one_in_the_costmap_s_frame(tmp_path):
     """Only then is the goal known in the frame that the robot plans in, ten seconds after start."""
     config = configuration(tmp_path / "config", "odom$(arg i)", "map")
     frames = OdomFrames(OdomDrift(0.2, 0.1), 1, seed=0)
-    robot = OfflineRobot(read_configurations(config, 1)[0], 0, frames)
+    robot = LoopRobot(read_configurations(config, 1)[0], 0, frames)
     robot.waiting_goal = Pose2D(3.0, 4.0, 0.5)
     robot.is_due(10.0)
     goal, map_from_odom = robot.navigator.goal, frames.map_from_odom(0, 10.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from quad_nav.mission.odometry_filter import OdometryFilter, OdometrySample
@@ -64,3 +65,31 @@ def test_a_gap_of_seconds_allows_a_distance_of_metres():
 
 def test_not_a_number_is_a_jump():
     assert not flying().accepts(at(0.525, math.nan))
+
+
+def test_a_track_is_filtered_as_its_samples_are():
+    draw = np.random.default_rng(5)
+    ends = 0
+    for _ in range(300):
+        single, whole = OdometryFilter(), OdometryFilter()
+        stamp_s, x_m = 1.0, 0.0
+        for _ in range(6):
+            stamps_s, rows = [], []
+            for _ in range(draw.integers(0, 25)):
+                stamp_s += draw.choice([0.025, 0.025, 0.025, 0.3, -0.01])
+                if draw.random() < 0.03:
+                    x_m += draw.choice([3.0, -3.0])
+                away_m = 50.0 if draw.random() < 0.03 else 0.0
+                stamps_s.append(stamp_s)
+                rows.append((x_m + away_m, 0.01 * len(rows)))
+            frame = "odom0" if draw.random() < 0.9 else "map"
+            expected = []
+            for at_s, row in zip(stamps_s, rows):
+                expected.append((single.accepts(at(at_s, *row, frame)), single.has_relocated))
+            accepted, relocated = whole.accepts_track(
+                np.array(stamps_s), frame, np.array(rows).reshape(-1, 2)
+            )
+            assert list(zip(accepted.tolist(), relocated.tolist())) == expected
+            assert whole.is_jumping == single.is_jumping
+            ends += relocated.sum()
+    assert ends > 50

@@ -14,13 +14,15 @@ import pytest
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, angle_difference
+from quad_nav.loop.navigator_group import NavigatorGroup
+from quad_nav.loop.worker_process import PROCESS_NAME, WorkerProcessError
 from quad_nav.mission.summary import FACTS, to_json
 from quad_nav.offline.flight import Flight, FlightObserver
-from quad_nav.offline.navigator_group import NavigatorGroup
 from quad_nav.offline.run import fly
-from quad_nav.offline.worker_process import PROCESS_NAME, WorkerProcessError
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.motion import Motion, Walkers
+from quad_nav.sim.scene import Cylinder, MovingObstacle
 from quad_nav.sim.simulation import SimulationParams
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -96,7 +98,7 @@ def test_the_same_seed_gives_the_same_flight_bit_for_bit_and_another_does_not():
 
 @pytest.mark.parametrize("processes", [2, 3])
 def test_worker_processes_fly_the_same_flight_bit_for_bit(processes):
-    """Four robots meet, so that their intentions matter."""
+    """Four robots meet, so that their intentions matter, and a cart and people do, too."""
     meeting = read_setup(
         options(
             scene=ROOT / "scenes" / "encounters" / "four_ways.yaml",
@@ -104,6 +106,12 @@ def test_worker_processes_fly_the_same_flight_bit_for_bit(processes):
             config="default",
             time_limit_s=12.0,
         )
+    )
+    between = Motion((0.0, 3.0), ((5.0, 4.0, 0.0), (5.0, 8.0, 0.0)), phase_s=None)
+    cart = MovingObstacle(Cylinder("cart", 0.0, 0.0, 0.3, 2.0), between)
+    people = Walkers(2, reacting=True)
+    meeting = dataclasses.replace(
+        meeting, scene=dataclasses.replace(meeting.scene, moving=(cart,), walkers=people)
     )
     alone, shared = Track(), Track()
     summary = fly(meeting, [alone])
@@ -126,7 +134,7 @@ def test_a_worker_process_that_dies_ends_the_flight_with_the_reason():
 def test_an_exception_in_a_worker_process_is_raised_with_its_traceback(monkeypatch):
     monkeypatch.setattr(NavigatorGroup, "navigate", lambda *_: 1 / 0)
     flight = Flight(read_setup(options()), processes=2)
-    flight._group.navigate = lambda *_: []
+    flight.loop.group.navigate = lambda *_: []
     with pytest.raises(WorkerProcessError, match="(?s)Traceback.*ZeroDivisionError"):
         flight.advance()
     flight.end()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.kernels.peers import nearest_in_time
 from quad_nav.peers.peer import (
     HIGHEST_PRIORITY,
     IDLE_PRIORITY,
@@ -190,3 +191,13 @@ def test_positions_on_the_path_of_a_peer():
     np.testing.assert_allclose(ahead, [(1.0, 1.0), (2.5, 3.0), (4.0, 5.0), (4.0, 6.0), (4.0, 7.0)])
     stays = predict_positions(np.array([1.0, 1.0]), np.empty((0, 2)), 0.5, np.array([0.0, 9.0]))
     assert stays.tolist() == [[1.0, 1.0], [1.0, 1.0]]
+
+
+def test_nearest_distance_in_time_is_that_of_all_pairs():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        one, other = rng.normal(size=(2, 29, 2))
+        distances = np.hypot(*np.moveaxis(one[:, None] - other[None], 2, 0))
+        apart = np.abs(np.subtract.outer(np.arange(29), np.arange(29)))
+        for steps in (0, 6, 29):
+            assert nearest_in_time(one, other, steps) == distances[apart <= steps].min()

@@ -21,7 +21,8 @@ from quad_nav.cli.preview import preview as command
 from quad_nav.errors import InputError
 from quad_nav.grid import INSCRIBED, LETHAL
 from quad_nav.mission.goal_file import parse_goals
-from quad_nav.report.preview_picture import cost_colours
+from quad_nav.report.preview_picture import cost_colours, preview_picture
+from quad_nav.report.scene_drawing import MOVING
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.scenario.preview import MissionPreview
 
@@ -185,6 +186,32 @@ def test_command_refuses_other_names(tmp_path):
     assert "expected a name in .png, .svg, .html" in result.output
 
 
+def test_moving_obstacles_are_drawn_where_they_start_with_their_paths(hall):
+    cart = """
+  - name: cart
+    shape: box
+    size: [1.0, 0.5]
+    height: 2.0
+    motion: {keyframes: [{time: 0.0, x: 1.0, y: 2.0}, {time: 8.0, x: 5.0, y: 2.0}]}
+walkers: {count: 2}
+starts"""
+    hall.scene.write_text(SCENE.replace("\nstarts", cart))
+    preview = MissionPreview(hall)
+    assert preview.problems == ()
+    assert [solid.name for solid in preview.moving] == ["cart", "person_0", "person_1"]
+    assert (preview.moving[0].x_m, preview.moving[0].y_m) == (1.0, 2.0)
+    (axes, *_) = preview_picture(preview, [preview.robot(0)], "hall").axes
+    brown = [line for line in axes.lines if line.get_color() == MOVING]
+    assert [line.get_xydata()[[0, -1]].tolist() for line in brown] == [[[1.0, 2.0], [5.0, 2.0]]]
+
+
+def test_people_without_room_are_a_problem(hall):
+    hall.scene.write_text(SCENE.replace("\nstarts", "\nwalkers: {count: 200, radius: 0.5}\nstarts"))
+    preview = MissionPreview(hall)
+    assert preview.moving == ()
+    assert "no room for person" in "".join(preview.problems)
+
+
 # The page that edits.
 
 
@@ -246,7 +273,7 @@ def test_a_dragged_goal_is_checked_and_saved(server, hall):
     assert post(server, "save", {"robots": [again]})["problems"] == []
     assert len(parse_goals(path.read_bytes(), "it").goals) == 1
     (problem,) = post(server, "save", {"robots": [moved]})["problems"]
-    assert "another version" in problem
+    assert "has changed since the page was loaded" in problem
 
 
 def test_a_faulty_place_is_refused_as_by_fly_and_nothing_is_written(server, hall):

@@ -47,10 +47,11 @@ def test_alone_there_is_no_gap():
 def test_clearance_is_to_the_pillar_or_a_wall():
     """From (2, 6) eastwards: 2 m to the wall, then 3.5 m - t to the pillar; less the radius."""
     scene = replace(SCENE, obstacles=SCENE.obstacles[:1])
-    tracks = resampled_tracks(flight(robot(0, (2.0, 6.0), (0.3, 0.0))))
+    flown = replace(flight(robot(0, (2.0, 6.0), (0.3, 0.0))), scene=scene)
+    tracks = resampled_tracks(flown)
     expected = np.minimum(2.0 + 0.3 * TIMES_S, 3.5 - 0.3 * TIMES_S) - RADIUS_M
-    assert clearances_m(tracks, scene, RADIUS_M)[0] == pytest.approx(expected)
-    assert np.isnan(clearances_m(tracks, None, RADIUS_M)).all()
+    assert clearances_m(tracks, flown)[0] == pytest.approx(expected)
+    assert np.isnan(clearances_m(tracks, replace(flown, scene=None))).all()
 
 
 def test_robots_with_different_samples_are_compared_at_the_same_times():

@@ -1,4 +1,4 @@
-"""The view in rerun: where beams hit, solids, and what is said when it cannot be had."""
+"""The view in rerun: solids, and what is said when it cannot be had."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ import pytest
 from recorded_flight import setup
 
 from quad_nav.errors import InputError
-from quad_nav.geometry import Pose3D, Scan, quaternion_from_yaw
 from quad_nav.offline.run import fly
 from quad_nav.recording import viewer as view
-from quad_nav.recording.viewer import View, scan_points
+from quad_nav.recording.viewer import View
 from quad_nav.recording.viewer_solids import solid
 from quad_nav.topics.markers import CUBE, CUBE_LIST, CYLINDER, SPHERE, Marker
 
@@ -63,13 +62,6 @@ def rerun(monkeypatch):
     monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setenv("PATH", "/bin")  # put back afterwards
     return fake
-
-
-def test_beams_hit_where_they_look():
-    """The LIDAR at (1, 2) looks along y; the beam to its left sees nothing."""
-    scan = Scan(0.0, 0.0, math.pi / 2, 0.02, 60.0, np.array([3.0, np.inf, 0.5], dtype=np.float32))
-    pose = Pose3D(1.0, 2.0, 1.06, quaternion_from_yaw(math.pi / 2))
-    assert scan_points(scan, pose) == pytest.approx(np.array([[1.0, 5.0, 1.06], [1.0, 1.5, 1.06]]))
 
 
 def marker(kind, alpha=1.0, **fields):

@@ -27,12 +27,12 @@ from quad_nav.config import Configuration
 from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.geometry import Pose2D, Scan
+from quad_nav.loop.worker_process import processes_for
 from quad_nav.mission.goal import Goal, goal_entry
 from quad_nav.mission.goal_file import SETTINGS, GoalSequence, SequenceSettings, load_goals
 from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
-from quad_nav.offline.worker_process import processes_for
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.scenario.scenario import read_configurations
 from quad_nav.sim.contacts import Contact
@@ -141,7 +141,7 @@ def fly(
     Args:
         setup: The mission; by default that of ``quad fly``.
         observers: Called as the flight goes on, see ``FlightObserver``.
-        processes: Processes that share the navigators; by default one for each ten robots. The
+        processes: Processes that share the navigators; by default one for each core. The
             flight does not depend on it.
     """
     setup = setup or prepare()

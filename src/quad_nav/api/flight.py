@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from quad_nav.api.result import FlightResult, TrajectoryObserver
 from quad_nav.config import Configuration, updated
 from quad_nav.geometry import Pose2D, Scan, Twist2D
+from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.mission.summary import summarize
 from quad_nav.navigator.tick import Tick
 from quad_nav.offline import flight as offline
@@ -23,7 +25,7 @@ from quad_nav.sim.simulation import STEPS_PER_S, RobotState
 
 Command = Twist2D
 """Velocity in ``base_link``: ``Command(vx_mps, vy_mps, vyaw_radps)``."""
-PERIOD_S = offline.STEPS_PER_ODOMETRY / STEPS_PER_S
+PERIOD_S = STEPS_PER_ODOMETRY / STEPS_PER_S
 """Shortest step of a flight, 1/40 s: the period of odometry."""
 NO_COMMANDS: Mapping[int, Optional[Command]] = {}
 
@@ -157,7 +159,9 @@ class Flight:
             groups.setdefault(namespace, {})[name] = value
         for namespace, changes in groups.items():
             configuration = updated(configuration, namespace, changes)
-        apply_configuration(self._loop.offline_robots[robot].navigator, configuration)
+        navigated = self._loop.offline_robots[robot]
+        apply_configuration(navigated.navigator, configuration)
+        navigated.due_s = -math.inf
         flown.configuration = configuration
         return configuration
 

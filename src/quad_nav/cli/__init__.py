@@ -28,9 +28,11 @@ _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 COMMANDS: Dict[str, str] = {
     "barn": "Fly through the worlds of the BARN benchmark without ROS.",
+    "dynabarn": "Fly among the moving obstacles of DynaBARN without ROS.",
     "check": "Check move_base's YAML without flying.",
     "fly": "Fly a mission without ROS, as fast as the machine allows.",
     "preview": "Show a mission before anything flies, and edit its goals.",
+    "replay": "Play a recorded flight on a page in the browser.",
     "report": "Write a report of a recorded flight, or compare several.",
     "sweep": "Compare flights over the values of some parameters.",
     "tune": "Search for parameters that fly better, without ROS.",

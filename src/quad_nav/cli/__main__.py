@@ -4,4 +4,5 @@ from __future__ import annotations
 
 from quad_nav.cli import main
 
-main(prog_name="quad")
+if __name__ == "__main__":
+    main(prog_name="quad")

@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from pathlib import Path
-from typing import Any, List, Optional, Tuple
+from typing import Any, List, Optional, Sequence, Tuple
 
 import click
 
@@ -138,10 +138,17 @@ def barn(
 
 
 def _options(parameters: Tuple[str, ...], only: str, **given: Any) -> BarnOptions:
-    return BarnOptions(**given, parameters=tuple(map(parameter, parameters)), only=_numbers(only))
+    return BarnOptions(
+        **given, parameters=tuple(map(parameter, parameters)), only=world_numbers(only)
+    )
 
 
-def _numbers(text: str) -> Tuple[int, ...]:
+def world_numbers(text: str) -> Tuple[int, ...]:
+    """Parse the value of --only.
+
+    Raises:
+        InputError: It is not a list of numbers.
+    """
     try:
         return tuple(int(word) for word in text.split(",") if word.strip())
     except ValueError as error:
@@ -152,7 +159,7 @@ def _numbers(text: str) -> Tuple[int, ...]:
 
 def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
     """Return the results, and true if Ctrl-C interrupted the flights."""
-    bar = _Bar(setup.wanted, workers, quiet)
+    bar = OutcomesBar(setup.wanted, workers, quiet)
     runs: List[Run] = []
     interrupted = False
     start_s = time.monotonic()
@@ -172,17 +179,18 @@ def _fly(setup: BarnSetup, workers: int, quiet: bool) -> Tuple[Results, bool]:
     return Results(setup.contestant, tuple(runs), setup.wanted, wall_time_s), interrupted
 
 
-class _Bar:
+class OutcomesBar:
     """Progress bar with counts of outcomes and the rate of flights."""
 
-    def __init__(self, wanted: int, workers: int, quiet: bool) -> None:
+    def __init__(self, wanted: int, workers: int, quiet: bool, name: str = "barn") -> None:
         self._progress = flights_progress(quiet)
         self._task = self._progress.add_task("flights", total=wanted, status="")
         self._wanted = wanted
+        self._name = name
         self._pace = FlightPace(workers)
         self._is_announced = quiet
 
-    def __enter__(self) -> _Bar:
+    def __enter__(self) -> OutcomesBar:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -192,7 +200,7 @@ class _Bar:
         """Start the clock of the rate."""
         self._pace.start()
 
-    def show(self, runs: List[Run]) -> None:
+    def show(self, runs: Sequence[Run]) -> None:
         """Count a flight and update the bar."""
         self._pace.on_flight()
         left = self._wanted - len(runs)
@@ -204,6 +212,6 @@ class _Bar:
             status += f"; {self._pace.left_text(left)} left"
             if not self._is_announced and left:
                 self._is_announced = True
-                echo(f"barn: {self._pace.estimate(left)}", err=True)
+                echo(f"{self._name}: {self._pace.estimate(left)}", err=True)
         self._progress.update(self._task, completed=len(runs), status=status)
         self._progress.start()

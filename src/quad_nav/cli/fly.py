@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, LIVE, OUTPUT, POSITIVE
+from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, LIVE, OUTPUT, POSITIVE, web_options
 
 # Those of quad_nav.sim.simulation and quad_nav.sim.odometry; importing them would load the engine.
 LIDAR_CASTERS = ("kernel", "bullet")
@@ -122,7 +122,7 @@ MAX_DRIFT = 1.0
     type=click.IntRange(min=1),
     metavar="N",
     help="Processes that share the navigators; the flight does not depend on it. [default: one"
-    " for each ten quadcopters, at most one per core]",
+    " for each core, at most one per quadcopter]",
 )
 @click.option(
     "--json",
@@ -143,6 +143,22 @@ MAX_DRIFT = 1.0
     flag_value=LIVE,
     metavar="[FILE.rrd]",
     help="Show the flight live in rerun's 3D viewer, or save it for the viewer.",
+)
+@click.option(
+    "--web",
+    is_flag=True,
+    help="Show the flight on a page in the browser, where people can also steer it. It begins when"
+    " a page is open; Ctrl-C closes the page.",
+)
+@web_options
+@click.option(
+    "--rate",
+    type=AMOUNT,
+    default=1.0,
+    show_default=True,
+    metavar="R",
+    help="Simulated seconds per second with --web, until somebody sets another one on the page; 0"
+    " is as fast as it goes.",
 )
 @click.option(
     "--report",

@@ -6,7 +6,6 @@ it refuses requests of other hosts and origins: no other page in the same browse
 
 from __future__ import annotations
 
-import hashlib
 import json
 import secrets
 import threading
@@ -16,14 +15,14 @@ from typing import Any, Callable, Dict, List, Mapping, Tuple
 
 from quad_nav.cli.options import echo, raise_on_signals
 from quad_nav.errors import InputError
-from quad_nav.files.output import output_faults, reason, write_bytes
-from quad_nav.files.user_files import read_bytes
+from quad_nav.files.output import output_faults
 from quad_nav.files.values import is_number, is_whole
-from quad_nav.mission.goal_edit import GoalEdit, edited_text
-from quad_nav.mission.goal_file import MAX_BYTES, MAX_GOALS, PlaceCheck, parse_goals
+from quad_nav.mission.goal_file import MAX_BYTES, MAX_GOALS, parse_goals
 from quad_nav.report.preview_page import page_data, preview_page, robot_data
 from quad_nav.scenario.flight_setup import FlightOptions
 from quad_nav.scenario.preview import MissionPreview
+from quad_nav.view.actions import GoalChange
+from quad_nav.view.goal_files import GoalFiles, version_of
 
 _LOOPBACK = "127.0.0.1"
 _PATIENCE_S = 10.0  # for the rest of a request
@@ -61,18 +60,18 @@ class GoalEditor:
             faults = list(preview.problems)
         if faults:
             raise InputError(faults)
-        self._contents = {number: read_bytes(path, MAX_BYTES) for number, path in files.items()}
+        self._files = GoalFiles(files, lambda number: self._preview.check(number))
 
     def page(self, nonce: str) -> str:
         """Return the page with the files as they are now."""
         self._preview = MissionPreview(self._options)
         numbers = self._preview.numbers
-        self._contents = {
-            number: read_bytes(self._preview.files[number], MAX_BYTES)
+        self._files.files = {
+            number: self._preview.files[number]
             for number in numbers
             if number in self._preview.files
         }
-        versions = {number: _version(content) for number, content in self._contents.items()}
+        versions = {one.robot: one.version for one in self._files.goal_files() if not one.problem}
         robots = [self._preview.robot(number) for number in numbers]
         return preview_page(page_data(self._preview, robots, self._title, versions), nonce)
 
@@ -86,7 +85,8 @@ class GoalEditor:
             Faults of the goals' positions, plans and warnings; or ``problems`` of the request.
         """
         try:
-            number, content = self._edited(request)
+            number, version, goals = _goals_of(request)
+            content = self._files.edited(number, version, goals, places=False)
             sequence = parse_goals(content, str(self._preview.files[number]))
         except InputError as error:
             return {"problems": error.problems}
@@ -110,12 +110,10 @@ class GoalEditor:
         robots = request.get("robots") if isinstance(request, Mapping) else None
         for one in robots if isinstance(robots, list) else []:
             try:
-                number, content = self._edited(one)
-                self._check(number, content, self._preview.check(number))
+                number, version, goals = _goals_of(one)
+                edited[number] = self._files.edited(number, version, goals)
             except InputError as error:
                 problems += error.problems
-            else:
-                edited[number] = content
         if not edited and not problems:
             problems = ["no goals to save; expected those of a robot"]
         if not problems:
@@ -123,49 +121,20 @@ class GoalEditor:
         if problems:
             return {"problems": problems}
         self._preview = MissionPreview(self._options)
-        versions = {number: _version(content) for number, content in edited.items()}
+        versions = {number: version_of(content) for number, content in edited.items()}
         return {"problems": [], "versions": versions, "remaining": list(self._preview.problems)}
-
-    def _check(self, number: int, content: bytes, check_place: PlaceCheck) -> None:
-        path = self._preview.files[number]
-        parse_goals(content, str(path), check_place)
-        if read_bytes(path, MAX_BYTES) != self._contents[number]:
-            raise InputError(
-                [f"{path}: has changed since the page was loaded; reload the page to edit it"]
-            )
 
     def _write(self, edited: Mapping[int, bytes]) -> List[str]:
         for number, content in edited.items():
-            path = self._preview.files[number]
             try:
-                write_bytes(path, content)
-            except OSError as error:
-                return [f"{path}: cannot be written: {reason(error)}"]
-            self._contents[number] = content
+                self._files.write(number, content)
+            except InputError as error:
+                return error.problems
         return []
 
-    def _edited(self, request: Any) -> Tuple[int, bytes]:
-        """Return the robot's number and the new content of its file.
 
-        Raises:
-            InputError: The request is not valid, or of another version of the file.
-        """
-        number, goals = _goals_of(request)
-        content = self._contents.get(number)
-        if content is None:
-            raise InputError([f"quad{number}: has no goal file that can be edited"])
-        if request.get("version") != _version(content):
-            path = self._preview.files[number]
-            raise InputError([f"{path}: the page has another version; reload the page to edit it"])
-        sources = {goal.source for goal in goals} - {None}
-        known = set(range(len(parse_goals(content, "the file").goals)))
-        if not sources <= known:
-            raise InputError([f"quad{number}: a goal is not one of the file's; reload the page"])
-        return number, edited_text(content.decode("utf-8"), goals).encode("utf-8")
-
-
-def _goals_of(request: Any) -> Tuple[int, List[GoalEdit]]:
-    """Return the robot and its goals in a request.
+def _goals_of(request: Any) -> Tuple[int, str, List[GoalChange]]:
+    """Return the robot, the version of its file and its goals in a request.
 
     Raises:
         InputError: It is not valid.
@@ -176,7 +145,7 @@ def _goals_of(request: Any) -> Tuple[int, List[GoalEdit]]:
     goals = request.get("goals")
     if not isinstance(goals, list) or len(goals) > MAX_GOALS:
         raise expected
-    edits: List[GoalEdit] = []
+    edits: List[GoalChange] = []
     for goal in goals:
         if not isinstance(goal, Mapping):
             raise expected
@@ -184,12 +153,8 @@ def _goals_of(request: Any) -> Tuple[int, List[GoalEdit]]:
         numbers = [goal.get("x"), goal.get("y"), *([] if yaw_rad is None else [yaw_rad])]
         if not all(map(is_number, numbers)) or not (source is None or is_whole(source)):
             raise expected
-        edits.append(GoalEdit(source, goal["x"], goal["y"], yaw_rad))
-    return int(request["robot"]), edits
-
-
-def _version(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+        edits.append(GoalChange(source, goal["x"], goal["y"], yaw_rad))
+    return int(request["robot"]), str(request.get("version")), edits
 
 
 class GoalServer(ThreadingHTTPServer):

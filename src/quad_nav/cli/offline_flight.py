@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.cli import EXIT_INTERRUPTED
+from quad_nav.cli.flight_page import FlightPage
 from quad_nav.cli.options import (
     LIVE,
     echo,
@@ -24,12 +25,12 @@ from quad_nav.cli.pictures import FlightPictures
 from quad_nav.cli.progress import ProgressBar
 from quad_nav.errors import PluginError
 from quad_nav.files.shipped import shipped
+from quad_nav.loop.worker_process import processes_for
 from quad_nav.mission.flight_log import INTERRUPTED
 from quad_nav.mission.summary import MissionSummary, to_json
 from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
-from quad_nav.offline.worker_process import processes_for
 from quad_nav.scenario.flight_facts import offline_facts
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.lidar import LidarParams
@@ -37,6 +38,7 @@ from quad_nav.sim.odometry import OdomDrift
 from quad_nav.sim.simulation import SimulationParams
 
 _TUTORIAL_ROBOTS = 2
+_PAGE_OPTIONS = ("address", "port", "rate", "open_it")
 
 
 def fly_mission(
@@ -48,9 +50,11 @@ def fly_mission(
     animate: Optional[Path],
     quiet: bool,
     processes: Optional[int],
+    web: bool,
     **given: Any,
 ) -> None:
     """Fly with the options of ``quad fly`` and exit with its status."""
+    served = {name: given.pop(name) for name in _PAGE_OPTIONS}
     with exit_on_faults():
         saved_view = None if view in (None, LIVE) else Path(view)
         outputs = Outputs(
@@ -61,15 +65,28 @@ def fly_mission(
         )
         options = _options(**given)
         setup = read_setup(options)
-        drawn = FlightPictures(setup, report, pictures, animate)
-        observers = _observers(record, view)
-    if not quiet:
-        show_warnings(setup.warnings)
-    processes = processes or processes_for(len(setup.robots))
-    facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
-    with exit_on_faults():
-        status = _fly(setup, facts, observers, outputs, drawn, quiet, processes)
+        page = FlightPage(**served) if web else None
+    while True:
+        with exit_on_faults():
+            drawn = FlightPictures(setup, report, pictures, animate)
+            observers = _observers(record, view)
+            if not quiet:
+                show_warnings(setup.warnings)
+            facts = offline_facts(options, setup, ["quad", *sys.argv[1:]])
+            status = _fly(setup, facts, observers, outputs, drawn, quiet, processes, page)
+        if page is None or status == EXIT_INTERRUPTED or not _is_wanted_again(page):
+            break
+        with exit_on_faults():
+            setup = read_setup(options)  # the goal files may have changed
+    if page is not None:
+        page.close()
     sys.exit(status)
+
+
+def _is_wanted_again(page: FlightPage) -> bool:
+    """Keep the page until Ctrl-C; return true if people want the flight again."""
+    with _StopOnSignal() as stop:
+        return page.wants_flight(lambda: bool(stop.stop_reason))
 
 
 def _options(
@@ -122,12 +139,16 @@ def _fly(
     outputs: Outputs,
     pictures: FlightPictures,
     quiet: bool,
-    processes: int,
+    processes: Optional[int],
+    page: Optional[FlightPage],
 ) -> int:
-    bar = [] if quiet else [ProgressBar()]
+    processes = processes or processes_for(len(setup.robots))
+    bar: List[FlightObserver] = [] if quiet else [ProgressBar()]
+    bar += [] if page is None else [page.observer()]
     with _StopOnSignal() as stop:
         flown = _summary(setup, [*observers, *pictures.observers, *bar, stop], processes, quiet)
-    summary = replace(flown, facts=facts)
+    interventions = () if page is None else tuple(page.interventions)
+    summary = replace(flown, facts=facts, interventions=interventions)
     width = shutil.get_terminal_size((DEFAULT_WIDTH, 24)).columns
     overview = table(summary, width)
     if not quiet:

@@ -6,7 +6,7 @@ import signal
 import sys
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Iterable, Iterator, Tuple
+from typing import Any, Callable, Iterable, Iterator, Tuple
 
 import click
 import yaml
@@ -25,6 +25,33 @@ OUTPUT = click.Path(dir_okay=False, allow_dash=True, path_type=Path)
 """Type of an option whose text ``-`` sends to standard output."""
 LIVE = "live"
 """Value of ``--view`` without a file."""
+LOOPBACK = "127.0.0.1"
+
+
+def web_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say where a page is served."""
+    for option in (
+        click.option(
+            "--open", "open_it", is_flag=True, help="Open the page in the browser of this machine."
+        ),
+        click.option(
+            "--address",
+            default=LOOPBACK,
+            show_default=True,
+            metavar="A",
+            help="Serve the page on this address. Other machines need a token, which is printed as"
+            " part of the page's address: one to steer, another one to watch.",
+        ),
+        click.option(
+            "--port",
+            type=click.IntRange(0, 65535),
+            default=0,
+            metavar="N",
+            help="Serve the page on this port. [default: the first free one from 8080 on]",
+        ),
+    ):
+        command = option(command)
+    return command
 
 
 def parameter(text: str) -> Tuple[str, Any]:

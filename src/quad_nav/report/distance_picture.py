@@ -50,7 +50,7 @@ def shown_gaps(trace: FlightTrace, tracks: Tracks) -> List[Tuple[str, NDArray[np
             ("Separation from the nearest robot", _touching(trace, tracks, separations, True))
         )
     if trace.scene is not None:
-        clearances = clearances_m(tracks, trace.scene, trace.robot_radius_m)
+        clearances = clearances_m(tracks, trace)
         panels.append(
             (
                 "Clearance to the nearest obstacle or wall",

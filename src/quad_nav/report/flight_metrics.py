@@ -122,7 +122,7 @@ class FlightMetrics:
 def flight_metrics(trace: FlightTrace, tracks: Optional[Tracks] = None) -> FlightMetrics:
     """Compute the metrics of a flight; ``tracks`` are its resampled tracks, if known."""
     tracks = resampled_tracks(trace) if tracks is None else tracks
-    clearances = clearances_m(tracks, trace.scene, trace.robot_radius_m)
+    clearances = clearances_m(tracks, trace)
     separations = separations_m(tracks, trace.robot_radius_m)
     robots = tuple(
         _robot(robot, trace, smallest(clearances[k]), smallest(separations[k]))

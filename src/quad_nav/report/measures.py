@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from quad_nav.mission import distances
 from quad_nav.mission.flight_log import SPIN_ABOVE_RADPS, SPIN_BELOW_MPS
 from quad_nav.recording.trace import FlightTrace, GoalTrace, RobotTrace
-from quad_nav.sim.scene import Scene
+from quad_nav.sim.movers import Movers
 
 Span = Tuple[float, float]
 
@@ -89,11 +89,14 @@ def separations_m(tracks: Tracks, radius_m: float) -> NDArray[np.float64]:
     return distances.nearest_separations_m(tracks.positions_m, radius_m)
 
 
-def clearances_m(tracks: Tracks, scene: Optional[Scene], radius_m: float) -> NDArray[np.float64]:
+def clearances_m(tracks: Tracks, trace: FlightTrace) -> NDArray[np.float64]:
     """Return each robot's clearance, shape (n, t); NaN without a scene."""
-    if scene is None or tracks.positions_m.size == 0:
+    if trace.scene is None or tracks.positions_m.size == 0:
         return np.full(tracks.yaws_rad.shape, np.nan)
-    return distances.clearances_m(tracks.positions_m, scene.flight_surface_distances_m, radius_m)
+    surface_distance = Movers(trace.scene, trace.seed).flight_surface_distances_m
+    return distances.clearances_m(
+        tracks.positions_m, tracks.times_s, surface_distance, trace.robot_radius_m
+    )
 
 
 def trace_span_s(trace: FlightTrace) -> Span:

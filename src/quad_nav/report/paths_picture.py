@@ -15,8 +15,8 @@ from matplotlib.textpath import TextPath
 
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.encounters import LETTERS, Encounter
-from quad_nav.report.measures import Tracks, goal_end_s, position_m
-from quad_nav.report.scene_drawing import draw_hull, draw_scene, extent, outlines
+from quad_nav.report.measures import Tracks, goal_end_s, position_m, trace_span_s
+from quad_nav.report.scene_drawing import draw_hull, draw_motions, draw_scene, extent, outlines
 from quad_nav.report.style import (
     ALARM,
     QUIET,
@@ -38,6 +38,7 @@ def paths_picture(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter
     figure = new_figure(height_in)
     axes = figure.subplots()
     draw_scene(axes, trace.scene)
+    draw_motions(axes, trace, trace_span_s(trace))
     scale = min(1.0, (_FULL_SIZE_UP_TO / max(len(trace.robots), 1)) ** 0.2)
     for k, robot in enumerate(trace.robots):
         _draw_path(axes, k, robot, scale)

@@ -19,7 +19,7 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.files.output import write_bytes
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN
 from quad_nav.report import style
-from quad_nav.report.scene_drawing import Extent, draw_hull, draw_scene
+from quad_nav.report.scene_drawing import MOVING, Extent, draw_hull, draw_scene, draw_starting
 from quad_nav.report.style import ALARM, QUIET, WIDTH_IN, colour, new_figure, robot_legend
 from quad_nav.scenario.preview import MissionPreview, RobotPreview
 
@@ -103,6 +103,8 @@ def preview_picture(preview: MissionPreview, robots: Sequence[RobotPreview], tit
     figure = new_figure((WIDTH_IN - 0.6) * min(max((y1 - y0) / (x1 - x0), 0.3), 1.6) + 1.3)
     axes = figure.subplots()
     draw_scene(axes, preview.scene)
+    if preview.scene is not None:
+        draw_starting(axes, preview.scene, preview.moving)
     costmap = preview.costmap(robots[0].number) if robots else None
     if costmap is not None:
         axes.imshow(
@@ -117,7 +119,8 @@ def preview_picture(preview: MissionPreview, robots: Sequence[RobotPreview], tit
     for robot in robots:
         _draw_robot(axes, robot, preview.robot_radius_m, scale)
     names = [robot.name for robot in robots]
-    robot_legend(figure, names, _symbols(costmap, any(any(one.faults) for one in robots)))
+    symbols = _symbols(costmap, any(any(one.faults) for one in robots), bool(preview.moving))
+    robot_legend(figure, names, symbols)
     return figure
 
 
@@ -184,7 +187,7 @@ def _text(axes: Axes, place: Tuple[float, float], text: str, size: float, ink: A
     )
 
 
-def _symbols(costmap: Optional[LayeredCostmap], has_faults: bool) -> List[Any]:
+def _symbols(costmap: Optional[LayeredCostmap], has_faults: bool, has_moving: bool) -> List[Any]:
     def line(label: str, **looks: Any) -> Line2D:
         return Line2D([], [], label=label, **{"color": QUIET, "mec": QUIET, **looks})
 
@@ -196,6 +199,8 @@ def _symbols(costmap: Optional[LayeredCostmap], has_faults: bool) -> List[Any]:
     ]
     if has_faults:
         found.append(line("refused goal", ls="", marker="o", ms=8, color="white", mec=ALARM))
+    if has_moving:
+        found.append(Patch(color=MOVING, label="moving obstacle"))
     if costmap is not None:
         kinds = {"lethal": _LETHAL_RGB, "inscribed": _INSCRIBED_RGB, "inflated": _INFLATED_RGB}
         for label, (red, green, blue) in kinds.items():

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Tuple
+from dataclasses import replace
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,12 +13,17 @@ from matplotlib.patches import Circle, Patch, Rectangle
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
+from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks
 from quad_nav.report.style import colour
+from quad_nav.sim.movers import Motions, Movers
 from quad_nav.sim.scene import Box, Obstacle, Scene
 
 Extent = Tuple[float, float, float, float]
+MOVING = "#cc5c33"
 _SOLID, _EDGE = "#b9bfc6", "#7c858e"
+_PATH_POINTS = 1000
+_MOTION_STEP_S, _JUMP_M = 0.1, 1.0
 
 
 def draw_scene(axes: Axes, scene: Optional[Scene], near: Optional[Extent] = None) -> None:
@@ -44,6 +50,44 @@ def draw_scene(axes: Axes, scene: Optional[Scene], near: Optional[Extent] = None
     axes.add_collection(
         PatchCollection(passed, facecolor="none", edgecolor=_EDGE, lw=0.8, linestyle=":", zorder=1)
     )
+
+
+def draw_motions(axes: Axes, trace: FlightTrace, span: Tuple[float, float]) -> None:
+    """Draw the paths of moving obstacles in a time span, and where they are at its end."""
+    if trace.scene is None or not trace.scene.moving_shapes:
+        return
+    movers = Movers(trace.scene, trace.seed)
+    times_s = np.arange(span[0], span[1], _MOTION_STEP_S)
+    for track in np.swapaxes(movers.poses_at(np.append(times_s, span[1])), 0, 1):
+        steps_m = np.hypot(*np.diff(track[:, :2], axis=0).T)
+        track[1:][steps_m > _JUMP_M] = np.nan  # no line where a loop starts again
+        axes.plot(track[:, 0], track[:, 1], color=MOVING, lw=0.7, alpha=0.5, zorder=2)
+    for solid in movers.at(span[1]):
+        axes.add_patch(moving_patch(solid))
+
+
+def draw_starting(axes: Axes, scene: Scene, moving: Sequence[Obstacle]) -> None:
+    """Draw the paths along keyframes, and moving obstacles where they start.
+
+    Args:
+        axes: Axes to draw in.
+        scene: Scene, whose moving obstacles have the keyframes.
+        moving: The obstacles and people where they start.
+    """
+    for obstacle in scene.moving:
+        motion = replace(obstacle.motion, loop=False)  # no line where it starts again
+        times_s = np.linspace(0.0, motion.length_s, _PATH_POINTS)
+        track = Motions([motion], [0.0]).poses(times_s)[:, 0]
+        axes.plot(track[:, 0], track[:, 1], color=MOVING, lw=1.0, alpha=0.35, zorder=2)
+    for solid in moving:
+        axes.add_patch(moving_patch(solid))
+
+
+def moving_patch(solid: Obstacle) -> Patch:
+    """Return the outline of a moving obstacle."""
+    patch = _outline(solid)
+    patch.set(facecolor=MOVING, edgecolor=_EDGE, lw=0.8, alpha=0.7, zorder=3)
+    return patch
 
 
 def outlines(

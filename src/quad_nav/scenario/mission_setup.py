@@ -22,8 +22,9 @@ from quad_nav.mission.goal_file import SETTINGS, SequenceSettings, read_settings
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.flight_facts import ros_facts
-from quad_nav.scenario.rules import RANDOM, RULES, optional
+from quad_nav.scenario.rules import RANDOM, RULES, START_S, optional
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
+from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 DEFAULTS: Dict[str, Any] = {
@@ -148,7 +149,7 @@ def _mission_setup(
         scenario.robots,
         scenario.robot_radius_m,
         scene.altitude_m if scene else None,
-        scene.flight_surface_distances_m if scene else None,
+        Movers(scene, values["seed"], START_S).flight_surface_distances_m if scene else None,
         values["simulation"],
         float(values["ready_timeout"]),
         values["exit_when_done"],

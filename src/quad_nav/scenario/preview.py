@@ -26,7 +26,8 @@ from quad_nav.scenario.flight_setup import (
 )
 from quad_nav.scenario.goal_checks import place_check
 from quad_nav.scenario.scene_map import scene_map, scene_map_problem, scene_occupancy
-from quad_nav.sim.scene import Scene
+from quad_nav.sim.movers import Movers
+from quad_nav.sim.scene import Obstacle, Scene
 
 _ROUNDING_M = 1e-9
 NO_PLAN: NDArray[np.float64] = np.empty((0, 2))
@@ -68,6 +69,8 @@ class MissionPreview:
         warnings: The warnings of ``quad fly``.
         files: Goal files by the robots' numbers; none for a random mission.
         robot_radius_m: Radius of the robots' hulls.
+        moving: Moving obstacles and people where they start; without people who react to
+            quadcopters.
     """
 
     def __init__(self, options: FlightOptions) -> None:
@@ -85,6 +88,7 @@ class MissionPreview:
             self.scene, self.warnings, robots = setup.scene, setup.warnings, setup.robots
             configurations = setup.configurations
             self.robot_radius_m = setup.robot_radius_m
+        self.moving = self._starting(options.seed)
         self._configurations = dict(enumerate(configurations))
         self._sequences = {int(one.name[len("quad") :]): one.sequence for one in robots}
         self._costmaps: Dict[CostmapParams, LayeredCostmap] = {}
@@ -93,6 +97,16 @@ class MissionPreview:
         if options.goals is not None:
             self.files, _ = goal_paths(Path(options.goals).expanduser(), options.robots or 1)
             self._read_faulty_files()
+
+    def _starting(self, seed: int) -> Tuple[Obstacle, ...]:
+        """Return the moving obstacles where they start; note if there is no room for people."""
+        if self.scene is None:
+            return ()
+        try:
+            return tuple(Movers(self.scene, seed).at(0.0))
+        except InputError as error:
+            self.problems += tuple(error.problems)
+            return ()
 
     def _read_faulty_files(self) -> None:
         """Read the goals of files in which only positions are faulty."""

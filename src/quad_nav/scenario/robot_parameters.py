@@ -5,7 +5,8 @@
 The faults of the files go to stderr, one a line, with exit status 2, which ends roslaunch. With
 ``QUAD_COLLECT_FAULTS`` in the environment they are printed as a parameter instead, exit status 0:
 ``quad_nav.ros.common.preflight`` lists them together with the faults of goals, scene and values.
-roslaunch waits for this command, so it imports neither numba nor pybullet.
+roslaunch waits for this command, so it imports neither numba nor pybullet unless the scene is
+random.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
     source = _source(given)
     try:
         tree = robot_tree(source)
-        area = _area(given.scene)
+        area = _area(given)
     except InputError as error:
         if os.environ.get(COLLECT):
             print(printable(_yaml({FAULTS: error.problems}), "\n"))
@@ -77,18 +78,24 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--override", default="", help="file that is loaded last")
     parser.add_argument("--scene", default="", help="file of the scene that the costmap covers")
+    parser.add_argument("--seed", type=int, default=0, help="seed of a random scene")
+    parser.add_argument("--size", type=float, default=0.0, help="side of a random scene, m")
     return parser
 
 
-def _area(scene: str) -> Optional[Bounds]:
-    """Return the area of a scene file, None for "" and a random scene.
+def _area(given: argparse.Namespace) -> Optional[Bounds]:
+    """Return the area of a scene file or of a random scene, None for "".
 
     Raises:
-        InputError: The file cannot be read or has faults. While faults are collected, they are
-            left to the simulator's.
+        InputError: The file cannot be read or has faults, or there is no such random scene. While
+            faults are collected, they are left to the simulator's.
     """
     try:
-        return None if scene in ("", RANDOM) else scene_bounds(load_scene(scene))
+        if given.scene == RANDOM:
+            from quad_nav.scenario.scenario import area_of
+
+            return area_of(vars(given))
+        return scene_bounds(load_scene(given.scene)) if given.scene else None
     except InputError:
         if os.environ.get(COLLECT):
             return None

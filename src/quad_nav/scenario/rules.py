@@ -9,6 +9,7 @@ from quad_nav.files.values import (
     Rule,
     choice,
     is_number,
+    is_whole,
     number,
     optional_text,
     text,
@@ -19,6 +20,8 @@ from quad_nav.sim.simulation import LIDAR_CASTERS, STEPS_PER_S
 
 RANDOM = "random"
 """Value of ``scene`` and ``goals`` that asks for a random mission."""
+START_S = 1.0
+"""Time on `/clock` when a simulation starts: rospy treats 0 as a clock without messages."""
 MAX_SIZE_M = 250  # a larger random arena takes minutes to fill with obstacles
 MAX_ROBOTS = 100
 """Each has costmaps of its own: a thousand need more memory than most machines have."""
@@ -41,6 +44,13 @@ def _is_drift(value: Any) -> bool:
     """True for two speeds of an odometry frame."""
     speed = number(at_least=0, at_most=MAX_DRIFT)
     return isinstance(value, (list, tuple)) and len(value) == 2 and all(map(speed.accepts, value))
+
+
+def _is_packages(value: Any) -> bool:
+    """True for the packages of separate navigators, by ``nav{i}``."""
+    return isinstance(value, dict) and all(
+        isinstance(name, str) and isinstance(package, str) for name, package in value.items()
+    )
 
 
 def _is_path_or_paths(value: Any) -> bool:
@@ -93,9 +103,19 @@ RULES: Dict[str, Rule] = {
     # A fleet's processes.
     "hosts": whole(at_least=1),
     "host": Rule(whole(at_least=0).accepts, "a whole number below hosts"),
+    "composed": BOOLEAN,
+    "separate": Rule(_is_packages, "packages of navigators, such as {nav3: move_base}"),
 }
 
 
 def optional(rule: Rule) -> Rule:
     """The same rule, which also accepts an empty text."""
     return Rule(lambda value: value == "" or rule.accepts(value), f"{rule.expected}, or nothing")
+
+
+def optional_whole(rule: Rule) -> Rule:
+    """The same rule for a whole number, which also accepts 0."""
+    return Rule(
+        lambda value: (is_whole(value) and value == 0) or rule.accepts(value),
+        f"{rule.expected}, or 0",
+    )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 from quad_nav.config import Configuration, load
 from quad_nav.costmap.static import StaticLayerParams
 from quad_nav.errors import InputError
 from quad_nav.files.values import is_number, is_whole, unknown_names, value_faults
-from quad_nav.scenario.rules import RULES, optional, steps_per_scan
+from quad_nav.scenario.rules import RULES, optional, optional_whole, steps_per_scan
 from quad_nav.scenario.scenario import (
     area_of,
     body_radius_m,
@@ -45,13 +46,27 @@ DEFAULTS: Dict[str, Any] = {
     "controller_period": 0.05,  # controller_period without commands; the node asks the navigators
     "body_radius": BODY_RADIUS_M,  # m, of the quadcopters' guards; the navigators may have another
     "map_resolution": 0.0,  # m, cells of the scene's map on the topic map; 0: no map
+    "composed": False,  # host the robots' navigators, too
+    "separate": {},  # {nav3: package}: robots whose navigators are nodes of their own all the same
+    "hosts": 0,  # processes that share the navigators, the simulator's included; 0: chosen
 }
-_RULES = {**{name: RULES[name] for name in DEFAULTS}, "config": optional(RULES["config"])}
+_RULES = {
+    **{name: RULES[name] for name in DEFAULTS},
+    "config": optional(RULES["config"]),
+    "hosts": optional_whole(RULES["hosts"]),
+}
 
 
 @dataclass(frozen=True)
 class SimulatorSetup:
-    """A simulation that can be run; ``rate`` is in simulated seconds per second."""
+    """A simulation that can be run.
+
+    Attributes:
+        rate: Simulated seconds per second.
+        configurations: Those of the robots whose navigators are in the simulation's processes, by
+            number.
+        hosts: Number of these processes; 0 if nobody chose it.
+    """
 
     scene: Scene
     robots: int
@@ -62,29 +77,60 @@ class SimulatorSetup:
     start_paused: bool
     steps_per_scan: int
     map_resolution_m: float = 0.0
+    configurations: Mapping[int, Configuration] = field(default_factory=dict)
+    hosts: int = 0
 
 
-def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
+def read_setup(
+    parameters: Mapping[str, Any],
+    name: str,
+    all_parameters: Mapping[str, Any] = MappingProxyType({}),
+) -> SimulatorSetup:
     """Read the simulation that a node's private parameters describe.
 
     Args:
         parameters: The node's private parameters.
         name: The node's name, for messages.
+        all_parameters: Those of all nodes; without ``config`` navigators have theirs from there.
 
     Raises:
         InputError: Every fault in the parameters and in the scene.
     """
-    values = {**DEFAULTS, **parameters}
-    problems = unknown_names(parameters, DEFAULTS, name, "a parameter of the simulator")
-    problems += value_faults(values, _RULES, name)
-    if problems:
-        raise InputError(problems)
+    values = _checked_values(parameters, name)
     scene = scene_of(values)
     if values["config"]:
-        fleet = read_configurations(
-            values["config"], values["robots"], area_of(values), numbered=True
-        )
+        area = area_of(values)
+        fleet = read_configurations(values["config"], values["robots"], area, numbered=True)
         values = {**DEFAULTS, **_asked_for(fleet), **parameters}
+        hosted = {number: fleet[number] for number in _hosted(values)}
+    else:
+        hosted = _on_the_server(all_parameters, _hosted(values))
+    return SimulatorSetup(
+        scene,
+        values["robots"],
+        _checked_params(scene, values, name),
+        values["seed"],
+        float(values["rate"]),
+        values["gui"],
+        values["start_paused"],
+        steps_per_scan(values["lidar_rate"]),
+        float(values["map_resolution"]),
+        hosted,
+        values["hosts"],
+    )
+
+
+def _checked_values(parameters: Mapping[str, Any], name: str) -> Dict[str, Any]:
+    values = {**DEFAULTS, **parameters}
+    problems = unknown_names(parameters, DEFAULTS, name, "a parameter of the simulator")
+    problems += value_faults(values, _RULES, name) or _host_faults(values, name)
+    if problems:
+        raise InputError(problems)
+    return values
+
+
+def _checked_params(scene: Scene, values: Mapping[str, Any], name: str) -> SimulationParams:
+    """Return the simulation's parameters, with which every quadcopter has a start pose."""
     try:
         params = _simulation_params(values)
         start_poses(
@@ -92,17 +138,39 @@ def read_setup(parameters: Mapping[str, Any], name: str) -> SimulatorSetup:
         )
     except InputError as error:
         raise InputError([f"{name}: {problem}" for problem in error.problems]) from error
-    return SimulatorSetup(
-        scene,
-        values["robots"],
-        params,
-        values["seed"],
-        float(values["rate"]),
-        values["gui"],
-        values["start_paused"],
-        steps_per_scan(values["lidar_rate"]),
-        float(values["map_resolution"]),
-    )
+    return params
+
+
+def _hosted(values: Mapping[str, Any]) -> List[int]:
+    """Return the numbers of the robots whose navigators the simulator hosts."""
+    if not values["composed"]:
+        return []
+    return [i for i in range(values["robots"]) if f"nav{i}" not in values["separate"]]
+
+
+def _host_faults(values: Mapping[str, Any], name: str) -> List[str]:
+    count = len(_hosted(values))
+    if not count or values["hosts"] <= count:
+        return []
+    return [f"{name}: hosts {values['hosts']} for {count} robots; expected a robot for each host"]
+
+
+def _on_the_server(
+    all_parameters: Mapping[str, Any], numbers: Sequence[int]
+) -> Dict[int, Configuration]:
+    """Read the configurations of navigators that have their parameters on the server."""
+    found: Dict[int, Configuration] = {}
+    problems: List[str] = []
+    for number in numbers:
+        try:
+            found[number] = load(
+                all_parameters.get(f"move_base{number}", {}), f"/move_base{number}"
+            )
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return found
 
 
 def asked_for_by_navigators(all_parameters: Mapping[str, Any], robots: Any) -> Dict[str, Any]:

@@ -83,7 +83,8 @@ def read_flights(path: Path) -> Dict[Key, FlightResult]:
                 raise InputError([f"{path}: {line}; {_RESTORE}" for line in problems])
             _check_writable(database)
             flights, problems = flights_of(database)
-    except (sqlite3.Error, OverflowError, MemoryError) as error:
+    # sqlite3 raises UnicodeDecodeError for text that is not UTF-8.
+    except (sqlite3.Error, OverflowError, MemoryError, UnicodeDecodeError) as error:
         raise InputError([f"{path}: {reason(error)}; {advice(error)}"]) from error
     if problems:
         raise InputError(

@@ -1,0 +1,72 @@
+"""Moving obstacles as the node of the page hears of them."""
+
+from __future__ import annotations
+
+import io
+import math
+
+import numpy as np
+import pytest
+
+rospy = pytest.importorskip("rospy")
+
+from quad_nav.ros.common.conversions import marker_array  # noqa: E402
+from quad_nav.ros.web.obstacles import Obstacles  # noqa: E402
+from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
+from quad_nav.sim.movers import Movers  # noqa: E402
+from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402
+from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_markers, moving_poses  # noqa: E402
+
+CART = MovingObstacle(
+    Box("cart", 1.0, 6.0, 1.0, 0.5, 2.0), Motion((0.0, 10.0), ((1.0, 6.0, -3.0), (5.0, 6.0, -3.0)))
+)
+STREET = Scene("street", 10.0, 8.0, 1.0, Walls(), (), (), moving=(CART,), walkers=Walkers(2))
+EMPTY = Scene("empty", 10.0, 8.0, 1.0, Walls(), (), ())
+
+
+def hear(obstacles: Obstacles, message) -> None:
+    """Give it a message as rospy does, which has its bytes only."""
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    topic = obstacles.topics(STREET)[OBSTACLES_TOPIC]
+    topic.callback(topic.message_type().deserialize(buffer.getvalue()))
+
+
+def test_markers_tell_the_poses_that_they_were_made_of():
+    movers = Movers(STREET, 1)
+    message = marker_array(moving_markers(movers, 2.5))
+    assert moving_poses(message.markers, 3) == pytest.approx(movers.poses(2.5))
+    missing = moving_poses(message.markers[:1], 3)
+    assert missing[0] == pytest.approx([2.0, 6.0, -3.0])  # a quarter of the way
+    assert np.isnan(missing[1:]).all()
+
+
+def test_nothing_is_subscribed_to_where_nothing_moves():
+    obstacles = Obstacles()
+    assert obstacles.topics(None) == obstacles.topics(EMPTY) == {}
+    assert list(obstacles.topics(STREET)) == [OBSTACLES_TOPIC]
+
+
+def test_the_item_is_put_once_for_each_move():
+    obstacles, movers = Obstacles(), Movers(STREET, 1)
+    assert obstacles.items(STREET) == obstacles.solids() == []
+    for now_s, x_m in ((2.5, 2.0), (5.0, 3.0)):
+        message = marker_array(moving_markers(movers, now_s))
+        hear(obstacles, message)
+        (item,) = obstacles.items(STREET)
+        assert item.arrays["poses"][0].tolist() == pytest.approx([x_m, 6.0, -3.0])
+        assert [solid.name for solid in obstacles.solids()] == ["cart", "person_0", "person_1"]
+        hear(obstacles, message)
+        assert obstacles.items(STREET) == []
+    obstacles.start()  # another client has come
+    hear(obstacles, message)
+    assert len(obstacles.items(STREET)) == 1
+
+
+@pytest.mark.parametrize("number, x_m", [(3, 1.0), (-1, 1.0), (0, math.nan)])
+def test_markers_that_are_no_obstacles_are_dropped(number, x_m):
+    obstacles = Obstacles()
+    message = marker_array(moving_markers(Movers(STREET, 1), 2.5))
+    message.markers[0].id, message.markers[0].pose.position.x = number, x_m
+    hear(obstacles, message)
+    assert obstacles.items(STREET) == obstacles.solids() == []
