@@ -300,6 +300,15 @@ def yaw_from_quaternion(quaternion: Quaternion) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def yaws_from_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the yaws float64[n] of unit quaternions float64[n, 4], (x, y, z, w)."""
+    # Contiguous operands: near the end of a strided one numpy may take its scalar arctan2, whose
+    # last bit differs, as the memory happens to lie.
+    x, y, z, w = quaternions.T
+    yaws_rad: NDArray[np.float64] = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return yaws_rad
+
+
 def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
     """Return the unit quaternion of ROS's fixed-axis roll, pitch, yaw.
 

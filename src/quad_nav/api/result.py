@@ -8,6 +8,7 @@ from typing import Any, Dict, List, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.geometry import yaws_from_quaternions
 from quad_nav.mission.summary import MissionSummary, to_json
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.sim.flight import BodyState
@@ -111,7 +112,8 @@ class TrajectoryObserver(FlightObserver):
         rotations = rotations.reshape(count, robots, 3, 3)
         velocities = np.einsum("krji,krj->kri", rotations, rows[..., 7:10])
         spins = np.einsum("krj,krj->kr", rotations[..., 2], rows[..., 10:13])
-        yaws = np.arctan2(rotations[..., 1, 0], rotations[..., 0, 0])
+        quaternions = rows[..., 3:7].reshape(-1, 4)
+        yaws = yaws_from_quaternions(quaternions).reshape(count, robots)
         return tuple(
             np.column_stack(
                 [
