@@ -19,6 +19,7 @@ LAYERS = [
     {"geometry", "grid", "files"},
     {"footprint", "timing"},
     {"kernels"},
+    {"tracking"},
     {"costmap", "plan", "control", "sim"},
     {"recovery", "peers"},
     {"navigator", "mission"},

@@ -20,7 +20,7 @@ MOST_LOOSE_MODULES = 8  # directly in quad_nav
 MOST_LINES = 400
 MOST_FUNCTION_LINES = 40  # signature and docstring included, kernels apart
 SMALL_LINES = 60
-MOST_SMALL_MODULES = 34
+MOST_SMALL_MODULES = 8  # apart from the text that introduces a package
 PRINTS_ITS_OWN = ("config/reference.py",)  # our own documentation
 
 
@@ -29,7 +29,11 @@ def test_few_modules_are_outside_of_packages():
 
 
 def test_few_modules_are_small():
-    small = [path.relative_to(PACKAGE) for path in MODULES if lines_of(path) < SMALL_LINES]
+    small = [
+        path.relative_to(PACKAGE)
+        for path in MODULES
+        if path.name != "__init__.py" and lines_of(path) < SMALL_LINES
+    ]
     assert len(small) <= MOST_SMALL_MODULES, small
 
 

@@ -1,0 +1,70 @@
+"""Tracks of moving obstacles: positions, velocities and their uncertainty at one time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.geometry import Pose2D
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Moving obstacles at one time, as upright discs with a constant velocity.
+
+    Attributes:
+        time_s: Time of the states.
+        numbers: int64[n], a number for each obstacle, kept from scan to scan.
+        states: float64[n, 4]: x and y, m, and their velocities, m/s, in one fixed frame.
+        covariances: float64[n, 4, 4] of the states.
+        radii_m: float64[n], radii of the discs that hold the obstacles.
+    """
+
+    time_s: float
+    numbers: NDArray[np.int64]
+    states: Floats
+    covariances: Floats
+    radii_m: Floats
+
+    @classmethod
+    def none(cls, time_s: float) -> Tracks:
+        """Return no tracks."""
+        return cls(
+            time_s,
+            np.empty(0, np.int64),
+            np.empty((0, 4)),
+            np.empty((0, 4, 4)),
+            np.empty(0),
+        )
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def at(self, time_s: float) -> Tracks:
+        """Return the obstacles where they are at another time if they keep their velocities.
+
+        The covariances grow with the uncertainty of the velocities only.
+        """
+        step = np.eye(4)
+        step[0, 2] = step[1, 3] = time_s - self.time_s
+        return Tracks(
+            time_s,
+            self.numbers,
+            self.states @ step.T,
+            step @ self.covariances @ step.T,
+            self.radii_m,
+        )
+
+    def transformed(self, a_from_b: Pose2D) -> Tracks:
+        """Return the tracks in frame a, of tracks in frame b; neither frame moves."""
+        x, y, vx, vy = self.states.T
+        states = np.column_stack([*a_from_b.transform(x, y), *a_from_b.rotate(vx, vy)])
+        turn = np.kron(
+            np.eye(2), np.column_stack([a_from_b.rotate(1.0, 0.0), a_from_b.rotate(0.0, 1.0)])
+        )
+        covariances = turn @ self.covariances @ turn.T
+        return Tracks(self.time_s, self.numbers, states, covariances, self.radii_m)
