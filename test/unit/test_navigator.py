@@ -19,6 +19,7 @@ from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.planner import ring_offsets
 from quad_nav.recovery import Step
 from quad_nav.timing import Schedule
+from quad_nav.tracking.tracks import Tracks
 
 HERE = Pose2D(1.0, 1.0, 0.0)
 GOAL = Pose2D(5.0, 1.0, 0.0)
@@ -378,3 +379,14 @@ def test_a_changed_frequency_takes_effect_at_once():
     before = len(flight.global_costmap.updates)
     flight.until(2.0)
     assert len(flight.global_costmap.updates) - before >= 16
+
+
+def test_tracks_without_avoidance_change_no_command():
+    tracks = Tracks(
+        0.0, np.array([0]), np.array([[1.5, 1.0, -1.0, 0.0]]), np.zeros((1, 4, 4)), [0.5]
+    )
+    flight = Flight()
+    flight.navigator.set_goal(GOAL, 0.0)
+    here = RobotPoses(HERE, HERE)
+    assert flight.navigator.tick(0.0, here, FORWARD, (), tracks).command == Twist2D()
+    assert flight.navigator.tick(0.1, here, FORWARD, (), tracks).command == FORWARD

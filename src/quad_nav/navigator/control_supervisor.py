@@ -24,6 +24,7 @@ from quad_nav.navigator.parameter_limiter import ParameterLimiter
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.recovery import ParameterLimit
 from quad_nav.timing import StallTimer
+from quad_nav.tracking.tracks import Tracks
 
 
 @dataclass(frozen=True)
@@ -108,11 +109,13 @@ class ControlSupervisor:
 
     Attributes:
         limiter: Limits of the planner's parameters, from recoveries and stalls.
+        tracks: Moving obstacles in the local costmap's frame, None if nothing tracks them.
     """
 
     def __init__(self, controller: LocalPlanner) -> None:
         """Supervise a local planner that has no plan yet."""
         self.limiter = ParameterLimiter(controller)
+        self.tracks: Optional[Tracks] = None
         self._controller = controller
         self._last_valid_s = -math.inf
         self.reset()

@@ -26,6 +26,7 @@ from quad_nav.peers.peer import Peer
 from quad_nav.peers.peer_tracker import CRUISE_MPS
 from quad_nav.plan.planner import GlobalPlanner, plan_near
 from quad_nav.timing import Schedule
+from quad_nav.tracking.tracks import Tracks
 
 _IDLE_CHECK_HZ = 4.0  # of whether an idle robot is on the path of a peer
 
@@ -177,7 +178,12 @@ class Navigator:
             self.set_goal(goal, now_s)
 
     def tick(
-        self, now_s: float, poses: RobotPoses, velocity: Twist2D, peers: Sequence[Peer] = ()
+        self,
+        now_s: float,
+        poses: RobotPoses,
+        velocity: Twist2D,
+        peers: Sequence[Peer] = (),
+        tracks: Optional[Tracks] = None,
     ) -> Tick:
         """Do what is due.
 
@@ -186,16 +192,15 @@ class Navigator:
             poses: Poses of the robot in the costmaps' frames.
             velocity: Velocity of the odometry, in the robot's frame.
             peers: The other robots with a known pose.
+            tracks: Moving obstacles in the local costmap's frame, None if nothing tracks them.
         """
+        self._machine.control.tracks = tracks
         if not self._started:
             self._started = True
             self._idle_check.start(now_s)
             self._updates.start(now_s)
         tick = Tick(now_s)
-        cruise_mps = getattr(self._machine.control.limiter.usual, "max_vel_x_mps", CRUISE_MPS)
-        tick.notes += self.peers.observe(
-            now_s, poses.in_global, poses.local_from_global, peers, cruise_mps
-        )
+        self._observe_peers(tick, poses, peers)
         if not self._costmaps_rest:
             self._updates.update(tick, poses)
         if poses.in_global is not None:
@@ -211,6 +216,12 @@ class Navigator:
         tick.state = self.state
         tick.yielding = self.peers.decision
         return tick
+
+    def _observe_peers(self, tick: Tick, poses: RobotPoses, peers: Sequence[Peer]) -> None:
+        cruise_mps = getattr(self._machine.control.limiter.usual, "max_vel_x_mps", CRUISE_MPS)
+        tick.notes += self.peers.observe(
+            tick.now_s, poses.in_global, poses.local_from_global, peers, cruise_mps
+        )
 
     def _make_room_when_idle(self, tick: Tick, pose: Optional[Pose2D]) -> None:
         if pose is None:
