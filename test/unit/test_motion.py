@@ -456,10 +456,10 @@ def test_people_who_react_do_so_whatever_the_calls(crowded):
 
 def test_people_who_react_keep_to_a_minute_of_memory(crowded):
     crowd = Crowd(replace(crowded, walkers=Walkers(2, reacting=True)), 0)
-    nobody = np.zeros((0, 4))
+    no_robots = np.zeros((0, 4))
     for k in range(2500):
-        crowd.react(0.025 * k, nobody, 0.3)
-        crowd.react(0.025 * k + 0.01, nobody, 0.3)  # of the same period
+        crowd.react(0.025 * k, no_robots, 0.3)
+        crowd.react(0.025 * k + 0.01, no_robots, 0.3)  # of the same period
     poses = crowd.poses(np.array([0.0, 40.0, 62.5, 62.6]))
     assert np.isfinite(poses).all(axis=(1, 2)).tolist() == [False, True, True, False]
     between = crowd.poses(np.array([50.0, 50.0125, 50.025]))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.kernels.collision import Triple
+from quad_nav.kernels.cost_grid import CostmapView
 from quad_nav.kernels.dwa import (
     ALIGNMENT,
     GOAL,
@@ -240,6 +241,17 @@ def least_costs(
 
 
 @njit(cache=True, nogil=True)
+def _cell_at(costmap: CostmapView, x_m: float, y_m: float, doubt: float) -> Tuple[int, int]:
+    """Return the column and the row of an end in the costmap's frame, see ``cell_of_end``."""
+    return cell_of_end(
+        (x_m - costmap.origin_x_m) / costmap.resolution_m,
+        (y_m - costmap.origin_y_m) / costmap.resolution_m,
+        costmap.costs.shape,
+        doubt,
+    )
+
+
+@njit(cache=True, nogil=True)
 def _cost_of_end(
     critics: Critics,
     pose: Triple,
@@ -267,12 +279,7 @@ def _cost_of_end(
     distances[:] = 0.0
     if grids.follows_path or grids.follows_goal:
         doubt = doubt_of(_ROUNDING, last, farthest, way_m / resolution_m, heading)
-        cell_x, cell_y = cell_of_end(
-            (x - costmap.origin_x_m) / resolution_m,
-            (y - costmap.origin_y_m) / resolution_m,
-            costmap.costs.shape,
-            doubt,
-        )
+        cell_x, cell_y = _cell_at(costmap, x, y, doubt)
         if cell_x < 0:
             return np.inf, cell_x == OFF_MAP
         if grids.follows_path:
@@ -288,12 +295,7 @@ def _cost_of_end(
         )
         theta = pose[2] + state[TURN + lane]
         x, y = x + forward_m * math.cos(theta), y + forward_m * math.sin(theta)
-        cell_x, cell_y = cell_of_end(
-            (x - costmap.origin_x_m) / resolution_m,
-            (y - costmap.origin_y_m) / resolution_m,
-            costmap.costs.shape,
-            doubt,
-        )
+        cell_x, cell_y = _cell_at(costmap, x, y, doubt)
         if cell_x < 0:
             return np.inf, cell_x == OFF_MAP
         if grids.follows_goal:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from quad_nav.kernels.flight_law import BodyConstants, FlightGains, fly, rotation_from_quaternion
 from quad_nav.kernels.jit import njit
 
-NOBODY = -1
+NO_INDEX = -1
 MOVING = -2
 """Instead of another quadcopter's number: a solid that moves by itself."""
 
@@ -82,14 +82,14 @@ def fly_freely(
     forces, torques = np.empty_like(commands), np.empty_like(commands)
     for done in range(steps):
         found, other = find_near(rows, excluded, space)
-        if found != NOBODY:
+        if found != NO_INDEX:
             return done, found, other
         found = find_near_moving(excluded, space, moving, done)
-        if found != NOBODY:
+        if found != NO_INDEX:
             return done, found, MOVING
         fly(rows, commands, altitude_m, constants, gains, forces, torques)
         step_freely(rows, excluded, forces, torques, constants, step_s)
-    return steps, NOBODY, NOBODY
+    return steps, NO_INDEX, NO_INDEX
 
 
 @njit(cache=True, nogil=True)
@@ -176,8 +176,8 @@ def find_near(
 
     Returns:
         The quadcopter's number and that of another one with its centre nearer than
-        ``space.pair_m``. The second is ``NOBODY`` if the first is beyond its free distance, so that
-        it may be near to something else. Both are ``NOBODY`` if nothing may be touched.
+        ``space.pair_m``. The second is ``NO_INDEX`` if the first is beyond its free distance, so that
+        it may be near to something else. Both are ``NO_INDEX`` if nothing may be touched.
     """
     mount_m, pair_m, centres_m = space.mount_m, space.pair_m, space.centres_m
     for k in range(rows.shape[0]):
@@ -188,14 +188,14 @@ def find_near(
     for k in range(rows.shape[0]):
         room_m = space.free_m[k]
         if not excluded[k] and _square_m2(centres_m[k], space.checked_m[k]) >= room_m * room_m:
-            return k, NOBODY
+            return k, NO_INDEX
     for k in range(rows.shape[0]):
         for other in range(k):
             if _square_m2(centres_m[k], centres_m[other]) < pair_m * pair_m and not (
                 excluded[k] and excluded[other]
             ):
                 return (other, k) if excluded[k] else (k, other)
-    return NOBODY, NOBODY
+    return NO_INDEX, NO_INDEX
 
 
 @njit(cache=True, nogil=True)
@@ -211,7 +211,7 @@ def find_near_moving(
         step: Number of the next step.
 
     Returns:
-        Its number, or ``NOBODY``.
+        Its number, or ``NO_INDEX``.
     """
     for k in range(excluded.shape[0] if moving.reaches_m.shape[0] > 0 else 0):
         x, y, z = space.centres_m[k]
@@ -222,7 +222,7 @@ def find_near_moving(
                 and moving.lows_m[solid] < z < moving.highs_m[solid]
             ):
                 return k
-    return NOBODY
+    return NO_INDEX
 
 
 @njit(cache=True, nogil=True)

@@ -166,8 +166,8 @@ def walk(
     tracks: NDArray[np.float64],
 ) -> None:
     """Let people walk, and fill their positions, float64[t, n, 2], each ``steps_each`` steps."""
-    nobody = np.zeros((0, 4))
+    no_robots = np.zeros((0, 4))
     for k in range(tracks.shape[0]):
         tracks[k] = people.positions
         for _ in range(steps_each):
-            step_people(people, nobody, 0.0, ground, model, reached_m, step_s)
+            step_people(people, no_robots, 0.0, ground, model, reached_m, step_s)

@@ -14,7 +14,7 @@ from typing import Callable, List, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.rigid_body import MOVING, NOBODY, FreeSpace, MovingSolids, fly_freely
+from quad_nav.kernels.rigid_body import MOVING, NO_INDEX, FreeSpace, MovingSolids, fly_freely
 from quad_nav.sim.flight import BodyState, FlightLaw
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.movers import reach_m
@@ -87,9 +87,9 @@ class FreeFlight:
             done += more
             if other == MOVING:
                 return BodyState(rows), done, [found]
-            if other != NOBODY:
+            if other != NO_INDEX:
                 return BodyState(rows), done, [found, other]
-            if found != NOBODY and not self._is_far(found):
+            if found != NO_INDEX and not self._is_far(found):
                 return BodyState(rows), done, [found]
         return BodyState(rows), done, []
 
