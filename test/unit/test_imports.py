@@ -22,7 +22,7 @@ LAYERS = [
     {"tracking"},
     {"costmap", "plan", "control", "sim"},
     {"recovery", "peers"},
-    {"navigator", "mission"},
+    {"navigator", "mission", "vehicle"},
     {"config"},
     {"scenario"},
     {"loop", "topics"},
@@ -86,6 +86,7 @@ PLACES = {
     "fastapi": "web/",
     "starlette": "web/",
     "uvicorn": "web/",
+    "pymavlink": "vehicle/mavlink_link.py",
     "PIL": ("sim/map_image.py", "report/"),
 }
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")

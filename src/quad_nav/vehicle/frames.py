@@ -1,0 +1,113 @@
+"""Convert between the axes of autopilots and the axes of ROS.
+
+Autopilots (MAVLink) have a world frame NED (x north, y east, z down) and a body frame FRD (x
+forward, y right, z down). ROS (REP 103) has ENU (x east, y north, z up) and FLU (x forward, y left,
+z up). Yaw is clockwise from north in NED, and counter-clockwise from east in ENU.
+
+This is the only place of the project where an axis changes its sign or its name. Each of the vector
+conversions is its own inverse.
+
+Quaternions of ROS are (x, y, z, w), those of MAVLink (w, x, y, z).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Tuple
+
+from quad_nav.geometry import Quaternion, multiply_quaternions, normalize_angle
+
+Vector = Tuple[float, float, float]
+MavlinkQuaternion = Tuple[float, float, float, float]
+"""(w, x, y, z), the rotation from FRD to NED, as in ``ATTITUDE_QUATERNION``."""
+
+_SQRT_HALF = math.sqrt(0.5)
+_ENU_FROM_NED: Quaternion = (_SQRT_HALF, _SQRT_HALF, 0.0, 0.0)  # half a turn about (1, 1, 0)
+_FRD_FROM_FLU: Quaternion = (1.0, 0.0, 0.0, 0.0)  # half a turn about x
+
+
+def enu_from_ned(vector: Vector) -> Vector:
+    """Return a position or velocity (north, east, down) as (east, north, up)."""
+    north, east, down = vector
+    return (east, north, -down)
+
+
+def ned_from_enu(vector: Vector) -> Vector:
+    """Return a position or velocity (east, north, up) as (north, east, down)."""
+    east, north, up = vector
+    return (north, east, -up)
+
+
+def flu_from_frd(vector: Vector) -> Vector:
+    """Return a velocity or angular velocity (forward, right, down) as (forward, left, up)."""
+    forward, right, down = vector
+    return (forward, -right, -down)
+
+
+def frd_from_flu(vector: Vector) -> Vector:
+    """Return a velocity or angular velocity (forward, left, up) as (forward, right, down)."""
+    forward, left, up = vector
+    return (forward, -left, -up)
+
+
+def enu_yaw(ned_yaw_rad: float) -> float:
+    """Return a heading clockwise from north as a yaw counter-clockwise from east, [-pi, pi]."""
+    return normalize_angle(math.pi / 2.0 - ned_yaw_rad)
+
+
+def ned_yaw(enu_yaw_rad: float) -> float:
+    """Return a yaw counter-clockwise from east as a heading clockwise from north, [-pi, pi]."""
+    return normalize_angle(math.pi / 2.0 - enu_yaw_rad)
+
+
+def yaw_rate(rate_radps: float) -> float:
+    """Return a clockwise yaw rate as a counter-clockwise one, or the other way round."""
+    return -rate_radps
+
+
+def enu_from_flu(frd_to_ned: MavlinkQuaternion) -> Quaternion:
+    """Return the attitude of a body in ROS's axes.
+
+    Args:
+        frd_to_ned: Attitude of MAVLink, of length 1.
+
+    Returns:
+        Quaternion (x, y, z, w) of the rotation from FLU to ENU, with w >= 0.
+    """
+    w, x, y, z = frd_to_ned
+    turned = multiply_quaternions(_ENU_FROM_NED, multiply_quaternions((x, y, z, w), _FRD_FROM_FLU))
+    return _with_positive_w(turned)
+
+
+def ned_from_frd(flu_to_enu: Quaternion) -> MavlinkQuaternion:
+    """Return the attitude of a body in MAVLink's axes, the inverse of ``enu_from_flu``.
+
+    Args:
+        flu_to_enu: Quaternion (x, y, z, w) of length 1.
+
+    Returns:
+        Quaternion (w, x, y, z) of the rotation from FRD to NED, with w >= 0.
+    """
+    # Half a turn is its own inverse, but for the sign of the quaternion.
+    x, y, z, w = _with_positive_w(
+        multiply_quaternions(_ENU_FROM_NED, multiply_quaternions(flu_to_enu, _FRD_FROM_FLU))
+    )
+    return (w, x, y, z)
+
+
+def mavlink_quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> MavlinkQuaternion:
+    """Return the quaternion of ``ATTITUDE``'s roll, pitch and yaw (Tait-Bryan z-y'-x'')."""
+    cr, sr = math.cos(roll_rad / 2.0), math.sin(roll_rad / 2.0)
+    cp, sp = math.cos(pitch_rad / 2.0), math.sin(pitch_rad / 2.0)
+    cy, sy = math.cos(yaw_rad / 2.0), math.sin(yaw_rad / 2.0)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def _with_positive_w(quaternion: Quaternion) -> Quaternion:
+    x, y, z, w = quaternion
+    return (-x, -y, -z, -w) if w < 0.0 else (x, y, z, w)

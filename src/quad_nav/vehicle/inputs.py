@@ -1,0 +1,193 @@
+"""Telemetry and commands of one vehicle, with the times at which they came."""
+
+from __future__ import annotations
+
+import math
+from typing import Dict, List, Optional, Sequence
+
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.vehicle.safety import (
+    ESTIMATE_HOVER_S,
+    HEARTBEAT_S,
+    SILENT_S,
+    STILL_MPS,
+    STILL_S,
+    FlightView,
+    jump_m,
+)
+from quad_nav.vehicle.telemetry import Estimate, Landed, Limits, Status
+
+TEXT_S = 35.0
+"""How long a refusal counts as a reason; ArduPilot repeats its own every 31 s."""
+REFUSAL_S = 5.0
+_NEVER_S = -math.inf
+
+
+class Inputs:
+    """The last values, which adapters write and the state machine reads.
+
+    Attributes:
+        status: Last heartbeat of the vehicle.
+        landed: Where the vehicle is.
+        estimate: Last estimate with finite numbers.
+        battery: Charge from 0 to 1; None if it is unknown.
+        command: Last velocity command.
+        command_s: Time of that command.
+        moved_sticks: Sticks that the pilot has moved in flight, "" for none.
+        faults: Faults of the autopilot's parameters; None until they are checked.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        """Start without any input."""
+        self._limits = limits
+        self.status: Optional[Status] = None
+        self.landed = Landed.UNKNOWN
+        self.estimate: Optional[Estimate] = None
+        self.battery: Optional[float] = None
+        self.command, self.command_s = Twist2D(), _NEVER_S
+        self.moved_sticks = ""
+        self.faults: Optional[Sequence[str]] = None
+        self._status_s = self._heard_s = self._estimate_s = self._idle_s = _NEVER_S
+        self._texts: Dict[str, float] = {}  # reason -> until when it counts
+        self._low_since_s: Optional[float] = None
+        self._still_since_s: Optional[float] = None
+        self._jump_m = 0.0
+
+    # What comes in.
+
+    def hear(self, now_s: float) -> None:
+        """Note that any message of the vehicle has come."""
+        self._heard_s = now_s
+
+    def take_status(self, status: Status, now_s: float) -> None:
+        """Take a heartbeat of the vehicle."""
+        self.status, self._status_s = status, now_s
+        self.hear(now_s)
+
+    def take_estimate(self, estimate: Estimate, now_s: float) -> None:
+        """Take an estimate; one with infinite numbers or NaN counts as none."""
+        if not estimate.is_finite:
+            return
+        before = self.estimate
+        self.estimate = estimate
+        if before is not None and self._is_frozen(before, estimate, now_s):
+            return
+        elapsed_s = now_s - self._estimate_s
+        if before is not None and elapsed_s < 1.0:
+            self._jump_m = self._jump_m or jump_m(
+                tuple(before.odom_from_base.translation.tolist()),
+                before.odom_velocity_mps,
+                max(estimate.stamp_s - before.stamp_s, elapsed_s),
+                tuple(estimate.odom_from_base.translation.tolist()),
+            )
+        self._estimate_s = now_s
+
+    def _is_frozen(self, before: Estimate, after: Estimate, now_s: float) -> bool:
+        """Return whether the estimate stands still although the command is to move."""
+        same = before.odom_from_base == after.odom_from_base
+        command = self.command
+        moves = math.hypot(command.vx_mps, command.vy_mps) > STILL_MPS
+        if not (same and moves and now_s - self.command_s < 1.0):
+            self._still_since_s = None
+            return False
+        if self._still_since_s is None:
+            self._still_since_s = now_s
+        return now_s - self._still_since_s > STILL_S
+
+    def take_battery(self, share: Optional[float], now_s: float) -> None:
+        """Take the charge, 0 to 1; None if it is unknown."""
+        self.battery = share
+        if share is None or share >= self._limits.battery:
+            self._low_since_s = None
+        elif self._low_since_s is None:
+            self._low_since_s = now_s
+
+    def take_command(self, twist: Twist2D, now_s: float) -> bool:
+        """Take a velocity command; return False for one that is not finite, which is dropped."""
+        if not twist.is_finite:
+            return False
+        self.command, self.command_s = twist, now_s
+        return True
+
+    def take_idle(self, now_s: float) -> None:
+        """Note the navigator's word that it lives and has no goal."""
+        self._idle_s = now_s
+
+    def take_text(self, text: str, now_s: float) -> None:
+        """Take a reason of the autopilot for not being ready."""
+        self._texts[text] = now_s + TEXT_S
+
+    def refuse(self, reason: str, now_s: float) -> None:
+        """Count a refusal as a reason for a short time."""
+        self._texts[reason] = now_s + REFUSAL_S
+
+    def clear_texts(self) -> None:
+        """Forget the autopilot's reasons: it has said that it is ready."""
+        self._texts.clear()
+
+    def begin_flight(self, now_s: float) -> None:
+        """Forget what belongs to the flight before; waiting for commands begins now."""
+        self._jump_m, self.moved_sticks, self._still_since_s = 0.0, "", None
+        self.command = Twist2D()
+        self.command_s, self._idle_s = _NEVER_S, now_s
+
+    # What the state machine asks.
+
+    def link_problem(self, now_s: float) -> str:
+        """Return why the link counts as lost, "" if it does not."""
+        if self.status is None:
+            return "no heartbeat yet"
+        if now_s - self._heard_s > SILENT_S and now_s - self._status_s > SILENT_S + 0.5:
+            return f"nothing heard from the vehicle for {SILENT_S:g} s"
+        if now_s - self._status_s > HEARTBEAT_S:
+            return f"no heartbeat for {HEARTBEAT_S:g} s"
+        return ""
+
+    def is_estimate_late(self, now_s: float) -> bool:
+        """Return whether there is no recent estimate."""
+        return self.estimate is None or now_s - self._estimate_s > ESTIMATE_HOVER_S
+
+    def not_ready(self, now_s: float) -> List[str]:
+        """Return the reasons why the vehicle cannot take off."""
+        reasons = []
+        if self.faults is None:
+            reasons.append("the autopilot's parameters are not checked yet")
+        else:
+            reasons += self.faults
+        if self.is_estimate_late(now_s):
+            reasons.append("no position estimate")
+        if self.battery is not None and self.battery < self._limits.battery:
+            share = f"{100.0 * self.battery:.0f} %"
+            reasons.append(f"battery at {share}, expected {100.0 * self._limits.battery:.0f} %")
+        self._texts = {text: end_s for text, end_s in self._texts.items() if end_s > now_s}
+        return reasons + list(self._texts)
+
+    def height_m(self, ground_m: float) -> float:
+        """Return the height above a ground; 0 without an estimate."""
+        return 0.0 if self.estimate is None else self.estimate.odom_from_base.z_m - ground_m
+
+    def view(self, now_s: float, start: Optional[Pose2D], ground_m: float) -> FlightView:
+        """Return the facts about the vehicle in flight.
+
+        Raises:
+            ValueError: If no heartbeat has come yet.
+        """
+        if self.status is None:
+            raise ValueError("no heartbeat yet")
+        low_s = self._low_since_s
+        distance_m = 0.0
+        if start is not None and self.estimate is not None:
+            distance_m = start.distance_to(self.estimate.odom_from_base.to_2d())
+        return FlightView(
+            self.status,
+            moved_sticks=self.moved_sticks,
+            heard_age_s=now_s - self._heard_s,
+            status_age_s=now_s - self._status_s,
+            estimate_age_s=now_s - self._estimate_s,
+            jump_m=self._jump_m,
+            low_battery_s=0.0 if low_s is None else now_s - low_s,
+            height_m=self.height_m(ground_m),
+            distance_m=distance_m,
+            command_age_s=now_s - self.command_s,
+            waiting_age_s=now_s - max(self.command_s, self._idle_s),
+        )

@@ -1,0 +1,199 @@
+"""Dangers in flight, and what the bridge does about each, in order.
+
+1. A pilot or another station changes the mode, or moves the sticks: stop sending (taken over).
+2. The link is lost: stop sending, heartbeats included, so that the autopilot's own failsafe acts.
+3. The estimate jumps, stays away, the battery is low, or a limit of height or distance is crossed:
+   land.
+4. The estimate is late: hover.
+5. No velocity command: hover after 0.5 s, land after 5 s.
+
+``danger`` tests them in this order and returns the first.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Callable, Optional, Sequence, Tuple
+
+from quad_nav.vehicle.telemetry import Limits, Status, Vector
+
+COMMAND_HOVER_S = 0.5
+COMMAND_LAND_S = 5.0
+ESTIMATE_HOVER_S = 0.5
+ESTIMATE_LAND_S = 2.0
+SILENT_S = 1.0
+"""The link is lost when nothing has come from the vehicle for this long."""
+HEARTBEAT_S = 3.5
+"""The link is lost when no heartbeat has come for this long; they come once a second."""
+BATTERY_S = 2.0
+"""The charge must be low for this long, because the voltage sags under load."""
+JUMP_M = 0.5
+"""Smallest jump of the estimated position, beside what its velocity explains."""
+STILL_S = 1.5
+"""An estimate that does not change at all under a command to move is frozen after this time."""
+STILL_MPS = 0.15
+FENCE_RANGE_M = 1.0
+"""Outward commands are slowed down in this range before the limit of distance."""
+
+
+class Reaction(enum.Enum):
+    """What the bridge does about a danger."""
+
+    TAKEN_OVER = "taken over"
+    LINK_LOST = "link lost"
+    LAND = "land"
+    HOVER = "hover"
+
+
+@dataclass(frozen=True)
+class Danger:
+    """A danger and the reaction.
+
+    Attributes:
+        reaction: What the bridge does.
+        reason: Why, for people.
+    """
+
+    reaction: Reaction
+    reason: str
+
+
+@dataclass(frozen=True)
+class FlightView:
+    """Facts about a vehicle in flight at one time, ages in seconds.
+
+    Attributes:
+        status: Last heartbeat.
+        may_land: Whether the mode for landing is ours too, because we have ordered it.
+        moved_sticks: Sticks that the pilot has moved, "" for none.
+        heard_age_s: Age of the last message from the vehicle.
+        status_age_s: Age of the last heartbeat.
+        estimate_age_s: Age of the last estimate that counts.
+        jump_m: Jump of the estimate, 0 if there was none.
+        low_battery_s: How long the charge has been low.
+        height_m: Height above the place of take-off.
+        distance_m: Horizontal distance from the place of take-off.
+        command_age_s: Age of the last velocity command.
+        waiting_age_s: Age of the last command, or of the navigator's last word that it has no goal.
+    """
+
+    status: Status
+    may_land: bool = False
+    moved_sticks: str = ""
+    heard_age_s: float = 0.0
+    status_age_s: float = 0.0
+    estimate_age_s: float = 0.0
+    jump_m: float = 0.0
+    low_battery_s: float = 0.0
+    height_m: float = 0.0
+    distance_m: float = 0.0
+    command_age_s: float = 0.0
+    waiting_age_s: float = 0.0
+
+
+Test = Callable[[FlightView, Limits], str]
+
+
+def danger(view: FlightView, limits: Limits) -> Optional[Danger]:
+    """Return the most important danger, None if there is none."""
+    for reaction, test in _TESTS:
+        reason = test(view, limits)
+        if reason:
+            return Danger(reaction, reason)
+    return None
+
+
+def _taken_over(view: FlightView, _: Limits) -> str:
+    status = view.status
+    if not status.is_armed:
+        return "the motors were disarmed from outside"
+    is_ours = status.is_controlled or status.is_settling or (view.may_land and status.is_landing)
+    if not is_ours:
+        return f"the mode was changed to {status.mode} from outside"
+    return f"the pilot moved the sticks ({view.moved_sticks})" if view.moved_sticks else ""
+
+
+def _link_lost(view: FlightView, _: Limits) -> str:
+    if view.heard_age_s > SILENT_S:
+        return f"nothing heard from the vehicle for {SILENT_S:g} s"
+    return f"no heartbeat for {HEARTBEAT_S:g} s" if view.status_age_s > HEARTBEAT_S else ""
+
+
+def _must_land(view: FlightView, limits: Limits) -> str:
+    if view.jump_m > 0.0:
+        return f"the estimated position jumped by {view.jump_m:.2f} m"
+    if view.estimate_age_s > ESTIMATE_LAND_S:
+        return f"no new estimate for {ESTIMATE_LAND_S:g} s"
+    if view.low_battery_s > BATTERY_S:
+        return f"battery below {100.0 * limits.battery:.0f} %"
+    if view.height_m > limits.height_m:
+        return f"height {view.height_m:.2f} m, the limit is {limits.height_m:g} m"
+    if view.distance_m > limits.radius_m:
+        return f"{view.distance_m:.2f} m from take-off, the limit is {limits.radius_m:g} m"
+    return ""
+
+
+def _must_hover(view: FlightView, _: Limits) -> str:
+    late = view.estimate_age_s > ESTIMATE_HOVER_S
+    return f"no new estimate for {ESTIMATE_HOVER_S:g} s" if late else ""
+
+
+def _never_commanded(view: FlightView, _: Limits) -> str:
+    silent = view.waiting_age_s > COMMAND_LAND_S
+    return f"no velocity command for {COMMAND_LAND_S:g} s" if silent else ""
+
+
+def _not_commanded(view: FlightView, _: Limits) -> str:
+    silent = view.command_age_s > COMMAND_HOVER_S
+    return f"no velocity command for {COMMAND_HOVER_S:g} s" if silent else ""
+
+
+_TESTS: Sequence[Tuple[Reaction, Test]] = (
+    (Reaction.TAKEN_OVER, _taken_over),
+    (Reaction.LINK_LOST, _link_lost),
+    (Reaction.LAND, _must_land),
+    (Reaction.LAND, _never_commanded),
+    (Reaction.HOVER, _must_hover),
+    (Reaction.HOVER, _not_commanded),
+)
+
+
+def jump_m(before: Vector, velocity_mps: Vector, elapsed_s: float, after: Vector) -> float:
+    """Return how far an estimated position jumped, 0 if its velocity explains the step.
+
+    Args:
+        before: Position before, m.
+        velocity_mps: Velocity before, in the same frame.
+        elapsed_s: Time between the two.
+        after: Position after, m.
+    """
+    steps = (a - (b + v * elapsed_s) for a, b, v in zip(after, before, velocity_mps))
+    error_m = math.sqrt(sum(step * step for step in steps))
+    return error_m if error_m > JUMP_M + max(elapsed_s, 0.0) else 0.0
+
+
+def inside_fence(
+    velocity_mps: Tuple[float, float], offset_m: Tuple[float, float], radius_m: float
+) -> Tuple[float, float]:
+    """Slow the outward part of a horizontal velocity down before the limit of distance.
+
+    Args:
+        velocity_mps: Velocity (x, y).
+        offset_m: Position (x, y) from the place of take-off, in the same axes.
+        radius_m: Largest distance.
+
+    Returns:
+        The velocity (x, y), its outward part at most what is left of the way, in m, each second.
+    """
+    distance_m = math.hypot(*offset_m)
+    left_m = radius_m - distance_m
+    if left_m >= FENCE_RANGE_M or distance_m == 0.0:
+        return velocity_mps
+    x, y = offset_m[0] / distance_m, offset_m[1] / distance_m
+    outward_mps = velocity_mps[0] * x + velocity_mps[1] * y
+    excess_mps = outward_mps - max(left_m, 0.0)
+    if outward_mps <= 0.0 or excess_mps <= 0.0:
+        return velocity_mps
+    return velocity_mps[0] - excess_mps * x, velocity_mps[1] - excess_mps * y

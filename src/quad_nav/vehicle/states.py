@@ -1,0 +1,388 @@
+"""State machine of one vehicle: from no link to flying and landed.
+
+Telemetry, velocity commands and requests go in, each with its time; `tick` returns what to send.
+The machine orders the same of all kinds of autopilots; `Traits` says what differs.
+
+    no link -> not ready -> ready -> arming -> taking off -> holding <-> flying
+                                                                 |         |
+                                           landed <- landing <---+---------+--> taken over
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import List, Optional
+
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.vehicle.inputs import Inputs
+from quad_nav.vehicle.orders import (
+    IN_FLIGHT,
+    Answer,
+    Order,
+    Output,
+    Permissions,
+    Response,
+    State,
+    Traits,
+)
+from quad_nav.vehicle.safety import Danger, FlightView, Reaction, danger, inside_fence
+from quad_nav.vehicle.setpoints import HeightLoop
+from quad_nav.vehicle.telemetry import Landed, Limits, Velocity
+
+RETRY_S = 1.0
+"""An order that has had no effect is given again after this time."""
+MOST_ORDERS = 4
+STREAM_S = 1.0
+"""Set-points are streamed for this long before an autopilot that wants them takes our control."""
+TAKE_OFF_AGAIN_S = 7.0
+"""A take-off that has not left the ground is ordered again; a set-point may have cancelled it."""
+TAKE_OFF_S = 20.0
+NEAR_M = 0.15
+"""A take-off by set-points has ended this close to the altitude."""
+DISARM_S = 10.0
+"""After a landing the autopilot disarms; after this time on the ground we order it."""
+
+
+class VehicleMachine:
+    """State machine of one vehicle.
+
+    Attributes:
+        inputs: Telemetry and commands; the adapters write to it.
+        state: Present state.
+        reason: Why it is in this state, for people; "" if that is plain.
+        odom_from_start: Where the vehicle stood before the last take-off.
+        ground_m: Height of that place in the odometry frame.
+    """
+
+    def __init__(
+        self, altitude_m: float, limits: Limits, traits: Traits, permissions: Permissions
+    ) -> None:
+        """Start without a link."""
+        self.inputs = Inputs(limits)
+        self.state, self.reason = State.NO_LINK, "no heartbeat yet"
+        self.odom_from_start: Optional[Pose2D] = None
+        self.ground_m = 0.0
+        self._altitude_m, self._limits = altitude_m, limits
+        self._traits, self._permissions = traits, permissions
+        self._loop = HeightLoop(climb_mps=limits.climb_mps)
+        self._before_loss = State.NO_LINK
+        self._state_s = 0.0  # begin of the state
+        self._order: Optional[Order] = None  # the one that has not taken effect yet
+        self._order_s, self._orders = -math.inf, 0
+        self._grounded_s: Optional[float] = None
+        self._wants_control = False  # taken over, and somebody has asked to resume
+        self._stops_once = self._pauses = False
+        self._news: List[str] = []
+
+    # Requests of people and of the mission.
+
+    def take_off(self, now_s: float) -> Response:
+        """Ask for a take-off."""
+        if self.state in IN_FLIGHT or self.state is State.ARMING:
+            return Response(True, f"already {self.state.value}")
+        if self.state not in (State.READY, State.LANDED):
+            return Response(False, f"{self.state.value}: {self.reason}")
+        problem = self._take_off_problem(now_s)
+        if problem:
+            return Response(False, problem)
+        estimate = self.inputs.estimate
+        assert estimate is not None  # otherwise not ready
+        self.odom_from_start = estimate.odom_from_base.to_2d()
+        self.ground_m = estimate.odom_from_base.z_m
+        self.inputs.begin_flight(now_s)
+        self._enter(State.ARMING, "", now_s)
+        return Response(True, "taking off")
+
+    def _take_off_problem(self, now_s: float) -> str:
+        reasons = self.inputs.not_ready(now_s)
+        if reasons:
+            return "; ".join(reasons)
+        status = self.inputs.status
+        is_armed = status is not None and status.is_armed
+        if self._traits.needs_arming and not (
+            is_armed or self._permissions.may_arm or self._permissions.is_dry
+        ):
+            return "the motors are not armed: arm by hand, or start with arm:=true"
+        return ""
+
+    def land(self, now_s: float, reason: str, is_stop_all: bool = False) -> Response:
+        """Ask for a landing; with ``is_stop_all`` not against the mode that a pilot has set."""
+        status = self.inputs.status
+        if self.state in (State.FLYING, State.HOLDING, State.TAKING_OFF):
+            self._land(reason, now_s)
+        elif self.state is State.ARMING:
+            self._give(Order.DISARM, now_s)
+            self._enter(State.NOT_READY, reason, now_s)
+        elif self.state is State.TAKEN_OVER and status is not None and status.is_armed:
+            if is_stop_all and not status.is_controlled:
+                return Response(False, f"taken over: {self.reason}")
+            self._land(reason, now_s)
+        elif self.state is State.NO_LINK:
+            return Response(False, "no link")
+        return Response(True, self.state.value)
+
+    def resume(self, now_s: float) -> Response:
+        """Ask to fly again after the vehicle was taken over."""
+        status = self.inputs.status
+        if self.state is not State.TAKEN_OVER or status is None:
+            return Response(self.state is not State.NO_LINK, self.state.value)
+        self.inputs.moved_sticks = ""
+        if not status.is_armed or self.inputs.landed is Landed.ON_GROUND:
+            self._enter(State.NOT_READY, "on the ground", now_s)
+            return Response(True, "on the ground: take off again")
+        self._wants_control, self._state_s = True, now_s
+        self._order = None
+        return Response(True, "taking control")
+
+    # The machine.
+
+    def tick(self, now_s: float) -> Output:
+        """Return what to send now; called at the rate of the set-points."""
+        self._orders_now: List[Order] = []
+        if self.state in IN_FLIGHT:
+            self._watch(now_s)
+        elif self.state is not State.NO_LINK and self.inputs.link_problem(now_s):
+            self._lose_link(self.inputs.link_problem(now_s), now_s)
+        velocity = self._STEPS[self.state](self, now_s)
+        if self._stops_once:
+            velocity, self._stops_once = self._hover(now_s), False
+        output = Output(
+            velocity,
+            tuple(self._orders_now),
+            self.state is not State.NO_LINK or self._before_loss not in IN_FLIGHT,
+            self._pauses,
+            tuple(self._news),
+        )
+        self._pauses, self._news = False, []
+        return output
+
+    def answer(self, answer: Answer, now_s: float) -> None:
+        """Take the autopilot's answer to an order."""
+        if answer.is_accepted or answer.order is not self._order:
+            return
+        what = f"the autopilot refuses to {answer.order.value}"
+        reason = f"{what}: {answer.reason or 'without a reason'}"
+        if self.state is State.ARMING:
+            self.inputs.refuse(reason, now_s)
+            self._enter(State.NOT_READY, reason, now_s)
+        elif self.state is State.TAKING_OFF and self._orders >= MOST_ORDERS:
+            self._land(reason, now_s)
+        elif self.state is State.TAKEN_OVER:
+            self._wants_control = False
+            self._news.append(reason)
+
+    def _watch(self, now_s: float) -> None:
+        """React to the most important danger in flight."""
+        if self._permissions.is_dry:
+            problem = self.inputs.link_problem(now_s)
+            if problem:
+                self._lose_link(problem, now_s)
+            return
+        found = danger(self._view(now_s), self._limits)
+        if found is None:
+            if self.state is State.HOLDING:
+                self._enter(State.FLYING, "", now_s)
+        elif found.reaction is Reaction.TAKEN_OVER:
+            self._taken_over(found, now_s)
+        elif found.reaction is Reaction.LINK_LOST:
+            self._lose_link(found.reason, now_s)
+        elif found.reaction is Reaction.LAND and self.state is not State.LANDING:
+            self._land(found.reason, now_s)
+        elif found.reaction is Reaction.HOVER and self.state is State.FLYING:
+            self._enter(State.HOLDING, found.reason, now_s)
+
+    def _view(self, now_s: float) -> FlightView:
+        is_commanded = self.state in (State.FLYING, State.HOLDING)
+        view = self.inputs.view(now_s, self.odom_from_start, self.ground_m)
+        if not is_commanded:  # commands count only in flight
+            view = replace(view, command_age_s=0.0, waiting_age_s=0.0)
+        return replace(view, may_land=self.state is State.LANDING)
+
+    def _taken_over(self, found: Danger, now_s: float) -> None:
+        status = self.inputs.status
+        if self.state is State.LANDING and status is not None and not status.is_armed:
+            return self._enter(State.LANDED, "", now_s)
+        self._stops_once = status is not None and status.is_controlled and status.is_armed
+        self._wants_control, self._pauses = False, True
+        return self._enter(State.TAKEN_OVER, found.reason, now_s)
+
+    def _lose_link(self, reason: str, now_s: float) -> None:
+        self._before_loss = self.state
+        self._enter(State.NO_LINK, reason, now_s)
+
+    def _land(self, reason: str, now_s: float) -> None:
+        self._enter(State.LANDING, reason, now_s)
+
+    # One step for each state; it returns the set-point.
+
+    def _in_no_link(self, now_s: float) -> Optional[Velocity]:
+        status = self.inputs.status
+        if status is None or self.inputs.link_problem(now_s):
+            return None
+        before, self._before_loss = self._before_loss, State.NO_LINK
+        is_up = status.is_armed and self.inputs.landed is not Landed.ON_GROUND
+        if not is_up:
+            self._enter(State.NOT_READY, "connected", now_s)
+        elif before is State.LANDING and status.is_landing:
+            self._enter(State.LANDING, "link restored", now_s)
+        elif before in IN_FLIGHT and status.is_controlled:
+            self.inputs.command_s = min(self.inputs.command_s, now_s)
+            self._enter(State.HOLDING, "link restored", now_s)
+        else:
+            self._pauses = True
+            what = "the link was lost" if before in IN_FLIGHT else "it was in the air at the start"
+            self._enter(State.TAKEN_OVER, f"{what}; mode {status.mode}", now_s)
+        return None
+
+    def _on_ground(self, now_s: float) -> Optional[Velocity]:
+        status = self.inputs.status
+        assert status is not None
+        if status.is_armed and self.inputs.landed in (Landed.IN_AIR, Landed.TAKING_OFF):
+            self._enter(State.TAKEN_OVER, "somebody else took off", now_s)
+            return None
+        reasons = self.inputs.not_ready(now_s)
+        if reasons:
+            reason = "; ".join(reasons)
+            if self.state is not State.NOT_READY or reason != self.reason:
+                self._enter(State.NOT_READY, reason, now_s)
+        elif self.state is State.NOT_READY:
+            self._enter(State.READY, "", now_s)
+        return None
+
+    def _in_arming(self, now_s: float) -> Optional[Velocity]:
+        status = self.inputs.status
+        assert status is not None
+        streams = self._traits.streams_before_control
+        if not status.is_controlled:
+            if not streams or now_s - self._state_s >= STREAM_S:
+                self._give(Order.TAKE_CONTROL, now_s)
+        elif self._permissions.is_dry:
+            self._enter(State.FLYING, "dry run", now_s)
+        elif self._traits.needs_arming and not status.is_armed:
+            self._give(Order.ARM, now_s)
+        else:
+            self._enter(State.TAKING_OFF, "", now_s)
+            return self._in_taking_off(now_s)
+        if self._orders > MOST_ORDERS and self._order is not None:
+            reason = f"no effect of the order to {self._order.value}"
+            self.inputs.refuse(reason, now_s)
+            self._enter(State.NOT_READY, reason, now_s)
+        return Velocity() if streams else None
+
+    def _in_taking_off(self, now_s: float) -> Optional[Velocity]:
+        inputs, elapsed_s = self.inputs, now_s - self._state_s
+        if elapsed_s > TAKE_OFF_S:
+            self._land(f"take-off not finished after {TAKE_OFF_S:g} s", now_s)
+            return None
+        if not self._traits.takes_off_by_command:
+            if inputs.height_m(self.ground_m) > self._altitude_m - NEAR_M:
+                self._hold(now_s)
+            return self._hover(now_s)
+        if inputs.landed is Landed.IN_AIR:
+            self._hold(now_s)
+            return self._hover(now_s)
+        if self._order is not Order.TAKE_OFF or (
+            inputs.landed is Landed.ON_GROUND and now_s - self._order_s > TAKE_OFF_AGAIN_S
+        ):
+            self._order = None
+            self._give(Order.TAKE_OFF, now_s)
+        return None
+
+    def _hold(self, now_s: float) -> None:
+        self.inputs.begin_flight(now_s)
+        self._enter(State.HOLDING, "at altitude, waiting for commands", now_s)
+
+    def _in_flying(self, now_s: float) -> Optional[Velocity]:
+        return self._command(now_s)
+
+    def _in_holding(self, now_s: float) -> Optional[Velocity]:
+        return self._hover(now_s)
+
+    def _in_landing(self, now_s: float) -> Optional[Velocity]:
+        status = self.inputs.status
+        assert status is not None
+        if not status.is_armed:
+            self._enter(State.LANDED, "", now_s)
+        elif not status.is_landing:
+            self._give(Order.LAND, now_s)
+        elif self.inputs.landed is not Landed.ON_GROUND:
+            self._grounded_s = None
+        elif self._grounded_s is None:
+            self._grounded_s = now_s
+        elif now_s - self._grounded_s > DISARM_S:
+            self._give(Order.DISARM, now_s)
+        return None
+
+    def _in_taken_over(self, now_s: float) -> Optional[Velocity]:
+        status = self.inputs.status
+        assert status is not None
+        if not self._wants_control:
+            return None
+        streams = self._traits.streams_before_control
+        if status.is_controlled:
+            self._hold(now_s)
+            return self._hover(now_s)
+        if not streams or now_s - self._state_s >= STREAM_S:
+            self._give(Order.TAKE_CONTROL, now_s)
+        if self._orders > MOST_ORDERS:
+            self._wants_control = False
+            self._news.append("no effect of the order to take control")
+        return Velocity() if streams else None
+
+    _STEPS = {
+        State.NO_LINK: _in_no_link,
+        State.NOT_READY: _on_ground,
+        State.READY: _on_ground,
+        State.LANDED: _on_ground,
+        State.ARMING: _in_arming,
+        State.TAKING_OFF: _in_taking_off,
+        State.FLYING: _in_flying,
+        State.HOLDING: _in_holding,
+        State.LANDING: _in_landing,
+        State.TAKEN_OVER: _in_taken_over,
+    }
+
+    # Parts of the steps.
+
+    def _hover(self, now_s: float) -> Velocity:
+        return self._velocity(Twist2D(), now_s)
+
+    def _command(self, now_s: float) -> Velocity:
+        """Return the last command, slowed down at the limit of distance."""
+        twist, estimate = self.inputs.command, self.inputs.estimate
+        if estimate is None or self.odom_from_start is None:
+            return self._velocity(twist, now_s)
+        pose = estimate.odom_from_base.to_2d()
+        start = self.odom_from_start
+        vx, vy = inside_fence(
+            pose.rotate(twist.vx_mps, twist.vy_mps),
+            (pose.x_m - start.x_m, pose.y_m - start.y_m),
+            self._limits.radius_m,
+        )
+        vx, vy = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(vx, vy)
+        return self._velocity(Twist2D(vx, vy, twist.vyaw_radps), now_s)
+
+    def _velocity(self, twist: Twist2D, now_s: float) -> Velocity:
+        vz_mps = 0.0
+        if not self.inputs.is_estimate_late(now_s):
+            height_m = self.inputs.height_m(self.ground_m)
+            vz_mps = self._loop.velocity_mps(self._altitude_m, height_m)
+        return Velocity(twist.vx_mps, twist.vy_mps, vz_mps, twist.vyaw_radps, self._altitude_m)
+
+    def _give(self, order: Order, now_s: float) -> None:
+        """Give an order, again while it has no effect."""
+        if order is not self._order:
+            self._order, self._orders = order, 0
+        elif now_s - self._order_s < RETRY_S:
+            return
+        self._order_s, self._orders = now_s, self._orders + 1
+        self._orders_now.append(order)
+
+    def _enter(self, state: State, reason: str, now_s: float) -> None:
+        if state is not self.state or reason != self.reason:
+            self._news.append(f"{state.value}: {reason}" if reason else state.value)
+        if state is not self.state:
+            self._order, self._orders, self._state_s = None, 0, now_s
+            self._grounded_s = None
+        self.state, self.reason = state, reason

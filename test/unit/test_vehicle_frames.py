@@ -1,0 +1,153 @@
+"""NED and FRD to ENU and FLU: every axis, every yaw, and round trips."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quad_nav.geometry import quaternion_from_euler, rotate, yaw_from_quaternion
+from quad_nav.vehicle import frames
+from quad_nav.vehicle.setpoints import limited, setpoint_fields
+from quad_nav.vehicle.telemetry import Limits, Velocity
+
+ANGLES = st.floats(-math.pi, math.pi)
+NUMBERS = st.floats(-1e6, 1e6)
+VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS)
+
+
+@pytest.mark.parametrize(
+    "ned, enu",
+    [((1, 0, 0), (0, 1, 0)), ((0, 1, 0), (1, 0, 0)), ((0, 0, 1), (0, 0, -1))],
+    ids=["north is y", "east is x", "down is -z"],
+)
+def test_axes_of_the_world(ned, enu):
+    assert frames.enu_from_ned(ned) == enu
+    assert frames.ned_from_enu(enu) == ned
+
+
+@pytest.mark.parametrize(
+    "frd, flu",
+    [((1, 0, 0), (1, 0, 0)), ((0, 1, 0), (0, -1, 0)), ((0, 0, 1), (0, 0, -1))],
+    ids=["forward is x", "right is -y", "down is -z"],
+)
+def test_axes_of_the_body(frd, flu):
+    assert frames.flu_from_frd(frd) == flu
+    assert frames.frd_from_flu(flu) == frd
+
+
+@pytest.mark.parametrize(
+    "heading_deg, yaw_deg", [(0, 90), (90, 0), (180, -90), (-90, 180), (45, 45), (30.7, 59.3)]
+)
+def test_headings(heading_deg, yaw_deg):
+    yaw = frames.enu_yaw(math.radians(heading_deg))
+    assert math.remainder(yaw - math.radians(yaw_deg), math.tau) == pytest.approx(0.0, abs=1e-12)
+
+
+@given(VECTORS)
+def test_vectors_return(vector):
+    assert frames.enu_from_ned(frames.ned_from_enu(vector)) == vector
+    assert frames.flu_from_frd(frames.frd_from_flu(vector)) == vector
+
+
+@given(ANGLES)
+def test_yaws_return(yaw_rad):
+    back = frames.enu_yaw(frames.ned_yaw(yaw_rad))
+    assert math.remainder(back - yaw_rad, math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+@given(ANGLES, st.floats(-1.5, 1.5), ANGLES)
+def test_attitudes_return(roll_rad, pitch_rad, yaw_rad):
+    attitude = quaternion_from_euler(roll_rad, pitch_rad, yaw_rad)
+    back = np.array(frames.enu_from_flu(frames.ned_from_frd(attitude)))
+    sign = 1.0 if np.dot(back, attitude) > 0 else -1.0  # q and -q are the same rotation
+    np.testing.assert_allclose(back * sign, attitude, atol=1e-12)
+
+
+@pytest.mark.parametrize("heading_deg", range(-180, 181, 5))
+@pytest.mark.parametrize("roll_deg, pitch_deg", [(0, 0), (10, 0), (0, 10), (-20, 15)])
+def test_an_attitude_turns_vectors_as_its_matrix_does(heading_deg, roll_deg, pitch_deg):
+    """Forward, right and down of the body, turned by MAVLink's angles, agree in both frames."""
+    roll, pitch, heading = map(math.radians, (roll_deg, pitch_deg, heading_deg))
+    attitude = frames.enu_from_flu(frames.mavlink_quaternion(roll, pitch, heading))
+    matrix = rotation(heading, 2) @ rotation(pitch, 1) @ rotation(roll, 0)  # FRD to NED
+    for frd in np.eye(3):
+        ned = tuple((matrix @ frd).tolist())
+        enu = rotate(attitude, frames.flu_from_frd(tuple(frd.tolist())))
+        np.testing.assert_allclose(enu, frames.enu_from_ned(ned), atol=1e-12)
+
+
+@pytest.mark.parametrize("heading_deg", range(-180, 181, 5))
+def test_level_attitude_has_the_yaw_of_the_heading(heading_deg):
+    heading = math.radians(heading_deg)
+    attitude = frames.enu_from_flu(frames.mavlink_quaternion(0.0, 0.0, heading))
+    yaw = yaw_from_quaternion(attitude)
+    assert math.remainder(yaw - frames.enu_yaw(heading), math.tau) == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("heading_deg", range(-180, 181, 15))
+@pytest.mark.parametrize("axis", range(4))
+def test_a_set_point_moves_the_vehicle_as_the_command_says(heading_deg, axis):
+    """The command in ROS's axes, flown as MAVLink defines frame 8, ends where ROS expects it."""
+    command = [0.0] * 4
+    command[axis] = 0.3
+    fields = setpoint_fields(Velocity(*command), 0)
+    heading = math.radians(heading_deg)
+    forward, right = fields["vx"], fields["vy"]
+    ned = (
+        forward * math.cos(heading) - right * math.sin(heading),
+        forward * math.sin(heading) + right * math.cos(heading),
+        fields["vz"],
+    )
+    yaw = frames.enu_yaw(heading)
+    vx, vy, vz, vyaw = command
+    enu = (
+        vx * math.cos(yaw) - vy * math.sin(yaw),
+        vx * math.sin(yaw) + vy * math.cos(yaw),
+        vz,
+    )
+    np.testing.assert_allclose(frames.enu_from_ned(ned), enu, atol=1e-12)
+    turned = frames.enu_yaw(heading + fields["yaw_rate"])
+    assert math.remainder(turned - yaw - vyaw, math.tau) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_set_point_has_frame_8_and_mask_1479():
+    fields = setpoint_fields(Velocity(0.1, 0.2, 0.3, 0.4), 2**32 + 7)
+    assert fields == {
+        "time_boot_ms": 7,
+        "coordinate_frame": 8,
+        "type_mask": 1479,
+        **dict.fromkeys(("x", "y", "z", "afx", "afy", "afz", "yaw"), 0.0),
+        "vx": 0.1,
+        "vy": -0.2,
+        "vz": -0.3,
+        "yaw_rate": -0.4,
+    }
+
+
+ANY = st.floats(allow_nan=True, allow_infinity=True)
+
+
+@given(ANY, ANY, ANY, ANY)
+def test_nothing_leaves_but_finite_numbers_within_the_limits(vx, vy, vz, vyaw):
+    limits = Limits(speed_mps=0.7, climb_mps=0.3, yaw_rate_radps=1.0)
+    velocity = limited(Velocity(vx, vy, vz, vyaw), limits)
+    if not all(map(math.isfinite, (vx, vy, vz, vyaw))):
+        assert velocity is None
+        return
+    assert math.hypot(velocity.vx_mps, velocity.vy_mps) <= 0.7 * (1 + 1e-9)
+    assert abs(velocity.vz_mps) <= 0.3 and abs(velocity.vyaw_radps) <= 1.0
+
+
+def rotation(angle, axis):
+    """Matrix of a right-handed rotation about an axis."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    first, second = [k for k in range(3) if k != axis]
+    sign = -1.0 if axis == 1 else 1.0
+    matrix = np.eye(3)
+    matrix[first, first] = matrix[second, second] = cos
+    matrix[first, second], matrix[second, first] = -sign * sin, sign * sin
+    return matrix
