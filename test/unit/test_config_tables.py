@@ -43,6 +43,7 @@ from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
 from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
+from quad_nav.tracking.params import TrackerParams
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
 
@@ -85,6 +86,7 @@ SWITCH_OWNERS = [
     RotateParams,
     ScanValidatorParams,
     StaticLayerParams,
+    TrackerParams,
     TrajectoryPlannerParams,
     VoxelLayerParams,
 ]

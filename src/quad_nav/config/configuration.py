@@ -35,6 +35,7 @@ from quad_nav.errors import InputError
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.peers.coordinator import PeerParams
+from quad_nav.tracking.params import TrackerParams
 
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards too, to the node's level.
@@ -62,6 +63,7 @@ class Configuration:
     navigator: NavigatorParams
     peers: PeerParams
     scan_validator: ScanValidatorParams
+    tracker: TrackerParams
     global_costmap: CostmapParams
     local_costmap: CostmapParams
     global_planner: Any
@@ -144,6 +146,7 @@ def _made(
         navigator=navigator_params(tree, listed, given),
         peers=with_fixes(PeerParams(), tree),
         scan_validator=with_fixes(ScanValidatorParams(), tree),
+        tracker=with_fixes(TrackerParams(), tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),
         global_planner=planner_params(tree, "base_global_planner"),

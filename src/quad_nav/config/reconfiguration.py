@@ -149,6 +149,7 @@ def _with_other_fixes(configuration: Configuration) -> Configuration:
         ),
         peers=with_fixes(configuration.peers, tree),
         scan_validator=with_fixes(configuration.scan_validator, tree),
+        tracker=with_fixes(configuration.tracker, tree),
         local_planner=with_fixes(configuration.local_planner, tree),
         global_costmap=costmap_params(tree, "global_costmap"),
         local_costmap=costmap_params(tree, "local_costmap"),

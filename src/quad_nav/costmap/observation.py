@@ -8,7 +8,12 @@ from typing import Callable, List, Optional, Tuple, Union
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.observations import ObservationStack, Ranges, store_observation
+from quad_nav.kernels.observations import (
+    ObservationStack,
+    Ranges,
+    store_marks,
+    store_observation,
+)
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,9 @@ class SourceParams:
     inf_is_valid: bool = False
 
 
+Points = Union[NDArray[np.float32], Callable[[], NDArray[np.float32]]]
+
+
 class Observation:
     """Points of one message, in the global frame.
 
@@ -51,15 +59,22 @@ class Observation:
         self,
         stamp_s: float,
         sensor: NDArray[np.float64],
-        points: Union[NDArray[np.float32], Callable[[], NDArray[np.float32]]],
+        points: Points,
+        marks: Optional[Points] = None,
     ) -> None:
         """Take points, or a function that makes them when a costmap first needs them.
 
         Many messages need not be projected: another comes before the costmaps are updated.
+
+        Args:
+            stamp_s: When the sensor saw the points.
+            sensor: float64[3], where the rays start, metres.
+            points: float32[n, 3], metres.
+            marks: float32[m, 3], those of the points that mark; None for all of them.
         """
         self.stamp_s, self.sensor = stamp_s, sensor
         self.stamp_ns = _nanoseconds(stamp_s)
-        self._points = points
+        self._points, self._marks = points, marks
 
     @property
     def points(self) -> NDArray[np.float32]:
@@ -67,6 +82,20 @@ class Observation:
         if callable(self._points):
             self._points = self._points()
         return self._points
+
+    @property
+    def some_mark(self) -> bool:
+        """True if not all of the points mark."""
+        return self._marks is not None
+
+    @property
+    def marks(self) -> NDArray[np.float32]:
+        """float32[m, 3], the points that mark, metres."""
+        if self._marks is None:
+            return self.points
+        if callable(self._marks):
+            self._marks = self._marks()
+        return self._marks
 
 
 class ObservationBuffer:
@@ -109,6 +138,8 @@ class ObservationBuffer:
             for one in reversed(fresh):
                 self._newest = (self._newest + 1) % len(self._stack.sectors)
                 store_observation(self._stack, self._newest, one.sensor, one.points, ranges)
+                if one.some_mark:
+                    store_marks(self._stack, self._newest, one.sensor, one.marks, ranges)
             self._unstored = 0
         return self._stack, self._newest, kept
 

@@ -7,18 +7,18 @@ newer scan cleared therefore comes back until its own scan expires, as in costma
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.cost_grid import Bounds, CostGrid, Window, merge_known, merge_maximum
-from quad_nav.costmap.layer import GridLayer, LayerParams
+from quad_nav.costmap.layer import GridLayer, LayerParams, Redraw
 from quad_nav.costmap.observation import Observation, ObservationBuffer, SourceParams
 from quad_nav.costmap.projection import scan_points, transform_points
 from quad_nav.geometry import Pose2D, Pose3D, Scan
-from quad_nav.grid import FREE, UNKNOWN, GridSpec
+from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels.cost_grid import place_polygon
 from quad_nav.kernels.observations import Ranges
 from quad_nav.kernels.projection import outside_circles
@@ -128,6 +128,7 @@ class ObstacleLayer(GridLayer):
         scan: Scan,
         global_from_sensor: Pose3D,
         global_from_origin: Optional[Pose3D] = None,
+        unmarked_beams: Optional[NDArray[np.bool_]] = None,
     ) -> Observation:
         """Project a scan into the global frame.
 
@@ -137,6 +138,7 @@ class ObstacleLayer(GridLayer):
             global_from_sensor: Pose of the scan's frame at its stamp.
             global_from_origin: Pose where rays start, if the source names a ``sensor_frame``
                 other than the scan's.
+            unmarked_beams: bool[n], beams that clear and do not mark, None for none.
 
         Returns:
             The points within the source's heights, for marking and for clearing; projected
@@ -148,8 +150,16 @@ class ObstacleLayer(GridLayer):
         def project() -> NDArray[np.float32]:
             return scan_points(scan, inf_is_valid, global_from_sensor, (low_m, high_m), circles)
 
-        origin = global_from_origin or global_from_sensor
-        return Observation(scan.stamp_s, origin.translation, project)
+        origin = (global_from_origin or global_from_sensor).translation
+        if unmarked_beams is None:
+            return Observation(scan.stamp_s, origin, project)
+        ranges_m = np.where(unmarked_beams, np.float32(np.nan), scan.ranges_m)
+        marking = replace(scan, ranges_m=ranges_m)
+
+        def project_marks() -> NDArray[np.float32]:
+            return scan_points(marking, inf_is_valid, global_from_sensor, (low_m, high_m), circles)
+
+        return Observation(scan.stamp_s, origin, project, project_marks)
 
     def observe_cloud(
         self,
@@ -174,6 +184,25 @@ class ObstacleLayer(GridLayer):
         """
         source = self.buffers[source_name].params
         return (source.inf_is_valid, source.min_obstacle_height_m, source.max_obstacle_height_m)
+
+    def forget_points(self, points: NDArray[np.float64]) -> None:
+        """Free the cells of points, float64[n, 3] in the global frame, which something has left."""
+        rows, columns = self._cells_of(points)
+        if not len(rows):
+            return
+        self.grid.costs[rows, columns] = FREE
+        low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        self._pass_on(Bounds(*low.tolist(), *high.tolist()), Redraw.NEXT_UPDATE)
+
+    def _cells_of(self, points: NDArray[np.float64]) -> Tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return rows and columns of the obstacles at points, float64[n, 3]."""
+        spec, costs = self.grid.spec, self.grid.costs
+        columns = np.floor((points[:, 0] - spec.origin_x_m) / spec.resolution_m).astype(np.int64)
+        rows = np.floor((points[:, 1] - spec.origin_y_m) / spec.resolution_m).astype(np.int64)
+        inside = (columns >= 0) & (columns < spec.size_x) & (rows >= 0) & (rows < spec.size_y)
+        rows, columns = rows[inside], columns[inside]
+        marked = costs[rows, columns] == LETHAL
+        return rows[marked], columns[marked]
 
     def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
         """Take another footprint, under which the layer clears."""

@@ -18,6 +18,7 @@ from quad_nav.costmap.observation import Observation, SourceParams
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.scan_validator import ScanValidator, ScanValidatorParams
 from quad_nav.geometry import Pose3D, Scan
+from quad_nav.tracking.tracker import ObstacleTracker, TrackedScan
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,24 @@ class ScanIntake:
         sinks: Layers and sources that take the messages.
     """
 
-    def __init__(self, sinks: Sequence[Sink], params: ScanValidatorParams) -> None:
+    def __init__(
+        self,
+        sinks: Sequence[Sink],
+        params: ScanValidatorParams,
+        tracker: Optional[ObstacleTracker] = None,
+    ) -> None:
+        """Hand messages to sinks, and the scans to a tracker before.
+
+        Args:
+            sinks: Layers and sources that take the messages.
+            params: Parameters of the scan validation.
+            tracker: Tracker of moving obstacles, which are not marked then.
+        """
         self.sinks = tuple(sinks)
+        self._tracker = tracker
+        frames = [sink.costmap.params.global_frame for sink in self.sinks]
+        is_tracked = tracker is not None and tracker.frame in frames
+        self._tracking_sink = frames.index(tracker.frame) if tracker and is_tracked else None
         self._keys = [sink.layer.projection_key(sink.source.name) for sink in self.sinks]
         self._params = params
         self._validator = ScanValidator(sink.source for sink in self.sinks)
@@ -83,6 +100,8 @@ class ScanIntake:
     def reset(self) -> None:
         """Forget earlier scans, after the clock has jumped."""
         self._validator.reset()
+        if self._tracker is not None:
+            self._tracker.reset()
 
     def add_scan(
         self, scan: Scan, poses: Sequence[SensorPose], received_s: float, now_s: float
@@ -104,11 +123,31 @@ class ScanIntake:
             if reason:
                 return reason
 
+        tracked = self._track(scan, poses)
+        moving = tracked.moving_beams if tracked is not None and tracked.any_moving else None
+
         def make(sink: Sink, pose: SensorPose) -> Observation:
-            return sink.layer.observe_scan(sink.source.name, scan, pose.frame, pose.origin)
+            name, layer = sink.source.name, sink.layer
+            return layer.observe_scan(name, scan, pose.frame, pose.origin, moving)
 
         self._add(make, poses, scan.stamp_s, received_s)
         return ""
+
+    def _track(self, scan: Scan, poses: Sequence[SensorPose]) -> Optional[TrackedScan]:
+        """Show the tracker a scan, and free the cells that obstacles have left."""
+        k, tracker = self._tracking_sink, self._tracker
+        if k is None or tracker is None:
+            return None
+        sink, pose = self.sinks[k], poses[k].frame
+        _, low_m, high_m = self._keys[k]
+        circles = sink.layer.excluded_circles
+        name = sink.source.topic or sink.source.name
+        tracked = tracker.add_scan(name, scan, pose, (low_m, high_m), circles)
+        if tracked is not None and len(tracked.vacated):
+            at_sensor = pose.inverse().transform_points(tracked.vacated)
+            for other, there in zip(self.sinks, poses):
+                other.layer.forget_points(there.frame.transform_points(at_sensor))
+        return tracked
 
     def add_cloud(
         self,

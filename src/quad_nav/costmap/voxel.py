@@ -24,7 +24,7 @@ from quad_nav.costmap.cost_grid import shift
 from quad_nav.costmap.observation import ObservationBuffer
 from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.geometry import Pose2D
-from quad_nav.grid import LETHAL, UNKNOWN, GridSpec
+from quad_nav.grid import FREE, LETHAL, UNKNOWN, GridSpec
 from quad_nav.kernels.voxels import RayLimits, VoxelGrid, clear_voxel_rays, mark_voxels
 
 
@@ -113,6 +113,13 @@ class VoxelLayer(ObstacleLayer):
         self._was_current = was_current
         self._awaits_update = not was_current
 
+    def forget_points(self, points: NDArray[np.float64]) -> None:
+        """Free the columns of points; see ``ObstacleLayer.forget_points``."""
+        rows, columns = self._cells_of(points)
+        super().forget_points(points)
+        freed = self.voxels[rows, columns]
+        self.voxels[rows, columns] = np.where(freed == LETHAL, FREE, freed)
+
     @property
     def is_empty(self) -> bool:
         """True if every voxel is unknown."""
@@ -152,7 +159,7 @@ class VoxelLayer(ObstacleLayer):
     def _mark(self, buffer: ObservationBuffer, touched: NDArray[np.float64]) -> None:
         grid, ranges = self._voxel_grid(), self._ranges(buffer.params)
         for seen in buffer.observations:
-            mark_voxels(grid, seen.sensor, seen.points, ranges.mark_m, ranges.max_height_m, touched)
+            mark_voxels(grid, seen.sensor, seen.marks, ranges.mark_m, ranges.max_height_m, touched)
 
     def _voxel_grid(self) -> VoxelGrid:
         return VoxelGrid(

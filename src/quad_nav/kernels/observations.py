@@ -76,6 +76,27 @@ def store_observation(
 
 
 @njit(cache=True, nogil=True)
+def store_marks(
+    seen: ObservationStack,
+    slot: int,
+    sensor: NDArray[np.float64],
+    points: NDArray[np.float32],
+    ranges: Ranges,
+) -> None:
+    """Replace the points of a slot that mark; the arguments are those of ``store_observation``."""
+    marks, count = seen.marks[slot], 0
+    for k in range(points.shape[0]):
+        x, y, z = float(points[k, 0]), float(points[k, 1]), float(points[k, 2])
+        dx, dy, dz = x - sensor[0], y - sensor[1], z - sensor[2]
+        if z > ranges.max_height_m:
+            continue
+        if dx * dx + dy * dy + dz * dz < ranges.mark_m * ranges.mark_m:
+            marks[count, 0], marks[count, 1] = points[k, 0], points[k, 1]
+            count += 1
+    seen.counts[slot, 1] = count
+
+
+@njit(cache=True, nogil=True)
 def clip_to_grid(
     sensor_x: float,
     sensor_y: float,

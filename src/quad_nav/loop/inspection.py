@@ -124,6 +124,7 @@ def reconfigure(group: NavigatorGroup, robot: int, configuration: Configuration)
     """Change every parameter of a navigator that may change in flight."""
     hosted = group.robots[robot]
     apply_configuration(hosted.navigator, configuration)
+    hosted.tracker.params = configuration.tracker
     hosted.due_s = -math.inf
 
 

@@ -31,6 +31,7 @@ from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import OdomFrames, pose_in
 from quad_nav.sim.simulation import STEPS_PER_S, RobotState, RobotStates
+from quad_nav.tracking.tracker import ObstacleTracker
 
 LocatedScan = Tuple[Scan, Pose3D]
 """A scan and ``map_from_lidar``, the LIDAR's pose at its stamp."""
@@ -64,6 +65,7 @@ class LoopRobot:
 
     Attributes:
         navigator: The navigator.
+        tracker: The tracker of moving obstacles.
         waiting_goal: The last goal that was sent, in ``map``, until the navigator takes it.
         due_s: Time before which no tick is due, unless a goal waits. Who changes the navigator
             between ticks sets it to -inf.
@@ -94,7 +96,8 @@ class LoopRobot:
         self.cycle_wall_s: Optional[float] = None
         self._number, self._frames, self._start_s = number, frames, start_s
         costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
-        self._intake = ScanIntake(sinks_of(costmaps), configuration.scan_validator)
+        self.tracker = ObstacleTracker(configuration.tracker, costmaps[1].params.global_frame)
+        self._intake = ScanIntake(sinks_of(costmaps), configuration.scan_validator, self.tracker)
 
     def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> str:
         """Hand a scan that arrives now to the costmaps; return why not, "" if they have it."""
@@ -137,7 +140,7 @@ class LoopRobot:
         map_from_global = self.map_from_global(now_s)
         if map_from_global != _IDENTITY:
             peers = [peer.relative_to(map_from_global) for peer in peers]
-        tick = self.navigator.tick(now_s, located, state.twist, peers)
+        tick = self.navigator.tick(now_s, located, state.twist, peers, self.tracker.active_tracks)
         self.due_s = -math.inf if self.navigator.has_work else self.navigator.next_due_s
         self._remember(tick)
         return tick, located

@@ -30,6 +30,8 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
 from quad_nav.scenario.assembly import build_navigator
+from quad_nav.tracking.params import TrackerParams
+from quad_nav.tracking.tracker import ObstacleTracker
 
 _AHEAD_M = 1.0
 _LIDAR: Dict[str, Any] = {
@@ -78,6 +80,16 @@ def warm_up(configuration: config.Configuration) -> None:
     _add_scans(navigator, here)  # again, with the points of a peer to remove
     if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
         navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
+
+
+def track_obstacle() -> None:
+    """Track an obstacle that comes nearer in free space, so that every kernel is called."""
+    tracker = ObstacleTracker(TrackerParams(track_moving_obstacles=True), "map")
+    lidar, ranges = Pose3D(0.0, 0.0, 1.0), np.full(64, np.inf, np.float32)
+    for step in range(12):
+        ranges[28:36] = 4.0 - 0.1 * step
+        scan = Scan(0.1 * step, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
+        tracker.add_scan("scan", scan, lidar)
 
 
 def _oncoming_peer(here: Pose2D, now_s: float) -> Peer:
@@ -132,6 +144,7 @@ def simulate() -> None:
 def fly_missions() -> None:
     """Call every kernel that any configuration may call."""
     simulate()
+    track_obstacle()
     for costmap, node in _MISSIONS:
         warm_up(
             config.load(

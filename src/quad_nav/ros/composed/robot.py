@@ -59,15 +59,16 @@ class ComposedRobot(LoopRobot):
         costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
         sinks = sinks_of(costmaps)
         lidar = [one for one in sinks if _is_of_lidar(one, number, names)]
-        self._intake = ScanIntake(lidar, configuration.scan_validator)
+        self._intake = ScanIntake(lidar, configuration.scan_validator, self.tracker)
         others, validator = [one for one in sinks if one not in lidar], configuration.scan_validator
-        self._sensors = sensors.connect(f"quad{number}", others, validator, names)
+        self._sensors = sensors.connect(f"quad{number}", others, validator, self.tracker, names)
         self._transforms = transforms
         self._now_s = start_s
         self._state: Optional[RobotState] = None
         self.interface = RobotInterface(
             configuration,
             self.navigator,
+            self.tracker,
             transforms,
             self._located_now,
             names,

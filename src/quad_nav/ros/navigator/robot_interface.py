@@ -27,6 +27,7 @@ from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.ros.navigator.reconfigure import serve_namespaces
 from quad_nav.scenario.assembly import apply_configuration
 from quad_nav.topics.publishing import Names, own_node
+from quad_nav.tracking.tracker import ObstacleTracker
 
 
 class RobotInterface:
@@ -44,6 +45,7 @@ class RobotInterface:
         self,
         configuration: config.Configuration,
         navigator: Navigator,
+        tracker: ObstacleTracker,
         transforms: Transforms,
         locate: Callable[[], Tuple[float, RobotPoses]],
         names: Names = own_node,
@@ -55,6 +57,7 @@ class RobotInterface:
         Args:
             configuration: Parameters of the robot.
             navigator: The navigator.
+            tracker: The tracker of moving obstacles.
             transforms: Transform tree, for goals in other frames.
             locate: Returns the time and the robot's poses.
             names: Names of the robot's topics, services and parameters.
@@ -65,7 +68,7 @@ class RobotInterface:
         self.lock = threading.RLock()
         self.warnings = ThrottledWarnings()
         self._configuration, self._navigator = configuration, navigator
-        self._intakes = intakes
+        self._intakes, self._tracker = intakes, tracker
         self._advertise(names, transforms, locate)
         node = rospy.get_name() if names is own_node else names("~")
         self.health = NavigatorHealth(node.strip("/"), self.name, inputs)
@@ -101,6 +104,7 @@ class RobotInterface:
             apply_configuration(self._navigator, configuration)
             for intake in self._intakes:
                 intake.reconfigure(configuration.scan_validator)
+            self._tracker.params = configuration.tracker
             self._configuration = configuration
             return configuration
 

@@ -27,6 +27,7 @@ from quad_nav.ros.navigator.robot_interface import RobotInterface
 from quad_nav.scenario.assembly import build_navigator
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import odometry_problem
+from quad_nav.tracking.tracker import ObstacleTracker
 
 POLL_S = 0.05  # delay after which an idle navigator notices a goal
 
@@ -64,12 +65,14 @@ class RobotNavigator:
         self._transforms, self._peers = transforms, peers
         costmaps = (navigator.global_costmap, navigator.local_costmap)
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
+        self._tracker = ObstacleTracker(configuration.tracker, costmaps[1].params.global_frame)
         self._sensors = sensors.connect(
-            self.name, sinks_of(costmaps), configuration.scan_validator, names
+            self.name, sinks_of(costmaps), configuration.scan_validator, self._tracker, names
         )
         self._interface = RobotInterface(
             configuration,
             navigator,
+            self._tracker,
             transforms,
             self._located_now,
             names,
@@ -132,7 +135,7 @@ class RobotNavigator:
         in_global, located = self._locate(now_s)
         peers = self._peers.near(self.number, located.in_global, navigator.peers.reach_m)
         start_s = time.perf_counter()
-        tick = navigator.tick(now_s, located, self._velocity, peers)
+        tick = navigator.tick(now_s, located, self._velocity, peers, self._tracker.active_tracks)
         self._interface.publish(tick, in_global, located, time.perf_counter() - start_s)
 
     def _locate(self, now_s: float) -> Tuple[Optional[Pose3D], RobotPoses]:

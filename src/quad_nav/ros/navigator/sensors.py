@@ -25,6 +25,7 @@ from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.ros.navigator.health_meters import InputMeter
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import MAX_MAGNITUDE, MAX_POINTS, scan_problem, stamp_problem
+from quad_nav.tracking.tracker import ObstacleTracker
 
 MESSAGE_TYPES = {"LaserScan": ScanMessage, "PointCloud": PointCloud, "PointCloud2": PointCloud2}
 QUEUE_LENGTH = 50
@@ -57,10 +58,11 @@ class Sensor:
         data_type: str,
         sinks: Sequence[Sink],
         params: ScanValidatorParams,
+        tracker: ObstacleTracker,
     ) -> None:
         self.topic = topic
         self.data_type = data_type
-        self.intake = ScanIntake(sinks, params)
+        self.intake = ScanIntake(sinks, params, tracker)
         self._robot = robot
         self._waiting: Deque[Tuple[Any, float]] = deque(maxlen=QUEUE_LENGTH)
         self._warnings = ThrottledWarnings()
@@ -258,7 +260,11 @@ def topic_of(sink: Sink, names: Names) -> Tuple[str, str]:
 
 
 def connect(
-    robot: str, sinks: Iterable[Sink], params: ScanValidatorParams, names: Names = own_node
+    robot: str,
+    sinks: Iterable[Sink],
+    params: ScanValidatorParams,
+    tracker: ObstacleTracker,
+    names: Names = own_node,
 ) -> List[Sensor]:
     """Subscribe to the topics of sources of obstacle layers, to each topic once.
 
@@ -266,9 +272,10 @@ def connect(
         robot: Name with which log lines begin.
         sinks: The sources.
         params: Parameters of the scan validation.
+        tracker: Tracker of moving obstacles, for the scans.
         names: Resolves the names of topics.
     """
     takers: Dict[Tuple[str, str], List[Sink]] = {}
     for sink in sinks:
         takers.setdefault(topic_of(sink, names), []).append(sink)
-    return [Sensor(robot, *key, those, params) for key, those in takers.items()]
+    return [Sensor(robot, *key, those, params, tracker) for key, those in takers.items()]

@@ -1,0 +1,235 @@
+"""Points of a scan against earlier scans, and the clusters that they make.
+
+Mirrors ``tracking/moving_points.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
+
+FREED, UNKNOWN, OCCUPIED = 1, 0, -1
+"""Evidence about a point: free space earlier, unseen or in doubt, occupied earlier."""
+_MAX_SIDE_BEAMS = 64
+
+
+class ScanView(NamedTuple):
+    """A scan and the pose of its sensor in the fixed frame."""
+
+    ranges: NDArray[np.float32]  # [n], metres; +inf without a return
+    directions: NDArray[np.float64]  # [n, 2], cosine and sine of each beam
+    angle_min: float  # radians
+    increment: float  # radians, not 0
+    is_full_turn: bool  # beam 0 follows beam n - 1
+    origin: NDArray[np.float64]  # [3], metres
+    rotation: NDArray[np.float64]  # [3, 3], frame from sensor
+
+
+class EarlierScans(NamedTuple):
+    """Scans with the same beams, in slots."""
+
+    ranges: NDArray[np.float32]  # [slots, n], metres
+    origins: NDArray[np.float64]  # [slots, 3], metres in the fixed frame
+    rotations: NDArray[np.float64]  # [slots, 3, 3], frame from sensor
+
+
+class Doubts(NamedTuple):
+    """Limits of what a scan can tell."""
+
+    range_min: float  # metres; shorter ranges are no points
+    range_max: float  # metres; farther points are left out
+    low_z: float  # metres in the fixed frame; lower points are left out
+    high_z: float  # metres; higher points are left out
+    level: float  # metres off a sensor's plane; points farther off are in doubt
+    margin: float  # metres by which a point is inside of free space, in depth and to the sides
+
+
+@njit(cache=True, nogil=True)
+def _evidence(
+    ranges: NDArray[np.float32],
+    origin: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    scan: ScanView,
+    doubts: Doubts,
+    point: Tuple[float, float, float],
+) -> int:
+    """Return what one earlier scan tells about a point (x, y, z) in the fixed frame."""
+    dx, dy, dz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
+    y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
+    z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
+    if abs(z) > doubts.level:
+        return UNKNOWN
+    n = ranges.shape[0]
+    distance = math.sqrt(x * x + y * y)
+    turn = (math.atan2(y, x) - scan.angle_min) / scan.increment
+    if scan.is_full_turn:
+        turn -= n * math.floor(turn / n)
+    beam = int(math.floor(turn + 0.5))
+    if scan.is_full_turn and beam >= n:
+        beam -= n
+    if beam < 1 or beam >= n - 1:
+        if not scan.is_full_turn:
+            return UNKNOWN
+    nearest, farthest = np.inf, 0.0
+    for step in range(-1, 2):
+        k = beam + step
+        k = k + n if k < 0 else k - n if k >= n else k
+        one = float(ranges[k])
+        if one >= doubts.range_min:  # beams without a valid range tell nothing
+            nearest, farthest = min(nearest, one), max(farthest, one)
+    if farthest == 0.0:
+        return UNKNOWN
+    if nearest <= distance + doubts.margin:
+        return OCCUPIED if farthest >= distance - doubts.margin else UNKNOWN
+    wide = math.ceil(doubts.margin / max(distance * abs(scan.increment), 1e-9))
+    side = min(int(wide), _MAX_SIDE_BEAMS)
+    for step in range(-side, side + 1):
+        k = beam + step
+        if k < 0 or k >= n:
+            if not scan.is_full_turn:
+                return UNKNOWN
+            k = k + n if k < 0 else k - n
+        if doubts.range_min <= float(ranges[k]) <= distance + doubts.margin:
+            return UNKNOWN
+    return FREED
+
+
+@njit(cache=True, nogil=True)
+def compare_scan(
+    scan: ScanView,
+    earlier: EarlierScans,
+    order: NDArray[np.int64],
+    is_thorough: bool,
+    doubts: Doubts,
+    points: NDArray[np.float64],
+    evidence: NDArray[np.int8],
+) -> int:
+    """Place the points of a scan and tell which of them lie in space that was free earlier.
+
+    Args:
+        scan: The scan.
+        earlier: Earlier scans.
+        order: int64[k], slots to compare with, the oldest first.
+        is_thorough: Ask every slot until one finds the point freed. Otherwise the first slot
+            that knows about a point decides.
+        doubts: Limits.
+        points: float64[n, 3], written: the points in the fixed frame; NaN where there is none.
+        evidence: int8[n], written: FREED, UNKNOWN or OCCUPIED.
+
+    Returns:
+        Number of points that are FREED.
+    """
+    rotation, freed = scan.rotation, 0
+    for k in range(scan.ranges.shape[0]):
+        one = float(scan.ranges[k])
+        evidence[k] = UNKNOWN
+        points[k, 0] = points[k, 1] = points[k, 2] = np.nan
+        if not doubts.range_min <= one < doubts.range_max:
+            continue
+        sx, sy = one * scan.directions[k, 0], one * scan.directions[k, 1]
+        up = rotation[2, 0] * sx + rotation[2, 1] * sy
+        z = scan.origin[2] + up
+        if abs(up) > doubts.level or z < doubts.low_z or z > doubts.high_z:
+            continue
+        x = scan.origin[0] + rotation[0, 0] * sx + rotation[0, 1] * sy
+        y = scan.origin[1] + rotation[1, 0] * sx + rotation[1, 1] * sy
+        points[k, 0], points[k, 1], points[k, 2] = x, y, z
+        told = UNKNOWN
+        for slot in order:
+            found = _evidence(
+                earlier.ranges[slot],
+                earlier.origins[slot],
+                earlier.rotations[slot],
+                scan,
+                doubts,
+                (x, y, z),
+            )
+            if found == FREED:
+                told = FREED
+                break
+            if found == OCCUPIED:
+                told = OCCUPIED
+                if not is_thorough:
+                    break
+        evidence[k] = told
+        freed += told == FREED
+    return freed
+
+
+@njit(cache=True, nogil=True)
+def find_clusters(
+    scan: ScanView,
+    points: NDArray[np.float64],
+    evidence: NDArray[np.int8],
+    incidence: float,
+    noise: float,
+    labels: NDArray[np.int32],
+    clusters: NDArray[np.int64],
+) -> int:
+    """Cut a scan into clusters: at jumps in depth, and where standing things begin.
+
+    Args:
+        scan: The scan.
+        points: float64[n, 3], as ``compare_scan`` writes them.
+        evidence: int8[n], the same.
+        incidence: Smallest angle between a beam and a surface that stays in one piece, radians.
+        noise: Standard deviation of ranges, metres.
+        labels: int32[n], written: row of each point's cluster, -1 for none.
+        clusters: int64[m, 4], written: first beam, number of beams (on from there, beyond
+            beam n - 1 with beam 0), number of FREED points, 1 if the cluster stands.
+
+    Returns:
+        Number of clusters.
+    """
+    n = scan.ranges.shape[0]
+    step = abs(scan.increment)
+    spread = math.sin(step) / math.sin(max(incidence - step, 1e-3))
+    starts = np.zeros(n, np.bool_)
+    first = -1
+    for k in range(n):
+        before = k - 1 if k > 0 else n - 1
+        joined = k > 0 or scan.is_full_turn
+        if joined:
+            dx, dy = points[k, 0] - points[before, 0], points[k, 1] - points[before, 1]
+            gap = float(scan.ranges[before]) * spread + 3.0 * noise
+            joined = dx * dx + dy * dy <= gap * gap  # False for NaN
+        starts[k] = not joined
+        if not joined and first < 0:
+            first = k
+    first = max(first, 0)
+    stands = np.empty(n, np.bool_)
+    for k in range(n):
+        stands[k] = evidence[k] == OCCUPIED
+    count, was_standing = 0, False
+    for i in range(n):
+        k = first + i if first + i < n else first + i - n
+        if math.isnan(points[k, 0]):
+            labels[k] = -1
+            continue
+        here = _majority(stands, starts, k)
+        if i == 0 or starts[k] or here != was_standing:
+            clusters[count, 0], clusters[count, 1], clusters[count, 2] = k, 0, 0
+            clusters[count, 3] = 1 if here else 0
+            count += 1
+        was_standing = here
+        labels[k] = count - 1
+        clusters[count - 1, 1] += 1
+        clusters[count - 1, 2] += evidence[k] == FREED
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _majority(stands: NDArray[np.bool_], starts: NDArray[np.bool_], k: int) -> bool:
+    """Return what most of a point and its two neighbours in the same piece do."""
+    n = stands.shape[0]
+    after = k + 1 if k + 1 < n else 0
+    before = k - 1 if k > 0 else n - 1
+    left = stands[k] if starts[k] else stands[before]
+    right = stands[k] if starts[after] else stands[after]
+    return int(left) + int(stands[k]) + int(right) >= 2

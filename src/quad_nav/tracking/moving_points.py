@@ -1,0 +1,175 @@
+"""Tell the points that move from those that stand, and cut a scan into clusters.
+
+A point moves if it lies where an earlier scan saw free space. So walls that come into view, the
+edges of standing things seen from elsewhere, and what was hidden before do not move: no earlier
+beam passed there. A point that an earlier scan saw occupied stands. Everything else is in doubt.
+
+Sources: free space that is violated: C.-C. Wang, C. Thorpe, S. Thrun, "Online simultaneous
+localization and mapping with detection and tracking of moving objects", ICRA 2003, section IV; by
+queries to earlier scans instead of a grid: D. J. Yoon, T. Y. Tang, T. D. Barfoot, "Mapless online
+detection of dynamic objects in 3D lidar", CRV 2019, section III. Cutting at jumps in depth: G. A.
+Borges, M.-J. Aldon, "Line extraction in 2D range images for mobile robotics", J. of Intelligent
+and Robotic Systems 40, 2004, section 3.2, the adaptive breakpoint detector.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Optional, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.geometry import Pose3D, Scan, angle_difference
+from quad_nav.kernels.earlier_scans import (
+    Doubts,
+    EarlierScans,
+    ScanView,
+    compare_scan,
+    find_clusters,
+)
+from quad_nav.tracking.params import TrackerParams
+
+Floats = NDArray[np.float64]
+Heights = Tuple[float, float]
+
+SPACING_S, SLOTS = 0.4, 5
+"""Earlier scans: the time from one to the next, and their number."""
+RANGE_NOISE_M = 0.02
+"""Standard deviation of ranges, of common LIDARs."""
+LEVEL_M = 0.3
+"""Height above or below a LIDAR's plane in which its beams speak for upright things."""
+_INCIDENCE_RAD = math.radians(10.0)
+_FULL_TURN_BEAMS = 1.5  # a gap of fewer beams is none
+# A larger step of the pose from one scan to the next is a correction of the localisation.
+_CORRECTION_M, _CORRECTION_RAD = 0.25, 0.3
+
+
+@dataclass(frozen=True)
+class ScanClusters:
+    """Clusters of one scan.
+
+    Attributes:
+        view: The scan.
+        points: float64[n, 3] in the fixed frame, for each beam; NaN where there is none.
+        labels: int32[n], row of each point's cluster, -1 for none.
+        rows: int64[m, 4]: first beam, number of beams, number of points in space that was free,
+            and 1 if the cluster stands.
+    """
+
+    view: ScanView
+    points: Floats
+    labels: NDArray[np.int32]
+    rows: NDArray[np.int64]
+
+    def beams(self, row: int) -> NDArray[np.bool_]:
+        """Return which beams hit a cluster, bool[n]."""
+        mask: NDArray[np.bool_] = self.labels == row
+        return mask
+
+
+class MovingPoints:
+    """Compare the scans of one LIDAR with its earlier ones."""
+
+    def __init__(self) -> None:
+        """Start without earlier scans."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget earlier scans, after a jump of clock or pose, or with other beams."""
+        self._earlier: Optional[EarlierScans] = None
+        self._stamps_s = np.full(SLOTS, -math.inf)
+        self._previous: Optional[Pose3D] = None
+        self._beams = (0.0, 0.0, 0)
+
+    def compare(
+        self,
+        scan: Scan,
+        frame_from_sensor: Pose3D,
+        heights_m: Heights,
+        params: TrackerParams,
+        is_thorough: bool,
+    ) -> Optional[ScanClusters]:
+        """Cut a scan into clusters and keep it for later ones.
+
+        Args:
+            scan: The scan, newer than all before.
+            frame_from_sensor: Pose of the LIDAR in the fixed frame.
+            heights_m: Lowest and greatest height of points that count.
+            params: The parameters.
+            is_thorough: Ask all earlier scans about each point. Otherwise the oldest one that
+                knows decides, and the clusters are None if nothing moves.
+        """
+        self._check_continuity(scan, frame_from_sensor)
+        view = _view(scan, frame_from_sensor)
+        count = len(view.ranges)
+        points, evidence = np.empty((count, 3)), np.empty(count, np.int8)
+        earlier, order = self._slots(count)
+        doubts = Doubts(
+            max(scan.range_min_m, 1e-3),
+            min(scan.range_max_m, params.range_m),
+            *heights_m,
+            LEVEL_M,
+            params.margin_m,
+        )
+        freed = compare_scan(view, earlier, order, is_thorough, doubts, points, evidence)
+        self._keep(view, scan.stamp_s, earlier)
+        if not freed and not is_thorough:
+            return None
+        labels, rows = np.empty(count, np.int32), np.empty((count, 4), np.int64)
+        found = find_clusters(view, points, evidence, _INCIDENCE_RAD, RANGE_NOISE_M, labels, rows)
+        return ScanClusters(view, points, labels, rows[:found])
+
+    def _slots(self, beams: int) -> Tuple[EarlierScans, NDArray[np.int64]]:
+        """Return the earlier scans, and the numbers of their slots, the oldest first."""
+        if self._earlier is None:
+            self._earlier = EarlierScans(
+                np.full((SLOTS, beams), np.nan, np.float32),
+                np.zeros((SLOTS, 3)),
+                np.zeros((SLOTS, 3, 3)),
+            )
+        order = np.argsort(self._stamps_s, kind="stable")
+        return self._earlier, order[np.isfinite(self._stamps_s[order])]
+
+    def _check_continuity(self, scan: Scan, pose: Pose3D) -> None:
+        beams = (scan.angle_min_rad, scan.angle_increment_rad, len(scan.ranges_m))
+        before, now = self._previous, pose
+        if before is not None and (
+            beams != self._beams
+            or scan.stamp_s < self._stamps_s.max()
+            or math.hypot(now.x_m - before.x_m, now.y_m - before.y_m) > _CORRECTION_M
+            or abs(angle_difference(now.yaw_rad, before.yaw_rad)) > _CORRECTION_RAD
+        ):
+            self.reset()
+        self._previous, self._beams = now, beams
+
+    def _keep(self, view: ScanView, stamp_s: float, earlier: EarlierScans) -> None:
+        if stamp_s - self._stamps_s.max() < SPACING_S:
+            return
+        slot = int(np.argmin(self._stamps_s))
+        self._stamps_s[slot] = stamp_s
+        earlier.ranges[slot] = view.ranges
+        earlier.origins[slot], earlier.rotations[slot] = view.origin, view.rotation
+
+
+def _view(scan: Scan, pose: Pose3D) -> ScanView:
+    count = len(scan.ranges_m)
+    turn_rad = count * abs(scan.angle_increment_rad)
+    return ScanView(
+        np.ascontiguousarray(scan.ranges_m, dtype=np.float32),
+        _directions(scan.angle_min_rad, scan.angle_increment_rad, count),
+        scan.angle_min_rad,
+        scan.angle_increment_rad,
+        abs(turn_rad - 2.0 * math.pi) < _FULL_TURN_BEAMS * abs(scan.angle_increment_rad),
+        pose.translation,
+        pose.rotation,
+    )
+
+
+@lru_cache(maxsize=64)
+def _directions(angle_min_rad: float, angle_increment_rad: float, n: int) -> Floats:
+    """Return cosine and sine of each beam, float64[n, 2]; Python's are the C library's."""
+    angles = [angle_min_rad + k * angle_increment_rad for k in range(n)]
+    return np.array([(math.cos(a), math.sin(a)) for a in angles]).reshape(n, 2)

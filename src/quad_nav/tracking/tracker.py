@@ -1,0 +1,330 @@
+"""Tracks of moving obstacles: association, filters and the life of each track.
+
+A cluster of points in space that was free begins a track. A track is confirmed when it has moved
+and its velocity is larger than what its uncertainty explains; only then it is told to others. A
+track that is not seen is predicted for a while if something hides it, and ends soon if the LIDAR
+sees through it. An obstacle that has stopped is no longer in space that was free: its track ends,
+and it is a standing obstacle again.
+
+Sources: detection and tracking as in C.-C. Wang, C. Thorpe, S. Thrun, ICRA 2003, section V; gates,
+global nearest neighbours and M of N detections as in S. Blackman, R. Popoli, "Design and Analysis
+of Modern Tracking Systems", 1999, sections 6.2 and 6.4; discs and filters as in M. Przybyla, RoMoCo
+2017, section III.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Dict, List, Optional, Set
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.geometry import Pose3D, Scan
+from quad_nav.tracking import kalman
+from quad_nav.tracking.association import assign
+from quad_nav.tracking.discs import Outlines, Radius, fit, outlines
+from quad_nav.tracking.moving_points import Heights, MovingPoints, ScanClusters
+from quad_nav.tracking.params import TrackerParams
+from quad_nav.tracking.tracks import Tracks
+
+Floats = NDArray[np.float64]
+
+FIRST_SPEED_MPS = 1.0
+"""Standard deviation of each component of an obstacle's velocity when it is first seen."""
+_MIN_POINTS = 3
+_FREED_SHARE = 0.5
+_HITS = 3
+_MOVED_M = 0.12
+_SIGNIFICANT = 13.8  # chi-square, 2 degrees of freedom, 0.1 %
+_SEEN_THROUGH_S = 0.3  # patience with a track at whose place there is nothing
+_RESTART_S = 1.5  # time in which a track is confirmed, or measured from another start
+_TENTATIVE_S = 0.3  # patience with a track that is not confirmed
+_BESIDE_M = 0.15
+_TRAIL_SCANS = 60
+_NO_CIRCLES = np.empty((0, 3))
+_NO_POINTS = np.empty((0, 3))
+
+
+@dataclass
+class _Life:
+    """What a track is besides its state."""
+
+    number: int
+    start: Floats
+    start_noise: Floats
+    start_s: float
+    seen_s: float
+    radius: Radius
+    hits: int = 1
+    is_confirmed: bool = False
+    trail: List[Floats] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class TrackedScan:
+    """What a scan shows of moving obstacles.
+
+    Attributes:
+        moving_beams: bool[n], beams that hit confirmed tracks.
+        vacated: float64[k, 3], points in the fixed frame, seen before, of obstacles whose tracks
+            this scan confirms: they have moved on.
+    """
+
+    moving_beams: NDArray[np.bool_]
+    vacated: Floats
+
+    @property
+    def any_moving(self) -> bool:
+        """True if the scan shows a confirmed track."""
+        return bool(self.moving_beams.any())
+
+
+class ObstacleTracker:
+    """Tracks moving obstacles in the scans of one robot's LIDARs.
+
+    Attributes:
+        params: The parameters; they may change in flight.
+        frame: Name of the fixed frame.
+        tracks: The confirmed tracks, at the time of the last scan.
+    """
+
+    def __init__(self, params: TrackerParams, frame: str) -> None:
+        """Track nothing yet; poses of scans will be in ``frame``."""
+        self.params = params
+        self.frame = frame
+        self._number = 0
+        self.reset()
+
+    @property
+    def active_tracks(self) -> Optional[Tracks]:
+        """The confirmed tracks; None if obstacles are not tracked."""
+        return self.tracks if self.params.track_moving_obstacles else None
+
+    def reset(self) -> None:
+        """Forget tracks and scans, after the clock has jumped."""
+        self._points: Dict[str, MovingPoints] = {}
+        self._end_all(-math.inf)
+
+    def _end_all(self, now_s: float) -> None:
+        self._now_s = now_s
+        self._lives: List[_Life] = []
+        self._states, self._covariances = np.empty((0, 4)), np.empty((0, 4, 4))
+        self.tracks = Tracks.none(now_s)
+
+    def add_scan(
+        self,
+        sensor: str,
+        scan: Scan,
+        frame_from_sensor: Pose3D,
+        heights_m: Heights = (-math.inf, math.inf),
+        known_circles: Floats = _NO_CIRCLES,
+    ) -> Optional[TrackedScan]:
+        """Take a scan.
+
+        Args:
+            sensor: Name of the LIDAR.
+            scan: The scan.
+            frame_from_sensor: Pose of the LIDAR in the fixed frame at the scan's stamp.
+            heights_m: Lowest and greatest height in the fixed frame of points that count.
+            known_circles: float64[k, 3], rows x, y, radius in the fixed frame: what is in them is
+                known otherwise, as peers are, and is not tracked.
+
+        Returns:
+            What the scan shows of moving obstacles, None if nothing moves.
+        """
+        if not self.params.track_moving_obstacles:
+            if self._points:
+                self.reset()
+            return None
+        moving = self._points.setdefault(sensor, MovingPoints())
+        now_s = scan.stamp_s
+        clusters = moving.compare(
+            scan, frame_from_sensor, heights_m, self.params, bool(self._lives)
+        )
+        if clusters is None:
+            self.tracks = Tracks.none(now_s)
+            self._now_s = now_s
+            return None
+        return self._track(now_s, clusters, known_circles)
+
+    def _track(self, now_s: float, clusters: ScanClusters, known_circles: Floats) -> TrackedScan:
+        seen = outlines(clusters)
+        usable = self._usable(clusters, seen, known_circles)
+        self._predict(now_s, known_circles)
+        pairs = assign(self._states, self._covariances, seen, usable)
+        for track, row in pairs:
+            self._update(track, row, now_s, clusters, seen)
+        self._drop(now_s, {track for track, _ in pairs}, clusters, seen)
+        self._begin(now_s, clusters, seen, usable, {row for _, row in pairs})
+        result = self._confirm(clusters, seen)
+        told = [k for k, life in enumerate(self._lives) if life.is_confirmed]
+        self.tracks = Tracks(
+            now_s,
+            np.array([self._lives[k].number for k in told], np.int64),
+            self._states[told],
+            self._covariances[told],
+            np.array([self._lives[k].radius.outer_m for k in told], float),
+        )
+        return result
+
+    def _usable(
+        self, clusters: ScanClusters, seen: Outlines, known_circles: Floats
+    ) -> NDArray[np.bool_]:
+        """Return which clusters may be obstacles that move, bool[m]."""
+        usable = (
+            (clusters.rows[:, 3] == 0)
+            & (clusters.rows[:, 1] >= _MIN_POINTS)
+            & (seen.radii_m <= self.params.max_radius_m)
+        )
+        for x_m, y_m, radius_m in known_circles:
+            usable &= np.hypot(seen.centres[:, 0] - x_m, seen.centres[:, 1] - y_m) > radius_m
+        return usable
+
+    def _predict(self, now_s: float, known_circles: Floats) -> None:
+        """Predict all tracks up to now; end those of what is known otherwise."""
+        if self._lives and now_s > self._now_s:
+            self._states, self._covariances = kalman.predict(
+                self._states, self._covariances, now_s - self._now_s, self.params.acceleration_mps2
+            )
+        self._now_s = now_s
+        for x_m, y_m, radius_m in known_circles:
+            away_m = np.hypot(self._states[:, 0] - x_m, self._states[:, 1] - y_m)
+            self._keep(away_m > radius_m)
+
+    def _update(
+        self, track: int, row: int, now_s: float, clusters: ScanClusters, seen: Outlines
+    ) -> None:
+        life = self._lives[track]
+        is_whole = bool(seen.is_whole[row])
+        life.radius.see(float(seen.radii_m[row]), is_whole)
+        guess = seen.centres[row] if is_whole else self._states[track, :2].copy()
+        disc = fit(clusters, row, guess, life.radius)
+        life.radius.hold(disc.farthest_m)
+        self._states[track], self._covariances[track], _ = kalman.update(
+            self._states[track], self._covariances[track], disc.position, disc.noise
+        )
+        life.seen_s = now_s
+        life.hits += 1
+        self._remember(life, clusters, row)
+
+    def _remember(self, life: _Life, clusters: ScanClusters, row: int) -> None:
+        """Keep the points of a track until it is confirmed."""
+        if not life.is_confirmed:
+            life.trail.append(clusters.points[clusters.beams(row)])
+            del life.trail[:-_TRAIL_SCANS]
+
+    def _drop(
+        self, now_s: float, updated: Set[int], clusters: ScanClusters, seen: Outlines
+    ) -> None:
+        """End the tracks that are lost, and those of obstacles that stand."""
+        keep = np.ones(len(self._lives), bool)
+        for track, life in enumerate(self._lives):
+            if track in updated:
+                continue
+            unseen_s = now_s - life.seen_s
+            if not life.is_confirmed:
+                keep[track] = unseen_s <= _TENTATIVE_S
+            elif self._stands(track, clusters, seen):
+                keep[track] = False
+            elif _sees_through(clusters, self._states[track], life.radius.circle_m):
+                keep[track] = unseen_s <= _SEEN_THROUGH_S
+            else:
+                keep[track] = unseen_s <= self.params.lost_after_s
+        self._keep(keep)
+
+    def _stands(self, track: int, clusters: ScanClusters, seen: Outlines) -> bool:
+        """Return whether a track that was not seen has become a standing cluster."""
+        x_m, y_m, vx_mps, vy_mps = self._states[track].tolist()
+        if math.hypot(vx_mps, vy_mps) > self.params.min_speed_mps:
+            return False
+        near = np.hypot(seen.centres[:, 0] - x_m, seen.centres[:, 1] - y_m)
+        limit_m = self._lives[track].radius.circle_m + _BESIDE_M
+        return bool(((clusters.rows[:, 3] == 1) & (near < limit_m)).any())
+
+    def _begin(
+        self,
+        now_s: float,
+        clusters: ScanClusters,
+        seen: Outlines,
+        usable: NDArray[np.bool_],
+        taken: Set[int],
+    ) -> None:
+        """Begin tracks of clusters in space that was free and that belong to no track."""
+        freed, beams = clusters.rows[:, 2], clusters.rows[:, 1]
+        wanted = usable & (freed >= _MIN_POINTS) & (freed >= _FREED_SHARE * beams)
+        for row in np.flatnonzero(wanted).tolist():
+            if row in taken or self._is_covered(seen.centres[row]):
+                continue
+            radius = Radius()
+            radius.see(float(seen.radii_m[row]), bool(seen.is_whole[row]))
+            disc = fit(clusters, row, seen.centres[row], radius)
+            radius.hold(disc.farthest_m)
+            state, covariance = kalman.first_state(disc.position, disc.noise, FIRST_SPEED_MPS)
+            self._number += 1
+            life = _Life(self._number, disc.position, disc.noise, now_s, now_s, radius)
+            self._remember(life, clusters, row)
+            self._lives.append(life)
+            self._states = np.concatenate([self._states, state[None]])
+            self._covariances = np.concatenate([self._covariances, covariance[None]])
+
+    def _is_covered(self, centre: Floats) -> bool:
+        """Return whether a place is in the disc of a track, float64[2]."""
+        for state, life in zip(self._states, self._lives):
+            if math.hypot(*(centre - state[:2])) < life.radius.outer_m + _BESIDE_M:
+                return True
+        return False
+
+    def _confirm(self, clusters: ScanClusters, seen: Outlines) -> TrackedScan:
+        """Confirm tracks that have moved; return the beams on all confirmed ones."""
+        vacated: List[Floats] = []
+        rows = np.zeros(len(clusters.rows), bool)
+        may_move = clusters.rows[:, 3] == 0
+        for state, covariance, life in zip(self._states, self._covariances, self._lives):
+            if not life.is_confirmed and self._has_moved(state, covariance, life):
+                life.is_confirmed = True
+                vacated += life.trail
+                life.trail = []
+            if life.is_confirmed:
+                away_m = np.hypot(*(seen.centres - state[:2]).T)
+                rows |= may_move & (away_m < life.radius.outer_m + _BESIDE_M)
+        beams = np.append(rows, False)[clusters.labels]  # label -1 takes the last one
+        return TrackedScan(beams, np.concatenate(vacated) if vacated else _NO_POINTS)
+
+    def _has_moved(self, state: Floats, covariance: Floats, life: _Life) -> bool:
+        """Return whether a track has moved by more than its uncertainty, and is fast enough."""
+        passed_s = life.seen_s - life.start_s
+        moved = state[:2] - life.start
+        moved_m = math.hypot(*moved)
+        if life.hits < _HITS or moved_m < max(_MOVED_M, self.params.min_speed_mps * passed_s):
+            if passed_s > _RESTART_S:
+                life.start, life.start_noise = state[:2].copy(), covariance[:2, :2].copy()
+                life.start_s = life.seen_s
+            return False
+        spread = life.start_noise + covariance[:2, :2]
+        return float(moved @ np.linalg.solve(spread, moved)) > _SIGNIFICANT
+
+    def _keep(self, keep: NDArray[np.bool_]) -> None:
+        if not keep.all():
+            self._lives = [life for life, is_kept in zip(self._lives, keep) if is_kept]
+            self._states, self._covariances = self._states[keep], self._covariances[keep]
+
+
+def _sees_through(clusters: ScanClusters, state: Floats, radius_m: float) -> bool:
+    """Return whether the LIDAR sees what is behind the middle half of a disc."""
+    view = clusters.view
+    away = np.array([state[0] - view.origin[0], state[1] - view.origin[1], 0.0])
+    x_m, y_m, _ = (view.rotation.T @ away).tolist()
+    distance_m = math.hypot(x_m, y_m)
+    if distance_m <= radius_m:
+        return False
+    n = len(view.ranges)
+    middle = (math.atan2(y_m, x_m) - view.angle_min) / view.increment
+    half = int(0.5 * math.asin(radius_m / distance_m) / abs(view.increment))
+    beams = round(middle) + np.arange(-half, half + 1)
+    if view.is_full_turn:
+        beams %= n
+    elif beams[0] < 0 or beams[-1] >= n:
+        return False
+    return bool((view.ranges[beams] > distance_m + radius_m).all())

@@ -1,0 +1,222 @@
+"""Tracking of moving obstacles: in scans made by hand, and in flights against the truth."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from quad_nav.geometry import Pose3D, Scan, quaternion_from_yaw
+from quad_nav.tracking.params import TrackerParams
+from quad_nav.tracking.tracker import ObstacleTracker
+
+BEAMS = 512
+STEP_RAD = 2.0 * math.pi / BEAMS
+ON = TrackerParams(track_moving_obstacles=True)
+LIDAR = Pose3D(0.0, 0.0, 1.0)
+ROOM = (-6.0, -6.0, 6.0, 6.0)
+
+
+def pose_at(x_m, y_m, yaw_rad=0.0):
+    return Pose3D(x_m, y_m, 1.0, quaternion_from_yaw(yaw_rad))
+
+
+def scan_of(stamp_s, discs=(), pose=LIDAR, room=ROOM, noise_m=0.0, seed=0):
+    """Cast beams at discs (x, y, radius) in a rectangular room (min x, min y, max x, max y)."""
+    angles = -math.pi + STEP_RAD * np.arange(BEAMS) + pose.yaw_rad
+    along = np.column_stack([np.cos(angles), np.sin(angles)])
+    here = np.array([pose.x_m, pose.y_m])
+    with np.errstate(divide="ignore"):
+        far = np.where(along > 0, np.array(room[2:]) - here, here - np.array(room[:2]))
+        far = far / np.abs(along)
+    ranges = far.min(axis=1)
+    for x_m, y_m, radius_m in discs:
+        off = np.array([x_m, y_m]) - here
+        middle = along @ off
+        depth = middle**2 - off @ off + radius_m**2
+        hit = middle - np.sqrt(np.maximum(depth, 0.0))
+        ranges = np.where((depth >= 0.0) & (hit > 0.0), np.minimum(ranges, hit), ranges)
+    ranges = ranges + noise_m * np.random.default_rng([seed, round(1e6 * stamp_s)]).normal(
+        size=BEAMS
+    )
+    return Scan(stamp_s, -math.pi, STEP_RAD, 0.02, 60.0, ranges.astype(np.float32))
+
+
+def track(discs_at, times_s, pose_of=lambda _: LIDAR, params=ON, noise_m=0.0):
+    """Yield time, result and tracker after each scan of discs that move."""
+    tracker = ObstacleTracker(params, "map")
+    for time_s in times_s:
+        pose = pose_of(time_s)
+        scan = scan_of(time_s, discs_at(time_s), pose, noise_m=noise_m)
+        yield time_s, tracker.add_scan("scan", scan, pose), tracker
+
+
+def times(until_s, rate_hz=10.0):
+    return np.arange(round(until_s * rate_hz) + 1) / rate_hz
+
+
+PILLARS = ((2.0, 1.0, 0.3), (3.0, -2.0, 0.5), (-2.0, 2.5, 0.1), (-3.0, -3.0, 0.4))
+
+
+@pytest.mark.parametrize("speed_mps", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("rate_hz", [10.0, 20.0])
+def test_a_crossing_cylinder_is_tracked(speed_mps, rate_hz):
+    errors, confirmed_s = [], math.nan
+    for now_s, _, tracker in track(
+        lambda t: ((3.0, -4.0 + speed_mps * t, 0.3),), times(7.0 / speed_mps, rate_hz)
+    ):
+        if len(tracker.tracks):
+            confirmed_s = min(confirmed_s, now_s) if confirmed_s == confirmed_s else now_s
+            truth = (3.0, -4.0 + speed_mps * now_s, 0.0, speed_mps)
+            errors.append(np.abs(tracker.tracks.states[0] - truth))
+            assert len(tracker.tracks) == 1 and tracker.tracks.numbers[0] == 1
+    assert confirmed_s <= 0.4 + 0.3 / speed_mps
+    settled = np.array(errors[round(rate_hz) :])
+    assert settled[:, :2].max() < 0.05 and settled[:, 2:].max() < 0.15
+    assert tracker.tracks.radii_m[0] == pytest.approx(0.3, abs=0.05)
+
+
+def test_an_obstacle_that_comes_nearer_is_tracked():
+    *_, (_, _, tracker) = track(lambda t: ((5.0 - t, 0.0, 0.3),), times(2.0))
+    np.testing.assert_allclose(tracker.tracks.states, [(3.0, 0.0, -1.0, 0.0)], atol=0.1)
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.02])
+@pytest.mark.parametrize("rate_hz", [5.0, 10.0, 20.0, 40.0])
+def test_standing_things_do_not_move_for_a_lidar_that_flies_and_turns(noise_m, rate_hz):
+    def pose_of(t):
+        return pose_at(-1.0 + 0.5 * t, 0.5 * math.sin(t), 0.6 * math.sin(0.7 * t))
+
+    for _, _, tracker in track(lambda _: PILLARS, times(12.0, rate_hz), pose_of, noise_m=noise_m):
+        assert len(tracker.tracks) == 0
+
+
+def test_nothing_is_clustered_or_tracked_where_nothing_moves():
+    assert all(result is None for _, result, _ in track(lambda _: PILLARS, times(3.0)))
+
+
+def test_a_wall_that_comes_into_view_behind_a_pillar_does_not_move():
+    """The pillar's shadow sweeps over the walls and uncovers a post."""
+    for _, _, tracker in track(
+        lambda _: ((2.0, 0.0, 0.5), (4.0, 0.3, 0.1)),
+        times(8.0),
+        lambda t: pose_at(0.0, -2.0 + 0.5 * t),
+    ):
+        assert len(tracker.tracks) == 0
+
+
+def test_an_obstacle_that_passes_behind_a_pillar_keeps_its_number():
+    numbers, hidden_s = [], []
+    for now_s, _, tracker in track(lambda t: ((2.0, 0.0, 0.3), (4.0, -3.0 + t, 0.25)), times(6.0)):
+        if now_s > 1.0:
+            numbers += tracker.tracks.numbers.tolist()
+            assert len(tracker.tracks) == 1
+            hidden_s.append(abs(-3.0 + now_s) < 0.3)
+            assert tracker.tracks.states[0, 1] == pytest.approx(-3.0 + now_s, abs=0.15)
+    assert set(numbers) == {1} and any(hidden_s)
+
+
+def test_two_obstacles_that_pass_each_other_keep_their_numbers():
+    *_, (_, _, tracker) = track(lambda t: ((3.0, -3.0 + t, 0.25), (4.2, 3.0 - t, 0.25)), times(6.0))
+    velocities = dict(zip(tracker.tracks.numbers.tolist(), tracker.tracks.states[:, 3]))
+    assert set(velocities) == {1, 2}
+    assert sorted(velocities.values()) == pytest.approx([-1.0, 1.0], abs=0.1)
+
+
+def test_an_obstacle_that_stops_becomes_a_standing_one():
+    moving = {}
+    for now_s, result, tracker in track(lambda t: ((3.0, -2.0 + min(t, 2.0), 0.3),), times(6.0)):
+        moving[round(now_s, 1)] = len(tracker.tracks)
+        last = result
+    assert moving[2.0] == 1 and moving[6.0] == 0
+    ended_s = max(time_s for time_s, count in moving.items() if count)
+    assert 2.5 < ended_s < 5.0
+    assert last is None  # its beams mark again
+
+
+def test_an_obstacle_that_starts_again_is_tracked_again():
+    for now_s, _, tracker in track(lambda t: ((3.0, max(0.0, t - 5.0), 0.3),), times(6.0)):
+        assert now_s > 5.0 or len(tracker.tracks) == 0
+    assert tracker.tracks.states[0, 3] == pytest.approx(1.0, abs=0.15)
+
+
+def test_an_obstacle_that_vanishes_in_sight_is_dropped_at_once():
+    present = []
+    for now_s, _, tracker in track(
+        lambda t: ((3.0, -2.0 + t, 0.3),) if t < 2.0 else (), times(3.0)
+    ):
+        present.append((round(now_s, 1), len(tracker.tracks)))
+    assert dict(present)[1.9] == 1 and dict(present)[2.5] == 0
+
+
+def test_a_disc_of_which_a_pillar_hides_a_part_keeps_its_centre():
+    """At 0.5 m of its path the pillar hides a half of it."""
+    *_, (_, _, tracker) = track(lambda t: ((2.0, 0.0, 0.3), (4.0, -3.0 + t, 0.4)), times(2.4))
+    np.testing.assert_allclose(tracker.tracks.states[0, :2], (4.0, -0.6), atol=0.1)
+
+
+def test_moving_beams_are_those_on_confirmed_tracks():
+    *_, (now_s, result, _) = track(lambda t: ((3.0, -2.0 + t, 0.3), *PILLARS), times(2.0))
+    scan = scan_of(now_s, ((3.0, 0.0, 0.3),), room=(-100.0, -100.0, 100.0, 100.0))
+    np.testing.assert_array_equal(result.moving_beams, scan.ranges_m < 4.0)
+
+
+def test_the_scan_that_confirms_a_track_tells_where_the_obstacle_was():
+    vacated = []
+    for now_s, result, _ in track(lambda t: ((3.0, -2.0 + t, 0.3),), times(2.0)):
+        if result is not None and len(result.vacated):
+            vacated.append((now_s, result.vacated))
+    ((confirmed_s, points),) = vacated
+    assert confirmed_s < 1.0
+    assert 2.65 < points[:, 0].min() and points[:, 0].max() < 3.1  # its near side
+    assert -1.8 < points[:, 1].min() < -1.6 and points[:, 1].max() < -1.7 + confirmed_s
+
+
+def test_known_peers_are_not_tracked_and_lost_ones_are():
+    tracker = ObstacleTracker(ON, "map")
+    for now_s in times(4.0):
+        y_m = -2.0 + now_s
+        known = np.array([(3.0, y_m, 0.5)]) if now_s < 2.0 else np.empty((0, 3))
+        scan = scan_of(now_s, ((3.0, y_m, 0.3),))
+        tracker.add_scan("scan", scan, LIDAR, known_circles=known)
+        assert now_s > 2.0 or len(tracker.tracks) == 0
+    assert tracker.tracks.states[0, 3] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_jump_of_the_pose_moves_nothing():
+    for _, _, tracker in track(
+        lambda _: PILLARS, times(6.0), lambda t: pose_at(0.0 if t < 3.0 else 0.4, 0.0)
+    ):
+        assert len(tracker.tracks) == 0
+
+
+def test_off_nothing_is_tracked():
+    results = list(track(lambda t: ((3.0, -2.0 + t, 0.3),), times(2.0), params=TrackerParams()))
+    assert all(result is None for _, result, _ in results)
+    assert len(results[-1][2].tracks) == 0 and results[-1][2].active_tracks is None
+
+
+def test_covariances_are_honest():
+    """With the noise that the tracker assumes, and the accelerations: NEES, 4 on average."""
+    random = np.random.default_rng(7)
+    nees = []
+    for run in range(12):
+        velocity = random.normal(0.0, 0.5, 2) + (0.0, 1.0)
+        path, place = [], np.array([3.0, -3.0])
+        for _ in times(6.0):
+            path.append((*place, *velocity))
+            change = 0.1 * ON.acceleration_mps2 * random.normal(size=2)
+            place, velocity = place + 0.1 * velocity + 0.05 * change, velocity + change
+        tracker = ObstacleTracker(ON, "map")
+        for k, now_s in enumerate(times(6.0)):
+            x_m, y_m = path[k][:2]
+            if not (1.0 < x_m < 5.5 and abs(y_m) < 5.5):
+                break
+            scan = scan_of(now_s, ((x_m, y_m, 0.3),), noise_m=0.02, seed=run)
+            tracker.add_scan("scan", scan, LIDAR)
+            if len(tracker.tracks) == 1:
+                off = tracker.tracks.states[0] - path[k]
+                nees.append(off @ np.linalg.solve(tracker.tracks.covariances[0], off))
+    assert len(nees) > 150
+    assert 2.0 < np.mean(nees) < 6.0
