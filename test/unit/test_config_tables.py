@@ -28,6 +28,7 @@ from quad_nav.config.tables.recoveries import (
 )
 from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
 from quad_nav.control.dwa_planner import DwaParams
+from quad_nav.control.evasion import EvasionParams
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams
@@ -50,7 +51,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
 ROTATE = Table(fixed=ROTATE_TABLE.fixed + ROTATE_FROM_PLANNER)
 # (dataclass, table, fields that are read in another way than from one row)
 PAIRS = [
-    (NavigatorParams, MOVE_BASE_TABLE, {"recovery_behaviors", "progress"}),
+    (NavigatorParams, MOVE_BASE_TABLE, {"recovery_behaviors", "progress", "evasion"}),
     (TrajectoryPlannerParams, TRAJECTORY_PLANNER_TABLE, set()),
     (NavfnParams, NAVFN_TABLE, set()),
     (SearchPlannerParams, GLOBAL_PLANNER_TABLE, set()),
@@ -83,6 +84,7 @@ SWITCH_OWNERS = [
     ObstacleLayerParams,
     PeerParams,
     ProgressParams,
+    EvasionParams,
     RotateParams,
     ScanValidatorParams,
     StaticLayerParams,

@@ -29,6 +29,7 @@ from quad_nav.config.recoveries import (
 )
 from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.config.workload import rollout_problem, size_problem
+from quad_nav.control.evasion import EvasionParams
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError
@@ -175,6 +176,7 @@ def navigator_params(
     params = NavigatorParams(
         recovery_behaviors=listed,
         progress=with_fixes(ProgressParams(), tree),
+        evasion=with_fixes(EvasionParams(), tree),
         **fields(tree, MOVE_BASE_TABLE.parameters, given),
     )
     return with_fixes(params, tree)

@@ -13,6 +13,7 @@ from typing import Any, Mapping, Tuple, TypeVar, cast
 from quad_nav.config.reader import fields
 from quad_nav.config.spec import RESTORE_DEFAULTS, Parameter, Table, double, flag
 from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.evasion import EvasionParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
@@ -362,6 +363,27 @@ _SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
             high=1,
         ),
         (TrackerParams,),
+    ),
+    (
+        flag(
+            "avoid_moving_obstacles",
+            False,
+            "avoid_moving_obstacles",
+            "A robot that flies sideways evades tracked obstacles, also while it hovers.",
+        ),
+        (EvasionParams,),
+    ),
+    (
+        double(
+            "moving_obstacle_clearance",
+            0.1,
+            "clearance_m",
+            "metres",
+            "Distance that the robot keeps from where tracked obstacles are predicted.",
+            low=0,
+            high=2,
+        ),
+        (EvasionParams,),
     ),
 )
 

@@ -145,7 +145,9 @@ def _with_other_fixes(configuration: Configuration) -> Configuration:
     return replace(
         configuration,
         navigator=replace(
-            with_fixes(navigator, tree), progress=with_fixes(navigator.progress, tree)
+            with_fixes(navigator, tree),
+            progress=with_fixes(navigator.progress, tree),
+            evasion=with_fixes(navigator.evasion, tree),
         ),
         peers=with_fixes(configuration.peers, tree),
         scan_validator=with_fixes(configuration.scan_validator, tree),

@@ -110,12 +110,14 @@ class ControlSupervisor:
     Attributes:
         limiter: Limits of the planner's parameters, from recoveries and stalls.
         tracks: Moving obstacles in the local costmap's frame, None if nothing tracks them.
+        plan: float64[n, 3], the last plan, in the global costmap's frame; None without one.
     """
 
     def __init__(self, controller: LocalPlanner) -> None:
         """Supervise a local planner that has no plan yet."""
         self.limiter = ParameterLimiter(controller)
         self.tracks: Optional[Tracks] = None
+        self.plan: Optional[NDArray[np.float64]] = None
         self._controller = controller
         self._last_valid_s = -math.inf
         self.reset()
@@ -147,6 +149,7 @@ class ControlSupervisor:
 
     def set_plan(self, plan: NDArray[np.float64]) -> None:
         """Give the local planner a plan, float64[n, 3] of (x_m, y_m, yaw_rad)."""
+        self.plan = plan
         self._controller.set_plan(plan)
 
     def is_goal_reached(self) -> bool:

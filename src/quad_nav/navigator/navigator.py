@@ -80,6 +80,7 @@ class Navigator:
             peers,
         )
         self._idle_check = Schedule(_IDLE_CHECK_HZ)
+        self._idle_guard = Schedule(params.controller_frequency_hz)
         self._started = False
         self._stop_wanted = False
 
@@ -158,6 +159,8 @@ class Navigator:
         due_s = min(due_s, self._machine.control.limiter.due_s)
         if self._machine.state is not State.IDLE:
             return min(due_s, self._machine.due_s)
+        if self.params.evasion.avoid_moving_obstacles:
+            due_s = min(due_s, self._idle_guard.due_s)
         return min(due_s, self._idle_check.due_s) if self.peers.params.avoid_peers else due_s
 
     @property
@@ -169,7 +172,7 @@ class Navigator:
         """Restart schedules, patience and costmaps after the clock has jumped back."""
         goal = None if self.peers.is_yield_manoeuvre else self.goal
         self._machine.end_goal()
-        self._idle_check.start(now_s)
+        self._start_idle_checks(now_s)
         self.peers.restart()
         self._updates.start(now_s)
         self.clear_costmaps(now_s)
@@ -197,7 +200,7 @@ class Navigator:
         self._machine.control.tracks = tracks
         if not self._started:
             self._started = True
-            self._idle_check.start(now_s)
+            self._start_idle_checks(now_s)
             self._updates.start(now_s)
         tick = Tick(now_s)
         self._observe_peers(tick, poses, peers)
@@ -212,10 +215,23 @@ class Navigator:
             self._make_room_when_idle(tick, poses.in_global)
         if self.state is not State.IDLE:
             self._machine.run(tick, poses, velocity)
+        self._evade(tick, poses, velocity)
         self._machine.limit_command(tick, poses.in_global, velocity)
         tick.state = self.state
         tick.yielding = self.peers.decision
         return tick
+
+    def _start_idle_checks(self, now_s: float) -> None:
+        self._idle_check.start(now_s)
+        self._idle_guard.start(now_s)
+
+    def _evade(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
+        """Guard the command of a control cycle; without a goal, at the same frequency."""
+        if not self.params.evasion.avoid_moving_obstacles:
+            return
+        is_due = self._idle_guard.pop(tick.now_s) and self.state is State.IDLE
+        if is_due or tick.command is not None:
+            self._machine.evade(tick, poses, velocity)
 
     def _observe_peers(self, tick: Tick, poses: RobotPoses, peers: Sequence[Peer]) -> None:
         cruise_mps = getattr(self._machine.control.limiter.usual, "max_vel_x_mps", CRUISE_MPS)

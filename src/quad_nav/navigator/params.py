@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
+from quad_nav.control.evasion import EvasionParams
 from quad_nav.navigator.control_supervisor import ProgressParams
 
 
@@ -26,6 +27,7 @@ class NavigatorParams:
         stop_while_planning: A robot without a plan stops; False restores upstream behaviour,
             which leaves the last command in force.
         progress: Detection of a robot that makes no progress.
+        evasion: Evasion of moving obstacles.
     """
 
     base_global_planner: str = "navfn/NavfnROS"
@@ -49,3 +51,4 @@ class NavigatorParams:
     command_in_first_cycle: bool = True
     stop_while_planning: bool = True
     progress: ProgressParams = ProgressParams()
+    evasion: EvasionParams = EvasionParams()

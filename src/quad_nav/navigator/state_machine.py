@@ -17,6 +17,7 @@ from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator.control_supervisor import ControlSupervisor, StuckAction, escape_command
 from quad_nav.navigator.costmap_updates import CostmapUpdates
+from quad_nav.navigator.evasion_guard import EvasionGuard, speed_limits
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.navigator.plan_search import PlanSearch
 from quad_nav.navigator.recovery_sequence import NamedRecovery, RecoverySequence
@@ -36,6 +37,7 @@ class StateMachine:
         goal: Goal pose in the global costmap's frame, None if the robot is idle.
         control: Supervisor of the local planner.
         recovery: The recovery behaviours.
+        guard: Evasion of moving obstacles.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class StateMachine:
         self.control = ControlSupervisor(controller)
         self.recovery = RecoverySequence(recoveries, global_costmap, local_costmap)
         self._global, self._local = global_costmap, local_costmap
+        self.guard = EvasionGuard(params.evasion, local_costmap)
         self._updates = updates
         self._peers = peers
         self._search = PlanSearch(params.planner_frequency_hz)
@@ -147,6 +150,18 @@ class StateMachine:
             self._starts_from_rest = False
         if not self.params.command_in_first_cycle and self._search.thread.is_due(tick.now_s):
             self._search_plan(tick, poses.in_global)
+
+    def evade(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
+        """Replace a command that moving obstacles threaten; without a goal, hover or evade."""
+        self.guard.params = self.params.evasion
+        limits = speed_limits(self.control.limiter.usual)
+        if self.control.tracks is None or limits is None:
+            return
+        follows = tick.control is not None and self.state is State.CONTROLLING
+        plan = self.control.plan if follows else None
+        self.guard.check(tick, poses, velocity, self.control.tracks, plan, limits)
+        if tick.evades:
+            self.control.restart_timers(tick.now_s)
 
     def limit_command(self, tick: Tick, pose: Optional[Pose2D], velocity: Twist2D) -> None:
         """Limit the final command so that it cannot lead to a collision with a peer."""

@@ -97,6 +97,7 @@ class Tick:
         outcome: End of the goal.
         yielding: The decision to yield that is in force.
         limited_by: Name of the peer that limited the command, "" if none did.
+        evades: The command evades moving obstacles.
         notes: Messages for the log that tell no fault.
         warnings: Messages for the log that tell a fault.
         is_stopped: The robot stops for lack of data; the first warning says of which.
@@ -114,6 +115,7 @@ class Tick:
     outcome: Optional[Outcome] = None
     yielding: Optional[YieldDecision] = None
     limited_by: str = ""
+    evades: bool = False
     notes: List[str] = field(default_factory=list)
     warnings: List[str] = field(default_factory=list)
     is_stopped: bool = False

@@ -1,0 +1,197 @@
+"""Evasion of moving obstacles: the command that they threaten least.
+
+Each control cycle searches the positions that the robot can reach in space and time. Positions
+near the predicted discs of the obstacles cost their threat, which falls off as a Gaussian with the
+uncertainty of the prediction, and positions far from the end of the plan cost the time to fly
+there. Dynamic programming from the end of the horizon gives the cost of the best motion from each
+cell and step; the commands of a polar grid, and the command that the navigator wishes, are
+followed through one step with the body's lag and take the rest from there. The robot goes behind,
+in front, back or waits as it costs least against all obstacles together. It keeps the wish where
+nothing is much better.
+
+Sources: P. Fiorini, Z. Shiller, "Motion Planning in Dynamic Environments Using Velocity
+Obstacles", IJRR 17(7), 1998: obstacles that keep their velocities, judged in the plane of
+velocities; A. Kushleyev, M. Likhachev, "Time-bounded Lattice for Efficient Planning in Dynamic
+Environments", ICRA 2009: search in space and time against Gaussian predictions, up to a horizon.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
+from quad_nav.kernels.space_time import SpaceTime, command_costs, fill_costs
+from quad_nav.tracking.tracks import Tracks
+
+Floats = NDArray[np.float64]
+
+STEP_S = 0.5
+_STEPS = 12
+_SUBSTEPS = 5  # predictions in each step
+_REACH_CELLS = 2  # cells that the robot flies in a step
+_MAX_CELL_M = 0.2
+_GAIN_PER_S = 3.0  # of the body's velocity loop
+_RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 50.0, 100.0, 0.05
+_SIGMA_M, _SIGMA_MPS = 0.08, 0.08  # least uncertainty of a prediction, and its growth
+_MAX_SIGMA_MPS = 0.12
+_WISH_S = 0.1  # by how much a command has to be better than the wish
+_SPEEDS, _COURSES = 4, 24
+
+
+@dataclass(frozen=True)
+class EvasionParams:
+    """Parameters of the evasion of moving obstacles, see ``docs/moving_obstacles.md``.
+
+    Attributes:
+        avoid_moving_obstacles: Evade tracked obstacles; False restores upstream behaviour.
+        clearance_m: Distance that the robot keeps from where obstacles are predicted.
+    """
+
+    avoid_moving_obstacles: bool = False
+    clearance_m: float = 0.1
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The robot among what stands, in the local costmap's frame.
+
+    Attributes:
+        spec: Grid of the local costmap.
+        costs: uint8[H, W] on it.
+        pose: Pose of the robot.
+        velocity: Velocity of the robot, in its own frame.
+        radius_m: Radius of the robot.
+        max_speed_mps: Greatest speed of the robot in any direction.
+        is_following: The robot follows a plan; else it stays near a point.
+    """
+
+    spec: GridSpec
+    costs: NDArray[np.uint8]
+    pose: Pose2D
+    velocity: Twist2D
+    radius_m: float
+    max_speed_mps: float
+    is_following: bool
+
+
+def evade(
+    params: EvasionParams,
+    around: Surroundings,
+    tracks: Tracks,
+    now_s: float,
+    route: Floats,
+    wish: Twist2D,
+) -> Twist2D:
+    """Return the command that moving obstacles threaten least, the wish where it is as good.
+
+    Args:
+        params: The parameters.
+        around: The robot among what stands.
+        tracks: The moving obstacles, in the local costmap's frame.
+        now_s: Present time.
+        route: float64[n, 2], what is left of the plan, or the point to hover at.
+        wish: The command of the navigator, in the robot's frame.
+    """
+    search = _search_of(around.max_speed_mps)
+    discs = predicted_discs(params, around, tracks, now_s, search.step_s)
+    if not discs.shape[1] and around.is_following:
+        return wish
+    middle = _STEPS * _REACH_CELLS + 3
+    offsets = np.arange(-middle, middle + 1) * search.cell_m
+    blocked = _blocked(around, offsets)
+    to_go = _to_go(around, offsets, route)
+    costs = np.full((_STEPS + 1, len(offsets), len(offsets)), math.inf)
+    fill_costs(search, discs, blocked, to_go, costs)
+    pose = around.pose
+    wished = pose.rotate(wish.vx_mps, wish.vy_mps)
+    commands = _commands(around.max_speed_mps, wished)
+    velocity = pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
+    found = command_costs(search, discs, blocked, costs, velocity, commands)
+    best = int(np.argmin(found[1:])) + 1
+    if found[0] <= found[best] + _WISH_S:
+        return wish
+    vx_mps, vy_mps = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(*commands[best].tolist())
+    return Twist2D(vx_mps, vy_mps, wish.vyaw_radps)
+
+
+def predicted_discs(
+    params: EvasionParams, around: Surroundings, tracks: Tracks, now_s: float, step_s: float
+) -> Floats:
+    """Return where the obstacles will be that can come near within the horizon.
+
+    Returns:
+        float64[t, n, 4], five times in each step: x and y relative to the robot, radius with that
+        of the robot and the clearance, standard deviation of the position.
+    """
+    now = tracks.at(now_s)
+    offsets = now.states[:, :2] - np.array([around.pose.x_m, around.pose.y_m])
+    speeds = np.hypot(now.states[:, 2], now.states[:, 3])
+    radii = now.radii_m + around.radius_m + params.clearance_m
+    horizon_s = _STEPS * step_s
+    reach_m = radii + (speeds + around.max_speed_mps) * horizon_s
+    near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
+    times = np.arange(_STEPS * _SUBSTEPS + 1) * (step_s / _SUBSTEPS)
+    discs = np.empty((len(times), int(near.sum()), 4))
+    discs[:, :, :2] = offsets[near] + times[:, None, None] * now.states[near, 2:]
+    discs[:, :, 2] = radii[near]
+    position = np.trace(now.covariances[near, :2, :2], axis1=1, axis2=2) / 2
+    velocity = np.trace(now.covariances[near, 2:, 2:], axis1=1, axis2=2) / 2
+    growth = np.clip(np.sqrt(velocity), _SIGMA_MPS, _MAX_SIGMA_MPS)
+    discs[:, :, 3] = np.sqrt(position + _SIGMA_M**2) + times[:, None] * growth
+    return discs
+
+
+def _search_of(max_speed_mps: float) -> SpaceTime:
+    """Return the search of a robot: cells are smaller than obstacles, steps are as long."""
+    cell_m = min(max_speed_mps * STEP_S / _REACH_CELLS, _MAX_CELL_M)
+    return SpaceTime(
+        cell_m,
+        cell_m * _REACH_CELLS / max_speed_mps,
+        max_speed_mps,
+        _GAIN_PER_S,
+        _RISK_PER_S,
+        _BLOCKED_PER_S,
+        _AWAY_PER_S,
+    )
+
+
+def _commands(max_speed_mps: float, wished: Tuple[float, float]) -> Floats:
+    """Return the wish, the hover and a polar grid of velocities, float64[c, 2]."""
+    courses = np.arange(_COURSES) * (2.0 * math.pi / _COURSES)
+    ring = np.column_stack([np.cos(courses), np.sin(courses)])
+    speeds = max_speed_mps * np.arange(1, _SPEEDS + 1) / _SPEEDS
+    return np.concatenate([[wished], np.zeros((1, 2)), *(speed * ring for speed in speeds)])
+
+
+def _blocked(around: Surroundings, offsets: Floats) -> NDArray[np.bool_]:
+    """Return the cells of the search where the robot's circle hits what stands, bool[M, M]."""
+    spec = around.spec
+    columns, rows = (
+        np.floor((at_m + offsets - origin_m) / spec.resolution_m).astype(np.int64)
+        for at_m, origin_m in (
+            (around.pose.x_m, spec.origin_x_m),
+            (around.pose.y_m, spec.origin_y_m),
+        )
+    )
+    inside = (
+        ((rows >= 0) & (rows < spec.size_y))[:, None] & (columns >= 0) & (columns < spec.size_x)
+    )
+    costs = around.costs[np.clip(rows, 0, spec.size_y - 1)][:, np.clip(columns, 0, spec.size_x - 1)]
+    return inside & (costs >= INSCRIBED) & (costs != UNKNOWN)
+
+
+def _to_go(around: Surroundings, offsets: Floats, route: Floats) -> Floats:
+    """Return the time to the end of the route from each cell, float64[M, M]."""
+    legs = np.hypot(*np.diff(route, axis=0).T)
+    left = np.concatenate([np.cumsum(legs[::-1])[::-1], [0.0]])
+    x = around.pose.x_m + offsets
+    y = around.pose.y_m + offsets
+    away = np.hypot(x[None, :, None] - route[:, 0], y[:, None, None] - route[:, 1])
+    to_go: Floats = (away + left).min(axis=2) / around.max_speed_mps
+    return to_go

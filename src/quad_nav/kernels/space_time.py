@@ -1,0 +1,159 @@
+"""Search in space and time for the motion that moving obstacles threaten least.
+
+``control/evasion.py`` has the reasoning. Cells are those of a square window of M by M cells around
+the robot, at [row, column] = [y, x]; the robot is in the middle of cell [M // 2, M // 2]. Times
+count from now. Coordinates are metres relative to the robot, along the axes of the costmap's frame.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
+
+_SUBSTEPS = 5
+_FAR = 3.0  # standard deviations at which the threat ends
+
+
+class SpaceTime(NamedTuple):
+    """Resolution and costs of the search."""
+
+    cell_m: float
+    step_s: float
+    max_speed_mps: float
+    gain_per_s: float  # of the body's velocity loop
+    risk_per_s: float  # cost of a second inside an obstacle
+    blocked_per_s: float  # cost of a second on a blocked cell
+    away_per_s: float  # part of the cost to go that a second costs
+
+
+@njit(cache=True, nogil=True)
+def threat(discs: NDArray[np.float64], k: int, x: float, y: float) -> float:
+    """Return the threat at a point at time k: 1 inside a disc, a Gaussian's flank outside.
+
+    Args:
+        discs: float64[t, n, 4], rows x, y, radius and standard deviation of the position.
+        k: Index of the time.
+        x: Position.
+        y: Position.
+    """
+    total = 0.0
+    for n in range(discs.shape[1]):
+        dx, dy = x - discs[k, n, 0], y - discs[k, n, 1]
+        radius, sigma = discs[k, n, 2], discs[k, n, 3]
+        squared = dx * dx + dy * dy
+        if squared >= (radius + _FAR * sigma) ** 2:
+            continue
+        beyond = math.sqrt(squared) - radius
+        total += 1.0 if beyond <= 0.0 else math.exp(-0.5 * (beyond / sigma) ** 2)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def fill_costs(
+    search: SpaceTime,
+    discs: NDArray[np.float64],
+    blocked: NDArray[np.bool_],
+    to_go: NDArray[np.float64],
+    costs: NDArray[np.float64],
+) -> None:
+    """Fill the least cost from each cell and step to the end of the horizon.
+
+    Args:
+        search: Resolution and costs.
+        discs: float64[steps * 5 + 1, n, 4], as for ``threat``, five for each step.
+        blocked: bool[M, M], cells where the robot hits what stands.
+        to_go: float64[M, M], cost of the way that is left after the horizon.
+        costs: float64[steps + 1, M, M], filled from step 1 on, as far as the robot may be.
+    """
+    steps, middle = costs.shape[0] - 1, costs.shape[1] // 2
+    reach = int(search.max_speed_mps * search.step_s / search.cell_m + 1e-6)
+    costs[steps] = to_go
+    for k in range(steps - 1, 0, -1):
+        near = min(k * reach + 2, middle - reach)
+        for row in range(middle - near, middle + near + 1):
+            for column in range(middle - near, middle + near + 1):
+                x, y = (column - middle) * search.cell_m, (row - middle) * search.cell_m
+                cost = search.risk_per_s * threat(discs, k * _SUBSTEPS, x, y)
+                cost += search.away_per_s * to_go[row, column]
+                if blocked[row, column]:
+                    cost += search.blocked_per_s
+                costs[k, row, column] = cost * search.step_s + _least(
+                    costs[k + 1], row, column, reach
+                )
+
+
+@njit(cache=True, nogil=True)
+def _least(costs: NDArray[np.float64], row: int, column: int, reach: int) -> float:
+    """Return the least cost within ``reach`` cells, float64[M, M]."""
+    least = math.inf
+    for i in range(-reach, reach + 1):
+        for j in range(-reach, reach + 1):
+            if i * i + j * j <= reach * reach:
+                least = min(least, costs[row + i, column + j])
+    return least
+
+
+@njit(cache=True, nogil=True)
+def command_costs(
+    search: SpaceTime,
+    discs: NDArray[np.float64],
+    blocked: NDArray[np.bool_],
+    costs: NDArray[np.float64],
+    velocity: Tuple[float, float],
+    commands: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the cost of each command, held for a step, and of the best motion afterwards.
+
+    The robot approaches the command as a first-order lag.
+
+    Args:
+        search: Resolution and costs.
+        discs: As for ``fill_costs``.
+        blocked: bool[M, M].
+        costs: float64[steps + 1, M, M], of ``fill_costs``.
+        velocity: Present velocity of the robot, vx and vy in m/s.
+        commands: float64[c, 2], vx and vy in m/s.
+
+    Returns:
+        float64[c].
+    """
+    middle = costs.shape[1] // 2
+    found = np.empty(commands.shape[0])
+    for n in range(commands.shape[0]):
+        vx, vy = commands[n, 0], commands[n, 1]
+        cost, x, y = 0.0, 0.0, 0.0
+        for k in range(1, _SUBSTEPS + 1):
+            time = k * search.step_s / _SUBSTEPS
+            lag = (1.0 - math.exp(-search.gain_per_s * time)) / search.gain_per_s
+            x = velocity[0] * lag + vx * (time - lag)
+            y = velocity[1] * lag + vy * (time - lag)
+            rate = search.risk_per_s * threat(discs, k, x, y)
+            row, column = int(round(y / search.cell_m)), int(round(x / search.cell_m))
+            if blocked[_inside(row + middle, middle), _inside(column + middle, middle)]:
+                rate += search.blocked_per_s
+            cost += rate * search.step_s / _SUBSTEPS
+        found[n] = cost + _between(costs[1], x / search.cell_m, y / search.cell_m)
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _inside(index: int, middle: int) -> int:
+    return min(max(index, 0), 2 * middle)
+
+
+@njit(cache=True, nogil=True)
+def _between(costs: NDArray[np.float64], x: float, y: float) -> float:
+    """Interpolate float64[M, M] at (x, y) cells from the middle."""
+    middle = costs.shape[0] // 2
+    column, row = math.floor(x), math.floor(y)
+    right, up = x - column, y - row
+    i, j = _inside(int(row) + middle, middle), _inside(int(column) + middle, middle)
+    k, m = _inside(i + 1, middle), _inside(j + 1, middle)
+    return (1.0 - up) * ((1.0 - right) * costs[i, j] + right * costs[i, m]) + up * (
+        (1.0 - right) * costs[k, j] + right * costs[k, m]
+    )

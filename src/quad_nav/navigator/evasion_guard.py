@@ -1,0 +1,147 @@
+"""Evasion guard: the last word on the command when moving obstacles come near.
+
+It acts in every state: while the robot follows a plan, waits for a peer, recovers, or hovers
+without a goal. A robot that stands still stays near the point where it stopped, and returns to it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Optional
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.control.dwa_planner_params import DwaParams
+from quad_nav.control.evasion import EvasionParams, Surroundings, evade
+from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
+from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.geometry import Pose2D, Twist2D, angle_difference
+from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.tracking.tracks import Tracks
+
+Floats = NDArray[np.float64]
+
+_AT_POINT_M = 0.15
+_ROUTE_POINTS = 40
+_AHEAD_M = 1.5
+_TURN_GAIN_PER_S = 1.0
+_MIN_TURN_RAD = 0.1
+
+
+@dataclass(frozen=True)
+class SpeedLimits:
+    """Greatest speed in any direction and greatest turn rate of a local planner."""
+
+    speed_mps: float
+    turn_radps: float
+
+
+class EvasionGuard:
+    """Replaces commands that moving obstacles threaten.
+
+    Attributes:
+        params: The parameters; they may change in flight.
+        is_evading: The guard chose the last command.
+    """
+
+    def __init__(self, params: EvasionParams, local_costmap: LayeredCostmap) -> None:
+        """Guard a robot that hovers."""
+        self.params = params
+        self.is_evading = False
+        self._costmap = local_costmap
+        self._point: Optional[Pose2D] = None  # where a robot that follows no plan stopped
+
+    def check(
+        self,
+        tick: Tick,
+        poses: RobotPoses,
+        velocity: Twist2D,
+        tracks: Tracks,
+        plan: Optional[Floats],
+        limits: SpeedLimits,
+    ) -> None:
+        """Replace the command of a step by that which moving obstacles threaten least.
+
+        Args:
+            tick: The step.
+            poses: Poses of the robot in the costmaps' frames.
+            velocity: Velocity of the robot, in its own frame.
+            tracks: The moving obstacles, in the local costmap's frame.
+            plan: float64[n, 3], the plan that the robot follows, in the global costmap's frame;
+                None if it follows none.
+            limits: Greatest speeds of the robot.
+        """
+        local_from_global = poses.local_from_global
+        if poses.in_local is None or poses.in_global is None or local_from_global is None:
+            return
+        wish = tick.command or Twist2D()
+        route = self._route(plan, poses.in_global, local_from_global)
+        if not len(tracks) and not self._is_displaced(poses.in_global):
+            self._end(tick)
+            return
+        around = self._surroundings(poses.in_local, velocity, limits, plan is not None)
+        command = evade(self.params, around, tracks, tick.now_s, route, wish)
+        if command is wish:
+            self._end(tick)
+            return
+        turn_radps = _turn(route, poses.in_local, limits) if plan is not None else 0.0
+        tick.command = Twist2D(command.vx_mps, command.vy_mps, turn_radps)
+        tick.evades = self.is_evading = True
+
+    def _surroundings(
+        self, pose: Pose2D, velocity: Twist2D, limits: SpeedLimits, is_following: bool
+    ) -> Surroundings:
+        costmap = self._costmap
+        return Surroundings(
+            costmap.spec,
+            costmap.costs,
+            pose,
+            velocity,
+            costmap.inscribed_radius_m,
+            limits.speed_mps,
+            is_following,
+        )
+
+    def _end(self, tick: Tick) -> None:
+        if self.is_evading and tick.command is None:
+            tick.command = Twist2D()
+        self.is_evading = False
+
+    def _is_displaced(self, pose: Pose2D) -> bool:
+        return self._point is not None and pose.distance_to(self._point) > _AT_POINT_M
+
+    def _route(self, plan: Optional[Floats], pose: Pose2D, local_from_global: Pose2D) -> Floats:
+        """Return the points to fly along in the local costmap's frame, float64[n, 2]."""
+        if plan is not None and len(plan):
+            self._point = None
+            rows = np.unique(np.linspace(0, len(plan) - 1, _ROUTE_POINTS).astype(np.int64))
+            x, y = np.ascontiguousarray(plan[rows, :2].T)
+        else:
+            self._point = self._point or pose
+            x, y = np.array([self._point.x_m]), np.array([self._point.y_m])
+        return np.column_stack(local_from_global.transform(x, y))
+
+
+def _turn(route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:
+    """Return the turn rate that faces the route some way ahead."""
+    away = np.hypot(route[:, 0] - pose.x_m, route[:, 1] - pose.y_m)
+    ahead = np.flatnonzero(away[int(away.argmin()) :] >= _AHEAD_M)
+    x_m, y_m = route[int(away.argmin()) + int(ahead[0]) if len(ahead) else -1].tolist()
+    turn_rad = angle_difference(math.atan2(y_m - pose.y_m, x_m - pose.x_m), pose.yaw_rad)
+    if abs(turn_rad) < _MIN_TURN_RAD:
+        return 0.0
+    return max(-limits.turn_radps, min(_TURN_GAIN_PER_S * turn_rad, limits.turn_radps))
+
+
+def speed_limits(params: Any) -> Optional[SpeedLimits]:
+    """Return the limits of a local planner's parameters, None if it does not fly sideways."""
+    if isinstance(params, TrajectoryPlannerParams) and params.holonomic_robot:
+        return SpeedLimits(params.max_vel_x_mps, params.max_vel_theta_radps)
+    if isinstance(params, DwaParams) and params.max_vel_y_mps > 0.0:
+        speed_mps = params.max_vel_trans_mps
+        if speed_mps < 0.0:
+            speed_mps = params.max_vel_x_mps
+        return SpeedLimits(speed_mps, params.max_vel_theta_radps)
+    return None
