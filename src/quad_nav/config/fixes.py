@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Mapping, Tuple, TypeVar, cast
 
+from quad_nav.config.moving_obstacles import MOVING_OBSTACLES, Switch
 from quad_nav.config.reader import fields
 from quad_nav.config.spec import RESTORE_DEFAULTS, Parameter, Table, double, flag
 from quad_nav.control.dwa_planner_params import DwaParams
-from quad_nav.control.evasion import EvasionParams
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
@@ -23,14 +23,13 @@ from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.peers.coordinator import PeerParams
 from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
-from quad_nav.tracking.params import TrackerParams
 
 FIXES = "fixes"  # the name of the group below the node's own namespace
 
 _Params = TypeVar("_Params")
 
 # The switches in the order of dynamic_reconfigure, each with the dataclasses that own it.
-_SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
+_SWITCHES: Tuple[Switch, ...] = (
     (
         double(
             "progress_timeout",
@@ -282,109 +281,7 @@ _SWITCHES: Tuple[Tuple[Parameter, Tuple[type, ...]], ...] = (
         ),
         (VoxelLayerParams,),
     ),
-    (
-        flag(
-            "track_moving_obstacles",
-            False,
-            "track_moving_obstacles",
-            "Track what moves and says nothing, such as people, in the scans of LIDARs, and leave"
-            " no trace of it in the costmaps.",
-        ),
-        (TrackerParams,),
-    ),
-    (
-        double(
-            "moving_obstacle_range",
-            10.0,
-            "range_m",
-            "metres",
-            "Obstacles are tracked up to this range.",
-            low=0,
-            high=100,
-        ),
-        (TrackerParams,),
-    ),
-    (
-        double(
-            "moving_obstacle_min_speed",
-            0.2,
-            "min_speed_mps",
-            "metres/s",
-            "Slower obstacles count as standing.",
-            low=0,
-            high=5,
-        ),
-        (TrackerParams,),
-    ),
-    (
-        double(
-            "moving_obstacle_max_radius",
-            1.0,
-            "max_radius_m",
-            "metres",
-            "Larger obstacles count as standing.",
-            low=0,
-            high=10,
-        ),
-        (TrackerParams,),
-    ),
-    (
-        double(
-            "moving_obstacle_acceleration",
-            1.5,
-            "acceleration_mps2",
-            "metres/s^2",
-            "Standard deviation of the accelerations of tracked obstacles.",
-            low=0,
-            high=20,
-        ),
-        (TrackerParams,),
-    ),
-    (
-        double(
-            "moving_obstacle_timeout",
-            1.5,
-            "lost_after_s",
-            "seconds",
-            "A tracked obstacle that is hidden is predicted for so long.",
-            low=0,
-            high=60,
-        ),
-        (TrackerParams,),
-    ),
-    (
-        double(
-            "moving_obstacle_margin",
-            0.12,
-            "margin_m",
-            "metres",
-            "Points that are inside free space seen earlier by so much have moved.",
-            low=0,
-            high=1,
-        ),
-        (TrackerParams,),
-    ),
-    (
-        flag(
-            "avoid_moving_obstacles",
-            False,
-            "avoid_moving_obstacles",
-            "A robot that flies sideways evades tracked obstacles, also while it hovers.",
-        ),
-        (EvasionParams,),
-    ),
-    (
-        double(
-            "moving_obstacle_clearance",
-            0.1,
-            "clearance_m",
-            "metres",
-            "Distance that the robot keeps from where tracked obstacles are predicted.",
-            low=0,
-            high=2,
-        ),
-        (EvasionParams,),
-    ),
+    *MOVING_OBSTACLES,
 )
 
 FIXES_TABLE = Table(
