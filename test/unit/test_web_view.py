@@ -161,6 +161,16 @@ def test_samples_are_at_least_a_tenth_of_a_second_of_wall_time_apart():
     assert clock.now_s - 100.0 == pytest.approx(1.0, abs=0.11)
 
 
+def test_samples_are_further_apart_at_full_speed():
+    clock = Clock(0.005)
+    page = FakePage(clock)
+    fly(setup_of(time_limit_s=6.0), [WebView(page, FlightActions(rate=0.0), clock)])
+    gaps_s = np.diff(page.times_s)[:-1]  # the last one is sent at the end of the flight
+    assert len(gaps_s) >= 3
+    assert gaps_s.min() >= 0.35 - 1e-9
+    assert gaps_s.max() < 0.35 + 0.1 + 4 * 0.005  # people's actions are looked for each 0.1 s
+
+
 @pytest.mark.parametrize("rate, wall_s", [(0.5, 2.0), (4.0, 0.25)])
 def test_the_rate_is_simulated_seconds_per_second(rate, wall_s):
     clock = Clock()

@@ -22,6 +22,9 @@ from quad_nav.view.state import MAX_EVENTS, Wanted
 from quad_nav.web.process import Batch, Call
 
 PERIOD_S = 0.1
+FULL_SPEED_PERIOD_S = 0.35
+"""Least time between samples at full speed, when the flight and the browser share the processor and
+seconds of simulated time pass from one sample to the next."""
 SHARE = 0.04
 """Largest part of the wall time that is spent on samples, unless there is one per second."""
 _LONGEST_REST_S = 1.0
@@ -153,7 +156,8 @@ class WebView(FlightObserver):
             self._send()
             end_s = self._clock()
             rest_s = min((end_s - start_s) / SHARE, _LONGEST_REST_S)
-            self._next_sample_s = max(start_s + PERIOD_S, end_s + rest_s)
+            period_s = PERIOD_S if self.actions.rate > 0.0 else FULL_SPEED_PERIOD_S
+            self._next_sample_s = max(start_s + period_s, end_s + rest_s)
 
     def _send(self, everything: bool = False) -> None:
         now_s = self._flight.now_s

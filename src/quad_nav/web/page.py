@@ -30,6 +30,7 @@ from quad_nav.web.robot_panels import RobotCard, RobotTable
 _STYLE = Path(__file__).parent / "static" / "page.css"
 _LONGEST = 600  # characters of an answer
 _REFRESH_S = 0.5
+_FULL_SPEED_REFRESH_S = 1.0  # the flight needs the processor
 _READ_S = 2.0  # parameters and goal files, which others change, too
 
 SIDE = {"robots": "Robots", "parameters": "Parameters", "goals": "Goals"}
@@ -85,7 +86,7 @@ class Page:
         self.client.on_select(self._selected)
         self.refresh()
         # Both end with the page: NiceGUI deletes them with the client.
-        ui.timer(_REFRESH_S, self.refresh)
+        self._timer = ui.timer(_REFRESH_S, self._tick)
         ui.timer(_READ_S, self._read)
 
     # -- elements --------------------------------------------------------------------
@@ -161,6 +162,12 @@ class Page:
             self.diagnostics = Diagnostics(self.client)
 
     # -- what it shows ---------------------------------------------------------------
+
+    def _tick(self) -> None:
+        self.refresh()
+        flight = self.client.data("flight")
+        is_at_full_speed = flight.get("wanted_rate") == 0.0 and flight.get("state") == "running"
+        self._timer.interval = _FULL_SPEED_REFRESH_S if is_at_full_speed else _REFRESH_S
 
     def refresh(self) -> None:
         """Show what has changed in the state."""

@@ -9,6 +9,8 @@ import { sharedLink } from "./link.js";
 import { SampleHistory } from "./samples.js";
 
 const PERIOD_MS = 500;
+const FULL_SPEED_PERIOD_MS = 1000; // the flight needs the processor
+const STILL_FRAMES = 1; // after which ECharts stops to ask the browser for frames
 
 /** The charts in an element of the page. */
 export class ChartsView {
@@ -27,9 +29,11 @@ export class ChartsView {
     root.append(this._key, this._plot);
     this._link = sharedLink();
     this._chart = echarts.init(this._plot, null, { renderer: "canvas" });
+    this._chart.getZr().setSleepAfterStill(STILL_FRAMES);
+    this._drawn_ms = 0;
     this._onFrame = () => this._read();
     this._link.addEventListener("frame", this._onFrame);
-    this._timer = setInterval(() => this._draw(), PERIOD_MS);
+    this._timer = setInterval(() => this._drawIfDue(), PERIOD_MS);
     this._resizes = new ResizeObserver(() => this._resize());
     this._resizes.observe(this._plot);
   }
@@ -72,11 +76,20 @@ export class ChartsView {
     }
   }
 
+  _drawIfDue() {
+    const isAtFullSpeed = this._link.store.get("flight")?.data.wanted_rate === 0;
+    const period_ms = isAtFullSpeed ? FULL_SPEED_PERIOD_MS : PERIOD_MS;
+    if (performance.now() - this._drawn_ms > period_ms - PERIOD_MS / 2) {
+      this._draw();
+    }
+  }
+
   _draw() {
     if (!this._hasNews || !this._isSeen || !this._history.count) {
       return;
     }
     this._hasNews = false;
+    this._drawn_ms = performance.now();
     const colours = this._link.store.get("robots")?.data.colours ?? [];
     const colourOf = (robot) => colours[robot] ?? INK.limited;
     const series = seriesOptions(this._history, this._selected, colourOf);
