@@ -107,7 +107,7 @@ def test_the_plan_of_a_study_ends_at_its_flights(tmp_path):
 
 
 def test_a_sweep_says_how_many_flights_it_flies(tmp_path, monkeypatch):
-    without_flying(monkeypatch, "sweep")
+    without_flying(monkeypatch, "sweep_flights")
     mission = write_mission(tmp_path)
     over = ["--over", "TrajectoryPlannerROS/max_vel_x=0.3,0.4", "--flights", "4"]
     files = ["--scene", str(mission.scene), "--goals", str(mission.goals)]

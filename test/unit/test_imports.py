@@ -17,7 +17,7 @@ LAYERS = [
     {"versions"},
     {"__init__"},  # quad_nav.__version__
     {"geometry", "grid", "files"},
-    {"footprint", "timing"},
+    {"footprint", "timing", "results"},
     {"kernels"},
     {"tracking"},
     {"costmap", "plan", "control", "sim"},

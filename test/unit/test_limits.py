@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from quad_nav import errors
-from quad_nav.barn import worlds
+from quad_nav.barn import arrays
 from quad_nav.config import workload
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.static import StaticLayerParams
@@ -56,7 +56,7 @@ ROWS = {
     "image of a map": [map_image.MAX_BYTES, map_image.MAX_CELLS, values.MAX_MEMORY_BYTES // 10**9],
     "cells of a map": [map_file.MIN_RESOLUTION_M, map_file.MAX_RESOLUTION_M, map_file.MAX_BOXES],
     "costmap": [values.MAX_MEMORY_BYTES // 10**9, workload.MAX_POINTS],
-    "BARN worlds (`.npz`)": [worlds.MAX_BYTES],
+    "BARN worlds (`.npz`)": [arrays.MAX_BYTES],
     "recording that is read": [
         bag_trace.MAX_MEMORY_BYTES / 1e9,
         bag_trace.LONGEST_FLIGHT_S / 86400,

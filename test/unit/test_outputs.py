@@ -244,7 +244,7 @@ class PaperWorkers:
 @pytest.fixture
 def on_paper(tmp_path, monkeypatch):
     """Options of a mission that sweep and tune fly on paper."""
-    for command in ("sweep", "tune"):
+    for command in ("sweep_flights", "tune_study"):
         monkeypatch.setattr(f"quad_nav.cli.{command}.workers_of", lambda *_: PaperWorkers())
     monkeypatch.setattr("quad_nav.cli.flights_bar.warm_up", lambda _: None)
     monkeypatch.setattr("quad_nav.cli.flights_bar.simulate", lambda: None)

@@ -85,7 +85,7 @@ def tune_command(folder):
 
 
 def test_the_command_prints_the_best_and_ends_with_status_1(tmp_path, monkeypatch):
-    without_flying(monkeypatch, "tune")
+    without_flying(monkeypatch, "tune_study")
     fill_disk(monkeypatch, 40)
     done = CliRunner().invoke(tune, tune_command(tmp_path))
     assert done.exit_code == 1, done.output
@@ -96,7 +96,7 @@ def test_the_command_prints_the_best_and_ends_with_status_1(tmp_path, monkeypatc
 
 
 def test_the_command_refuses_a_disk_that_is_full_already(tmp_path, monkeypatch):
-    without_flying(monkeypatch, "tune")
+    without_flying(monkeypatch, "tune_study")
     for most in (1, 2, 10):
         with monkeypatch.context() as patch:
             fill_disk(patch, most)
@@ -106,7 +106,7 @@ def test_the_command_refuses_a_disk_that_is_full_already(tmp_path, monkeypatch):
 
 
 def test_a_sweep_flies_on_without_storing(tmp_path, monkeypatch):
-    without_flying(monkeypatch, "sweep")
+    without_flying(monkeypatch, "sweep_flights")
     mission, path = write_mission(tmp_path), tmp_path / "flights.db"
     arguments = ["--scene", str(mission.scene), "--goals", str(mission.goals), "--flights", "30"]
     arguments += ["--over", "TrajectoryPlannerROS/max_vel_x=0.3,0.4", "--cache", str(path)]

@@ -228,8 +228,8 @@ def test_spaces_that_are_refused(tmp_path, space, more, words):
 
 
 def test_the_start_names_the_limits_that_stay(tmp_path, monkeypatch):
-    without_flying(monkeypatch, "tune")
-    monkeypatch.setattr("quad_nav.cli.tune.write_result", lambda *_: ())
+    without_flying(monkeypatch, "tune_study")
+    monkeypatch.setattr("quad_nav.cli.tune_study.write_result", lambda *_: ())
     space = "TrajectoryPlannerROS/max_vel_x: {range: [0.2, 1]}\nplanner_frequency: {range: [1, 2]}"
     sizes = ["--candidates", "2", "--flights", "1", "--held-out", "1", "--final-flights", "1"]
     done = CliRunner().invoke(tune, command(tmp_path, space, *sizes))

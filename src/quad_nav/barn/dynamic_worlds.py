@@ -18,12 +18,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from quad_nav.barn.worlds import read_arrays
+from quad_nav.barn.arrays import Arrays, numbers_array, read_arrays, world_numbers
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.motion import Motion
@@ -95,16 +94,9 @@ def load_dynamic_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[DynamicWo
         InputError: Lists every fault of the file.
     """
     arrays = read_arrays(path, _ARRAYS)
-    numbers, difficulties = _numbers(arrays, path)
-    absent = [str(number) for number in only if number not in numbers]
-    if absent:
-        raise InputError(
-            [
-                f"{path}: no world {', '.join(absent)}; expected numbers of its "
-                f"{len(numbers)} worlds, such as {numbers[0]}"
-            ]
-        )
+    numbers = world_numbers(arrays, path, only)
     problems: List[str] = []
+    difficulties = _difficulties(arrays, path, len(numbers), problems)
     worlds = [
         _world(arrays, number, difficulty, path, problems)
         for number, difficulty in zip(numbers, difficulties)
@@ -115,34 +107,21 @@ def load_dynamic_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[DynamicWo
     return tuple(worlds)
 
 
-def _numbers(arrays: Dict[str, NDArray[Any]], path: Path) -> Tuple[List[int], List[int]]:
-    """Return numbers and difficulties of the worlds."""
-    rows = []
-    for name in ("index", "difficulty"):
-        row = arrays.get(name, np.zeros((0, 0)))
-        if row.ndim != 1 or row.dtype.kind not in "iu" or len(row) == 0:
-            raise InputError(
-                [f"{path}: {name}: {row.dtype} {row.shape}, expected a row of integers"]
-            )
-        rows.append([int(value) for value in row])
-    numbers, difficulties = rows
-    problems = []
-    if len(set(numbers)) < len(numbers):
-        problems.append(f"{path}: index: duplicate numbers, expected each once")
-    if len(difficulties) != len(numbers) or not set(difficulties) <= {0, 1, 2}:
-        problems.append(f"{path}: difficulty: expected 0, 1 or 2 for each of {len(numbers)} worlds")
-    if problems:
-        raise InputError(problems)
-    return numbers, difficulties
+def _difficulties(arrays: Arrays, path: Path, count: int, problems: List[str]) -> List[int]:
+    """Return the difficulty of each world."""
+    found = numbers_array(arrays, "difficulty", path, problems, (count,)).tolist()
+    if not set(found) <= {0, 1, 2}:
+        problems.append(f"{path}: difficulty: expected 0, 1 or 2 for each of {count} worlds")
+    return [int(one) for one in found]
 
 
 def _world(
-    arrays: Dict[str, NDArray[Any]], number: int, difficulty: int, path: Path, problems: List[str]
+    arrays: Arrays, number: int, difficulty: int, path: Path, problems: List[str]
 ) -> DynamicWorld:
-    radii = _floats(arrays, f"radius_{number}", path, problems, (None,))
-    times = _floats(arrays, f"times_{number}", path, problems, (len(radii), None))
-    points = _floats(arrays, f"xy_{number}", path, problems, (*times.shape, 2))
-    walls = _floats(arrays, f"walls_{number}", path, problems, (None, 5))
+    radii = numbers_array(arrays, f"radius_{number}", path, problems, (None,))
+    times = numbers_array(arrays, f"times_{number}", path, problems, (len(radii), None))
+    points = numbers_array(arrays, f"xy_{number}", path, problems, (*times.shape, 2))
+    walls = numbers_array(arrays, f"walls_{number}", path, problems, (None, 5))
     counts = np.sum(np.isfinite(times), axis=1).tolist()
     sound = points.shape[:2] == times.shape and all(
         1 <= count <= MAX_KEYFRAMES
@@ -171,24 +150,3 @@ def _world(
             for k, (x_m, y_m, size_x_m, size_y_m, yaw_rad) in enumerate(walls.tolist())
         ),
     )
-
-
-def _floats(
-    arrays: Dict[str, NDArray[Any]],
-    name: str,
-    path: Path,
-    problems: List[str],
-    shape: Tuple[Any, ...],
-) -> NDArray[np.float64]:
-    """Return an array of this shape, of which None is any length; an empty one after a fault."""
-    array = arrays.get(name, np.zeros(0))
-    fits = array.ndim == len(shape) and all(
-        wanted is None or length == wanted for length, wanted in zip(array.shape, shape)
-    )
-    if not fits or array.dtype.kind not in "fiu":
-        expected = ", ".join("any" if one is None else str(one) for one in shape)
-        problems.append(
-            f"{path}: {name}: {array.dtype} {array.shape}, expected numbers ({expected})"
-        )
-        return np.zeros(tuple(one or 0 for one in shape))
-    return array.astype(float)

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-import textwrap
 from dataclasses import asdict, dataclass
-from typing import Any, Dict, List, Optional, Sequence, Tuple
-
-import tabulate
+from typing import Any, Dict, List, Sequence, Tuple
 
 from quad_nav.barn.protocol import Run
 from quad_nav.barn.setup import SCANS_PER_S, Contestant
 from quad_nav.barn.statistics import BarnStatistics, barn_statistics
 from quad_nav.barn.worlds import ALTITUDE_M, MARGIN_M
+from quad_nav.results import (
+    csv_text,
+    interruption,
+    interval_text,
+    number_text,
+    percent,
+    rounded,
+    table,
+    versions_text,
+    wrapped,
+)
 from quad_nav.sim.simulation import STEPS_PER_S
 from quad_nav.versions import versions
 
-_WIDTH = 96
-_HEADER = [
+OUTCOME_HEADER = [
     "",
     "worlds",
     "flights",
@@ -28,7 +33,6 @@ _HEADER = [
     "collision\n(%)",
     "time-out\n(%)",
     "mean\ntime (s)",
-    "metric",
 ]
 _COLUMNS = (
     "world",
@@ -68,21 +72,24 @@ class Results:
     @property
     def world_rows(self) -> List[Tuple[str, BarnStatistics]]:
         """Statistics of each world, by name."""
-        worlds: Dict[int, List[Run]] = {}
-        for run in self.runs:
-            worlds.setdefault(run.world, []).append(run)
-        return [(f"world {number}", barn_statistics(runs)) for number, runs in worlds.items()]
+        return world_statistics(self.runs)
+
+
+def world_statistics(runs: Sequence[Run]) -> List[Tuple[str, BarnStatistics]]:
+    """Return the statistics of each world, by name."""
+    worlds: Dict[int, List[Run]] = {}
+    for run in runs:
+        worlds.setdefault(run.world, []).append(run)
+    return [(f"world {number}", barn_statistics(flown)) for number, flown in worlds.items()]
 
 
 def text(results: Results, per_world: bool = False) -> str:
     """Format the results for a terminal of 100 columns."""
     seeds = sorted({run.seed for run in results.runs})
-    with_versions = ", ".join(f"{name} {version}" for name, version in versions().items())
     parts = [_table(results.world_rows)] if per_world and results.runs else []
     parts += [_table(results.rows) if results.runs else "No flight was completed."]
     notes = _collisions(results.runs)
-    if len(results.runs) < results.wanted:
-        notes.append(f"Interrupted after {len(results.runs)} of {results.wanted} flights.")
+    notes += interruption(len(results.runs), results.wanted)
     if seeds:
         per_minute = 60.0 * len(results.runs) / max(results.wall_time_s, 1e-3)
         notes.append(
@@ -90,7 +97,7 @@ def text(results: Results, per_world: bool = False) -> str:
             f"{seeds[0] if len(seeds) == 1 else f'{seeds[0]} to {seeds[-1]}'}, "
             f"{results.wall_time_s:.0f} s, {per_minute:.1f} flights per minute."
         )
-    notes.append(with_versions)
+    notes.append(versions_text())
     return "\n\n".join([*parts, "\n".join(notes), differences(results.contestant)])
 
 
@@ -117,14 +124,6 @@ def differences(contestant: Contestant) -> str:
     return wrapped("Differences from the challenge:", lines)
 
 
-def wrapped(head: str, lines: Sequence[str]) -> str:
-    """Format indented paragraphs below a line for a terminal of 100 columns."""
-    paragraphs = (
-        textwrap.fill(line, _WIDTH, initial_indent="  ", subsequent_indent="    ") for line in lines
-    )
-    return "\n".join([head, *paragraphs])
-
-
 def to_json(results: Results) -> Dict[str, Any]:
     """Convert the results to JSON data."""
     return {
@@ -134,49 +133,36 @@ def to_json(results: Results) -> Dict[str, Any]:
         "wall_time_s": round(results.wall_time_s, 3),
         "versions": versions(),
         "differences": differences(results.contestant),
-        "figures": {name: _statistics_json(row) for name, row in results.rows},
-        "worlds": {name: _statistics_json(row) for name, row in results.world_rows},
-        "runs": [_run_row(run) for run in results.runs],
+        "figures": {name: statistics_json(row) for name, row in results.rows},
+        "worlds": {name: statistics_json(row) for name, row in results.world_rows},
+        "runs": [run_row(run) for run in results.runs],
     }
 
 
 def to_csv(results: Results) -> str:
     """Return a row for each run."""
-    file = io.StringIO()
-    writer = csv.DictWriter(file, _COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(_run_row(run) for run in results.runs)
-    return file.getvalue().rstrip("\n")
+    return csv_text([run_row(run) for run in results.runs], _COLUMNS)
 
 
 def _table(rows: Sequence[Tuple[str, BarnStatistics]]) -> str:
-    return tabulate.tabulate(
-        [_row(name, row) for name, row in rows],
-        _HEADER,
-        tablefmt="simple",
-        disable_numparse=True,
-        colalign=("left",) + ("right",) * 8,
+    return table(
+        [[*outcome_cells(name, row), f"{row.metric:.3f}"] for name, row in rows],
+        [*OUTCOME_HEADER, "metric"],
     )
 
 
-def _row(name: str, row: BarnStatistics) -> List[str]:
-    low, high = row.success_interval
-    time = "-" if row.mean_time_s is None else f"{row.mean_time_s:.1f}"
+def outcome_cells(name: str, row: BarnStatistics) -> List[str]:
+    """Return the cells below ``OUTCOME_HEADER``."""
     return [
         name,
         str(row.worlds),
         str(row.runs),
-        _percent(row.successes, row.runs),
-        f"{100 * low:.1f}-{100 * high:.1f}",
-        _percent(row.collisions, row.runs),
-        _percent(row.time_outs, row.runs),
-        time,
-        f"{row.metric:.3f}",
+        percent(row.successes, row.runs),
+        interval_text(row.success_interval),
+        percent(row.collisions, row.runs),
+        percent(row.time_outs, row.runs),
+        number_text(row.mean_time_s),
     ]
-
-
-def _percent(count: int, runs: int) -> str:
-    return f"{100 * count / runs:.1f}"
 
 
 def _collisions(runs: Sequence[Run]) -> List[str]:
@@ -192,35 +178,33 @@ def _collisions(runs: Sequence[Run]) -> List[str]:
     return lines
 
 
-def _statistics_json(row: BarnStatistics) -> Dict[str, Any]:
+def statistics_json(row: BarnStatistics) -> Dict[str, Any]:
+    """Convert statistics to JSON data."""
     low, high = row.success_interval
     return {
         **asdict(row),
-        "success_rate": _rounded(row.successes / row.runs),
-        "success_interval": [_rounded(low), _rounded(high)],
-        "mean_time_s": _rounded(row.mean_time_s),
-        "metric": _rounded(row.metric),
+        "success_rate": rounded(row.successes / row.runs),
+        "success_interval": [rounded(low), rounded(high)],
+        "mean_time_s": rounded(row.mean_time_s),
+        "metric": rounded(row.metric),
     }
 
 
-def _run_row(run: Run) -> Dict[str, Any]:
+def run_row(run: Run) -> Dict[str, Any]:
+    """Return a run's values by the names of their columns."""
     x_m, y_m = run.touched_at_m or (None, None)
     return {
         "world": run.world,
         "run": run.run,
         "seed": run.seed,
         "outcome": run.outcome.value,
-        "time_s": _rounded(run.time_s),
-        "metric": _rounded(run.metric),
-        "path_length_m": _rounded(run.path_length_m),
-        "min_clearance_m": _rounded(run.min_clearance_m),
+        "time_s": rounded(run.time_s),
+        "metric": rounded(run.metric),
+        "path_length_m": rounded(run.path_length_m),
+        "min_clearance_m": rounded(run.min_clearance_m),
         "recoveries": run.recoveries,
         "gave_up": run.gave_up,
         "touched": run.touched,
-        "touched_x_m": _rounded(x_m),
-        "touched_y_m": _rounded(y_m),
+        "touched_x_m": rounded(x_m),
+        "touched_y_m": rounded(y_m),
     }
-
-
-def _rounded(value: Optional[float]) -> Optional[float]:
-    return None if value is None else round(value, 4)

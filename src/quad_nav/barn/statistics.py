@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from dataclasses import dataclass
 from typing import DefaultDict, List, Optional, Sequence, Tuple
 
 from quad_nav.barn.protocol import Outcome, Run
-
-_Z = 1.959963984540054
-"""Two-sided 95 % quantile of the normal distribution."""
+from quad_nav.results import wilson_interval
 
 
 @dataclass(frozen=True)
@@ -68,15 +65,3 @@ def barn_statistics(runs: Sequence[Run]) -> BarnStatistics:
         sum(means_s) / len(means_s) if means_s else None,
         sum(run.metric for run in runs) / len(runs),
     )
-
-
-def wilson_interval(successes: int, trials: int) -> Tuple[float, float]:
-    """Return Wilson's 95 % score interval of a rate, for independent trials.
-
-    Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference",
-    Journal of the American Statistical Association 22, 1927.
-    """
-    rate, weight = successes / trials, _Z * _Z / trials
-    centre = (rate + weight / 2) / (1 + weight)
-    half = _Z * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
-    return max(0.0, centre - half), min(1.0, centre + half)

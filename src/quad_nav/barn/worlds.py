@@ -11,18 +11,16 @@ Cell [row, column] is centred at x = 0.15 column - 4.425, y = 0.15 row + 0.075.
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.barn.arrays import Arrays, numbers_array, read_arrays, world_numbers
 from quad_nav.barn.protocol import GOAL_M, START
 from quad_nav.errors import InputError
-from quad_nav.files.user_files import open_file
 from quad_nav.sim.scene import Cylinder, Scene, Walls
 
 ALTITUDE_M = 0.5
@@ -34,8 +32,6 @@ FIELD = (64, 30)
 """Number of rows along y and of columns along x."""
 MARGIN_M = 5.0
 """Free floor between the field, start and goal and the scene's walls."""
-MAX_BYTES = 256 * 1024 * 1024
-"""Of all arrays of a file, unpacked."""
 _LOW_X_M = -4.5
 
 
@@ -87,19 +83,15 @@ def load_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[BarnWorld, ...]:
         InputError: Lists every fault of the file.
     """
     arrays = read_arrays(path, "index, occupied and path_<index>")
-    numbers = _numbers(arrays, path)
-    absent = [str(number) for number in only if number not in numbers]
-    if absent:
-        raise InputError(
-            [
-                f"{path}: no world {', '.join(absent)}; expected numbers of its "
-                f"{len(numbers)} worlds, such as {numbers[0]}"
-            ]
-        )
+    numbers = world_numbers(arrays, path, only)
     problems: List[str] = []
+    shape = (len(numbers), *FIELD)
+    occupied = numbers_array(arrays, "occupied", path, problems, shape)
+    if problems:
+        raise InputError(problems)
     worlds = [
-        BarnWorld(number, np.argwhere(occupied), _length_m(arrays, number, path, problems))
-        for number, occupied in zip(numbers, arrays["occupied"])
+        BarnWorld(number, np.argwhere(field), _length_m(arrays, number, path, problems))
+        for number, field in zip(numbers, occupied)
         if not only or number in only
     ]
     if problems:
@@ -107,66 +99,12 @@ def load_worlds(path: Path, only: Sequence[int] = ()) -> Tuple[BarnWorld, ...]:
     return tuple(worlds)
 
 
-def read_arrays(path: Path, expected: str) -> Dict[str, NDArray[Any]]:
-    """Read the arrays of an ``.npz`` file that somebody else made.
-
-    Raises:
-        InputError: The file cannot be read, with the ``expected`` arrays.
-    """
-    try:
-        with open_file(path) as opened, np.load(opened, allow_pickle=False) as file:
-            size = sum(member.file_size for member in file.zip.infolist())
-            if size > MAX_BYTES:
-                raise ValueError(f"{size} bytes, expected at most {MAX_BYTES} are read")
-            return {name: file[name] for name in file.files}
-    except (
-        OSError,
-        EOFError,
-        ValueError,
-        AttributeError,
-        TypeError,
-        NotImplementedError,
-        MemoryError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        raise InputError(
-            [f"{path}: cannot read: {error}; expected an .npz with {expected}"]
-        ) from error
-
-
-def _numbers(arrays: Dict[str, NDArray[Any]], path: Path) -> List[int]:
-    """Return the worlds' numbers after a check of both arrays that hold all worlds."""
-    problems = [f"{path}: no array {name}" for name in ("index", "occupied") if name not in arrays]
-    if problems:
-        raise InputError(problems)
-    index, occupied = arrays["index"], arrays["occupied"]
-    if index.ndim != 1 or index.dtype.kind not in "iu" or len(index) == 0:
-        problems.append(f"{path}: index: {index.dtype} {index.shape}, expected a row of integers")
-    elif len(set(index.tolist())) < len(index):
-        problems.append(f"{path}: index: duplicate numbers, expected each once")
-    expected = (*index.shape[:1], *FIELD)
-    if occupied.shape != expected:
-        problems.append(f"{path}: occupied: {occupied.shape}, expected {expected}")
-    if problems:
-        raise InputError(problems)
-    return list(map(int, index))
-
-
-def _length_m(
-    arrays: Dict[str, NDArray[Any]], number: int, path: Path, problems: List[str]
-) -> float:
-    points = arrays.get(f"path_{number}", np.zeros(0))
-    if (
-        points.ndim != 2
-        or points.shape[1] != 2
-        or points.dtype.kind not in "fiu"
-        or not np.all(np.isfinite(points))
-    ):
-        problems.append(
-            f"{path}: path_{number}: {points.dtype} {points.shape}, expected points "
-            "(n, 2) in metres"
-        )
+def _length_m(arrays: Arrays, number: int, path: Path, problems: List[str]) -> float:
+    """Return the length of a world's reference path; 0 after a fault."""
+    name = f"path_{number}"
+    points = numbers_array(arrays, name, path, problems, (None, 2))
+    if not np.all(np.isfinite(points)):
+        problems.append(f"{path}: {name}: expected finite points in metres")
         return 0.0
-    whole = np.vstack([(START.x_m, START.y_m), points.astype(float), GOAL_M])
+    whole = np.vstack([(START.x_m, START.y_m), points, GOAL_M])
     return float(np.sum(np.hypot(*np.diff(whole, axis=0).T)))

@@ -176,8 +176,8 @@ def find_near(
 
     Returns:
         The quadcopter's number and that of another one with its centre nearer than
-        ``space.pair_m``. The second is ``NO_INDEX`` if the first is beyond its free distance, so that
-        it may be near to something else. Both are ``NO_INDEX`` if nothing may be touched.
+        ``space.pair_m``. The second is ``NO_INDEX`` if the first is beyond its free distance: it
+        may be near to something else. Both are ``NO_INDEX`` if nothing may be touched.
     """
     mount_m, pair_m, centres_m = space.mount_m, space.pair_m, space.centres_m
     for k in range(rows.shape[0]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
-from quad_nav.barn.statistics import wilson_interval
+from quad_nav.results import wilson_interval
 from quad_nav.tuning.flight_result import FlightResult
 from quad_nav.tuning.score import cost
 from quad_nav.tuning.statistics import mean_interval
