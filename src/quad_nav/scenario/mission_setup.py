@@ -27,6 +27,7 @@ from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configura
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
+START_SERVICE = "/simulation/start"
 DEFAULTS: Dict[str, Any] = {
     "robots": 2,
     "goals": "",
@@ -37,6 +38,7 @@ DEFAULTS: Dict[str, Any] = {
     "config_name": "",  # name of the navigators' configuration, for the summary
     "robot_radius": BODY_RADIUS_M,
     "simulation": True,
+    "start_service": "",  # called before the first goal; the simulator's with `simulation`
     "ready_timeout": 60.0,
     "exit_when_done": False,
     "result": "",
@@ -50,6 +52,7 @@ _RULES: Dict[str, Rule] = {
         name: RULES[name]
         for name in (
             "simulation",
+            "start_service",
             "ready_timeout",
             "exit_when_done",
             "result",
@@ -64,7 +67,8 @@ _RULES: Dict[str, Rule] = {
 class MissionSetup:
     """A mission that can be flown.
 
-    ``surface_distance`` and ``altitude_m`` are None if the scene is unknown. ``parameters`` are
+    ``surface_distance`` and ``altitude_m`` are None if the scene is unknown. ``start_service`` is
+    called before the first goal is sent, if it has a name. ``parameters`` are
     the navigators' trees, {} for one whose parameters are unknown. ``facts`` are for the summary.
     """
 
@@ -81,6 +85,7 @@ class MissionSetup:
     parameters: Tuple[Mapping[str, Any], ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
     notes: Tuple[str, ...] = ()
+    start_service: str = ""
 
 
 def read_setup(
@@ -158,6 +163,7 @@ def _mission_setup(
         values["resume"],
         tuple(one.to_tree() if one else {} for one in scenario.configurations),
         notes=scenario.notes,
+        start_service=values["start_service"] or (START_SERVICE if values["simulation"] else ""),
     )
 
 

@@ -95,6 +95,7 @@ RULES: Dict[str, Rule] = {
         lambda value: isinstance(value, (int, float)) and value > 0, "a number of seconds above 0"
     ),
     "simulation": BOOLEAN,
+    "start_service": optional_text("the name of a service"),
     "ready_timeout": number(above=0, unit="seconds"),
     "exit_when_done": BOOLEAN,
     "resume": BOOLEAN,

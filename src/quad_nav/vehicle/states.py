@@ -53,6 +53,8 @@ class VehicleMachine:
         reason: Why it is in this state, for people; "" if that is plain.
         odom_from_start: Where the vehicle stood before the last take-off.
         ground_m: Height of that place in the odometry frame.
+        altitude_m: Flying altitude above it.
+        refusal: Why the last take-off was given up before the vehicle left the ground.
     """
 
     def __init__(
@@ -62,8 +64,8 @@ class VehicleMachine:
         self.inputs = Inputs(limits)
         self.state, self.reason = State.NO_LINK, "no heartbeat yet"
         self.odom_from_start: Optional[Pose2D] = None
-        self.ground_m = 0.0
-        self._altitude_m, self._limits = altitude_m, limits
+        self.ground_m, self.refusal = 0.0, ""
+        self.altitude_m, self._limits = altitude_m, limits
         self._traits, self._permissions = traits, permissions
         self._loop = HeightLoop(climb_mps=limits.climb_mps)
         self._before_loss = State.NO_LINK
@@ -90,6 +92,7 @@ class VehicleMachine:
         assert estimate is not None  # otherwise not ready
         self.odom_from_start = estimate.odom_from_base.to_2d()
         self.ground_m = estimate.odom_from_base.z_m
+        self.refusal = ""
         self.inputs.begin_flight(now_s)
         self._enter(State.ARMING, "", now_s)
         return Response(True, "taking off")
@@ -112,8 +115,7 @@ class VehicleMachine:
         if self.state in (State.FLYING, State.HOLDING, State.TAKING_OFF):
             self._land(reason, now_s)
         elif self.state is State.ARMING:
-            self._give(Order.DISARM, now_s)
-            self._enter(State.NOT_READY, reason, now_s)
+            self._give_up(reason, now_s)
         elif self.state is State.TAKEN_OVER and status is not None and status.is_armed:
             if is_stop_all and not status.is_controlled:
                 return Response(False, f"taken over: {self.reason}")
@@ -157,6 +159,10 @@ class VehicleMachine:
         self._pauses, self._news = False, []
         return output
 
+    def commanded_velocity(self, now_s: float) -> Velocity:
+        """Return the set-point for the last command, between two ticks."""
+        return self._command(now_s)
+
     def answer(self, answer: Answer, now_s: float) -> None:
         """Take the autopilot's answer to an order."""
         if answer.is_accepted or answer.order is not self._order:
@@ -164,8 +170,7 @@ class VehicleMachine:
         what = f"the autopilot refuses to {answer.order.value}"
         reason = f"{what}: {answer.reason or 'without a reason'}"
         if self.state is State.ARMING:
-            self.inputs.refuse(reason, now_s)
-            self._enter(State.NOT_READY, reason, now_s)
+            self._give_up(reason, now_s)
         elif self.state is State.TAKING_OFF and self._orders >= MOST_ORDERS:
             self._land(reason, now_s)
         elif self.state is State.TAKEN_OVER:
@@ -265,9 +270,7 @@ class VehicleMachine:
             self._enter(State.TAKING_OFF, "", now_s)
             return self._in_taking_off(now_s)
         if self._orders > MOST_ORDERS and self._order is not None:
-            reason = f"no effect of the order to {self._order.value}"
-            self.inputs.refuse(reason, now_s)
-            self._enter(State.NOT_READY, reason, now_s)
+            self._give_up(f"no effect of the order to {self._order.value}", now_s)
         return Velocity() if streams else None
 
     def _in_taking_off(self, now_s: float) -> Optional[Velocity]:
@@ -276,7 +279,7 @@ class VehicleMachine:
             self._land(f"take-off not finished after {TAKE_OFF_S:g} s", now_s)
             return None
         if not self._traits.takes_off_by_command:
-            if inputs.height_m(self.ground_m) > self._altitude_m - NEAR_M:
+            if inputs.height_m(self.ground_m) > self.altitude_m - NEAR_M:
                 self._hold(now_s)
             return self._hover(now_s)
         if inputs.landed is Landed.IN_AIR:
@@ -288,6 +291,12 @@ class VehicleMachine:
             self._order = None
             self._give(Order.TAKE_OFF, now_s)
         return None
+
+    def _give_up(self, reason: str, now_s: float) -> None:
+        """End a take-off before the vehicle has left the ground."""
+        self.refusal = reason
+        self.inputs.refuse(reason, now_s)
+        self._enter(State.NOT_READY, reason, now_s)
 
     def _hold(self, now_s: float) -> None:
         self.inputs.begin_flight(now_s)
@@ -367,8 +376,8 @@ class VehicleMachine:
         vz_mps = 0.0
         if not self.inputs.is_estimate_late(now_s):
             height_m = self.inputs.height_m(self.ground_m)
-            vz_mps = self._loop.velocity_mps(self._altitude_m, height_m)
-        return Velocity(twist.vx_mps, twist.vy_mps, vz_mps, twist.vyaw_radps, self._altitude_m)
+            vz_mps = self._loop.velocity_mps(self.altitude_m, height_m)
+        return Velocity(twist.vx_mps, twist.vy_mps, vz_mps, twist.vyaw_radps, self.altitude_m)
 
     def _give(self, order: Order, now_s: float) -> None:
         """Give an order, again while it has no effect."""

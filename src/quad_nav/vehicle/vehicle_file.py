@@ -238,17 +238,13 @@ def _read_lidar(check: Checker, value: Any, place: str, kind: str) -> Optional[L
 
 
 def _check_numbers(check: Checker, vehicles: List[Vehicle], entries: int) -> None:
-    """Find numbers that are given twice or left out, and links that two vehicles share."""
+    """Find numbers that are given twice or left out, and addresses that two vehicles share."""
     numbers = sorted(vehicle.number for vehicle in vehicles)
     if len(vehicles) == entries and numbers != list(range(entries)) and not check.problems:
         check.fault("vehicles", f"numbers {numbers}, expected each of 0 to {entries - 1} once")
-    links = [
-        (vehicle.address, vehicle.system if vehicle.kind == "mavlink" else 0)
-        for vehicle in vehicles
-        if vehicle.address
-    ]
-    for link in sorted({link for link in links if links.count(link) > 1}):
-        check.fault("vehicles", f"two vehicles have the address {link[0]} and system {link[1]}")
+    addresses = [vehicle.address for vehicle in vehicles if vehicle.address]
+    for address in sorted({one for one in addresses if addresses.count(one) > 1}):
+        check.fault("vehicles", f"two vehicles have the address {address}, expected one for each")
 
 
 def _whole(

@@ -45,7 +45,6 @@ from quad_nav.topics.flight_info import (
 from quad_nav.topics.markers import goal_markers
 from quad_nav.topics.validation import MAX_LEAD_S
 
-START_SERVICE = "/simulation/start"
 WAIT_S = 0.2  # wall time, as the next; longest delay until the node notices a shutdown
 GOALS_PERIOD_S = 0.2  # shortest time between two messages with the goals of all robots
 PAUSE_S = 1.0  # longest wait for a step of a robot that is in progress
@@ -110,14 +109,15 @@ class MissionRunner:
 
     def needs(self) -> List[Need]:
         """Return the conditions for the start of the mission."""
+        service = self._setup.start_service
         needs = (
             [
                 Need(
-                    lambda: readiness.service_exists(START_SERVICE),
-                    lambda: readiness.missing_service(START_SERVICE),
+                    lambda: readiness.service_exists(service),
+                    lambda: readiness.missing_service(service),
                 )
             ]
-            if self._setup.simulation
+            if service
             else []
         )
         for robot in self.robots:
@@ -125,10 +125,10 @@ class MissionRunner:
         return needs
 
     def start(self) -> None:
-        """Start the simulation, and begin or resume the mission.
+        """Start the simulation or the vehicles, and begin or resume the mission.
 
         Raises:
-            ServiceException: If the simulator refuses.
+            ServiceException: If the simulator or a vehicle refuses.
         """
         self._start_simulation()
         if self._before is None:
@@ -140,8 +140,8 @@ class MissionRunner:
             thread.start()
 
     def _start_simulation(self) -> None:
-        if self._setup.simulation:
-            response = rospy.ServiceProxy(START_SERVICE, Trigger)()
+        if self._setup.start_service:
+            response = rospy.ServiceProxy(self._setup.start_service, Trigger)()
             if not response.success:
                 raise rospy.ServiceException(response.message or "refused without giving a reason")
 
@@ -232,7 +232,7 @@ class MissionRunner:
         try:
             self._start_simulation()
         except rospy.ServiceException as error:
-            rospy.logwarn("sequencer: %s failed: %s", START_SERVICE, error)
+            rospy.logwarn("sequencer: %s failed: %s", self._setup.start_service, error)
 
     def _resume(self, before: MissionCheckpoint, now_s: float, same_clock: bool) -> None:
         """Resume the mission from a checkpoint."""

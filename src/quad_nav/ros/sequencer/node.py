@@ -30,8 +30,8 @@ from quad_nav.mission.summary_table import DEFAULT_WIDTH, table
 from quad_nav.ros.common import readiness
 from quad_nav.ros.common.preflight import read_mission_setup, result_path
 from quad_nav.ros.common.readiness import init_node, server_parameters
-from quad_nav.ros.sequencer.mission import START_SERVICE, MissionRunner
-from quad_nav.scenario.mission_setup import MissionSetup
+from quad_nav.ros.sequencer.mission import MissionRunner
+from quad_nav.scenario.mission_setup import START_SERVICE, MissionSetup
 
 STOPPED = "stopped before all goals were reached"
 Stop = Callable[[], str]
@@ -91,9 +91,9 @@ def fly(mission: MissionRunner, setup: MissionSetup, result: Path, stop: Stop) -
     try:
         mission.start()
     except (rospy.ServiceException, rospy.ROSException) as error:
-        return _not_flown(
-            setup, result, "the simulation did not start", [f"{START_SERVICE}: {error}"]
-        )
+        what = "the simulation" if setup.simulation else "the vehicles"
+        problem = f"{setup.start_service}: {error}"
+        return _not_flown(setup, result, f"{what} did not start", [problem])
     try:
         return watch(mission, setup.exit_when_done, result, stop)
     except Exception as error:  # keep the result of the flight after a bug

@@ -1,0 +1,218 @@
+"""Node `vehicles`: what concerns all vehicles together, in the simulator's place.
+
+It takes all vehicles off when the mission starts, lands them when it has ended or when somebody
+asks for it, and publishes the scene. The vehicles fly on without it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_msgs.msg import Empty, String
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
+from quad_nav.errors import InputError, printable
+from quad_nav.files.values import BOOLEAN, Rule, choice, number, optional_text, text, value_faults
+from quad_nav.ros.common.readiness import init_node
+from quad_nav.ros.vehicle.node import LAND_ALL_TOPIC
+from quad_nav.ros.vehicle.scene_topics import SceneLidars, SceneTopics
+from quad_nav.sim.lidar import LidarParams
+from quad_nav.sim.scene import Scene
+from quad_nav.sim.scene_file import load_scene
+from quad_nav.topics.flight_info import EVENTS_TOPIC, from_text
+from quad_nav.vehicle.vehicle_file import Vehicle, load_vehicles
+
+READY_WAIT_S = 90.0
+"""Longest wait for all vehicles to be ready: a GPS takes 45 s from its start."""
+CALL_WAIT_S = 40.0
+LAND_AFTER_S = 1.0
+_DEFAULTS: Dict[str, Any] = {
+    "vehicles": "",
+    "scene": "",
+    "lidar_for": "none",
+    "lidar_rate": 10.0,
+    "scan_range": LidarParams().scan_range_rad,
+    "step_size": LidarParams().step_size_rad,
+    "range_noise": 0.0,
+    "map_resolution": 0.0,
+    "land_when_done": True,
+}
+_RULES: Dict[str, Rule] = {
+    "vehicles": text("the file of the vehicles"),
+    "scene": optional_text("a scene's file"),
+    "lidar_for": choice(("none", "vehicles")),
+    "lidar_rate": number(above=0.0, at_most=100.0, unit="Hz"),
+    "scan_range": number(above=0.0, unit="radians"),
+    "step_size": number(above=0.0, unit="radians"),
+    "range_noise": number(at_least=0.0, unit="metres"),
+    "map_resolution": number(at_least=0.0, unit="metres"),
+    "land_when_done": BOOLEAN,
+}
+
+
+class VehicleFleet:
+    """Services for all vehicles."""
+
+    def __init__(self, vehicles: Sequence[Vehicle], lands_when_done: bool) -> None:
+        """Advertise everything.
+
+        Args:
+            vehicles: All vehicles of the file.
+            lands_when_done: Whether to land when the missions of all robots have ended.
+        """
+        self._real = [one for one in vehicles if one.kind != "simulated"]
+        self._simulates = len(self._real) < len(vehicles)
+        self._robots = len(vehicles)
+        self._done: Set[int] = set()
+        self._lands_when_done = lands_when_done
+        self._states: Dict[int, Tuple[str, str]] = {}
+        self._land_all = rospy.Publisher(LAND_ALL_TOPIC, Empty, queue_size=1)
+        self._subscribers = [
+            rospy.Subscriber(
+                f"/vehicle{one.number}/state", DiagnosticStatus, self._on_state, one.number
+            )
+            for one in self._real
+        ]
+        self._events = rospy.Subscriber(EVENTS_TOPIC, String, self._on_event, queue_size=100)
+        self._services = [
+            rospy.Service("/vehicles/take_off", Trigger, self._take_off),
+            rospy.Service("/vehicles/land", Trigger, self._land),
+        ]
+
+    def _on_state(self, message: DiagnosticStatus, number: int) -> None:
+        values = {one.key: one.value for one in message.values}
+        self._states[number] = values.get("state", ""), values.get("reason", "")
+
+    def _on_event(self, message: String) -> None:
+        """Land when the last robot has flown all its goals."""
+        event = from_text(message.data) or {}
+        robot = event.get("robot")
+        if not isinstance(robot, int):
+            return
+        if event.get("event") != "done":
+            self._done.discard(robot)
+            return
+        self._done.add(robot)
+        if len(self._done) >= self._robots and self._lands_when_done:
+            rospy.loginfo("vehicles: all missions have ended; landing")
+            self._done.clear()
+            threading.Timer(LAND_AFTER_S, self._land_all.publish, (Empty(),)).start()
+
+    def _land(self, _: TriggerRequest) -> TriggerResponse:
+        self._land_all.publish(Empty())
+        return TriggerResponse(True, "all vehicles land")
+
+    def _take_off(self, _: TriggerRequest) -> TriggerResponse:
+        """Take all vehicles off when all are ready; land all if one does not."""
+        problems = self._wait_ready()
+        if not problems:
+            problems = self._call_all("take_off")
+        if not problems and self._simulates:
+            problems = _call("/simulation/start")
+        if problems:
+            self._land_all.publish(Empty())
+            return TriggerResponse(False, "; ".join(problems))
+        return TriggerResponse(True, "all vehicles are in the air")
+
+    def _wait_ready(self) -> List[str]:
+        """Wait until every vehicle is ready or in the air; return why not."""
+        end_s = time.monotonic() + READY_WAIT_S
+        good = ("ready", "landed", "flying", "holding")
+        while not rospy.is_shutdown():
+            missing = [
+                f"{one.name}: {': '.join(filter(None, state)) or 'no bridge'}"
+                for one in self._real
+                for state in [self._states.get(one.number, ("", ""))]
+                if state[0] not in good
+            ]
+            if not missing or time.monotonic() > end_s:
+                return missing
+            time.sleep(0.1)
+        return ["shutdown"]
+
+    def _call_all(self, action: str) -> List[str]:
+        """Call a service of all real vehicles at the same time; return the refusals."""
+        problems: List[str] = []
+
+        def call(vehicle: Vehicle) -> None:
+            found = _call(f"/vehicle{vehicle.number}/{action}")
+            problems.extend(f"{vehicle.name}: {problem}" for problem in found)
+
+        threads = [threading.Thread(target=call, args=(one,), daemon=True) for one in self._real]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(CALL_WAIT_S)
+        return problems
+
+
+def _call(service: str) -> List[str]:
+    """Call a service; return why it has failed, if it has."""
+    try:
+        rospy.wait_for_service(service, 2.0)
+        response = rospy.ServiceProxy(service, Trigger)()
+    except (rospy.ROSException, rospy.ServiceException) as error:
+        return [f"{service}: {error}"]
+    return [] if response.success else [response.message]
+
+
+def read_setup(
+    parameters: Mapping[str, Any], name: str
+) -> Tuple[Dict[str, Any], Tuple[Vehicle, ...], Optional[Scene]]:
+    """Read the node's private parameters, the vehicles and the scene.
+
+    Raises:
+        InputError: Every fault.
+    """
+    values = {**_DEFAULTS, **parameters}
+    problems = value_faults(values, _RULES, name)
+    vehicles: Tuple[Vehicle, ...] = ()
+    scene: Optional[Scene] = None
+    try:
+        vehicles = load_vehicles(values["vehicles"]) if not problems else ()
+    except InputError as error:
+        problems += error.problems
+    try:
+        scene = load_scene(values["scene"]) if values["scene"] and not problems else None
+    except InputError as error:
+        problems += error.problems
+    if values["lidar_for"] == "vehicles" and not values["scene"]:
+        problems.append(f"{name}: lidar_for: vehicles needs a scene")
+    if problems:
+        raise InputError(problems)
+    return values, vehicles, scene
+
+
+def main() -> int:
+    """Run the node.
+
+    Returns:
+        0 after a shutdown, 2 if parameters or files are not valid.
+    """
+    init_node("vehicles")
+    try:
+        values, vehicles, scene = read_setup(rospy.get_param("~", {}), "vehicles")
+        lidar = LidarParams(
+            values["scan_range"], values["step_size"], noise_std_m=values["range_noise"]
+        )
+    except InputError as error:
+        rospy.logfatal("%s", printable(error, "\n"))
+        return 2
+    topics = SceneTopics(scene, len(vehicles), values["map_resolution"]) if scene else None
+    fleet = VehicleFleet(vehicles, values["land_when_done"])
+    lidars = None
+    if scene is not None and values["lidar_for"] == "vehicles":
+        real = [one.number for one in vehicles if one.kind != "simulated"]
+        lidars = SceneLidars(scene, len(vehicles), real, lidar)
+    period_s, next_s = 1.0 / values["lidar_rate"], time.monotonic()
+    while not rospy.is_shutdown():
+        if lidars is not None:
+            lidars.publish()
+        next_s = max(next_s + period_s, time.monotonic())
+        time.sleep(max(next_s - time.monotonic(), 0.0))
+    del fleet, topics
+    return 0

@@ -1,0 +1,318 @@
+"""Node `vehicle`: the bridge of one vehicle of any kind.
+
+One thread reads the link and publishes the estimates as they come. The main thread ticks the state
+machine and sends. A velocity command is sent on from the callback that receives it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Callable, Dict, List, Optional, Protocol, Sequence, Tuple
+
+import rospy
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Empty
+from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
+
+from quad_nav.errors import InputError, excerpt, printable
+from quad_nav.files.values import is_whole
+from quad_nav.geometry import Scan, Twist2D
+from quad_nav.ros.common.conversions import twist_from_message
+from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
+from quad_nav.ros.common.readiness import init_node
+from quad_nav.ros.vehicle.mission_pause import MissionPause
+from quad_nav.ros.vehicle.topics import VehicleTopics, vehicle_health
+from quad_nav.topics.health import Health
+from quad_nav.topics.validation import CommandLease, twist_problem
+from quad_nav.vehicle.autopilots import AUTOPILOTS
+from quad_nav.vehicle.mavlink_link import MavlinkLink
+from quad_nav.vehicle.orders import IN_FLIGHT, Output, Permissions, Response, State
+from quad_nav.vehicle.safety import COMMAND_HOVER_S
+from quad_nav.vehicle.states import VehicleMachine
+from quad_nav.vehicle.telemetry import Estimate
+from quad_nav.vehicle.vehicle_file import Vehicle, load_vehicles
+
+TICK_S = 0.025
+READ_S = 0.1
+STATE_PERIOD_S = 1.0
+TAKE_OFF_WAIT_S = 30.0
+SHUTDOWN_WAIT_S = 2.0
+LAND_ALL_TOPIC = "/vehicles/land_all"
+_BUSY = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
+
+
+class Bridge(Protocol):
+    """Connection to one vehicle of any kind.
+
+    One thread calls `read`, another one `tick` and `follow`. Whoever uses the state machine or
+    the other attributes holds the lock.
+    """
+
+    lock: threading.Lock
+
+    @property
+    def machine(self) -> VehicleMachine:
+        """State machine of the vehicle."""
+
+    @property
+    def estimate(self) -> Optional[Estimate]:
+        """Last estimate, its stamp in monotonic time."""
+
+    @property
+    def scan(self) -> Optional[Scan]:
+        """Last scan of the vehicle's own sensors, its stamp in monotonic time."""
+
+    def pop_texts(self) -> Sequence[Tuple[int, str]]:
+        """Return the autopilot's texts since the last call, each with its severity (0 worst)."""
+
+    def read(self, timeout_s: float) -> None:
+        """Wait for something to come, and take it."""
+
+    def tick(self) -> Output:
+        """Let the state machine work, and send what it wants."""
+
+    def follow(self, twist: Twist2D) -> bool:
+        """Take a velocity command; return whether it is finite."""
+
+    def close(self) -> None:
+        """Close the connection."""
+
+
+class VehicleNode:
+    """Topics and services of one vehicle."""
+
+    def __init__(self, vehicle: Vehicle, bridge: Bridge) -> None:
+        """Advertise everything."""
+        i = vehicle.number
+        self._vehicle, self._bridge = vehicle, bridge
+        self._topics = VehicleTopics(vehicle)
+        self._pause = MissionPause(i)
+        self._lease = CommandLease(COMMAND_HOVER_S)
+        self._warnings = ThrottledWarnings()
+        self._state: Optional[Tuple[State, str]] = None
+        self._next_state_s = 0.0
+        self._subscribers = [
+            rospy.Subscriber(f"/cmd_vel{i}", Twist, self._follow, queue_size=1, tcp_nodelay=True),
+            rospy.Subscriber(
+                f"/move_base{i}/status", GoalStatusArray, self._on_navigator, queue_size=1
+            ),
+            rospy.Subscriber(LAND_ALL_TOPIC, Empty, self._land_all, queue_size=1),
+        ]
+        self._services = [
+            rospy.Service(f"/vehicle{i}/{name}", Trigger, handler)
+            for name, handler in (
+                ("take_off", self._take_off),
+                ("land", self._land),
+                ("resume", self._resume),
+            )
+        ]
+        publish_health(self._health)
+
+    def run(self) -> None:
+        """Run until ROS shuts down."""
+        reader = threading.Thread(target=self._read, name="link", daemon=True)
+        reader.start()
+        next_s = time.monotonic()
+        while not rospy.is_shutdown():
+            if not reader.is_alive():
+                raise RuntimeError(f"{self._vehicle.name}: the thread that reads the link has died")
+            self._tick()
+            next_s = max(next_s + TICK_S, time.monotonic())
+            time.sleep(max(next_s - time.monotonic(), 0.0))
+
+    def stop(self) -> None:
+        """Land before the node shuts down: without us the autopilot's failsafe would."""
+        with self._bridge.lock:
+            machine = self._bridge.machine
+            if machine.state in IN_FLIGHT and machine.state is not State.LANDING:
+                machine.land(time.monotonic(), "the bridge shuts down")
+        end_s = time.monotonic() + SHUTDOWN_WAIT_S
+        while time.monotonic() < end_s and self._is_flying():
+            time.sleep(TICK_S)
+
+    def _is_flying(self) -> bool:
+        with self._bridge.lock:
+            machine = self._bridge.machine
+            status = machine.inputs.status
+            return machine.state in IN_FLIGHT and status is not None and not status.is_landing
+
+    # The link's thread.
+
+    def _read(self) -> None:
+        published: Optional[Estimate] = None
+        scanned: Optional[Scan] = None
+        while not rospy.is_shutdown():
+            self._bridge.read(READ_S)
+            with self._bridge.lock:
+                estimate, scan = self._bridge.estimate, self._bridge.scan
+            try:
+                if estimate is not None and estimate is not published:
+                    published = estimate
+                    self._topics.publish_estimate(estimate, self._bridge.machine)
+                if scan is not None and scan is not scanned:
+                    scanned = scan
+                    self._topics.publish_scan(scan)
+            except rospy.ROSException:
+                if not rospy.core.is_shutdown_requested():  # at shutdown rospy closes the topics
+                    raise
+
+    # The main thread.
+
+    def _tick(self) -> None:
+        output = self._bridge.tick()
+        if output.pauses_mission:
+            self._pause.pause()
+        for line in output.news:
+            rospy.loginfo("%s: %s", self._vehicle.name, excerpt(line))
+        with self._bridge.lock:
+            texts = self._bridge.pop_texts()
+            machine = self._bridge.machine
+            state = (machine.state, machine.reason)
+        for severity, text in texts:
+            log = rospy.logwarn if severity <= 4 else rospy.loginfo
+            log("%s: autopilot: %s", self._vehicle.name, excerpt(text))
+        now_s = time.monotonic()
+        if state != self._state or now_s >= self._next_state_s:
+            self._state, self._next_state_s = state, now_s + STATE_PERIOD_S
+            self._topics.publish_state(machine)
+
+    def _health(self) -> List[Health]:
+        with self._bridge.lock:
+            return [vehicle_health(self._vehicle, self._bridge.machine)]
+
+    # Callbacks.
+
+    def _follow(self, message: Twist) -> None:
+        twist, name = twist_from_message(message), self._vehicle.name
+        problem = twist_problem(twist)
+        if not problem:
+            node = excerpt(message._connection_header.get("callerid", "an unnamed node"))
+            holder = self._lease.holder(self._vehicle.number, node, time.monotonic())
+            if holder == node:
+                self._bridge.follow(twist)
+                return
+            problem = f"from {node}: {holder} controls this vehicle, expected one node at a time"
+        self._warnings.warn(f"{name}: command dropped: {problem}")
+
+    def _on_navigator(self, message: GoalStatusArray) -> None:
+        if not any(status.status in _BUSY for status in message.status_list):
+            with self._bridge.lock:
+                self._bridge.machine.inputs.take_idle(time.monotonic())
+
+    def _land_all(self, _: Empty) -> None:
+        with self._bridge.lock:
+            self._bridge.machine.land(time.monotonic(), "all vehicles land", is_stop_all=True)
+
+    def _land(self, _: TriggerRequest) -> TriggerResponse:
+        with self._bridge.lock:
+            response = self._bridge.machine.land(time.monotonic(), "asked to land")
+        return TriggerResponse(response.is_accepted, response.text)
+
+    def _resume(self, _: TriggerRequest) -> TriggerResponse:
+        with self._bridge.lock:
+            response = self._bridge.machine.resume(time.monotonic())
+        if response.is_accepted:
+            response = self._wait((State.FLYING, State.HOLDING, *_GROUND), (State.TAKEN_OVER,))
+        if response.is_accepted:
+            self._pause.resume()
+        return TriggerResponse(response.is_accepted, response.text)
+
+    def _take_off(self, _: TriggerRequest) -> TriggerResponse:
+        """Take off, and respond when the vehicle hovers or has given up."""
+        with self._bridge.lock:
+            response = self._bridge.machine.take_off(time.monotonic())
+        if response.is_accepted:
+            response = self._wait((State.FLYING, State.HOLDING), _UNTIL_HOVER)
+        return TriggerResponse(response.is_accepted, response.text)
+
+    def _wait(self, good: Sequence[State], pending: Sequence[State]) -> Response:
+        """Wait until the vehicle is in a good state or in none of the pending ones."""
+        end_s = time.monotonic() + TAKE_OFF_WAIT_S
+        while time.monotonic() < end_s and not rospy.is_shutdown():
+            with self._bridge.lock:
+                machine = self._bridge.machine
+                state, reason = machine.state, machine.refusal or machine.reason
+            if state in good:
+                return Response(True, state.value)
+            if state not in pending:
+                return Response(False, f"{state.value}: {reason}")
+            time.sleep(TICK_S)
+        return Response(False, f"still {state.value} after {TAKE_OFF_WAIT_S:g} s")
+
+
+_GROUND = (State.READY, State.NOT_READY, State.LANDED)
+_UNTIL_HOVER = (State.ARMING, State.TAKING_OFF)
+
+
+def read_vehicle(parameters: Dict) -> Tuple[Vehicle, Permissions]:
+    """Read the vehicle that a node's private parameters name.
+
+    Raises:
+        InputError: Parameters or the file of the vehicles are not valid.
+    """
+    name = rospy.get_name().lstrip("/")
+    problems = [
+        f"{name}: {key}: is {parameters.get(key)!r}; expected {what}"
+        for key, what, is_sound in (
+            ("vehicles", "the file of the vehicles", isinstance(parameters.get("vehicles"), str)),
+            ("number", "the number of a vehicle", is_whole(parameters.get("number"))),
+            ("arm", "true or false", isinstance(parameters.get("arm", False), bool)),
+            ("dry", "true or false", isinstance(parameters.get("dry", False), bool)),
+        )
+        if not is_sound
+    ]
+    if problems:
+        raise InputError(problems)
+    vehicles = {one.number: one for one in load_vehicles(parameters["vehicles"])}
+    if parameters["number"] not in vehicles:
+        raise InputError([f"{name}: number: {parameters['number']}, expected one of the file's"])
+    permissions = Permissions(parameters.get("arm", False), parameters.get("dry", False))
+    return vehicles[parameters["number"]], permissions
+
+
+def make_bridge(vehicle: Vehicle, permissions: Permissions, clock: Callable[[], float]) -> Bridge:
+    """Open the connection of a vehicle.
+
+    Args:
+        vehicle: The vehicle.
+        permissions: What the person at the desk allows.
+        clock: Returns monotonic time in s.
+
+    Raises:
+        InputError: If a package is missing, or the address cannot be opened.
+    """
+    traits = AUTOPILOTS[vehicle.autopilot].traits
+    machine = VehicleMachine(vehicle.altitude_m, vehicle.limits, traits, permissions)
+    return MavlinkLink(vehicle, machine, clock)
+
+
+def main() -> int:
+    """Run the node of one vehicle.
+
+    Returns:
+        0 after a shutdown, 2 if parameters or files are not valid.
+    """
+    nodes: List[VehicleNode] = []
+
+    def land() -> None:
+        for node in nodes:
+            node.stop()
+
+    init_node("vehicle", land)
+    try:
+        vehicle, permissions = read_vehicle(rospy.get_param("~", {}))
+        if vehicle.kind == "simulated":
+            rospy.loginfo("%s: the simulator flies it", vehicle.name)
+            return 0
+        bridge = make_bridge(vehicle, permissions, time.monotonic)
+    except InputError as error:
+        rospy.logfatal("%s", printable(error, "\n"))
+        return 2
+    nodes.append(VehicleNode(vehicle, bridge))
+    try:
+        nodes[0].run()
+    finally:
+        bridge.close()
+    return 0

@@ -1,0 +1,153 @@
+"""Topics of one vehicle: odometry, transforms, scans, state and diagnostics."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Dict, Optional
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticStatus
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+from tf2_msgs.msg import TFMessage
+
+from quad_nav.geometry import Pose2D, Pose3D, Scan
+from quad_nav.ros.common.conversions import (
+    ScanMessage,
+    key_values,
+    odometry_message,
+    scan_message,
+    time_message,
+    transform_message,
+)
+from quad_nav.topics.health import Health, Level
+from quad_nav.vehicle.orders import IN_FLIGHT, State
+from quad_nav.vehicle.states import VehicleMachine
+from quad_nav.vehicle.telemetry import Estimate
+from quad_nav.vehicle.vehicle_file import Vehicle
+
+_GOOD = (State.READY, State.FLYING, State.HOLDING, State.LANDED, State.TAKING_OFF, State.ARMING)
+
+
+class VehicleTopics:
+    """Publishers of one vehicle."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Advertise the topics."""
+        i = vehicle.number
+        self._vehicle = vehicle
+        self._odom, self._base, self._lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
+        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
+        self._odometry = rospy.Publisher(f"/odom{i}", Odometry, queue_size=10, tcp_nodelay=True)
+        self._state = rospy.Publisher(
+            f"/vehicle{i}/state", DiagnosticStatus, queue_size=10, latch=True
+        )
+        self._map_from_odom: Optional[Pose3D] = vehicle.map_from_odom
+        self._scan: Optional[rospy.Publisher] = None
+        self._relay: Optional[rospy.Subscriber] = None
+        self._advertise_scan()
+
+    def _advertise_scan(self) -> None:
+        lidar, topic = self._vehicle.lidar, f"/scan{self._vehicle.number}"
+        if lidar is None or lidar.topic == topic:
+            return
+        type_ = ScanMessage if lidar.is_obstacle_distance else LaserScan
+        self._scan = rospy.Publisher(topic, type_, queue_size=10)
+        if lidar.topic:
+            self._relay = rospy.Subscriber(lidar.topic, LaserScan, self._pass_on, queue_size=2)
+
+    def _pass_on(self, message: LaserScan) -> None:
+        """Publish a driver's scan in the frame that the navigator expects."""
+        message.header.frame_id = self._lidar
+        if self._scan is not None:
+            self._scan.publish(message)
+
+    def publish_scan(self, scan: Scan) -> None:
+        """Publish a scan of OBSTACLE_DISTANCE; its stamp is monotonic time."""
+        if self._scan is not None:
+            self._scan.publish(
+                scan_message(replace(scan, stamp_s=scan.stamp_s + _clock_offset_s()), self._lidar)
+            )
+
+    def publish_estimate(self, estimate: Estimate, machine: VehicleMachine) -> None:
+        """Publish odometry and transforms; the estimate's stamp is monotonic time."""
+        stamp = time_message(estimate.stamp_s + _clock_offset_s())
+        pose = estimate.odom_from_base
+        self._odometry.publish(
+            odometry_message(
+                pose,
+                estimate.linear_mps,
+                estimate.angular_radps,
+                (self._odom, self._base),
+                stamp,
+            )
+        )
+        transforms = [transform_message(pose, self._odom, self._base, stamp)]
+        lidar = self._vehicle.lidar
+        mount = _DEFAULT_MOUNT if lidar is None else lidar.base_from_lidar
+        transforms.append(transform_message(mount, self._base, self._lidar, stamp))
+        map_from_odom = self.map_from_odom(pose, machine)
+        if map_from_odom is not None:
+            transforms.insert(0, transform_message(map_from_odom, "map", self._odom, stamp))
+        self._tf.publish(TFMessage(transforms))
+
+    def map_from_odom(self, odom_from_base: Pose3D, machine: VehicleMachine) -> Optional[Pose3D]:
+        """Return the pose of the odometry frame; None if another node publishes it.
+
+        With a known pose at the start it is fixed at the first take-off. Before, it follows the
+        estimate on the ground, which drifts while the vehicle stands still.
+        """
+        start = self._vehicle.map_from_start
+        if self._map_from_odom is not None or start is None:
+            return self._map_from_odom
+        if machine.odom_from_start is not None:
+            self._map_from_odom = _frame_at(start, machine.odom_from_start, machine.ground_m)
+            return self._map_from_odom
+        return _frame_at(start, odom_from_base.to_2d(), odom_from_base.z_m)
+
+    def publish_state(self, machine: VehicleMachine) -> None:
+        """Publish the state, latched."""
+        health = vehicle_health(self._vehicle, machine)
+        self._state.publish(
+            DiagnosticStatus(
+                level=int(health.level),
+                name=health.name,
+                message=health.message,
+                hardware_id=health.hardware_id,
+                values=key_values(health.values),
+            )
+        )
+
+
+_DEFAULT_MOUNT = Pose3D(0.0, 0.0, 0.06)
+
+
+def _frame_at(map_from_base: Pose2D, odom_from_base: Pose2D, ground_m: float) -> Pose3D:
+    """Return the pose of the odometry frame in which both poses are the same place."""
+    frame = map_from_base.compose(odom_from_base.inverse()).to_3d()
+    return Pose3D(frame.x_m, frame.y_m, -ground_m, frame.quaternion)
+
+
+def _clock_offset_s() -> float:
+    """Return ROS's time minus the monotonic one, which all parts of the bridge use."""
+    return float(rospy.get_time()) - time.monotonic()
+
+
+def vehicle_health(vehicle: Vehicle, machine: VehicleMachine) -> Health:
+    """Return the diagnostic status of a vehicle."""
+    status = machine.inputs.status
+    level = Level.OK if machine.state in _GOOD else Level.WARN
+    if machine.state is State.NO_LINK or machine.state is State.TAKEN_OVER:
+        level = Level.ERROR
+    message = machine.state.value + (f": {machine.reason}" if machine.reason else "")
+    values: Dict[str, str] = {
+        "state": machine.state.value,
+        "reason": machine.reason,
+        "mode": "" if status is None else status.mode,
+        "armed": str(status is not None and status.is_armed).lower(),
+        "in flight": str(machine.state in IN_FLIGHT).lower(),
+        "height_m": f"{machine.inputs.height_m(machine.ground_m):.2f}",
+        "battery": "" if machine.inputs.battery is None else f"{machine.inputs.battery:.2f}",
+    }
+    return Health(f"vehicle{vehicle.number}: bridge", vehicle.name, level, message, values)

@@ -1,0 +1,165 @@
+"""ArduPilot and PX4: one table of what differs.
+
+ArduPilot's values were measured on ArduCopter 4.5.3 in software. PX4's are from its documentation
+(flight modes, offboard control, parameter reference of v1.14); the project has not measured them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Dict, FrozenSet, Mapping, Tuple
+
+from quad_nav.vehicle.orders import Order, Traits
+from quad_nav.vehicle.telemetry import Status
+
+ARMED = 128  # bit of HEARTBEAT.base_mode
+AUTOPILOT_COMPONENT = 1
+DO_SET_MODE, NAV_TAKEOFF, COMPONENT_ARM_DISARM, SET_MESSAGE_INTERVAL = 176, 22, 400, 511
+_CUSTOM_MODE = 1.0  # of DO_SET_MODE: the mode is given by the autopilot's own numbers
+
+Command = Tuple[int, Tuple[float, ...]]
+"""Number of a MAV_CMD, and its first parameters."""
+
+
+def _px4(main: int, sub: int = 0) -> int:
+    return main << 16 | sub << 24
+
+
+@dataclass(frozen=True)
+class Autopilot:
+    """One kind of autopilot.
+
+    Attributes:
+        name: Name in files of vehicles.
+        number: Its ``MAV_AUTOPILOT``.
+        traits: What the state machine has to know.
+        modes: Names by ``HEARTBEAT.custom_mode``.
+        control: Mode in which it obeys set-points.
+        land: Mode that lands.
+        settling: Modes that it passes through by itself on the way to ours.
+        commands: Commands of the orders.
+        sends_bits: Whether parameters that are whole numbers travel as the bits of the number, and
+            not as its value.
+        refusals: Beginnings of texts with a reason for a refused order.
+        complaints: Beginnings of texts with a reason for not being ready.
+    """
+
+    name: str
+    number: int
+    traits: Traits
+    modes: Mapping[int, str]
+    control: int
+    land: int
+    settling: FrozenSet[int]
+    commands: Mapping[Order, Command]
+    sends_bits: bool
+    refusals: Tuple[str, ...]
+    complaints: Tuple[str, ...]
+
+    def status(self, base_mode: int, custom_mode: int) -> Status:
+        """Return what a heartbeat says."""
+        return Status(
+            self.modes.get(custom_mode, f"mode {custom_mode}"),
+            custom_mode == self.control,
+            custom_mode == self.land,
+            bool(base_mode & ARMED),
+            custom_mode in self.settling,
+        )
+
+    def command_fields(self, order: Order, altitude_m: float) -> Dict[str, Any]:
+        """Return the fields of COMMAND_LONG for an order, without the target."""
+        number, parameters = self.commands[order]
+        fields = command_fields(number, *parameters)
+        if order is Order.TAKE_OFF:
+            fields["param7"] = altitude_m
+        return fields
+
+
+def command_fields(number: int, *parameters: float) -> Dict[str, Any]:
+    """Return the fields of COMMAND_LONG, without the target; further parameters are 0."""
+    values = (*parameters, *(0.0,) * (7 - len(parameters)))
+    return {
+        "command": number,
+        "confirmation": 0,
+        **{f"param{k}": float(value) for k, value in enumerate(values, 1)},
+    }
+
+
+_ARM: Mapping[Order, Command] = {
+    Order.ARM: (COMPONENT_ARM_DISARM, (1.0,)),
+    Order.DISARM: (COMPONENT_ARM_DISARM, (0.0,)),
+    Order.TAKE_OFF: (NAV_TAKEOFF, ()),
+}
+
+ARDUPILOT = Autopilot(
+    "ardupilot",
+    3,
+    Traits(streams_before_control=False, takes_off_by_command=True),
+    MappingProxyType(
+        {
+            0: "STABILIZE",
+            2: "ALT_HOLD",
+            3: "AUTO",
+            4: "GUIDED",
+            5: "LOITER",
+            6: "RTL",
+            9: "LAND",
+            16: "POSHOLD",
+            17: "BRAKE",
+            21: "SMART_RTL",
+        }
+    ),
+    control=4,
+    land=9,
+    settling=frozenset(),
+    commands=MappingProxyType(
+        {
+            **_ARM,
+            Order.TAKE_CONTROL: (DO_SET_MODE, (_CUSTOM_MODE, 4.0)),
+            Order.LAND: (DO_SET_MODE, (_CUSTOM_MODE, 9.0)),
+        }
+    ),
+    sends_bits=False,
+    refusals=("Arm: ", "Mode change to "),
+    complaints=("PreArm: ",),
+)
+
+PX4 = Autopilot(
+    "px4",
+    12,
+    Traits(streams_before_control=True, takes_off_by_command=False),
+    MappingProxyType(
+        {
+            _px4(1): "MANUAL",
+            _px4(2): "ALTCTL",
+            _px4(3): "POSCTL",
+            _px4(4, 1): "AUTO.READY",
+            _px4(4, 2): "AUTO.TAKEOFF",
+            _px4(4, 3): "AUTO.LOITER",
+            _px4(4, 4): "AUTO.MISSION",
+            _px4(4, 5): "AUTO.RTL",
+            _px4(4, 6): "AUTO.LAND",
+            _px4(5): "ACRO",
+            _px4(6): "OFFBOARD",
+            _px4(7): "STABILIZED",
+        }
+    ),
+    control=_px4(6),
+    land=_px4(4, 6),
+    settling=frozenset(),
+    commands=MappingProxyType(
+        {
+            **_ARM,
+            Order.TAKE_CONTROL: (DO_SET_MODE, (_CUSTOM_MODE, 6.0, 0.0)),
+            Order.LAND: (DO_SET_MODE, (_CUSTOM_MODE, 4.0, 6.0)),
+        }
+    ),
+    sends_bits=True,
+    refusals=("Arming denied", "Switching to ", "Takeoff denied"),
+    complaints=("Preflight Fail", "Preflight:"),
+)
+
+AUTOPILOTS: Mapping[str, Autopilot] = MappingProxyType(
+    {autopilot.name: autopilot for autopilot in (ARDUPILOT, PX4)}
+)

@@ -1,0 +1,219 @@
+"""What the autopilot does when it is left alone: checked before the motors are armed.
+
+The bridge writes the fence, the limit of height and the time-out of the stream, which are its own
+business. The failsafes are the pilot's: they are read, and a take-off is refused if the autopilot
+would do nothing, or would climb under a roof. With ``failsafes: set`` in the file of the vehicles
+they are written too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Callable, Dict, List, Mapping, Optional, Tuple
+
+from quad_nav.vehicle.telemetry import Limits
+from quad_nav.vehicle.vehicle_file import Vehicle
+
+STREAM_TIMEOUT_S = 0.5
+FENCE_MARGIN_M = 0.5
+"""The autopilot's fence lies this far behind ours, which lands first."""
+OUR_SYSTEM = 255
+"""Our MAVLink system: ArduPilot counts only its own ground station's heartbeats."""
+
+Values = Mapping[str, Optional[float]]
+"""Parameters by name; None for one that the autopilot does not have."""
+
+
+@dataclass(frozen=True)
+class Failsafe:
+    """A parameter that a pilot sets, and the values with which we fly.
+
+    Attributes:
+        parameter: Its name.
+        problem: Returns what is wrong with the values of all parameters, "" if nothing is.
+        safe: Value that the bridge proposes.
+        is_needed: Whether an autopilot without the parameter is refused.
+    """
+
+    parameter: str
+    problem: Callable[[Values, Vehicle], str]
+    safe: float
+    is_needed: bool = True
+
+
+def own_parameters(autopilot: str, limits: Limits) -> Dict[str, float]:
+    """Return the parameters that the bridge writes, with their values."""
+    height_m, radius_m = limits.height_m + FENCE_MARGIN_M, limits.radius_m + FENCE_MARGIN_M
+    if autopilot == "px4":
+        return {
+            "COM_OF_LOSS_T": STREAM_TIMEOUT_S,
+            "GF_ACTION": 5.0,  # land
+            "GF_MAX_HOR_DIST": radius_m,
+            "GF_MAX_VER_DIST": height_m,
+        }
+    return {
+        "GUID_TIMEOUT": STREAM_TIMEOUT_S,
+        "FENCE_TYPE": 3.0,  # greatest height, circle
+        "FENCE_ACTION": 2.0,  # land
+        "FENCE_ALT_MAX": height_m,
+        "FENCE_RADIUS": radius_m,
+        "FENCE_MARGIN": FENCE_MARGIN_M / 2.0,  # it slows down this far before the fence
+        "FENCE_ENABLE": 1.0,
+    }
+
+
+def names(vehicle: Vehicle) -> Tuple[str, ...]:
+    """Return the parameters to read."""
+    read = [failsafe.parameter for failsafe in _FAILSAFES[vehicle.autopilot]]
+    return (*own_parameters(vehicle.autopilot, vehicle.limits), *read, *_ALSO[vehicle.autopilot])
+
+
+def wanted(values: Values, vehicle: Vehicle) -> Dict[str, float]:
+    """Return the parameters to write, those that have another value now."""
+    ours = own_parameters(vehicle.autopilot, vehicle.limits)
+    if vehicle.sets_failsafes:
+        for failsafe in _FAILSAFES[vehicle.autopilot]:
+            if values.get(failsafe.parameter) is not None and failsafe.problem(values, vehicle):
+                ours[failsafe.parameter] = failsafe.safe
+    return {
+        name: value
+        for name, value in ours.items()
+        if values.get(name) is not None and not is_equal(values[name], value)
+    }
+
+
+def faults(values: Values, vehicle: Vehicle) -> List[str]:
+    """Return why the vehicle must not take off with these parameters."""
+    found = []
+    for name, value in own_parameters(vehicle.autopilot, vehicle.limits).items():
+        if values.get(name) is None:
+            found.append(f"{name}: the autopilot does not answer, expected {value:g}")
+        elif not is_equal(values[name], value):
+            found.append(f"{name}: is {values[name]:g}, the autopilot does not take {value:g}")
+    for failsafe in _FAILSAFES[vehicle.autopilot]:
+        value_ = values.get(failsafe.parameter)
+        if value_ is None:
+            if failsafe.is_needed:
+                found.append(f"{failsafe.parameter}: the autopilot does not answer")
+            continue
+        problem = failsafe.problem(values, vehicle)
+        if problem:
+            found.append(
+                f"{failsafe.parameter}: is {value_:g}: {problem}; set it to {failsafe.safe:g}"
+            )
+    return found
+
+
+def is_equal(value: Optional[float], other: float) -> bool:
+    """Return whether a parameter has a value, up to the rounding of its 32 bits."""
+    return value is not None and abs(value - other) <= 1e-5 * max(1.0, abs(other))
+
+
+def _value(values: Values, name: str) -> float:
+    value = values.get(name)
+    return 0.0 if value is None else value
+
+
+def _climb(values: Values, vehicle: Vehicle) -> str:
+    """Say that a return to launch climbs under a roof; "" if it may."""
+    if not vehicle.has_roof:
+        return ""
+    is_px4 = vehicle.autopilot == "px4"
+    name = "RTL_RETURN_ALT" if is_px4 else "RTL_ALT"
+    value = values.get(name)
+    if value is None:
+        return "it returns to launch at a height that it does not tell"
+    height_m = value if is_px4 else value / 100.0
+    if height_m <= vehicle.limits.height_m:
+        return ""
+    return f"it climbs to {height_m:g} m ({name}), expected {vehicle.limits.height_m:g} m or less"
+
+
+# ArduPilot: 0 nothing, 1 return to launch, 3 return by the same way or straight, 4 return by the
+# same way or land, 5 land (link) and 1 return, 3 land, 4 and 5 return by the same way (radio).
+
+
+def _ardupilot_link(values: Values, vehicle: Vehicle) -> str:
+    value = _value(values, "FS_GCS_ENABLE")
+    if value == 5.0:
+        return ""
+    if value in (1.0, 2.0, 3.0, 4.0):
+        return _climb(values, vehicle)
+    return "it does nothing when the link to this machine is lost"
+
+
+def _ardupilot_station(values: Values, _: Vehicle) -> str:
+    if _value(values, "SYSID_MYGCS") == OUR_SYSTEM:
+        return ""
+    return f"it does not count our heartbeats, those of system {OUR_SYSTEM}"
+
+
+def _ardupilot_radio(values: Values, vehicle: Vehicle) -> str:
+    value = _value(values, "FS_THR_ENABLE")
+    if value == 3.0 or (value and int(_value(values, "FS_OPTIONS")) & 4):
+        return ""  # it lands, or flies on under our control
+    if value == 0.0:
+        return "it does nothing when the radio is lost" if vehicle.has_radio else ""
+    return _climb(values, vehicle)
+
+
+def _ardupilot_estimate(values: Values, _: Vehicle) -> str:
+    lands = _value(values, "FS_EKF_ACTION") in (1.0, 3.0)
+    return "" if lands else "it does not land when it loses its position"
+
+
+def _ardupilot_battery(values: Values, vehicle: Vehicle) -> str:
+    value = _value(values, "BATT_FS_LOW_ACT")
+    return _climb(values, vehicle) if value in (2.0, 3.0, 4.0) else ""
+
+
+# PX4: 0 nothing, 1 hold, 2 return, 3 land, 5 terminate, 6 disarm. Lost offboard control: 0
+# position, 1 altitude, 2 manual, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm.
+
+
+def _px4_link(values: Values, vehicle: Vehicle) -> str:
+    value = _value(values, "NAV_DLL_ACT")
+    if value == 2.0:
+        return _climb(values, vehicle)
+    return "" if value == 3.0 else "it does not land when the link to this machine is lost"
+
+
+def _px4_offboard(values: Values, vehicle: Vehicle) -> str:
+    value = _value(values, "COM_OBL_RC_ACT")
+    if value == 3.0:
+        return _climb(values, vehicle)
+    return "" if value in (4.0, 5.0) else "it does not land or hold when the set-points stop"
+
+
+def _px4_radio(values: Values, vehicle: Vehicle) -> str:
+    value = _value(values, "NAV_RCL_ACT")
+    if value == 3.0 or int(_value(values, "COM_RCL_EXCEPT")) & 4 or not vehicle.has_radio:
+        return ""  # it lands, or flies on under our control
+    if value == 2.0:
+        return _climb(values, vehicle)
+    return "it does not land when the radio is lost"
+
+
+def _px4_battery(values: Values, vehicle: Vehicle) -> str:
+    return _climb(values, vehicle) if _value(values, "COM_LOW_BAT_ACT") == 3.0 else ""
+
+
+_FAILSAFES: Mapping[str, Tuple[Failsafe, ...]] = {
+    "ardupilot": (
+        Failsafe("FS_GCS_ENABLE", _ardupilot_link, 5.0),
+        Failsafe("SYSID_MYGCS", _ardupilot_station, float(OUR_SYSTEM), is_needed=False),
+        Failsafe("FS_THR_ENABLE", _ardupilot_radio, 3.0),
+        Failsafe("FS_EKF_ACTION", _ardupilot_estimate, 1.0, is_needed=False),
+        Failsafe("BATT_FS_LOW_ACT", _ardupilot_battery, 1.0, is_needed=False),
+    ),
+    "px4": (
+        Failsafe("NAV_DLL_ACT", _px4_link, 3.0),
+        Failsafe("COM_OBL_RC_ACT", _px4_offboard, 4.0),
+        Failsafe("NAV_RCL_ACT", _px4_radio, 3.0),
+        Failsafe("COM_LOW_BAT_ACT", _px4_battery, 2.0, is_needed=False),
+    ),
+}
+_ALSO: Mapping[str, Tuple[str, ...]] = {
+    "ardupilot": ("FS_OPTIONS", "RTL_ALT"),
+    "px4": ("COM_RCL_EXCEPT", "RTL_RETURN_ALT"),
+}

@@ -1,0 +1,184 @@
+"""Connection to one MAVLink vehicle, the only place with pymavlink.
+
+It decodes what comes, encodes what the adapter wants to send, and connects again when the
+connection is closed. It decides nothing.
+"""
+
+from __future__ import annotations
+
+import os
+from threading import Lock
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+
+os.environ["MAVLINK20"] = "1"  # pymavlink reads it at its import
+
+from quad_nav.errors import InputError
+from quad_nav.geometry import Scan, Twist2D
+from quad_nav.vehicle.autopilots import AUTOPILOT_COMPONENT
+from quad_nav.vehicle.exchanges import Message
+from quad_nav.vehicle.failsafes import OUR_SYSTEM
+from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
+from quad_nav.vehicle.orders import Output
+from quad_nav.vehicle.states import VehicleMachine
+from quad_nav.vehicle.telemetry import Estimate
+from quad_nav.vehicle.vehicle_file import Vehicle
+
+try:
+    from pymavlink import mavutil
+except ImportError:  # an extra
+    mavutil = None
+
+OUR_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+_EMPTY_READS = 50
+"""A connection that is readable but empty this often in a row was closed by the other side."""
+_REOPEN_S = 1.0
+_TARGETED = frozenset(
+    ("COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED", "PARAM_REQUEST_READ", "PARAM_SET")
+)
+
+
+class MavlinkLink:
+    """The bridge of one vehicle over a connection of pymavlink.
+
+    One thread calls `read`, another one `tick` and `follow`.
+
+    Attributes:
+        adapter: Translates; the lock is held while it works.
+        lock: Held whenever the adapter or the state machine is used.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, machine: VehicleMachine, clock: Callable[[], float]
+    ) -> None:
+        """Open the connection.
+
+        Args:
+            vehicle: The vehicle.
+            machine: Its state machine.
+            clock: Returns the present time in s; it never goes back.
+
+        Raises:
+            InputError: If pymavlink is missing, or the address cannot be opened.
+        """
+        if mavutil is None:
+            raise InputError(
+                [f"{vehicle.name}: pymavlink is missing; install requirements-mavlink.txt"]
+            )
+        self.adapter = MavlinkAdapter(vehicle, machine)
+        self.lock = Lock()
+        self._vehicle, self._clock = vehicle, clock
+        self._empty, self._reopen_s = 0, 0.0
+        try:
+            self._connection: Any = self._open()
+        except (OSError, ValueError) as error:
+            raise InputError(
+                [f"{vehicle.name}: address {vehicle.address} cannot be opened: {error}"]
+            ) from error
+
+    @property
+    def machine(self) -> VehicleMachine:
+        """State machine of the vehicle."""
+        return self.adapter.machine
+
+    @property
+    def estimate(self) -> Optional[Estimate]:
+        """Last estimate, its stamp on our clock."""
+        return self.adapter.estimate
+
+    @property
+    def scan(self) -> Optional[Scan]:
+        """Last scan of OBSTACLE_DISTANCE."""
+        return self.adapter.scan
+
+    def pop_texts(self) -> Sequence[Tuple[int, str]]:
+        """Return the autopilot's texts since the last call, each with its severity."""
+        return self.adapter.pop_texts()
+
+    def _open(self) -> Any:
+        # Without its own reconnection: it sleeps and prints in the thread that reads.
+        return mavutil.mavlink_connection(
+            self._vehicle.address,
+            source_system=OUR_SYSTEM,
+            source_component=OUR_COMPONENT,
+            dialect="ardupilotmega",
+            autoreconnect=False,
+            retries=1,
+        )
+
+    def read(self, timeout_s: float) -> None:
+        """Wait for messages, and pass those that are there to the adapter."""
+        if self._connection is None:
+            self._try_again()
+            return
+        if not self._connection.select(timeout_s):
+            self._empty = 0
+            return
+        got = False
+        while True:
+            message = self._receive()
+            if message is None:
+                break
+            got = True
+            self._pass(message)
+        self._empty = 0 if got else self._empty + 1
+        if self._empty > _EMPTY_READS:
+            self.close()
+            self._reopen_s = self._clock() + _REOPEN_S
+
+    def _receive(self) -> Any:
+        try:
+            return self._connection.recv_msg()
+        except OSError:  # such as a refused datagram, while nothing listens there
+            return None
+
+    def _pass(self, message: Any) -> None:
+        name = message.get_type()
+        if message.get_srcSystem() != self._vehicle.system or name == "BAD_DATA":
+            return
+        with self.lock:
+            self.adapter.receive(name, message.get_srcComponent(), message, self._clock())
+
+    def _try_again(self) -> None:
+        if self._clock() < self._reopen_s:
+            return
+        self._empty, self._reopen_s = 0, self._clock() + _REOPEN_S
+        try:
+            self._connection = self._open()
+        except (OSError, ValueError):
+            self._connection = None
+
+    def follow(self, twist: Twist2D) -> bool:
+        """Take a velocity command, and send its set-point; return whether it is finite."""
+        with self.lock:
+            is_finite, messages = self.adapter.follow(twist, self._clock())
+        self._send(messages)
+        return is_finite
+
+    def tick(self) -> Output:
+        """Let the state machine work, and send what it wants."""
+        with self.lock:
+            output, messages = self.adapter.tick(self._clock())
+        self._send(messages)
+        return output
+
+    def _send(self, messages: List[Message]) -> None:
+        connection = self._connection
+        if connection is None:
+            return
+        for name, fields in messages:
+            values: Dict[str, Any] = dict(fields)
+            if name in _TARGETED:
+                values["target_system"] = self._vehicle.system
+                values["target_component"] = AUTOPILOT_COMPONENT
+            if "param_id" in values:
+                values["param_id"] = values["param_id"].encode()
+            try:
+                getattr(connection.mav, f"{name.lower()}_send")(**values)
+            except OSError:  # the link is lost; the state machine notices the silence
+                return
+
+    def close(self) -> None:
+        """Close the connection."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            connection.close()
