@@ -39,6 +39,7 @@ DEFAULTS: Dict[str, Any] = {
     "robot_radius": BODY_RADIUS_M,
     "simulation": True,
     "start_service": "",  # called before the first goal; the simulator's with `simulation`
+    "end_service": "",  # called after the last goal, before the node exits
     "ready_timeout": 60.0,
     "exit_when_done": False,
     "result": "",
@@ -53,6 +54,7 @@ _RULES: Dict[str, Rule] = {
         for name in (
             "simulation",
             "start_service",
+            "end_service",
             "ready_timeout",
             "exit_when_done",
             "result",
@@ -68,7 +70,7 @@ class MissionSetup:
     """A mission that can be flown.
 
     ``surface_distance`` and ``altitude_m`` are None if the scene is unknown. ``start_service`` is
-    called before the first goal is sent, if it has a name. ``parameters`` are
+    called before the first goal is sent, ``end_service`` before the node exits, if they have names. ``parameters`` are
     the navigators' trees, {} for one whose parameters are unknown. ``facts`` are for the summary.
     """
 
@@ -86,6 +88,7 @@ class MissionSetup:
     facts: Mapping[str, Any] = field(default_factory=dict)
     notes: Tuple[str, ...] = ()
     start_service: str = ""
+    end_service: str = ""
 
 
 def read_setup(
@@ -164,6 +167,7 @@ def _mission_setup(
         tuple(one.to_tree() if one else {} for one in scenario.configurations),
         notes=scenario.notes,
         start_service=values["start_service"] or (START_SERVICE if values["simulation"] else ""),
+        end_service=values["end_service"],
     )
 
 

@@ -96,6 +96,7 @@ RULES: Dict[str, Rule] = {
     ),
     "simulation": BOOLEAN,
     "start_service": optional_text("the name of a service"),
+    "end_service": optional_text("the name of a service"),
     "ready_timeout": number(above=0, unit="seconds"),
     "exit_when_done": BOOLEAN,
     "resume": BOOLEAN,

@@ -40,8 +40,7 @@ def scan_from_obstacle_distance(
     sectors = min(len(message.distances), math.floor(_FULL_TURN_DEG / abs(increment_deg) + 1e-6))
     if sectors < 1:
         return None
-    if message.frame != _BODY_FRD:
-        offset_rad -= heading_rad
+    offset_rad -= 0.0 if message.frame == _BODY_FRD else heading_rad
     centimetres = np.array(message.distances[:sectors], dtype=np.float64)
     ranges_m = np.where(centimetres > message.max_distance, np.inf, centimetres / 100.0)
     ranges_m[centimetres == _UNKNOWN_CM] = np.nan

@@ -145,6 +145,18 @@ class MissionRunner:
             if not response.success:
                 raise rospy.ServiceException(response.message or "refused without giving a reason")
 
+    def end(self) -> None:
+        """Land the vehicles after the last goal, before the node exits."""
+        service = self._setup.end_service
+        if not service:
+            return
+        try:
+            response = rospy.ServiceProxy(service, Trigger)()
+        except (rospy.ServiceException, rospy.ROSException) as error:
+            rospy.logerr("sequencer: %s failed: %s", service, error)
+            return
+        (rospy.loginfo if response.success else rospy.logerr)("sequencer: %s", response.message)
+
     def advance(self) -> None:
         """Wait for news of the robots, and process them."""
         self._news.wait(WAIT_S)

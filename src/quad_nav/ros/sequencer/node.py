@@ -57,6 +57,7 @@ def watch(mission: MissionRunner, exit_when_done: bool, result: Path, stop: Stop
         elif status is None:
             status = report(mission.summary(), result)
             if exit_when_done:
+                mission.end()
                 return status
     if status is None:
         status = report(mission.summary(stop() or STOPPED), result)

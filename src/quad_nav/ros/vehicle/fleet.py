@@ -24,12 +24,15 @@ from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.topics.flight_info import EVENTS_TOPIC, from_text
+from quad_nav.vehicle.orders import IN_FLIGHT, State
 from quad_nav.vehicle.vehicle_file import Vehicle, load_vehicles
 
 READY_WAIT_S = 90.0
 """Longest wait for all vehicles to be ready: a GPS takes 45 s from its start."""
 CALL_WAIT_S = 40.0
+LAND_WAIT_S = 30.0
 LAND_AFTER_S = 1.0
+_IN_THE_AIR = tuple(state.value for state in (*IN_FLIGHT, State.TAKEN_OVER))
 _DEFAULTS: Dict[str, Any] = {
     "vehicles": "",
     "scene": "",
@@ -103,8 +106,18 @@ class VehicleFleet:
             threading.Timer(LAND_AFTER_S, self._land_all.publish, (Empty(),)).start()
 
     def _land(self, _: TriggerRequest) -> TriggerResponse:
+        """Land all vehicles, and respond when none is in the air."""
         self._land_all.publish(Empty())
-        return TriggerResponse(True, "all vehicles land")
+        end_s = time.monotonic() + LAND_WAIT_S
+        while time.monotonic() < end_s and not rospy.is_shutdown():
+            flying = [one.name for one in self._real if self._is_in_the_air(one.number)]
+            if not flying:
+                return TriggerResponse(True, "all vehicles have landed")
+            time.sleep(0.1)
+        return TriggerResponse(False, f"still in the air: {', '.join(flying)}")
+
+    def _is_in_the_air(self, number: int) -> bool:
+        return self._states.get(number, ("", ""))[0] in _IN_THE_AIR
 
     def _take_off(self, _: TriggerRequest) -> TriggerResponse:
         """Take all vehicles off when all are ready; land all if one does not."""
