@@ -13,8 +13,13 @@ from quad_nav.geometry import Pose3D, Quaternion, Scan, Twist2D, rotate
 from quad_nav.vehicle import failsafes
 from quad_nav.vehicle.autopilots import AUTOPILOT_COMPONENT, AUTOPILOTS
 from quad_nav.vehicle.exchanges import BEGIN_S, ClockSync, Message, MessageRates, Parameters
-from quad_nav.vehicle.frames import enu_from_flu, enu_from_ned, flu_from_frd, mavlink_quaternion
-from quad_nav.vehicle.obstacle_distance import scan_from_obstacle_distance
+from quad_nav.vehicle.frames import (
+    enu_from_flu,
+    enu_from_ned,
+    flu_from_frd,
+    mavlink_quaternion,
+    scan_from_obstacle_distance,
+)
 from quad_nav.vehicle.orders import IN_FLIGHT, Answer, Order, Output, State
 from quad_nav.vehicle.setpoints import SetpointClock, limited, setpoint_fields
 from quad_nav.vehicle.states import VehicleMachine
