@@ -22,8 +22,7 @@ from quad_nav.geometry import Scan, Twist2D
 from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
 from quad_nav.ros.common.readiness import init_node
-from quad_nav.ros.vehicle.mission_pause import MissionPause
-from quad_nav.ros.vehicle.topics import VehicleTopics, vehicle_health
+from quad_nav.ros.vehicle.topics import MissionPause, VehicleTopics, vehicle_health
 from quad_nav.topics.health import Health
 from quad_nav.topics.validation import CommandLease, twist_problem
 from quad_nav.vehicle.autopilots import AUTOPILOTS

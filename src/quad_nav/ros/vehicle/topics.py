@@ -1,7 +1,9 @@
-"""Topics of one vehicle: odometry, transforms, scans, state and diagnostics."""
+"""Topics of one vehicle: odometry, transforms, scans, state; and its mission's services."""
 
 from __future__ import annotations
 
+import queue
+import threading
 import time
 from dataclasses import replace
 from typing import Dict, Optional
@@ -10,6 +12,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
+from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 from quad_nav.geometry import Pose2D, Pose3D, Scan
@@ -27,6 +30,7 @@ from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate
 from quad_nav.vehicle.vehicle_file import Vehicle
 
+_MISSION_WAIT_S = 2.0
 _GOOD = (State.READY, State.FLYING, State.HOLDING, State.LANDED, State.TAKING_OFF, State.ARMING)
 
 
@@ -151,3 +155,44 @@ def vehicle_health(vehicle: Vehicle, machine: VehicleMachine) -> Health:
         "battery": "" if machine.inputs.battery is None else f"{machine.inputs.battery:.2f}",
     }
     return Health(f"vehicle{vehicle.number}: bridge", vehicle.name, level, message, values)
+
+
+class MissionPause:
+    """Calls the sequencer's services of one robot, in the order in which they are asked for."""
+
+    def __init__(self, robot: int) -> None:
+        """Start the thread that calls.
+
+        Args:
+            robot: Number of the robot.
+        """
+        self._name = f"quad{robot}"
+        self._calls: queue.Queue[Optional[str]] = queue.Queue()
+        threading.Thread(target=self._run, name="mission pause", daemon=True).start()
+
+    def pause(self) -> None:
+        """Stop the robot's mission until somebody resumes it."""
+        self._calls.put("stop")
+
+    def resume(self) -> None:
+        """Resume the robot's mission."""
+        self._calls.put("resume")
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            try:
+                action = self._calls.get(timeout=0.5)
+            except queue.Empty:
+                continue
+            self._call(f"/mission/{self._name}/{action}")
+
+    def _call(self, service: str) -> None:
+        """Call a service; without a sequencer there is no mission to pause."""
+        try:
+            rospy.wait_for_service(service, _MISSION_WAIT_S)
+            response = rospy.ServiceProxy(service, Trigger)()
+        except (rospy.ROSException, rospy.ServiceException) as error:
+            if not rospy.is_shutdown():
+                rospy.logwarn("%s: %s: %s", self._name, service, error)
+            return
+        rospy.loginfo("%s: %s", self._name, response.message)
