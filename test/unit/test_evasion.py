@@ -11,6 +11,7 @@ from quad_nav.control.evasion import EvasionParams, Surroundings, evade, predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
 from quad_nav.kernels.space_time import SpaceTime, command_costs, fill_costs, threat
+from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
 ON = EvasionParams(True, clearance_m=0.1)
@@ -22,7 +23,7 @@ SEARCH = SpaceTime(0.125, 0.5, 0.5, 3.0, 50.0, 100.0, 0.05)
 def around(pose=ORIGIN, costs=None, is_following=False):
     spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
     costs = np.zeros(spec.shape, np.uint8) if costs is None else costs
-    return Surroundings(spec, costs, pose, Twist2D(), 0.25, 0.5, is_following)
+    return Surroundings(spec, costs, pose, Twist2D(), 0.25, 0.5, is_following, MotionMemory())
 
 
 def tracks(*states):

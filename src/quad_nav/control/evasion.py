@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
 from quad_nav.kernels.space_time import SpaceTime, command_costs, fill_costs
+from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]
@@ -40,6 +41,7 @@ _GAIN_PER_S = 3.0  # of the body's velocity loop
 _RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 50.0, 100.0, 0.05
 _SIGMA_M, _SIGMA_MPS = 0.08, 0.08  # least uncertainty of a prediction, and its growth
 _MAX_SIGMA_MPS = 0.12
+_RECALLED_SIGMA_MPS = 0.03
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _SPEEDS, _COURSES = 4, 24
 
@@ -51,10 +53,12 @@ class EvasionParams:
     Attributes:
         avoid_moving_obstacles: Evade tracked obstacles; False restores upstream behaviour.
         clearance_m: Distance that the robot keeps from where obstacles are predicted.
+        watch_s: Time for which a robot watches many moving obstacles before its first goal.
     """
 
     avoid_moving_obstacles: bool = False
     clearance_m: float = 0.1
+    watch_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,7 @@ class Surroundings:
         radius_m: Radius of the robot.
         max_speed_mps: Greatest speed of the robot in any direction.
         is_following: The robot follows a plan; else it stays near a point.
+        memory: The memory of how obstacles have moved.
     """
 
     spec: GridSpec
@@ -78,6 +83,7 @@ class Surroundings:
     radius_m: float
     max_speed_mps: float
     is_following: bool
+    memory: MotionMemory
 
 
 def evade(
@@ -144,7 +150,18 @@ def predicted_discs(
     velocity = np.trace(now.covariances[near, 2:, 2:], axis1=1, axis2=2) / 2
     growth = np.clip(np.sqrt(velocity), _SIGMA_MPS, _MAX_SIGMA_MPS)
     discs[:, :, 3] = np.sqrt(position + _SIGMA_M**2) + times[:, None] * growth
+    _recall(around.memory, now.numbers[near], times, discs)
     return discs
+
+
+def _recall(memory: MotionMemory, numbers: NDArray[np.int64], times: Floats, discs: Floats) -> None:
+    """Move the discs of obstacles that the memory knows as it recalls."""
+    for k, number in enumerate(numbers.tolist()):
+        recalled = memory.recall(number, times)
+        if recalled.known:
+            discs[:, k, :2] = discs[0, k, :2] + recalled.moves
+            known = discs[0, k, 3] + times * _RECALLED_SIGMA_MPS
+            discs[: recalled.known, k, 3] = known[: recalled.known]
 
 
 def _search_of(max_speed_mps: float) -> SpaceTime:

@@ -19,11 +19,13 @@ from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
 from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]
 
 _AT_POINT_M = 0.15
+_MANY = 3  # obstacles that are worth watching
 _ROUTE_POINTS = 40
 _AHEAD_M = 1.5
 _TURN_GAIN_PER_S = 1.0
@@ -51,6 +53,7 @@ class EvasionGuard:
         self.params = params
         self.is_evading = False
         self._costmap = local_costmap
+        self._memory = MotionMemory()
         self._point: Optional[Pose2D] = None  # where a robot that follows no plan stopped
 
     def check(
@@ -76,6 +79,7 @@ class EvasionGuard:
         local_from_global = poses.local_from_global
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
             return
+        self._memory.add(tracks)
         wish = tick.command or Twist2D()
         route = self._route(plan, poses.in_global, local_from_global)
         if not len(tracks) and not self._is_displaced(poses.in_global):
@@ -102,7 +106,12 @@ class EvasionGuard:
             costmap.inscribed_radius_m,
             limits.speed_mps,
             is_following,
+            self._memory,
         )
+
+    def watches(self, tracks: Tracks) -> bool:
+        """Return whether the robot still watches how obstacles move, and waits."""
+        return len(tracks) >= _MANY and self._memory.span_s < self.params.watch_s
 
     def _end(self, tick: Tick) -> None:
         if self.is_evading and tick.command is None:
