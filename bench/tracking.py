@@ -59,6 +59,7 @@ class Tally:
     scans: int = 0
     tracks: int = 0
     false_tracks: int = 0
+    false_predicted: int = 0
     false_numbers: int = 0
     seen: int = 0
     found: int = 0
@@ -96,7 +97,7 @@ class Trial(FlightObserver):
         self._tally.cost_us.append(1e6 * (time.perf_counter() - start_s))
         self._tally.scans += 1
         states, radii_m = self._truth(scan.stamp_s)
-        self._compare(self.tracker.tracks, states, radii_m)
+        self._compare(self.tracker.tracks, self.tracker.unseen_s, states, radii_m)
         self._watch(scan, map_from_lidar, self.tracker.tracks, states, radii_m)
 
     def _truth(self, now_s: float) -> Tuple[Floats, Floats]:
@@ -112,15 +113,18 @@ class Trial(FlightObserver):
         radii_m = [*(reach_m(shape) for shape in movers.shapes), *(body_m for _ in bodies)]
         return states, np.array(radii_m)
 
-    def _compare(self, tracks: Tracks, states: Floats, radii_m: Floats) -> None:
+    def _compare(self, tracks: Tracks, unseen_s: Floats, states: Floats, radii_m: Floats) -> None:
         tally = self._tally
         tally.tracks += len(tracks)
-        for number, state, covariance, radius_m in zip(
-            tracks.numbers.tolist(), tracks.states, tracks.covariances, tracks.radii_m
+        for number, state, covariance, radius_m, hidden_s in zip(
+            tracks.numbers.tolist(), tracks.states, tracks.covariances, tracks.radii_m, unseen_s
         ):
             away_m = np.hypot(*(states[:, :2] - state[:2]).T) if len(states) else np.empty(0)
             nearest = int(np.argmin(away_m)) if len(away_m) else -1
             if nearest < 0 or away_m[nearest] > MATCH_M + radii_m[nearest]:
+                if hidden_s > 0.0:
+                    tally.false_predicted += 1
+                    continue
                 tally.false_tracks += 1
                 if number not in self._false:
                     self._false.add(number)
@@ -179,7 +183,7 @@ def flights(
             )
             yield name, read_setup(options)
     if barn is not None:
-        setup = read_barn_setup(BarnOptions(barn, only=(0, 100, 200)))
+        setup = read_barn_setup(BarnOptions(barn, only=(0, 60, 120, 180)))
         for world in setup.worlds:
             yield "BARN", barn_setup(setup.contestant, world, 0)
     if dynabarn is not None:
@@ -200,7 +204,9 @@ def row(name: str, tally: Tally) -> List[str]:
         name,
         str(tally.scans),
         f"{tally.found / tally.seen:.0%}" if tally.seen else "-",
+        f"{tally.tracks / max(tally.scans, 1):.2f}",
         f"{tally.false_tracks / max(tally.scans, 1):.3f}",
+        f"{tally.false_predicted / max(tally.scans, 1):.3f}",
         str(tally.false_numbers),
         middle(tally.position_m, 2),
         middle(tally.position_m, 2, 95.0),
@@ -220,8 +226,10 @@ HEADERS = (
     "",
     "scans",
     "tracked",
-    "false/scan",
+    "tracks",
     "false",
+    "hidden",
+    "falses",
     "m",
     "m 95%",
     "m/s",

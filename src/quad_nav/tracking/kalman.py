@@ -1,75 +1,88 @@
-"""Kalman filters with constant velocity, one for each track, as arrays.
+"""Kalman filters with constant velocity, one for each track.
 
 State: x and y, m, and their velocities, m/s. Accelerations are white and constant between two
-steps. Source: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to Tracking
-and Navigation", 2001, section 6.3.2 (discrete white noise acceleration) and 5.4 (consistency).
+steps; while the innovations of a track are larger than expected, its accelerations are taken to be
+larger. Source: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to Tracking
+and Navigation", 2001, sections 6.3.2 (discrete white noise acceleration), 5.4 (consistency) and
+11.2.2 (adjustment of the level of the process noise).
 """
 
 from __future__ import annotations
 
-from typing import Tuple
-
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.kernels.kalman import predict_states, update_state
+
 Floats = NDArray[np.float64]
 
-
-def first_state(position: Floats, noise: Floats, speed_mps: float) -> Tuple[Floats, Floats]:
-    """Return state float64[4] and covariance float64[4, 4] after one measurement.
-
-    Args:
-        position: float64[2], metres.
-        noise: float64[2, 2], covariance of the position.
-        speed_mps: Standard deviation of each component of the velocity.
-    """
-    covariance = np.zeros((4, 4))
-    covariance[:2, :2] = noise
-    covariance[2, 2] = covariance[3, 3] = speed_mps**2
-    return np.array([position[0], position[1], 0.0, 0.0]), covariance
+_MEMORY = 0.7  # weight of the innovations before, in the mean
+_LARGE, _EXPECTED = 4.6, 2.0  # of a chi-square with 2 degrees of freedom: 10 %, mean
+_UP, _DOWN, _HIGHEST = 1.5, 0.85, 5.0  # factors of the acceleration
 
 
-def predict(
-    states: Floats, covariances: Floats, step_s: float, acceleration_mps2: float
-) -> Tuple[Floats, Floats]:
-    """Return states float64[m, 4] and covariances float64[m, 4, 4] after a step of time.
+class Filters:
+    """Filters of several tracks.
 
-    Args:
+    Attributes:
         states: float64[m, 4].
         covariances: float64[m, 4, 4].
-        step_s: The step.
-        acceleration_mps2: Standard deviation of each component of the acceleration.
     """
-    step = np.eye(4)
-    step[0, 2] = step[1, 3] = step_s
-    half = 0.5 * step_s * step_s
-    noise = np.zeros((4, 4))
-    noise[0, 0] = noise[1, 1] = half * half
-    noise[0, 2] = noise[2, 0] = noise[1, 3] = noise[3, 1] = half * step_s
-    noise[2, 2] = noise[3, 3] = step_s * step_s
-    return states @ step.T, step @ covariances @ step.T + acceleration_mps2**2 * noise
 
+    def __init__(self) -> None:
+        """Start without tracks."""
+        self.states, self.covariances = np.empty((0, 4)), np.empty((0, 4, 4))
+        self._levels, self._innovations = np.empty(0), np.empty(0)
 
-def update(
-    state: Floats, covariance: Floats, position: Floats, noise: Floats
-) -> Tuple[Floats, Floats, float]:
-    """Take a measurement of a position into one state, in Joseph's form.
+    def __len__(self) -> int:
+        return len(self.states)
 
-    Args:
-        state: float64[4].
-        covariance: float64[4, 4].
-        position: float64[2], metres.
-        noise: float64[2, 2], covariance of the position.
+    def add(self, position: Floats, noise: Floats, speed_mps: float) -> None:
+        """Begin a filter with one measurement.
 
-    Returns:
-        State, covariance, and the normalised innovation squared: chi-square with two degrees of
-        freedom if the filter is consistent.
-    """
-    spread = covariance[:2, :2] + noise
-    off = position - state[:2]
-    gain = np.linalg.solve(spread, covariance[:2]).T
-    nis = float(off @ np.linalg.solve(spread, off))
-    keep = np.eye(4)
-    keep[:, :2] -= gain
-    after = keep @ covariance @ keep.T + gain @ noise @ gain.T
-    return state + gain @ off, 0.5 * (after + after.T), nis
+        Args:
+            position: float64[2], metres.
+            noise: float64[2, 2], covariance of the position.
+            speed_mps: Standard deviation of each component of the velocity.
+        """
+        covariance = np.zeros((1, 4, 4))
+        covariance[0, :2, :2] = noise
+        covariance[0, 2, 2] = covariance[0, 3, 3] = speed_mps**2
+        self.states = np.concatenate([self.states, [[position[0], position[1], 0.0, 0.0]]])
+        self.covariances = np.concatenate([self.covariances, covariance])
+        self._levels = np.append(self._levels, 1.0)
+        self._innovations = np.append(self._innovations, _EXPECTED)
+
+    def keep(self, kept: NDArray[np.bool_]) -> None:
+        """Keep some of the filters, bool[m]."""
+        self.states, self.covariances = self.states[kept], self.covariances[kept]
+        self._levels, self._innovations = self._levels[kept], self._innovations[kept]
+
+    def predict(self, step_s: float, acceleration_mps2: float) -> None:
+        """Predict all states.
+
+        Args:
+            step_s: The step of time.
+            acceleration_mps2: Standard deviation of each component of the usual acceleration.
+        """
+        predict_states(self.states, self.covariances, step_s, acceleration_mps2 * self._levels)
+
+    def update(self, track: int, position: Floats, noise: Floats) -> float:
+        """Take a measurement into one state.
+
+        Args:
+            track: Row of the state.
+            position: float64[2], metres.
+            noise: float64[2, 2], covariance of the position.
+
+        Returns:
+            The normalised innovation squared: chi-square with two degrees of freedom if the filter
+            is consistent.
+        """
+        nis = float(update_state(self.states[track], self.covariances[track], position, noise))
+        mean = self._innovations[track] = _MEMORY * self._innovations[track] + (
+            1.0 - _MEMORY
+        ) * min(nis, 4.0 * _LARGE)
+        factor = _UP if mean > _LARGE else _DOWN
+        self._levels[track] = min(max(factor * self._levels[track], 1.0), _HIGHEST)
+        return nis

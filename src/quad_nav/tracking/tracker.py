@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose3D, Scan
-from quad_nav.tracking import kalman
 from quad_nav.tracking.association import assign
 from quad_nav.tracking.discs import Outlines, Radius, fit, outlines
+from quad_nav.tracking.kalman import Filters
 from quad_nav.tracking.moving_points import Heights, MovingPoints, ScanClusters
 from quad_nav.tracking.params import TrackerParams
 from quad_nav.tracking.tracks import Tracks
@@ -88,6 +88,7 @@ class ObstacleTracker:
         params: The parameters; they may change in flight.
         frame: Name of the fixed frame.
         tracks: The confirmed tracks, at the time of the last scan.
+        unseen_s: float64[n], times for which each of them has not been seen, but predicted.
     """
 
     def __init__(self, params: TrackerParams, frame: str) -> None:
@@ -110,8 +111,8 @@ class ObstacleTracker:
     def _end_all(self, now_s: float) -> None:
         self._now_s = now_s
         self._lives: List[_Life] = []
-        self._states, self._covariances = np.empty((0, 4)), np.empty((0, 4, 4))
-        self.tracks = Tracks.none(now_s)
+        self._filters = Filters()
+        self.tracks, self.unseen_s = Tracks.none(now_s), np.empty(0)
 
     def add_scan(
         self,
@@ -144,8 +145,7 @@ class ObstacleTracker:
             scan, frame_from_sensor, heights_m, self.params, bool(self._lives)
         )
         if clusters is None:
-            self.tracks = Tracks.none(now_s)
-            self._now_s = now_s
+            self._end_all(now_s)
             return None
         return self._track(now_s, clusters, known_circles)
 
@@ -153,21 +153,26 @@ class ObstacleTracker:
         seen = outlines(clusters)
         usable = self._usable(clusters, seen, known_circles)
         self._predict(now_s, known_circles)
-        pairs = assign(self._states, self._covariances, seen, usable)
+        pairs = assign(self._states, self._filters.covariances, seen, usable)
         for track, row in pairs:
             self._update(track, row, now_s, clusters, seen)
         self._drop(now_s, {track for track, _ in pairs}, clusters, seen)
         self._begin(now_s, clusters, seen, usable, {row for _, row in pairs})
         result = self._confirm(clusters, seen)
+        self._tell(now_s)
+        return result
+
+    def _tell(self, now_s: float) -> None:
+        """Tell others of the confirmed tracks."""
         told = [k for k, life in enumerate(self._lives) if life.is_confirmed]
         self.tracks = Tracks(
             now_s,
             np.array([self._lives[k].number for k in told], np.int64),
             self._states[told],
-            self._covariances[told],
+            self._filters.covariances[told],
             np.array([self._lives[k].radius.outer_m for k in told], float),
         )
-        return result
+        self.unseen_s = np.array([now_s - self._lives[k].seen_s for k in told], float)
 
     def _usable(
         self, clusters: ScanClusters, seen: Outlines, known_circles: Floats
@@ -185,13 +190,15 @@ class ObstacleTracker:
     def _predict(self, now_s: float, known_circles: Floats) -> None:
         """Predict all tracks up to now; end those of what is known otherwise."""
         if self._lives and now_s > self._now_s:
-            self._states, self._covariances = kalman.predict(
-                self._states, self._covariances, now_s - self._now_s, self.params.acceleration_mps2
-            )
+            self._filters.predict(now_s - self._now_s, self.params.acceleration_mps2)
         self._now_s = now_s
         for x_m, y_m, radius_m in known_circles:
             away_m = np.hypot(self._states[:, 0] - x_m, self._states[:, 1] - y_m)
             self._keep(away_m > radius_m)
+
+    @property
+    def _states(self) -> Floats:
+        return self._filters.states
 
     def _update(
         self, track: int, row: int, now_s: float, clusters: ScanClusters, seen: Outlines
@@ -202,9 +209,7 @@ class ObstacleTracker:
         guess = seen.centres[row] if is_whole else self._states[track, :2].copy()
         disc = fit(clusters, row, guess, life.radius)
         life.radius.hold(disc.farthest_m)
-        self._states[track], self._covariances[track], _ = kalman.update(
-            self._states[track], self._covariances[track], disc.position, disc.noise
-        )
+        self._filters.update(track, disc.position, disc.noise)
         life.seen_s = now_s
         life.hits += 1
         self._remember(life, clusters, row)
@@ -261,13 +266,11 @@ class ObstacleTracker:
             radius.see(float(seen.radii_m[row]), bool(seen.is_whole[row]))
             disc = fit(clusters, row, seen.centres[row], radius)
             radius.hold(disc.farthest_m)
-            state, covariance = kalman.first_state(disc.position, disc.noise, FIRST_SPEED_MPS)
             self._number += 1
             life = _Life(self._number, disc.position, disc.noise, now_s, now_s, radius)
             self._remember(life, clusters, row)
             self._lives.append(life)
-            self._states = np.concatenate([self._states, state[None]])
-            self._covariances = np.concatenate([self._covariances, covariance[None]])
+            self._filters.add(disc.position, disc.noise, FIRST_SPEED_MPS)
 
     def _is_covered(self, centre: Floats) -> bool:
         """Return whether a place is in the disc of a track, float64[2]."""
@@ -281,7 +284,7 @@ class ObstacleTracker:
         vacated: List[Floats] = []
         rows = np.zeros(len(clusters.rows), bool)
         may_move = clusters.rows[:, 3] == 0
-        for state, covariance, life in zip(self._states, self._covariances, self._lives):
+        for state, covariance, life in zip(self._states, self._filters.covariances, self._lives):
             if not life.is_confirmed and self._has_moved(state, covariance, life):
                 life.is_confirmed = True
                 vacated += life.trail
@@ -302,13 +305,15 @@ class ObstacleTracker:
                 life.start, life.start_noise = state[:2].copy(), covariance[:2, :2].copy()
                 life.start_s = life.seen_s
             return False
-        spread = life.start_noise + covariance[:2, :2]
-        return float(moved @ np.linalg.solve(spread, moved)) > _SIGNIFICANT
+        (xx, xy), (_, yy) = (life.start_noise + covariance[:2, :2]).tolist()
+        dx, dy = moved.tolist()
+        square = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
+        return bool(square > _SIGNIFICANT)
 
     def _keep(self, keep: NDArray[np.bool_]) -> None:
         if not keep.all():
             self._lives = [life for life, is_kept in zip(self._lives, keep) if is_kept]
-            self._states, self._covariances = self._states[keep], self._covariances[keep]
+            self._filters.keep(keep)
 
 
 def _sees_through(clusters: ScanClusters, state: Floats, radius_m: float) -> bool:
