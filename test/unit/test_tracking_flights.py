@@ -12,6 +12,9 @@ import pytest
 from quad_nav.grid import LETHAL
 from quad_nav.loop.navigator_group import LoopRobot
 from quad_nav.offline.flight import Flight
+from quad_nav.offline.run import fly
+from quad_nav.recording.bag_file import read_messages
+from quad_nav.recording.recorder import Recorder
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.scene import Cylinder, MovingObstacle
@@ -145,3 +148,15 @@ def test_the_tracker_is_switched_in_flight():
         assert isinstance(robot, LoopRobot) and isinstance(robot.tracker, ObstacleTracker)
         assert bool(len(robot.tracker.tracks)) is is_on
     flight.end()
+
+
+def test_a_recording_has_the_markers_of_tracks(tmp_path):
+    setup = replace(arena(moving=[walker((5.0, 2.0), (5.0, 6.0))]), time_limit_s=3.0)
+    fly(setup, [Recorder(tmp_path / "walk.bag")])
+    topic = "/move_base0/moving_obstacles"
+    shown = [
+        one.content for one in read_messages(tmp_path / "walk.bag", lambda name, _: name == topic)
+    ]
+    assert 15 <= len(shown) <= 30
+    names = [marker.ns for marker in shown[-1].markers]
+    assert names == ["", "disc", "ellipse", "number", "velocity"]  # the first deletes all others

@@ -81,7 +81,10 @@ class Flight:
     def to_hover(self):
         assert self.run(10.0, lambda: self.state is State.READY), (self.state, self.machine.reason)
         assert self.machine.take_off(self.now_s).is_accepted
-        assert self.run(20.0, lambda: self.state is State.HOLDING), (self.state, self.machine.reason)
+        assert self.run(20.0, lambda: self.state is State.HOLDING), (
+            self.state,
+            self.machine.reason,
+        )
         return self
 
     def to_flight(self, command=Twist2D(0.5, 0.0, 0.0)):

@@ -13,7 +13,7 @@ from quad_nav.costmap.cost_grid import Window
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
-from quad_nav.navigator.navigator import Navigator
+from quad_nav.loop.navigator_group import LoopRobot
 from quad_nav.navigator.tick import RecoveryStart, RobotPoses, State, Tick
 from quad_nav.recording import messages
 from quad_nav.recording.action_topics import ActionTopics
@@ -21,6 +21,7 @@ from quad_nav.recording.messages import plan_bytes
 from quad_nav.recording.record_file import TopicWriter, stamp_at
 from quad_nav.topics.publishing import CostmapSchedule
 from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWaySchedule
+from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, TrackSchedule, track_markers
 
 _NO_PLAN = np.zeros((0, 3))
 
@@ -28,7 +29,10 @@ _NO_PLAN = np.zeros((0, 3))
 class NavigatorTopics:
     """Writes ticks as the topics of the node ``move_base``."""
 
-    def __init__(self, robot: int, navigator: Navigator, topics: TopicWriter) -> None:
+    def __init__(self, robot: int, hosted: LoopRobot, topics: TopicWriter) -> None:
+        """Write the topics of robot number ``robot``."""
+        navigator = hosted.navigator
+        self._tracker, self._tracks = hosted.tracker, TrackSchedule(hosted.tracker)
         self.action = ActionTopics(robot, topics, navigator.global_costmap.params.global_frame)
         self._robot, self._topics = f"quad{robot}", topics
         self._navigator = navigator
@@ -60,6 +64,7 @@ class NavigatorTopics:
             self._state = tick.state
             self._write("state", stamp, messages.text(tick.state.value), latched=True)
         self._write_right_of_way(tick, stamp)
+        self._write_obstacles(tick.now_s, stamp)
         if tick.command is not None:
             self._topics.write(
                 self._command_topic, stamp, messages.command(tick.command), self._node
@@ -82,6 +87,12 @@ class NavigatorTopics:
                 0, RIGHT_OF_WAY_STATUS, changed.text, self._robot, changed.values
             )
             self._write("right_of_way", stamp, status, latched=True)
+
+    def _write_obstacles(self, now_s: float, stamp: int) -> None:
+        tracks = self._tracks.pop(now_s)
+        if tracks is not None:
+            shown = track_markers(tracks, self._tracker.unseen_s, self._tracker.frame)
+            self._write(MARKERS_TOPIC, stamp, messages.marker_array(shown, replaces_all=True))
 
     def _write_plans(self, tick: Tick, stamp: int) -> None:
         """Write the plans; a failed search publishes an empty plan, which clears the display."""

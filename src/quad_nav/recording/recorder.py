@@ -65,7 +65,7 @@ class Recorder(FlightObserver):
         self._flight = flight
         self._next_obstacles_s = 0.0
         self._navigators = [
-            NavigatorTopics(index, flight.offline_robots[index].navigator, self._topics)
+            NavigatorTopics(index, flight.offline_robots[index], self._topics)
             for index in range(len(flight.robots))
         ]
         self._paths = [FlownPath(_path_pose) for _ in flight.robots]

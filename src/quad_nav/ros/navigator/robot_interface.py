@@ -22,6 +22,7 @@ from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
 from quad_nav.ros.navigator.goal_server import GoalServer
 from quad_nav.ros.navigator.health_meters import InputMeter, NavigatorHealth
+from quad_nav.ros.navigator.obstacle_topics import ObstacleTopics
 from quad_nav.ros.navigator.plan_services import PlanServices
 from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.ros.navigator.reconfigure import serve_namespaces
@@ -83,6 +84,7 @@ class RobotInterface:
             for name, costmap in zip(("global", "local"), costmaps)
         }
         self._topics = PlanTopics(self.name, navigator, names)
+        self._obstacles = ObstacleTopics(self._tracker, names)
         self._reconfigure = serve_namespaces(
             self.name, self._configuration, self._on_reconfigure, names
         )
@@ -115,6 +117,7 @@ class RobotInterface:
     def restart(self, now_s: float) -> None:
         """Restart all schedules after a clock jump."""
         self._goals.restart(now_s)
+        self._obstacles.restart(now_s)
         for publisher in self._publishers.values():
             publisher.restart(now_s)
 
@@ -149,6 +152,7 @@ class RobotInterface:
                 self._goals.publish_feedback(in_global, rospy.Time.from_sec(tick.now_s))
         elif tick.command is not None:
             self._topics.stop()
+        self._obstacles.publish(tick.now_s)
         poses = {"global": located.in_global, "local": located.in_local}
         for name, window in tick.windows.items():
             pose = poses[name]

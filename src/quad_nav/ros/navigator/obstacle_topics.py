@@ -1,0 +1,60 @@
+"""Publish the tracked moving obstacles of a robot: markers for RViz, a point cloud for programs."""
+
+from __future__ import annotations
+
+import rospy
+from sensor_msgs.msg import PointCloud2, PointField
+from visualization_msgs.msg import MarkerArray
+
+from quad_nav.ros.common.conversions import replacing_markers
+from quad_nav.topics.publishing import Names, own_node
+from quad_nav.topics.tracked_obstacles import (
+    CLOUD_FIELDS,
+    CLOUD_TOPIC,
+    MARKERS_TOPIC,
+    TrackSchedule,
+    cloud_rows,
+    track_markers,
+)
+from quad_nav.tracking.tracker import ObstacleTracker
+from quad_nav.tracking.tracks import Tracks
+
+
+class ObstacleTopics:
+    """Publishes a tracker's tracks where someone listens."""
+
+    def __init__(self, tracker: ObstacleTracker, names: Names = own_node) -> None:
+        """Advertise the topics."""
+        self._tracker, self._schedule = tracker, TrackSchedule(tracker)
+        self._markers = rospy.Publisher(names(f"~{MARKERS_TOPIC}"), MarkerArray, queue_size=1)
+        self._cloud = rospy.Publisher(names(f"~{CLOUD_TOPIC}"), PointCloud2, queue_size=1)
+
+    def restart(self, now_s: float) -> None:
+        """Restart the schedule after a clock jump."""
+        self._schedule.restart(now_s)
+
+    def publish(self, now_s: float) -> None:
+        """Publish the tracks if they are due."""
+        tracks = self._schedule.pop(now_s)
+        if tracks is None:
+            return
+        frame = self._tracker.frame
+        if self._markers.get_num_connections() > 0:
+            shown = track_markers(tracks, self._tracker.unseen_s, frame)
+            self._markers.publish(replacing_markers(shown))
+        if self._cloud.get_num_connections() > 0:
+            self._cloud.publish(cloud_message(tracks, frame))
+
+
+def cloud_message(tracks: Tracks, frame: str) -> PointCloud2:
+    """Convert tracks to a cloud with a point for each of them."""
+    rows, size = cloud_rows(tracks), 4 * len(CLOUD_FIELDS)
+    message = PointCloud2(
+        height=1, width=len(rows), point_step=size, row_step=size * len(rows), is_dense=True
+    )
+    message.header.frame_id, message.header.stamp = frame, rospy.Time.from_sec(tracks.time_s)
+    message.fields = [
+        PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(CLOUD_FIELDS)
+    ]
+    message.data = rows.tobytes()
+    return message

@@ -1,0 +1,141 @@
+"""Tracked moving obstacles as topics: markers for people, and a point cloud for programs.
+
+No message for tracked objects is packaged for both Debian 12 and ROS Noetic: ``vision_msgs``,
+``people_msgs`` and ``costmap_converter`` are not on the former. A ``sensor_msgs/PointCloud2`` is
+everywhere, has all obstacles of one time in one message, and its fields have names.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import List, Optional, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.timing import Schedule
+from quad_nav.topics.markers import ARROW, CYLINDER, TEXT, Marker, Rgba
+from quad_nav.tracking.tracker import ObstacleTracker
+from quad_nav.tracking.tracks import Tracks
+
+MARKERS_TOPIC, CLOUD_TOPIC = "moving_obstacles", "moving_obstacles_cloud"
+"""Names below ``/move_base{i}``."""
+CLOUD_FIELDS = (
+    "x",
+    "y",
+    "z",
+    "vx",
+    "vy",
+    "radius",
+    "number",
+    *(f"cov_{row}_{column}" for row in ("x", "y", "vx", "vy") for column in ("x", "y", "vx", "vy")),
+)
+"""Fields of the cloud, float32: metres, metres per second; ``number`` is the track's."""
+RATE_HZ = 10.0
+SIGMAS = 2.0
+"""Half axes of the ellipse of the position, in standard deviations."""
+
+_DISC_RGBA: Rgba = (0.95, 0.35, 0.10, 0.45)
+_HIDDEN_RGBA: Rgba = (0.95, 0.35, 0.10, 0.18)
+_ELLIPSE_RGBA: Rgba = (0.55, 0.10, 0.60, 0.40)
+_ARROW_RGBA: Rgba = (0.75, 0.10, 0.05, 0.9)
+_TEXT_RGBA: Rgba = (0.1, 0.1, 0.1, 0.9)
+_HEIGHT_M, _ELLIPSE_M, _TEXT_M, _ARROW_M = 0.5, 0.02, 0.25, 0.08
+_ARROW_S = 1.0  # the arrow leads to where the obstacle is after this time
+_SLOWEST_MPS = 0.05
+
+
+class TrackSchedule:
+    """Decides when a robot's tracks are published: at a rate, and once more when they end."""
+
+    def __init__(self, tracker: ObstacleTracker) -> None:
+        """Publish the tracks of a tracker."""
+        self._tracker = tracker
+        self._schedule = Schedule(RATE_HZ)
+        self._had_any = False
+        self.restart(0.0)
+
+    def restart(self, now_s: float) -> None:
+        """Restart after a clock jump."""
+        self._schedule.start(now_s)
+
+    def pop(self, now_s: float) -> Optional[Tracks]:
+        """Return the tracks to publish now, None if nothing is due or nothing has changed."""
+        tracks = self._tracker.tracks
+        has_any = len(tracks) > 0
+        if not (has_any or self._had_any) or not self._schedule.pop(now_s):
+            return None
+        self._had_any = has_any
+        return tracks
+
+
+def track_markers(tracks: Tracks, unseen_s: NDArray[np.float64], frame: str) -> List[Marker]:
+    """Return discs, arrows of the velocities, ellipses of two sigma and numbers.
+
+    Args:
+        tracks: The tracks.
+        unseen_s: float64[n], times for which they have not been seen; those discs are paler.
+        frame: Frame of the tracks.
+    """
+    return [
+        marker
+        for number, state, covariance, radius_m, hidden_s in zip(
+            tracks.numbers.tolist(),
+            tracks.states.tolist(),
+            tracks.covariances,
+            tracks.radii_m.tolist(),
+            unseen_s.tolist(),
+        )
+        for marker in _markers(frame, number, state, covariance, radius_m, hidden_s > 0.0)
+    ]
+
+
+def _markers(
+    frame: str,
+    number: int,
+    state: List[float],
+    covariance: NDArray[np.float64],
+    radius_m: float,
+    is_hidden: bool,
+) -> List[Marker]:
+    x_m, y_m, vx_mps, vy_mps = state
+    number %= 2**31  # an int32 in the message
+    rgba = _HIDDEN_RGBA if is_hidden else _DISC_RGBA
+    (major_m, minor_m), turn_rad = ellipse(covariance[:2, :2])
+    disc = (2.0 * radius_m, 2.0 * radius_m, _HEIGHT_M)
+    flat = (2.0 * SIGMAS * major_m, 2.0 * SIGMAS * minor_m, _ELLIPSE_M)
+    text, name = (0.0, 0.0, _TEXT_M), str(number)
+    middle, top = (x_m, y_m, 0.5 * _HEIGHT_M), (x_m, y_m, _HEIGHT_M)
+    above = (x_m, y_m, _HEIGHT_M + _TEXT_M)
+    markers = [
+        Marker(frame, "disc", number, CYLINDER, middle, disc, rgba),
+        Marker(frame, "ellipse", number, CYLINDER, top, flat, _ELLIPSE_RGBA, turn_rad),
+        Marker(frame, "number", number, TEXT, above, text, _TEXT_RGBA, text=name),
+    ]
+    speed_mps = math.hypot(vx_mps, vy_mps)
+    if speed_mps > _SLOWEST_MPS:
+        arrow, turn_rad = (_ARROW_S * speed_mps, _ARROW_M, _ARROW_M), math.atan2(vy_mps, vx_mps)
+        markers.append(Marker(frame, "velocity", number, ARROW, top, arrow, _ARROW_RGBA, turn_rad))
+    return markers
+
+
+def ellipse(covariance: NDArray[np.float64]) -> Tuple[Tuple[float, float], float]:
+    """Return the standard deviations along the axes, the larger first, and its direction.
+
+    Args:
+        covariance: float64[2, 2].
+    """
+    (xx, xy), (_, yy) = covariance.tolist()
+    middle, half = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+    axes = math.sqrt(middle + half), math.sqrt(max(middle - half, 0.0))
+    return axes, 0.5 * math.atan2(2.0 * xy, xx - yy)
+
+
+def cloud_rows(tracks: Tracks) -> NDArray[np.float32]:
+    """Return the points of the cloud, float32[n, 23], columns as in ``CLOUD_FIELDS``."""
+    count = len(tracks)
+    rows = np.zeros((count, len(CLOUD_FIELDS)), np.float32)
+    rows[:, :2], rows[:, 3:5] = tracks.states[:, :2], tracks.states[:, 2:]
+    rows[:, 5], rows[:, 6] = tracks.radii_m, tracks.numbers
+    rows[:, 7:] = tracks.covariances.reshape(count, 16)
+    return rows

@@ -1,0 +1,79 @@
+"""Tracked moving obstacles on topics: markers, the point cloud, when they are published."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from quad_nav.topics.markers import ARROW, CYLINDER
+from quad_nav.topics.tracked_obstacles import (
+    CLOUD_FIELDS,
+    TrackSchedule,
+    cloud_rows,
+    ellipse,
+    track_markers,
+)
+from quad_nav.tracking.params import TrackerParams
+from quad_nav.tracking.tracker import ObstacleTracker
+from quad_nav.tracking.tracks import Tracks
+
+COVARIANCE = np.diag([0.04, 0.01, 0.09, 0.16])
+TRACKS = Tracks(
+    3.0,
+    np.array([7, 9]),
+    np.array([(1.0, 2.0, 0.0, 1.5), (4.0, 5.0, 0.0, 0.0)]),
+    np.array([COVARIANCE, COVARIANCE]),
+    np.array([0.3, 0.5]),
+)
+
+
+def test_a_track_has_a_disc_an_ellipse_and_an_arrow_to_where_it_is_in_a_second():
+    markers = track_markers(TRACKS, np.array([0.0, 0.4]), "odom0")
+    moving = {one.namespace: one for one in markers if one.number == 7}
+    assert set(moving) == {"disc", "ellipse", "number", "velocity"}
+    assert moving["disc"].kind == CYLINDER and moving["disc"].size_m[:2] == (0.6, 0.6)
+    assert moving["ellipse"].size_m[:2] == pytest.approx((0.8, 0.4))
+    arrow = moving["velocity"]
+    assert arrow.kind == ARROW and arrow.size_m[0] == 1.5
+    assert arrow.yaw_rad == pytest.approx(math.pi / 2)
+    assert all(one.frame == "odom0" for one in markers)
+
+
+def test_a_track_that_stands_has_no_arrow_and_a_hidden_one_is_paler():
+    markers = track_markers(TRACKS, np.array([0.0, 0.4]), "map")
+    standing = {one.namespace: one for one in markers if one.number == 9}
+    seen = next(one for one in markers if one.number == 7 and one.namespace == "disc")
+    assert "velocity" not in standing
+    assert standing["disc"].rgba[3] < seen.rgba[3]
+
+
+def test_the_ellipse_is_turned_to_its_larger_axis():
+    """Variances 9 and 1 along axes at 30 and 120 degrees."""
+    cos, sin = math.cos(math.pi / 6), math.sin(math.pi / 6)
+    turn = np.array([[cos, -sin], [sin, cos]])
+    axes, direction_rad = ellipse(turn @ np.diag([9.0, 1.0]) @ turn.T)
+    assert axes == pytest.approx((3.0, 1.0)) and direction_rad == pytest.approx(math.pi / 6)
+
+
+def test_the_cloud_has_states_radii_numbers_and_covariances():
+    rows = cloud_rows(TRACKS)
+    assert rows.shape == (2, 23) and rows.dtype == np.float32
+    first = dict(zip(CLOUD_FIELDS, rows[0].tolist()))
+    expected = {"x": 1.0, "y": 2.0, "z": 0.0, "vx": 0.0, "vy": 1.5, "radius": 0.3, "number": 7.0}
+    assert {name: first[name] for name in expected} == pytest.approx(expected)
+    assert first["cov_x_x"] == pytest.approx(0.04) and first["cov_vy_vy"] == pytest.approx(0.16)
+    assert first["cov_x_y"] == 0.0
+
+
+def test_tracks_are_published_at_10_hz_and_once_more_when_they_end():
+    tracker = ObstacleTracker(TrackerParams(True), "map")
+    schedule = TrackSchedule(tracker)
+    assert schedule.pop(0.0) is None
+    tracker.tracks = TRACKS
+    published = [k for k in range(40) if schedule.pop(3.0 + k / 40) is not None]
+    assert published == [0, 4, 8, 12, 16, 20, 24, 28, 32, 36]
+    tracker.tracks = Tracks.none(4.0)
+    ended = [schedule.pop(4.0 + k / 40) for k in range(40)]
+    assert [len(one) for one in ended if one is not None] == [0]
