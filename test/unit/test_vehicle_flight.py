@@ -3,100 +3,13 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import pytest
-from vehicles.point_vehicle import ARDUPILOT, PX4, PointVehicle
+from vehicles import failures
+from vehicles.virtual_flight import STEP_S, Flight
 
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.vehicle.autopilots import AUTOPILOTS
-from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
 from quad_nav.vehicle.orders import Permissions, State
-from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Vehicle
-
-STEP_S = 0.01
-KINDS = {"ardupilot": ARDUPILOT, "px4": PX4}
-
-
-class Flight:
-    """A bridge and a vehicle, which exchange messages without delay."""
-
-    def __init__(self, autopilot="ardupilot", permissions=Permissions(may_arm=True), **limits):
-        self.vehicle = PointVehicle(KINDS[autopilot], heading_rad=0.6, boot_s=40.0)
-        limits = Limits(**{"speed_mps": 1.0, **limits})
-        self.machine = VehicleMachine(1.2, limits, AUTOPILOTS[autopilot].traits, permissions)
-        self.adapter = MavlinkAdapter(
-            Vehicle(0, "mavlink", autopilot, altitude_m=1.2, limits=limits), self.machine
-        )
-        self.now_s = 100.0
-        self.sent = []  # (time, name, fields)
-        self.news, self.states, self.pauses = [], [], 0
-        self.hears = self.is_heard = True
-        self.command = None  # Twist2D of each 50 ms
-        self._next_command_s = 0.0
-
-    def run(self, seconds, until=None):
-        """Fly; return whether `until` became true."""
-        end_s = self.now_s + seconds - 1e-9
-        while self.now_s < end_s:
-            self._step()
-            if until is not None and until():
-                return True
-        return until is None
-
-    def _step(self):
-        self.now_s += STEP_S
-        for name, fields in self.vehicle.advance(STEP_S):
-            if self.hears:
-                message = SimpleNamespace(id=0, **fields) if name == "STATUSTEXT" else None
-                self.adapter.receive(name, 1, message or SimpleNamespace(**fields), self.now_s)
-        messages = []
-        if self.command is not None and self.now_s >= self._next_command_s:
-            self._next_command_s = self.now_s + 0.05
-            messages += self.adapter.follow(self.command, self.now_s)[1]
-        output, more = self.adapter.tick(self.now_s)
-        self.news += [(self.now_s, line) for line in output.news]
-        self.pauses += output.pauses_mission
-        if not self.states or self.states[-1] is not self.state:
-            self.states.append(self.state)
-        for name, fields in messages + more:
-            self.sent.append((self.now_s, name, fields))
-            if self.is_heard:
-                self.vehicle.receive(name, fields)
-
-    @property
-    def state(self):
-        return self.machine.state
-
-    @property
-    def height_m(self):
-        return -self.vehicle.position[2]
-
-    @property
-    def speed_mps(self):
-        return math.hypot(*self.vehicle.velocity[:2])
-
-    def to_hover(self):
-        assert self.run(10.0, lambda: self.state is State.READY), (self.state, self.machine.reason)
-        assert self.machine.take_off(self.now_s).is_accepted
-        assert self.run(20.0, lambda: self.state is State.HOLDING), (
-            self.state,
-            self.machine.reason,
-        )
-        return self
-
-    def to_flight(self, command=Twist2D(0.5, 0.0, 0.0)):
-        self.to_hover()
-        self.command = command
-        self.run(3.0)
-        assert self.state is State.FLYING
-        return self
-
-    def setpoints_since(self, start_s):
-        name = "SET_POSITION_TARGET_LOCAL_NED"
-        return [fields for at_s, sent, fields in self.sent if sent == name and at_s >= start_s]
 
 
 @pytest.fixture(params=["ardupilot", "px4"])
@@ -153,3 +66,156 @@ def test_lands_when_asked(autopilot):
     flight.run(1.0)
     assert flight.machine.take_off(flight.now_s).is_accepted  # again
     assert flight.run(20.0, lambda: flight.state is State.HOLDING)
+
+
+@pytest.mark.parametrize("moment_s", [0.0, 1.37])
+@pytest.mark.parametrize("row", failures.ROWS)
+def test_failure(autopilot, row, moment_s):
+    failures.fly_row(row, autopilot, moment_s)
+
+
+def test_a_running_stream_does_not_take_over_when_the_pilot_returns_the_mode(autopilot):
+    flight, _, _ = failures.fly_row("the pilot changes the mode", autopilot, 0.5)
+    start_s = flight.now_s
+    flight.vehicle.set_mode(flight.vehicle.kind["control"])
+    flight.run(3.0)
+    assert flight.state is State.TAKEN_OVER
+    assert flight.setpoints_since(start_s) == []
+
+
+def test_a_taken_over_vehicle_flies_again_when_somebody_resumes_it(autopilot):
+    flight, _, _ = failures.fly_row("the pilot changes the mode", autopilot, 0.5)
+    assert flight.machine.resume(flight.now_s).is_accepted
+    assert flight.run(3.0, lambda: flight.state is State.FLYING)
+    assert flight.vehicle.mode == flight.vehicle.kind["control"]
+
+
+def test_no_heartbeat_leaves_while_the_link_is_lost_in_flight(autopilot):
+    """Otherwise the autopilot's failsafe would not act when only its messages are lost."""
+    flight = Flight(autopilot).to_flight()
+    flight.hears = False
+    assert flight.run(1.2, lambda: flight.state is State.NO_LINK)
+    start_s = flight.now_s + STEP_S
+    assert flight.run(8.0, lambda: flight.vehicle.mode == flight.vehicle.kind["land"])
+    assert [name for at_s, name, _ in flight.sent if at_s > start_s and name == "HEARTBEAT"] == []
+
+
+def test_a_short_loss_of_the_link_ends_in_flight(autopilot):
+    flight = Flight(autopilot).to_flight()
+    flight.hears = flight.is_heard = False
+    flight.run(2.0)
+    assert flight.state is State.NO_LINK
+    flight.hears = flight.is_heard = True
+    assert flight.run(2.0, lambda: flight.state is State.FLYING)
+
+
+def test_refused_arming_tells_the_autopilots_reason():
+    flight = Flight()
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    flight.vehicle.refuses_arming = "Gyros inconsistent"
+    flight.machine.take_off(flight.now_s)
+    assert flight.run(3.0, lambda: flight.state is State.NOT_READY)
+    assert flight.machine.refusal == "the autopilot refuses to arm: Arm: Gyros inconsistent"
+
+
+def test_never_arms_without_permission(autopilot):
+    flight = Flight(autopilot, Permissions())
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    response = flight.machine.take_off(flight.now_s)
+    assert not response.is_accepted and "arm:=true" in response.text
+    flight.run(5.0)
+    assert not flight.vehicle.armed
+    flight.vehicle.armed = True  # the pilot arms
+    flight.vehicle.set_mode(flight.vehicle.mode)
+    flight.run(0.1)
+    assert flight.machine.take_off(flight.now_s).is_accepted
+    assert flight.run(20.0, lambda: flight.state is State.HOLDING)
+
+
+def test_a_dry_run_streams_but_does_not_arm(autopilot):
+    flight = Flight(autopilot, Permissions(may_arm=True, is_dry=True))
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    assert flight.machine.take_off(flight.now_s).is_accepted
+    flight.command = Twist2D(0.2, 0.1, 0.3)
+    flight.run(5.0)
+    assert flight.state is State.FLYING and not flight.vehicle.armed
+    last = flight.setpoints_since(flight.now_s - 0.1)[-1]
+    assert [last["vx"], last["vy"], last["yaw_rate"]] == pytest.approx([0.2, -0.1, -0.3])
+    commands = [fields["command"] for _, name, fields in flight.sent if name == "COMMAND_LONG"]
+    assert 400 not in commands and 22 not in commands
+
+
+@pytest.mark.parametrize(
+    "autopilot, parameter, value, text",
+    [
+        ("ardupilot", "FS_GCS_ENABLE", 0.0, "does nothing when the link"),
+        ("ardupilot", "FS_THR_ENABLE", 1.0, "climbs to 15 m (RTL_ALT)"),
+        ("ardupilot", "FS_THR_ENABLE", 0.0, "does nothing when the radio"),
+        ("ardupilot", "FS_EKF_ACTION", 0.0, "does not land when it loses its position"),
+        ("px4", "NAV_DLL_ACT", 0.0, "does not land when the link"),
+        ("px4", "NAV_RCL_ACT", 2.0, "climbs to 30 m (RTL_RETURN_ALT)"),
+        ("px4", "COM_OBL_RC_ACT", 0.0, "does not land or hold when the set-points stop"),
+    ],
+)
+def test_unsafe_failsafe_is_refused_before_arming(autopilot, parameter, value, text):
+    flight = Flight(autopilot)
+    flight.vehicle.parameters[parameter] = value
+    flight.run(10.0)
+    assert flight.state is State.NOT_READY
+    assert parameter in flight.machine.reason and text in flight.machine.reason
+    assert not flight.machine.take_off(flight.now_s).is_accepted
+
+
+def test_radio_failsafe_that_continues_under_our_control_is_accepted():
+    flight = Flight()
+    flight.vehicle.parameters.update(FS_THR_ENABLE=1.0, FS_OPTIONS=4.0)
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+
+
+def test_fence_height_and_timeout_are_written():
+    flight = Flight(height_m=2.0, radius_m=8.0)
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    written = flight.vehicle.parameters
+    assert (written["GUID_TIMEOUT"], written["FENCE_ENABLE"]) == (0.5, 1.0)
+    assert (written["FENCE_ALT_MAX"], written["FENCE_RADIUS"]) == (2.5, 8.5)
+    assert (written["FENCE_ACTION"], written["FENCE_TYPE"]) == (2.0, 3.0)
+
+
+def test_set_points_go_out_at_20_hz_and_at_once_after_a_command(autopilot):
+    flight = Flight(autopilot).to_flight()
+    start_s = flight.now_s
+    flight.run(10.0)
+    times = [at_s for at_s, name, _ in flight.sent if "SET_POSITION" in name and at_s > start_s]
+    assert len(times) == pytest.approx(200, abs=3)
+    flight.command = None
+    start_s = flight.now_s
+    flight.run(4.0)  # holding
+    times = [at_s for at_s, name, _ in flight.sent if "SET_POSITION" in name and at_s > start_s]
+    assert len(times) == pytest.approx(80, abs=3)
+
+
+def test_outward_command_slows_down_before_the_fence(autopilot):
+    flight = Flight(autopilot, radius_m=2.0).to_flight(Twist2D(0.5, 0.0, 0.0))
+    flight.run(8.0)
+    assert flight.state is State.FLYING
+    distance_m = math.hypot(*flight.vehicle.position[:2])
+    assert 1.7 < distance_m < 2.0
+
+
+def test_a_cancelled_take_off_is_ordered_again():
+    flight = Flight()
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    flight.machine.take_off(flight.now_s)
+    assert flight.run(5.0, lambda: flight.state is State.TAKING_OFF)
+    flight.run(1.0)
+    flight.vehicle._takeoff_s = None  # another station's set-point
+    assert flight.run(20.0, lambda: flight.state is State.HOLDING)
+
+
+def test_a_navigator_that_waits_keeps_the_vehicle_in_the_air(autopilot):
+    flight = Flight(autopilot).to_hover()
+    for _ in range(20):
+        flight.machine.inputs.take_idle(flight.now_s)
+        flight.run(0.5)
+    assert flight.state is State.HOLDING
+    assert flight.run(5.6, lambda: flight.state is State.LANDING)  # it has died

@@ -28,6 +28,7 @@ class Inputs:
 
     Attributes:
         status: Last heartbeat of the vehicle.
+        status_s: Time of that heartbeat.
         landed: Where the vehicle is.
         estimate: Last estimate with finite numbers.
         battery: Charge from 0 to 1; None if it is unknown.
@@ -47,7 +48,7 @@ class Inputs:
         self.command, self.command_s = Twist2D(), _NEVER_S
         self.moved_sticks = ""
         self.faults: Optional[Sequence[str]] = None
-        self._status_s = self._heard_s = self._estimate_s = self._idle_s = _NEVER_S
+        self.status_s = self._heard_s = self._estimate_s = self._idle_s = _NEVER_S
         self._texts: Dict[str, float] = {}  # reason -> until when it counts
         self._low_since_s: Optional[float] = None
         self._still_since_s: Optional[float] = None
@@ -61,7 +62,7 @@ class Inputs:
 
     def take_status(self, status: Status, now_s: float) -> None:
         """Take a heartbeat of the vehicle."""
-        self.status, self._status_s = status, now_s
+        self.status, self.status_s = status, now_s
         self.hear(now_s)
 
     def take_estimate(self, estimate: Estimate, now_s: float) -> None:
@@ -137,9 +138,9 @@ class Inputs:
         """Return why the link counts as lost, "" if it does not."""
         if self.status is None:
             return "no heartbeat yet"
-        if now_s - self._heard_s > SILENT_S and now_s - self._status_s > SILENT_S + 0.5:
+        if now_s - self._heard_s > SILENT_S and now_s - self.status_s > SILENT_S + 0.5:
             return f"nothing heard from the vehicle for {SILENT_S:g} s"
-        if now_s - self._status_s > HEARTBEAT_S:
+        if now_s - self.status_s > HEARTBEAT_S:
             return f"no heartbeat for {HEARTBEAT_S:g} s"
         return ""
 
@@ -182,7 +183,7 @@ class Inputs:
             self.status,
             moved_sticks=self.moved_sticks,
             heard_age_s=now_s - self._heard_s,
-            status_age_s=now_s - self._status_s,
+            status_age_s=now_s - self.status_s,
             estimate_age_s=now_s - self._estimate_s,
             jump_m=self._jump_m,
             low_battery_s=0.0 if low_s is None else now_s - low_s,

@@ -34,8 +34,8 @@ JUMP_M = 0.5
 STILL_S = 1.5
 """An estimate that does not change at all under a command to move is frozen after this time."""
 STILL_MPS = 0.15
-FENCE_RANGE_M = 1.0
-"""Outward commands are slowed down in this range before the limit of distance."""
+FENCE_GAIN_1PS = 0.4
+"""Outward speed for each metre to the limit of distance: slow against the 0.65 s of the vehicle."""
 
 
 class Reaction(enum.Enum):
@@ -185,15 +185,14 @@ def inside_fence(
         radius_m: Largest distance.
 
     Returns:
-        The velocity (x, y), its outward part at most what is left of the way, in m, each second.
+        The velocity (x, y), its outward part at most `FENCE_GAIN_1PS` of the way that is left.
     """
     distance_m = math.hypot(*offset_m)
-    left_m = radius_m - distance_m
-    if left_m >= FENCE_RANGE_M or distance_m == 0.0:
+    if distance_m == 0.0:
         return velocity_mps
     x, y = offset_m[0] / distance_m, offset_m[1] / distance_m
     outward_mps = velocity_mps[0] * x + velocity_mps[1] * y
-    excess_mps = outward_mps - max(left_m, 0.0)
+    excess_mps = outward_mps - FENCE_GAIN_1PS * max(radius_m - distance_m, 0.0)
     if outward_mps <= 0.0 or excess_mps <= 0.0:
         return velocity_mps
     return velocity_mps[0] - excess_mps * x, velocity_mps[1] - excess_mps * y

@@ -225,6 +225,8 @@ class VehicleMachine:
         status = self.inputs.status
         if status is None or self.inputs.link_problem(now_s):
             return None
+        if self.inputs.status_s < self._state_s:  # a heartbeat, not only an echo from before
+            return None
         before, self._before_loss = self._before_loss, State.NO_LINK
         is_up = status.is_armed and self.inputs.landed is not Landed.ON_GROUND
         if not is_up:

@@ -1,0 +1,157 @@
+#!/usr/bin/env python3
+"""The table of failures: each row many times, at random moments of a flight.
+
+    PYTHONPATH=src:test python3 test/vehicles/failures.py [REPEATS]
+
+Prints how long the vehicle took to hover or to begin to land, and in how many flights it did what
+the row says. The vehicle is `point_vehicle`, the clock is virtual.
+"""
+
+from __future__ import annotations
+
+import random
+import statistics
+import sys
+
+from vehicles.virtual_flight import Flight
+
+from quad_nav.geometry import Twist2D
+from quad_nav.vehicle.orders import State
+
+HOVER_MPS = 0.05
+
+
+def _change_mode(flight):
+    flight.vehicle.set_mode(flight.vehicle.kind["other"])
+
+
+def _move_stick(flight):
+    flight.vehicle.sticks[0] = 1750
+
+
+def _disarm(flight):
+    flight.vehicle.armed = False
+    flight.vehicle.set_mode(flight.vehicle.mode)
+
+
+def _stop_commands(flight):
+    flight.command = None
+
+
+def _lose_link(flight):
+    flight.hears = flight.is_heard = False
+
+
+def _lose_telemetry(flight):
+    flight.hears = False
+
+
+def _lose_commands(flight):
+    flight.is_heard = False
+
+
+def _freeze(flight):
+    flight.vehicle.is_frozen = True
+
+
+def _jump(flight):
+    flight.vehicle.jump_m = 1.5
+
+
+def _drain(flight):
+    flight.vehicle.battery = 12
+
+
+def _stop_all(flight):
+    flight.machine.land(flight.now_s, "all vehicles land", is_stop_all=True)
+
+
+def _climb(flight):
+    flight.vehicle.position[2] = -2.7  # a barometer's error
+
+
+def _leave(flight):
+    flight.machine._limits = flight.machine.inputs._limits.__class__(radius_m=0.2)
+
+
+# Name: fault, state that must follow, within s, whether the mission must pause.
+ROWS = {
+    "the pilot changes the mode": (_change_mode, State.TAKEN_OVER, 0.1, True),
+    "the pilot moves a stick": (_move_stick, State.TAKEN_OVER, 0.3, True),
+    "somebody disarms": (_disarm, State.TAKEN_OVER, 0.1, True),
+    "commands stop: hover": (_stop_commands, State.HOLDING, 0.6, False),
+    "commands stop: land": (_stop_commands, State.LANDING, 5.1, False),
+    "link lost": (_lose_link, State.NO_LINK, 1.1, False),
+    "link lost from the vehicle": (_lose_telemetry, State.NO_LINK, 1.1, False),
+    "link lost to the vehicle": (_lose_commands, State.TAKEN_OVER, 7.0, True),
+    "estimate frozen": (_freeze, State.LANDING, 4.0, False),
+    "estimate jumps by 1.5 m": (_jump, State.LANDING, 0.1, False),
+    "battery low": (_drain, State.LANDING, 3.2, False),
+    "height limit crossed": (_climb, State.LANDING, 0.1, False),
+    "distance limit crossed": (_leave, State.LANDING, 0.1, False),
+    "stop all": (_stop_all, State.LANDING, 0.1, False),
+}
+STATES_WITHOUT_STREAM = (State.TAKEN_OVER, State.NO_LINK, State.LANDING)
+
+
+COMMAND = Twist2D(0.4, 0.1, 0.2)
+
+
+def fly_row(name, autopilot, moment_s, command=COMMAND):
+    """Fly one row; return the flight, the time to its state, and the time to a hover or landing.
+
+    Raises:
+        AssertionError: The bridge did something else.
+    """
+    fault, state, within_s, pauses = ROWS[name]
+    flight = Flight(autopilot).to_flight(command)
+    flight.run(moment_s)
+    assert flight.state is State.FLYING, (flight.state, flight.machine.reason)
+    start_s = flight.now_s
+    fault(flight)
+    assert flight.run(within_s, lambda: flight.state is state), (flight.state, flight.news[-2:])
+    reached_s = flight.now_s - start_s
+
+    def is_safe():
+        return flight.speed_mps < HOVER_MPS and not (
+            state is State.LANDING and flight.vehicle.landed == 2
+        )
+
+    assert flight.run(12.0, is_safe), (flight.state, flight.speed_mps)
+    safe_s = flight.now_s - start_s
+    silent_s = start_s + reached_s + 0.1
+    flight.run(1.0)
+    if state in STATES_WITHOUT_STREAM and flight.state in STATES_WITHOUT_STREAM:
+        assert flight.setpoints_since(silent_s) == []
+    assert (flight.pauses > 0) == pauses, flight.pauses
+    return flight, reached_s, safe_s
+
+
+def main():
+    repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    moments = random.Random(20)
+    print(f"{'failure':30} {'autopilot':10} {'as said':>8} {'state s':>8} {'safe s':>7} {'max':>6}")
+    failed = 0
+    for name in ROWS:
+        for autopilot in ("ardupilot", "px4"):
+            reached, safe = [], []
+            for _ in range(repeats):
+                try:
+                    _, reached_s, safe_s = fly_row(name, autopilot, moments.uniform(0.0, 4.0))
+                except AssertionError as error:
+                    failed += 1
+                    print("   ", name, autopilot, error)
+                    continue
+                reached.append(reached_s)
+                safe.append(safe_s)
+            if safe:
+                print(
+                    f"{name:30} {autopilot:10} {len(safe):>4}/{repeats:<3}"
+                    f" {statistics.median(reached):8.2f} {statistics.median(safe):7.2f}"
+                    f" {max(safe):6.2f}"
+                )
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
