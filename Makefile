@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance fuzz bench bench-compare bench-startup bench-original bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fuzz bench bench-compare bench-startup bench-original bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -53,7 +53,7 @@ docs: venv  ## The documentation as a site, in site/; warnings are errors
 	@echo "quad: open site/index.html"
 
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
-	@scripts/make_venv .venv requirements-web.txt
+	@scripts/make_venv .venv requirements-web.txt requirements-mavlink.txt
 	@scripts/ros_env scripts/rostests $(TEST)
 
 first-hour: workspace  ## What a user does first: an own scene, map, robot, goals and report
@@ -68,6 +68,10 @@ ray: packages  ## The tests with a Ray cluster, in an environment of their own
 # make itself ends with 2 on any failure and names the command's own exit status in its message.
 conformance: venv  ## Compare with the original's recordings: make conformance DIR=folder
 	@$(PYTHON) test/conformance/run.py $(DIR)
+
+replay-vehicles: venv  ## Replay recorded MAVLink logs to the bridge of vehicles: make replay-vehicles DIR=folder
+	@scripts/make_venv .venv requirements-mavlink.txt
+	@PYTHONPATH=src:test $(PYTHON) test/vehicles/replay.py $(DIR)
 
 fuzz: venv  ## Feed what reads files with made-up bytes: make fuzz TARGET=scene SECONDS=60
 	@scripts/make_venv .venv requirements-fuzz.txt

@@ -155,19 +155,20 @@ class ClockSync:
     def __init__(self) -> None:
         """Start without samples."""
         self._samples: Deque[Tuple[float, float]] = deque(maxlen=SYNC_SAMPLES)
-        self._next_s = -math.inf
+        self._next_s, self._asked = -math.inf, 0
         self._best_s: Optional[float] = None
 
     def forget(self) -> None:
         """Forget the samples: the autopilot's clock has started again."""
         self._samples.clear()
-        self._next_s, self._best_s = -math.inf, None
+        self._next_s, self._best_s, self._asked = -math.inf, None, 0
 
     def requests(self, now_s: float) -> List[Message]:
         """Return the request if it is due."""
         if now_s < self._next_s:
             return []
-        fast = len(self._samples) < self._samples.maxlen // 2  # type: ignore[operator]
+        self._asked += 1
+        fast = self._asked <= SYNC_SAMPLES
         self._next_s = now_s + (SYNC_FAST_PERIOD_S if fast else SYNC_PERIOD_S)
         return [("TIMESYNC", {"tc1": 0, "ts1": round(now_s * 1e9)})]
 

@@ -77,6 +77,7 @@ class FlightView:
         distance_m: Horizontal distance from the place of take-off.
         command_age_s: Age of the last velocity command.
         waiting_age_s: Age of the last command, or of the navigator's last word that it has no goal.
+        is_grounded: Whether the vehicle stands on the ground although it should fly.
     """
 
     status: Status
@@ -91,6 +92,7 @@ class FlightView:
     distance_m: float = 0.0
     command_age_s: float = 0.0
     waiting_age_s: float = 0.0
+    is_grounded: bool = False
 
 
 Test = Callable[[FlightView, Limits], str]
@@ -122,6 +124,8 @@ def _link_lost(view: FlightView, _: Limits) -> str:
 
 
 def _must_land(view: FlightView, limits: Limits) -> str:
+    if view.is_grounded:
+        return "it stands on the ground"
     if view.jump_m > 0.0:
         return f"the estimated position jumped by {view.jump_m:.2f} m"
     if view.estimate_age_s > ESTIMATE_LAND_S:

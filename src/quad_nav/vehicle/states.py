@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import List, Optional
+from typing import Callable, Dict, List, Optional
 
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.vehicle.inputs import Inputs
@@ -159,10 +159,6 @@ class VehicleMachine:
         self._pauses, self._news = False, []
         return output
 
-    def commanded_velocity(self, now_s: float) -> Velocity:
-        """Return the set-point for the last command, between two ticks."""
-        return self._command(now_s)
-
     def answer(self, answer: Answer, now_s: float) -> None:
         """Take the autopilot's answer to an order."""
         if answer.is_accepted or answer.order is not self._order:
@@ -200,7 +196,9 @@ class VehicleMachine:
     def _view(self, now_s: float) -> FlightView:
         is_commanded = self.state in (State.FLYING, State.HOLDING)
         view = self.inputs.view(now_s, self.odom_from_start, self.ground_m)
-        if not is_commanded:  # commands count only in flight
+        if is_commanded:
+            view = replace(view, is_grounded=self.inputs.landed is Landed.ON_GROUND)
+        else:  # commands count only in flight
             view = replace(view, command_age_s=0.0, waiting_age_s=0.0)
         return replace(view, may_land=self.state is State.LANDING)
 
@@ -304,12 +302,6 @@ class VehicleMachine:
         self.inputs.begin_flight(now_s)
         self._enter(State.HOLDING, "at altitude, waiting for commands", now_s)
 
-    def _in_flying(self, now_s: float) -> Optional[Velocity]:
-        return self._command(now_s)
-
-    def _in_holding(self, now_s: float) -> Optional[Velocity]:
-        return self._hover(now_s)
-
     def _in_landing(self, now_s: float) -> Optional[Velocity]:
         status = self.inputs.status
         assert status is not None
@@ -341,26 +333,13 @@ class VehicleMachine:
             self._news.append("no effect of the order to take control")
         return Velocity() if streams else None
 
-    _STEPS = {
-        State.NO_LINK: _in_no_link,
-        State.NOT_READY: _on_ground,
-        State.READY: _on_ground,
-        State.LANDED: _on_ground,
-        State.ARMING: _in_arming,
-        State.TAKING_OFF: _in_taking_off,
-        State.FLYING: _in_flying,
-        State.HOLDING: _in_holding,
-        State.LANDING: _in_landing,
-        State.TAKEN_OVER: _in_taken_over,
-    }
-
     # Parts of the steps.
 
     def _hover(self, now_s: float) -> Velocity:
         return self._velocity(Twist2D(), now_s)
 
-    def _command(self, now_s: float) -> Velocity:
-        """Return the last command, slowed down at the limit of distance."""
+    def commanded_velocity(self, now_s: float) -> Velocity:
+        """Return the set-point for the last command, slowed down at the limit of distance."""
         twist, estimate = self.inputs.command, self.inputs.estimate
         if estimate is None or self.odom_from_start is None:
             return self._velocity(twist, now_s)
@@ -373,6 +352,19 @@ class VehicleMachine:
         )
         vx, vy = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(vx, vy)
         return self._velocity(Twist2D(vx, vy, twist.vyaw_radps), now_s)
+
+    _STEPS: Dict[State, Callable[[VehicleMachine, float], Optional[Velocity]]] = {
+        State.NO_LINK: _in_no_link,
+        State.NOT_READY: _on_ground,
+        State.READY: _on_ground,
+        State.LANDED: _on_ground,
+        State.ARMING: _in_arming,
+        State.TAKING_OFF: _in_taking_off,
+        State.FLYING: commanded_velocity,
+        State.HOLDING: _hover,
+        State.LANDING: _in_landing,
+        State.TAKEN_OVER: _in_taken_over,
+    }
 
     def _velocity(self, twist: Twist2D, now_s: float) -> Velocity:
         vz_mps = 0.0
