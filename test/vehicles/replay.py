@@ -3,14 +3,14 @@
 
     PYTHONPATH=src:test python3 test/vehicles/replay.py FOLDER
 
-Each line of a log is a JSON object with `t` (s), `dir` (`rx` from the vehicle), `sys`, `comp`, `name`
-and `fields`, where a missing field is 0. The vehicle does not react to the bridge, so that only the
-kind, the rate and the order of what is sent can be compared: the bridge follows a vehicle that
-others fly.
+Each line of a log is a JSON object with `t` (s), `dir` (`rx` from the vehicle), `sys`, `comp`,
+`name` and `fields`, where a missing field is 0. The vehicle does not react to the bridge, so that
+only the kind, the rate and the order of what is sent can be compared: the bridge follows a vehicle
+that others fly.
 
-Checked for each log: nothing but known messages, finite set-points in frame 8 with mask 1479 at 20 Hz,
-none while the vehicle is on the ground, taking off, landing, in another mode, or silent; no order
-but those that the state allows; and the bridge never sets a mode after it was taken over.
+Checked for each log: nothing but known messages; finite set-points in frame 8 with mask 1479 at
+20 Hz; none while the vehicle is on the ground, taking off, landing, in another mode, or silent; no
+order but those that the state allows; and no order after the vehicle was taken over.
 """
 
 from __future__ import annotations
