@@ -53,7 +53,8 @@ docs: venv  ## The documentation as a site, in site/; warnings are errors
 	@echo "quad: open site/index.html"
 
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
-	@scripts/make_venv .venv requirements-web.txt requirements-mavlink.txt
+	@$(if $(if $(TEST),$(filter web_browser,$(TEST)),all),scripts/install_packages --browser)
+	@scripts/make_venv .venv requirements-web.txt requirements-web-test.txt requirements-mavlink.txt
 	@scripts/ros_env scripts/rostests $(TEST)
 
 first-hour: workspace  ## What a user does first: an own scene, map, robot, goals and report

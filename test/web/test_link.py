@@ -28,6 +28,24 @@ def test_a_page_whose_server_is_gone_says_so_and_comes_back(open_page, serve):
     driver.is_ready()
 
 
+def tokens(age):
+    return "--steer-token", f"{age}-to-steer", "--watch-token", f"{age}-to-watch"
+
+
+def test_a_page_with_an_old_token_says_what_to_do_and_comes_back(open_page, serve):
+    server = serve("--robots", "2", *tokens("old"))
+    driver = Driver(open_page(server.url)).is_ready()
+    notice = driver.page.locator(NOTICE)
+    driver.page.watch.forgive(GONE)
+    server.stop()
+    expect(notice).to_contain_text("reconnecting")
+    other = serve("--robots", "3", "--port", server.port, *tokens("new"))
+    expect(notice).to_contain_text("open the address that it has printed")
+    assert driver.page.context.new_page().goto(other.url).ok  # the cookie is the browser's
+    expect(notice).to_be_hidden()
+    expect(driver.rows()).to_have_count(3)
+
+
 def test_a_page_whose_server_hangs_says_so(driver, server):
     notice = driver.page.locator(NOTICE)
     driver.page.watch.forgive(GONE)

@@ -11,6 +11,9 @@ const SCALE_BAR_PX = 120;
 const WIDE_PX = 700; // narrower arenas begin with the legend closed
 const TOOLBAR_PX = 46; // height of the page's own toolbar
 const NOTE_MS = 6000;
+const REFUSED =
+  "The server was restarted and has new tokens: open the address that it has printed. " +
+  "This page then comes back by itself.";
 
 /** The elements over the arena. */
 export class Hud {
@@ -162,7 +165,7 @@ export class Hud {
   }
 }
 
-/** A bar at the top of the page that says how long the link has been silent. */
+/** A bar at the top of the page that says how long the link has been silent, or what to do. */
 export class LinkNotice {
   /** @param {import("./link.js").Link} link */
   constructor(link) {
@@ -187,10 +190,11 @@ export class LinkNotice {
   }
 
   _update() {
-    const { isAlive, silence_s } = this._link;
+    const { isAlive, isRefused, silence_s } = this._link;
     const isDead = !isAlive && silence_s >= 1;
     document.body.classList.toggle("quad-link-dead", isDead);
     this._element.hidden = !isDead;
-    say(this._text, `No data for ${Math.floor(silence_s)} s, reconnecting`);
+    const text = `No data for ${Math.floor(silence_s)} s, reconnecting`;
+    say(this._text, isRefused ? REFUSED : text);
   }
 }

@@ -14,6 +14,8 @@ const CHECK_MS = 250;
 const FIRST_RETRY_MS = 100;
 const LONGEST_RETRY_MS = 1000;
 const LONGEST_DRAW_MS = 1000;
+const PROBE = "/favicon.ico"; // the page itself would be built anew
+const FORBIDDEN = 403;
 
 /**
  * A connection that comes back by itself.
@@ -21,6 +23,9 @@ const LONGEST_DRAW_MS = 1000;
  * Events: `frame` after the items of a message are in the store (listeners draw), `drawn` after
  * that (detail: `{seq, wall_s, latency_s}`), `state` when the link dies, stays dead for another
  * while, or comes back (detail: `{isAlive, silence_s}`).
+ *
+ * `isRefused` is true while the server answers, but refuses this page: after a restart it has other
+ * tokens, unless they were given.
  */
 export class Link extends EventTarget {
   /** @param {string} url Address of the stream, `ws://...`. */
@@ -29,6 +34,7 @@ export class Link extends EventTarget {
     this.url = url;
     this.store = new Store();
     this.isAlive = false;
+    this.isRefused = false;
     this._wanted = { layers: [], robot: null, every: true };
     this._heard_ms = performance.now();
     this._retry_ms = FIRST_RETRY_MS;
@@ -137,6 +143,23 @@ export class Link extends EventTarget {
     if (this._socket && wasTried_s > SILENCE_S) {
       this._retry(); // open but silent, or neither accepted nor refused
     }
+    this._askWhy();
+  }
+
+  /** Ask the server whether it refuses this page; a browser does not tell of a WebSocket. */
+  async _askWhy() {
+    if (this._isAsking) {
+      return;
+    }
+    this._isAsking = true;
+    try {
+      const signal = AbortSignal.timeout(1000 * SILENCE_S);
+      const answer = await fetch(PROBE, { method: "HEAD", cache: "no-store", signal });
+      this.isRefused = !this.isAlive && answer.status === FORBIDDEN;
+    } catch (error) {
+      this.isRefused = false; // no server, or one that does not answer
+    }
+    setTimeout(() => (this._isAsking = false), LONGEST_RETRY_MS);
   }
 
   _setAlive(isAlive) {
@@ -144,6 +167,7 @@ export class Link extends EventTarget {
       return;
     }
     this.isAlive = isAlive;
+    this.isRefused = this.isRefused && !isAlive;
     const detail = { isAlive, silence_s: this.silence_s };
     this.dispatchEvent(new CustomEvent("state", { detail }));
   }

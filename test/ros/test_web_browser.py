@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+"""The page of a flight of ROS nodes in chromium: see it, send a goal, stop all, a killed node."""
+
+import os
+import re
+import signal
+import sys
+from pathlib import Path
+
+import rospy
+import rostest
+from flight_case import FlightCase, pid_of
+from playwright.sync_api import expect
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "test" / "web"))
+
+from browser import DESKTOP, Watch, chromium  # noqa: E402
+from driver import Driver  # noqa: E402
+
+PATIENCE_MS = 60000
+NOTICE = ".quad-link-notice"
+GONE = r"ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|WebSocket|Failed to load"
+
+
+class WebBrowser(FlightCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        expect.set_options(timeout=PATIENCE_MS)
+        cls.start()
+        cls.wait(lambda: rospy.get_param("/web/port", 0), "a page")  # 0: it starts
+        browser = chromium(draws_3d=False)
+        cls.addClassCleanup(browser.__exit__, None, None, None)
+        cls.context = browser.__enter__().new_context(**DESKTOP)
+        cls.watch = Watch(cls.context)
+        cls.driver = Driver(cls.context.new_page())
+        cls.driver.page.set_default_timeout(PATIENCE_MS)
+        cls.driver.page.goto(cls.url())
+
+    @staticmethod
+    def url():
+        """Return the address that the node prints to steer."""
+        token = rospy.get_param("/web/steer_token")
+        return f"http://127.0.0.1:{rospy.get_param('/web/port')}/?token={token}"
+
+    def restart_node(self):
+        """Kill the node, and return once the page has noticed."""
+        os.kill(pid_of("/web"), signal.SIGKILL)
+        expect(self.driver.page.locator(NOTICE)).to_contain_text("No data for")
+        expect(self.driver.page.locator("body")).to_have_class(re.compile("quad-link-dead"))
+
+    def tearDown(self):
+        self.assertEqual(self.watch.faults, [])
+
+    def test_1_the_page_shows_both_quadcopters_where_they_are(self):
+        driver = self.driver.is_ready()
+        expect(driver.at("role")).to_have_text("Steering")
+        expect(driver.at("flight-state")).to_have_text("running")
+        expect(driver.rows()).to_have_count(2)
+        driver.wait_for_arena("arena.fleet.robots.length === 2", PATIENCE_MS / 1e3)
+        for robot in (0, 1):
+            with self.subTest(robot=robot):
+                shown = driver.arena(f"fleet.robots[{robot}]")
+                self.assertLess(self.distance(robot, shown["x"], shown["y"]), 1.0)
+
+    def test_2_a_goal_that_is_dragged_is_flown_to(self):
+        driver = self.driver
+        x, y = self.position(0)
+        goal = x + 1.5, 3.0 if y > 6.0 else 9.0
+        driver.select(0)
+        driver.use_goal_tool()
+        driver.fit()
+        driver.drag_arena(goal, (goal[0] + 1.0, goal[1]))
+        driver.says("quad0")
+        self.wait(lambda: self.distance(0, *goal) < 0.5, "quad0 at the goal")
+        near = (
+            f"Math.hypot(arena.fleet.robots[0].x - {goal[0]}, arena.fleet.robots[0].y - {goal[1]})"
+        )
+        driver.wait_for_arena(f"{near} < 1.0")
+
+    def test_3_stop_all_stops_all(self):
+        self.driver.at("stop-all").click()
+        self.driver.says("every quadcopter hovers")
+        self.wait(lambda: max(self.speed(0), self.speed(1)) < 0.05, "both hovering")
+        for robot in (0, 1):
+            row = self.driver.at(f"robots-row-{robot}")
+            expect(row).to_contain_text("stopped")
+
+    def test_4_a_killed_node_is_noticed_and_the_page_comes_back(self):
+        self.watch.forgive(GONE)
+        self.restart_node()
+        expect(self.driver.page.locator(NOTICE)).to_be_hidden()
+        expect(self.driver.rows()).to_have_count(2)
+        self.driver.is_ready()
+
+    def test_5_a_page_with_an_old_token_says_what_to_do(self):
+        rospy.set_param("/web/steer_token", "the-second-to-steer")
+        self.restart_node()
+        notice = self.driver.page.locator(NOTICE)
+        expect(notice).to_contain_text("open the address that it has printed")
+        other = self.context.new_page()
+        other.goto(self.url())
+        expect(Driver(other).at("role")).to_have_text("Steering")
+        expect(notice).to_be_hidden()  # the cookie is the browser's
+        self.driver.is_ready()
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "web_browser", WebBrowser)
