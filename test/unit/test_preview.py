@@ -21,6 +21,7 @@ from quad_nav.cli.preview import preview as command
 from quad_nav.errors import InputError
 from quad_nav.grid import INSCRIBED, LETHAL
 from quad_nav.mission.goal_file import parse_goals
+from quad_nav.report.preview_page import page_data
 from quad_nav.report.preview_picture import cost_colours, preview_picture
 from quad_nav.report.scene_drawing import MOVING
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
@@ -203,6 +204,13 @@ starts"""
     (axes, *_) = preview_picture(preview, [preview.robot(0)], "hall").axes
     brown = [line for line in axes.lines if line.get_color() == MOVING]
     assert [line.get_xydata()[[0, -1]].tolist() for line in brown] == [[[1.0, 2.0], [5.0, 2.0]]]
+    data = page_data(preview, [preview.robot(0)], "hall")
+    assert [[path[0], path[-1]] for path in data["motions"]] == [[[1.0, 2.0], [5.0, 2.0]]]
+    cart, *people = data["moving"]
+    assert np.mean(cart[:4], axis=0) == pytest.approx([1.0, 2.0])
+    assert [np.mean(person[:-1], axis=0) for person in people] == [
+        pytest.approx([solid.x_m, solid.y_m], abs=1e-3) for solid in preview.moving[1:]
+    ]
 
 
 def test_people_without_room_are_a_problem(hall):

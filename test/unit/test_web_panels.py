@@ -40,14 +40,14 @@ def test_steps_of_the_rate():
 
 
 @pytest.mark.parametrize(
-    "age_s, text, is_lost",
-    [(0.1, "now", False), (1.94, "1.9 s", False), (2.1, "2.1 s", True), (70.2, "70 s", True)],
+    "age_s, text", [(0.1, "now"), (1.94, "1.9 s"), (2.1, "2.1 s"), (70.2, "70 s")]
 )
-def test_rows_of_robots_that_fall_silent_are_lost(age_s, text, is_lost):
+@pytest.mark.parametrize("state", ["flying", "lost"])
+def test_rows_of_robots_are_lost_if_their_source_says_so(age_s, text, state):
     (status, _) = fleet().item("status").data["rows"]
-    row = robots.table_row({**status, "age_s": age_s}, "#123456")
-    assert (row["age"], row["lost"]) == (text, is_lost)
-    assert row["state"] == ("lost" if is_lost else "flying")
+    row = robots.table_row({**status, "state": state, "age_s": age_s}, "#123456")
+    assert (row["age"], row["lost"]) == (text, state == "lost")
+    assert row["state"] == state
     assert (row["goal"], row["distance_m"], row["gap_m"]) == ("1/3", 1.23, None)
 
 

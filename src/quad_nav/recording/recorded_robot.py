@@ -20,7 +20,8 @@ from quad_nav.view.items import TRAIL_POINTS, TRAIL_SPACING_M, UNKNOWN_BODY
 
 _DEFAULT_RECOVERIES = 4  # of move_base
 LOST_AFTER_S = 1.0
-"""A robot without a pose for so long is lost."""
+"""A robot without a pose for so long is lost: recorded time has no delays, and over longer gaps
+poses are not interpolated."""
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 import jinja2
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_nav.report.preview_picture import cost_png, costmap_extent, shown_area
-from quad_nav.report.scene_drawing import outlines
+from quad_nav.report.scene_drawing import MOVING, keyframe_paths, outline, outlines
 from quad_nav.scenario.preview import MissionPreview, RobotPreview
 from quad_nav.sim.colours import robot_rgba
 
@@ -48,14 +49,18 @@ def page_data(
         title: Heading of the page.
         editable: Versions of the goal files that may be edited, by the robots' numbers.
     """
-    solids, passed = outlines(preview.scene) if preview.scene else ([], [])
+    scene = preview.scene
+    solids, passed = outlines(scene) if scene else ([], [])
     return {
         "title": title,
         "area": list(shown_area(preview, robots)),
         "radius": preview.robot_radius_m,
         "costmap": _costmap(preview, robots),
-        "solids": [np.round(one, _DIGITS).tolist() for one in solids],
-        "passed": [np.round(one, _DIGITS).tolist() for one in passed],
+        "solids": _lines(solids),
+        "passed": _lines(passed),
+        "moving": _lines([outline(one) for one in preview.moving]),
+        "motions": _lines(keyframe_paths(scene) if scene else []),
+        "movingColor": MOVING,
         "robots": [
             {
                 **robot_data(robot),
@@ -84,6 +89,10 @@ def preview_page(data: Mapping[str, Any], nonce: str = "") -> str:
         undefined=jinja2.StrictUndefined,
     )
     return environment.get_template("preview.html.jinja").render(data=data, nonce=nonce)
+
+
+def _lines(lines: Sequence[NDArray[np.float64]]) -> List[Any]:
+    return [np.round(line, _DIGITS).tolist() for line in lines]
 
 
 def _costmap(preview: MissionPreview, robots: Sequence[RobotPreview]) -> Optional[Dict[str, Any]]:

@@ -74,13 +74,20 @@ def draw_starting(axes: Axes, scene: Scene, moving: Sequence[Obstacle]) -> None:
         scene: Scene, whose moving obstacles have the keyframes.
         moving: The obstacles and people where they start.
     """
-    for obstacle in scene.moving:
-        motion = replace(obstacle.motion, loop=False)  # no line where it starts again
-        times_s = np.linspace(0.0, motion.length_s, _PATH_POINTS)
-        track = Motions([motion], [0.0]).poses(times_s)[:, 0]
+    for track in keyframe_paths(scene):
         axes.plot(track[:, 0], track[:, 1], color=MOVING, lw=1.0, alpha=0.35, zorder=2)
     for solid in moving:
         axes.add_patch(moving_patch(solid))
+
+
+def keyframe_paths(scene: Scene) -> List[NDArray[np.float64]]:
+    """Return the paths, shape (k, 2) in ``map``, of the obstacles that follow keyframes."""
+    paths = []
+    for obstacle in scene.moving:
+        motion = replace(obstacle.motion, loop=False)  # no line where it starts again
+        times_s = np.linspace(0.0, motion.length_s, _PATH_POINTS)
+        paths.append(Motions([motion], [0.0]).poses(times_s)[:, 0, :2])
+    return paths
 
 
 def moving_patch(solid: Obstacle) -> Patch:
@@ -101,7 +108,7 @@ def outlines(
     solids: List[NDArray[np.float64]] = []
     passed: List[NDArray[np.float64]] = []
     for solid in (*scene.wall_boxes(), *scene.obstacles):
-        (solids if _meets(solid, scene.altitude_m) else passed).append(_corners(solid))
+        (solids if _meets(solid, scene.altitude_m) else passed).append(outline(solid))
     return solids, passed
 
 
@@ -109,7 +116,8 @@ def _meets(solid: Obstacle, altitude_m: float) -> bool:
     return solid.bottom_m <= altitude_m <= solid.bottom_m + solid.height_m
 
 
-def _corners(solid: Obstacle) -> NDArray[np.float64]:
+def outline(solid: Obstacle) -> NDArray[np.float64]:
+    """Return the closed outline, shape (k, 2) in ``map``, of an obstacle."""
     if isinstance(solid, Box):
         x_m, y_m = solid.size_x_m / 2, solid.size_y_m / 2
         corners = [(x_m, y_m), (-x_m, y_m), (-x_m, -y_m), (x_m, -y_m), (x_m, y_m)]

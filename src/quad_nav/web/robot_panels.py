@@ -21,8 +21,6 @@ from quad_nav.web.flight_bar import enable, why_idle
 from quad_nav.web.live_table import LiveTable, column
 from quad_nav.web.page_client import PageClient
 
-OLD_S = 2.0
-"""Age of the last message from which on a robot's row is grey."""
 _HINT = "Click one in the table or in the arena. A goal goes to the nearest one."
 _STEP_S = 0.5  # ages below are shown as one, so that an idle row does not change
 
@@ -39,14 +37,13 @@ _COLUMNS = [
 
 
 def table_row(status: Mapping[str, Any], colour: str) -> Dict[str, Any]:
-    """Return a row of the item ``status`` as a row of the table."""
+    """Return a row of the item ``status`` as a row of the table; its source says if it is lost."""
     goal, goals, age_s = status.get("goal"), status.get("goals"), status.get("age_s")
-    is_old = age_s is not None and age_s > OLD_S
     return {
         "key": status["robot"],
         "robot": status["robot"],
         "colour": colour,
-        "state": "lost" if is_old else printable(status.get("state", "")),
+        "state": printable(status.get("state", "")),
         "reason": printable(status.get("reason", "")),
         "goal": None if goal is None else f"{goal}/{goals}" if goals else str(goal),
         "distance_m": _rounded(status.get("distance_m")),
@@ -54,7 +51,7 @@ def table_row(status: Mapping[str, Any], colour: str) -> Dict[str, Any]:
         "gap_m": _rounded(status.get("gap_m")),
         "recoveries": status.get("recoveries"),
         "age": age_text(age_s),
-        "lost": is_old or status.get("state") == "lost",
+        "lost": status.get("state") == "lost",
     }
 
 

@@ -17,7 +17,8 @@ from quad_nav.topics.health import Level
 from quad_nav.view.state import Item
 
 LOST_AFTER_S = 3.0
-"""Wall time without a message after which a robot counts as lost; diagnostics come each second."""
+"""Wall time without a message after which a robot or its navigator counts as lost. Diagnostics come
+each second: at least two of them are missing then."""
 MAX_STATUSES, MAX_VALUES, MAX_TEXT = 2000, 60, 500
 _BUSY = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 _FORGET_AFTER_S = 60.0
