@@ -65,6 +65,7 @@ class Tally:
     found: int = 0
     nees: List[float] = field(default_factory=list)
     position_m: List[float] = field(default_factory=list)
+    predicted_m: List[float] = field(default_factory=list)
     velocity_mps: List[float] = field(default_factory=list)
     radius_m: List[float] = field(default_factory=list)
     delays_s: List[float] = field(default_factory=list)
@@ -131,6 +132,9 @@ class Trial(FlightObserver):
                     tally.false_numbers += 1
                 continue
             off = state - states[nearest]
+            if hidden_s > 0.0:
+                tally.predicted_m.append(float(np.hypot(*off[:2])))
+                continue
             tally.nees.append(float(off @ np.linalg.solve(covariance, off)))
             tally.position_m.append(float(np.hypot(*off[:2])))
             tally.velocity_mps.append(float(np.hypot(*off[2:])))
@@ -210,6 +214,7 @@ def row(name: str, tally: Tally) -> List[str]:
         str(tally.false_numbers),
         middle(tally.position_m, 2),
         middle(tally.position_m, 2, 95.0),
+        middle(tally.predicted_m, 2),
         middle(tally.velocity_mps, 2),
         middle(tally.velocity_mps, 2, 95.0),
         middle(tally.nees, 1),
@@ -232,6 +237,7 @@ HEADERS = (
     "falses",
     "m",
     "m 95%",
+    "m hid.",
     "m/s",
     "m/s 95%",
     "NEES",

@@ -198,7 +198,9 @@ def test_off_nothing_is_tracked():
 
 
 def test_covariances_are_honest():
-    """With the noise that the tracker assumes, and the accelerations: NEES, 4 on average."""
+    """With the noise and the accelerations that the tracker assumes the NEES is 4 on average, or less:
+    errors that stay from scan to scan are allowed for.
+    """
     random = np.random.default_rng(7)
     nees = []
     for run in range(12):
@@ -219,4 +221,5 @@ def test_covariances_are_honest():
                 off = tracker.tracks.states[0] - path[k]
                 nees.append(off @ np.linalg.solve(tracker.tracks.covariances[0], off))
     assert len(nees) > 150
-    assert 2.0 < np.mean(nees) < 6.0
+    assert 1.0 < np.mean(nees) < 5.0
+    assert np.mean(np.array(nees) < 9.49) > 0.95  # chi-square with 4 degrees of freedom

@@ -14,6 +14,7 @@ from quad_nav.kernels.earlier_scans import ScanView
 from quad_nav.kernels.jit import njit
 
 _ITERATIONS = 6
+_FAR = 1.0  # 1/m^2, of a centre that the points do not tell
 
 
 @njit(cache=True, nogil=True)
@@ -83,8 +84,8 @@ def fit_disc(
         radius: Radius of the disc, metres.
         noise: Standard deviation of the distances of points from the circle, metres.
         prior: Standard deviation of the guess, metres.
-        fitted: float64[6], written: x, y, variances of x and y and their covariance, and the
-            distance of the farthest point from the centre.
+        fitted: float64[6], written: x, y, variances of x and y and their covariance, by the points
+            alone, and the distance of the farthest point from the centre.
     """
     n = points.shape[0]
     x, y = guess[0], guess[1]
@@ -108,6 +109,8 @@ def fit_disc(
         det = xx * yy - xy * xy
         x += (yy * gx - xy * gy) / det
         y += (xx * gy - xy * gx) / det
+    # The guess is no measurement: it keeps the fit of a few points from running away.
+    xx, yy = xx - own + _FAR, yy - own + _FAR
     det = xx * yy - xy * xy
     fitted[0], fitted[1] = x, y
     fitted[2], fitted[3], fitted[4] = yy / det, xx / det, -xy / det

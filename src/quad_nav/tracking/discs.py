@@ -24,7 +24,9 @@ FIRST_RADIUS_M = 0.3
 MIN_RADIUS_M = 0.05
 _EDGE_JUMP_M = 0.1
 _SHAPE_NOISE_M = 0.01  # of outlines that are no circles
-_POSE_NOISE_M = 0.01  # of the LIDAR
+_PART_M, _NEVER_WHOLE_M = 0.1, 0.25
+_EDGE_BEAMS = 0.4
+_POSE_NOISE_M = 0.02  # of the LIDAR
 _GUESS_M = 0.3
 _UNKNOWN_RADIUS_M = 0.15  # standard deviation of ``FIRST_RADIUS_M``
 _SLOWEST = 0.05  # weight of a new view of an obstacle that is known for long
@@ -90,11 +92,13 @@ class DiscFit:
         position: float64[2] in the fixed frame, metres.
         noise: float64[2, 2], covariance of the position.
         farthest_m: Distance of the farthest point of the cluster.
+        bias_m: Standard deviation of the error that stays the same from scan to scan.
     """
 
     position: Floats
     noise: Floats
     farthest_m: float
+    bias_m: float
 
 
 def outlines(clusters: ScanClusters) -> Outlines:
@@ -104,7 +108,7 @@ def outlines(clusters: ScanClusters) -> Outlines:
     return Outlines(rows[:, :2].copy(), rows[:, 2].copy(), rows[:, 3] > 1.5, rows[:, 4].copy())
 
 
-def fit(clusters: ScanClusters, row: int, guess: Floats, radius: Radius) -> DiscFit:
+def fit(clusters: ScanClusters, row: int, guess: Floats, radius: Radius, is_whole: bool) -> DiscFit:
     """Fit the disc of a known radius to a cluster.
 
     Args:
@@ -112,6 +116,7 @@ def fit(clusters: ScanClusters, row: int, guess: Floats, radius: Radius) -> Disc
         row: Row of the cluster.
         guess: float64[2], where the centre may be.
         radius: What is known of the size.
+        is_whole: Both edges of the cluster are in sight.
     """
     view, fitted = clusters.view, np.empty(6)
     first, beams = int(clusters.rows[row, 0]), int(clusters.rows[row, 1])
@@ -125,4 +130,14 @@ def fit(clusters: ScanClusters, row: int, guess: Floats, radius: Radius) -> Disc
     depth_m = _UNKNOWN_RADIUS_M if not radius.views else 0.5 * spacing_m / math.sqrt(radius.views)
     noise = np.array([[xx, xy], [xy, yy]]) + depth_m**2 * np.outer(away, away)
     noise += _POSE_NOISE_M**2 * np.eye(2)
-    return DiscFit(np.array([x, y]), noise, farthest_m)
+    return DiscFit(np.array([x, y]), noise, farthest_m, _bias(spacing_m, radius, is_whole))
+
+
+def _bias(spacing_m: float, radius: Radius, is_whole: bool) -> float:
+    """Return the standard deviation of what no averaging over scans makes smaller.
+
+    Edges are known to a part of the beams' spacing; of a part in view, neither the centre across
+    the line of sight nor, before the first full view, the radius is known.
+    """
+    part_m = 0.0 if is_whole else _PART_M if radius.views else _NEVER_WHOLE_M
+    return math.sqrt(_POSE_NOISE_M**2 + (_EDGE_BEAMS * spacing_m) ** 2 + part_m**2)

@@ -57,6 +57,7 @@ class _Life:
     start_s: float
     seen_s: float
     radius: Radius
+    bias_m: float
     hits: int = 1
     is_confirmed: bool = False
     trail: List[Floats] = field(default_factory=list)
@@ -165,11 +166,15 @@ class ObstacleTracker:
     def _tell(self, now_s: float) -> None:
         """Tell others of the confirmed tracks."""
         told = [k for k, life in enumerate(self._lives) if life.is_confirmed]
+        covariances = self._filters.covariances[told]
+        biases_m = np.array([self._lives[k].bias_m for k in told], float)
+        covariances[:, 0, 0] += biases_m**2
+        covariances[:, 1, 1] += biases_m**2
         self.tracks = Tracks(
             now_s,
             np.array([self._lives[k].number for k in told], np.int64),
             self._states[told],
-            self._filters.covariances[told],
+            covariances,
             np.array([self._lives[k].radius.outer_m for k in told], float),
         )
         self.unseen_s = np.array([now_s - self._lives[k].seen_s for k in told], float)
@@ -207,10 +212,10 @@ class ObstacleTracker:
         is_whole = bool(seen.is_whole[row])
         life.radius.see(float(seen.radii_m[row]), is_whole)
         guess = seen.centres[row] if is_whole else self._states[track, :2].copy()
-        disc = fit(clusters, row, guess, life.radius)
+        disc = fit(clusters, row, guess, life.radius, is_whole)
         life.radius.hold(disc.farthest_m)
         self._filters.update(track, disc.position, disc.noise)
-        life.seen_s = now_s
+        life.seen_s, life.bias_m = now_s, disc.bias_m
         life.hits += 1
         self._remember(life, clusters, row)
 
@@ -263,11 +268,12 @@ class ObstacleTracker:
             if row in taken or self._is_covered(seen.centres[row]):
                 continue
             radius = Radius()
-            radius.see(float(seen.radii_m[row]), bool(seen.is_whole[row]))
-            disc = fit(clusters, row, seen.centres[row], radius)
+            is_whole = bool(seen.is_whole[row])
+            radius.see(float(seen.radii_m[row]), is_whole)
+            disc = fit(clusters, row, seen.centres[row], radius, is_whole)
             radius.hold(disc.farthest_m)
             self._number += 1
-            life = _Life(self._number, disc.position, disc.noise, now_s, now_s, radius)
+            life = _Life(self._number, disc.position, disc.noise, now_s, now_s, radius, disc.bias_m)
             self._remember(life, clusters, row)
             self._lives.append(life)
             self._filters.add(disc.position, disc.noise, FIRST_SPEED_MPS)
