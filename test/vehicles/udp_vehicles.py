@@ -2,12 +2,14 @@
 """Run point vehicles over UDP: udp_vehicles.py KIND:PORT:NORTH:EAST:HEADING_DEG ...
 
 Each sends to its port on this machine, where a bridge listens (`address: udpin:127.0.0.1:PORT`).
+The signal SIGUSR1 changes the mode of the first one, as its pilot would.
 """
 
 from __future__ import annotations
 
 import math
 import os
+import signal
 import sys
 import time
 
@@ -36,13 +38,18 @@ class UdpVehicle:
             dialect="ardupilotmega",
         )
 
-    def step(self):
+    def receive(self):
+        """Take the messages that have come."""
         while True:
             message = self._link.recv_msg()
             if message is None:
                 break
             fields = message.to_dict()
             self.vehicle.receive(fields.pop("mavpackettype"), fields)
+
+    def step(self):
+        """Take the messages that have come, fly on, and send."""
+        self.receive()
         for name, fields in self.vehicle.advance(STEP_S):
             if "param_id" in fields:
                 fields["param_id"] = fields["param_id"].encode()
@@ -53,6 +60,8 @@ class UdpVehicle:
 
 def main():
     vehicles = [UdpVehicle(text) for text in sys.argv[1:]]
+    first = vehicles[0].vehicle
+    signal.signal(signal.SIGUSR1, lambda *_: first.set_mode(first.kind["other"]))
     next_s = time.monotonic()
     while True:
         for one in vehicles:

@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""Two vehicles take off, fly goals, one is taken over and resumed, and both land."""
+
+import json
+import math
+import signal
+import subprocess
+import sys
+import time
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+import tf2_ros
+from diagnostic_msgs.msg import DiagnosticStatus
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Empty, String
+from std_srvs.srv import Trigger
+
+VEHICLES = Path(__file__).resolve().parents[1] / "vehicles" / "udp_vehicles.py"
+PATIENCE_S = 60.0
+
+
+class Vehicles(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("test_vehicles", disable_signals=True)
+        cls.process = subprocess.Popen(
+            [sys.executable, str(VEHICLES), "ardupilot:14651:3:-2:30", "px4:14652:0:0:200"]
+        )
+        cls.states, cls.values, cls.odometry, cls.events = {}, {}, {}, []
+        cls.buffer = tf2_ros.Buffer()
+        cls.listener = tf2_ros.TransformListener(cls.buffer)
+        cls.subscribers = [rospy.Subscriber("/quad/events", String, cls._on_event)]
+        for i in range(2):
+            cls.subscribers += [
+                rospy.Subscriber(f"/vehicle{i}/state", DiagnosticStatus, cls._on_state, i),
+                rospy.Subscriber(f"/odom{i}", Odometry, cls._on_odometry, i),
+            ]
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.process.terminate()
+        cls.process.wait(10.0)
+
+    @classmethod
+    def _on_state(cls, message, number):
+        cls.values[number] = {one.key: one.value for one in message.values}
+        cls.states[number] = cls.values[number]["state"]
+
+    @classmethod
+    def _on_odometry(cls, message, number):
+        cls.odometry[number] = message
+
+    @classmethod
+    def _on_event(cls, message):
+        cls.events.append(json.loads(message.data))
+
+    def wait(self, condition, what):
+        end_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            self.assertIsNone(self.process.poll(), "the vehicles have died")
+            self.assertLess(time.monotonic(), end_s, f"no {what}: {self.values}")
+            time.sleep(0.02)
+
+    def call(self, name):
+        rospy.wait_for_service(name, PATIENCE_S)
+        return rospy.ServiceProxy(name, Trigger)()
+
+    def speed(self, number):
+        twist = self.odometry[number].twist.twist.linear
+        return math.hypot(twist.x, twist.y)
+
+    def test_a_flight(self):
+        self.wait(lambda: self.states.get(0) == self.states.get(1) == "flying", "flight of both")
+        self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "motion of both")
+        self.the_frames_agree()
+        self.a_pilot_takes_one_over()
+        self.somebody_resumes_it()
+        self.all_land()
+
+    def the_frames_agree(self):
+        """A vehicle that stood at (3, -2) of its own frame is in map where its file says."""
+        pose = self.buffer.lookup_transform("map", "odom0", rospy.Time()).transform
+        odometry = self.odometry[0].pose.pose
+        self.assertAlmostEqual(odometry.position.z, 1.0, delta=0.1)
+        yaw = 2.0 * math.atan2(pose.rotation.z, pose.rotation.w)
+        # North 3 m and east -2 m, heading 30 degrees: yaw 60 degrees in ENU, 0 in map.
+        self.assertAlmostEqual(math.degrees(yaw), -60.0, delta=0.5)
+        x = pose.translation.x + math.cos(yaw) * -2.0 - math.sin(yaw) * 3.0
+        y = pose.translation.y + math.sin(yaw) * -2.0 + math.cos(yaw) * 3.0
+        self.assertAlmostEqual(x, 1.5, delta=0.02)
+        self.assertAlmostEqual(y, 1.5, delta=0.02)
+
+    def a_pilot_takes_one_over(self):
+        self.process.send_signal(signal.SIGUSR1)
+        self.wait(lambda: self.states[0] == "taken over", "state of vehicle 0")
+        self.assertIn("the mode was changed", self.values[0]["reason"])
+        self.wait(lambda: rospy.get_param("/mission/quad0/stopped"), "stop of its mission")
+        self.assertFalse(rospy.get_param("/mission/quad1/stopped"))
+        self.wait(lambda: self.speed(0) < 0.05, "hover of vehicle 0")
+        self.assertEqual(self.states[1], "flying")
+
+    def somebody_resumes_it(self):
+        response = self.call("/vehicle0/resume")
+        self.assertTrue(response.success, response.message)
+        self.wait(lambda: not rospy.get_param("/mission/quad0/stopped"), "mission of quad0")
+        self.wait(lambda: self.states[0] == "flying" and self.speed(0) > 0.2, "flight again")
+
+    def all_land(self):
+        publisher = rospy.Publisher("/vehicles/land_all", Empty, queue_size=1)
+        self.wait(lambda: publisher.get_num_connections() == 2, "subscribers")
+        start_s = time.monotonic()
+        publisher.publish(Empty())
+        self.wait(lambda: set(self.states.values()) == {"landing"}, "landing of both")
+        self.assertLess(time.monotonic() - start_s, 1.0)
+        self.wait(lambda: set(self.states.values()) <= {"landed", "not ready"}, "both on ground")
+        self.assertEqual({one["armed"] for one in self.values.values()}, {"false"})
+
+
+if __name__ == "__main__":
+    rostest.rosrun("quad", "vehicle_flight", Vehicles)
