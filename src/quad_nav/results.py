@@ -68,6 +68,11 @@ def wrapped(head: str, lines: Sequence[str]) -> str:
     return "\n".join([head, *paragraphs])
 
 
+def paragraphs(lines: Sequence[str]) -> str:
+    """Wrap each line for a terminal of 100 columns."""
+    return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
+
+
 def interruption(flown: int, wanted: int) -> Sequence[str]:
     """Return a line about flights that were not flown, if there are any."""
     return [f"Interrupted after {flown} of {wanted} flights."] if flown < wanted else []
