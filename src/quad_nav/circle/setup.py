@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, List, Tuple
+from typing import Any, List, Sequence, Tuple
 
 from quad_nav.circle.orca import HORIZON_S, OrcaParams, load_pyrvo
 from quad_nav.config import Configuration
@@ -161,15 +161,6 @@ def _circle(options: CircleOptions, robots: int) -> Circle:
     name = f"circle of {robots} robots, radius {radius_m:g} m"
     scene = Scene(name, side_m, side_m, _ALTITUDE_M, Walls(), (), starts, low_m, low_m)
     configurations = _configurations(options, robots, (low_m, low_m, -low_m, -low_m))
-    settings = replace(DEFAULT_SETTINGS, goal_timeout_s=options.time_limit_s)
-    goals = tuple(
-        RobotGoals(
-            f"quad{k}",
-            WatchedGoalFile(f"quad{k}_goals.json"),
-            GoalSequence((Goal(*opposite(start)),), settings),
-        )
-        for k, start in enumerate(starts)
-    )
     simulation = SimulationParams(
         airframe=Airframe(radius_m=options.body_radius_m),
         jitter_m=options.jitter_m,
@@ -178,7 +169,7 @@ def _circle(options: CircleOptions, robots: int) -> Circle:
     start_poses(scene, robots, options.jitter_m, options.seed, options.body_radius_m)
     flight = FlightSetup(
         scene,
-        goals,
+        _goals(starts, options.time_limit_s),
         tuple(configurations),
         config_label(options.config),
         simulation,
@@ -194,6 +185,18 @@ def _circle(options: CircleOptions, robots: int) -> Circle:
         options.orca_horizon_s,
     )
     return Circle(radius_m, starts, flight, orca)
+
+
+def _goals(starts: Sequence[Pose2D], time_limit_s: float) -> Tuple[RobotGoals, ...]:
+    settings = replace(DEFAULT_SETTINGS, goal_timeout_s=time_limit_s)
+    return tuple(
+        RobotGoals(
+            f"quad{k}",
+            WatchedGoalFile(f"quad{k}_goals.json"),
+            GoalSequence((Goal(*opposite(start)),), settings),
+        )
+        for k, start in enumerate(starts)
+    )
 
 
 def _configurations(
