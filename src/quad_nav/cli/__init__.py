@@ -30,7 +30,7 @@ COMMANDS: Dict[str, str] = {
     "barn": "Fly through the worlds of the BARN benchmark without ROS.",
     "dynabarn": "Fly among the moving obstacles of DynaBARN without ROS.",
     "check": "Check move_base's YAML without flying.",
-    "circle": "Let robots on a circle swap sides without ROS, and compare with ORCA.",
+    "circle": "Let robots on a circle swap sides, beside ORCA.",
     "fly": "Fly a mission without ROS, as fast as the machine allows.",
     "preview": "Show a mission before anything flies, and edit its goals.",
     "replay": "Play a recorded flight on a page in the browser.",
