@@ -16,15 +16,17 @@ from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D, Scan, quaternion_from_yaw
 from quad_nav.grid import GridSpec
 from quad_nav.recording import messages
+from quad_nav.recording import replay as replay_module
 from quad_nav.recording.bag_file import read_messages
 from quad_nav.recording.bag_index import RecordingIndex
 from quad_nav.recording.record_file import TopicWriter, create, stamp_at
 from quad_nav.recording.recorded_flight import RecordedFlight
-from quad_nav.recording.replay import FASTEST, Replay
+from quad_nav.recording.replay import FASTEST, OpenedReplay, Replay
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.scene import BODY_RADIUS_M, Box, MovingObstacle, Scene, Walls
 from quad_nav.topics import flight_info
 from quad_nav.topics.markers import CUBE, OBSTACLES_TOPIC, Marker
+from quad_nav.view.actions import Answer
 from quad_nav.view.state import LAYERS, FleetState, Wanted
 
 SCENE = Scene(
@@ -389,6 +391,23 @@ def test_the_log_has_each_event_once(player):
         (10.0, "goal 1: reached after 9.0 s"),
         (10.0, "goal 2: sent (7.00, 2.00)"),
     ]
+
+
+def test_while_the_file_is_read_the_page_says_how_far_it_is(path, monkeypatch):
+    monkeypatch.setattr(replay_module, "_PROGRESS_PERIOD_S", 0.0)
+    state, titles = FleetState(), []
+    replay = OpenedReplay(path, state)
+    state.add_listener(lambda: titles.append(state.item("flight").data["title"]))
+    assert state.item("flight").data["state"] == "starting"
+    assert replay.pause() == Answer(False, "pause: the recording is still being read")
+    player = replay.read()
+    shares = [int(title.split(", ")[1].rstrip("%")) for title in titles[:-1]]
+    assert titles[0] == f"reading {path.name}, 0%" and titles[-1] == path.name
+    assert len(shares) > 100 and shares == sorted(shares) and 95 < shares[-1] <= 100
+    assert replay.seek(1.0).ok and replay.pause().ok
+    player.step()
+    assert state.item("flight").data["state"] == "paused"
+    assert state.item("flight").data["time_s"] == 1.0
 
 
 def test_a_replay_steers_nothing(player):

@@ -13,6 +13,8 @@ from quad_nav.cli import EXIT_BAD_INPUT
 from quad_nav.cli.options import echo, echo_lines, raise_on_signals, web_options
 from quad_nav.errors import InputError
 
+_SOON_S = 0.5  # a file that is no flight is mostly refused within, and needs no page
+
 
 @click.command()
 @click.argument("flight", type=click.Path(path_type=Path))
@@ -43,34 +45,41 @@ def _play(path: Path, address: str, port: int, open_it: bool) -> None:
     """
     # Imported here, because the readers load slowly, and --help does not need them.
     from quad_nav.cli.flight_page import announce
-    from quad_nav.recording.recorded_flight import RecordedFlight
-    from quad_nav.recording.replay import Replay
+    from quad_nav.recording.replay import OpenedReplay
     from quad_nav.view.state import FleetState
     from quad_nav.web.process import require_nicegui
     from quad_nav.web.server import Server, WebOptions
 
     require_nicegui()
     echo(f"reading {path}", err=True)
-    flight, state = RecordedFlight(path), FleetState()
-    player = Replay(flight, state)
-    server = Server(state, player, WebOptions(address=address, port=port, title=path.name))
+    state = FleetState()
+    replay, reading = OpenedReplay(path, state), threading.Event()
+    server = Server(state, replay, WebOptions(address=address, port=port, title=path.name))
     faults: List[InputError] = []
 
     def run() -> None:
-        """Play; end if the file cannot be read any more."""
+        """Read and play; end if the file cannot be read, or not any more."""
         try:
+            player = replay.read()
+            reading.set()
             player.run()
         except InputError as error:
             faults.append(error)
+            reading.set()
             server.stop()
 
+    threading.Thread(target=run, name="player", daemon=True).start()
     try:
-        server.start()
-        announce(server.urls, open_it)
-        threading.Thread(target=run, name="player", daemon=True).start()
-        server.wait()
+        reading.wait(_SOON_S)
+        if not faults:
+            server.start()
+            announce(server.urls, open_it)
+            server.wait()
+    except InputError:
+        if not faults:  # else the server was stopped before it had started
+            raise
     finally:
-        player.close()
+        replay.close()
         server.stop()
     if faults:
         raise faults[0]

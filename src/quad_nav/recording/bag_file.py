@@ -18,6 +18,14 @@ TopicFilter = Callable[[str, str], bool]
 """Returns true for topics to read, given the topic and its type, such as ``nav_msgs/Path``."""
 
 
+Progress = Callable[[float], object]
+"""Called with the share of a recording that is read, from 0 to 1."""
+
+
+def no_progress(share: float) -> None:
+    """Tell nobody."""
+
+
 class Message(NamedTuple):
     """One recorded message; ``stamp_ns`` is the time of recording, ``kind`` its type."""
 
@@ -27,10 +35,17 @@ class Message(NamedTuple):
     content: Any
 
 
-def read_messages(path: Path, wanted: TopicFilter) -> Iterator[Message]:
+def read_messages(
+    path: Path, wanted: TopicFilter, progress: Progress = no_progress
+) -> Iterator[Message]:
     """Yield the messages of the wanted topics in the order of recording.
 
     One chunk is in memory at a time. Unwanted messages are not decoded.
+
+    Args:
+        path: The recording.
+        wanted: Selects topics.
+        progress: Called before each message with the share of the recorded time that is read.
 
     Raises:
         InputError: The file is not a recording, is damaged or was not completed.
@@ -38,7 +53,8 @@ def read_messages(path: Path, wanted: TopicFilter) -> Iterator[Message]:
     open_file(path).close()  # refuses pipes, on which the libraries would block
     read = _read_mcap if path.suffix == ".mcap" else _read_bag
     with recording_faults(path):
-        for topic, kind, stamp_ns, data in read(path, wanted):
+        for topic, kind, stamp_ns, data, share in read(path, wanted):
+            progress(share)
             yield Message(topic, kind, stamp_ns, decode(data, kind))
 
 
@@ -72,7 +88,11 @@ def message_kind(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-_Raw = Tuple[str, str, int, bytes]
+_Raw = Tuple[str, str, int, bytes, float]
+
+
+def _share(stamp_ns: int, start_ns: int, end_ns: int) -> float:
+    return (stamp_ns - start_ns) / max(end_ns - start_ns, 1)
 
 
 def _read_bag(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
@@ -85,7 +105,8 @@ def _read_bag(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
         connections = [c for c in reader.connections if c.id in kinds]
         if connections:  # an empty list would mean all of them
             for connection, stamp_ns, data in reader.messages(connections):
-                yield connection.topic, kinds[connection.id], stamp_ns, data
+                share = _share(stamp_ns, reader.start_time, reader.end_time)
+                yield connection.topic, kinds[connection.id], stamp_ns, data, share
 
 
 def _read_mcap(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
@@ -100,10 +121,13 @@ def _read_mcap(path: Path, wanted: TopicFilter) -> Iterator[_Raw]:
             if channel.message_encoding == "ros1"
             and wanted(channel.topic, summary.schemas[channel.schema_id].name)
         ]
-        if topics:
+        statistics = summary.statistics
+        if topics and statistics is not None:
+            start_ns, end_ns = statistics.message_start_time, statistics.message_end_time
             for schema, channel, message in reader.iter_messages(topics):
                 assert schema is not None
-                yield channel.topic, schema.name, message.log_time, message.data
+                share = _share(message.log_time, start_ns, end_ns)
+                yield channel.topic, schema.name, message.log_time, message.data, share
 
 
 def _problem_text(error: Exception) -> str:

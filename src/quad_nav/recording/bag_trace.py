@@ -13,7 +13,7 @@ from typing import Any, Callable, Dict, List, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import limit_memory
-from quad_nav.recording.bag_file import Message, read_messages
+from quad_nav.recording.bag_file import Message, Progress, no_progress, read_messages
 from quad_nav.recording.bag_info import (
     MAX_ROBOTS,
     MAX_SECONDS,
@@ -76,15 +76,19 @@ def read_trace(path: Path) -> FlightTrace:
     return read_recording(path).trace(path)
 
 
-def read_recording(path: Path) -> TraceReader:
+def read_recording(path: Path, progress: Progress = no_progress) -> TraceReader:
     """Read what the trace of a recorded flight is made of.
+
+    Args:
+        path: The recording.
+        progress: Called often with the share that is read.
 
     Raises:
         InputError: The file is not a recording, or is damaged.
     """
     try:
         with limit_memory(MAX_MEMORY_BYTES):
-            return _read(path)
+            return _read(path, progress)
     except MemoryError as error:
         raise InputError(
             [
@@ -94,9 +98,9 @@ def read_recording(path: Path) -> TraceReader:
         ) from error
 
 
-def _read(path: Path) -> TraceReader:
+def _read(path: Path, progress: Progress) -> TraceReader:
     reader = TraceReader()
-    for message in read_messages(path, _is_wanted):
+    for message in read_messages(path, _is_wanted, progress):
         try:
             reader.add(message)
         except ValueError as error:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, Scan
+from quad_nav.recording.bag_file import Progress, no_progress
 from quad_nav.recording.bag_index import RecordingIndex
 from quad_nav.recording.bag_trace import read_recording
 from quad_nav.recording.recorded_costmaps import CostmapTrack
@@ -68,13 +69,17 @@ class RecordedFlight:
         end_reason: Why the flight ended early, "" if it did not.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, progress: Progress = no_progress) -> None:
         """Read the trace, and the index of what is read on demand.
+
+        Args:
+            path: The recording.
+            progress: Called often with the share that is read.
 
         Raises:
             InputError: As ``bag_trace.read_trace``.
         """
-        reader = read_recording(path)
+        reader = read_recording(path, progress)
         self._trace = trace = reader.trace(path)
         self._index = RecordingIndex(path, _is_wanted)
         self.title, self.end_reason = path.name, trace.reason

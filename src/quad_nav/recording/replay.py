@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from pathlib import Path
 from typing import Callable, Dict, FrozenSet, Hashable, List, Optional
 
 import numpy as np
@@ -18,6 +19,7 @@ FASTEST = 50.0
 """Rate of "as fast as it goes", recorded seconds per second: nothing faster is readable."""
 _HISTORY_S, _HISTORY_PERIOD_S = 60.0, 1.0
 _SHOW_WITHIN_S = 0.08
+_PROGRESS_PERIOD_S = 0.25
 SLOWEST, MAX_RATE = 0.01, 1000.0
 
 
@@ -206,3 +208,63 @@ class Replay(Actions):
             duration_s=flight.end_s,
             reason=flight.end_reason if has_ended else "",
         )
+
+
+class OpenedReplay(Actions):
+    """A replay whose file is read while pages are open: until then they show how far it is."""
+
+    available = Replay.available
+    _refusal = "the recording is still being read"
+
+    def __init__(self, path: Path, state: FleetState) -> None:
+        """Read nothing yet.
+
+        Args:
+            path: The recording.
+            state: What pages show.
+        """
+        self._path, self._state = path, state
+        self._player: Optional[Replay] = None
+        self._next_told_s = -float("inf")
+        self._progress(0.0)
+
+    def read(self) -> Replay:
+        """Read the file, and return what plays it.
+
+        Raises:
+            InputError: The file cannot be read as a flight.
+        """
+        self._player = Replay(RecordedFlight(self._path, self._progress), self._state)
+        return self._player
+
+    def _progress(self, share: float) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._next_told_s:
+            self._next_told_s = now_s + _PROGRESS_PERIOD_S
+            title = f"reading {self._path.name}, {share:.0%}"
+            self._state.put_all([flight_item("replay", title, "starting", 0.0)])
+
+    def start(self) -> Answer:
+        """Play."""
+        return self._player.start() if self._player else self._refused("start")
+
+    def pause(self) -> Answer:
+        """Stand still."""
+        return self._player.pause() if self._player else self._refused("pause")
+
+    def reset(self) -> Answer:
+        """Go to the start of the recording."""
+        return self._player.reset() if self._player else self._refused("reset")
+
+    def set_rate(self, rate: float) -> Answer:
+        """Set seconds of the recording per second; 0 is as fast as it goes."""
+        return self._player.set_rate(rate) if self._player else self._refused("set_rate")
+
+    def seek(self, time_s: float) -> Answer:
+        """Go to a time of the flight."""
+        return self._player.seek(time_s) if self._player else self._refused("seek")
+
+    def close(self) -> None:
+        """End ``Replay.run``."""
+        if self._player:
+            self._player.close()
