@@ -39,7 +39,8 @@ sys.path[:0] = [str(ROOT / "test" / "web"), str(ROOT / "src")]
 from browser import DESKTOP, chromium  # noqa: E402
 from playwright.sync_api import Browser  # noqa: E402
 from stream_client import open_stream  # noqa: E402
-from synthetic import SyntheticActions, SyntheticFleet  # noqa: E402
+from synthetic_actions import SyntheticActions  # noqa: E402
+from synthetic_fleet import SyntheticFleet  # noqa: E402
 
 from quad_nav.view.state import FleetState  # noqa: E402
 from quad_nav.web.stream import Stream  # noqa: E402

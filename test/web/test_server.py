@@ -14,7 +14,8 @@ from urllib.parse import urlsplit
 
 import pytest
 from stream_client import open_stream
-from synthetic import SyntheticActions, SyntheticFleet
+from synthetic_actions import SyntheticActions
+from synthetic_fleet import SyntheticFleet
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
