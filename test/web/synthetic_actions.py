@@ -1,4 +1,4 @@
-"""Actions of the made-up fleet: recorded, and those that a page needs an answer of have an effect."""
+"""Actions of the made-up fleet: recorded; those that a page needs an answer of have an effect."""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import threading
 from pathlib import Path
-from typing import List
 
 import click
 
@@ -53,33 +52,25 @@ def _play(path: Path, address: str, port: int, open_it: bool) -> None:
     require_nicegui()
     echo(f"reading {path}", err=True)
     state = FleetState()
-    replay, reading = OpenedReplay(path, state), threading.Event()
+    replay = OpenedReplay(path, state)
     server = Server(state, replay, WebOptions(address=address, port=port, title=path.name))
-    faults: List[InputError] = []
 
     def run() -> None:
-        """Read and play; end if the file cannot be read, or not any more."""
-        try:
-            player = replay.read()
-            reading.set()
-            player.run()
-        except InputError as error:
-            faults.append(error)
-            reading.set()
-            server.stop()
+        replay.run()
+        server.stop()  # the file cannot be read, or not any more
 
     threading.Thread(target=run, name="player", daemon=True).start()
     try:
-        reading.wait(_SOON_S)
-        if not faults:
+        replay.is_read.wait(_SOON_S)
+        if not replay.faults:
             server.start()
             announce(server.urls, open_it)
             server.wait()
     except InputError:
-        if not faults:  # else the server was stopped before it had started
+        if not replay.faults:  # else the server was stopped before it had started
             raise
     finally:
         replay.close()
         server.stop()
-    if faults:
-        raise faults[0]
+    if replay.faults:
+        raise InputError(replay.faults)

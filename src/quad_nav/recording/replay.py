@@ -9,6 +9,7 @@ from typing import Callable, Dict, FrozenSet, Hashable, List, Optional
 
 import numpy as np
 
+from quad_nav.errors import InputError
 from quad_nav.recording.recorded_flight import RecordedFlight
 from quad_nav.view.actions import Actions, Answer
 from quad_nav.view.rows import flight_item
@@ -211,7 +212,12 @@ class Replay(Actions):
 
 
 class OpenedReplay(Actions):
-    """A replay whose file is read while pages are open: until then they show how far it is."""
+    """A replay whose file is read while pages are open: until then they show how far it is.
+
+    Attributes:
+        is_read: Set when the file is read, or cannot be read.
+        faults: Why it cannot be read, or not any more.
+    """
 
     available = Replay.available
     _refusal = "the recording is still being read"
@@ -224,9 +230,22 @@ class OpenedReplay(Actions):
             state: What pages show.
         """
         self._path, self._state = path, state
+        self.is_read = threading.Event()
+        self.faults: List[str] = []
         self._player: Optional[Replay] = None
         self._next_told_s = -float("inf")
         self._progress(0.0)
+
+    def run(self) -> None:
+        """Read the file and play until ``close``, or until there are faults."""
+        try:
+            player = self.read()
+            self.is_read.set()
+            player.run()
+        except InputError as error:
+            self.faults = error.problems
+        finally:
+            self.is_read.set()
 
     def read(self) -> Replay:
         """Read the file, and return what plays it.
