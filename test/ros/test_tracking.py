@@ -10,14 +10,15 @@ from flight_case import FlightCase
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
+from quad_nav.scenario.rules import START_S
 from quad_nav.topics.tracked_obstacles import CLOUD_FIELDS
 
 X_M, SPEED_MPS, RADIUS_M = 5.0, 1.0, 0.3
 
 
 def y_at(time_s):
-    """Return where the walker is; it starts with the clock."""
-    return 3.0 + 6.0 - abs(time_s % 12.0 - 6.0)
+    """Return where the walker is; it starts when the clock does, at START_S."""
+    return 3.0 + 6.0 - abs((time_s - START_S) % 12.0 - 6.0)
 
 
 def rows(cloud):

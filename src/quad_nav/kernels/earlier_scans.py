@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from quad_nav.kernels.jit import njit
 
-FREED, UNKNOWN, OCCUPIED = 1, 0, -1
-"""Evidence about a point: free space earlier, unseen or in doubt, occupied earlier."""
+UNKNOWN, OCCUPIED, FREED = 0, 1, 2
+"""Evidence about a point: unseen or in doubt, occupied earlier, free space earlier."""
 _MAX_SIDE_BEAMS = 64
 
 
@@ -50,24 +50,47 @@ class Doubts(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
+def bearing(y: float, x: float) -> float:
+    """Return atan2(y, x) to 1e-5 rad, a thousandth of a beam, in a third of its time.
+
+    Source: M. Abramowitz, I. A. Stegun, "Handbook of Mathematical Functions", 1964, 4.4.49.
+    """
+    along, across = abs(x), abs(y)
+    ratio = min(along, across) / max(along, across, 1e-300)
+    s = ratio * ratio
+    angle = 0.0208351
+    angle = angle * s - 0.0851330
+    angle = angle * s + 0.1801410
+    angle = angle * s - 0.3302995
+    angle = (angle * s + 0.9998660) * ratio
+    if across > along:
+        angle = 0.5 * math.pi - angle
+    if x < 0.0:
+        angle = math.pi - angle
+    return -angle if y < 0.0 else angle
+
+
+@njit(cache=True, nogil=True)
 def _evidence(
-    ranges: NDArray[np.float32],
-    origin: NDArray[np.float64],
-    rotation: NDArray[np.float64],
+    earlier: EarlierScans,
+    slot: int,
     scan: ScanView,
     doubts: Doubts,
     point: Tuple[float, float, float],
 ) -> int:
     """Return what one earlier scan tells about a point (x, y, z) in the fixed frame."""
-    dx, dy, dz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
-    x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
-    y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
-    z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
+    ranges, origins, turns = earlier
+    dx = point[0] - origins[slot, 0]
+    dy = point[1] - origins[slot, 1]
+    dz = point[2] - origins[slot, 2]
+    z = turns[slot, 0, 2] * dx + turns[slot, 1, 2] * dy + turns[slot, 2, 2] * dz
     if abs(z) > doubts.level:
         return UNKNOWN
-    n = ranges.shape[0]
+    x = turns[slot, 0, 0] * dx + turns[slot, 1, 0] * dy + turns[slot, 2, 0] * dz
+    y = turns[slot, 0, 1] * dx + turns[slot, 1, 1] * dy + turns[slot, 2, 1] * dz
+    n = ranges.shape[1]
     distance = math.sqrt(x * x + y * y)
-    turn = (math.atan2(y, x) - scan.angle_min) / scan.increment
+    turn = (bearing(y, x) - scan.angle_min) / scan.increment
     if scan.is_full_turn:
         turn -= n * math.floor(turn / n)
     beam = int(math.floor(turn + 0.5))
@@ -80,7 +103,7 @@ def _evidence(
     for step in range(-1, 2):
         k = beam + step
         k = k + n if k < 0 else k - n if k >= n else k
-        one = float(ranges[k])
+        one = float(ranges[slot, k])
         if one >= doubts.range_min:  # beams without a valid range tell nothing
             nearest, farthest = min(nearest, one), max(farthest, one)
     if farthest == 0.0:
@@ -95,7 +118,7 @@ def _evidence(
             if not scan.is_full_turn:
                 return UNKNOWN
             k = k + n if k < 0 else k - n
-        if doubts.range_min <= float(ranges[k]) <= distance + doubts.margin:
+        if doubts.range_min <= float(ranges[slot, k]) <= distance + doubts.margin:
             return UNKNOWN
     return FREED
 
@@ -106,9 +129,10 @@ def compare_scan(
     earlier: EarlierScans,
     order: NDArray[np.int64],
     is_thorough: bool,
+    step: int,
     doubts: Doubts,
     points: NDArray[np.float64],
-    evidence: NDArray[np.int8],
+    evidence: NDArray[np.uint8],
 ) -> int:
     """Place the points of a scan and tell which of them lie in space that was free earlier.
 
@@ -118,15 +142,16 @@ def compare_scan(
         order: int64[k], slots to compare with, the oldest first.
         is_thorough: Ask every slot until one finds the point freed. Otherwise the first slot
             that knows about a point decides.
+        step: 1 for all beams, 2 for every other one.
         doubts: Limits.
         points: float64[n, 3], written: the points in the fixed frame; NaN where there is none.
-        evidence: int8[n], written: FREED, UNKNOWN or OCCUPIED.
+        evidence: uint8[n], written: FREED, UNKNOWN or OCCUPIED.
 
     Returns:
         Number of points that are FREED.
     """
     rotation, freed = scan.rotation, 0
-    for k in range(scan.ranges.shape[0]):
+    for k in range(0, scan.ranges.shape[0], step):
         one = float(scan.ranges[k])
         evidence[k] = UNKNOWN
         points[k, 0] = points[k, 1] = points[k, 2] = np.nan
@@ -142,14 +167,7 @@ def compare_scan(
         points[k, 0], points[k, 1], points[k, 2] = x, y, z
         told = UNKNOWN
         for slot in order:
-            found = _evidence(
-                earlier.ranges[slot],
-                earlier.origins[slot],
-                earlier.rotations[slot],
-                scan,
-                doubts,
-                (x, y, z),
-            )
+            found = _evidence(earlier, slot, scan, doubts, (x, y, z))
             if found == FREED:
                 told = FREED
                 break
@@ -166,7 +184,7 @@ def compare_scan(
 def find_clusters(
     scan: ScanView,
     points: NDArray[np.float64],
-    evidence: NDArray[np.int8],
+    evidence: NDArray[np.uint8],
     incidence: float,
     noise: float,
     labels: NDArray[np.int32],
@@ -177,7 +195,7 @@ def find_clusters(
     Args:
         scan: The scan.
         points: float64[n, 3], as ``compare_scan`` writes them.
-        evidence: int8[n], the same.
+        evidence: uint8[n], the same.
         incidence: Smallest angle between a beam and a surface that stays in one piece, radians.
         noise: Standard deviation of ranges, metres.
         labels: int32[n], written: row of each point's cluster, -1 for none.

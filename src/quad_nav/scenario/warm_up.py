@@ -80,6 +80,8 @@ def warm_up(configuration: config.Configuration) -> None:
     _add_scans(navigator, here)  # again, with the points of a peer to remove
     if isinstance(navigator.controller, TrajectoryPlanner) and navigator.controller.rollout:
         navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
+    if configuration.tracker.track_moving_obstacles:
+        track_obstacle()
 
 
 def track_obstacle() -> None:

@@ -42,6 +42,8 @@ RANGE_NOISE_M = 0.02
 LEVEL_M = 0.3
 """Height above or below a LIDAR's plane in which its beams speak for upright things."""
 _INCIDENCE_RAD = math.radians(10.0)
+_IDLE_STEP = 3  # where nothing moved, one of three beams is compared: a track needs three
+_IDLE_PERIOD_S = 0.1  # where nothing moved, scans that come earlier are left out
 _FULL_TURN_BEAMS = 1.5  # a gap of fewer beams is none
 # A larger step of the pose from one scan to the next is a correction of the localisation.
 _CORRECTION_M, _CORRECTION_RAD = 0.25, 0.3
@@ -81,6 +83,7 @@ class MovingPoints:
         """Forget earlier scans, after a jump of clock or pose, or with other beams."""
         self._earlier: Optional[EarlierScans] = None
         self._stamps_s = np.full(SLOTS, -math.inf)
+        self._compared_s = -math.inf
         self._previous: Optional[Pose3D] = None
         self._beams = (0.0, 0.0, 0)
 
@@ -103,20 +106,21 @@ class MovingPoints:
                 knows decides, and the clusters are None if nothing moves.
         """
         self._check_continuity(scan, frame_from_sensor)
+        if not is_thorough and scan.stamp_s - self._compared_s < _IDLE_PERIOD_S - 1e-6:
+            return None
+        self._compared_s = scan.stamp_s
         view = _view(scan, frame_from_sensor)
         count = len(view.ranges)
-        points, evidence = np.empty((count, 3)), np.empty(count, np.int8)
+        points, evidence = np.empty((count, 3)), np.empty(count, np.uint8)
         earlier, order = self._slots(count)
-        doubts = Doubts(
-            max(scan.range_min_m, 1e-3),
-            min(scan.range_max_m, params.range_m),
-            *heights_m,
-            LEVEL_M,
-            params.margin_m,
+        doubts = _doubts(scan, heights_m, params)
+        is_idle = not is_thorough and not compare_scan(
+            view, earlier, order, False, _IDLE_STEP, doubts, points, evidence
         )
-        freed = compare_scan(view, earlier, order, is_thorough, doubts, points, evidence)
+        if not is_idle:
+            compare_scan(view, earlier, order, is_thorough, 1, doubts, points, evidence)
         self._keep(view, scan.stamp_s, earlier)
-        if not freed and not is_thorough:
+        if is_idle:
             return None
         labels, rows = np.empty(count, np.int32), np.empty((count, 4), np.int64)
         found = find_clusters(view, points, evidence, _INCIDENCE_RAD, RANGE_NOISE_M, labels, rows)
@@ -152,6 +156,11 @@ class MovingPoints:
         self._stamps_s[slot] = stamp_s
         earlier.ranges[slot] = view.ranges
         earlier.origins[slot], earlier.rotations[slot] = view.origin, view.rotation
+
+
+def _doubts(scan: Scan, heights_m: Heights, params: TrackerParams) -> Doubts:
+    nearest_m, farthest_m = max(scan.range_min_m, 1e-3), min(scan.range_max_m, params.range_m)
+    return Doubts(nearest_m, farthest_m, *heights_m, LEVEL_M, params.margin_m)
 
 
 def _view(scan: Scan, pose: Pose3D) -> ScanView:

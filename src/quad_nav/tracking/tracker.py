@@ -107,7 +107,7 @@ class ObstacleTracker:
     def reset(self) -> None:
         """Forget tracks and scans, after the clock has jumped."""
         self._points: Dict[str, MovingPoints] = {}
-        self._end_all(-math.inf)
+        self._end_all(0.0)
 
     def _end_all(self, now_s: float) -> None:
         self._now_s = now_s

@@ -43,16 +43,17 @@ class ObstacleTopics:
             shown = track_markers(tracks, self._tracker.unseen_s, frame)
             self._markers.publish(replacing_markers(shown))
         if self._cloud.get_num_connections() > 0:
-            self._cloud.publish(cloud_message(tracks, frame))
+            stamp = rospy.Time.from_sec(tracks.time_s if len(tracks) else now_s)
+            self._cloud.publish(cloud_message(tracks, frame, stamp))
 
 
-def cloud_message(tracks: Tracks, frame: str) -> PointCloud2:
+def cloud_message(tracks: Tracks, frame: str, stamp: rospy.Time) -> PointCloud2:
     """Convert tracks to a cloud with a point for each of them."""
     rows, size = cloud_rows(tracks), 4 * len(CLOUD_FIELDS)
     message = PointCloud2(
         height=1, width=len(rows), point_step=size, row_step=size * len(rows), is_dense=True
     )
-    message.header.frame_id, message.header.stamp = frame, rospy.Time.from_sec(tracks.time_s)
+    message.header.frame_id, message.header.stamp = frame, stamp
     message.fields = [
         PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate(CLOUD_FIELDS)
     ]
