@@ -40,6 +40,10 @@ class Failsafe:
     safe: float
     is_needed: bool = True
 
+    def safe_for(self, vehicle: Vehicle) -> float:
+        """Return the proposed value: without a radio its loss means nothing."""
+        return 0.0 if self.parameter == "FS_THR_ENABLE" and not vehicle.has_radio else self.safe
+
 
 def own_parameters(autopilot: str, limits: Limits) -> Dict[str, float]:
     """Return the parameters that the bridge writes, with their values."""
@@ -74,7 +78,7 @@ def wanted(values: Values, vehicle: Vehicle) -> Dict[str, float]:
     if vehicle.sets_failsafes:
         for failsafe in _FAILSAFES[vehicle.autopilot]:
             if values.get(failsafe.parameter) is not None and failsafe.problem(values, vehicle):
-                ours[failsafe.parameter] = failsafe.safe
+                ours[failsafe.parameter] = failsafe.safe_for(vehicle)
     return {
         name: value
         for name, value in ours.items()
@@ -98,9 +102,8 @@ def faults(values: Values, vehicle: Vehicle) -> List[str]:
             continue
         problem = failsafe.problem(values, vehicle)
         if problem:
-            found.append(
-                f"{failsafe.parameter}: is {value_:g}: {problem}; set it to {failsafe.safe:g}"
-            )
+            safe = failsafe.safe_for(vehicle)
+            found.append(f"{failsafe.parameter}: is {value_:g}: {problem}; set it to {safe:g}")
     return found
 
 

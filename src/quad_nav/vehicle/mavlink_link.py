@@ -7,7 +7,7 @@ connection is closed. It decides nothing.
 from __future__ import annotations
 
 import os
-from threading import Lock
+from threading import Event, Lock
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 os.environ["MAVLINK20"] = "1"  # pymavlink reads it at its import
@@ -29,7 +29,7 @@ except ImportError:  # an extra
     mavutil = None
 
 OUR_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
-_EMPTY_READS = 50
+_EMPTY_READS = 3
 """A connection that is readable but empty this often in a row was closed by the other side."""
 _REOPEN_S = 1.0
 _TARGETED = frozenset(
@@ -68,8 +68,12 @@ class MavlinkLink:
         self.lock = Lock()
         self._vehicle, self._clock = vehicle, clock
         self._empty, self._reopen_s = 0, 0.0
+        self._idle = Event()  # never set
+        self._connection: Any = None
         try:
-            self._connection: Any = self._open()
+            self._connection = self._open()
+        except (ConnectionError, TimeoutError):  # nothing listens there yet
+            self._reopen_s = clock() + _REOPEN_S
         except (OSError, ValueError) as error:
             raise InputError(
                 [f"{vehicle.name}: address {vehicle.address} cannot be opened: {error}"]
@@ -108,19 +112,18 @@ class MavlinkLink:
     def read(self, timeout_s: float) -> None:
         """Wait for messages, and pass those that are there to the adapter."""
         if self._connection is None:
-            self._try_again()
+            self._try_again(timeout_s)
             return
         if not self._connection.select(timeout_s):
             self._empty = 0
             return
-        got = False
-        while True:
-            message = self._receive()
-            if message is None:
-                break
-            got = True
+        before = self._connection.mav.total_bytes_received
+        message = self._receive()
+        while message is not None:
             self._pass(message)
-        self._empty = 0 if got else self._empty + 1
+            message = self._receive()
+        is_empty = self._connection.mav.total_bytes_received == before
+        self._empty = self._empty + 1 if is_empty else 0
         if self._empty > _EMPTY_READS:
             self.close()
             self._reopen_s = self._clock() + _REOPEN_S
@@ -138,8 +141,9 @@ class MavlinkLink:
         with self.lock:
             self.adapter.receive(name, message.get_srcComponent(), message, self._clock())
 
-    def _try_again(self) -> None:
+    def _try_again(self, timeout_s: float) -> None:
         if self._clock() < self._reopen_s:
+            self._idle.wait(timeout_s)
             return
         self._empty, self._reopen_s = 0, self._clock() + _REOPEN_S
         try:

@@ -23,10 +23,11 @@ BODY_NED = 8  # MAV_FRAME_BODY_NED: forward along the heading, right, down
 VELOCITY_AND_YAW_RATE = 1479
 """Mask of SET_POSITION_TARGET_LOCAL_NED: position, acceleration, force and yaw are ignored."""
 PERIOD_S = 0.05
-SOONEST_S = 0.04
+SOONEST_S = 0.02
 """Shortest time between two set-points, when commands come faster than the stream."""
-COMMANDED_PERIOD_S = 0.06
-"""Time to the next set-point after one that a command has caused: the next command comes first."""
+COMMANDED_PERIOD_S = 0.075
+"""Time to the next set-point after one that a command has caused: the next command comes first,
+even if it is late."""
 
 
 @dataclass(frozen=True)
@@ -114,8 +115,11 @@ class SetpointClock:
         return now_s >= self.due_s
 
     def may_follow_command(self, now_s: float) -> bool:
-        """Return whether a set-point may be sent at once for a new command."""
-        return now_s - self._sent_s >= SOONEST_S
+        """Return whether a set-point may be sent at once for a new command, else have it soon."""
+        if now_s - self._sent_s >= SOONEST_S:
+            return True
+        self.due_s = min(self.due_s, self._sent_s + SOONEST_S)
+        return False
 
     def sent(self, now_s: float, by_command: bool) -> None:
         """Note that a set-point was sent.

@@ -282,6 +282,8 @@ def make_bridge(vehicle: Vehicle, permissions: Permissions, clock: Callable[[], 
     Raises:
         InputError: If a package is missing, or the address cannot be opened.
     """
+    if vehicle.kind != "mavlink":
+        raise InputError([f"{vehicle.name}: kind {vehicle.kind} has no bridge yet"])
     traits = AUTOPILOTS[vehicle.autopilot].traits
     machine = VehicleMachine(vehicle.altitude_m, vehicle.limits, traits, permissions)
     return MavlinkLink(vehicle, machine, clock)

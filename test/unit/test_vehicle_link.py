@@ -1,0 +1,129 @@
+"""The connection over TCP: messages come through, and it connects again after it was closed."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+import pytest
+
+from quad_nav.errors import InputError
+from quad_nav.vehicle.autopilots import AUTOPILOTS
+from quad_nav.vehicle.mavlink_link import MavlinkLink, mavutil
+from quad_nav.vehicle.orders import Permissions
+from quad_nav.vehicle.states import VehicleMachine
+from quad_nav.vehicle.telemetry import Limits
+from quad_nav.vehicle.vehicle_file import Vehicle
+
+PATIENCE_S = 20.0
+
+
+def link_to(address):
+    machine = VehicleMachine(1.0, Limits(), AUTOPILOTS["ardupilot"].traits, Permissions())
+    return MavlinkLink(Vehicle(0, "mavlink", address=address), machine, time.monotonic)
+
+
+def heartbeat(mode, system=1, component=1):
+    mavlink = mavutil.mavlink
+    encoder = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
+    return encoder.heartbeat_encode(2, 3, 81, mode, 3).pack(encoder)
+
+
+def read_until(link, condition):
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s
+        link.read(0.05)
+
+
+@pytest.fixture
+def server():
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        one.settimeout(PATIENCE_S)
+        yield one
+
+
+def test_only_heartbeats_of_the_vehicles_autopilot_count(server):
+    link = link_to(f"tcp:127.0.0.1:{server.getsockname()[1]}")
+    vehicle, _ = server.accept()
+    # Another station's heartbeat (mode 0), that of a gimbal, and that of the autopilot.
+    vehicle.sendall(heartbeat(0, system=254) + heartbeat(0, component=154) + heartbeat(5))
+    inputs = link.machine.inputs
+    read_until(link, lambda: inputs.status is not None)
+    assert inputs.status.mode == "LOITER"
+    link.close()
+    vehicle.close()
+
+
+def test_it_connects_again_after_the_other_side_has_closed(server):
+    link = link_to(f"tcp:127.0.0.1:{server.getsockname()[1]}")
+    inputs = link.machine.inputs
+    for mode, name in [(4, "GUIDED"), (9, "LAND")]:
+        accepted = []
+        server.setblocking(False)
+
+        def is_accepted(accepted=accepted):
+            try:
+                accepted.append(server.accept()[0])
+            except BlockingIOError:
+                return False
+            return True
+
+        read_until(link, is_accepted)
+        accepted[0].sendall(heartbeat(mode))
+        read_until(link, lambda name=name: inputs.status is not None and inputs.status.mode == name)
+        accepted[0].close()
+    link.close()
+
+
+def test_a_vehicle_that_is_not_there_yet_is_no_fault(server):
+    port = server.getsockname()[1]
+    server.close()
+    link = link_to(f"tcp:127.0.0.1:{port}")
+    with socket.create_server(("127.0.0.1", port)) as later:
+        later.setblocking(False)
+        accepted = []
+
+        def is_accepted():
+            try:
+                accepted.append(later.accept()[0])
+            except BlockingIOError:
+                return False
+            return True
+
+        read_until(link, is_accepted)
+        accepted[0].close()
+    link.close()
+
+
+@pytest.mark.parametrize("address", ["udpin:nowhere", "udpin:256.1.1.1:5", "/dev/no_such_line"])
+def test_an_address_that_cannot_be_opened_is_named(address):
+    with pytest.raises(InputError) as error:
+        link_to(address)
+    assert f"quad0: address {address} cannot be opened" in str(error.value)
+
+
+def test_nothing_but_the_planned_bytes_leaves():
+    """A set-point as the wire has it: frame, mask, target and numbers."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        vehicle.settimeout(PATIENCE_S)
+        link = link_to(f"udpout:127.0.0.1:{vehicle.getsockname()[1]}")
+        fields = {
+            "time_boot_ms": 9,
+            "coordinate_frame": 8,
+            "type_mask": 1479,
+            **dict.fromkeys(("x", "y", "z", "afx", "afy", "afz", "yaw"), 0.0),
+            "vx": 0.25,
+            "vy": -0.5,
+            "vz": 0.125,
+            "yaw_rate": -1.0,
+        }
+        link._send([("SET_POSITION_TARGET_LOCAL_NED", fields)])
+        decoder = mavutil.mavlink.MAVLink(None)
+        (message,) = decoder.parse_buffer(vehicle.recv(1000))
+        values = message.to_dict()
+        assert values.pop("mavpackettype") == "SET_POSITION_TARGET_LOCAL_NED"
+        assert values == {**fields, "target_system": 1, "target_component": 1}
+        assert (message.get_srcSystem(), message.get_srcComponent()) == (255, 191)
+        link.close()
