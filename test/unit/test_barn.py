@@ -226,8 +226,8 @@ def test_the_body_keeps_to_the_parameters_velocities_and_frames_may_have_any_nam
         "Lidar0",
         "front_laser",
     )
-    backwards = setup_of(path, parameters=(("TrajectoryPlannerROS/escape_vel", -0.9),))
-    assert backwards.contestant.simulation.flight.max_speed_mps == 0.9
+    backwards = setup_of(path, parameters=(("TrajectoryPlannerROS/escape_vel", -1.3),))
+    assert backwards.contestant.simulation.flight.max_speed_mps == 1.3
     told = differences(setup.contestant)
     assert "radius 0.20 m" in told and "0.50 m/s and 1.57 rad/s" in told
     assert max(map(len, told.splitlines())) <= 100
@@ -254,6 +254,8 @@ def test_config_barn_is_the_default_but_for_body_place_and_what_studies_tuned():
         for name in (
             "max_vel_x",
             "min_vel_x",
+            "max_vel_theta",
+            "min_vel_theta",
             "min_in_place_vel_theta",
             "vtheta_samples",
             "sim_time",
@@ -262,6 +264,7 @@ def test_config_barn_is_the_default_but_for_body_place_and_what_studies_tuned():
             "heading_lookahead",
         )
     }
+    tuned |= {"local_costmap/width", "local_costmap/height"}
     tuned |= {"planner_frequency", *(f"{costmap}/cost_scaling_factor" for costmap in costmaps)}
     assert {path: pair for path, pair in changed.items() if path not in tuned} == {
         **{f"{costmap}/robot_radius": (0.35, 0.25) for costmap in costmaps},

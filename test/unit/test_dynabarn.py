@@ -122,7 +122,7 @@ def test_a_flight_starts_later_where_an_obstacle_is_at_the_start(tmp_path):
     assert flight.scene.motion_phase_s == pytest.approx(drawn + math.ceil(90.0 - drawn), abs=1.01)
 
 
-@pytest.mark.parametrize("given, limit", [(0.5, 0.5), (0.3, 0.3), (0.0, 0.732)])
+@pytest.mark.parametrize("given, limit", [(0.5, 0.5), (0.3, 0.3), (0.0, 1.2)])
 def test_the_speed_limit(worlds, given, limit):
     setup = read_dynamic_setup(options(worlds), "spline", given)
     assert setup.contestant.configuration.local_planner.max_vel_x_mps == limit
