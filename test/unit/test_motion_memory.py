@@ -83,3 +83,11 @@ def test_the_older_half_is_dropped_when_the_memory_is_full():
         memory.add(tracks(0.1 * k, 7, [0.1 * k, 0.0, 1.0, 0.0]))
     assert 2000.0 < memory.span_s < 4000.0
     assert memory.recall(7, TIMES).known == 0
+
+
+def test_the_acceleration_is_that_of_the_last_half_second():
+    memory = MotionMemory()
+    for k in range(8):
+        memory.add(tracks(0.1 * k, 7, [0.0, 0.0, 1.0, 0.1 * k]))
+    np.testing.assert_allclose(memory.acceleration(7), [0.0, 1.0])
+    np.testing.assert_allclose(memory.acceleration(8), [0.0, 0.0])

@@ -128,4 +128,17 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
         ),
         (EvasionParams,),
     ),
+    (
+        double(
+            "moving_obstacle_glance",
+            0.0,
+            "glance_rad",
+            "radians",
+            "A robot that evades looks to both sides of its way by this, for what is hidden from a"
+            " LIDAR that does not see all around.",
+            low=0,
+            high=3.1416,
+        ),
+        (EvasionParams,),
+    ),
 )

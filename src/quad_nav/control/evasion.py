@@ -38,10 +38,13 @@ _SUBSTEPS = 5  # predictions in each step
 _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
 _GAIN_PER_S = 3.0  # of the body's velocity loop
-_RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 50.0, 100.0, 0.05
-_SIGMA_M, _SIGMA_MPS = 0.08, 0.08  # least uncertainty of a prediction, and its growth
-_MAX_SIGMA_MPS = 0.12
+_FADE_PER_S = 0.35
+_RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 14.0, 100.0, 0.05
+_SIGMA_M, _SIGMA_MPS = 0.08, 0.05  # least uncertainty of a prediction, and its growth
+_MAX_SIGMA_MPS = 0.1
 _RECALLED_SIGMA_MPS = 0.03
+_ACCELERATES_S = 0.5  # for which an obstacle keeps its acceleration
+_CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _SPEEDS, _COURSES = 4, 24
 
@@ -53,11 +56,14 @@ class EvasionParams:
     Attributes:
         avoid_moving_obstacles: Evade tracked obstacles; False restores upstream behaviour.
         clearance_m: Distance that the robot keeps from where obstacles are predicted.
+        glance_rad: Angle by which a robot that evades looks to both sides of its way, for what a
+            LIDAR that does not see all around hides.
         watch_s: Time for which a robot watches many moving obstacles before its first goal.
     """
 
     avoid_moving_obstacles: bool = False
     clearance_m: float = 0.1
+    glance_rad: float = 0.0
     watch_s: float = 0.0
 
 
@@ -93,6 +99,7 @@ def evade(
     now_s: float,
     route: Floats,
     wish: Twist2D,
+    last: Tuple[float, float],
 ) -> Twist2D:
     """Return the command that moving obstacles threaten least, the wish where it is as good.
 
@@ -103,6 +110,7 @@ def evade(
         now_s: Present time.
         route: float64[n, 2], what is left of the plan, or the point to hover at.
         wish: The command of the navigator, in the robot's frame.
+        last: The last command's velocity along the axes of the costmap's frame, m/s.
     """
     search = _search_of(around.max_speed_mps)
     discs = predicted_discs(params, around, tracks, now_s, search.step_s)
@@ -119,6 +127,7 @@ def evade(
     commands = _commands(around.max_speed_mps, wished)
     velocity = pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
     found = command_costs(search, discs, blocked, costs, velocity, commands)
+    found += _CHANGE_S / around.max_speed_mps * np.hypot(*(commands - last).T)
     best = int(np.argmin(found[1:])) + 1
     if found[0] <= found[best] + _WISH_S:
         return wish
@@ -155,10 +164,14 @@ def predicted_discs(
 
 
 def _recall(memory: MotionMemory, numbers: NDArray[np.int64], times: Floats, discs: Floats) -> None:
-    """Move the discs of obstacles that the memory knows as it recalls."""
+    """Move the discs of obstacles as the memory recalls; others keep their acceleration a while."""
+    during = np.minimum(times, _ACCELERATES_S)
+    turned = during * (times - 0.5 * during)
     for k, number in enumerate(numbers.tolist()):
         recalled = memory.recall(number, times)
-        if recalled.known:
+        if not recalled.known:
+            discs[:, k, :2] += turned[:, None] * memory.acceleration(number)
+        else:
             discs[:, k, :2] = discs[0, k, :2] + recalled.moves
             known = discs[0, k, 3] + times * _RECALLED_SIGMA_MPS
             discs[: recalled.known, k, 3] = known[: recalled.known]
@@ -173,6 +186,7 @@ def _search_of(max_speed_mps: float) -> SpaceTime:
         max_speed_mps,
         _GAIN_PER_S,
         _RISK_PER_S,
+        _FADE_PER_S,
         _BLOCKED_PER_S,
         _AWAY_PER_S,
     )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from quad_nav.kernels.jit import njit
 
 _SUBSTEPS = 5
+_DEEP_M = 0.1  # depth inside a disc at which the threat is 2
 _FAR = 3.0  # standard deviations at which the threat ends
 
 
@@ -26,14 +27,17 @@ class SpaceTime(NamedTuple):
     step_s: float
     max_speed_mps: float
     gain_per_s: float  # of the body's velocity loop
-    risk_per_s: float  # cost of a second inside an obstacle
+    risk_per_s: float  # cost of a second at the rim of an obstacle
+    fade_per_s: float  # rate at which predictions lose their weight
     blocked_per_s: float  # cost of a second on a blocked cell
     away_per_s: float  # part of the cost to go that a second costs
 
 
 @njit(cache=True, nogil=True)
 def threat(discs: NDArray[np.float64], k: int, x: float, y: float) -> float:
-    """Return the threat at a point at time k: 1 inside a disc, a Gaussian's flank outside.
+    """Return the threat at a point at time k: a Gaussian's flank outside of a disc, 1 at its rim.
+
+    It grows linearly inside: the clearance is there, and a graze is better than a hit.
 
     Args:
         discs: float64[t, n, 4], rows x, y, radius and standard deviation of the position.
@@ -49,7 +53,10 @@ def threat(discs: NDArray[np.float64], k: int, x: float, y: float) -> float:
         if squared >= (radius + _FAR * sigma) ** 2:
             continue
         beyond = math.sqrt(squared) - radius
-        total += 1.0 if beyond <= 0.0 else math.exp(-0.5 * (beyond / sigma) ** 2)
+        if beyond <= 0.0:
+            total += 1.0 - beyond / _DEEP_M
+        else:
+            total += math.exp(-0.5 * (beyond / sigma) ** 2)
     return total
 
 
@@ -74,11 +81,12 @@ def fill_costs(
     reach = int(search.max_speed_mps * search.step_s / search.cell_m + 1e-6)
     costs[steps] = to_go
     for k in range(steps - 1, 0, -1):
+        risk = search.risk_per_s * math.exp(-search.fade_per_s * k * search.step_s)
         near = min(k * reach + 2, middle - reach)
         for row in range(middle - near, middle + near + 1):
             for column in range(middle - near, middle + near + 1):
                 x, y = (column - middle) * search.cell_m, (row - middle) * search.cell_m
-                cost = search.risk_per_s * threat(discs, k * _SUBSTEPS, x, y)
+                cost = risk * threat(discs, k * _SUBSTEPS, x, y)
                 cost += search.away_per_s * to_go[row, column]
                 if blocked[row, column]:
                     cost += search.blocked_per_s

@@ -28,7 +28,8 @@ _AT_POINT_M = 0.15
 _MANY = 3  # obstacles that are worth watching
 _ROUTE_POINTS = 40
 _AHEAD_M = 1.5
-_TURN_GAIN_PER_S = 1.0
+_TURN_GAIN_PER_S = 2.0
+_GLANCE_S = 6.0  # period of looking to both sides
 _MIN_TURN_RAD = 0.1
 
 
@@ -53,6 +54,7 @@ class EvasionGuard:
         self.params = params
         self.is_evading = False
         self._costmap = local_costmap
+        self._last = (0.0, 0.0)
         self._memory = MotionMemory()
         self._point: Optional[Pose2D] = None  # where a robot that follows no plan stopped
 
@@ -86,11 +88,15 @@ class EvasionGuard:
             self._end(tick)
             return
         around = self._surroundings(poses.in_local, velocity, limits, plan is not None)
-        command = evade(self.params, around, tracks, tick.now_s, route, wish)
+        command = evade(self.params, around, tracks, tick.now_s, route, wish, self._last)
+        self._last = poses.in_local.rotate(command.vx_mps, command.vy_mps)
         if command is wish:
             self._end(tick)
             return
-        turn_radps = _turn(route, poses.in_local, limits) if plan is not None else 0.0
+        turn_radps = command.vyaw_radps
+        if plan is not None:
+            aside_rad = self.params.glance_rad * math.sin(tick.now_s * 2.0 * math.pi / _GLANCE_S)
+            turn_radps = _turn(route, poses.in_local, limits, aside_rad)
         tick.command = Twist2D(command.vx_mps, command.vy_mps, turn_radps)
         tick.evades = self.is_evading = True
 
@@ -133,12 +139,14 @@ class EvasionGuard:
         return np.column_stack(local_from_global.transform(x, y))
 
 
-def _turn(route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:
-    """Return the turn rate that faces the route some way ahead."""
+def _turn(route: Floats, pose: Pose2D, limits: SpeedLimits, aside_rad: float) -> float:
+    """Return the turn rate that faces the route some way ahead, or aside of it."""
     away = np.hypot(route[:, 0] - pose.x_m, route[:, 1] - pose.y_m)
     ahead = np.flatnonzero(away[int(away.argmin()) :] >= _AHEAD_M)
     x_m, y_m = route[int(away.argmin()) + int(ahead[0]) if len(ahead) else -1].tolist()
-    turn_rad = angle_difference(math.atan2(y_m - pose.y_m, x_m - pose.x_m), pose.yaw_rad)
+    turn_rad = angle_difference(
+        math.atan2(y_m - pose.y_m, x_m - pose.x_m), pose.yaw_rad - aside_rad
+    )
     if abs(turn_rad) < _MIN_TURN_RAD:
         return 0.0
     return max(-limits.turn_radps, min(_TURN_GAIN_PER_S * turn_rad, limits.turn_radps))

@@ -27,6 +27,7 @@ _PERIOD_S = 0.1  # between two samples of a track
 _EARLIER = 5  # samples between those that have to be alike
 _SCALE_M, _SCALE_MPS = 0.3, 0.35
 _BEFORE_S = 5.0
+_MAX_ACCELERATION_MPS2 = 2.5
 _CAPACITY = 40_000  # samples; 200 s of 20 tracks
 
 
@@ -83,6 +84,18 @@ class MotionMemory:
             recent[number] = [*own[-_EARLIER:], row]
             self._count += 1
         self._recent = recent
+
+    def acceleration(self, number: int) -> Floats:
+        """Return how the velocity of a track changes, float64[2] in m/s^2, over half a second.
+
+        It is zero for a track that is younger, and no more than ``_MAX_ACCELERATION_MPS2``.
+        """
+        rows = self._recent.get(number)
+        if not rows or self._earlier[rows[-1]] == NONE:
+            return np.zeros(2)
+        now, earlier = self._samples[rows[-1]], self._samples[self._earlier[rows[-1]]]
+        change: Floats = (now[3:] - earlier[3:]) / (now[0] - earlier[0])
+        return change * min(1.0, _MAX_ACCELERATION_MPS2 / max(float(np.hypot(*change)), 1e-9))
 
     def recall(self, number: int, times_s: Floats) -> Recalled:
         """Return where an obstacle that moved like a track did went next.
