@@ -123,10 +123,9 @@ def evade(
     costs = np.full((_STEPS + 1, len(offsets), len(offsets)), math.inf)
     fill_costs(search, discs, blocked, to_go, costs)
     pose = around.pose
-    wished = pose.rotate(wish.vx_mps, wish.vy_mps)
-    commands = _commands(around.max_speed_mps, wished)
-    velocity = pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
-    found = command_costs(search, discs, blocked, costs, velocity, commands)
+    commands = _commands(around.max_speed_mps, pose.rotate(wish.vx_mps, wish.vy_mps))
+    moving = pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
+    found = command_costs(search, discs, blocked, costs, moving, commands)
     found += _CHANGE_S / around.max_speed_mps * np.hypot(*(commands - last).T)
     best = int(np.argmin(found[1:])) + 1
     if found[0] <= found[best] + _WISH_S:

@@ -82,21 +82,19 @@ class EvasionGuard:
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
             return
         self._memory.add(tracks)
-        wish = tick.command or Twist2D()
         route = self._route(plan, poses.in_global, local_from_global)
         if not len(tracks) and not self._is_displaced(poses.in_global):
             self._end(tick)
             return
+        wish = tick.command or Twist2D()
         around = self._surroundings(poses.in_local, velocity, limits, plan is not None)
         command = evade(self.params, around, tracks, tick.now_s, route, wish, self._last)
         self._last = poses.in_local.rotate(command.vx_mps, command.vy_mps)
         if command is wish:
             self._end(tick)
             return
-        turn_radps = command.vyaw_radps
-        if plan is not None:
-            aside_rad = self.params.glance_rad * math.sin(tick.now_s * 2.0 * math.pi / _GLANCE_S)
-            turn_radps = _turn(route, poses.in_local, limits, aside_rad)
+        aside_rad = self.params.glance_rad * math.sin(tick.now_s * 2.0 * math.pi / _GLANCE_S)
+        turn_radps = _turn(route, poses.in_local, limits, aside_rad) if plan is not None else 0.0
         tick.command = Twist2D(command.vx_mps, command.vy_mps, turn_radps)
         tick.evades = self.is_evading = True
 
