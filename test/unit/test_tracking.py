@@ -92,6 +92,20 @@ def test_standing_things_do_not_move_for_a_lidar_that_flies_and_turns(noise_m, r
         assert len(tracker.tracks) == 0
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_field_of_thin_pillars_does_not_move(seed):
+    """As in BARN: pillars of 0.075 m with gaps, seen from between them."""
+    random = np.random.default_rng(seed)
+    places = random.uniform(-5.5, 5.5, (120, 2))
+    pillars = [(x_m, y_m, 0.075) for x_m, y_m in places if abs(y_m) > 0.6]
+
+    def pose_of(t):
+        return pose_at(-5.0 + 0.7 * t, 0.2 * math.sin(t), 0.5 * math.sin(1.3 * t))
+
+    for _, _, tracker in track(lambda _: pillars, times(12.0, 20.0), pose_of, noise_m=0.01):
+        assert len(tracker.tracks) == 0
+
+
 def test_nothing_is_clustered_or_tracked_where_nothing_moves():
     assert all(result is None for _, result, _ in track(lambda _: PILLARS, times(3.0)))
 

@@ -83,7 +83,7 @@ class MovingPoints:
         """Forget earlier scans, after a jump of clock or pose, or with other beams."""
         self._earlier: Optional[EarlierScans] = None
         self._stamps_s = np.full(SLOTS, -math.inf)
-        self._compared_s = -math.inf
+        self._compared_s = self._newest_s = -math.inf
         self._previous: Optional[Pose3D] = None
         self._beams = (0.0, 0.0, 0)
 
@@ -142,7 +142,7 @@ class MovingPoints:
         before, now = self._previous, pose
         if before is not None and (
             beams != self._beams
-            or scan.stamp_s < self._stamps_s.max()
+            or scan.stamp_s < self._newest_s
             or math.hypot(now.x_m - before.x_m, now.y_m - before.y_m) > _CORRECTION_M
             or abs(angle_difference(now.yaw_rad, before.yaw_rad)) > _CORRECTION_RAD
         ):
@@ -150,8 +150,9 @@ class MovingPoints:
         self._previous, self._beams = now, beams
 
     def _keep(self, view: ScanView, stamp_s: float, earlier: EarlierScans) -> None:
-        if stamp_s - self._stamps_s.max() < SPACING_S:
+        if stamp_s - self._newest_s < SPACING_S:
             return
+        self._newest_s = stamp_s
         slot = int(np.argmin(self._stamps_s))
         self._stamps_s[slot] = stamp_s
         earlier.ranges[slot] = view.ranges

@@ -88,7 +88,7 @@ class ObstacleTracker:
     Attributes:
         params: The parameters; they may change in flight.
         frame: Name of the fixed frame.
-        tracks: The confirmed tracks, at the time of the last scan.
+        tracks: The confirmed tracks, at the time of the last scan; empty ones may be older.
         unseen_s: float64[n], times for which each of them has not been seen, but predicted.
     """
 
@@ -146,7 +146,8 @@ class ObstacleTracker:
             scan, frame_from_sensor, heights_m, self.params, bool(self._lives)
         )
         if clusters is None:
-            self._end_all(now_s)
+            if len(self.tracks):
+                self._end_all(now_s)
             return None
         return self._track(now_s, clusters, known_circles)
 
