@@ -219,3 +219,21 @@ def test_a_navigator_that_waits_keeps_the_vehicle_in_the_air(autopilot):
         flight.run(0.5)
     assert flight.state is State.HOLDING
     assert flight.run(5.6, lambda: flight.state is State.LANDING)  # it has died
+
+
+def test_a_dry_run_notices_the_pilot_and_missing_commands(autopilot):
+    flight = Flight(autopilot, Permissions(is_dry=True))
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    assert flight.machine.take_off(flight.now_s).is_accepted
+    flight.command = Twist2D(0.2, 0.0, 0.0)
+    assert flight.run(5.0, lambda: flight.state is State.FLYING)
+    flight.vehicle.position[2] = -30.0  # carried to another floor
+    flight.run(1.0)
+    assert flight.state is State.FLYING
+    flight.command = None
+    assert flight.run(1.0, lambda: flight.state is State.HOLDING)
+    flight.command = Twist2D(0.2, 0.0, 0.0)
+    assert flight.run(1.0, lambda: flight.state is State.FLYING)
+    flight.vehicle.set_mode(flight.vehicle.kind["other"])
+    assert flight.run(0.1, lambda: flight.state is State.TAKEN_OVER)
+    assert flight.pauses == 1

@@ -175,11 +175,6 @@ class VehicleMachine:
 
     def _watch(self, now_s: float) -> None:
         """React to the most important danger in flight."""
-        if self._permissions.is_dry:
-            problem = self.inputs.link_problem(now_s)
-            if problem:
-                self._lose_link(problem, now_s)
-            return
         found = danger(self._view(now_s), self._limits)
         if found is None:
             if self.state is State.HOLDING:
@@ -200,6 +195,16 @@ class VehicleMachine:
             view = replace(view, is_grounded=self.inputs.landed is Landed.ON_GROUND)
         else:  # commands count only in flight
             view = replace(view, command_age_s=0.0, waiting_age_s=0.0)
+        if self._permissions.is_dry:  # on the desk, or carried by hand
+            status = replace(view.status, is_armed=True)
+            view = FlightView(
+                status,
+                moved_sticks=view.moved_sticks,
+                heard_age_s=view.heard_age_s,
+                status_age_s=view.status_age_s,
+                command_age_s=view.command_age_s,
+                waiting_age_s=view.waiting_age_s,
+            )
         return replace(view, may_land=self.state is State.LANDING)
 
     def _taken_over(self, found: Danger, now_s: float) -> None:
