@@ -20,11 +20,13 @@ from quad_nav.peers.peer import (
     priority_of,
     resample,
 )
+from quad_nav.peers.peer_costs import is_met
 from quad_nav.peers.right_of_way import (
     Yield,
     YieldDecision,
     approaches,
     find_conflict,
+    meets,
     predict_positions,
 )
 
@@ -126,6 +128,27 @@ def test_a_robot_waits_beside_the_path_of_a_peer_and_makes_room_on_it():
     first = peer(1.0, 0.0, priority=HIGHEST_PRIORITY, path=[(1.0, 0.0), (6.0, 0.0)])
     assert decide([(2.5, -1.2), (2.5, 3.0)], -1.0, [first]) == ("other", Yield.WAIT)
     assert decide([(2.5, -0.5), (2.5, 3.0)], -1.0, [first]) == ("other", Yield.MAKE_ROOM)
+
+
+def test_a_robot_on_the_path_of_a_peer_goes_on_if_that_leaves_it_in_time():
+    """The peer gets within 0.4 m of (3, 0) in 7 s; by then the robot is 2.1 m from there."""
+    first = peer(0.5, 0.0, priority=HIGHEST_PRIORITY, path=[(0.5, 0.0), (6.0, 0.0)])
+    assert decide([(3.0, 0.0), (3.0, 3.0)], -1.0, [first]) is None
+    assert decide([(3.0, 0.0), (3.0, 0.3)], -1.0, [first]) == ("other", Yield.MAKE_ROOM)
+
+
+def test_a_robot_resumes_its_goal_when_that_meets_the_peer_no_more():
+    first = peer(1.0, 0.0, priority=HIGHEST_PRIORITY, path=[(1.0, 0.0), (6.0, 0.0)])
+    pose = Pose2D(2.5, -0.5)
+    assert not meets(pose, np.array([[2.5, -3.0]]), first, MIN_SEPARATION_M, CRUISE_MPS)
+    assert meets(pose, np.array([[2.5, 3.0]]), first, MIN_SEPARATION_M, CRUISE_MPS)
+
+
+def test_only_places_that_the_robot_reaches_before_the_peer_has_passed_cost_more():
+    """From (3, -3) it is 3.3, 2.5 and 2.1 m to within 0.9 m; it flies 0.45, 1.95 and 3.45 m."""
+    places = np.array([[0.0, 0.0], [1.5, 0.0], [3.0, 0.0]])
+    mask = is_met(places, np.array([0.0, 5.0, 10.0]), Pose2D(3.0, -3.0), 0.9, 0.3)
+    assert mask.tolist() == [False, False, True]
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ class PeerCosts:
             in_local = in_global.copy()
             in_local[:, :2] = local_from_global.transform_points(in_global[:, :2])
         for costmap, circles, areas in (
-            (self._global, in_global, self._areas(in_global[:, :2], priority)),
+            (self._global, in_global, self._areas(in_global[:, :2], pose, priority)),
             (self._local, in_local, self._obstacles(in_local[:, :2], pose)),
         ):
             points = circles[:, :2]
@@ -68,11 +68,17 @@ class PeerCosts:
                     for x_m, y_m in points[newcomers]:  # marked as obstacles until now
                         layer.free_square(float(x_m), float(y_m), 2.0 * radius_m)
 
-    def _areas(self, positions: NDArray[np.float64], priority: float) -> List[PeerArea]:
+    def _areas(
+        self, positions: NDArray[np.float64], pose: Pose2D, priority: float
+    ) -> List[PeerArea]:
         """Return the areas of the global costmap: stationary peers, and paths that go first.
+
+        Of a path only those places count that the robot can reach before the peer has passed
+        them: so it plans to pass behind the peer.
 
         Args:
             positions: Of the peers, float64[n, 2] in ``map``.
+            pose: Pose of the robot in ``map``.
             priority: Priority of the robot.
         """
         tracker = self._tracker
@@ -83,7 +89,8 @@ class PeerCosts:
                 areas.append(PeerArea(positions[k : k + 1], radius_m, _STATIONARY_COST))
             elif peer.intention.priority > priority:
                 path = predict_peer(peer, tracker.cruise_mps, _PATH_TIMES_S)
-                areas.append(PeerArea(path, radius_m, _PATH_COST))
+                ahead = is_met(path, _PATH_TIMES_S, pose, radius_m, tracker.cruise_mps)
+                areas += [PeerArea(path[ahead], radius_m, _PATH_COST)] if ahead.any() else []
         return areas
 
     def _obstacles(self, positions: NDArray[np.float64], pose: Pose2D) -> List[PeerArea]:
@@ -106,3 +113,24 @@ class PeerCosts:
             if radius_m > 0.0:
                 obstacles.append(PeerArea(positions[k : k + 1], radius_m, LETHAL))
         return obstacles
+
+
+def is_met(
+    path: NDArray[np.float64],
+    times_s: NDArray[np.float64],
+    pose: Pose2D,
+    radius_m: float,
+    cruise_mps: float,
+) -> NDArray[np.bool_]:
+    """Return a mask bool[k] of the places of a peer that the robot can reach before it has passed.
+
+    Args:
+        path: Positions of the peer, float64[k, 2] in ``map``.
+        times_s: Times from now at which the peer is there, float64[k].
+        pose: Pose of the robot in ``map``.
+        radius_m: Distance from a place within which the robot is at it.
+        cruise_mps: Speed of the robot.
+    """
+    offsets_m = path - np.array([pose.x_m, pose.y_m])
+    away_m = np.hypot(offsets_m[:, 0].copy(), offsets_m[:, 1].copy()) - radius_m
+    return np.asarray(away_m <= cruise_mps * (times_s + TIME_TOLERANCE_S))

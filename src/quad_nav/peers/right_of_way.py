@@ -70,8 +70,8 @@ def find_conflict(
 ) -> Optional[Tuple[Peer, Yield]]:
     """Find the peer of highest priority that the robot has to yield to.
 
-    A robot does not wait for a stationary peer. It makes room for one if it is near and on
-    its path, because it may be the reason why the peer stands.
+    A robot goes on if that takes it out of the peer's way in time. It does not wait for a stationary
+    peer, but makes room on its path, because it may be the reason why the peer stands.
 
     Args:
         position: Position of the robot, float64[2], metres in ``map``.
@@ -94,11 +94,24 @@ def find_conflict(
         if stands and np.hypot(*(peer.position - position)) > _BLOCKING_FACTOR * min_separation_m:
             continue
         theirs = predict_peer(peer, cruise_mps)
-        if approaches(position, theirs, min_separation_m):
-            return peer, Yield.MAKE_ROOM
-        if not stands and _conflict(own, theirs, min_separation_m):
-            return peer, Yield.WAIT
+        if stands or _conflict(own, theirs, min_separation_m):
+            is_on_path = approaches(position, theirs, min_separation_m)
+            if is_on_path or not stands:
+                return peer, Yield.MAKE_ROOM if is_on_path else Yield.WAIT
     return None
+
+
+def meets(
+    pose: Pose2D,
+    path: NDArray[np.float64],
+    peer: Peer,
+    min_separation_m: float,
+    cruise_mps: float,
+) -> bool:
+    """Return whether a robot that goes on along a path, float64[n, 2], conflicts with a peer."""
+    position = np.array([pose.x_m, pose.y_m])
+    own = predict_positions(position, path, cruise_mps, _TIMES_S)
+    return _conflict(own, predict_peer(peer, cruise_mps), min_separation_m)
 
 
 def predict_peer(

@@ -18,6 +18,7 @@ from quad_nav.peers.right_of_way import (
     YieldDecision,
     approaches,
     find_conflict,
+    meets,
     predict_peer,
 )
 
@@ -69,7 +70,7 @@ class YieldRules:
             The decision from now on, None to go on.
         """
         if current is not None and current.holding_point is not None:
-            kept = self._keep_making_room(now_s, pose, priority, current)
+            kept = self._keep_making_room(now_s, pose, goal_path, priority, current)
             if kept is not None:
                 return kept
             path = goal_path
@@ -110,14 +111,21 @@ class YieldRules:
         return self._make_room(now_s, peer, pose, priority)
 
     def _keep_making_room(
-        self, now_s: float, pose: Pose2D, priority: float, current: YieldDecision
+        self,
+        now_s: float,
+        pose: Pose2D,
+        goal_path: NDArray[np.float64],
+        priority: float,
+        current: YieldDecision,
     ) -> Optional[YieldDecision]:
-        """Return the decision to make room until the peer has passed or parks, then None."""
+        """Return the decision to make room until the way is clear or the peer parks, then None."""
         peer = next((p for p in self._tracker.peers if p.name == current.peer), None)
         if peer is None or peer.intention.priority <= priority or peer.is_parked:
             return None
         ahead = _path_ahead(peer)
         separation_m = self._tracker.min_separation_m + TOLERANCE_M
+        if not meets(pose, goal_path, peer, separation_m, self._tracker.cruise_mps):
+            return None
         nearest_m = float(np.hypot(*(ahead - (pose.x_m, pose.y_m)).T).min())
         if nearest_m > separation_m or not approaches(
             np.array([pose.x_m, pose.y_m]), ahead, separation_m
