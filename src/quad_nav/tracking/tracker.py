@@ -41,6 +41,7 @@ _SIGNIFICANT = 13.8  # chi-square, 2 degrees of freedom, 0.1 %
 _SEEN_THROUGH_S = 0.3  # patience with a track at whose place there is nothing
 _RESTART_S = 1.5  # time in which a track is confirmed, or measured from another start
 _TENTATIVE_S = 0.3  # patience with a track that is not confirmed
+_IN_DOUBT_S = 0.6  # time for which a track may be in space that was never seen: slivers of walls
 _BESIDE_M = 0.15
 _TRAIL_SCANS = 60
 _NO_CIRCLES = np.empty((0, 3))
@@ -58,6 +59,7 @@ class _Life:
     seen_s: float
     radius: Radius
     bias_m: float
+    freed_s: float
     hits: int = 1
     is_confirmed: bool = False
     trail: List[Floats] = field(default_factory=list)
@@ -155,7 +157,11 @@ class ObstacleTracker:
         seen = outlines(clusters)
         usable = self._usable(clusters, seen, known_circles)
         self._predict(now_s, known_circles)
-        pairs = assign(self._states, self._filters.covariances, seen, usable)
+        pairs = [
+            (track, row)
+            for track, row in assign(self._states, self._filters.covariances, seen, usable)
+            if clusters.rows[row, 2] or now_s - self._lives[track].freed_s <= _IN_DOUBT_S
+        ]
         for track, row in pairs:
             self._update(track, row, now_s, clusters, seen)
         self._drop(now_s, {track for track, _ in pairs}, clusters, seen)
@@ -217,6 +223,8 @@ class ObstacleTracker:
         life.radius.hold(disc.farthest_m)
         self._filters.update(track, disc.position, disc.noise)
         life.seen_s, life.bias_m = now_s, disc.bias_m
+        if clusters.rows[row, 2]:
+            life.freed_s = now_s
         life.hits += 1
         self._remember(life, clusters, row)
 
@@ -274,7 +282,9 @@ class ObstacleTracker:
             disc = fit(clusters, row, seen.centres[row], radius, is_whole)
             radius.hold(disc.farthest_m)
             self._number += 1
-            life = _Life(self._number, disc.position, disc.noise, now_s, now_s, radius, disc.bias_m)
+            life = _Life(
+                self._number, disc.position, disc.noise, now_s, now_s, radius, disc.bias_m, now_s
+            )
             self._remember(life, clusters, row)
             self._lives.append(life)
             self._filters.add(disc.position, disc.noise, FIRST_SPEED_MPS)
