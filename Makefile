@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fuzz bench bench-compare bench-startup bench-original bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles replay-airframe bench-airframe fuzz bench bench-compare bench-startup bench-original bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -74,6 +74,9 @@ replay-vehicles: venv  ## Replay recorded MAVLink logs to the bridge of vehicles
 	@scripts/make_venv .venv requirements-mavlink.txt
 	@PYTHONPATH=src:test $(PYTHON) test/vehicles/replay.py $(DIR)
 
+replay-airframe: venv  ## Compare the airframe with recorded flights: make replay-airframe DIR=folder
+	@PYTHONPATH=src:test $(PYTHON) test/vehicles/airframe_check.py $(DIR)
+
 fuzz: venv  ## Feed what reads files with made-up bytes: make fuzz TARGET=scene SECONDS=60
 	@scripts/make_venv .venv requirements-fuzz.txt
 	PYTHONPATH=src $(PYTHON) test/fuzz/run.py $(TARGET) $(SECONDS)
@@ -103,6 +106,9 @@ bench-original: workspace  ## The same flights with C++ move_base, where it is i
 
 bench-fleets: venv  ## Whether fleets get through without touching: make bench-fleets ARGS="swap 8in12"
 	PYTHONPATH=src $(PYTHON) bench/encounters.py $(ARGS)
+
+bench-airframe: venv  ## The tutorial's mission with a slow airframe, 20 seeds: make bench-airframe ARGS="--seeds 5"
+	PYTHONPATH=src $(PYTHON) bench/airframe.py $(ARGS)
 
 packages:  ## Install the system packages
 	@scripts/install_packages $(if $(and $(DISPLAY),$(filter fly,$(MAKECMDGOALS))),--rviz)

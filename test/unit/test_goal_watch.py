@@ -17,7 +17,7 @@ from quad_nav.mission.sequencer import SendGoal
 from quad_nav.navigator.tick import Outcome, State, Tick
 from quad_nav.offline.flight_robot import FlightRobot, GoalWatch
 from quad_nav.sim.flight import BodyState
-from quad_nav.sim.simulation import RobotStates
+from quad_nav.sim.robot_state import RobotStates
 
 PERIOD_S = 0.025
 

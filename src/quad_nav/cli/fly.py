@@ -9,8 +9,9 @@ import click
 
 from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, LIVE, OUTPUT, POSITIVE, web_options
 
-# Those of quad_nav.sim.simulation and quad_nav.sim.odometry; importing them would load the engine.
+# Those of quad_nav.sim.simulation, quad_nav.sim.flight and quad_nav.sim.odometry; importing them would load the engine.
 LIDAR_CASTERS = ("kernel", "bullet")
+AIRFRAMES = ("default", "arducopter")
 MAX_DRIFT = 1.0
 
 
@@ -116,6 +117,13 @@ MAX_DRIFT = 1.0
     default="kernel",
     show_default=True,
     help="Cast the beams with the numba kernel or with the physics engine.",
+)
+@click.option(
+    "--airframe",
+    type=click.Choice(AIRFRAMES),
+    default="default",
+    show_default=True,
+    help="Bodies that follow commands at once, or as slowly as with ArduCopter.",
 )
 @click.option(
     "--processes",

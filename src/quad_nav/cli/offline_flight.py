@@ -33,6 +33,7 @@ from quad_nav.offline.flight import FlightObserver
 from quad_nav.offline.run import fly as fly_setup
 from quad_nav.scenario.flight_facts import offline_facts
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
+from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift
 from quad_nav.sim.simulation import SimulationParams
@@ -95,13 +96,18 @@ def _options(
     range_noise: float,
     jitter: float,
     lidar: str,
+    airframe: str,
     odom_drift: Tuple[float, float],
     **given: Any,
 ) -> FlightOptions:
     """Translate the command line's options."""
     beam_params = LidarParams(scan_range, scan_range / beams, noise_std_m=range_noise)
     simulation = SimulationParams(
-        beam_params, jitter_m=jitter, lidar_caster=lidar, odom_drift=OdomDrift(*odom_drift)
+        beam_params,
+        airframe=AIRFRAMES[airframe],
+        jitter_m=jitter,
+        lidar_caster=lidar,
+        odom_drift=OdomDrift(*odom_drift),
     )
     return mission_options(simulation=simulation, **given)
 

@@ -24,7 +24,8 @@ from quad_nav.loop.navigator_group import (
 from quad_nav.loop.worker_process import START_METHOD, WorkerProcess, WorkerProcessError
 from quad_nav.peers.peer import Intention
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.simulation import STEPS_PER_S, RobotStates, Simulation
+from quad_nav.sim.robot_state import RobotStates
+from quad_nav.sim.simulation import STEPS_PER_S, Simulation
 
 STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 

@@ -30,7 +30,8 @@ from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import OdomFrames, pose_in
-from quad_nav.sim.simulation import STEPS_PER_S, RobotState, RobotStates
+from quad_nav.sim.robot_state import RobotState, RobotStates
+from quad_nav.sim.simulation import STEPS_PER_S
 from quad_nav.tracking.tracker import ObstacleTracker
 
 LocatedScan = Tuple[Scan, Pose3D]

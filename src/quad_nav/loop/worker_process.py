@@ -24,17 +24,13 @@ from quad_nav.errors import InputError, PluginError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.loop import LoopSetup
 from quad_nav.loop.inspection import Change, Inspection, NavigatorView, inspect_group
-from quad_nav.loop.navigator_group import (
-    SAME_TIME_S,
-    GroupFactory,
-    NavigatorGroup,
-    NavigatorResult,
-)
+from quad_nav.loop.navigator_group import SAME_TIME_S, GroupFactory, NavigatorGroup, NavigatorResult
 from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.peers.peer import Intention
 from quad_nav.sim.casters import Lidars, kernel_lidars
 from quad_nav.sim.flight import BODY_VALUES, BodyState
-from quad_nav.sim.simulation import STEPS_PER_S, RobotStates
+from quad_nav.sim.robot_state import RobotStates
+from quad_nav.sim.simulation import STEPS_PER_S
 
 PROCESS_NAME = "navigators"
 START_METHOD = "fork" if sys.platform == "linux" else "spawn"

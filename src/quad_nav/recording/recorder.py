@@ -21,7 +21,7 @@ from quad_nav.scenario.rules import START_S
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import pose_in
-from quad_nav.sim.simulation import RobotState
+from quad_nav.sim.robot_state import RobotState
 from quad_nav.topics import flight_info
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
 from quad_nav.topics.markers import (

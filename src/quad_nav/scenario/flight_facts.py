@@ -17,6 +17,7 @@ from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup
 from quad_nav.scenario.rules import RANDOM
 from quad_nav.scenario.simulator_setup import DEFAULT_BEAMS
 from quad_nav.scenario.simulator_setup import DEFAULTS as SIMULATOR_DEFAULTS
+from quad_nav.sim.flight import airframe_name
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.simulation import STEP_S
 
@@ -45,6 +46,7 @@ def offline_facts(
         "configuration": _configuration(options.config, trees, dict(options.parameters)),
         "scene": _scene(setup.scene, options.scene),
         "goals": _goals(options.goals),
+        "airframe": airframe_name(simulation.airframe),
         "jitter_m": simulation.jitter_m,
         "odom_drift": [simulation.odom_drift.speed_mps, simulation.odom_drift.turn_radps],
         "lidar": {
@@ -77,6 +79,7 @@ def ros_facts(
         "configuration": _configuration(values["config_name"] or values["config"], trees, {}),
         "scene": _scene(scene, values["scene"]),
         "goals": values["goals"],
+        "airframe": given and given["airframe"],
         "jitter_m": given and given["jitter"],
         "odom_drift": given and given["odom_drift"],
         "lidar": given and _lidar(given),

@@ -15,6 +15,7 @@ from quad_nav.files.values import (
     text,
     whole,
 )
+from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.odometry import MAX_DRIFT
 from quad_nav.sim.simulation import LIDAR_CASTERS, STEPS_PER_S
 
@@ -78,6 +79,7 @@ RULES: Dict[str, Rule] = {
     # The simulation.
     "rate": number(above=0),
     "jitter": number(at_least=0),
+    "airframe": choice(tuple(AIRFRAMES)),
     "lidar": choice(LIDAR_CASTERS),
     "lidar_rate": Rule(_divides, f"scans per second that divide {STEPS_PER_S}, such as 10 or 20"),
     "scan_range": number(at_least=0),

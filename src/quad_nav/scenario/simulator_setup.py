@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Dict, List, Mapping, Optional, Sequence
 
@@ -18,7 +18,7 @@ from quad_nav.scenario.scenario import (
     read_configurations,
     scene_of,
 )
-from quad_nav.sim.flight import Airframe
+from quad_nav.sim.flight import AIRFRAMES
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.odometry import OdomDrift
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
@@ -34,6 +34,7 @@ DEFAULTS: Dict[str, Any] = {
     "rate": 1.0,  # simulated seconds per second
     "gui": False,  # pybullet's window
     "start_paused": True,  # until /simulation/start
+    "airframe": "default",  # how bodies respond: default or arducopter
     "lidar": "kernel",  # what casts the beams: kernel or bullet
     "scan_range": 2 * math.pi,  # LIDAR's field of view, rad
     "step_size": 0.0,  # rad between beams; 0: 512 beams over scan_range
@@ -237,7 +238,7 @@ def _simulation_params(values: Mapping[str, Any]) -> SimulationParams:
     return SimulationParams(
         lidar,
         command_timeout_s=float(values["command_timeout"]),
-        airframe=Airframe(radius_m=float(values["body_radius"])),
+        airframe=replace(AIRFRAMES[values["airframe"]], radius_m=float(values["body_radius"])),
         controller_period_s=float(values["controller_period"]),
         jitter_m=float(values["jitter"]),
         lidar_caster=values["lidar"],

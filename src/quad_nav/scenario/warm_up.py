@@ -123,8 +123,9 @@ def simulate() -> None:
     """
     from quad_nav.sim.map_file import rectangles_of
     from quad_nav.sim.motion import Motion, Walkers
+    from quad_nav.sim.robot_state import RobotStates
     from quad_nav.sim.scene import Cylinder, MovingObstacle, Scene, Walls
-    from quad_nav.sim.simulation import RobotStates, Simulation
+    from quad_nav.sim.simulation import Simulation
 
     rectangles_of(np.ones((2, 2), np.bool_))
     starts = (Pose2D(5.0, 5.0), Pose2D(5.2, 5.0))  # so near that the engine moves both

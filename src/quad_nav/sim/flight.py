@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,31 @@ NO_OBSTACLES: Floats = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
+class AutopilotResponse:
+    """Response of an autopilot to velocity set-points; the defaults are ArduCopter 4.5.3's.
+
+    They were fitted to its flights in its own simulator (``docs/airframes.md``).
+
+    Attributes:
+        velocity_delay_s: Delay of the velocity in each of the world's axes.
+        velocity_time_s: Time constant of its first-order response.
+        yaw_delay_s: Delay of the yaw rate.
+        yaw_frequency_radps: Natural frequency of its second-order response.
+        yaw_damping: Damping ratio of that.
+        max_yaw_rate_radps: Limit of the commanded yaw rate.
+        max_acceleration_mps2: Limit of the horizontal acceleration.
+    """
+
+    velocity_delay_s: float = 0.196
+    velocity_time_s: float = 0.449
+    yaw_delay_s: float = 0.125
+    yaw_frequency_radps: float = 5.6
+    yaw_damping: float = 0.25
+    max_yaw_rate_radps: float = 1.05
+    max_acceleration_mps2: float = 2.5
+
+
+@dataclass(frozen=True)
 class Airframe:
     """Mass properties and limits; the defaults are a 1 kg quadcopter with arms of 0.2 m.
 
@@ -54,6 +79,7 @@ class Airframe:
         max_thrust_n: Largest thrust.
         max_torques_nm: Largest torques about the body's x, y and z axes.
         radius_m: Radius of the guard, the cylinder that collides.
+        response: Response of its autopilot; None for the flight controller of this module alone.
 
     Raises:
         InputError: The radius is not above 0.
@@ -64,10 +90,21 @@ class Airframe:
     max_thrust_n: float = 2.0 * 9.81
     max_torques_nm: Tuple[float, float, float] = (1.4, 1.4, 0.4)
     radius_m: float = BODY_RADIUS_M
+    response: Optional[AutopilotResponse] = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.radius_m < math.inf:
             raise InputError([f"body_radius: {self.radius_m}, expected metres above 0"])
+
+
+AIRFRAMES = {"default": Airframe(), "arducopter": Airframe(response=AutopilotResponse())}
+"""Airframes by the name that users choose."""
+
+
+def airframe_name(airframe: Airframe) -> str:
+    """Return the name in ``AIRFRAMES`` of the airframe with this response; "custom" without one."""
+    names = [name for name, one in AIRFRAMES.items() if one.response == airframe.response]
+    return names[0] if names else "custom"
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.errors import InputError
-from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D, rotate
-from quad_nav.kernels.flight_law import planar_states
+from quad_nav.geometry import Pose2D, Scan, Twist2D
+from quad_nav.sim.autopilot import Autopilot, flight_params
 from quad_nav.sim.body import GoalSphere, World
 from quad_nav.sim.casters import Caster, KernelCaster, Lidars, WorldCaster
 from quad_nav.sim.contacts import Contact, ContactLog
@@ -24,6 +23,7 @@ from quad_nav.sim.free_flight import FreeFlight
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.odometry import OdomDrift, OdomFrames
+from quad_nav.sim.robot_state import RobotState, robot_state
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.start_poses import start_poses
 
@@ -80,76 +80,6 @@ class SimulationParams:
             raise InputError(problems)
 
 
-@dataclass(frozen=True)
-class RobotState:
-    """Pose and velocities of one quadcopter.
-
-    Attributes:
-        map_from_base: Pose of ``base_link`` in ``map``.
-        map_velocities: Velocity (x, y, z) and angular velocity (x, y, z) in ``map``.
-    """
-
-    map_from_base: Pose3D
-    map_velocities: Sequence[float]
-
-    @cached_property
-    def linear_mps(self) -> Tuple[float, float, float]:
-        """Velocity (x, y, z) in ``base_link``."""
-        return self._in_base(self.map_velocities[:3])
-
-    @cached_property
-    def angular_radps(self) -> Tuple[float, float, float]:
-        """Angular velocity (x, y, z) in ``base_link``."""
-        return self._in_base(self.map_velocities[3:])
-
-    @property
-    def twist(self) -> Twist2D:
-        """Planar velocity in ``base_link``."""
-        return Twist2D(self.linear_mps[0], self.linear_mps[1], self.angular_radps[2])
-
-    def _in_base(self, vector: Sequence[float]) -> Tuple[float, float, float]:
-        qx, qy, qz, qw = self.map_from_base.quaternion
-        return rotate((-qx, -qy, -qz, qw), vector)
-
-
-class RobotStates(Sequence[RobotState]):
-    """States of all quadcopters at one instant; each is computed on its first access.
-
-    Attributes:
-        bodies: The states as arrays.
-    """
-
-    def __init__(self, bodies: BodyState) -> None:
-        self.bodies = bodies
-        self._states: List[Optional[RobotState]] = [None] * len(bodies.rows)
-
-    def __len__(self) -> int:
-        return len(self._states)
-
-    def __getitem__(self, robot: int) -> RobotState:  # type: ignore[override]
-        state = self._states[robot]
-        if state is None:
-            state = self._states[robot] = _robot_state(self.bodies.rows[robot])
-        return state
-
-    @cached_property
-    def planar(self) -> NDArray[np.float64]:
-        """Planar states float64[n, 8], see ``kernels.flight_law.planar_states``."""
-        states = np.empty((len(self._states), 8))
-        planar_states(self.bodies.rows, states)
-        return states
-
-    @property
-    def poses(self) -> NDArray[np.float64]:
-        """Poses float64[n, 3] of (x_m, y_m, yaw_rad) in ``map``."""
-        return self.planar[:, :3]
-
-
-def _robot_state(row: NDArray[np.float64]) -> RobotState:
-    x, y, z, qx, qy, qz, qw, *velocities = row.tolist()
-    return RobotState(Pose3D(x, y, z, (qx, qy, qz, qw)), velocities)
-
-
 class Simulation:
     """Quadcopters in a scene.
 
@@ -181,7 +111,7 @@ class Simulation:
         self.seed = seed
         self.step_count = start_step
         self.movers = Movers(scene, seed, start_step / STEPS_PER_S)
-        self._law = FlightLaw(params.airframe, params.flight)
+        self._law = FlightLaw(params.airframe, flight_params(params.airframe, params.flight))
         self._command_steps = math.floor(
             (params.command_timeout_s + params.controller_period_s) * STEPS_PER_S + 1e-9
         )
@@ -206,6 +136,8 @@ class Simulation:
         self._free_flight = FreeFlight(
             self.scene, n, self.params.airframe.radius_m, self._law, STEP_S
         )
+        response = self.params.airframe.response
+        self._autopilot = Autopilot(response, self._law, n, STEP_S) if response else None
         # Step up to which the engine moves a quadcopter, and the last of these.
         self._engine_end = math.inf if self._always_in_engine else -math.inf
         self._engine_until = np.full(n, self._engine_end)
@@ -274,6 +206,8 @@ class Simulation:
         if not twist.is_finite:
             raise ValueError(f"quad{robot}: command is not finite: {twist}")
         self._commands[robot] = limit_command(twist, self.params.flight)
+        if self._autopilot is not None:
+            self._autopilot.receive(robot, self._commands[robot], self._state, self.step_count)
         self._hover_step[robot] = self.step_count + self._command_steps
         self._next_hover_step = min(self._next_hover_step, self._hover_step[robot])
 
@@ -303,12 +237,22 @@ class Simulation:
             if self.step_count > self._next_hover_step:
                 self._hover()
             if self._engine_end <= self.step_count:
-                self._fly_freely(self._none, int(min(end, self._next_hover_step + 1)))
+                self._fly_freely(self._none, int(min(end, self._next_change())))
                 continue
             in_engine = self._engine_until > self.step_count
             if in_engine.all() or self._fly_freely(in_engine, self.step_count + 1):
                 contacts += self._step_with_engine(in_engine)
         return contacts
+
+    def _next_change(self) -> float:
+        """Return the step up to which the flight controller's commands are constant."""
+        return self.step_count + 1 if self._autopilot else self._next_hover_step + 1
+
+    def _tracked_commands(self) -> NDArray[np.float64]:
+        """Return the flight controller's commands float64[n, 3] for the next step."""
+        if self._autopilot is None:
+            return self._commands
+        return self._autopilot.commands(self._state, self.step_count)
 
     def _place_obstacles(self) -> None:
         """Move the obstacles that move to where they are at the present step."""
@@ -329,8 +273,9 @@ class Simulation:
         Returns:
             False if a quadcopter came near something before that step and is in the engine now.
         """
+        commands, steps = self._tracked_commands(), end - self.step_count
         state, done, near = self._free_flight.advance(
-            self._state, self._commands, in_engine, end - self.step_count, self._moving_poses
+            self._state, commands, in_engine, steps, self._moving_poses
         )
         is_all = in_engine is self._none
         if done:
@@ -347,7 +292,7 @@ class Simulation:
 
     def _step_with_engine(self, in_engine: NDArray[np.bool_]) -> List[Contact]:
         forces, torques = self._law.thrust_and_torque(
-            self._state, self._commands, self.scene.altitude_m
+            self._state, self._tracked_commands(), self.scene.altitude_m
         )
         self._world.engage(np.flatnonzero(in_engine).tolist(), self._state)
         self.step_count += 1
@@ -359,6 +304,9 @@ class Simulation:
     def _hover(self) -> None:
         """Replace commands that have timed out by zero velocity."""
         is_hovering = self.is_hovering
+        if self._autopilot is not None:
+            for robot in np.flatnonzero(is_hovering & self._commands.any(axis=1)).tolist():
+                self._autopilot.receive(robot, np.zeros(3), self._state, self.step_count)
         self._commands[is_hovering] = 0.0
         self._next_hover_step = np.min(self._hover_step[~is_hovering], initial=math.inf)
 
@@ -379,7 +327,7 @@ class Simulation:
 
     def state(self, robot: int) -> RobotState:
         """Return the state of a quadcopter."""
-        return _robot_state(self._state.rows[robot])
+        return robot_state(self._state.rows[robot])
 
     def map_from_frame(self, frame: str, robot: int) -> Pose2D:
         """Return the present pose of a frame of a quadcopter in ``map``, see ``OdomFrames``."""

@@ -25,7 +25,7 @@ from quad_nav.ros.composed.transforms import ComposedTransforms
 from quad_nav.ros.navigator.costmap_publisher import NewSubscriber, Publish
 from quad_nav.ros.navigator.health_meters import LoopHealth
 from quad_nav.sim.casters import Lidars
-from quad_nav.sim.simulation import RobotStates
+from quad_nav.sim.robot_state import RobotStates
 from quad_nav.topics.health import Health
 
 

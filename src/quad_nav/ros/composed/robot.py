@@ -22,7 +22,7 @@ from quad_nav.ros.navigator.health_meters import InputMeter
 from quad_nav.ros.navigator.intention_topics import IntentionPublisher
 from quad_nav.ros.navigator.robot_interface import RobotInterface
 from quad_nav.sim.odometry import OdomFrames
-from quad_nav.sim.simulation import RobotState
+from quad_nav.sim.robot_state import RobotState
 from quad_nav.topics.publishing import Names, in_fleet
 
 _MAP_FRAME = "map"

@@ -9,7 +9,7 @@ from quad_nav.ros.common.conversions import time_message, transform_message
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import OdomFrames, pose_in
-from quad_nav.sim.simulation import RobotStates
+from quad_nav.sim.robot_state import RobotStates
 
 
 class ComposedTransforms(Transforms):
