@@ -25,6 +25,7 @@ FACTS = (
     "configuration",
     "scene",
     "goals",
+    "airframe",
     "jitter_m",
     "odom_drift",
     "lidar",
