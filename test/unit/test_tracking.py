@@ -212,8 +212,9 @@ def test_off_nothing_is_tracked():
 
 
 def test_covariances_are_honest():
-    """With the noise and the accelerations that the tracker assumes the NEES is 4 on average, or less:
-    errors that stay from scan to scan are allowed for.
+    """With the noise and accelerations that the tracker assumes the mean NEES is 4, or less.
+
+    Errors that stay from scan to scan are allowed for.
     """
     random = np.random.default_rng(7)
     nees = []

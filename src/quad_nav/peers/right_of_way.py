@@ -70,8 +70,8 @@ def find_conflict(
 ) -> Optional[Tuple[Peer, Yield]]:
     """Find the peer of highest priority that the robot has to yield to.
 
-    A robot goes on if that takes it out of the peer's way in time. It does not wait for a stationary
-    peer, but makes room on its path, because it may be the reason why the peer stands.
+    A robot goes on if that takes it out of the peer's way in time. It does not wait for a
+    stationary peer, but makes room on its path, because it may be the reason why the peer stands.
 
     Args:
         position: Position of the robot, float64[2], metres in ``map``.

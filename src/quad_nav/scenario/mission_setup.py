@@ -70,8 +70,9 @@ class MissionSetup:
     """A mission that can be flown.
 
     ``surface_distance`` and ``altitude_m`` are None if the scene is unknown. ``start_service`` is
-    called before the first goal is sent, ``end_service`` before the node exits, if they have names. ``parameters`` are
-    the navigators' trees, {} for one whose parameters are unknown. ``facts`` are for the summary.
+    called before the first goal is sent, ``end_service`` before the node exits, if they have
+    names. ``parameters`` are the navigators' trees, {} for one whose parameters are unknown.
+    ``facts`` are for the summary.
     """
 
     robots: Tuple[RobotGoals, ...]
