@@ -27,7 +27,7 @@ LOGS = {"random_commands": (0.031, 0.1), "velocity_steps": (0.031, 0.069)}
 """Largest root mean square errors, m/s and rad/s.
 
 Those of the fitted model, except for the yaw rate of ``random_commands``: there the model has 0.069
-rad/s on the flight's full telemetry, and 0.092 rad/s on the log, which has a message in three.
+rad/s on the flight's full telemetry, and 0.092 rad/s on the log, which is thinned to 8 Hz.
 """
 
 
