@@ -16,7 +16,8 @@ from quad_nav.offline import workers
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.simulation import STEPS_PER_S, RobotStates, Simulation
+from quad_nav.sim.robot_state import RobotStates
+from quad_nav.sim.simulation import STEPS_PER_S, Simulation
 
 Floats = NDArray[np.float64]
 
