@@ -117,19 +117,6 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
     ),
     (
         double(
-            "moving_obstacle_watch",
-            0.0,
-            "watch_s",
-            "seconds",
-            "A robot that tracks many obstacles watches them for so long before its first goal, to"
-            " recall later how they move.",
-            low=0,
-            high=300,
-        ),
-        (EvasionParams,),
-    ),
-    (
-        double(
             "moving_obstacle_glance",
             0.0,
             "glance_rad",

@@ -58,13 +58,11 @@ class EvasionParams:
         clearance_m: Distance that the robot keeps from where obstacles are predicted.
         glance_rad: Angle by which a robot that evades looks to both sides of its way, for what a
             LIDAR that does not see all around hides.
-        watch_s: Time for which a robot watches many moving obstacles before its first goal.
     """
 
     avoid_moving_obstacles: bool = False
     clearance_m: float = 0.1
     glance_rad: float = 0.0
-    watch_s: float = 0.0
 
 
 @dataclass(frozen=True)

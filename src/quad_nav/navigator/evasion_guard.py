@@ -25,7 +25,6 @@ from quad_nav.tracking.tracks import Tracks
 Floats = NDArray[np.float64]
 
 _AT_POINT_M = 0.15
-_MANY = 3  # obstacles that are worth watching
 _ROUTE_POINTS = 40
 _AHEAD_M = 1.5
 _TURN_GAIN_PER_S = 2.0
@@ -112,10 +111,6 @@ class EvasionGuard:
             is_following,
             self._memory,
         )
-
-    def watches(self, tracks: Tracks) -> bool:
-        """Return whether the robot still watches how obstacles move, and waits."""
-        return len(tracks) >= _MANY and self._memory.span_s < self.params.watch_s
 
     def _end(self, tick: Tick) -> None:
         if self.is_evading and tick.command is None:
