@@ -105,8 +105,10 @@ def test_rviz_shows_every_quadcopter_in_its_colour():
     groups = [one for one in displays if one["Class"] == "rviz/Group"]
     assert [group["Name"] for group in groups] == [f"Quadcopter {i}" for i in range(6)]
     for number, group in enumerate(groups):
-        topics = {one["Name"]: one["Topic"] for one in group["Displays"]}
+        topics = {one["Name"]: one.get("Topic") for one in group["Displays"]}
         assert topics["Scan"] == f"/scan{number}"
+        tracked = next(one for one in group["Displays"] if one["Name"] == "Tracked obstacles")
+        assert tracked["Marker Topic"] == f"/move_base{number}/moving_obstacles"
         assert topics["Local costmap"] == f"/move_base{number}/local_costmap/costmap"
         path = next(one for one in group["Displays"] if one["Name"] == "Flown path")
         assert path["Color"] == "; ".join(map(str, ROBOT_COLOURS[number]))

@@ -220,6 +220,7 @@ DOCUMENTED = {
     "exit_status": 1,
     "reason": "",
     "problems": [],
+    "airframe": None,
     "sim_time_s": 20.0,
     "wall_time_s": 10.0,
     "real_time_factor": 2.0,

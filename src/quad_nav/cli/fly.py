@@ -9,7 +9,7 @@ import click
 
 from quad_nav.cli.options import A_FILE, A_FOLDER, AMOUNT, LIVE, OUTPUT, POSITIVE, web_options
 
-# Those of quad_nav.sim.simulation, quad_nav.sim.flight and quad_nav.sim.odometry; importing them would load the engine.
+# Those of quad_nav.sim.simulation, .flight and .odometry; importing them would load the engine.
 LIDAR_CASTERS = ("kernel", "bullet")
 AIRFRAMES = ("default", "arducopter")
 MAX_DRIFT = 1.0

@@ -20,18 +20,22 @@ from typing import Any, Dict, Tuple
 import numpy as np
 
 from quad_nav import config
+from quad_nav.control.evasion import EvasionParams, Surroundings, evade
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.scan_validator import ScanValidator
 from quad_nav.errors import printable
 from quad_nav.geometry import Pose2D, Pose3D, Scan, Twist2D
+from quad_nav.grid import GridSpec
 from quad_nav.kernels import jit, library
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
 from quad_nav.scenario.assembly import build_navigator
+from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.params import TrackerParams
 from quad_nav.tracking.tracker import ObstacleTracker
+from quad_nav.tracking.tracks import Tracks
 
 _AHEAD_M = 1.0
 _LIDAR: Dict[str, Any] = {
@@ -82,16 +86,34 @@ def warm_up(configuration: config.Configuration) -> None:
         navigator.controller.rollout.score(np.zeros((1, 3)))  # of strafing, the last resort
     if configuration.tracker.track_moving_obstacles:
         track_obstacle()
+        evade_obstacle()
 
 
 def track_obstacle() -> None:
-    """Track an obstacle that comes nearer in free space, so that every kernel is called."""
+    """Track an obstacle that crosses free space, so that every kernel is called."""
     tracker = ObstacleTracker(TrackerParams(track_moving_obstacles=True), "map")
-    lidar, ranges = Pose3D(0.0, 0.0, 1.0), np.full(64, np.inf, np.float32)
+    lidar = Pose3D(0.0, 0.0, 1.0)
     for step in range(12):
-        ranges[28:36] = 4.0 - 0.1 * step
-        scan = Scan(0.1 * step, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
+        ranges = np.full(256, 6.0, np.float32)
+        ranges[100 + 4 * step : 112 + 4 * step] = 3.0
+        scan = Scan(0.1 * step, -math.pi, 2 * math.pi / 256, 0.02, 60.0, ranges)
         tracker.add_scan("scan", scan, lidar)
+
+
+def evade_obstacle() -> None:
+    """Evade an obstacle that comes as another one did before, so that every kernel is called."""
+    memory = MotionMemory()
+    one = Tracks(0.0, np.array([0]), np.zeros((1, 4)), np.eye(4)[np.newaxis], np.array([0.3]))
+    for step in range(20):
+        number, at = divmod(step, 10)
+        states = np.array([[2.0 - 0.1 * at, 0.0, -1.0, 0.0]])
+        now_s = 10.0 * number + 0.1 * at
+        one = replace(one, time_s=now_s, numbers=np.array([number]), states=states)
+        memory.add(one)
+    spec = GridSpec(40, 40, 0.1, -2.0, -2.0)
+    costs = np.zeros(spec.shape, np.uint8)
+    around = Surroundings(spec, costs, Pose2D(0.0, 0.0), Twist2D(), 0.3, 0.5, False, memory)
+    evade(EvasionParams(True), around, one, one.time_s, np.zeros((1, 2)), Twist2D(), (0.0, 0.0))
 
 
 def _oncoming_peer(here: Pose2D, now_s: float) -> Peer:
@@ -107,12 +129,14 @@ def _add_scans(navigator: Navigator, here: Pose2D) -> None:
     ranges = np.where(np.abs(angles) > 3.0, 2.0, np.inf).astype(np.float32)
     scan = Scan(0.0, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
     lidar = Pose3D(here.x_m, here.y_m, 1.0)
+    is_moving = np.zeros(len(ranges), np.bool_)  # beams that clear only, as on moving obstacles
     ScanValidator([]).rejection_reason(scan, lidar, 0.0)
     for costmap in (navigator.global_costmap, navigator.local_costmap):
         for layer in costmap.layers.values():
             if isinstance(layer, ObstacleLayer):
                 for source in layer.params.sources:
-                    layer.add_scan(source.name, scan, lidar, 0.0)
+                    seen = layer.observe_scan(source.name, scan, lidar, None, is_moving)
+                    layer.add_observation(source.name, seen, 0.0)
 
 
 def simulate() -> None:
@@ -148,6 +172,7 @@ def fly_missions() -> None:
     """Call every kernel that any configuration may call."""
     simulate()
     track_obstacle()
+    evade_obstacle()
     for costmap, node in _MISSIONS:
         warm_up(
             config.load(
