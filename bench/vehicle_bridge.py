@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Processor time of a vehicle's bridge, and latency from `/cmd_vel` to the set-point.
 
-    scripts/ros_env .venv/bin/python3 bench/vehicles.py [--seconds 30]
+    scripts/ros_env .venv/bin/python3 bench/vehicle_bridge.py [--seconds 30]
 
 Starts a roscore on a free port, one bridge, and a vehicle of `test/vehicles` in this process. The
 navigator is this process: it publishes commands at 20 Hz and tells them apart by their speed.
