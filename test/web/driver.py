@@ -74,6 +74,16 @@ class Driver:
         )
         return self.pixel(x_m, y_m)
 
+    def resting_robot_pixel(self, robot: int) -> Tuple[float, float]:
+        """Return where on the page a robot is drawn once neither it nor the view moves."""
+        place, before = self.robot_pixel(robot), None
+        while place != before:
+            self.page.evaluate(
+                "() => new Promise((done) => setTimeout(() => requestAnimationFrame(done), 300))"
+            )
+            place, before = self.robot_pixel(robot), place
+        return place
+
     def click_arena(self, x_m: float, y_m: float) -> None:
         """Click a point of the arena."""
         self.page.mouse.click(*self.pixel(x_m, y_m))

@@ -25,7 +25,7 @@ def test_a_click_in_the_table_or_in_the_arena_selects_a_robot(driver):
     expect(driver.at("flight-state")).to_have_text("paused")
     driver.select(1)
     driver.wait_for_arena("arena.fleet.selected?.index === 1")
-    driver.page.mouse.click(*driver.robot_pixel(0))
+    driver.page.mouse.click(*driver.resting_robot_pixel(0))
     expect(driver.at("card-name")).to_contain_text("0")
     expect(driver.at("robots-row-0")).to_have_class(re.compile("selected"))
     driver.at("deselect").click()
@@ -149,7 +149,7 @@ def test_a_robot_is_selected_in_3d(driver):
     driver.at("play").click()
     driver.at("mode").get_by_text("3D").click()
     driver.wait_for_arena("arena.view.canvas.width > 0 && arena.view.drawLabels !== undefined")
-    driver.page.mouse.click(*driver.robot_pixel(1))
+    driver.page.mouse.click(*driver.resting_robot_pixel(1))
     expect(driver.at("card-name")).to_contain_text("1")
 
 
