@@ -28,6 +28,7 @@ _AT_POINT_M = 0.15
 _ROUTE_POINTS = 40
 _AHEAD_M = 1.5
 _TURN_GAIN_PER_S = 2.0
+_RETURN_GAIN_PER_S = 1.0
 _GLANCE_S = 6.0  # period of looking to both sides
 _MIN_TURN_RAD = 0.1
 
@@ -79,23 +80,24 @@ class EvasionGuard:
         """
         local_from_global = poses.local_from_global
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
-            return
+            return None
         self._memory.add(tracks)
         route = self._route(plan, poses.in_global, local_from_global)
-        if not len(tracks) and not self._is_displaced(poses.in_global):
-            self._end(tick)
-            return
+        is_displaced = plan is None and self._is_displaced(poses.in_global)
+        if not len(tracks) and not is_displaced:
+            return self._end(tick)
         wish = tick.command or Twist2D()
+        wish = _return(wish, route[0], poses.in_local, limits) if is_displaced else wish
         around = self._surroundings(poses.in_local, velocity, limits, plan is not None)
-        command = evade(self.params, around, tracks, tick.now_s, route, wish, self._last)
+        last = self._last if len(tracks) else poses.in_local.rotate(wish.vx_mps, wish.vy_mps)
+        command = evade(self.params, around, tracks, tick.now_s, route, wish, last)
         self._last = poses.in_local.rotate(command.vx_mps, command.vy_mps)
-        if command is wish:
-            self._end(tick)
-            return
-        aside_rad = self.params.glance_rad * math.sin(tick.now_s * 2.0 * math.pi / _GLANCE_S)
-        turn_radps = _turn(route, poses.in_local, limits, aside_rad) if plan is not None else 0.0
+        if command is wish and not is_displaced:
+            return self._end(tick)
+        turn_radps = 0.0 if plan is None else self._turn(tick.now_s, route, poses.in_local, limits)
         tick.command = Twist2D(command.vx_mps, command.vy_mps, turn_radps)
         tick.evades = self.is_evading = True
+        return None
 
     def _surroundings(
         self, pose: Pose2D, velocity: Twist2D, limits: SpeedLimits, is_following: bool
@@ -111,6 +113,10 @@ class EvasionGuard:
             is_following,
             self._memory,
         )
+
+    def _turn(self, now_s: float, route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:
+        aside_rad = self.params.glance_rad * math.sin(now_s * 2.0 * math.pi / _GLANCE_S)
+        return _turn(route, pose, limits, aside_rad)
 
     def _end(self, tick: Tick) -> None:
         if self.is_evading and tick.command is None:
@@ -130,6 +136,15 @@ class EvasionGuard:
             self._point = self._point or pose
             x, y = np.array([self._point.x_m]), np.array([self._point.y_m])
         return np.column_stack(local_from_global.transform(x, y))
+
+
+def _return(command: Twist2D, point: Floats, pose: Pose2D, limits: SpeedLimits) -> Twist2D:
+    """Let a command that hovers or turns fly back to a point, float64[2], slower when near."""
+    if command.vx_mps or command.vy_mps:
+        return command
+    x_m, y_m = pose.inverse_transform(*point.tolist())
+    gain_per_s = min(_RETURN_GAIN_PER_S, limits.speed_mps / max(math.hypot(x_m, y_m), 1e-9))
+    return Twist2D(gain_per_s * x_m, gain_per_s * y_m, command.vyaw_radps)
 
 
 def _turn(route: Floats, pose: Pose2D, limits: SpeedLimits, aside_rad: float) -> float:

@@ -1,0 +1,102 @@
+"""The guard against moving obstacles: when it takes the command, and where the robot returns."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from quad_nav.config import load
+from quad_nav.control.evasion import EvasionParams
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import GridSpec
+from quad_nav.navigator.evasion_guard import EvasionGuard, SpeedLimits, speed_limits
+from quad_nav.navigator.tick import RobotPoses, Tick
+from quad_nav.tracking.tracks import Tracks
+
+LIMITS = SpeedLimits(0.5, 1.0)
+AHEAD = Twist2D(vx_mps=0.3)
+HERE = Pose2D(0.0, 0.0)
+
+
+@pytest.fixture
+def guard():
+    spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
+    costs = np.zeros(spec.shape, np.uint8)
+    costmap = SimpleNamespace(spec=spec, costs=costs, inscribed_radius_m=0.3)
+    return EvasionGuard(EvasionParams(avoid_moving_obstacles=True), costmap)
+
+
+def one_track(x_m, y_m, vx_mps, vy_mps, now_s=0.0):
+    states = np.array([[x_m, y_m, vx_mps, vy_mps]])
+    return Tracks(now_s, np.array([1]), states, 1e-4 * np.eye(4)[np.newaxis], np.array([0.3]))
+
+
+def checked(guard, tracks, pose=HERE, plan=None, command=None, now_s=0.0):
+    tick = Tick(now_s)
+    tick.command = command
+    guard.check(tick, RobotPoses(pose, pose), Twist2D(), tracks, plan, LIMITS)
+    return tick
+
+
+def test_without_tracks_the_command_stays(guard):
+    tick = checked(guard, Tracks.none(0.0), command=AHEAD)
+    assert tick.command is AHEAD and not tick.evades and not guard.is_evading
+
+
+def test_an_obstacle_that_goes_away_changes_nothing(guard):
+    tick = checked(guard, one_track(2.0, 0.0, 1.0, 0.0))
+    assert tick.command is None and not tick.evades
+
+
+def test_a_hovering_robot_leaves_the_way_of_an_obstacle(guard):
+    """It comes along the x axis, slightly to the left: the short way out is to the right."""
+    tick = checked(guard, one_track(2.0, 0.1, -1.0, 0.0))
+    assert tick.evades and tick.command.vy_mps < -0.2
+    assert np.hypot(tick.command.vx_mps, tick.command.vy_mps) <= 0.5 + 1e-9
+    assert tick.command.vyaw_radps == 0.0
+
+
+def test_a_robot_that_evaded_returns_to_its_point_and_stops_there(guard):
+    checked(guard, one_track(2.0, 0.1, -1.0, 0.0))
+    gone = Tracks.none(1.0)
+    back = checked(guard, gone, Pose2D(0.0, -0.6), now_s=1.0)
+    assert back.evades and back.command.vy_mps > 0.1
+    there = checked(guard, gone, Pose2D(0.0, -0.1), now_s=2.0)
+    assert there.command == Twist2D() and not there.evades
+    assert checked(guard, gone, Pose2D(0.0, -0.1), now_s=2.1).command is None
+
+
+def test_a_robot_that_follows_a_plan_turns_to_it_while_it_evades(guard):
+    plan = np.column_stack([np.zeros(41), np.linspace(0.0, 4.0, 41), np.zeros(41)])
+    tick = checked(guard, one_track(1.2, 0.1, -1.0, 0.0), plan=plan, command=Twist2D())
+    assert tick.evades and tick.command.vyaw_radps == 1.0  # a quarter turn, at most 1 rad/s
+
+
+@pytest.mark.parametrize(
+    "planner, expected",
+    [
+        ({"TrajectoryPlannerROS": {"holonomic_robot": False}}, None),
+        (
+            {
+                "TrajectoryPlannerROS": {
+                    "holonomic_robot": True,
+                    "max_vel_x": 0.4,
+                    "max_vel_theta": 0.9,
+                }
+            },
+            SpeedLimits(0.4, 0.9),
+        ),
+        (
+            {
+                "base_local_planner": "dwa_local_planner/DWAPlannerROS",
+                "DWAPlannerROS": {"max_vel_y": 0.0, "min_vel_y": 0.0},
+            },
+            None,
+        ),
+    ],
+)
+def test_only_robots_that_fly_sideways_evade(planner, expected):
+    configuration = load({**planner, "global_costmap": {"static_map": True}})
+    assert speed_limits(configuration.local_planner) == expected
