@@ -32,8 +32,14 @@ from quad_nav.report.circle_picture import PathsPanel, paths_figure
 from quad_nav.sim.scene import BODY_RADIUS_M
 
 
+needs_orca = pytest.mark.skipif(
+    sys.version_info < (3, 9), reason="there is no pyrvo for this version of Python"
+)
+
+
 def only(**given):
-    (circle,) = read_circles(CircleOptions(**{"robots": (2,), "radius_m": 1.5, **given}))
+    usual = {"robots": (2,), "radius_m": 1.5, "methods": ("quad",)}
+    (circle,) = read_circles(CircleOptions(**{**usual, **given}))
     return circle
 
 
@@ -60,6 +66,7 @@ def test_the_circle_that_fits(robots, radius_m):
     assert fitting_radius_m(robots) == radius_m
 
 
+@needs_orca
 def test_every_method_has_the_same_displaced_starts():
     circle = only(robots=(8,), radius_m=4.0, seed=3)
     starts = circle.starts_of(2)
@@ -96,16 +103,18 @@ def test_faulty_options(given, problem):
 def test_without_pyrvo_only_our_navigator_flies(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyrvo", None)
     with pytest.raises(InputError, match=r"pip install 'quad-nav\[orca\]'.*only --method quad"):
-        only()
+        only(methods=METHODS)
     assert only(methods=("quad",)).radius_m == 1.5
 
 
+@needs_orca
 def test_orca_prefers_the_straight_way_and_stops_at_the_goal():
     orca = Orca(OrcaParams(0.3, 0.5, 0.1), np.zeros((2, 2)), np.array([[3.0, 4.0], [0.02, 0.0]]))
     preferred = orca.preferred_mps(np.zeros((2, 2)))
     assert preferred == pytest.approx(np.array([[0.3, 0.4], [0.2, 0.0]]))
 
 
+@needs_orca
 def test_a_lone_pair_far_apart_flies_straight_by_orca():
     starts = np.array([[0.0, 0.0], [0.0, 50.0]])
     orca = Orca(OrcaParams(0.3, 0.5, 0.1), starts, starts + (10.0, 0.0))
@@ -132,6 +141,7 @@ def test_hulls_that_overlap_touch():
     assert track.touching == {(0, 1): 1.0} and track.gap_m == pytest.approx(-0.2)
 
 
+@needs_orca
 @pytest.mark.parametrize("fly", [fly_orca, fly_orca_points])
 def test_two_swap_sides_by_orca(fly):
     """2.6 m at 0.3 m/s is 8.7 s."""
@@ -191,6 +201,7 @@ def test_the_picture_has_a_panel_for_each_flight():
     assert titles >= {"one", "two"}
 
 
+@needs_orca
 def test_the_command(tmp_path):
     picture, table = tmp_path / "paths.svg", tmp_path / "runs.csv"
     given = ["--robots", "2", "--robots", "4", "--radius", "2", "--method", "orca-points"]
