@@ -31,7 +31,6 @@ from quad_nav.errors import InputError
 from quad_nav.report.circle_picture import PathsPanel, paths_figure
 from quad_nav.sim.scene import BODY_RADIUS_M
 
-
 needs_orca = pytest.mark.skipif(
     sys.version_info < (3, 9), reason="there is no pyrvo for this version of Python"
 )
