@@ -5,7 +5,7 @@
 
 ``8in12`` are eight quadcopters with a random mission in an arena of 12 m, ``corridor`` is that of
 ``goals/encounters``; people walk in both. A quadcopter moved if it was faster than 0.05 m/s in the
-period of odometry before the touch. The body's radius is 0.20 m, as ``config/moving`` expects.
+period of odometry before the touch.
 """
 
 from __future__ import annotations
@@ -23,11 +23,9 @@ from quad_nav.offline.run import fly
 from quad_nav.offline.workers import LocalWorkers, fly_all
 from quad_nav.scenario.flight_setup import FlightSetup, read_setup
 from quad_nav.sim.contacts import Contact
-from quad_nav.sim.flight import Airframe
 from quad_nav.sim.motion import Walkers
 
 MOVED_MPS = 0.05
-BODY_RADIUS_M = 0.20
 
 
 @dataclass(frozen=True)
@@ -77,15 +75,7 @@ class Speeds(FlightObserver):
 def setup_of(task: Task) -> FlightSetup:
     """Return the flight with people in its scene."""
     options = options_of(task.name, task.seed, task.config)
-    simulation = replace(options.simulation, airframe=Airframe(radius_m=BODY_RADIUS_M))
-    setup = read_setup(
-        replace(
-            options,
-            parameters=task.parameters,
-            simulation=simulation,
-            time_limit_s=task.time_limit_s,
-        )
-    )
+    setup = read_setup(replace(options, parameters=task.parameters, time_limit_s=task.time_limit_s))
     walkers = Walkers(task.people, reacting=task.reacting) if task.people else None
     return replace(setup, scene=replace(setup.scene, walkers=walkers))
 
