@@ -14,7 +14,7 @@ import signal
 import sys
 import threading
 
-from synthetic_actions import SyntheticActions
+from synthetic_actions import SyntheticActions, say
 from synthetic_fleet import SyntheticFleet
 
 
@@ -23,9 +23,9 @@ def obey_input(actions: SyntheticActions) -> None:
     for line in sys.stdin:
         if line.strip() == "again":
             actions.renew()
-            print("renewed", flush=True)
+            say("renewed")
         else:
-            print(line.strip(), flush=True)
+            say(line.strip())
 
 
 def main() -> None:
@@ -55,7 +55,7 @@ def main() -> None:
         port=args.port,
         steer_token=args.steer_token,
         watch_token=args.watch_token,
-        on_ready=lambda urls: print(urls, flush=True),
+        on_ready=say,
     )
     actions = SyntheticActions(fleet)
     if args.calls:

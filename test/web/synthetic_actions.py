@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any, Dict, List, Optional
 
 import numpy as np
 from synthetic_fleet import SyntheticFleet
 
 from quad_nav.view.actions import Actions, Answer, GoalChange, GoalFileView, ParameterView
+
+
+def say(line: object) -> None:
+    """Print a line in one piece, whichever thread prints at the same time."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
 
 
 class SyntheticActions(Actions):
@@ -34,7 +41,7 @@ class SyntheticActions(Actions):
     def _did(self, text: str, *call: Any, ok: bool = True) -> Answer:
         self.calls.append(call)
         if self.prints_calls:
-            print("call", repr(call), flush=True)
+            say(f"call {call!r}")
         return Answer(ok, text)
 
     def start(self) -> Answer:
