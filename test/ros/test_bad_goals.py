@@ -18,6 +18,7 @@ class BadGoals(FlightCase):
             "quad1_goals.json: gaols: is not a key of goal files; expected goals", problems
         )
         self.wait(lambda: self.odometry[0].message is not None, "odometry")
+        self.wait(lambda: rospy.get_time() > 0.0, "the clock")
         self.assertEqual(rospy.get_time(), 1.0)  # the simulator's clock before the start
         self.assertEqual([command.count for command in self.command], [0, 0])
 
