@@ -20,6 +20,7 @@ from quad_nav.ros.common.packed_messages import (  # noqa: E402
     pose_row,
     states_message,
 )
+from quad_nav.ros.common.transforms import TransformUnavailable  # noqa: E402
 from quad_nav.ros.sequencer.mission import MissionRunner  # noqa: E402
 from quad_nav.ros.sequencer.odometry import OdometryIntake  # noqa: E402
 from quad_nav.ros.sequencer.state_feed import StateFeed  # noqa: E402
@@ -95,6 +96,23 @@ def test_a_jump_in_the_states_is_dropped_until_it_lasts(ros):
     track = odometry.take(timed, (), 2.3)
     assert track.stamps_s.tolist() == pytest.approx([2.1, 2.2])
     assert track.relocated.tolist() == [True, False]
+
+
+def test_an_unknown_frame_is_a_warning_once_it_has_lasted_for_a_second(ros):
+    def unknown():
+        raise TransformUnavailable("no tf")
+
+    odometry = OdometryIntake("quad0", "/odom0", unknown)
+    odometry.begin(1.0)
+    message = conversions.odometry_message(
+        Pose3D(0.0, 0.0, 1.0), (0, 0, 0), (0, 0, 0), ("odom0", "base_link0"), rospy.Time(1)
+    )
+    ros.set_time(2.1)
+    assert len(odometry.take((), [message], 1.9).stamps_s) == 0
+    assert not ros.log.lines
+    assert len(odometry.take((), [message], 2.1).stamps_s) == 0
+    (line,) = ros.log.lines
+    assert "quad0: pose in map unknown, odometry in 'odom0' dropped: no tf" in line
 
 
 def test_a_robot_goes_on_when_its_poses_come_from_another_topic(ros):

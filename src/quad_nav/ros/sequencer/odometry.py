@@ -18,6 +18,8 @@ from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
 from quad_nav.topics.validation import odometry_problem, pose_problem, stamp_problem
 
 ODOMETRY_SILENT_S = 3.0
+TF_PATIENCE_S = 1.0
+"""Without a pose in `map` for so long, a warning says why; at the start tf may arrive later."""
 TimedPose = Tuple[float, NDArray[np.float64]]
 """Time and pose in `map`, float64[7]: position in m and quaternion (x, y, z, w)."""
 
@@ -137,7 +139,7 @@ class OdometryIntake:
         self._set_source(False)
         valid = self._valid(messages, now_s)
         located = []
-        for (message, stamp_s, odom_from_base), origin in zip(valid, self._origins(valid)):
+        for (message, stamp_s, odom_from_base), origin in zip(valid, self._origins(valid, now_s)):
             if origin is not None and self._is_continuous(message, stamp_s):
                 pose = origin.compose(odom_from_base)
                 row = (stamp_s, pose.x_m, pose.y_m, pose.z_m, pose.yaw_rad)
@@ -169,22 +171,26 @@ class OdometryIntake:
         )
         return None
 
-    def _origins(self, valid: Sequence[Tuple[Odometry, float, Pose3D]]) -> List[Optional[Pose3D]]:
+    def _origins(
+        self, valid: Sequence[Tuple[Odometry, float, Pose3D]], now_s: float
+    ) -> List[Optional[Pose3D]]:
         """Return the pose of each message's frame in `map`; None if it is unknown.
 
         A frame whose latest pose is that of the step before has not moved: one lookup will do.
         """
         frames = [(message.header.frame_id, stamp_s) for message, stamp_s, _ in valid]
         before = self._latest
-        self._latest = {frame: self._origin(frame) for frame in dict(frames)}
+        self._latest = {frame: self._origin(frame, now_s) for frame in dict(frames)}
         return [
             self._latest[frame]
             if self._latest[frame] == before.get(frame)
-            else self._origin(frame, stamp_s)
+            else self._origin(frame, now_s, stamp_s)
             for frame, stamp_s in frames
         ]
 
-    def _origin(self, frame: str, stamp_s: Optional[float] = None) -> Optional[Pose3D]:
+    def _origin(
+        self, frame: str, now_s: float, stamp_s: Optional[float] = None
+    ) -> Optional[Pose3D]:
         try:
             map_from_odom = self.map_from(frame, stamp_s)
         except TransformUnavailable as error:
@@ -193,10 +199,11 @@ class OdometryIntake:
             problem = pose_problem(map_from_odom)
             if not problem:
                 return map_from_odom
-        self._warnings.warn(
-            f"{self._name}: pose in map unknown, odometry in {frame!r} dropped: {problem}",
-            kind="frame",
-        )
+        if now_s - self._odometry_s > TF_PATIENCE_S:
+            self._warnings.warn(
+                f"{self._name}: pose in map unknown, odometry in {frame!r} dropped: {problem}",
+                kind="frame",
+            )
         return None
 
     def _is_continuous(self, message: Odometry, stamp_s: float) -> bool:
