@@ -16,7 +16,7 @@ from typing import Any, List, Sequence, Tuple
 import click
 import numpy as np
 import tabulate
-from encounters import options_of
+from encounters import options_of, parameter
 
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly
@@ -107,12 +107,6 @@ def row(name: str, flights: Sequence[WalkersResult]) -> List[str]:
     ]
 
 
-def _parameter(text: str) -> Tuple[str, Any]:
-    path, _, value = text.partition("=")
-    known = {"true": True, "false": False}
-    return path, known[value] if value in known else float(value)
-
-
 @click.command()
 @click.argument("names", nargs=-1)
 @click.option("--config", default="moving", show_default=True)
@@ -133,7 +127,7 @@ def main(
     jobs: int,
 ) -> None:
     """Fly among people and print a table of the results."""
-    names, given = names or ("2in12", "8in12", "corridor"), tuple(map(_parameter, parameters))
+    names, given = names or ("2in12", "8in12", "corridor"), tuple(map(parameter, parameters))
     tasks = [
         (k, Task(name, seed, config, given, people, reacting, time_limit))
         for k, (name, seed) in enumerate((name, seed) for name in names for seed in range(seeds))

@@ -15,6 +15,7 @@ from quad_nav.errors import InputError
 from quad_nav.files.shipped import shipped
 from quad_nav.files.values import value_faults
 from quad_nav.mission.robot_goals import RobotGoals
+from quad_nav.peers.links import LinkOutages
 from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.rules import RANDOM, RULES, steps_per_scan
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
@@ -65,7 +66,8 @@ class FlightSetup:
     """A flight that can be flown.
 
     ``simulation`` has the navigators' control period. ``config_name`` is the folder's name
-    without its path, which recordings and reports do not disclose.
+    without its path, which recordings and reports do not disclose. ``links`` are the outages of the
+    links over which robots hear each other.
     """
 
     scene: Scene
@@ -77,6 +79,7 @@ class FlightSetup:
     seed: int = 0
     time_limit_s: float = math.inf
     warnings: Tuple[str, ...] = ()
+    links: LinkOutages = LinkOutages()
 
     @property
     def robot_radius_m(self) -> float:
