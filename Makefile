@@ -70,9 +70,10 @@ ray: packages  ## The tests with a Ray cluster, in an environment of their own
 conformance: venv  ## Compare with the original's recordings: make conformance DIR=folder
 	@$(PYTHON) test/conformance/run.py $(DIR)
 
-replay-vehicles: venv  ## Replay recorded MAVLink logs to the bridge of vehicles: make replay-vehicles DIR=folder
+replay-vehicles: venv  ## Replay recorded MAVLink logs to the bridge, and to the stand-in vehicle: make replay-vehicles DIR=folder
 	@scripts/make_venv .venv requirements-mavlink.txt
 	@PYTHONPATH=src:test $(PYTHON) test/vehicles/replay.py $(DIR)
+	@PYTHONPATH=src:test $(PYTHON) test/vehicles/stand_in_check.py $(DIR)
 
 replay-airframe: venv  ## Compare the airframe with recorded flights: make replay-airframe DIR=folder
 	@PYTHONPATH=src:test $(PYTHON) test/vehicles/airframe_check.py $(DIR)

@@ -51,7 +51,7 @@ def measure(port: int, pid: int, seconds: float) -> None:
     from udp_vehicles import UdpVehicle
 
     rospy.init_node("bench", disable_signals=True)
-    one = UdpVehicle(f"ardupilot:{port}:0:0:0")
+    one = UdpVehicle(f"point:{port}:0:0:0", None, 0)
     publisher = rospy.Publisher("/cmd_vel0", Twist, queue_size=1, tcp_nodelay=True)
     sent: Dict[int, float] = {}
     latencies_s: List[float] = []

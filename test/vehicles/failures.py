@@ -30,8 +30,7 @@ def _move_stick(flight):
 
 
 def _disarm(flight):
-    flight.vehicle.armed = False
-    flight.vehicle.set_mode(flight.vehicle.mode)
+    flight.vehicle.kill_motors()
 
 
 def _stop_commands(flight):
@@ -51,11 +50,11 @@ def _lose_commands(flight):
 
 
 def _freeze(flight):
-    flight.vehicle.is_frozen = True
+    flight.vehicle.freeze()
 
 
 def _jump(flight):
-    flight.vehicle.jump_m = 1.5
+    flight.vehicle.jump(north_m=1.5)
 
 
 def _drain(flight):
@@ -67,7 +66,7 @@ def _stop_all(flight):
 
 
 def _climb(flight):
-    flight.vehicle.position[2] = -2.7  # a barometer's error
+    flight.vehicle.jump(up_m=1.5)  # too high, as it thinks
 
 
 def _leave(flight):

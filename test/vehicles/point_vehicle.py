@@ -151,6 +151,28 @@ class PointVehicle:
         self._takeoff_s = None
         self._heartbeat()
 
+    def freeze(self):
+        """Let the estimate stay what it is."""
+        self.is_frozen = True
+
+    def jump(self, north_m=0.0, up_m=0.0):
+        """Let the estimate jump."""
+        self.jump_m = north_m
+        self.position[2] -= up_m
+
+    def kill_motors(self):
+        """Disarm in the air."""
+        self.armed = False
+        self._heartbeat()
+
+    @property
+    def height_m(self):
+        return -self.position[2]
+
+    @property
+    def speed_mps(self):
+        return math.hypot(*self.velocity[:2])
+
     def _arm(self, message):
         if message.param1 == 1 and self.refuses_arming:
             return False

@@ -1,36 +1,53 @@
 #!/usr/bin/env python3
-"""Run point vehicles over UDP: udp_vehicles.py KIND:PORT:NORTH:EAST:HEADING_DEG ...
+"""Run stand-in vehicles over UDP: udp_vehicles.py [--scene FILE] KIND:PORT:NORTH:EAST:HEADING ...
 
 Each sends to its port on this machine, where a bridge listens (`address: udpin:127.0.0.1:PORT`).
+North, east (m) and heading (degrees) are the vehicle's place in its own local frame. With a scene
+the vehicles stand at its start poses, and touch its walls and each other; contacts are printed.
+KIND is `ardupilot`, a stand-in with a simulated body, or `px4` or `point`, which are points.
 The signal SIGUSR1 changes the mode of the first one, as its pilot would.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import os
 import signal
 import sys
 import time
+from pathlib import Path
 
 os.environ["MAVLINK20"] = "1"
-from point_vehicle import ARDUPILOT, PX4, PointVehicle
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from pymavlink import mavutil
+from vehicles.bodies import EMPTY, Bodies
+from vehicles.estimator import LocalFrame
+from vehicles.point_vehicle import ARDUPILOT, PX4, PointVehicle
+from vehicles.stand_in import StandIn, advance
+from vehicles.virtual_flight import STAND_INS
 
-STEP_S = 0.01
+from quad_nav.geometry import Pose2D
+from quad_nav.sim.scene_file import load_scene
+
+STEP_S = 1.0 / 120.0
+BOOT_S = 60.0
+APART_M = 20.0
+POINTS = {"px4": PX4, "point": ARDUPILOT}
 
 
 class UdpVehicle:
     """One vehicle and its socket."""
 
-    def __init__(self, text):
+    def __init__(self, text, bodies, number):
         kind, port, north, east, heading = text.split(":")
-        self.vehicle = PointVehicle(
-            {"ardupilot": ARDUPILOT, "px4": PX4}[kind],
-            (float(north), float(east)),
-            math.radians(float(heading)),
-            boot_s=60.0,
-        )
+        place, heading_rad = (float(north), float(east)), math.radians(float(heading))
+        if kind in STAND_INS:
+            stand_in, safe = STAND_INS[kind]
+            frame = LocalFrame(*place, heading_rad)
+            self.vehicle = stand_in(bodies, number, frame, number, BOOT_S, safe)
+        else:
+            self.vehicle = PointVehicle(POINTS[kind], place, heading_rad, boot_s=BOOT_S)
         self._link = mavutil.mavlink_connection(
             f"udpout:127.0.0.1:{port}",
             source_system=1,
@@ -45,28 +62,61 @@ class UdpVehicle:
             if message is None:
                 break
             fields = message.to_dict()
-            self.vehicle.receive(fields.pop("mavpackettype"), fields)
+            sender = message.get_srcSystem(), message.get_srcComponent()
+            name = fields.pop("mavpackettype")
+            if isinstance(self.vehicle, StandIn):
+                self.vehicle.receive(name, fields, sender)
+            else:
+                self.vehicle.receive(name, fields)
 
     def step(self):
-        """Take the messages that have come, fly on, and send."""
+        """Let a point take what has come, fly on, and send."""
         self.receive()
-        for name, fields in self.vehicle.advance(STEP_S):
-            if "param_id" in fields:
-                fields["param_id"] = fields["param_id"].encode()
-            if "text" in fields:
-                fields["text"] = fields["text"].encode()
-            getattr(self._link.mav, f"{name.lower()}_send")(**fields)
+        self.send(self.vehicle.advance(STEP_S))
+
+    def send(self, messages):
+        """Send messages."""
+        for name, fields in messages:
+            values = dict(fields)
+            if "param_id" in values:
+                values["param_id"] = values["param_id"].encode()
+            if "text" in values:
+                values["text"] = values["text"].encode()
+            getattr(self._link.mav, f"{name.lower()}_send")(**values)
 
 
 def main():
-    vehicles = [UdpVehicle(text) for text in sys.argv[1:]]
-    first = vehicles[0].vehicle
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--scene", default="")
+    parser.add_argument("vehicles", nargs="+", metavar="KIND:PORT:NORTH:EAST:HEADING")
+    options = parser.parse_args()
+    count = len(options.vehicles)
+    if options.scene:
+        scene = load_scene(options.scene)
+        bodies = Bodies(scene, scene.starts[:count])
+    else:
+        middle = EMPTY.size_x_m / 2.0
+        bodies = Bodies(EMPTY, [Pose2D(middle + APART_M * k, middle) for k in range(count)])
+    links = [UdpVehicle(text, bodies, k) for k, text in enumerate(options.vehicles)]
+    vehicles = [link.vehicle for link in links]
+    stand_ins = [one for one in vehicles if isinstance(one, StandIn)]
+    first, told = vehicles[0], 0
     signal.signal(signal.SIGUSR1, lambda *_: first.set_mode(first.kind["other"]))
     next_s = time.monotonic()
     while True:
-        for one in vehicles:
-            one.step()
-        next_s += STEP_S
+        for link in links:
+            if link.vehicle in stand_ins:
+                link.receive()
+            else:
+                link.step()
+        advance(bodies, stand_ins, STEP_S)
+        for link in links:
+            if link.vehicle in stand_ins:
+                link.send(link.vehicle.messages())
+        for contact in bodies.contacts[told:]:
+            print(contact, flush=True)
+        told = len(bodies.contacts)
+        next_s = max(next_s + STEP_S, time.monotonic() - 0.2)
         time.sleep(max(next_s - time.monotonic(), 0.0))
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from types import SimpleNamespace
 
+from vehicles.ardupilot import ArduPilot
+from vehicles.bodies import Bodies
+from vehicles.estimator import LocalFrame
 from vehicles.point_vehicle import ARDUPILOT, PX4, PointVehicle
 
 from quad_nav.geometry import Twist2D
+from quad_nav.sim.simulation import STEP_S as STEP
 from quad_nav.vehicle.autopilots import AUTOPILOTS
 from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
 from quad_nav.vehicle.orders import Permissions, State
@@ -17,14 +20,17 @@ from quad_nav.vehicle.vehicle_file import Vehicle
 
 STEP_S = 0.01
 MAY_ARM, AHEAD = Permissions(may_arm=True), Twist2D(0.5, 0.0, 0.0)
+STAND_INS = {"ardupilot": (ArduPilot, {"FS_GCS_ENABLE": 5.0, "FS_THR_ENABLE": 3.0})}
 KINDS = {"ardupilot": ARDUPILOT, "px4": PX4}
 
 
 class Flight:
-    """A bridge and a vehicle, which exchange messages without delay."""
+    """A bridge and a vehicle, which exchange messages; those of the point have no delay."""
 
-    def __init__(self, autopilot="ardupilot", permissions=MAY_ARM, **limits):
-        self.vehicle = PointVehicle(KINDS[autopilot], heading_rad=0.6, boot_s=40.0)
+    step_s = STEP_S
+
+    def __init__(self, autopilot="ardupilot", permissions=MAY_ARM, seed=0, **limits):
+        self.vehicle = self.make_vehicle(autopilot, seed)
         limits = Limits(**{"speed_mps": 1.0, **limits})
         self.machine = VehicleMachine(1.2, limits, AUTOPILOTS[autopilot].traits, permissions)
         self.adapter = MavlinkAdapter(
@@ -37,6 +43,9 @@ class Flight:
         self.command = None  # Twist2D of each 50 ms
         self._next_command_s = 0.0
 
+    def make_vehicle(self, autopilot, seed):
+        return PointVehicle(KINDS[autopilot], heading_rad=0.6, boot_s=40.0)
+
     def run(self, seconds, until=None):
         """Fly; return whether `until` became true."""
         end_s = self.now_s + seconds - 1e-9
@@ -47,11 +56,10 @@ class Flight:
         return until is None
 
     def _step(self):
-        self.now_s += STEP_S
-        for name, fields in self.vehicle.advance(STEP_S):
+        self.now_s += self.step_s
+        for name, fields in self.vehicle.advance(self.step_s):
             if self.hears:
-                message = SimpleNamespace(id=0, **fields) if name == "STATUSTEXT" else None
-                self.adapter.receive(name, 1, message or SimpleNamespace(**fields), self.now_s)
+                self.adapter.receive(name, 1, SimpleNamespace(**{"id": 0, **fields}), self.now_s)
         messages = []
         if self.command is not None and self.now_s >= self._next_command_s:
             self._next_command_s = self.now_s + 0.05
@@ -72,11 +80,11 @@ class Flight:
 
     @property
     def height_m(self):
-        return -self.vehicle.position[2]
+        return self.vehicle.height_m
 
     @property
     def speed_mps(self):
-        return math.hypot(*self.vehicle.velocity[:2])
+        return self.vehicle.speed_mps
 
     def to_hover(self):
         assert self.run(10.0, lambda: self.state is State.READY), (self.state, self.machine.reason)
@@ -94,6 +102,27 @@ class Flight:
         assert self.state is State.FLYING
         return self
 
+    def end(self):
+        """Free what the vehicle has."""
+
     def setpoints_since(self, start_s):
         name = "SET_POSITION_TARGET_LOCAL_NED"
         return [fields for at_s, sent, fields in self.sent if sent == name and at_s >= start_s]
+
+
+class StandInFlight(Flight):
+    """The same with a simulated body and a stand-in that behaves as the recorded autopilot.
+
+    Its pilot has set the failsafes that the bridge asks for.
+    """
+
+    step_s = 2.0 * STEP
+
+    def make_vehicle(self, autopilot, seed):
+        self.bodies = Bodies()
+        stand_in, safe = STAND_INS[autopilot]
+        frame = LocalFrame(3.0, -2.0, 0.6)
+        return stand_in(self.bodies, 0, frame, seed, 60.0 + seed % 7, safe)
+
+    def end(self):
+        self.bodies.close()

@@ -1,0 +1,116 @@
+"""Simulated quadcopters that take off and land: the bodies of stand-in vehicles.
+
+The bodies, their guard, the floor, the walls and the obstacles are the simulator's, and so are the
+flight controller and the horizontal response of ArduCopter (``sim.autopilot``). The simulator holds
+one altitude; here each body gets a vertical acceleration of its own, or has its motors off.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from quad_nav.geometry import Pose2D, Pose3D, rotate
+from quad_nav.sim.autopilot import Autopilot, flight_params
+from quad_nav.sim.body import World
+from quad_nav.sim.contacts import ContactLog
+from quad_nav.sim.flight import AIRFRAMES, BodyState, FlightLaw, FlightParams
+from quad_nav.sim.lidar import MOUNT_HEIGHT_M
+from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene, Walls
+from quad_nav.sim.simulation import STEP_S
+
+REST_M = GUARD_HEIGHT_M / 2.0 - MOUNT_HEIGHT_M
+"""Height of a body that stands on the floor."""
+_TOUCHING_M = 0.015
+_MOST_MPS2 = 8.0
+EMPTY = Scene("empty", 400.0, 400.0, 1.0, Walls(), (), (Pose2D(200.0, 200.0, 0.0),))
+
+
+class Bodies:
+    """The bodies of all stand-ins in one scene, which stand on the floor at first.
+
+    Attributes:
+        state: State of all bodies in ``map``.
+        count: Steps since the start.
+        contacts: Contacts since the start, without those with the floor.
+        lift_mps2: Vertical acceleration of each body; None with the motors off.
+    """
+
+    def __init__(self, scene=EMPTY, starts=None, airframe=AIRFRAMES["arducopter"]):
+        starts = list(starts or scene.starts[:1])
+        self._world = World(replace(scene, altitude_m=REST_M), starts, airframe, STEP_S)
+        self._law = FlightLaw(airframe, flight_params(airframe, FlightParams()))
+        self._autopilot = Autopilot(airframe.response, self._law, len(starts), STEP_S)
+        self._log = ContactLog()
+        self.contacts = []
+        self.state, self.count = self._world.state(), 0
+        self.lift_mps2 = [None] * len(starts)
+
+    @property
+    def now_s(self):
+        return self.count * STEP_S
+
+    def __len__(self):
+        return len(self.lift_mps2)
+
+    def set_velocity(self, robot, forward_mps, left_mps, yaw_radps):
+        """Give a set-point in the body's frame; it takes effect with the autopilot's delay."""
+        command = np.array([forward_mps, left_mps, yaw_radps])
+        self._autopilot.receive(robot, command, self.state, self.count)
+
+    def step(self):
+        """Advance all bodies by one step of the simulation."""
+        commands = self._autopilot.commands(self.state, self.count)
+        forces, torques = np.zeros((len(self), 3)), np.zeros((len(self), 3))
+        bandwidth = self._law.gains.altitude_bandwidth_radps
+        for robot, lift in enumerate(self.lift_mps2):
+            if lift is None:
+                continue
+            lift = min(max(lift, -_MOST_MPS2), _MOST_MPS2)
+            row = self.state.rows[robot]
+            # The altitude for which the flight law accelerates like this.
+            altitude_m = float(row[2]) + (lift + 2.0 * bandwidth * float(row[9])) / bandwidth**2
+            one = slice(robot, robot + 1)
+            forces[one], torques[one] = self._law.thrust_and_torque(
+                BodyState(self.state.rows[one].copy()), commands[one].copy(), altitude_m
+            )
+        self.state = self._world.step(self.state, forces, torques)
+        self.count += 1
+        touches = [touch for touch in self._world.touches() if touch.other != "floor"]
+        self.contacts += self._log.update(self.now_s, touches)
+
+    def height_m(self, robot):
+        """Return the height above the floor on which it stood."""
+        return float(self.state.rows[robot, 2]) - REST_M
+
+    def is_touching(self, robot):
+        """Return whether it stands on the floor."""
+        return self.height_m(robot) < _TOUCHING_M
+
+    def pose(self, robot):
+        """Return the pose in ``map``."""
+        x, y, z, *quaternion = self.state.rows[robot, :7].tolist()
+        return Pose3D(x, y, z - REST_M, tuple(quaternion))
+
+    def velocity_mps(self, robot):
+        """Return the velocity (x, y, z) in ``map``."""
+        return tuple(self.state.rows[robot, 7:10].tolist())
+
+    def turn_radps(self, robot):
+        """Return the angular velocity (forward, left, up) in the body's frame."""
+        x, y, z, w = self.state.rows[robot, 3:7].tolist()
+        return rotate((-x, -y, -z, w), self.state.rows[robot, 10:13].tolist())
+
+    def body_velocity_mps(self, robot):
+        """Return the horizontal velocity (forward, left) along the heading."""
+        vx, vy, _ = self.velocity_mps(robot)
+        yaw = self.pose(robot).yaw_rad
+        return (
+            math.cos(yaw) * vx + math.sin(yaw) * vy,
+            math.cos(yaw) * vy - math.sin(yaw) * vx,
+        )
+
+    def close(self):
+        self._world.close()
