@@ -165,6 +165,23 @@ class Twist2D:
         return all(map(math.isfinite, (self.vx_mps, self.vy_mps, self.vyaw_radps)))
 
 
+def leading_velocity(
+    vx_mps: float, vy_mps: float, vyaw_radps: float, lead_s: float
+) -> Tuple[float, float]:
+    """Return a velocity turned by the angle through which the heading turns in a time.
+
+    A vehicle that follows a velocity later by this time flies along its heading in a turn.
+
+    Args:
+        vx_mps: Velocity forward.
+        vy_mps: Velocity to the left.
+        vyaw_radps: Yaw rate.
+        lead_s: The time.
+    """
+    cos, sin = math.cos(lead_s * vyaw_radps), math.sin(lead_s * vyaw_radps)
+    return cos * vx_mps - sin * vy_mps, sin * vx_mps + cos * vy_mps
+
+
 @dataclass(frozen=True)
 class Pose3D:
     """Pose in space, or a rigid transform: translation in metres and a unit quaternion."""

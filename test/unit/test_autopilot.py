@@ -1,6 +1,7 @@
 """The airframe ``arducopter`` responds as ArduCopter does: delays, lags, limits, directions."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,12 +16,11 @@ ROOM = Scene("room", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(30.0, 30.0, 0.0),))
 NARROW = Scene("narrow", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(59.0, 30.0, 0.0),))
 
 
-def simulation(scene=ROOM, timeout_s=60.0):
-    return Simulation(
-        scene,
-        1,
-        SimulationParams(airframe=AIRFRAMES["arducopter"], command_timeout_s=timeout_s),
-    )
+def simulation(scene=ROOM, timeout_s=60.0, repeat_s=0.05, turn_lead_s=0.0):
+    autopilot = AIRFRAMES["arducopter"].response
+    response = replace(autopilot, repeat_s=repeat_s, turn_lead_s=turn_lead_s)
+    params = SimulationParams(airframe=Airframe(response=response), command_timeout_s=timeout_s)
+    return Simulation(scene, 1, params)
 
 
 def velocities(flown, seconds):
@@ -80,7 +80,7 @@ def test_yaw_rate_is_capped():
 
 
 def test_direction_is_kept_between_setpoints():
-    flown = simulation()
+    flown = simulation(repeat_s=math.inf)
     flown.set_command(0, Twist2D(0.5, 0.0, 0.5))
     rows = velocities(flown, 4.0)
     # It has turned by almost 2 rad and flies along x in map all the same.
@@ -88,17 +88,21 @@ def test_direction_is_kept_between_setpoints():
     assert np.abs(rows[:, 1]).max() < 0.02
 
 
-def test_stream_while_turning_lags_behind_the_heading():
-    flown = simulation()
-    for k in range(8 * STEPS_PER_S):
-        if k % 12 == 0:
-            flown.set_command(0, Twist2D(0.5, 0.0, 0.5))
-        flown.advance(1)
+@pytest.mark.parametrize(
+    "repeat_s, sent, turn_lead_s, lag_deg",
+    [(math.inf, 160, 0.0, 18.0), (0.05, 1, 0.0, 18.0), (0.05, 1, 0.6, 18.0 - 17.2)],
+)
+def test_stream_while_turning_lags_behind_the_heading(repeat_s, sent, turn_lead_s, lag_deg):
+    """Whether the commands come at 20 Hz or the bridge repeats one; a lead takes the lag away."""
+    flown = simulation(repeat_s=repeat_s, turn_lead_s=turn_lead_s)
+    for _ in range(sent):
+        flown.set_command(0, Twist2D(0.5, 0.0, 0.5))
+        flown.advance(8 * STEPS_PER_S // sent)
     twist = flown.state(0).twist
     flown.close()
     angle_deg = math.degrees(math.atan2(twist.vy_mps, twist.vx_mps))
     # Recorded: 18 degrees at 20 Hz. The model: 0.5 rad/s times (delay + lag + half a period).
-    assert angle_deg == pytest.approx(-18.0, abs=2.0)
+    assert angle_deg == pytest.approx(-lag_deg, abs=2.0)
 
 
 def test_hovers_when_commands_time_out():

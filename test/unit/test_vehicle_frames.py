@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from quad_nav.geometry import quaternion_from_euler, rotate, yaw_from_quaternion
 from quad_nav.vehicle import frames
-from quad_nav.vehicle.setpoints import limited, setpoint_fields
+from quad_nav.vehicle.setpoints import led, limited, setpoint_fields
 from quad_nav.vehicle.telemetry import Limits, Velocity
 
 ANGLES = st.floats(-math.pi, math.pi)
@@ -126,6 +126,15 @@ def test_set_point_has_frame_8_and_mask_1479():
         "vz": -0.3,
         "yaw_rate": -0.4,
     }
+
+
+def test_a_velocity_is_turned_by_what_the_heading_turns_until_it_is_flown():
+    """0.6 s at 0.5 rad/s to the left are 0.3 rad."""
+    turned = led(Velocity(0.4, 0.0, 0.1, 0.5, 1.2), 0.6)
+    assert turned.vx_mps == pytest.approx(0.4 * math.cos(0.3))
+    assert turned.vy_mps == pytest.approx(0.4 * math.sin(0.3))
+    assert (turned.vz_mps, turned.vyaw_radps, turned.height_m) == (0.1, 0.5, 1.2)
+    assert led(Velocity(0.4, 0.1, 0.0, 0.0), 0.6) == Velocity(0.4, 0.1, 0.0, 0.0)
 
 
 ANY = st.floats(allow_nan=True, allow_infinity=True)

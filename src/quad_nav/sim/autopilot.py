@@ -4,6 +4,9 @@ A velocity set-point is turned into ``map`` when it arrives and then kept: betwe
 its direction does not turn with the quadcopter. Velocity follows it with a delay and a first-order
 lag, yaw rate with a delay and a second-order lag, see ``flight.AutopilotResponse``.
 
+In front of it is the bridge of vehicles: it sends the command in force again and again, so that the
+direction follows the heading of that time, and turns velocities ahead of the heading.
+
 The body stays a body that thrust and torque move. The attitude loop has a lag
 ``L = 2 / attitude_bandwidth`` of its own. A loop ``a = (u - v) / (T + L)`` around a lag L responds
 like a delay L and a time constant T, to first order in ``L / T``. So the autopilot delays the
@@ -23,6 +26,7 @@ from typing import Deque, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.geometry import leading_velocity
 from quad_nav.kernels.flight_law import rotation_from_quaternion
 from quad_nav.sim.flight import Airframe, AutopilotResponse, BodyState, FlightLaw, FlightParams
 
@@ -57,6 +61,8 @@ class Autopilot:
         self._time_s = response.velocity_time_s + lag_s
         self._velocity_steps = round(max(0.0, response.velocity_delay_s - lag_s) / step_s)
         self._yaw_steps = round(response.yaw_delay_s / step_s)
+        self._repeat_steps = response.repeat_s / step_s
+        self._in_force = [(0, np.zeros(3)) for _ in range(n_robots)]  # step of arrival and command
         self._step = -1  # that the tracked commands are for
         self._velocities = [_Delayed((0.0, 0.0)) for _ in range(n_robots)]
         self._yaw_rates = [_Delayed((0.0,)) for _ in range(n_robots)]
@@ -73,13 +79,16 @@ class Autopilot:
             state: Present state of the quadcopters.
             step: Number of the next step.
         """
+        self._in_force[robot] = step, command.copy()
+        limit = self._response.max_yaw_rate_radps
         vx, vy, vyaw = command.tolist()
+        vyaw = min(max(vyaw, -limit), limit)
+        vx, vy = leading_velocity(vx, vy, vyaw, self._response.turn_lead_s)
         rotation_from_quaternion(state.rows[robot, 3:7], self._rotation)
         cos, sin = _heading(self._rotation)
-        limit = self._response.max_yaw_rate_radps
         velocity = (cos * vx - sin * vy, sin * vx + cos * vy)
         self._velocities[robot].append(step + self._velocity_steps, velocity)
-        self._yaw_rates[robot].append(step + self._yaw_steps, (min(max(vyaw, -limit), limit),))
+        self._yaw_rates[robot].append(step + self._yaw_steps, (vyaw,))
 
     def commands(self, state: BodyState, step: int) -> Floats:
         """Return the flight controller's commands for a step.
@@ -94,6 +103,9 @@ class Autopilot:
         if step != self._step:
             self._step = step
             for robot, row in enumerate(state.rows):
+                arrived, command = self._in_force[robot]
+                if step - arrived >= self._repeat_steps:
+                    self.receive(robot, command, state, step)
                 self._track(robot, row)
         return self._tracked
 

@@ -58,6 +58,8 @@ class AutopilotResponse:
         yaw_damping: Damping ratio of that.
         max_yaw_rate_radps: Limit of the commanded yaw rate.
         max_acceleration_mps2: Limit of the horizontal acceleration.
+        repeat_s: Period in which the bridge sends the command in force again; infinite for never.
+        turn_lead_s: Time by which the bridge turns velocities ahead of the heading.
     """
 
     velocity_delay_s: float = 0.196
@@ -67,6 +69,8 @@ class AutopilotResponse:
     yaw_damping: float = 0.25
     max_yaw_rate_radps: float = 1.05
     max_acceleration_mps2: float = 2.5
+    repeat_s: float = 0.05
+    turn_lead_s: float = 0.6
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,8 @@ class Autopilot:
             not as its value.
         refusals: Beginnings of texts with a reason for a refused order.
         complaints: Beginnings of texts with a reason for not being ready.
+        turn_lead_s: Time by which its velocity follows a set-point. It turns a set-point by its
+            heading at the arrival, so in a turn it would fly behind its heading.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Autopilot:
     sends_bits: bool
     refusals: Tuple[str, ...]
     complaints: Tuple[str, ...]
+    turn_lead_s: float = 0.0
 
     def status(self, base_mode: int, custom_mode: int) -> Status:
         """Return what a heartbeat says."""
@@ -123,6 +126,7 @@ ARDUPILOT = Autopilot(
     sends_bits=False,
     refusals=("Arm: ", "Mode change to "),
     complaints=("PreArm: ",),
+    turn_lead_s=0.6,
 )
 
 PX4 = Autopilot(

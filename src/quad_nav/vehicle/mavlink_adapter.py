@@ -21,7 +21,7 @@ from quad_nav.vehicle.frames import (
     scan_from_obstacle_distance,
 )
 from quad_nav.vehicle.orders import IN_FLIGHT, Answer, Order, Output, State
-from quad_nav.vehicle.setpoints import SetpointClock, limited, setpoint_fields
+from quad_nav.vehicle.setpoints import SetpointClock, led, limited, setpoint_fields
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate, Landed, Velocity
 from quad_nav.vehicle.vehicle_file import Vehicle
@@ -289,6 +289,7 @@ class MavlinkAdapter:
         if velocity is None:
             return []
         self._setpoints.sent(now_s, by_command)
+        velocity = led(velocity, self._autopilot.turn_lead_s)
         fields = setpoint_fields(velocity, int(now_s * 1e3))
         return [("SET_POSITION_TARGET_LOCAL_NED", fields)]
 

@@ -13,9 +13,10 @@ nothing leaves here but finite numbers within the limits, in one frame and with 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Dict, Optional
 
+from quad_nav.geometry import leading_velocity
 from quad_nav.vehicle.frames import frd_from_flu, yaw_rate
 from quad_nav.vehicle.telemetry import Limits, Velocity
 
@@ -76,6 +77,17 @@ def limited(velocity: Velocity, limits: Limits) -> Optional[Velocity]:
         _clamp(velocity.vyaw_radps, limits.yaw_rate_radps),
         velocity.height_m,
     )
+
+
+def led(velocity: Velocity, lead_s: float) -> Velocity:
+    """Return a set-point turned ahead of the heading, as an autopilot that follows late needs.
+
+    Args:
+        velocity: The set-point.
+        lead_s: Time by which the velocity follows it.
+    """
+    vx, vy = leading_velocity(velocity.vx_mps, velocity.vy_mps, velocity.vyaw_radps, lead_s)
+    return replace(velocity, vx_mps=vx, vy_mps=vy)
 
 
 def setpoint_fields(velocity: Velocity, time_boot_ms: int) -> Dict[str, Any]:
