@@ -183,15 +183,18 @@ class UpstreamTopics(UpstreamCase):
             self.assertNotEqual(before, after)
 
     def test_updates_while_it_stands(self):
+        """Scans reach to all edges of the window.
+
+        On a loaded machine scans may be missing for longer than they persist. Then the footprint is
+        cleared and its surroundings inflated: 0.75 m around the robot, in the middle of the window.
+        """
         updates = self.of(1, "local_costmap/costmap_updates")
-        self.assertGreater(len(updates), 10)
         self.assertLessEqual(len(self.of(1, "local_costmap/costmap")), 2)
-        for update in updates:
-            self.assertEqual(update.header.frame_id, "map")
-            self.assertEqual(
-                (update.x, update.y, update.width, update.height),
-                (0, 0, WINDOW_CELLS, WINDOW_CELLS),
-            )
+        self.assertEqual({update.header.frame_id for update in updates}, {"map"})
+        areas = [(update.x, update.y, update.width, update.height) for update in updates]
+        whole = (0, 0, WINDOW_CELLS, WINDOW_CELLS)
+        self.assertGreater(areas.count(whole), 10)
+        self.assertLessEqual(set(areas), {whole, (29, 29, 62, 62)})
 
     def test_footprints(self):
         with_recorded = [(float(x), float(y)) for x, y in recorded_lines("footprint.txt", 0)]
