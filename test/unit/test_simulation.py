@@ -14,7 +14,7 @@ from quad_nav.sim.body import World
 from quad_nav.sim.contacts import CONTACT_GAP_S, ContactLog, Touch
 from quad_nav.sim.flight import Airframe
 from quad_nav.sim.lidar import LidarParams
-from quad_nav.sim.scene import Box, Cylinder, Scene, Sphere, Walls
+from quad_nav.sim.scene import BODY_RADIUS_M, Box, Cylinder, Scene, Sphere, Walls
 from quad_nav.sim.simulation import (
     LIDAR_CASTERS,
     STEPS_PER_S,
@@ -395,3 +395,23 @@ def test_starts_are_those_of_the_engine_to_the_last_bit():
     world.touches()
     assert np.array_equal(world.state().rows, early)
     world.close()
+
+
+def test_a_placed_body_is_seen_and_touched():
+    starts = (Pose2D(5.0, 5.0, 0.0), Pose2D(8.0, 5.0, 0.0))
+    scene = Scene("room", 20.0, 20.0, 1.0, Walls(), (), starts)
+    simulation = Simulation(scene, 2)
+    row = np.zeros((1, 13))
+    row[0, :7] = (7.0, 5.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    contacts = []
+    for k in range(400):
+        row[0, 0] = 7.0 - 0.004 * k  # towards robot 0, which hovers
+        simulation.place([1], row)
+        contacts += simulation.advance(4)
+        if k == 0:
+            assert simulation.scan(0).ranges_m[256] == pytest.approx(2.0 - BODY_RADIUS_M, abs=0.02)
+    assert simulation.state(1).map_from_base.x_m == pytest.approx(7.0 - 0.004 * 399, abs=0.01)
+    assert [(one.robot, one.other) for one in contacts] == [("quad0", "quad1")]
+    # It moved 1.596 m and pushes robot 0 ahead of it.
+    assert contacts[0].x_m == pytest.approx(5.0 + BODY_RADIUS_M, abs=0.02)
+    simulation.close()

@@ -16,13 +16,15 @@ from quad_nav.geometry import Pose2D, Pose3D, rotate
 from quad_nav.sim.autopilot import Autopilot, flight_params
 from quad_nav.sim.body import World
 from quad_nav.sim.contacts import ContactLog
-from quad_nav.sim.flight import AIRFRAMES, BodyState, FlightLaw, FlightParams
+from quad_nav.sim.flight import Airframe, AutopilotResponse, BodyState, FlightLaw, FlightParams
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
 from quad_nav.sim.scene import GUARD_HEIGHT_M, Scene, Walls
 from quad_nav.sim.simulation import STEP_S
 
 REST_M = GUARD_HEIGHT_M / 2.0 - MOUNT_HEIGHT_M
 """Height of a body that stands on the floor."""
+AIRFRAME = Airframe(response=AutopilotResponse(repeat_s=math.inf, turn_lead_s=0.0))
+"""With the autopilot alone: the bridge in front of it is the real one."""
 _TOUCHING_M = 0.015
 _MOST_MPS2 = 8.0
 EMPTY = Scene("empty", 400.0, 400.0, 1.0, Walls(), (), (Pose2D(200.0, 200.0, 0.0),))
@@ -38,7 +40,7 @@ class Bodies:
         lift_mps2: Vertical acceleration of each body; None with the motors off.
     """
 
-    def __init__(self, scene=EMPTY, starts=None, airframe=AIRFRAMES["arducopter"]):
+    def __init__(self, scene=EMPTY, starts=None, airframe=AIRFRAME):
         starts = list(starts or scene.starts[:1])
         self._world = World(replace(scene, altitude_m=REST_M), starts, airframe, STEP_S)
         self._law = FlightLaw(airframe, flight_params(airframe, FlightParams()))

@@ -211,6 +211,22 @@ class Simulation:
         self._hover_step[robot] = self.step_count + self._command_steps
         self._next_hover_step = min(self._next_hover_step, self._hover_step[robot])
 
+    def place(self, robots: Sequence[int], rows: NDArray[np.float64]) -> None:
+        """Put quadcopters that others fly where they are; they move on from there.
+
+        Called again and again, it leads a body from pose to pose. Others see it and touch it.
+
+        Args:
+            robots: Their numbers.
+            rows: float64[len(robots), 13], their states as in ``BodyState``.
+        """
+        placed = self._state.rows.copy()
+        placed[list(robots)] = rows
+        self._state = replace(self._state, rows=placed)
+        # The engine takes over the state of a body that it gets anew.
+        kept = np.flatnonzero(self._engine_until > self.step_count).tolist()
+        self._world.engage([robot for robot in kept if robot not in robots], self._state)
+
     def step(self) -> List[Contact]:
         """Advance by one step; return the contacts that begin."""
         return self.advance(1)

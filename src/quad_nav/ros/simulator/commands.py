@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 import functools
-from typing import Deque, Tuple
+from typing import Deque, Optional, Sequence, Tuple
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -25,14 +25,20 @@ class Commands:
     same process.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
-        """Subscribe to the topics of all quadcopters."""
+    def __init__(self, simulation: Simulation, robots: Optional[Sequence[int]] = None) -> None:
+        """Subscribe to the topics.
+
+        Args:
+            simulation: Gets the commands.
+            robots: Numbers of the quadcopters that are commanded; None for all.
+        """
         self._simulation = simulation
-        robots, params = simulation.n_robots, simulation.params
+        params = simulation.params
+        robots = range(simulation.n_robots) if robots is None else robots
         self._lease = CommandLease(params.command_timeout_s + params.controller_period_s)
         # Bounds the cost of a node that floods a topic.
         self._waiting: Deque[Tuple[int, Twist]] = collections.deque(
-            maxlen=_COMMANDS_PER_ROBOT * robots
+            maxlen=_COMMANDS_PER_ROBOT * len(robots)
         )
         self._subscribers = [
             rospy.Subscriber(
@@ -42,7 +48,7 @@ class Commands:
                 queue_size=10,
                 tcp_nodelay=True,
             )
-            for i in range(robots)
+            for i in robots
         ]
 
     def _store(self, robot: int, message: Twist) -> None:

@@ -20,6 +20,7 @@ from quad_nav.files.values import BOOLEAN, Rule, choice, number, optional_text, 
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.vehicle.node import LAND_ALL_TOPIC
 from quad_nav.ros.vehicle.scene_topics import SceneLidars, SceneTopics
+from quad_nav.ros.vehicle.simulated import TICK_S, SimulatedVehicles
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_file import load_scene
@@ -68,7 +69,6 @@ class VehicleFleet:
             lands_when_done: Whether to land when the missions of all robots have ended.
         """
         self._real = [one for one in vehicles if one.kind != "simulated"]
-        self._simulates = len(self._real) < len(vehicles)
         self._robots = len(vehicles)
         self._done: Set[int] = set()
         self._lands_when_done = lands_when_done
@@ -124,8 +124,6 @@ class VehicleFleet:
         problems = self._wait_ready()
         if not problems:
             problems = self._call_all("take_off")
-        if not problems and self._simulates:
-            problems = _call("/simulation/start")
         if problems:
             self._land_all.publish(Empty())
             return TriggerResponse(False, "; ".join(problems))
@@ -195,6 +193,8 @@ def read_setup(
         problems += error.problems
     if values["lidar_for"] == "vehicles" and not values["scene"]:
         problems.append(f"{name}: lidar_for: vehicles needs a scene")
+    if any(one.kind == "simulated" for one in vehicles) and not values["scene"]:
+        problems.append(f"{name}: vehicles of kind simulated need a scene")
     if problems:
         raise InputError(problems)
     return values, vehicles, scene
@@ -217,15 +217,36 @@ def main() -> int:
         return 2
     topics = SceneTopics(scene, len(vehicles), values["map_resolution"]) if scene else None
     fleet = VehicleFleet(vehicles, values["land_when_done"])
-    lidars = None
-    if scene is not None and values["lidar_for"] == "vehicles":
-        real = [one.number for one in vehicles if one.kind != "simulated"]
-        lidars = SceneLidars(scene, len(vehicles), real, lidar)
-    period_s, next_s = 1.0 / values["lidar_rate"], time.monotonic()
-    while not rospy.is_shutdown():
-        if lidars is not None:
-            lidars.publish()
-        next_s = max(next_s + period_s, time.monotonic())
-        time.sleep(max(next_s - time.monotonic(), 0.0))
+    lidars: Optional[SceneLidars] = None
+    bodies: Optional[SimulatedVehicles] = None
+    sees_scene = values["lidar_for"] == "vehicles"
+    scanned = [one.number for one in vehicles if sees_scene or one.kind == "simulated"]
+    if scene is not None and scanned:
+        lidars = SceneLidars(scene, len(vehicles), scanned, lidar)
+        try:
+            bodies = SimulatedVehicles(scene, vehicles, sees_scene, time.monotonic())
+        except InputError as error:
+            rospy.logfatal("%s", printable(error, "\n"))
+            return 2
+    _run(lidars, bodies, 1.0 / values["lidar_rate"])
     del fleet, topics
     return 0
+
+
+def _run(
+    lidars: Optional[SceneLidars], bodies: Optional[SimulatedVehicles], scan_period_s: float
+) -> None:
+    """Advance the bodies and publish the scans until ROS shuts down."""
+    next_s = next_scan_s = time.monotonic()
+    tick_s = scan_period_s if bodies is None else TICK_S
+    while not rospy.is_shutdown():
+        now_s = time.monotonic()
+        if bodies is not None:
+            bodies.advance(now_s)
+        if lidars is not None and now_s >= next_scan_s:
+            next_scan_s = max(next_scan_s + scan_period_s, now_s)
+            lidars.publish()
+        next_s = max(next_s + tick_s, now_s)
+        time.sleep(max(next_s - time.monotonic(), 0.0))
+    if bodies is not None:
+        bodies.close()

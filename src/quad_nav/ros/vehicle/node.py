@@ -305,7 +305,7 @@ def main() -> int:
     try:
         vehicle, permissions = read_vehicle(rospy.get_param("~", {}))
         if vehicle.kind == "simulated":
-            rospy.loginfo("%s: the simulator flies it", vehicle.name)
+            rospy.loginfo("%s: the node vehicles flies it", vehicle.name)
             return 0
         bridge = make_bridge(vehicle, permissions, time.monotonic)
     except InputError as error:
