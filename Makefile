@@ -9,7 +9,7 @@ PYTHON := .venv/bin/python3
 unexport PYTHONPATH PYTHONHOME
 export PYTHONNOUSERSITE := 1
 
-.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles replay-airframe bench-airframe fuzz bench bench-compare bench-startup bench-original bench-fleets packages venv workspace clean distclean
+.PHONY: help fly test unit unit38 web lint docs rostest first-hour ray conformance replay-vehicles fly-vehicles replay-airframe bench-airframe fuzz bench bench-compare bench-startup bench-original bench-fleets packages venv workspace clean distclean
 
 help:  ## List the targets
 	@sed -nE 's/^([a-z0-9-]+):.*## (.*)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 22
@@ -74,6 +74,9 @@ replay-vehicles: venv  ## Replay recorded MAVLink logs to the bridge, and to the
 	@scripts/make_venv .venv requirements-mavlink.txt
 	@PYTHONPATH=src:test $(PYTHON) test/vehicles/replay.py $(DIR)
 	@PYTHONPATH=src:test $(PYTHON) test/vehicles/stand_in_check.py $(DIR)
+
+fly-vehicles: venv  ## The tutorial's mission with stand-in vehicles and the bridge: make fly-vehicles ARGS="3 ardupilot"
+	@PYTHONPATH=src:test $(PYTHON) test/vehicles/missions.py $(ARGS)
 
 replay-airframe: venv  ## Compare the airframe with recorded flights: make replay-airframe DIR=folder
 	@PYTHONPATH=src:test $(PYTHON) test/vehicles/airframe_check.py $(DIR)

@@ -1,0 +1,11 @@
+"""The tutorial's mission through the bridge, flown by stand-ins on a virtual clock."""
+
+from __future__ import annotations
+
+from vehicles.missions import MOST_M, fly_vehicles, prepare
+
+
+def test_two_stand_ins_fly_the_tutorial_from_take_off_to_landing():
+    flown = fly_vehicles(prepare(1, "default"), "ardupilot")
+    assert (flown.reached, flown.goals, flown.contacts, flown.trouble) == (6, 6, 0, "")
+    assert flown.altitude_m <= MOST_M

@@ -1,0 +1,277 @@
+#!/usr/bin/env python3
+"""Fly the tutorial's mission with stand-ins and the bridge, on a virtual clock.
+
+    PYTHONPATH=src:test python3 test/vehicles/missions.py [FLIGHTS] [AUTOPILOT]
+
+The navigators and the sequencers are those of offline flights. Their commands go through the
+bridge, as MAVLink's messages, to two stand-ins, from take-off to landing. Navigators and LIDARs see
+the bridge's estimate; contacts are those of the bodies. Each flight is compared with one of the
+simulator with the same seed, start poses and limits of speed, with the airframe `arducopter` and
+with the default one.
+
+Exit status: 0 if all flights reach all goals without a contact, hold the altitude within 0.10 m,
+and take at most 10 % longer than the simulator's.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+import sys
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+from vehicles.bodies import Bodies
+from vehicles.estimator import LocalFrame
+from vehicles.stand_in import advance
+from vehicles.virtual_flight import STAND_INS
+
+import quad_nav.api as quad
+from quad_nav.geometry import Pose2D, Pose3D
+from quad_nav.mission.summary import summarize
+from quad_nav.offline.flight import Flight
+from quad_nav.sim.flight import AIRFRAMES, BodyState
+from quad_nav.sim.simulation import STEP_S, Simulation
+from quad_nav.vehicle.autopilots import AUTOPILOTS
+from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
+from quad_nav.vehicle.orders import Permissions, State
+from quad_nav.vehicle.states import VehicleMachine
+from quad_nav.vehicle.telemetry import Limits
+from quad_nav.vehicle.vehicle_file import Vehicle
+
+TICK_STEPS = 6  # 25 ms, as in the node
+TIME_LIMIT_S, GROUND_LIMIT_S = 400.0, 60.0
+MOST_M, MOST_SHARE = 0.10, 1.10
+LIMITS = Limits(speed_mps=1.0)
+JITTER_M = 0.3
+
+
+class Bridge:
+    """The bridge of one vehicle, its stand-in, and the messages between them."""
+
+    def __init__(self, number, autopilot, bodies, seed, altitude_m):
+        stand_in, safe = STAND_INS[autopilot]
+        heading_rad = 0.7 * seed + 2.0 * number
+        frame = LocalFrame(3.0 * number, -2.0 * number, math.remainder(heading_rad, math.tau))
+        self.vehicle = stand_in(bodies, number, frame, 100 * seed + number, 60.0, safe)
+        self.start = bodies.pose(number)
+        vehicle = Vehicle(
+            number, "mavlink", autopilot, altitude_m=altitude_m, limits=LIMITS, has_radio=False
+        )
+        traits = AUTOPILOTS[autopilot].traits
+        self.machine = VehicleMachine(altitude_m, LIMITS, traits, Permissions(may_arm=True))
+        self.adapter = MavlinkAdapter(vehicle, self.machine)
+        self.map_from_odom = Pose2D(0.0, 0.0).to_3d()
+
+    def receive(self, now_s):
+        for name, fields in self.vehicle.messages():
+            self.adapter.receive(name, 1, SimpleNamespace(**{"id": 0, **fields}), now_s)
+
+    def send(self, messages):
+        for name, fields in messages:
+            self.vehicle.receive(name, fields)
+
+    def tick(self, now_s):
+        self.send(self.adapter.tick(now_s)[1])
+
+    def follow(self, twist, now_s):
+        self.send(self.adapter.follow(twist, now_s)[1])
+
+    def begin(self):
+        """Fix the odometry frame in `map`: it stood at its start when it took off."""
+        frame = self.start.to_2d().compose(self.machine.odom_from_start.inverse()).to_3d()
+        self.map_from_odom = Pose3D(frame.x_m, frame.y_m, -self.machine.ground_m, frame.quaternion)
+
+    def row(self):
+        """Return the estimated state in `map`, float64[13]."""
+        estimate = self.adapter.estimate
+        pose = self.map_from_odom.compose(estimate.odom_from_base)
+        velocity = pose.rotation @ np.array(estimate.linear_mps)
+        turn = pose.rotation @ np.array(estimate.angular_radps)
+        return np.array([pose.x_m, pose.y_m, pose.z_m, *pose.quaternion, *velocity, *turn])
+
+
+class VehicleSimulation(Simulation):
+    """The simulation's calls, answered by stand-ins and their bridges in the air."""
+
+    def fly_with(self, autopilot, seed):
+        """Take off with all vehicles.
+
+        Raises:
+            AssertionError: One does not.
+        """
+        self.bodies = Bodies(self.scene, self._starts)
+        altitude_m = self.scene.altitude_m
+        self.bridges = [
+            Bridge(k, autopilot, self.bodies, seed, altitude_m) for k in range(self.n_robots)
+        ]
+        self.altitudes_m = []
+        self._until(lambda machine: machine.state is State.READY)
+        for bridge in self.bridges:
+            assert bridge.machine.take_off(self.bodies.now_s).is_accepted
+            bridge.begin()
+        # A hover of a second, in which the height settles.
+        self._until(lambda machine: machine.state in (State.HOLDING, State.FLYING))
+        for _ in range(round(2.0 / STEP_S)):
+            for bridge in self.bridges:
+                bridge.machine.inputs.take_idle(self.bodies.now_s)
+            self._step()
+        self._take_over()
+        return self
+
+    def _until(self, condition):
+        end_s = self.bodies.now_s + GROUND_LIMIT_S
+        while not all(condition(bridge.machine) for bridge in self.bridges):
+            machines = [bridge.machine for bridge in self.bridges]
+            assert self.bodies.now_s < end_s, [(one.state, one.reason) for one in machines]
+            self._step()
+
+    def _step(self):
+        vehicles = [bridge.vehicle for bridge in self.bridges]
+        advance(self.bodies, vehicles, STEP_S)
+        now_s = self.bodies.now_s
+        for bridge in self.bridges:
+            bridge.receive(now_s)
+            if self.bodies.count % TICK_STEPS == 0:
+                bridge.tick(now_s)
+
+    def _take_over(self):
+        self._state = BodyState(np.array([bridge.row() for bridge in self.bridges]))
+
+    def set_command(self, robot, twist):
+        self.bridges[robot].follow(twist, self.bodies.now_s)
+
+    def advance(self, steps):
+        before = len(self.bodies.contacts)
+        for _ in range(steps):
+            self._step()
+            self.step_count += 1
+        self.altitudes_m.append([self.bodies.height_m(k) for k in range(self.n_robots)])
+        self._take_over()
+        return [replace(contact, time_s=self.now_s) for contact in self.bodies.contacts[before:]]
+
+    def land(self):
+        """Land all; return whether all have landed."""
+        for bridge in self.bridges:
+            bridge.machine.land(self.bodies.now_s, "the mission has ended")
+        self._until(lambda machine: machine.state is State.LANDED)
+
+    def keep_idle(self, robot):
+        """Tell a bridge that its navigator has no goal."""
+        self.bridges[robot].machine.inputs.take_idle(self.bodies.now_s)
+
+    def close(self):
+        super().close()
+        self.bodies.close()
+
+
+class VehicleFlight(Flight):
+    """A mission whose commands go to vehicles."""
+
+    def __init__(self, setup, autopilot):
+        self._autopilot = autopilot
+        super().__init__(setup)
+
+    def _new_loop(self, hosted, processes):
+        loop = super()._new_loop(hosted, 1)
+        loop.simulation.close()
+        params, seed = self.setup.simulation, self.setup.seed
+        loop.simulation = VehicleSimulation(
+            self.setup.scene, len(self.setup.robots), params, seed
+        ).fly_with(self._autopilot, seed)
+        return loop
+
+    def advance(self):
+        for robot, one in enumerate(self.robots):
+            if not one.has_navigator_goal:
+                self.simulation.keep_idle(robot)
+        super().advance()
+
+
+@dataclass(frozen=True)
+class Result:
+    """Figures of one flight."""
+
+    reached: int
+    goals: int
+    contacts: int
+    time_s: float
+    altitude_m: float = 0.0
+    trouble: str = ""
+
+
+def result_of(summary, altitude_m=0.0, trouble=""):
+    legs = [leg for robot in summary.robots for leg in robot.legs]
+    time_s = max(sum(leg.time_s for leg in robot.legs) for robot in summary.robots)
+    reached = sum(leg.reached for leg in legs)
+    return Result(reached, len(legs), len(summary.contacts), time_s, altitude_m, trouble)
+
+
+def fly_vehicles(setup, autopilot):
+    """Fly a set-up with vehicles, from take-off to landing."""
+    flight = VehicleFlight(setup, autopilot)
+    simulation, trouble = flight.simulation, ""
+    flying = (State.FLYING, State.HOLDING)
+    while not flight.is_done and flight.now_s < TIME_LIMIT_S and not trouble:
+        flight.advance()
+        lost = [one.machine for one in simulation.bridges if one.machine.state not in flying]
+        trouble = "; ".join(f"{one.state.value}: {one.reason}" for one in lost)
+    sequencers = {robot.name: robot.sequencer for robot in flight.robots}
+    summary = summarize(
+        flight.log, sequencers, flight.now_s, sim_time_s=flight.now_s, wall_time_s=0.0
+    )
+    error_m = np.abs(np.array(simulation.altitudes_m) - setup.scene.altitude_m).max()
+    simulation.land()
+    flight.end()
+    return result_of(summary, float(error_m), trouble)
+
+
+def prepare(seed, airframe):
+    """Return the set-up of a seed; the speeds are the shipped configuration's."""
+    simulation = replace(quad.lidar_simulation(jitter_m=JITTER_M), airframe=AIRFRAMES[airframe])
+    return quad.prepare(seed=seed, simulation=simulation, time_limit_s=TIME_LIMIT_S)
+
+
+def fly_simulated(seed, airframe):
+    """Return the figures of the simulator's flight."""
+    return result_of(quad.fly(prepare(seed, airframe), processes=1).summary)
+
+
+def main():
+    flights = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    autopilots = sys.argv[2:] or list(STAND_INS)
+    failed = 0
+    for autopilot in autopilots:
+        shares, good = {"arducopter": [], "default": []}, 0
+        for seed in range(1, flights + 1):
+            flown = fly_vehicles(prepare(seed, "default"), autopilot)
+            times = {name: fly_simulated(seed, name).time_s for name in shares}
+            for name, time_s in times.items():
+                shares[name].append(flown.time_s / time_s)
+            is_good = flown.reached == flown.goals and not flown.contacts and not flown.trouble
+            is_good = is_good and flown.altitude_m <= MOST_M
+            good += is_good
+            print(
+                f"{autopilot} seed {seed}: {flown.reached} of {flown.goals} goals,"
+                f" {flown.contacts} contacts, altitude within {flown.altitude_m:.3f} m,"
+                f" {flown.time_s:.1f} s, simulator "
+                + ", ".join(f"{time_s:.1f} s ({name})" for name, time_s in times.items())
+                + (f"; {flown.trouble}" if flown.trouble else ""),
+                flush=True,
+            )
+        late = sum(share > MOST_SHARE for share in shares["arducopter"])
+        failed += flights - good + late
+        print(
+            f"{autopilot}: {good} of {flights} flights without fault; time x "
+            + ", ".join(
+                f"{statistics.median(found):.3f} (median) {max(found):.3f} (most) of {name}"
+                for name, found in shares.items()
+            ),
+            flush=True,
+        )
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
