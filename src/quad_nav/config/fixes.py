@@ -227,6 +227,28 @@ _SWITCHES: Tuple[Switch, ...] = (
     ),
     (
         flag(
+            "yield_to_strangers",
+            False,
+            "yield_to_strangers",
+            "A robot makes room for a tracked obstacle that keeps it from its goal.",
+        ),
+        (PeerParams,),
+    ),
+    (
+        double(
+            "stranger_patience",
+            3.0,
+            "stranger_patience_s",
+            "seconds",
+            "Time without progress until a robot makes room for a stranger; up to twice as much is"
+            " added at random.",
+            low=0.1,
+            high=60,
+        ),
+        (PeerParams,),
+    ),
+    (
+        flag(
             "notice_silence_at_once",
             True,
             "notice_silence_at_once",

@@ -203,7 +203,7 @@ class Navigator:
             self._start_idle_checks(now_s)
             self._updates.start(now_s)
         tick = Tick(now_s)
-        self._observe_peers(tick, poses, peers)
+        self._observe_peers(tick, poses, peers, tracks)
         if not self._costmaps_rest:
             self._updates.update(tick, poses)
         if poses.in_global is not None:
@@ -233,10 +233,12 @@ class Navigator:
         if is_due or tick.command is not None:
             self._machine.evade(tick, poses, velocity)
 
-    def _observe_peers(self, tick: Tick, poses: RobotPoses, peers: Sequence[Peer]) -> None:
+    def _observe_peers(
+        self, tick: Tick, poses: RobotPoses, peers: Sequence[Peer], tracks: Optional[Tracks]
+    ) -> None:
         cruise_mps = getattr(self._machine.control.limiter.usual, "max_vel_x_mps", CRUISE_MPS)
         tick.notes += self.peers.observe(
-            tick.now_s, poses.in_global, poses.local_from_global, peers, cruise_mps
+            tick.now_s, poses.in_global, poses.local_from_global, peers, cruise_mps, tracks
         )
 
     def _make_room_when_idle(self, tick: Tick, pose: Optional[Pose2D]) -> None:

@@ -25,10 +25,12 @@ from quad_nav.peers.peer import (
 )
 from quad_nav.peers.peer_costs import PeerCosts
 from quad_nav.peers.peer_tracker import PeerTracker
-from quad_nav.peers.right_of_way import Yield, YieldDecision
+from quad_nav.peers.right_of_way import STRANGER, Yield, YieldDecision
+from quad_nav.peers.stand_off import StandOff
 from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell
 from quad_nav.peers.yielding import YieldRules
 from quad_nav.timing import StallTimer
+from quad_nav.tracking.tracks import Tracks
 
 LATENCY_S = 0.15  # how much later than due the next command may come
 GIVE_UP_PRIORITY_AFTER_S = 15.0  # without progress
@@ -48,12 +50,17 @@ class PeerParams:
             between them; hulls stay twice as far apart.
         timeout_s: Age from which the state of a peer is ignored.
         yield_when_idle: A robot without a goal leaves the path of a peer, and comes back.
+        yield_to_strangers: Make room for a tracked obstacle that keeps the robot from its goal.
+        stranger_patience_s: Time without progress until the robot makes room for a stranger; a
+            random time of up to twice as much is added.
     """
 
     avoid_peers: bool = True
     margin_m: float = 0.05
     timeout_s: float = 0.5
     yield_when_idle: bool = True
+    yield_to_strangers: bool = False
+    stranger_patience_s: float = 3.0
 
 
 @dataclass(frozen=True)
@@ -104,6 +111,7 @@ class PeerCoordinator:
         self._tracker = PeerTracker(global_costmap, local_costmap)
         self._costs = PeerCosts(self._tracker, global_costmap, local_costmap)
         self._rules = YieldRules(self._tracker, global_costmap)
+        self._stand_off = StandOff(self._tracker, global_costmap, number)
         self._goal_set_s = -IDLE_PRIORITY
         self._path = NO_PATH
         self._progress = StallTimer()
@@ -149,6 +157,7 @@ class PeerCoordinator:
         self._path = _straight_to(goal)
         self._progress = StallTimer()
         self._limited = StallTimer()
+        self._stand_off.start_goal()
 
     def end_goal(self) -> None:
         """Make the robot idle; a parking pose that it has not reached stays."""
@@ -174,6 +183,7 @@ class PeerCoordinator:
         """Forget all peers, after a jump of the clock."""
         self._tracker.restart()
         self._rules.restart()
+        self._stand_off.restart()
 
     # -- observe -------------------------------------------------------------------------
 
@@ -184,6 +194,7 @@ class PeerCoordinator:
         local_from_global: Optional[Pose2D],
         peers: Sequence[Peer],
         cruise_mps: float,
+        strangers: Optional[Tracks] = None,
     ) -> List[str]:
         """Update the peers and their costs in both costmaps.
 
@@ -194,6 +205,8 @@ class PeerCoordinator:
                 unknown.
             peers: All peers with a known pose, however old.
             cruise_mps: Speed at which robots are expected to fly.
+            strangers: Moving obstacles in the frame of the local costmap, None if nothing tracks
+                them.
 
         Returns:
             Messages about peers that were lost or came back, for the log.
@@ -210,7 +223,20 @@ class PeerCoordinator:
         changed = had_peers or bool(self._tracker.peers)
         if changed and pose is not None and local_from_global is not None:
             self._costs.update(pose, local_from_global, self.priority)
+        if pose is not None and local_from_global is not None:
+            self._observe_strangers(now_s, pose, local_from_global, strangers)
         return messages
+
+    def _observe_strangers(
+        self, now_s: float, pose: Pose2D, local_from_global: Pose2D, strangers: Optional[Tracks]
+    ) -> None:
+        if strangers is None or not self.params.yield_to_strangers:
+            self._stand_off.restart()
+            return
+        places = strangers.states[:, :2]
+        if len(places) and local_from_global != Pose2D(0.0, 0.0):
+            places = local_from_global.inverse().transform_points(places)
+        self._stand_off.observe(now_s, pose, places)
 
     # -- decide --------------------------------------------------------------------------
 
@@ -224,13 +250,23 @@ class PeerCoordinator:
         """
         if goal is None:
             return self._decide_idle(now_s, pose)
-        if not self._tracker.peers and self.decision is None:
-            return PeerAdvice()
-        messages = self._give_up_priority(now_s, pose)
         before = self.decision
+        if not self._tracker.peers and before is None and self._stand_off.stranger is None:
+            return PeerAdvice()
+        messages = self._give_up_priority(now_s, pose) if self._tracker.peers or before else ()
+        for_stranger = before if before is not None and before.peer == STRANGER else None
         self.decision = self._rules.decide(
-            now_s, pose, self._path, _straight_to(goal), self.priority, before
+            now_s,
+            pose,
+            self._path,
+            _straight_to(goal),
+            self.priority,
+            before if for_stranger is None else None,
         )
+        if self.decision is None:
+            self.decision = self._stand_off.decide(
+                now_s, pose, self._path, for_stranger, self.params.stranger_patience_s
+            )
         if self.decision != before:
             messages += (str(self.decision or "path clear, resuming goal"),)
         replan = self.holding_point != (before.holding_point if before is not None else None)

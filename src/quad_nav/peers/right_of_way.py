@@ -22,6 +22,8 @@ from quad_nav.geometry import Pose2D
 from quad_nav.kernels.peers import nearest_in_time, sample_path
 from quad_nav.peers.peer import Peer
 
+STRANGER = "a stranger"
+"""Name of what moves and has no name, and that a robot makes room for."""
 HORIZON_S = 7.0
 TIME_TOLERANCE_S = 1.5
 _STEP_S = 0.25
@@ -53,7 +55,9 @@ class YieldDecision:
     holding_point: Optional[Pose2D] = None
 
     def __str__(self) -> str:
-        text = f"{self.action.value} {self.peer} (higher priority)"
+        text = f"{self.action.value} {self.peer}"
+        if self.peer != STRANGER:
+            text += " (higher priority)"
         if self.holding_point is None:
             return f"{text} to pass"
         return f"{text} at ({self.holding_point.x_m:.2f}, {self.holding_point.y_m:.2f})"
