@@ -1,14 +1,13 @@
 """The airframe ``arducopter`` responds as ArduCopter does: delays, lags, limits, directions."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.scenario.simulator_setup import read_setup
-from quad_nav.sim.flight import AIRFRAMES, Airframe, airframe_name
+from quad_nav.sim.flight import AIRFRAMES, Airframe, AutopilotResponse, airframe_name
 from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation, SimulationParams
 
@@ -17,8 +16,7 @@ NARROW = Scene("narrow", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(59.0, 30.0, 0.0),
 
 
 def simulation(scene=ROOM, timeout_s=60.0, repeat_s=0.05, turn_lead_s=0.0):
-    autopilot = AIRFRAMES["arducopter"].response
-    response = replace(autopilot, repeat_s=repeat_s, turn_lead_s=turn_lead_s)
+    response = AutopilotResponse(repeat_s=repeat_s, turn_lead_s=turn_lead_s)
     params = SimulationParams(airframe=Airframe(response=response), command_timeout_s=timeout_s)
     return Simulation(scene, 1, params)
 

@@ -14,13 +14,12 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.sim.flight import AIRFRAMES
+from quad_nav.sim.flight import Airframe, AutopilotResponse
 from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation, SimulationParams
 
@@ -50,10 +49,7 @@ def read_log(path):
 def fly(setpoints, yaws):
     """Return the simulated quadcopter's (t, vn, ve, yaw rate), float64[n, 4], at every step."""
     scene = Scene("check", 400.0, 400.0, 1.0, Walls(), (), (Pose2D(200.0, 200.0, 0.0),))
-    airframe = AIRFRAMES["arducopter"]
-    # The log has every set-point, as the autopilot got it.
-    response = replace(airframe.response, repeat_s=math.inf, turn_lead_s=0.0)
-    airframe = replace(airframe, response=response)
+    airframe = Airframe(response=AutopilotResponse())  # the log has what the autopilot got
     params = SimulationParams(airframe=airframe, command_timeout_s=3.0)
     simulation, rows, k = Simulation(scene, 1, params), [], 0
     headings = np.interp(setpoints[:, 0], yaws[:, 0], np.unwrap(yaws[:, 1]))

@@ -23,7 +23,7 @@ from quad_nav.sim.simulation import STEP_S
 
 REST_M = GUARD_HEIGHT_M / 2.0 - MOUNT_HEIGHT_M
 """Height of a body that stands on the floor."""
-AIRFRAME = Airframe(response=AutopilotResponse(repeat_s=math.inf, turn_lead_s=0.0))
+AIRFRAME = Airframe(response=AutopilotResponse())
 """With the autopilot alone: the bridge in front of it is the real one."""
 _TOUCHING_M = 0.015
 _MOST_MPS2 = 8.0

@@ -48,7 +48,8 @@ NO_OBSTACLES: Floats = np.zeros((0, 3))
 class AutopilotResponse:
     """Response of an autopilot to velocity set-points; the defaults are ArduCopter 4.5.3's.
 
-    They were fitted to its flights in its own simulator (``docs/airframes.md``).
+    They were fitted to its flights in its own simulator (``docs/airframes.md``). The last two are
+    what the bridge of vehicles adds in front of it.
 
     Attributes:
         velocity_delay_s: Delay of the velocity in each of the world's axes.
@@ -69,8 +70,8 @@ class AutopilotResponse:
     yaw_damping: float = 0.25
     max_yaw_rate_radps: float = 1.05
     max_acceleration_mps2: float = 2.5
-    repeat_s: float = 0.05
-    turn_lead_s: float = 0.6
+    repeat_s: float = math.inf
+    turn_lead_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,10 @@ class Airframe:
             raise InputError([f"body_radius: {self.radius_m}, expected metres above 0"])
 
 
-AIRFRAMES = {"default": Airframe(), "arducopter": Airframe(response=AutopilotResponse())}
+AIRFRAMES = {
+    "default": Airframe(),
+    "arducopter": Airframe(response=AutopilotResponse(repeat_s=0.05, turn_lead_s=0.6)),
+}
 """Airframes by the name that users choose."""
 
 
