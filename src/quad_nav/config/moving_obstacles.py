@@ -99,7 +99,8 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
             "avoid_moving_obstacles",
             False,
             "avoid_moving_obstacles",
-            "A robot that flies sideways evades tracked obstacles, also while it hovers.",
+            "Judge rollouts against tracked obstacles; a robot that flies sideways evades them,"
+            " also while it hovers.",
         ),
         (EvasionParams,),
     ),

@@ -133,7 +133,15 @@ class DwaPlanner(PlanFollower):
         if grids is None or grids.path.shape != costs.shape:
             grids = DwaGrids(*np.zeros((3, *costs.shape), dtype=np.int32))
         self.critics = Critics(
-            self.params, spec, costs, self.footprint, self.local_global_plan, pose, velocity, grids
+            self.params,
+            spec,
+            costs,
+            self.footprint,
+            self.local_global_plan,
+            pose,
+            velocity,
+            grids,
+            self.moving,
         )
         if not self.critics.is_legal((command.vx_mps, command.vy_mps, command.vyaw_radps)):
             raise NoValidTrajectory(
@@ -145,7 +153,14 @@ class DwaPlanner(PlanFollower):
         self, spec: GridSpec, costs: NDArray[np.uint8], pose: Pose2D, velocity: Twist2D
     ) -> Trajectory:
         self.critics = Critics(
-            self.params, spec, costs, self.footprint, self.local_global_plan, pose, velocity
+            self.params,
+            spec,
+            costs,
+            self.footprint,
+            self.local_global_plan,
+            pose,
+            velocity,
+            moving=self.moving,
         )
         self._grids = self.critics.grids
         self.best = self.critics.choose(self.oscillation, self.control_period_s)

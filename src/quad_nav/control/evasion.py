@@ -24,6 +24,7 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
 from quad_nav.kernels.space_time import SpaceTime, command_costs, fill_costs
@@ -40,10 +41,6 @@ _MAX_CELL_M = 0.2
 _GAIN_PER_S = 3.0  # of the body's velocity loop
 _FADE_PER_S = 0.35
 _RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 14.0, 100.0, 0.05
-_SIGMA_M, _SIGMA_MPS = 0.08, 0.05  # least uncertainty of a prediction, and its growth
-_MAX_SIGMA_MPS = 0.1
-_RECALLED_SIGMA_MPS = 0.03
-_ACCELERATES_S = 0.5  # for which an obstacle keeps its acceleration
 _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _SPEEDS, _COURSES = 4, 24
@@ -149,29 +146,9 @@ def predicted_discs(
     reach_m = radii + (speeds + around.max_speed_mps) * horizon_s
     near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
     times = np.arange(_STEPS * _SUBSTEPS + 1) * (step_s / _SUBSTEPS)
-    discs = np.empty((len(times), int(near.sum()), 4))
-    discs[:, :, :2] = offsets[near] + times[:, None, None] * now.states[near, 2:]
+    discs = predict(now.chosen(near), around.memory, times, (around.pose.x_m, around.pose.y_m))
     discs[:, :, 2] = radii[near]
-    position = np.trace(now.covariances[near, :2, :2], axis1=1, axis2=2) / 2
-    velocity = np.trace(now.covariances[near, 2:, 2:], axis1=1, axis2=2) / 2
-    growth = np.clip(np.sqrt(velocity), _SIGMA_MPS, _MAX_SIGMA_MPS)
-    discs[:, :, 3] = np.sqrt(position + _SIGMA_M**2) + times[:, None] * growth
-    _recall(around.memory, now.numbers[near], times, discs)
     return discs
-
-
-def _recall(memory: MotionMemory, numbers: NDArray[np.int64], times: Floats, discs: Floats) -> None:
-    """Move the discs of obstacles as the memory recalls; others keep their acceleration a while."""
-    during = np.minimum(times, _ACCELERATES_S)
-    turned = during * (times - 0.5 * during)
-    for k, number in enumerate(numbers.tolist()):
-        recalled = memory.recall(number, times)
-        if not recalled.known:
-            discs[:, k, :2] += turned[:, None] * memory.acceleration(number)
-        else:
-            discs[:, k, :2] = discs[0, k, :2] + recalled.moves
-            known = discs[0, k, 3] + times * _RECALLED_SIGMA_MPS
-            discs[: recalled.known, k, 3] = known[: recalled.known]
 
 
 def _search_of(max_speed_mps: float) -> SpaceTime:

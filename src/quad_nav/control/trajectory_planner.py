@@ -116,7 +116,14 @@ class TrajectoryPlanner(PlanFollower):
         self, spec: GridSpec, costs: NDArray[np.uint8], pose: Pose2D, velocity: Twist2D
     ) -> Trajectory:
         self.rollout = Rollout(
-            self.params, spec, costs, self.footprint, self.local_global_plan, pose, velocity
+            self.params,
+            spec,
+            costs,
+            self.footprint,
+            self.local_global_plan,
+            pose,
+            velocity,
+            self.moving,
         )
         self.best = choose_trajectory(
             self.rollout, self.params, self.oscillation, self.control_period_s

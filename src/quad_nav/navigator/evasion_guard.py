@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.evasion import EvasionParams, Surroundings, evade
+from quad_nav.control.prediction import NO_DISCS, rollout_discs
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
+from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
@@ -98,6 +100,21 @@ class EvasionGuard:
         tick.command = Twist2D(command.vx_mps, command.vy_mps, turn_radps)
         tick.evades = self.is_evading = True
         return None
+
+    def predict(self, now_s: float, pose: Pose2D, tracks: Tracks, rollout_s: float) -> MovingDiscs:
+        """Return what a local planner's rollouts of a duration are judged against.
+
+        Args:
+            now_s: Present time.
+            pose: Pose of the robot in the local costmap's frame.
+            tracks: The moving obstacles, in the same frame.
+            rollout_s: Duration of the rollouts.
+        """
+        if not len(tracks):
+            return NO_DISCS
+        self._memory.add(tracks)
+        radius_m, clearance_m = self._costmap.inscribed_radius_m, self.params.clearance_m
+        return rollout_discs(tracks.at(now_s), self._memory, pose, radius_m, clearance_m, rollout_s)
 
     def _surroundings(
         self, pose: Pose2D, velocity: Twist2D, limits: SpeedLimits, is_following: bool

@@ -12,9 +12,11 @@ import math
 from typing import Optional, Sequence
 
 from quad_nav.control.controller import LocalPlanner
+from quad_nav.control.prediction import NO_DISCS
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.kernels.moving_discs import MovingDiscs
 from quad_nav.navigator.control_supervisor import ControlSupervisor, StuckAction, escape_command
 from quad_nav.navigator.costmap_updates import CostmapUpdates
 from quad_nav.navigator.evasion_guard import EvasionGuard, speed_limits
@@ -267,7 +269,9 @@ class StateMachine:
         elif action is StuckAction.REPLAN:
             tick.command = Twist2D()
             self._begin_planning(tick.now_s)
-        elif self.control.compute_velocity(tick, self._local, poses, velocity):
+        elif self.control.compute_velocity(
+            tick, self._local, poses, velocity, self._predicted(tick.now_s, poses.in_local)
+        ):
             self.recovery.reset_after(Trigger.CONTROLLING)
         elif self.control.is_patience_exhausted(tick.now_s, params.controller_patience_s):
             self._enter_clearing(tick, Trigger.CONTROLLING)
@@ -276,6 +280,14 @@ class StateMachine:
             if params.escape_collision:
                 tick.command = escape_command(self._local, poses.in_local)
             self._begin_planning(tick.now_s)
+
+    def _predicted(self, now_s: float, pose: Pose2D) -> MovingDiscs:
+        """Return the moving obstacles that rollouts are judged against."""
+        tracks, usual = self.control.tracks, self.control.limiter.usual
+        rollout_s = getattr(usual, "sim_time_s", 0.0)
+        if tracks is None or not self.params.evasion.avoid_moving_obstacles:
+            return NO_DISCS
+        return self.guard.predict(now_s, pose, tracks, rollout_s)
 
     # -- peers ---------------------------------------------------------------------------
 

@@ -44,6 +44,16 @@ class Tracks:
     def __len__(self) -> int:
         return len(self.numbers)
 
+    def chosen(self, rows: NDArray[np.bool_]) -> Tracks:
+        """Return some of the obstacles, bool[n]."""
+        return Tracks(
+            self.time_s,
+            self.numbers[rows],
+            self.states[rows],
+            self.covariances[rows],
+            self.radii_m[rows],
+        )
+
     def at(self, time_s: float) -> Tracks:
         """Return the obstacles where they are at another time if they keep their velocities.
 

@@ -1,0 +1,100 @@
+"""Predictions of tracked obstacles, for the rollouts of local planners and for the evasion.
+
+An obstacle keeps its acceleration of the last half second for another half second, then its
+velocity. Where the memory of this flight recalls one that moved alike, it goes where that one
+went. The standard deviation of a prediction grows linearly with time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.geometry import Pose2D
+from quad_nav.kernels.moving_discs import MovingDiscs
+from quad_nav.tracking.motion_memory import MotionMemory
+from quad_nav.tracking.tracks import Tracks
+
+Floats = NDArray[np.float64]
+
+_SIGMA_M, _SIGMA_MPS = 0.08, 0.05  # least uncertainty of a prediction, and its growth
+_MAX_SIGMA_MPS = 0.1
+_RECALLED_SIGMA_MPS = 0.03
+_ACCELERATES_S = 0.5  # for which an obstacle keeps its acceleration
+_ROLLOUT_STEP_S = 0.05  # longest time between two predictions of a rollout
+
+NO_DISCS = MovingDiscs(np.empty((1, 0, 4)), 0.0)
+
+
+def predict(
+    tracks: Tracks, memory: MotionMemory, times_s: Floats, origin: Tuple[float, float] = (0.0, 0.0)
+) -> Floats:
+    """Return where obstacles will be.
+
+    Args:
+        tracks: The obstacles.
+        memory: The memory of how obstacles have moved; it holds these tracks already.
+        times_s: float64[t], times after that of the tracks, increasing from 0.
+        origin: Point that positions are relative to, in the tracks' frame, metres.
+
+    Returns:
+        float64[t, n, 4]: x and y relative to the origin, radius, standard deviation of the
+        position.
+    """
+    discs = np.empty((len(times_s), len(tracks), 4))
+    offsets = tracks.states[:, :2] - np.array(origin)
+    discs[:, :, :2] = offsets + times_s[:, None, None] * tracks.states[:, 2:]
+    discs[:, :, 2] = tracks.radii_m
+    position = np.trace(tracks.covariances[:, :2, :2], axis1=1, axis2=2) / 2
+    velocity = np.trace(tracks.covariances[:, 2:, 2:], axis1=1, axis2=2) / 2
+    growth = np.clip(np.sqrt(velocity), _SIGMA_MPS, _MAX_SIGMA_MPS)
+    discs[:, :, 3] = np.sqrt(position + _SIGMA_M**2) + times_s[:, None] * growth
+    _recall(memory, tracks.numbers, times_s, discs)
+    return discs
+
+
+def _recall(
+    memory: MotionMemory, numbers: NDArray[np.int64], times_s: Floats, discs: Floats
+) -> None:
+    """Move the discs of obstacles as the memory recalls; others keep their acceleration a while."""
+    during = np.minimum(times_s, _ACCELERATES_S)
+    turned = during * (times_s - 0.5 * during)
+    for k, number in enumerate(numbers.tolist()):
+        recalled = memory.recall(number, times_s)
+        if not recalled.known:
+            discs[:, k, :2] += turned[:, None] * memory.acceleration(number)
+        else:
+            discs[:, k, :2] = discs[0, k, :2] + recalled.moves
+            known = discs[0, k, 3] + times_s * _RECALLED_SIGMA_MPS
+            discs[: recalled.known, k, 3] = known[: recalled.known]
+
+
+def rollout_discs(
+    tracks: Tracks,
+    memory: MotionMemory,
+    pose: Pose2D,
+    radius_m: float,
+    clearance_m: float,
+    rollout_s: float,
+) -> MovingDiscs:
+    """Return what the rollouts of a local planner are judged against.
+
+    An obstacle that the robot's circle overlaps already counts as smaller, so that rollouts that
+    lead away from it are legal.
+
+    Args:
+        tracks: The obstacles now, in the local costmap's frame.
+        memory: The memory of how obstacles have moved; it holds these tracks already.
+        pose: Pose of the robot in the same frame.
+        radius_m: Radius of the robot.
+        clearance_m: Distance beyond it within which a pass costs most.
+        rollout_s: Duration of the rollouts.
+    """
+    steps = max(math.ceil(rollout_s / _ROLLOUT_STEP_S), 1)
+    discs = predict(tracks, memory, np.linspace(0.0, rollout_s, steps + 1))
+    apart = np.hypot(discs[0, :, 0] - pose.x_m, discs[0, :, 1] - pose.y_m)
+    discs[:, :, 2] = np.minimum(discs[0, :, 2] + radius_m, apart)
+    return MovingDiscs(discs, float(clearance_m))
