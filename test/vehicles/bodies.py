@@ -40,11 +40,21 @@ class Bodies:
         lift_mps2: Vertical acceleration of each body; None with the motors off.
     """
 
-    def __init__(self, scene=EMPTY, starts=None, airframe=AIRFRAME):
+    def __init__(self, scene=EMPTY, starts=None, airframes=(AIRFRAME,)):
+        """Put bodies on the floor.
+
+        Args:
+            scene: The room.
+            starts: Start poses; the scene's first one by default.
+            airframes: Of each body, or of all.
+        """
         starts = list(starts or scene.starts[:1])
-        self._world = World(replace(scene, altitude_m=REST_M), starts, airframe, STEP_S)
-        self._law = FlightLaw(airframe, flight_params(airframe, FlightParams()))
-        self._autopilot = Autopilot(airframe.response, self._law, len(starts), STEP_S)
+        airframes = list(airframes) * (len(starts) if len(airframes) == 1 else 1)
+        self._world = World(replace(scene, altitude_m=REST_M), starts, airframes[0], STEP_S)
+        self._laws = [FlightLaw(one, flight_params(one, FlightParams())) for one in airframes]
+        self._autopilots = [
+            Autopilot(one.response, law, 1, STEP_S) for one, law in zip(airframes, self._laws)
+        ]
         self._log = ContactLog()
         self.contacts = []
         self.state, self.count = self._world.state(), 0
@@ -60,28 +70,32 @@ class Bodies:
     def set_velocity(self, robot, forward_mps, left_mps, yaw_radps):
         """Give a set-point in the body's frame; it takes effect with the autopilot's delay."""
         command = np.array([forward_mps, left_mps, yaw_radps])
-        self._autopilot.receive(robot, command, self.state, self.count)
+        self._autopilots[robot].receive(0, command, self._one(robot), self.count)
+
+    def _one(self, robot):
+        """Return the state of one body alone."""
+        return BodyState(self.state.rows[robot : robot + 1].copy())
 
     def step(self):
         """Advance all bodies by one step of the simulation."""
-        commands = self._autopilot.commands(self.state, self.count)
         forces, torques = np.zeros((len(self), 3)), np.zeros((len(self), 3))
-        bandwidth = self._law.gains.altitude_bandwidth_radps
         for robot, lift in enumerate(self.lift_mps2):
-            if lift is None:
-                continue
-            lift = min(max(lift, -_MOST_MPS2), _MOST_MPS2)
-            row = self.state.rows[robot]
-            # The altitude for which the flight law accelerates like this.
-            altitude_m = float(row[2]) + (lift + 2.0 * bandwidth * float(row[9])) / bandwidth**2
-            one = slice(robot, robot + 1)
-            forces[one], torques[one] = self._law.thrust_and_torque(
-                BodyState(self.state.rows[one].copy()), commands[one].copy(), altitude_m
-            )
+            if lift is not None:
+                found = self._push(robot, min(max(lift, -_MOST_MPS2), _MOST_MPS2))
+                forces[robot], torques[robot] = found[0][0], found[1][0]
         self.state = self._world.step(self.state, forces, torques)
         self.count += 1
         touches = [touch for touch in self._world.touches() if touch.other != "floor"]
         self.contacts += self._log.update(self.now_s, touches)
+
+    def _push(self, robot, lift_mps2):
+        """Return force and torque of a body in flight."""
+        law, state = self._laws[robot], self._one(robot)
+        commands = self._autopilots[robot].commands(state, self.count)
+        bandwidth, row = law.gains.altitude_bandwidth_radps, state.rows[0]
+        # The altitude for which the flight law accelerates like this.
+        lead_m = (lift_mps2 + 2.0 * bandwidth * float(row[9])) / bandwidth**2
+        return law.thrust_and_torque(state, commands, float(row[2]) + lead_m)
 
     def height_m(self, robot):
         """Return the height above the floor on which it stood."""

@@ -74,7 +74,20 @@ def _leave(flight):
     flight.machine._limits = flight.machine.inputs._limits.__class__(radius_m=0.2)
 
 
-# Name: fault, state that must follow, within s, whether the mission must pause.
+def _hide(flight):
+    flight.vehicle.hides_position = True
+
+
+def _kill_bridge(flight):
+    flight.is_alive = False
+
+
+def _lands_by_itself(flight):
+    return flight.vehicle.mode == flight.vehicle.kind["land"]
+
+
+# Name: fault, state of the bridge that must follow or what must become true, within s, whether the
+# mission must pause.
 ROWS = {
     "the pilot changes the mode": (_change_mode, State.TAKEN_OVER, 0.1, True),
     "the pilot moves a stick": (_move_stick, State.TAKEN_OVER, 0.3, True),
@@ -84,6 +97,9 @@ ROWS = {
     "link lost": (_lose_link, State.NO_LINK, 1.1, False),
     "link lost from the vehicle": (_lose_telemetry, State.NO_LINK, 1.1, False),
     "link lost to the vehicle": (_lose_commands, State.TAKEN_OVER, 7.0, True),
+    "the bridge dies": (_kill_bridge, _lands_by_itself, 17.0, False),
+    "estimate late: hover": (_hide, State.HOLDING, 0.6, False),
+    "estimate late: land": (_hide, State.LANDING, 2.1, False),
     "estimate frozen": (_freeze, State.LANDING, 4.0, False),
     "estimate jumps by 1.5 m": (_jump, State.LANDING, 0.1, False),
     "battery low": (_drain, State.LANDING, 3.2, False),
@@ -113,13 +129,16 @@ def fly_row(name, autopilot, moment_s, command=COMMAND, make_flight=Flight, seed
     assert flight.state is State.FLYING, (flight.state, flight.machine.reason)
     start_s = flight.now_s
     fault(flight)
-    assert flight.run(within_s, lambda: flight.state is state), (flight.state, flight.news[-2:])
+
+    def has_followed():
+        return state(flight) if callable(state) else flight.state is state
+
+    assert flight.run(within_s, has_followed), (flight.state, flight.news[-2:])
     reached_s = flight.now_s - start_s
 
     def is_safe():
-        return flight.speed_mps < HOVER_MPS and not (
-            state is State.LANDING and flight.vehicle.landed == 2
-        )
+        must_descend = state is State.LANDING or callable(state)
+        return flight.speed_mps < HOVER_MPS and not (must_descend and flight.vehicle.landed == 2)
 
     assert flight.run(12.0, is_safe), (flight.state, flight.speed_mps)
     safe_s = flight.now_s - start_s

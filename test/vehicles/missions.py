@@ -25,6 +25,7 @@ import numpy as np
 from vehicles.bodies import Bodies
 from vehicles.estimator import LocalFrame
 from vehicles.stand_in import advance
+from vehicles.virtual_flight import AIRFRAMES as BARE_AIRFRAMES
 from vehicles.virtual_flight import STAND_INS
 
 import quad_nav.api as quad
@@ -101,7 +102,7 @@ class VehicleSimulation(Simulation):
         Raises:
             AssertionError: One does not.
         """
-        self.bodies = Bodies(self.scene, self._starts)
+        self.bodies = Bodies(self.scene, self._starts, [BARE_AIRFRAMES[autopilot]])
         altitude_m = self.scene.altitude_m
         self.bridges = [
             Bridge(k, autopilot, self.bodies, seed, altitude_m) for k in range(self.n_robots)

@@ -72,7 +72,7 @@ class PointVehicle:
         self.mode, self.armed, self.landed = 0, False, 1
         self.battery, self.sticks = 97, [1500, 1500, 1500, 1500]
         self.refuses_arming = ""
-        self.is_frozen = False  # its estimate
+        self.is_frozen = self.hides_position = False  # its estimate
         self.jump_m = 0.0
         self.received = []  # names
         self.setpoints = []  # (time, fields)
@@ -332,6 +332,8 @@ class PointVehicle:
         if self._due("HEARTBEAT", 1.0):
             self._heartbeat()
         for name in ("ATTITUDE", "LOCAL_POSITION_NED", "EXTENDED_SYS_STATE", "SYS_STATUS"):
+            if name == "LOCAL_POSITION_NED" and self.hides_position:
+                continue
             if name in self._rates and self._due(name, self._rates[name]):
                 self._send(name, **makers[name])
         if "RC_CHANNELS" in self._rates and self._due("RC_CHANNELS", self._rates["RC_CHANNELS"]):

@@ -55,6 +55,7 @@ class StandIn:
         loses_up: Fault: nothing arrives at it.
         delay_down_s: Fault: delay of what it sends.
         delay_up_s: Fault: delay of what it gets.
+        hides_position: Fault: it sends no position.
         has_ended: Its program has crashed.
     """
 
@@ -71,7 +72,7 @@ class StandIn:
         self.mode, self.armed, self.landed = 0, False, ON_GROUND
         self.battery, self.sticks = 97, [1500, 1500, 1500, 1500]
         self.refuses_arming = ""
-        self.loses_down = self.loses_up = self.has_ended = False
+        self.loses_down = self.loses_up = self.hides_position = self.has_ended = False
         self.delay_down_s = self.delay_up_s = 0.0
         self.setpoints, self.received = [], []
         self.is_critical = False
@@ -246,7 +247,7 @@ class StandIn:
         for name, period_s in list(self._periods.items()):
             if not self._is_due(name, period_s):
                 continue
-            if name == "LOCAL_POSITION_NED" and not self.has_position:
+            if name == "LOCAL_POSITION_NED" and (self.hides_position or not self.has_position):
                 continue
             self.send(name, **getattr(self, f"_make_{name.lower()}")())
 

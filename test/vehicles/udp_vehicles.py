@@ -4,7 +4,7 @@
 Each sends to its port on this machine, where a bridge listens (`address: udpin:127.0.0.1:PORT`).
 North, east (m) and heading (degrees) are the vehicle's place in its own local frame. With a scene
 the vehicles stand at its start poses, and touch its walls and each other; contacts are printed.
-KIND is `ardupilot`, a stand-in with a simulated body, or `px4` or `point`, which are points.
+KIND is `ardupilot` or `px4`, a stand-in with a simulated body, or `point`, a point without body.
 The signal SIGUSR1 changes the mode of the first one, as its pilot would.
 """
 
@@ -21,11 +21,11 @@ from pathlib import Path
 os.environ["MAVLINK20"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from pymavlink import mavutil
-from vehicles.bodies import EMPTY, Bodies
+from vehicles.bodies import AIRFRAME, EMPTY, Bodies
 from vehicles.estimator import LocalFrame
-from vehicles.point_vehicle import ARDUPILOT, PX4, PointVehicle
+from vehicles.point_vehicle import ARDUPILOT, PointVehicle
 from vehicles.stand_in import StandIn, advance
-from vehicles.virtual_flight import STAND_INS
+from vehicles.virtual_flight import AIRFRAMES, STAND_INS
 
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.scene_file import load_scene
@@ -33,7 +33,6 @@ from quad_nav.sim.scene_file import load_scene
 STEP_S = 1.0 / 120.0
 BOOT_S = 60.0
 APART_M = 20.0
-POINTS = {"px4": PX4, "point": ARDUPILOT}
 
 
 class UdpVehicle:
@@ -47,7 +46,7 @@ class UdpVehicle:
             frame = LocalFrame(*place, heading_rad)
             self.vehicle = stand_in(bodies, number, frame, number, BOOT_S, safe)
         else:
-            self.vehicle = PointVehicle(POINTS[kind], place, heading_rad, boot_s=BOOT_S)
+            self.vehicle = PointVehicle(ARDUPILOT, place, heading_rad, boot_s=BOOT_S)
         self._link = mavutil.mavlink_connection(
             f"udpout:127.0.0.1:{port}",
             source_system=1,
@@ -91,12 +90,15 @@ def main():
     parser.add_argument("vehicles", nargs="+", metavar="KIND:PORT:NORTH:EAST:HEADING")
     options = parser.parse_args()
     count = len(options.vehicles)
+    kinds = [text.split(":")[0] for text in options.vehicles]
+    airframes = [AIRFRAMES.get(kind, AIRFRAME) for kind in kinds]
     if options.scene:
         scene = load_scene(options.scene)
-        bodies = Bodies(scene, scene.starts[:count])
+        bodies = Bodies(scene, scene.starts[:count], airframes)
     else:
         middle = EMPTY.size_x_m / 2.0
-        bodies = Bodies(EMPTY, [Pose2D(middle + APART_M * k, middle) for k in range(count)])
+        starts = [Pose2D(middle + APART_M * k, middle) for k in range(count)]
+        bodies = Bodies(EMPTY, starts, airframes)
     links = [UdpVehicle(text, bodies, k) for k, text in enumerate(options.vehicles)]
     vehicles = [link.vehicle for link in links]
     stand_ins = [one for one in vehicles if isinstance(one, StandIn)]

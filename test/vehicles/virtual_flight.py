@@ -5,9 +5,12 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from vehicles.ardupilot import ArduPilot
+from vehicles.bodies import AIRFRAME as BARE_ARDUPILOT
 from vehicles.bodies import Bodies
 from vehicles.estimator import LocalFrame
 from vehicles.point_vehicle import ARDUPILOT, PX4, PointVehicle
+from vehicles.px4 import AIRFRAME as BARE_PX4
+from vehicles.px4 import Px4
 
 from quad_nav.geometry import Twist2D
 from quad_nav.sim.simulation import STEP_S as STEP
@@ -20,7 +23,11 @@ from quad_nav.vehicle.vehicle_file import Vehicle
 
 STEP_S = 0.01
 MAY_ARM, AHEAD = Permissions(may_arm=True), Twist2D(0.5, 0.0, 0.0)
-STAND_INS = {"ardupilot": (ArduPilot, {"FS_GCS_ENABLE": 5.0, "FS_THR_ENABLE": 3.0})}
+STAND_INS = {
+    "ardupilot": (ArduPilot, {"FS_GCS_ENABLE": 5.0, "FS_THR_ENABLE": 3.0}),
+    "px4": (Px4, {"COM_OBL_RC_ACT": 4.0, "NAV_DLL_ACT": 3.0, "NAV_RCL_ACT": 3.0}),
+}
+AIRFRAMES = {"ardupilot": BARE_ARDUPILOT, "px4": BARE_PX4}
 KINDS = {"ardupilot": ARDUPILOT, "px4": PX4}
 
 
@@ -39,7 +46,7 @@ class Flight:
         self.now_s = 100.0
         self.sent = []  # (time, name, fields)
         self.news, self.states, self.pauses = [], [], 0
-        self.hears = self.is_heard = True
+        self.hears = self.is_heard = self.is_alive = True
         self.command = None  # Twist2D of each 50 ms
         self._next_command_s = 0.0
 
@@ -60,6 +67,10 @@ class Flight:
         for name, fields in self.vehicle.advance(self.step_s):
             if self.hears:
                 self.adapter.receive(name, 1, SimpleNamespace(**{"id": 0, **fields}), self.now_s)
+        if self.is_alive:
+            self._tick()
+
+    def _tick(self):
         messages = []
         if self.command is not None and self.now_s >= self._next_command_s:
             self._next_command_s = self.now_s + 0.05
@@ -119,7 +130,7 @@ class StandInFlight(Flight):
     step_s = 2.0 * STEP
 
     def make_vehicle(self, autopilot, seed):
-        self.bodies = Bodies()
+        self.bodies = Bodies(airframes=[AIRFRAMES[autopilot]])
         stand_in, safe = STAND_INS[autopilot]
         frame = LocalFrame(3.0, -2.0, 0.6)
         return stand_in(self.bodies, 0, frame, seed, 60.0 + seed % 7, safe)

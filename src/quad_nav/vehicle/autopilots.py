@@ -160,7 +160,7 @@ PX4 = Autopilot(
         }
     ),
     sends_bits=True,
-    refusals=("Arming denied", "Switching to ", "Takeoff denied"),
+    refusals=("Preflight Fail", "Arming denied", "Switching to ", "Takeoff denied"),
     complaints=("Preflight Fail", "Preflight:"),
 )
 

@@ -195,10 +195,10 @@ class MavlinkAdapter:
         """Return the text, joined if it came in parts of 50 bytes; None before the last part."""
         number = message.id
         if not number:
-            return str(message.text)
+            return str(message.text).rstrip()  # PX4 marks some with a tab at their end
         text = self._chunks.pop(number, "") + message.text
         if len(message.text) < _TEXT_BYTES:
-            return text
+            return text.rstrip()
         self._chunks = {number: text}
         return None
 
