@@ -59,8 +59,6 @@ AIRFRAME = Airframe(
         yaw_delay_s=0.05,
         yaw_frequency_radps=10.0,
         yaw_damping=1.0,
-        repeat_s=math.inf,
-        turn_lead_s=0.0,
     )
 )
 
