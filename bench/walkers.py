@@ -1,17 +1,25 @@
-"""Fly among people, and count contacts and those at which the quadcopter moved.
+"""Fly among people, and count contacts: how many, and what the quadcopter did then.
 
     python bench/walkers.py                                  # arena and corridor, 2 and 8 robots
     python bench/walkers.py 2in12 corridor --seeds 10 --set fixes/avoid_moving_obstacles=false
 
 ``8in12`` are eight quadcopters with a random mission in an arena of 12 m, ``corridor`` is that of
-``goals/encounters``; people walk in both. A quadcopter moved if it was faster than 0.05 m/s in the
-period of odometry before the touch.
+``goals/encounters``; people walk in both. Of the contacts with people, in the period of odometry
+(25 ms) before the touch the quadcopter
+
+* *moved* if its speed was above 0.05 m/s, in any direction;
+* *moved into* the person if its velocity had a part above 0.05 m/s from its centre towards the
+  point of the touch. The others were run into while the quadcopter stood, or fled.
+
+``person`` is the mean part of the person's velocity towards the quadcopter's centre at contacts.
+Contacts with anything else are in the column ``others``.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, replace
-from typing import Any, List, Sequence, Tuple
+from typing import Any, List, Optional, Sequence, Tuple
 
 import click
 import numpy as np
@@ -26,6 +34,7 @@ from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Walkers
 
 MOVED_MPS = 0.05
+PERIOD_S = 0.025
 
 
 @dataclass(frozen=True)
@@ -43,33 +52,61 @@ class Task:
 
 @dataclass(frozen=True)
 class WalkersResult:
-    """Contacts of one flight; ``moved`` are those at which the quadcopter moved."""
+    """Contacts of one flight, of those with people how many moved and moved into the person.
+
+    ``person_mps`` are the people's speeds towards the quadcopter at the contacts.
+    """
 
     name: str
     seed: int
     contacts: int
     moved: int
+    moved_into: int
+    others: int
+    person_mps: Tuple[float, ...]
     reached: int
     goals: int
     time_s: float
 
 
-class Speeds(FlightObserver):
-    """Counts the contacts at which the quadcopter moved."""
+class Touches(FlightObserver):
+    """Keeps the velocities of quadcopter and person towards each other at each contact."""
 
     def __init__(self) -> None:
-        self.moved = 0
-        self._speeds = np.zeros(0)
+        self.speeds_mps: List[Tuple[float, float, float]] = []  # of both ways, and any direction
+        self.others = 0
+        self._flight: Optional[Flight] = None
+        self._velocities = self._places = np.zeros((0, 2))
+
+    def on_start(self, flight: Flight) -> None:
+        """Keep the flight."""
+        self._flight = flight
+        self.on_move(flight)
 
     def on_move(self, flight: Flight) -> None:
-        """Keep the speeds of the last period of odometry."""
-        velocities = flight.states.bodies.velocities_mps
-        self._speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+        """Keep places and velocities of the last period of odometry."""
+        self._velocities = flight.states.bodies.velocities_mps[:, :2].copy()
+        self._places = flight.states.poses[:, :2].copy()
 
     def on_contact(self, contact: Contact) -> None:
-        """Count a contact of a robot that moves."""
+        """Keep the speeds of a robot and a person who touch."""
         robot = int(contact.robot[len("quad") :])
-        self.moved += bool(len(self._speeds) and self._speeds[robot] > MOVED_MPS)
+        if not contact.other.startswith("person_"):
+            self.others += 1
+            return
+        assert self._flight is not None
+        movers, person = self._flight.simulation.movers, int(contact.other[len("person_") :])
+        before, now = movers.poses_at(contact.time_s - np.array([PERIOD_S, 0.0]))[:, person, :2]
+        away = np.array([contact.x_m, contact.y_m]) - self._places[robot]
+        away /= np.hypot(*away)
+        velocity = self._velocities[robot]
+        self.speeds_mps.append(
+            (
+                float(velocity @ away),
+                float((before - now) @ away / PERIOD_S),
+                float(np.hypot(*velocity)),
+            )
+        )
 
 
 def setup_of(task: Task) -> FlightSetup:
@@ -82,14 +119,17 @@ def setup_of(task: Task) -> FlightSetup:
 
 def fly_task(task: Task) -> WalkersResult:
     """Fly among people."""
-    speeds = Speeds()
-    summary = fly(setup_of(task), (speeds,))
+    touches = Touches()
+    summary = fly(setup_of(task), (touches,))
     legs = [leg for robot in summary.robots for leg in robot.legs]
     return WalkersResult(
         task.name,
         task.seed,
-        len(summary.contacts),
-        speeds.moved,
+        len(touches.speeds_mps),
+        sum(speed_mps > MOVED_MPS for _, _, speed_mps in touches.speeds_mps),
+        sum(towards_mps > MOVED_MPS for towards_mps, _, _ in touches.speeds_mps),
+        touches.others,
+        tuple(person_mps for _, person_mps, _ in touches.speeds_mps),
         sum(leg.reached for leg in legs),
         len(legs),
         summary.sim_time_s,
@@ -97,11 +137,15 @@ def fly_task(task: Task) -> WalkersResult:
 
 
 def row(name: str, flights: Sequence[WalkersResult]) -> List[str]:
+    persons = [speed_mps for one in flights for speed_mps in one.person_mps]
     return [
         name,
         str(len(flights)),
         str(sum(one.contacts for one in flights)),
         str(sum(one.moved for one in flights)),
+        str(sum(one.moved_into for one in flights)),
+        f"{np.mean(persons):.2f}" if persons else "",
+        str(sum(one.others for one in flights)),
         f"{sum(one.reached for one in flights)} of {sum(one.goals for one in flights)}",
         f"{np.mean([one.time_s for one in flights]):.0f}",
     ]
@@ -132,9 +176,22 @@ def main(
         (k, Task(name, seed, config, given, people, reacting, time_limit))
         for k, (name, seed) in enumerate((name, seed) for name in names for seed in range(seeds))
     ]
-    flights = [one for _, one in fly_all(LocalWorkers(jobs), fly_task, tasks)]
+    flights: List[WalkersResult] = []
+    for _, one in fly_all(LocalWorkers(jobs), fly_task, tasks):
+        flights.append(one)
+        print(one, file=sys.stderr, flush=True)
     rows = [row(name, [one for one in flights if one.name == name]) for name in names]
-    header = ["flights of", "flights", "contacts", "moved", "goals", "mean time (s)"]
+    header = [
+        "flights of",
+        "flights",
+        "contacts\nwith people",
+        "quadcopter\nmoved",
+        "moved into\nthe person",
+        "person\nm/s",
+        "others",
+        "goals",
+        "mean time\ns",
+    ]
     print(tabulate.tabulate(rows, header, disable_numparse=True))
 
 

@@ -100,3 +100,16 @@ def test_a_robot_that_follows_a_plan_turns_to_it_while_it_evades(guard):
 def test_only_robots_that_fly_sideways_evade(planner, expected):
     configuration = load({**planner, "global_costmap": {"static_map": True}})
     assert speed_limits(configuration.local_planner) == expected
+
+
+def test_a_robot_evades_faster_than_it_flies_where_that_is_allowed(guard):
+    """Something as fast as 1 m/s comes along the x axis, 1.2 m away: 1 m/s sideways avoids it."""
+    track = one_track(1.2, 0.1, -1.0, 0.0)
+    slow = checked(guard, track).command
+    assert np.hypot(slow.vx_mps, slow.vy_mps) == pytest.approx(0.5)
+    guard.params = EvasionParams(avoid_moving_obstacles=True, speed_mps=1.0)
+    fast = checked(guard, track).command
+    assert np.hypot(fast.vx_mps, fast.vy_mps) == pytest.approx(1.0)
+    guard.params = EvasionParams(avoid_moving_obstacles=True, speed_mps=0.2)
+    still = checked(guard, track).command
+    assert np.hypot(still.vx_mps, still.vy_mps) == pytest.approx(0.5)

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from quad_nav.config import load
-from quad_nav.geometry import Pose2D
+from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
 from quad_nav.peers.peer import Peer
 from quad_nav.peers.right_of_way import STRANGER, Yield
 from quad_nav.peers.stand_off import StandOff
 from quad_nav.scenario.assembly import build_navigator
+from quad_nav.tracking.tracks import Tracks
 
 TREE = {
     "global_costmap": {"width": 10.0, "height": 10.0, "robot_radius": 0.35, "resolution": 0.1},
@@ -144,3 +145,24 @@ def test_the_switch_is_off_by_default() -> None:
     ).peers
     assert on.params.yield_to_strangers
     assert math.isclose(on.params.stranger_patience_s, 2.5)
+
+
+def test_a_peer_that_went_silent_keeps_its_cell_for_a_second_where_strangers_are_tracked(
+    coordinator,
+) -> None:
+    """It was 2 m ahead at 0 s, and came nearer at 0.5 m/s; ``peer_timeout`` is 0.5 s."""
+    here, word = Pose2D(2.0, 5.0), Peer("quad1", 4.0, 5.0, -0.5, 0.0, 0.0)
+
+    def limited(now_s: float, tracks) -> str:
+        coordinator.observe(now_s, here, Pose2D(0.0, 0.0), [word], 0.3, tracks)
+        command = coordinator.limit(here, Twist2D(), Twist2D(vx_mps=2.0), 0.1)
+        return command.limited_by
+
+    assert limited(0.4, Tracks.none(0.4)) == "quad1"
+    assert limited(1.4, Tracks.none(1.4)) == "quad1"
+    assert [peer.x_m for peer in coordinator._tracker.silent] == [pytest.approx(4.0 - 0.5 * 1.4)]
+    assert not coordinator.peers
+    assert limited(1.4, None) == ""
+    assert limited(1.6, Tracks.none(1.6)) == ""
+    coordinator.observe(1.7, here, Pose2D(0.0, 0.0), [], 0.3, None)
+    assert coordinator._tracker.silent == []

@@ -129,4 +129,16 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
         ),
         (EvasionParams,),
     ),
+    (
+        double(
+            "moving_obstacle_evasion_speed",
+            0.0,
+            "speed_mps",
+            "metres/s",
+            "Greatest speed of a robot that evades; 0 for that of its local planner.",
+            low=0,
+            high=10,
+        ),
+        (EvasionParams,),
+    ),
 )

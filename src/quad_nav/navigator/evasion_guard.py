@@ -126,7 +126,7 @@ class EvasionGuard:
             pose,
             velocity,
             costmap.inscribed_radius_m,
-            limits.speed_mps,
+            max(self.params.speed_mps, limits.speed_mps),
             is_following,
             self._memory,
         )

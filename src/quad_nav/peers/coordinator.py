@@ -116,6 +116,7 @@ class PeerCoordinator:
         self._path = NO_PATH
         self._progress = StallTimer()
         self._limited = StallTimer()
+        self._tracks = False  # moving obstacles are tracked
 
     @property
     def peers(self) -> Sequence[Peer]:
@@ -212,6 +213,7 @@ class PeerCoordinator:
             Messages about peers that were lost or came back, for the log.
         """
         had_peers = bool(self._tracker.peers)
+        self._tracks = strangers is not None
         self._tracker.cruise_mps = cruise_mps
         messages = self._tracker.observe(
             now_s,
@@ -323,7 +325,7 @@ class PeerCoordinator:
             pose,
             velocity,
             command,
-            self._tracker.peers,
+            [*self._tracker.peers, *self._tracker.silent] if self._tracks else self._tracker.peers,
             self._tracker.safety_radius_m,
             control_period_s + LATENCY_S,
         )

@@ -15,6 +15,7 @@ from quad_nav.timing import StallTimer
 CRUISE_MPS = 0.3  # of a robot whose local planner has no max_vel_x
 STATIONARY_AFTER_S = 8.0  # a peer that stays in place for so long counts as stationary
 TOLERANCE_M = 0.1  # added to distances that a robot can choose
+SILENT_S = 1.0  # for which a peer that went silent keeps its cell: by then it is tracked
 _MOVED_M = 0.1
 
 
@@ -23,6 +24,7 @@ class PeerTracker:
 
     Attributes:
         peers: Peers within reach whose state is fresh, extrapolated to now.
+        silent: Peers that went silent a moment ago, extrapolated to now.
         newcomers: Names of peers that came into reach and are not yet in the costmaps.
         stationary: Names of peers that stay: they intend to, or have not moved for long.
         cruise_mps: Speed at which robots are expected to fly.
@@ -44,6 +46,7 @@ class PeerTracker:
     def restart(self) -> None:
         """Forget all peers, after a jump of the clock."""
         self.peers: List[Peer] = []
+        self.silent: List[Peer] = []
         self.newcomers: List[str] = []
         self.stationary: Set[str] = set()
         self._lost: List[str] = []
@@ -70,6 +73,7 @@ class PeerTracker:
             Messages about peers that were lost or came back.
         """
         if not peers and not self.peers and not self._lost:
+            self.silent = []
             return []
         if pose is None:
             peers = ()
@@ -77,14 +81,21 @@ class PeerTracker:
         lost = [peer.name for peer in peers if abs(now_s - peer.stamp_s) > timeout_s]
         messages = self._update_lost(lost, {peer.name for peer in fresh}, timeout_s)
         self.margin_m = margin_m
-        reach_m = self.reach_m
-        self.peers = [
-            peer.extrapolated(now_s)
-            for peer in fresh
-            if pose is not None and math.hypot(peer.x_m - pose.x_m, peer.y_m - pose.y_m) < reach_m
-        ]
+        self.peers = self._in_reach(now_s, pose, fresh)
+        silent = [peer for peer in peers if 0.0 < now_s - peer.stamp_s - timeout_s <= SILENT_S]
+        self.silent = self._in_reach(now_s, pose, silent)
         self._update_stall_timers(now_s)
         return messages
+
+    def _in_reach(self, now_s: float, pose: Optional[Pose2D], peers: Sequence[Peer]) -> List[Peer]:
+        if pose is None:
+            return []
+        reach_m = self.reach_m
+        return [
+            peer.extrapolated(now_s)
+            for peer in peers
+            if math.hypot(peer.x_m - pose.x_m, peer.y_m - pose.y_m) < reach_m
+        ]
 
     def _update_lost(self, lost: List[str], fresh: Set[str], timeout_s: float) -> List[str]:
         """Keep the names of lost peers; return messages about changes."""
