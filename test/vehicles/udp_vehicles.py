@@ -84,6 +84,16 @@ class UdpVehicle:
             getattr(self._link.mav, f"{name.lower()}_send")(**values)
 
 
+def warm_up():
+    """Fly a body for some steps, so that nothing is compiled in flight."""
+    bodies = Bodies()
+    bodies.lift_mps2[0] = 1.0
+    for _ in range(5):
+        bodies.set_velocity(0, 0.1, 0.0, 0.0)
+        bodies.step()
+    bodies.close()
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--scene", default="")
@@ -99,6 +109,7 @@ def main():
         middle = EMPTY.size_x_m / 2.0
         starts = [Pose2D(middle + APART_M * k, middle) for k in range(count)]
         bodies = Bodies(EMPTY, starts, airframes)
+    warm_up()
     links = [UdpVehicle(text, bodies, k) for k, text in enumerate(options.vehicles)]
     vehicles = [link.vehicle for link in links]
     stand_ins = [one for one in vehicles if isinstance(one, StandIn)]
