@@ -123,6 +123,18 @@ def test_the_bridge_passes_on_why_arming_was_refused(autopilot):
     flight.end()
 
 
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_somebody_resumes_after_the_pilot(autopilot):
+    flight, _, _ = failures.fly_row(
+        "the pilot changes the mode", autopilot, 1.0, make_flight=StandInFlight
+    )
+    flight.machine.resume(flight.now_s)
+    assert flight.run(3.0, lambda: flight.state is State.FLYING), flight.news[-1]
+    flight.run(3.0)
+    assert flight.speed_mps > 0.3
+    flight.end()
+
+
 def test_the_bridge_orders_a_cancelled_take_off_again():
     flight = StandInFlight("ardupilot")
     assert flight.run(10.0, lambda: flight.state is State.READY)

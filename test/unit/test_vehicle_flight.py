@@ -101,10 +101,11 @@ def test_no_heartbeat_leaves_while_the_link_is_lost_in_flight(autopilot):
     assert [name for at_s, name, _ in flight.sent if at_s > start_s and name == "HEARTBEAT"] == []
 
 
-def test_a_short_loss_of_the_link_ends_in_flight(autopilot):
+@pytest.mark.parametrize("lost_s", [1.2, 1.5, 2.0, 2.4, 2.7, 3.0])
+def test_a_short_loss_of_the_link_ends_in_flight(autopilot, lost_s):
     flight = Flight(autopilot).to_flight()
     flight.hears = flight.is_heard = False
-    flight.run(2.0)
+    flight.run(lost_s)
     assert flight.state is State.NO_LINK
     flight.hears = flight.is_heard = True
     assert flight.run(2.0, lambda: flight.state is State.FLYING)

@@ -132,6 +132,11 @@ class Inputs:
         self.command = Twist2D()
         self.command_s, self._idle_s = _NEVER_S, now_s
 
+    def restore_link(self, now_s: float) -> None:
+        """Count a late estimate as late only from now on: before, the link was lost."""
+        self._estimate_s = max(self._estimate_s, now_s - ESTIMATE_HOVER_S)
+        self.command_s = min(self.command_s, now_s)
+
     # What the state machine asks.
 
     def link_problem(self, now_s: float) -> str:

@@ -33,8 +33,9 @@ from quad_nav.vehicle.telemetry import Landed, Limits, Velocity
 RETRY_S = 1.0
 """An order that has had no effect is given again after this time."""
 MOST_ORDERS = 4
-STREAM_S = 1.0
-"""Set-points are streamed for this long before an autopilot that wants them takes our control."""
+STREAM_S = 1.5
+"""Set-points are streamed for this long before an autopilot that wants them takes our control; PX4
+wants them for more than 1 s."""
 TAKE_OFF_AGAIN_S = 7.0
 """A take-off that has not left the ground is ordered again; a set-point may have cancelled it."""
 TAKE_OFF_S = 20.0
@@ -237,7 +238,7 @@ class VehicleMachine:
         elif before is State.LANDING and status.is_landing:
             self._enter(State.LANDING, "link restored", now_s)
         elif before in IN_FLIGHT and status.is_controlled:
-            self.inputs.command_s = min(self.inputs.command_s, now_s)
+            self.inputs.restore_link(now_s)
             self._enter(State.HOLDING, "link restored", now_s)
         else:
             self._pauses = True
