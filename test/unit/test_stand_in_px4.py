@@ -123,6 +123,21 @@ def test_the_bridge_passes_on_why_arming_was_refused(autopilot):
     flight.end()
 
 
+@pytest.mark.parametrize("delay_s, loss_share", [(0.3, 0.0), (0.0, 0.2), (0.1, 0.15)])
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_the_bridge_flies_over_a_bad_link(autopilot, delay_s, loss_share):
+    flight = StandInFlight(autopilot, seed=3)
+    vehicle = flight.vehicle
+    vehicle.delay_up_s = vehicle.delay_down_s = delay_s
+    vehicle.loss_share = loss_share
+    flight.to_flight()
+    flight.run(10.0)
+    assert flight.state is State.FLYING and flight.speed_mps > 0.45
+    flight.machine.land(flight.now_s, "asked")
+    assert flight.run(15.0, lambda: flight.state is State.LANDED)
+    flight.end()
+
+
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
 def test_somebody_resumes_after_the_pilot(autopilot):
     flight, _, _ = failures.fly_row(

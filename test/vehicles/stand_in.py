@@ -55,6 +55,7 @@ class StandIn:
         loses_up: Fault: nothing arrives at it.
         delay_down_s: Fault: delay of what it sends.
         delay_up_s: Fault: delay of what it gets.
+        loss_share: Fault: share of the messages that are lost, both ways.
         hides_position: Fault: it sends no position.
         has_ended: Its program has crashed.
     """
@@ -73,7 +74,7 @@ class StandIn:
         self.battery, self.sticks = 97, [1500, 1500, 1500, 1500]
         self.refuses_arming = ""
         self.loses_down = self.loses_up = self.hides_position = self.has_ended = False
-        self.delay_down_s = self.delay_up_s = 0.0
+        self.delay_down_s = self.delay_up_s = self.loss_share = 0.0
         self.setpoints, self.received = [], []
         self.is_critical = False
         self._periods, self._due = {}, {"HEARTBEAT": 0.95, "TIMESYNC": 4.0}
@@ -84,7 +85,7 @@ class StandIn:
     def receive(self, name, fields, sender=(255, 191)):
         """Take a message; it takes effect after the delay of the link."""
         self.received.append(name)
-        if self.loses_up:
+        if self.loses_up or self._random.random() < self.loss_share:
             return
         self._sequence += 1
         due_s = self.now_s + self.delay_up_s
@@ -197,7 +198,7 @@ class StandIn:
 
     def send(self, name, **fields):
         """Send a message; it arrives after the delay of the link, in order."""
-        if self.loses_down or self.has_ended:
+        if self.loses_down or self.has_ended or self._random.random() < self.loss_share:
             return
         low_s, high_s = _LATENCY_S
         share = self._random.random() ** 3  # mostly soon, sometimes late

@@ -72,7 +72,7 @@ class VehicleMachine:
         self._before_loss = State.NO_LINK
         self._state_s = 0.0  # begin of the state
         self._order: Optional[Order] = None  # the one that has not taken effect yet
-        self._order_s, self._orders = -math.inf, 0
+        self._order_s, self._orders, self._is_confirmed = -math.inf, 0, False
         self._grounded_s: Optional[float] = None
         self._wants_control = False  # taken over, and somebody has asked to resume
         self._stops_once = self._pauses = False
@@ -163,6 +163,7 @@ class VehicleMachine:
     def answer(self, answer: Answer, now_s: float) -> None:
         """Take the autopilot's answer to an order."""
         if answer.is_accepted or answer.order is not self._order:
+            self._is_confirmed = answer.order is self._order
             return
         what = f"the autopilot refuses to {answer.order.value}"
         reason = f"{what}: {answer.reason or 'without a reason'}"
@@ -291,10 +292,11 @@ class VehicleMachine:
         if inputs.landed is Landed.IN_AIR:
             self._hold(now_s)
             return self._hover(now_s)
+        again_s = TAKE_OFF_AGAIN_S if self._is_confirmed else RETRY_S
         if self._order is not Order.TAKE_OFF or (
-            inputs.landed is Landed.ON_GROUND and now_s - self._order_s > TAKE_OFF_AGAIN_S
+            inputs.landed is Landed.ON_GROUND and now_s - self._order_s > again_s
         ):
-            self._order = None
+            self._order, self._is_confirmed = None, False
             self._give(Order.TAKE_OFF, now_s)
         return None
 
