@@ -54,7 +54,7 @@ docs: venv  ## The documentation as a site, in site/; warnings are errors
 
 rostest: workspace  ## The tests with a roscore: make rostest TEST=environment
 	@$(if $(if $(TEST),$(filter web_browser,$(TEST)),all),scripts/install_packages --browser)
-	@scripts/make_venv .venv requirements-web.txt requirements-web-test.txt requirements-mavlink.txt
+	@scripts/make_venv .venv requirements-web.txt requirements-web-test.txt requirements-mavlink.txt requirements-crazyflie.txt
 	@scripts/ros_env scripts/rostests $(TEST)
 
 first-hour: workspace  ## What a user does first: an own scene, map, robot, goals and report

@@ -89,6 +89,7 @@ PLACES = {
     "starlette": "web/",
     "uvicorn": "web/",
     "pymavlink": "vehicle/mavlink_link.py",
+    "cflib": "vehicle/crazyflie_link.py",
     "PIL": ("sim/map_image.py", "report/"),
 }
 MESSAGE_SUFFIXES = ("_msgs", "_srvs")

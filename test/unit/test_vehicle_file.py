@@ -79,7 +79,7 @@ vehicles:
         (("14551", "14552"), "two vehicles have the address udpin:127.0.0.1:14552"),
         (("altitude: 1.5", "altitude: 2.4"), "expected 0.3 m or more below limits.height"),
         (("start: [1, 2, 3]", "start: [1, 2, 3], localisation: true"), "start and localisation"),
-        (("obstacle_distance: true", "mount: [0, 0, 0, 0]"), "expected either topic or"),
+        (("obstacle_distance: true", "mount: [0, 0, 0, 0]"), "expected one of topic"),
     ],
 )
 def test_fault(change, text):

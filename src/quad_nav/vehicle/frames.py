@@ -8,6 +8,8 @@ This is the only place of the project where an axis changes its sign or its name
 conversions is its own inverse.
 
 Quaternions of ROS are (x, y, z, w), those of MAVLink (w, x, y, z).
+
+A Crazyflie has ROS's axes, but for the sign of the pitch that it logs.
 """
 
 from __future__ import annotations
@@ -17,7 +19,13 @@ from typing import Any, Optional, Tuple
 
 import numpy as np
 
-from quad_nav.geometry import Quaternion, Scan, multiply_quaternions, normalize_angle
+from quad_nav.geometry import (
+    Quaternion,
+    Scan,
+    multiply_quaternions,
+    normalize_angle,
+    quaternion_from_euler,
+)
 
 Vector = Tuple[float, float, float]
 MavlinkQuaternion = Tuple[float, float, float, float]
@@ -111,6 +119,12 @@ def mavlink_quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Mav
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
+
+
+def crazyflie_quaternion(roll_deg: float, pitch_deg: float, yaw_deg: float) -> Quaternion:
+    """Return a Crazyflie's logged attitude, whose pitch is positive nose up, in ROS's axes."""
+    roll, pitch, yaw = (math.radians(angle) for angle in (roll_deg, -pitch_deg, yaw_deg))
+    return quaternion_from_euler(roll, pitch, yaw)
 
 
 def _with_positive_w(quaternion: Quaternion) -> Quaternion:

@@ -47,11 +47,13 @@ class Traits:
         takes_off_by_command: It has an order for take-off, during which set-points cancel it.
             Otherwise it takes off by set-points that climb.
         needs_arming: It has to be armed.
+        lands_by_itself: It goes on landing without us. Otherwise it lands by set-points that sink.
     """
 
     streams_before_control: bool = False
     takes_off_by_command: bool = True
     needs_arming: bool = True
+    lands_by_itself: bool = True
 
 
 class State(enum.Enum):

@@ -56,6 +56,7 @@ class VehicleMachine:
         ground_m: Height of that place in the odometry frame.
         altitude_m: Flying altitude above it.
         refusal: Why the last take-off was given up before the vehicle left the ground.
+        traits: What is special about the kind of autopilot.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class VehicleMachine:
         self.odom_from_start: Optional[Pose2D] = None
         self.ground_m, self.refusal = 0.0, ""
         self.altitude_m, self._limits = altitude_m, limits
-        self._traits, self._permissions = traits, permissions
+        self.traits, self._permissions = traits, permissions
         self._loop = HeightLoop(climb_mps=limits.climb_mps)
         self._before_loss = State.NO_LINK
         self._state_s = 0.0  # begin of the state
@@ -104,7 +105,7 @@ class VehicleMachine:
             return "; ".join(reasons)
         status = self.inputs.status
         is_armed = status is not None and status.is_armed
-        if self._traits.needs_arming and not (
+        if self.traits.needs_arming and not (
             is_armed or self._permissions.may_arm or self._permissions.is_dry
         ):
             return "the motors are not armed: arm by hand, or start with arm:=true"
@@ -265,13 +266,13 @@ class VehicleMachine:
     def _in_arming(self, now_s: float) -> Optional[Velocity]:
         status = self.inputs.status
         assert status is not None
-        streams = self._traits.streams_before_control
+        streams = self.traits.streams_before_control
         if not status.is_controlled:
             if not streams or now_s - self._state_s >= STREAM_S:
                 self._give(Order.TAKE_CONTROL, now_s)
         elif self._permissions.is_dry:
             self._enter(State.FLYING, "dry run", now_s)
-        elif self._traits.needs_arming and not status.is_armed:
+        elif self.traits.needs_arming and not status.is_armed:
             self._give(Order.ARM, now_s)
         else:
             self._enter(State.TAKING_OFF, "", now_s)
@@ -285,7 +286,7 @@ class VehicleMachine:
         if elapsed_s > TAKE_OFF_S:
             self._land(f"take-off not finished after {TAKE_OFF_S:g} s", now_s)
             return None
-        if not self._traits.takes_off_by_command:
+        if not self.traits.takes_off_by_command:
             if inputs.height_m(self.ground_m) > self.altitude_m - NEAR_M:
                 self._hold(now_s)
             return self._hover(now_s)
@@ -330,7 +331,7 @@ class VehicleMachine:
         assert status is not None
         if not self._wants_control:
             return None
-        streams = self._traits.streams_before_control
+        streams = self.traits.streams_before_control
         if status.is_controlled:
             self._hold(now_s)
             return self._hover(now_s)

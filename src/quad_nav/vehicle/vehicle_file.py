@@ -13,11 +13,18 @@
         limits: {speed: 0.7, climb: 0.3, yaw_rate: 1.0, height: 2.5, radius: 30.0, battery: 0.2}
         lidar: {topic: /scan0, mount: [0.0, 0.0, 0.06, 0.0]}
         failsafes: check           # or set: write the failsafes' parameters
+      - number: 1
+        kind: crazyflie
+        address: radio://0/80/2M/E7E7E7E7E7
+        start: [10.0, 2.0, 3.14]
+        link_lost: falls           # it has no other failsafe; required
+        lidar: {multiranger: true}
 
 ``map -> odom{i}`` is found in one of three ways: ``start``, from which the frame is computed at
 take-off; ``odom: [x, y, z, yaw]``, a fixed pose; or ``localisation: true``, another node publishes
 the transform. A LIDAR is a driver's ``topic``, or ``obstacle_distance: true`` for MAVLink's
-message; without ``lidar`` another node publishes ``/scan{i}``.
+message, or ``multiranger: true`` for the Crazyflie's deck; without ``lidar`` another node publishes
+``/scan{i}``.
 
 A file with a fault is refused as a whole; the ``InputError`` lists every fault.
 """
@@ -36,6 +43,11 @@ from quad_nav.vehicle.telemetry import Limits
 KINDS = ("mavlink", "crazyflie", "simulated")
 AUTOPILOTS = ("ardupilot", "px4")
 FAILSAFES = ("check", "set")
+LINK_LOST = "falls"
+LINK_LOST_PROBLEM = (
+    "a crazyflie that hears nothing stops its motors after 2 s, and nothing else can be set;"
+    f" expected 'link_lost: {LINK_LOST}' to allow that"
+)
 MAX_VEHICLES = 100
 _KEYS = [
     "number",
@@ -51,6 +63,7 @@ _KEYS = [
     "limits",
     "lidar",
     "failsafes",
+    "link_lost",
 ]
 _MOUNT = (0.0, 0.0, 0.06, 0.0)
 _MAX_SYSTEM = 254  # 255 is ours
@@ -63,11 +76,13 @@ class Lidar:
     Attributes:
         topic: Topic of a driver; "" if there is none.
         is_obstacle_distance: Whether scans are made of MAVLink's ``OBSTACLE_DISTANCE``.
+        is_multiranger: Whether scans are made of a Crazyflie's Multi-ranger.
         base_from_lidar: Mount of the LIDAR.
     """
 
     topic: str = ""
     is_obstacle_distance: bool = False
+    is_multiranger: bool = False
     base_from_lidar: Pose3D = Pose3D(*_MOUNT[:3])
 
 
@@ -154,6 +169,8 @@ def _read_vehicle(check: Checker, entry: Any, index: int, has_roof: bool) -> Opt
     problem = limits.height_problem(altitude_m)
     if problem and not check.problems:
         check.fault(f"{place}.altitude", problem)
+    if kind == "crazyflie" and fields.get("link_lost") != LINK_LOST:
+        check.fault(f"{place}.link_lost", LINK_LOST_PROBLEM)
     start, odom = _read_frames(check, fields, place)
     return Vehicle(
         _whole(check, fields, "number", place, None, MAX_VEHICLES - 1),
@@ -222,19 +239,24 @@ def _read_frames(
 def _read_lidar(check: Checker, value: Any, place: str, kind: str) -> Optional[Lidar]:
     if value is None:
         return None
-    fields = check.mapping(value, place, ["topic", "obstacle_distance", "mount"])
+    fields = check.mapping(value, place, ["topic", "obstacle_distance", "multiranger", "mount"])
     if fields is None:
         return None
     is_distance = _flag(check, fields, "obstacle_distance", place, False)
-    if is_distance == ("topic" in fields):
-        check.fault(place, "expected either topic or obstacle_distance: true")
+    is_multiranger = _flag(check, fields, "multiranger", place, False)
+    if is_distance + is_multiranger + ("topic" in fields) != 1:
+        check.fault(place, "expected one of topic, obstacle_distance: true, multiranger: true")
     if is_distance and kind != "mavlink":
         check.fault(f"{place}.obstacle_distance", f"a {kind} vehicle has no such message")
+    if is_multiranger and kind != "crazyflie":
+        check.fault(f"{place}.multiranger", f"a {kind} vehicle has no such deck")
     x_m, y_m, z_m, yaw_rad = (
         check.numbers(fields, "mount", place, 4) if "mount" in fields else _MOUNT
     )
     topic = check.text(fields, "topic", place, "") if "topic" in fields else ""
-    return Lidar(topic, is_distance, Pose3D(x_m, y_m, z_m, quaternion_from_yaw(yaw_rad)))
+    return Lidar(
+        topic, is_distance, is_multiranger, Pose3D(x_m, y_m, z_m, quaternion_from_yaw(yaw_rad))
+    )
 
 
 def _check_numbers(check: Checker, vehicles: List[Vehicle], entries: int) -> None:

@@ -25,7 +25,9 @@ from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.vehicle.topics import MissionPause, VehicleTopics, vehicle_health
 from quad_nav.topics.health import Health
 from quad_nav.topics.validation import CommandLease, twist_problem
+from quad_nav.vehicle import crazyflie_adapter
 from quad_nav.vehicle.autopilots import AUTOPILOTS
+from quad_nav.vehicle.crazyflie_link import CrazyflieLink
 from quad_nav.vehicle.mavlink_link import MavlinkLink
 from quad_nav.vehicle.orders import IN_FLIGHT, Output, Permissions, Response, State
 from quad_nav.vehicle.safety import COMMAND_HOVER_S
@@ -37,7 +39,8 @@ TICK_S = 0.025
 READ_S = 0.1
 STATE_PERIOD_S = 1.0
 TAKE_OFF_WAIT_S = 30.0
-SHUTDOWN_WAIT_S = 2.0
+SHUTDOWN_WAIT_S = 12.0
+"""For a vehicle that needs us until it is down; roslaunch kills nodes after 15 s."""
 LAND_ALL_TOPIC = "/vehicles/land_all"
 _BUSY = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 
@@ -135,7 +138,9 @@ class VehicleNode:
         with self._bridge.lock:
             machine = self._bridge.machine
             status = machine.inputs.status
-            return machine.state in IN_FLIGHT and status is not None and not status.is_landing
+            if machine.state not in IN_FLIGHT or status is None:
+                return False
+            return not (status.is_landing and machine.traits.lands_by_itself)
 
     # The link's thread.
 
@@ -282,10 +287,11 @@ def make_bridge(vehicle: Vehicle, permissions: Permissions, clock: Callable[[], 
     Raises:
         InputError: If a package is missing, or the address cannot be opened.
     """
-    if vehicle.kind != "mavlink":
-        raise InputError([f"{vehicle.name}: kind {vehicle.kind} has no bridge yet"])
-    traits = AUTOPILOTS[vehicle.autopilot].traits
+    is_crazyflie = vehicle.kind == "crazyflie"
+    traits = crazyflie_adapter.TRAITS if is_crazyflie else AUTOPILOTS[vehicle.autopilot].traits
     machine = VehicleMachine(vehicle.altitude_m, vehicle.limits, traits, permissions)
+    if is_crazyflie:
+        return CrazyflieLink(vehicle, machine, clock)
     return MavlinkLink(vehicle, machine, clock)
 
 

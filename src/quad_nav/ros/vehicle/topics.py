@@ -56,7 +56,7 @@ class VehicleTopics:
         lidar, topic = self._vehicle.lidar, f"/scan{self._vehicle.number}"
         if lidar is None or lidar.topic == topic:
             return
-        type_ = ScanMessage if lidar.is_obstacle_distance else LaserScan
+        type_ = LaserScan if lidar.topic else ScanMessage
         self._scan = rospy.Publisher(topic, type_, queue_size=10)
         if lidar.topic:
             self._relay = rospy.Subscriber(lidar.topic, LaserScan, self._pass_on, queue_size=2)
@@ -68,7 +68,7 @@ class VehicleTopics:
             self._scan.publish(message)
 
     def publish_scan(self, scan: Scan) -> None:
-        """Publish a scan of OBSTACLE_DISTANCE; its stamp is monotonic time."""
+        """Publish a scan of the vehicle's own sensors; its stamp is monotonic time."""
         if self._scan is not None:
             self._scan.publish(
                 scan_message(replace(scan, stamp_s=scan.stamp_s + _clock_offset_s()), self._lidar)

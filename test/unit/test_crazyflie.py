@@ -1,0 +1,294 @@
+"""The bridge of a Crazyflie: signs, heights, safety, on a virtual clock."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from vehicles.crazyflie import advance, alone
+
+from quad_nav.geometry import Pose3D, Twist2D
+from quad_nav.sim.simulation import STEP_S
+from quad_nav.vehicle.arrival_clock import ArrivalClock
+from quad_nav.vehicle.crazyflie_adapter import BLOCKS, TRAITS, CrazyflieAdapter
+from quad_nav.vehicle.frames import crazyflie_quaternion
+from quad_nav.vehicle.orders import Permissions, State
+from quad_nav.vehicle.states import VehicleMachine
+from quad_nav.vehicle.telemetry import Limits
+from quad_nav.vehicle.vehicle_file import Lidar, Vehicle
+
+MAY_ARM, AHEAD = Permissions(may_arm=True), Twist2D(0.3, 0.0, 0.0)
+STEPS = 2  # of the simulation, between two ticks of the bridge
+
+
+class Flight:
+    """A bridge and a Crazyflie, which exchange values without delay."""
+
+    def __init__(self, permissions=MAY_ARM, **keywords):
+        limits = Limits(speed_mps=0.7)
+        vehicle = Vehicle(0, "crazyflie", limits=limits, lidar=Lidar(is_multiranger=True))
+        self.machine = VehicleMachine(vehicle.altitude_m, limits, TRAITS, permissions)
+        self.adapter = CrazyflieAdapter(vehicle, self.machine)
+        self.bodies, self.crazyflie = alone(**keywords)
+        self.hears = self.is_heard = True
+        self.command, self.calls, self.news = None, [], []
+        self._due_s = dict.fromkeys(BLOCKS, 0.0)
+        self._next_command_s = 0.0
+        self.adapter.connected(self.crazyflie.parameters)
+
+    @property
+    def now_s(self):
+        return 100.0 + self.bodies.now_s
+
+    @property
+    def state(self):
+        return self.machine.state
+
+    def run(self, seconds, until=None):
+        """Fly; return whether `until` became true."""
+        for _ in range(round(seconds / (STEPS * STEP_S))):
+            self._step()
+            if until is not None and until():
+                return True
+        return until is None
+
+    def _step(self):
+        advance(self.bodies, [self.crazyflie], STEPS * STEP_S)
+        now_s, values = self.now_s, self.crazyflie.values()
+        for name, (period_ms, variables) in BLOCKS.items():
+            if now_s >= self._due_s[name]:
+                self._due_s[name] = now_s + period_ms / 1e3 - 1e-6
+                if self.hears:
+                    shown = {one: values[one] for one in variables}
+                    self.adapter.receive(name, int(now_s * 1e3) % (1 << 24), shown, now_s)
+        calls = []
+        if self.command is not None and now_s >= self._next_command_s:
+            self._next_command_s = now_s + 0.1
+            calls += self.adapter.follow(self.command, now_s)[1]
+        output, more = self.adapter.tick(now_s)
+        self.news += output.news
+        for name, arguments in calls + more:
+            self.calls.append(name)
+            if self.is_heard:
+                getattr(self.crazyflie, name)(*arguments)
+
+    def to_hover(self):
+        assert self.run(5.0, lambda: self.state is State.READY), self.machine.reason
+        assert self.machine.take_off(self.now_s).is_accepted
+        assert self.run(10.0, lambda: self.state is State.HOLDING), self.machine.reason
+        return self
+
+    def to_flight(self, command=AHEAD):
+        self.to_hover().command = command
+        self.run(2.0)
+        assert self.state is State.FLYING
+        return self
+
+
+@pytest.fixture
+def flights():
+    made = []
+
+    def make(*arguments, **keywords):
+        made.append(Flight(*arguments, **keywords))
+        return made[-1]
+
+    yield make
+    for flight in made:
+        flight.bodies.close()
+
+
+def test_from_the_desk_to_the_desk(flights):
+    flight = flights().to_hover()
+    heights = [setpoint[4] for setpoint in flight.crazyflie.setpoints]
+    times = [setpoint[0] for setpoint in flight.crazyflie.setpoints]
+    # It climbs by 0.3 m/s and not in one step.
+    assert np.max(np.diff(heights) / np.diff(times)) == pytest.approx(0.3, abs=0.01)
+    flight.run(2.0)
+    assert flight.crazyflie.height_m == pytest.approx(1.0, abs=0.03)
+    assert flight.machine.land(flight.now_s, "asked").is_accepted
+    assert flight.run(10.0, lambda: flight.state is State.LANDED)
+    flight.run(3.0)
+    assert not flight.crazyflie.is_running
+    assert flight.crazyflie.height_m == pytest.approx(0.0, abs=0.01)
+    assert flight.machine.take_off(flight.now_s).is_accepted  # and again
+    assert flight.run(10.0, lambda: flight.state is State.HOLDING)
+
+
+@pytest.mark.parametrize(
+    "command, setpoint",
+    [
+        (Twist2D(0.3, 0.0, 0.0), (0.3, 0.0, 0.0)),
+        (Twist2D(0.0, 0.3, 0.0), (0.0, 0.3, 0.0)),
+        (Twist2D(0.0, 0.0, 0.5), (0.0, 0.0, 28.6479)),
+        (Twist2D(2.0, 0.0, 3.0), (0.7, 0.0, 57.2958)),  # the limits: 0.7 m/s, 1 rad/s
+    ],
+)
+def test_axes_units_and_limits_of_set_points(flights, command, setpoint):
+    flight = flights().to_flight(command)
+    assert flight.crazyflie.setpoints[-1][1:4] == pytest.approx(setpoint, abs=1e-4)
+    assert flight.crazyflie.setpoints[-1][4] == pytest.approx(1.0, abs=0.001)
+
+
+def test_a_body_goes_where_the_command_says(flights):
+    """Left and counter-clockwise, as its own log tells."""
+    flight = flights().to_flight(Twist2D(0.0, 0.2, 0.3))
+    flight.run(1.0)
+    estimate = flight.adapter.estimate
+    assert estimate.linear_mps[1] == pytest.approx(0.2, abs=0.05)
+    assert estimate.angular_radps[2] == pytest.approx(0.3, abs=0.05)
+    assert estimate.odom_from_base.yaw_rad > 0.3
+
+
+@pytest.mark.parametrize("yaw_deg", range(-180, 181, 30))
+def test_nose_up_is_a_positive_logged_pitch_and_a_negative_pitch_of_ros(yaw_deg):
+    attitude = Pose3D(0.0, 0.0, 0.0, crazyflie_quaternion(0.0, 10.0, yaw_deg))
+    ahead = attitude.compose(Pose3D(1.0, 0.0, 0.0))
+    assert ahead.z_m == pytest.approx(math.sin(math.radians(10.0)))
+    assert (
+        math.atan2(ahead.y_m, ahead.x_m)
+        == pytest.approx(math.remainder(math.radians(yaw_deg), math.tau), abs=1e-9)
+        or abs(yaw_deg) == 180
+    )
+    left = attitude.compose(Pose3D(0.0, 1.0, 0.0))
+    assert left.z_m == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_multi_ranger_is_a_scan_of_four_beams(flights):
+    flight = flights()
+    flight.crazyflie.ranges_mm = [32767, 1200, 800, 0, 300]  # back, right, front, left, up
+    flight.run(0.2)
+    scan = flight.adapter.scan
+    bearings = scan.angle_min_rad + scan.angle_increment_rad * np.arange(4)
+    assert bearings == pytest.approx([-math.pi, -math.pi / 2, 0.0, math.pi / 2])
+    np.testing.assert_array_equal(scan.ranges_m, np.float32([np.inf, 1.2, 0.8, np.nan]))
+
+
+def test_nothing_turns_the_motors_without_permission(flights):
+    flight = flights(Permissions())
+    assert flight.run(5.0, lambda: flight.state is State.READY)
+    response = flight.machine.take_off(flight.now_s)
+    assert not response.is_accepted and "arm:=true" in response.text
+    flight.command = AHEAD
+    flight.run(2.0)
+    assert flight.calls == []
+
+
+def test_a_dry_run_sends_nothing(flights):
+    flight = flights(Permissions(may_arm=True, is_dry=True))
+    assert flight.run(5.0, lambda: flight.state is State.READY)
+    assert flight.machine.take_off(flight.now_s).is_accepted
+    flight.command = AHEAD
+    flight.run(3.0)
+    assert flight.state is State.FLYING and flight.calls == []
+
+
+def test_a_crazyflie_that_has_to_be_armed(flights):
+    flight = flights(arms_itself=False).to_hover()
+    assert flight.calls[0] == "arm"
+
+
+def test_no_commands_hover_then_land(flights):
+    flight = flights().to_flight()
+    flight.command = None
+    assert flight.run(1.0, lambda: flight.state is State.HOLDING)
+    assert flight.run(6.0, lambda: flight.state is State.LANDING)
+    assert flight.run(10.0, lambda: flight.state is State.LANDED)
+    assert flight.crazyflie.height_m < 0.06
+
+
+def test_a_low_battery_lands(flights):
+    flight = flights().to_flight()
+    flight.crazyflie.battery = 10
+    assert flight.run(4.0, lambda: flight.state is State.LANDING)
+    assert "battery" in flight.machine.reason
+
+
+def test_a_frozen_estimate_lands(flights):
+    flight = flights().to_flight()
+    flight.crazyflie.is_frozen = True
+    assert flight.run(5.0, lambda: flight.state is State.LANDING)
+
+
+def test_it_sinks_to_the_ground_when_nothing_is_heard_but_it_hears(flights):
+    flight = flights().to_flight()
+    flight.hears = False
+    assert flight.run(3.0, lambda: flight.state is State.NO_LINK)
+    lowest_m = flight.crazyflie.height_m
+    flight.run(8.0)
+    heights = [setpoint[4] for setpoint in flight.crazyflie.setpoints]
+    assert lowest_m > 0.9 and heights[-1] == pytest.approx(0.0, abs=0.001)
+    assert flight.crazyflie.height_m < 0.06
+    flight.run(10.0)
+    assert not flight.crazyflie.is_running
+
+
+def test_a_link_that_comes_back_goes_on(flights):
+    flight = flights().to_flight()
+    flight.hears = False
+    assert flight.run(3.0, lambda: flight.state is State.NO_LINK)
+    flight.run(0.5)
+    flight.hears = True
+    assert flight.run(1.0, lambda: flight.state is State.FLYING)
+    flight.run(3.0)
+    assert flight.crazyflie.height_m == pytest.approx(1.0, abs=0.05)
+
+
+def test_it_falls_when_it_hears_nothing(flights):
+    """What the file of the vehicles has to allow by `link_lost: falls`."""
+    flight = flights().to_flight()
+    flight.hears = flight.is_heard = False
+    flight.run(1.9)
+    assert flight.crazyflie.is_running
+    flight.run(0.2)
+    assert not flight.crazyflie.is_running
+
+
+def test_a_tumble_ends_the_flight(flights):
+    flight = flights().to_flight()
+    flight.crazyflie.is_tumbled = True
+    assert flight.run(1.0, lambda: flight.state is State.TAKEN_OVER)
+    assert (4, "the firmware has stopped the motors: it is tumbled") in flight.adapter.pop_texts()
+    before = len(flight.crazyflie.setpoints)
+    flight.run(2.0)
+    assert len(flight.crazyflie.setpoints) == before
+
+
+@pytest.mark.parametrize(
+    "parameters, fault",
+    [
+        ({"deck.bcMultiranger": 1}, "no deck that measures the position"),
+        ({"deck.bcFlow2": 1}, "no Multi-ranger deck"),
+    ],
+)
+def test_missing_decks_are_reasons_not_to_fly(flights, parameters, fault):
+    flight = flights()
+    flight.adapter.connected(parameters)
+    flight.run(1.0)
+    assert flight.state is State.NOT_READY and fault in flight.machine.reason
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf])
+def test_numbers_that_are_not_finite_stay_here(flights, broken):
+    flight = flights().to_flight()
+    before = len(flight.crazyflie.setpoints)
+    assert flight.adapter.follow(Twist2D(broken, 0.0, 0.0), flight.now_s) == (False, [])
+    values = {**flight.crazyflie.values(), "stateEstimate.x": broken}
+    estimate = flight.adapter.estimate
+    flight.adapter.receive("pose", 0, values, flight.now_s)
+    assert flight.adapter.estimate is estimate
+    flight.run(1.0)
+    sent = flight.crazyflie.setpoints[before:]
+    assert len(sent) > 10 and np.isfinite(sent).all()
+
+
+def test_stamps_are_on_our_clock_across_the_turn_of_the_counter():
+    """The shortest delay, here 2 ms, stays in the offset."""
+    clock = ArrivalClock()
+    start_ms, delays_s = (1 << 24) - 500, [0.010, 0.002, 0.030, 0.004]
+    for k in range(40):
+        stamp_ms, sent_s = (start_ms + 50 * k) % (1 << 24), 7.0 + 0.05 * k
+        ours_s = clock.ours_s(stamp_ms, sent_s + delays_s[k % 4])
+        if k:
+            assert ours_s == pytest.approx(sent_s + 0.002, abs=1e-9)
