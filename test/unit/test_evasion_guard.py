@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -72,6 +73,13 @@ def test_a_robot_that_follows_a_plan_turns_to_it_while_it_evades(guard):
     plan = np.column_stack([np.zeros(41), np.linspace(0.0, 4.0, 41), np.zeros(41)])
     tick = checked(guard, one_track(1.2, 0.1, -1.0, 0.0), plan=plan, command=Twist2D())
     assert tick.evades and tick.command.vyaw_radps == 1.0  # a quarter turn, at most 1 rad/s
+
+
+def test_a_robot_that_looks_all_around_turns_steadily_while_it_evades(guard):
+    guard.params = replace(guard.params, glance_rad=3.1416)
+    plan = np.column_stack([np.linspace(0.0, 4.0, 41), np.zeros(41), np.zeros(41)])
+    tick = checked(guard, one_track(1.2, 0.1, -1.0, 0.0), plan=plan, command=Twist2D())
+    assert tick.evades and tick.command.vyaw_radps == 1.0  # though it faces the way
 
 
 @pytest.mark.parametrize(

@@ -123,7 +123,7 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
             "glance_rad",
             "radians",
             "A robot that evades looks to both sides of its way by this, for what is hidden from a"
-            " LIDAR that does not see all around.",
+            " LIDAR that does not see all around; at 3.1416 it turns steadily.",
             low=0,
             high=3.1416,
         ),

@@ -54,7 +54,7 @@ class EvasionParams:
         avoid_moving_obstacles: Evade tracked obstacles; False restores upstream behaviour.
         clearance_m: Distance that the robot keeps from where obstacles are predicted.
         glance_rad: Angle by which a robot that evades looks to both sides of its way, for what a
-            LIDAR that does not see all around hides.
+            LIDAR that does not see all around hides; it turns steadily at pi.
         speed_mps: Greatest speed while the robot evades; 0 for that of the local planner.
     """
 

@@ -132,6 +132,8 @@ class EvasionGuard:
         )
 
     def _turn(self, now_s: float, route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:
+        if self.params.glance_rad >= math.pi - _MIN_TURN_RAD:
+            return limits.turn_radps
         aside_rad = self.params.glance_rad * math.sin(now_s * 2.0 * math.pi / _GLANCE_S)
         return _turn(route, pose, limits, aside_rad)
 

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 _PERIOD_S = 0.1  # between two samples of a track
 _EARLIER = 5  # samples between those that have to be alike
-_SCALE_M, _SCALE_MPS = 0.3, 0.35
+_SCALE_M, _SCALE_MPS = 0.5, 0.5  # differences that count as 1
 _BEFORE_S = 5.0
 _MAX_ACCELERATION_MPS2 = 2.5
 _CAPACITY = 40_000  # samples; 200 s of 20 tracks
