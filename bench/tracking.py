@@ -35,9 +35,8 @@ from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
 from quad_nav.sim.motion import SPLINE
 from quad_nav.sim.movers import reach_m
-from quad_nav.tracking.params import TrackerParams
 from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import Tracks
+from quad_nav.tracking.tracks import TrackerParams, Tracks
 
 Floats = NDArray[np.float64]
 

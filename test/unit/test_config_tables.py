@@ -44,7 +44,7 @@ from quad_nav.plan.carrot import CarrotParams
 from quad_nav.plan.global_planner import SearchPlannerParams
 from quad_nav.plan.navfn import NavfnParams
 from quad_nav.recovery import ClearCostmapParams, MoveSlowAndClearParams, RotateParams
-from quad_nav.tracking.params import TrackerParams
+from quad_nav.tracking.tracks import TrackerParams
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameters.md"
 

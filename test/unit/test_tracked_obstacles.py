@@ -15,9 +15,8 @@ from quad_nav.topics.tracked_obstacles import (
     ellipse,
     track_markers,
 )
-from quad_nav.tracking.params import TrackerParams
 from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import Tracks
+from quad_nav.tracking.tracks import TrackerParams, Tracks
 
 COVARIANCE = np.diag([0.04, 0.01, 0.09, 0.16])
 TRACKS = Tracks(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose3D, Scan, quaternion_from_yaw
-from quad_nav.tracking.params import TrackerParams
 from quad_nav.tracking.tracker import ObstacleTracker
+from quad_nav.tracking.tracks import TrackerParams
 
 BEAMS = 512
 STEP_RAD = 2.0 * math.pi / BEAMS

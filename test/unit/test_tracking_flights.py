@@ -18,8 +18,8 @@ from quad_nav.recording.recorder import Recorder
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.scene import Cylinder, MovingObstacle
-from quad_nav.tracking.params import TrackerParams
 from quad_nav.tracking.tracker import ObstacleTracker
+from quad_nav.tracking.tracks import TrackerParams
 
 ROOT = Path(__file__).resolve().parents[2]
 ON = (("fixes/track_moving_obstacles", True),)

@@ -36,7 +36,7 @@ from quad_nav.errors import InputError
 from quad_nav.navigator.control_supervisor import ProgressParams
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.peers.coordinator import PeerParams
-from quad_nav.tracking.params import TrackerParams
+from quad_nav.tracking.tracks import TrackerParams
 
 COSTMAPS = ("global_costmap", "local_costmap")
 # Costmaps look for these upwards too, to the node's level.

@@ -6,7 +6,7 @@ from typing import Tuple
 
 from quad_nav.config.spec import Parameter, double, flag
 from quad_nav.control.evasion import EvasionParams
-from quad_nav.tracking.params import TrackerParams
+from quad_nav.tracking.tracks import TrackerParams
 
 Switch = Tuple[Parameter, Tuple[type, ...]]
 """A parameter of the group and the dataclasses that own it."""

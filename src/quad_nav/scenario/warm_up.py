@@ -33,9 +33,8 @@ from quad_nav.navigator.tick import RobotPoses
 from quad_nav.peers.peer import HIGHEST_PRIORITY, Intention, Peer
 from quad_nav.scenario.assembly import build_navigator
 from quad_nav.tracking.motion_memory import MotionMemory
-from quad_nav.tracking.params import TrackerParams
 from quad_nav.tracking.tracker import ObstacleTracker
-from quad_nav.tracking.tracks import Tracks
+from quad_nav.tracking.tracks import TrackerParams, Tracks
 
 _AHEAD_M = 1.0
 _LIDAR: Dict[str, Any] = {

@@ -30,7 +30,7 @@ from quad_nav.kernels.earlier_scans import (
     compare_scan,
     find_clusters,
 )
-from quad_nav.tracking.params import TrackerParams
+from quad_nav.tracking.tracks import TrackerParams
 
 Floats = NDArray[np.float64]
 Heights = Tuple[float, float]

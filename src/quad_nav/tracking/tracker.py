@@ -26,8 +26,7 @@ from quad_nav.tracking.association import assign
 from quad_nav.tracking.discs import Outlines, Radius, fit, outlines
 from quad_nav.tracking.kalman import Filters
 from quad_nav.tracking.moving_points import Heights, MovingPoints, ScanClusters
-from quad_nav.tracking.params import TrackerParams
-from quad_nav.tracking.tracks import Tracks
+from quad_nav.tracking.tracks import TrackerParams, Tracks
 
 Floats = NDArray[np.float64]
 
