@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from vehicles.crazyflie import advance, alone
+from vehicles.crazyflie import LogBlocks, alone
+from vehicles.stand_in import advance
 
 from quad_nav.geometry import Pose3D, Twist2D
 from quad_nav.sim.simulation import STEP_S
 from quad_nav.vehicle.arrival_clock import ArrivalClock
-from quad_nav.vehicle.crazyflie_adapter import BLOCKS, TRAITS, CrazyflieAdapter
+from quad_nav.vehicle.crazyflie_adapter import TRAITS, CrazyflieAdapter
 from quad_nav.vehicle.frames import crazyflie_quaternion
 from quad_nav.vehicle.orders import Permissions, State
 from quad_nav.vehicle.states import VehicleMachine
@@ -33,7 +34,7 @@ class Flight:
         self.bodies, self.crazyflie = alone(**keywords)
         self.hears = self.is_heard = True
         self.command, self.calls, self.news = None, [], []
-        self._due_s = dict.fromkeys(BLOCKS, 0.0)
+        self._log = LogBlocks(self.crazyflie)
         self._next_command_s = 0.0
         self.adapter.connected(self.crazyflie.parameters)
 
@@ -55,14 +56,10 @@ class Flight:
 
     def _step(self):
         advance(self.bodies, [self.crazyflie], STEPS * STEP_S)
-        now_s, values = self.now_s, self.crazyflie.values()
-        for name, (period_ms, variables) in BLOCKS.items():
-            if now_s >= self._due_s[name]:
-                self._due_s[name] = now_s + period_ms / 1e3 - 1e-6
-                if self.hears:
-                    shown = {one: values[one] for one in variables}
-                    self.adapter.receive(name, int(now_s * 1e3) % (1 << 24), shown, now_s)
-        calls = []
+        now_s, calls = self.now_s, []
+        for block, stamp_ms, values in self._log.due(now_s):
+            if self.hears:
+                self.adapter.receive(block, stamp_ms, values, now_s)
         if self.command is not None and now_s >= self._next_command_s:
             self._next_command_s = now_s + 0.1
             calls += self.adapter.follow(self.command, now_s)[1]

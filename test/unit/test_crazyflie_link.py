@@ -29,7 +29,7 @@ class Desk:
     """A Crazyflie behind a port, and its bridge."""
 
     def __init__(self):
-        self.bodies = Bodies(airframe=AIRFRAME)
+        self.bodies = Bodies(airframes=[AIRFRAME])
         self.crazyflie = Crazyflie(self.bodies)
         self.server = Server(0, self.crazyflie)
         self.is_over = False

@@ -13,7 +13,7 @@ import numpy as np
 from vehicles.bodies import Bodies
 
 from quad_nav.sim.flight import Airframe, AutopilotResponse
-from quad_nav.sim.simulation import STEP_S
+from quad_nav.vehicle.crazyflie_adapter import BLOCKS
 
 AIRFRAME = Airframe(
     response=AutopilotResponse(
@@ -86,7 +86,7 @@ class Crazyflie:
 
     # The firmware.
 
-    def step(self):
+    def before_step(self):
         """Decide the motors for the next step of the bodies."""
         age_s = self.now_s - self._setpoint_s
         if self.is_tumbled or (self._setpoint is not None and age_s > STOP_S):
@@ -149,15 +149,27 @@ class Crazyflie:
         return {name: float(np.float32(value)) for name, value in values.items()}
 
 
-def advance(bodies, crazyflies, seconds):
-    """Let time pass."""
-    for _ in range(round(seconds / STEP_S)):
-        for one in crazyflies:
-            one.step()
-        bodies.step()
+class LogBlocks:
+    """The log blocks of a Crazyflie, each at its period."""
+
+    def __init__(self, crazyflie):
+        self._crazyflie = crazyflie
+        self._due_s = dict.fromkeys(BLOCKS, 0.0)
+
+    def due(self, now_s):
+        """Return (block, stamp in ms, values) of those that are due."""
+        found, values = [], None
+        for name, (period_ms, variables) in BLOCKS.items():
+            if now_s >= self._due_s[name]:
+                self._due_s[name] = now_s + period_ms / 1e3 - 1e-6
+                values = values or self._crazyflie.values()
+                found.append(
+                    (name, int(now_s * 1e3) % (1 << 24), {k: values[k] for k in variables})
+                )
+        return found
 
 
 def alone(**keywords):
     """Return the bodies and a Crazyflie in an empty scene."""
-    bodies = Bodies(airframe=AIRFRAME)
+    bodies = Bodies(airframes=[AIRFRAME])
     return bodies, Crazyflie(bodies, **keywords)

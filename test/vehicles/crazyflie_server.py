@@ -17,7 +17,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from vehicles.bodies import EMPTY, Bodies
-from vehicles.crazyflie import AIRFRAME, Crazyflie, advance
+from vehicles.crazyflie import AIRFRAME, Crazyflie
+from vehicles.stand_in import advance
 
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.scene_file import load_scene
@@ -231,11 +232,11 @@ def main():
     count = len(options.ports)
     if options.scene:
         scene = load_scene(options.scene)
-        bodies = Bodies(scene, scene.starts[:count], AIRFRAME)
+        bodies = Bodies(scene, scene.starts[:count], [AIRFRAME])
     else:
         middle = EMPTY.size_x_m / 2.0
         starts = [Pose2D(middle + APART_M * k, middle) for k in range(count)]
-        bodies = Bodies(EMPTY, starts, AIRFRAME)
+        bodies = Bodies(EMPTY, starts, [AIRFRAME])
     crazyflies = [Crazyflie(bodies, robot) for robot in range(count)]
     servers = [Server(port, one) for port, one in zip(options.ports, crazyflies)]
     fly(bodies, servers, crazyflies)

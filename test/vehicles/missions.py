@@ -4,10 +4,10 @@
     PYTHONPATH=src:test python3 test/vehicles/missions.py [FLIGHTS] [AUTOPILOT]
 
 The navigators and the sequencers are those of offline flights. Their commands go through the
-bridge, as MAVLink's messages, to two stand-ins, from take-off to landing. Navigators and LIDARs see
-the bridge's estimate; contacts are those of the bodies. Each flight is compared with one of the
-simulator with the same seed, start poses and limits of speed, with the airframe `arducopter` and
-with the default one.
+bridge, as MAVLink's messages or a Crazyflie's set-points, to two stand-ins, from take-off to
+landing. Navigators and LIDARs see the bridge's estimate; contacts are those of the bodies. Each
+flight is compared with one of the simulator with the same seed, start poses and limits of speed,
+with the airframe `arducopter` and with the default one.
 
 Exit status: 0 if all flights reach all goals without a contact, hold the altitude within 0.10 m,
 and take at most 10 % longer than the simulator's.
@@ -23,6 +23,8 @@ from types import SimpleNamespace
 
 import numpy as np
 from vehicles.bodies import Bodies
+from vehicles.crazyflie import AIRFRAME as CRAZYFLIE_AIRFRAME
+from vehicles.crazyflie import Crazyflie, LogBlocks
 from vehicles.estimator import LocalFrame
 from vehicles.stand_in import advance
 from vehicles.virtual_flight import AIRFRAMES as BARE_AIRFRAMES
@@ -34,6 +36,7 @@ from quad_nav.mission.summary import summarize
 from quad_nav.offline.flight import Flight
 from quad_nav.sim.flight import AIRFRAMES, BodyState
 from quad_nav.sim.simulation import STEP_S, Simulation
+from quad_nav.vehicle import crazyflie_adapter
 from quad_nav.vehicle.autopilots import AUTOPILOTS
 from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
 from quad_nav.vehicle.orders import Permissions, State
@@ -41,6 +44,7 @@ from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Limits
 from quad_nav.vehicle.vehicle_file import Vehicle
 
+BARE = {**BARE_AIRFRAMES, "crazyflie": CRAZYFLIE_AIRFRAME}
 TICK_STEPS = 6  # 25 ms, as in the node
 TIME_LIMIT_S, GROUND_LIMIT_S = 400.0, 60.0
 MOST_M, MOST_SHARE = 0.10, 1.10
@@ -49,29 +53,14 @@ JITTER_M = 0.3
 
 
 class Bridge:
-    """The bridge of one vehicle, its stand-in, and the messages between them."""
+    """The bridge of one vehicle, its stand-in, and what goes between them."""
 
-    def __init__(self, number, autopilot, bodies, seed, altitude_m):
-        stand_in, safe = STAND_INS[autopilot]
-        heading_rad = 0.7 * seed + 2.0 * number
-        frame = LocalFrame(3.0 * number, -2.0 * number, math.remainder(heading_rad, math.tau))
-        self.vehicle = stand_in(bodies, number, frame, 100 * seed + number, 60.0, safe)
+    traits = crazyflie_adapter.TRAITS
+
+    def __init__(self, number, bodies, altitude_m):
         self.start = bodies.pose(number)
-        vehicle = Vehicle(
-            number, "mavlink", autopilot, altitude_m=altitude_m, limits=LIMITS, has_radio=False
-        )
-        traits = AUTOPILOTS[autopilot].traits
-        self.machine = VehicleMachine(altitude_m, LIMITS, traits, Permissions(may_arm=True))
-        self.adapter = MavlinkAdapter(vehicle, self.machine)
+        self.machine = VehicleMachine(altitude_m, LIMITS, self.traits, Permissions(may_arm=True))
         self.map_from_odom = Pose2D(0.0, 0.0).to_3d()
-
-    def receive(self, now_s):
-        for name, fields in self.vehicle.messages():
-            self.adapter.receive(name, 1, SimpleNamespace(**{"id": 0, **fields}), now_s)
-
-    def send(self, messages):
-        for name, fields in messages:
-            self.vehicle.receive(name, fields)
 
     def tick(self, now_s):
         self.send(self.adapter.tick(now_s)[1])
@@ -93,6 +82,53 @@ class Bridge:
         return np.array([pose.x_m, pose.y_m, pose.z_m, *pose.quaternion, *velocity, *turn])
 
 
+class MavlinkBridge(Bridge):
+    """With MAVLink's messages."""
+
+    def __init__(self, number, autopilot, bodies, seed, altitude_m):
+        self.traits = AUTOPILOTS[autopilot].traits
+        super().__init__(number, bodies, altitude_m)
+        stand_in, safe = STAND_INS[autopilot]
+        heading_rad = 0.7 * seed + 2.0 * number
+        frame = LocalFrame(3.0 * number, -2.0 * number, math.remainder(heading_rad, math.tau))
+        self.vehicle = stand_in(bodies, number, frame, 100 * seed + number, 60.0, safe)
+        vehicle = Vehicle(
+            number, "mavlink", autopilot, altitude_m=altitude_m, limits=LIMITS, has_radio=False
+        )
+        self.adapter = MavlinkAdapter(vehicle, self.machine)
+
+    def receive(self, now_s):
+        for name, fields in self.vehicle.messages():
+            self.adapter.receive(name, 1, SimpleNamespace(**{"id": 0, **fields}), now_s)
+
+    def send(self, messages):
+        for name, fields in messages:
+            self.vehicle.receive(name, fields)
+
+
+class CrazyflieBridge(Bridge):
+    """With log blocks and hover set-points; its local frame begins where it stands."""
+
+    def __init__(self, number, _autopilot, bodies, _seed, altitude_m):
+        super().__init__(number, bodies, altitude_m)
+        self.vehicle = Crazyflie(bodies, number)
+        vehicle = Vehicle(number, "crazyflie", altitude_m=altitude_m, limits=LIMITS)
+        self.adapter = crazyflie_adapter.CrazyflieAdapter(vehicle, self.machine)
+        self.adapter.connected(self.vehicle.parameters)
+        self._log = LogBlocks(self.vehicle)
+
+    def receive(self, now_s):
+        for block, stamp_ms, values in self._log.due(now_s):
+            self.adapter.receive(block, stamp_ms, values, now_s)
+
+    def send(self, calls):
+        for name, arguments in calls:
+            getattr(self.vehicle, name)(*arguments)
+
+
+BRIDGES = {"crazyflie": CrazyflieBridge}
+
+
 class VehicleSimulation(Simulation):
     """The simulation's calls, answered by stand-ins and their bridges in the air."""
 
@@ -102,10 +138,11 @@ class VehicleSimulation(Simulation):
         Raises:
             AssertionError: One does not.
         """
-        self.bodies = Bodies(self.scene, self._starts, [BARE_AIRFRAMES[autopilot]])
+        self.bodies = Bodies(self.scene, self._starts, [BARE[autopilot]])
         altitude_m = self.scene.altitude_m
         self.bridges = [
-            Bridge(k, autopilot, self.bodies, seed, altitude_m) for k in range(self.n_robots)
+            BRIDGES.get(autopilot, MavlinkBridge)(k, autopilot, self.bodies, seed, altitude_m)
+            for k in range(self.n_robots)
         ]
         self.altitudes_m = []
         self._until(lambda machine: machine.state is State.READY)
@@ -241,7 +278,7 @@ def fly_simulated(seed, airframe):
 
 def main():
     flights = int(sys.argv[1]) if len(sys.argv) > 1 else 10
-    autopilots = sys.argv[2:] or list(STAND_INS)
+    autopilots = sys.argv[2:] or list(BARE)
     failed = 0
     for autopilot in autopilots:
         shares, good = {"arducopter": [], "default": []}, 0
