@@ -103,6 +103,11 @@ class MissionRunner:
             self._resets = rospy.Subscriber(RESET_TOPIC, Time, self._on_reset)
 
     @property
+    def _hears_contacts(self) -> bool:
+        """Whether a node publishes contacts, as `vehicles` does if it has the bodies."""
+        return bool(self._contacts.get_num_connections())
+
+    @property
     def is_done(self) -> bool:
         """True when the missions of all robots have ended."""
         return all(thread.is_done for thread in self._threads)
@@ -229,7 +234,7 @@ class MissionRunner:
                 reason=reason,
                 reasons=self._failures,
                 seed=self._seed,
-                contacts_reported=self._setup.simulation,
+                contacts_reported=self._setup.simulation or self._hears_contacts,
             )
         return replace(summary, facts=self._setup.facts)
 
