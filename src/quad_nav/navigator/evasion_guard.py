@@ -84,10 +84,10 @@ class EvasionGuard:
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
             return None
         self._memory.add(tracks)
-        route = self._route(plan, poses.in_global, local_from_global)
-        is_displaced = plan is None and self._is_displaced(poses.in_global)
+        is_displaced = self._is_displaced(plan, poses.in_global)
         if not len(tracks) and not is_displaced:
             return self._end(tick)
+        route = self._route(plan, local_from_global)
         wish = tick.command or Twist2D()
         wish = _return(wish, route[0], poses.in_local, limits) if is_displaced else wish
         around = self._surroundings(poses.in_local, velocity, limits, plan is not None)
@@ -142,17 +142,21 @@ class EvasionGuard:
             tick.command = Twist2D()
         self.is_evading = False
 
-    def _is_displaced(self, pose: Pose2D) -> bool:
-        return self._point is not None and pose.distance_to(self._point) > _AT_POINT_M
-
-    def _route(self, plan: Optional[Floats], pose: Pose2D, local_from_global: Pose2D) -> Floats:
-        """Return the points to fly along in the local costmap's frame, float64[n, 2]."""
+    def _is_displaced(self, plan: Optional[Floats], pose: Pose2D) -> bool:
+        """Keep the point where a robot without a plan stopped; return whether it is elsewhere."""
         if plan is not None and len(plan):
             self._point = None
+            return False
+        self._point = self._point or pose
+        return plan is None and pose.distance_to(self._point) > _AT_POINT_M
+
+    def _route(self, plan: Optional[Floats], local_from_global: Pose2D) -> Floats:
+        """Return the points to fly along in the local costmap's frame, float64[n, 2]."""
+        if self._point is None:
+            assert plan is not None
             rows = np.unique(np.linspace(0, len(plan) - 1, _ROUTE_POINTS).astype(np.int64))
             x, y = np.ascontiguousarray(plan[rows, :2].T)
         else:
-            self._point = self._point or pose
             x, y = np.array([self._point.x_m]), np.array([self._point.y_m])
         return np.column_stack(local_from_global.transform(x, y))
 

@@ -13,7 +13,7 @@ distributed packet switching for local computer networks", Communications of the
 from __future__ import annotations
 
 import math
-from typing import List, Optional
+from typing import List, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ class StandOff:
         """Forget everything, after a jump of the clock."""
         self.stranger: Optional[Floats] = None
         self._seen_s = -math.inf
-        self._trail: List[Floats] = []
+        self._trail: List[Tuple[float, float]] = []
         self._assumed = np.zeros((0, 2))  # path that the stranger is expected to take
         self._held_at = 0.0  # distance along it at which the robot leaves it
         self._until_s = -math.inf
@@ -84,15 +84,19 @@ class StandOff:
             pose: Pose of the robot in ``map``.
             strangers: float64[n, 2], places in ``map`` of what moves now.
         """
-        at = np.array([pose.x_m, pose.y_m])
+        at = (pose.x_m, pose.y_m)
         if not self._trail or math.dist(at, self._trail[-1]) >= _SPACING_M:
             self._trail.append(at)
             del self._trail[: -int(_TRAIL_M / _SPACING_M)]
-        near = strangers[np.hypot(*(strangers - at).T) < _REACH_M]
+        near = strangers
+        if len(strangers):
+            near = strangers[np.hypot(*(strangers - at).T) < _REACH_M]
         if len(near):
             from_m = np.hypot(*(near - (at if self.stranger is None else self.stranger)).T)
             self.stranger, self._seen_s = near[int(from_m.argmin())], now_s
-        elif self._is_known() or now_s > max(self._seen_s + _REMEMBERED_S, self._until_s):
+        elif self.stranger is not None and (
+            self._is_known() or now_s > max(self._seen_s + _REMEMBERED_S, self._until_s)
+        ):
             self.stranger = None
 
     def _is_known(self) -> bool:
@@ -144,7 +148,7 @@ class StandOff:
     def _stranger_path(self, pose: Pose2D) -> Floats:
         """Return the path by which a stranger passes: to the robot, and on where it came from."""
         assert self.stranger is not None
-        points = [self.stranger, np.array([pose.x_m, pose.y_m]), *self._trail[::-1]]
+        points = [self.stranger, (pose.x_m, pose.y_m), *self._trail[::-1]]
         return resample(np.array(points), _SPACING_M)
 
     def _make_room(self, now_s: float, pose: Pose2D, path: Floats) -> Optional[YieldDecision]:
