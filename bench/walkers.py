@@ -156,6 +156,7 @@ def row(name: str, flights: Sequence[WalkersResult]) -> List[str]:
 @click.option("--config", default="moving", show_default=True)
 @click.option("--set", "parameters", multiple=True, help="PATH=VALUE on top of it.")
 @click.option("--seeds", default=10, show_default=True)
+@click.option("--first-seed", default=0, show_default=True)
 @click.option("--people", default=10, show_default=True)
 @click.option("--reacting", is_flag=True, help="People keep away from quadcopters.")
 @click.option("--time-limit", default=300.0, show_default=True, help="Seconds of each flight.")
@@ -165,6 +166,7 @@ def main(
     config: str,
     parameters: Sequence[str],
     seeds: int,
+    first_seed: int,
     people: int,
     reacting: bool,
     time_limit: float,
@@ -174,7 +176,9 @@ def main(
     names, given = names or ("2in12", "8in12", "corridor"), tuple(map(parameter, parameters))
     tasks = [
         (k, Task(name, seed, config, given, people, reacting, time_limit))
-        for k, (name, seed) in enumerate((name, seed) for name in names for seed in range(seeds))
+        for k, (name, seed) in enumerate(
+            (name, seed) for name in names for seed in range(first_seed, first_seed + seeds)
+        )
     ]
     flights: List[WalkersResult] = []
     for _, one in fly_all(LocalWorkers(jobs), fly_task, tasks):
