@@ -157,6 +157,19 @@ _SWITCHES: Tuple[Switch, ...] = (
         (NavigatorParams,),
     ),
     (
+        double(
+            "plan_hysteresis",
+            0.0,
+            "plan_hysteresis_s",
+            "seconds",
+            "The robot takes another way when all plans have led another way for so long; 0 takes"
+            " every new plan.",
+            low=0,
+            high=100,
+        ),
+        (NavigatorParams,),
+    ),
+    (
         flag(
             "predict_goal_turn",
             True,

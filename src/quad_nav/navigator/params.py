@@ -26,6 +26,8 @@ class NavigatorParams:
             restores upstream behaviour, which commands one control period later.
         stop_while_planning: A robot without a plan stops; False restores upstream behaviour,
             which leaves the last command in force.
+        plan_hysteresis_s: The robot takes another way when all plans have led another way for so
+            long; 0 restores upstream behaviour, which takes every new plan.
         progress: Detection of a robot that makes no progress.
         evasion: Evasion of moving obstacles.
     """
@@ -50,5 +52,6 @@ class NavigatorParams:
     escape_collision: bool = True
     command_in_first_cycle: bool = True
     stop_while_planning: bool = True
+    plan_hysteresis_s: float = 0.0
     progress: ProgressParams = ProgressParams()
     evasion: EvasionParams = EvasionParams()
