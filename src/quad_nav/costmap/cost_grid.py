@@ -114,7 +114,10 @@ class CostGrid:
     def resize(self, spec: GridSpec) -> None:
         """Take another size, resolution or position, and forget all costs."""
         self.spec = spec
-        self.costs = np.full(spec.shape, self.default_cost, dtype=np.uint8)
+        if self.default_cost == FREE:
+            self.costs = np.zeros(spec.shape, np.uint8)  # memory from the system, when written to
+        else:
+            self.costs = np.full(spec.shape, self.default_cost, np.uint8)
 
     def reset(self, window: Optional[Window] = None) -> None:
         """Give the window, or everything, the default cost."""

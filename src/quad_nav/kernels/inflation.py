@@ -50,10 +50,10 @@ def inflate(
     their left, lower, right and upper neighbour. A cell keeps the first seed that reaches
     it, so this is close to the exact Euclidean transform and not equal to it.
 
-    Three short cuts change nothing. A neighbour that already waits at the same or a lower rank
-    is not queued again: it would find itself visited. A step back towards the seed is not
-    tried: its rank is lower, so that the neighbour has been visited. Ranks without a cost are
-    not visited.
+    Four short cuts change nothing. Only the rectangle within reach of the seeds is looked at. A
+    neighbour that already waits at the same or a lower rank is not queued again: it would find
+    itself visited. A step back towards the seed is not tried: its rank is lower, so that the
+    neighbour has been visited. Ranks without a cost are not visited.
 
     Args:
         costs: uint8[H, W], changed in place.
@@ -67,8 +67,13 @@ def inflate(
     """
     shift, beyond, side = ranks.shift, ranks.costs.shape[0], ranks.states.shape[0]
     reach = side - 2
-    low_x, low_y = max(0, x0 - reach), max(0, y0 - reach)
-    high_x, high_y = min(costs.shape[1], xn + reach), min(costs.shape[0], yn + reach)
+    seeds = _seeds(costs, x0, xn, y0, yn)
+    if len(seeds) == 0:
+        return
+    rows, columns = seeds[:, 0], seeds[:, 1]
+    low_x, low_y = max(0, columns.min() - reach), max(0, rows[0] - reach)
+    high_x = min(costs.shape[1], columns.max() + 1 + reach)
+    high_y = min(costs.shape[0], rows[-1] + 1 + reach)
     # Copies with a border of visited cells save the test for the grid's end.
     height, pitch = high_y - low_y + 2, high_x - low_x + 2
     near_2d = np.zeros((height, pitch), np.uint8)
@@ -78,16 +83,16 @@ def inflate(
         _copy(costs[low_y + y - 1, low_x:high_x], near_2d[y, 1 : pitch - 1])
         states_2d[y, 1 : pitch - 1] = unreached
     near, states, table = near_2d.reshape(-1), states_2d.reshape(-1), ranks.states.reshape(-1)
-    seeds = _seeds(near_2d, x0 - low_x + 1, xn - low_x + 1, y0 - low_y + 1, yn - low_y + 1)
     # Next and cell; the first entries are heads of the ranks' lists. Memory is taken from the
     # system as far as it is written to.
-    most = seeds.size + 4 * min(near.size, seeds.size * (2 * reach + 1) ** 2)
+    most = len(seeds) + 4 * min(near.size, len(seeds) * (2 * reach + 1) ** 2)
     queue = np.empty((beyond + most, 2), np.int32)
     last = np.empty(beyond, np.int32)
     for rank in range(beyond):
         queue[rank, 0], last[rank] = -1, rank
     end = beyond
-    for cell in seeds:
+    for k in range(len(seeds)):
+        cell = (rows[k] - low_y + 1) * pitch + columns[k] - low_x + 1
         states[cell] = _LEFT | _LOWER | _RIGHT | _UPPER
         end = _append(queue, last, end, 0, cell)
     payload = (1 << shift) - 1
@@ -136,11 +141,11 @@ def _copy(source: NDArray[np.uint8], target: NDArray[np.uint8]) -> None:
 
 @njit(cache=True, nogil=True)
 def _seeds(costs: NDArray[np.uint8], x0: int, xn: int, y0: int, yn: int) -> NDArray[np.int64]:
-    """Return the flat indices, int64[s], of a window's lethal cells, in row order."""
+    """Return row and column, int64[s, 2], of a window's lethal cells, in row order."""
     in_row = np.zeros(yn - y0, np.int64)
     for y in range(y0, yn):
         in_row[y - y0] = _count_lethal(costs[y, x0:xn])
-    seeds = np.empty(in_row.sum(), np.int64)
+    seeds = np.empty((in_row.sum(), 2), np.int64)
     count = 0
     for y in range(y0, yn):
         if in_row[y - y0] == 0:
@@ -151,7 +156,7 @@ def _seeds(costs: NDArray[np.uint8], x0: int, xn: int, y0: int, yn: int) -> NDAr
                 continue
             for x in range(part.size):
                 if part[x] == LETHAL:
-                    seeds[count] = y * costs.shape[1] + begin + x
+                    seeds[count, 0], seeds[count, 1] = y, begin + x
                     count += 1
     return seeds
 
