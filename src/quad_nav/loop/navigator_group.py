@@ -26,6 +26,9 @@ from quad_nav.loop import LoopSetup
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.peers.links import PeerLinks
 from quad_nav.peers.peer import Intention, Peer, idle_priority
+from quad_nav.plan.global_planner import SearchPlanner
+from quad_nav.plan.navfn import Navfn
+from quad_nav.plan.wavefront import Wavefront
 from quad_nav.scenario.assembly import build_navigator
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
@@ -220,6 +223,7 @@ class NavigatorGroup:
         self.lidar_enabled = np.ones(len(setup.names), dtype=bool)
         self.intentions = [Intention(idle_priority(n)) for n in range(len(setup.names))]
         self.last_scans: Dict[int, LocatedScan] = {}
+        self._wave = Wavefront()
         self.robots = {number: self.new_robot(number) for number in robots}
         self.set_maps()
 
@@ -231,8 +235,12 @@ class NavigatorGroup:
             maps.set_map_of(robot.navigator.local_costmap)
 
     def new_robot(self, number: int) -> LoopRobot:
-        """Build a robot's navigator."""
-        return LoopRobot(self.setup.configurations[number], number, self._frames, self._start_s)
+        """Build a robot's navigator; the planners of the group share their working memory."""
+        robot = LoopRobot(self.setup.configurations[number], number, self._frames, self._start_s)
+        planner = robot.navigator.planner
+        if isinstance(planner, (Navfn, SearchPlanner)):
+            planner.wave = self._wave
+        return robot
 
     def scan(self, now_s: float, states: RobotStates) -> Dict[int, LocatedScan]:
         """Take a scan with each LIDAR that is on and pass it to the robot's navigator.

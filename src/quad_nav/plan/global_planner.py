@@ -76,12 +76,14 @@ class SearchPlanner:
         params: Parameters.
         potential: Potential of the last plan, float32[H, W], 1e10 where the search did not
             come; None before the first plan. The next plan overwrites it.
+        wave: Working memory. Planners that one thread runs may share it: each plan overwrites the
+            potential of the last one.
     """
 
     def __init__(self, params: SearchPlannerParams = SearchPlannerParams()) -> None:
         self.params = params
         self.potential: Optional[NDArray[np.float32]] = None
-        self._wave = Wavefront()
+        self.wave = Wavefront()
 
     def make_plan(
         self, spec: GridSpec, costs: NDArray[np.uint8], start: Pose2D, goal: Pose2D
@@ -176,7 +178,7 @@ class SearchPlanner:
                 goal_flat,
                 params.use_quadratic,
             )
-            self._wave.note_change(goal_flat, 2)
+            self.wave.note_change(goal_flat, 2)
         self.potential = potential.reshape(costs.shape)
         path = np.empty((4 * costs.size, 2), dtype=np.float32)
         if not arrived:
@@ -189,7 +191,7 @@ class SearchPlanner:
     ) -> Tuple[NDArray[np.float32], bool]:
         params, size_x = self.params, costs.shape[1]
         source = _flat(start, size_x)
-        potential = self._wave.begin((costs.shape[0], size_x)).ravel()
+        potential = self.wave.begin((costs.shape[0], size_x)).ravel()
         if params.old_navfn_behavior:
             front = wavefront.start_at_cell(potential, source, size_x)
         else:
@@ -201,7 +203,7 @@ class SearchPlanner:
                 _hundredths(start[1]),
                 params.neutral_cost,
             )
-        arrived = self._wave.spread(
+        arrived = self.wave.spread(
             costs, front, wave_params(params), source, _flat(goal, size_x), 2 * costs.size
         )
         return potential, arrived
@@ -210,8 +212,8 @@ class SearchPlanner:
         self, costs: NDArray[np.uint8], start: Point, goal: Point
     ) -> Tuple[NDArray[np.float32], bool]:
         params, size_x = self.params, costs.shape[1]
-        potential = self._wave.begin((costs.shape[0], size_x)).ravel()
-        self._wave.note_change(0, costs.size)
+        potential = self.wave.begin((costs.shape[0], size_x)).ravel()
+        self.wave.note_change(0, costs.size)
         arrived = kernel.a_star(
             byte_costs(costs, params),
             _enterable(costs, params),

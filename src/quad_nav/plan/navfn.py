@@ -51,12 +51,14 @@ class Navfn:
 
     Attributes:
         params: Parameters.
+        wave: Working memory. Planners that one thread runs may share it: each plan overwrites the
+            potential of the last one.
     """
 
     def __init__(self, params: NavfnParams = NavfnParams()) -> None:
         self.params = params
         self._potential: Optional[NDArray[np.float32]] = None
-        self._wave = Wavefront()
+        self.wave = Wavefront()
         self._not_spread: Optional[Tuple[NDArray[np.uint8], Cell, Cell]] = None
 
     @property
@@ -126,7 +128,7 @@ class Navfn:
     def _spread(self, costs: NDArray[np.uint8], start: Cell, goal: Cell) -> NDArray[np.float32]:
         """Return the potential, float32[H, W], of a wave from a start to a goal."""
         self._not_spread = None
-        return _spread(self._wave, costs, _WAVES[bool(self.params.allow_unknown)], start, goal)
+        return _spread(self.wave, costs, _WAVES[bool(self.params.allow_unknown)], start, goal)
 
     def _reached_pose_near(self, spec: GridSpec, goal: Pose2D) -> Optional[Pose2D]:
         """Return the reached point nearest to the goal, on a square lattice around it."""
