@@ -70,6 +70,10 @@ def test_obstacles_reach_into_a_window_from_one_radius_around_it():
     assert costs[0].tolist() == [253, 254, 253, 126, 63, 0, 0, 0, 0, 254]
 
 
+def test_no_obstacle_no_change():
+    assert picture(inflated(".?.\n...")) == drawn(".?.\n...")
+
+
 def test_no_radius_no_change():
     params = InflationLayerParams(inflation_radius_m=0.0)
     assert picture(inflated("..#..", params)) == drawn("..#..")

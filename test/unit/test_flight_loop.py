@@ -159,6 +159,15 @@ def test_single_steps_give_the_same_flight(setup):
     stepped.close()
 
 
+def test_planners_of_a_group_share_their_working_memory(setup):
+    loop = FlightLoop(setup, [(0, 1)])
+
+    first, second = (robot.navigator.planner for robot in loop.group.robots.values())
+
+    loop.close()
+    assert first.wave is second.wave
+
+
 def test_a_robot_of_no_share_is_flown_from_outside(setup):
     loop = started(setup, [(1,)])
     assert loop.hosted == (1,)

@@ -190,6 +190,18 @@ def test_long_path_is_cut_at_the_robot_end():
     assert plan[-1].tolist() == [1.5, 30.5, 0.7]
 
 
+def test_planners_that_share_a_wave_plan_as_with_their_own():
+    spec, first, second = GridSpec(7, 3, 1.0), Navfn(), Navfn()
+    second.wave = first.wave
+
+    there = first.make_plan(spec, costs_of(CORRIDOR), Pose2D(1.5, 1.5), Pose2D(5.5, 1.5))
+    back = second.make_plan(spec, costs_of(CORRIDOR), Pose2D(5.5, 1.5), Pose2D(1.5, 1.5))
+
+    assert there[:, 0].tolist() == [1, 2, 3, 4, 5, 5.5]
+    assert back[:, 0].tolist() == [5, 4, 3, 2, 1, 1.5]
+    assert first.potential is second.potential
+
+
 def test_potential_stays_readable():
     planner = Navfn()
     assert planner.potential is None
