@@ -6,81 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from vehicles.crazyflie import LogBlocks, alone
-from vehicles.stand_in import advance
+from vehicles import crazyflie_failures
+from vehicles.crazyflie_flight import AHEAD, CrazyflieFlight
 
 from quad_nav.geometry import Pose3D, Twist2D
-from quad_nav.sim.simulation import STEP_S
 from quad_nav.vehicle.arrival_clock import ArrivalClock
-from quad_nav.vehicle.crazyflie_adapter import TRAITS, CrazyflieAdapter
 from quad_nav.vehicle.frames import crazyflie_quaternion
 from quad_nav.vehicle.orders import Permissions, State
-from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Lidar, Vehicle
-
-MAY_ARM, AHEAD = Permissions(may_arm=True), Twist2D(0.3, 0.0, 0.0)
-STEPS = 2  # of the simulation, between two ticks of the bridge
-
-
-class Flight:
-    """A bridge and a Crazyflie, which exchange values without delay."""
-
-    def __init__(self, permissions=MAY_ARM, **keywords):
-        limits = Limits(speed_mps=0.7)
-        vehicle = Vehicle(0, "crazyflie", limits=limits, lidar=Lidar(is_multiranger=True))
-        self.machine = VehicleMachine(vehicle.altitude_m, limits, TRAITS, permissions)
-        self.adapter = CrazyflieAdapter(vehicle, self.machine)
-        self.bodies, self.crazyflie = alone(**keywords)
-        self.hears = self.is_heard = True
-        self.command, self.calls, self.news = None, [], []
-        self._log = LogBlocks(self.crazyflie)
-        self._next_command_s = 0.0
-        self.adapter.connected(self.crazyflie.parameters)
-
-    @property
-    def now_s(self):
-        return 100.0 + self.bodies.now_s
-
-    @property
-    def state(self):
-        return self.machine.state
-
-    def run(self, seconds, until=None):
-        """Fly; return whether `until` became true."""
-        for _ in range(round(seconds / (STEPS * STEP_S))):
-            self._step()
-            if until is not None and until():
-                return True
-        return until is None
-
-    def _step(self):
-        advance(self.bodies, [self.crazyflie], STEPS * STEP_S)
-        now_s, calls = self.now_s, []
-        for block, stamp_ms, values in self._log.due(now_s):
-            if self.hears:
-                self.adapter.receive(block, stamp_ms, values, now_s)
-        if self.command is not None and now_s >= self._next_command_s:
-            self._next_command_s = now_s + 0.1
-            calls += self.adapter.follow(self.command, now_s)[1]
-        output, more = self.adapter.tick(now_s)
-        self.news += output.news
-        for name, arguments in calls + more:
-            self.calls.append(name)
-            if self.is_heard:
-                getattr(self.crazyflie, name)(*arguments)
-
-    def to_hover(self):
-        assert self.run(5.0, lambda: self.state is State.READY), self.machine.reason
-        assert self.machine.take_off(self.now_s).is_accepted
-        assert self.run(10.0, lambda: self.state is State.HOLDING), self.machine.reason
-        return self
-
-    def to_flight(self, command=AHEAD):
-        self.to_hover().command = command
-        self.run(2.0)
-        assert self.state is State.FLYING
-        return self
 
 
 @pytest.fixture
@@ -88,7 +20,7 @@ def flights():
     made = []
 
     def make(*arguments, **keywords):
-        made.append(Flight(*arguments, **keywords))
+        made.append(CrazyflieFlight(*arguments, **keywords))
         return made[-1]
 
     yield make
@@ -186,26 +118,16 @@ def test_a_crazyflie_that_has_to_be_armed(flights):
     assert flight.calls[0] == "arm"
 
 
-def test_no_commands_hover_then_land(flights):
+@pytest.mark.parametrize("row", crazyflie_failures.ROWS)
+def test_each_failure(row):
+    crazyflie_failures.fly_row(row, 0.5)
+
+
+def test_it_lands_without_commands(flights):
     flight = flights().to_flight()
     flight.command = None
-    assert flight.run(1.0, lambda: flight.state is State.HOLDING)
-    assert flight.run(6.0, lambda: flight.state is State.LANDING)
-    assert flight.run(10.0, lambda: flight.state is State.LANDED)
+    assert flight.run(15.0, lambda: flight.state is State.LANDED)
     assert flight.crazyflie.height_m < 0.06
-
-
-def test_a_low_battery_lands(flights):
-    flight = flights().to_flight()
-    flight.crazyflie.battery = 10
-    assert flight.run(4.0, lambda: flight.state is State.LANDING)
-    assert "battery" in flight.machine.reason
-
-
-def test_a_frozen_estimate_lands(flights):
-    flight = flights().to_flight()
-    flight.crazyflie.is_frozen = True
-    assert flight.run(5.0, lambda: flight.state is State.LANDING)
 
 
 def test_it_sinks_to_the_ground_when_nothing_is_heard_but_it_hears(flights):

@@ -37,6 +37,7 @@ class Crazyflie:
         parameters: Values by their complete names.
         ranges_mm: Back, right, front, left and up.
         is_frozen: Fault: the estimate stays what it was.
+        shift_m: Fault: a jump of the estimate along x.
         is_tumbled: Fault: it lies upside down.
         battery: Charge in per cent.
         setpoints: Set-points that have come: (time, vx, vy, yaw rate, z).
@@ -48,6 +49,7 @@ class Crazyflie:
         self.parameters = {"deck.bcFlow2": 1, "deck.bcMultiranger": 1}
         self.ranges_mm = [32767, 1200, 800, 2500, 32767]
         self.is_frozen, self.is_tumbled, self.battery = False, False, 90
+        self.shift_m = 0.0
         self.setpoints = []
         self._held = None
         self._is_armed, self._is_stopped = arms_itself, False
@@ -133,7 +135,7 @@ class Crazyflie:
         pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
         yaw = math.remainder(pose.yaw_rad - start.yaw_rad, math.tau)
         estimate = {
-            "x": cos * x_m + sin * y_m,
+            "x": cos * x_m + sin * y_m + self.shift_m,
             "y": cos * y_m - sin * x_m,
             "z": self.height_m,
             "vx": cos * vx + sin * vy,
