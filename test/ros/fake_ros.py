@@ -8,6 +8,7 @@ does, and always have a subscriber. The clock stands still until `set_time`.
 from __future__ import annotations
 
 import collections
+import contextlib
 import io
 import logging
 from typing import Any, Callable, Dict, List, Optional, Tuple
@@ -115,6 +116,7 @@ class FakeRos:
     def __init__(self, node: str) -> None:
         self._parameters: Dict[str, Any] = {}
         self.log = Lines()
+        self.exit_stack = contextlib.ExitStack()  # what a node under test undoes at the end
         self._patches = [
             mock.patch.object(rospy, name, value)
             for name, value in {
@@ -153,6 +155,7 @@ class FakeRos:
         return self
 
     def __exit__(self, *_: Any) -> None:
+        self.exit_stack.close()
         self._logger.handlers, self._logger.propagate = self._handlers, True
         self._logger.filters = self._filters
         for patch in self._patches:

@@ -16,6 +16,7 @@ import rostest
 from hostile_messages import feed
 from hostile_navigators import Navigators
 from hostile_nodes import SequencerNode, Simulator
+from hostile_vehicles import FleetUnderTest, VehicleUnderTest
 
 COUNT = int(os.environ.get("QUAD_MESSAGES", "500"))
 
@@ -40,6 +41,12 @@ class GeneratedMessages(unittest.TestCase):
         folder = Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, folder)
         self.check("/sequencer", partial(SequencerNode, folder=folder))
+
+    def test_vehicle(self):
+        self.check("/vehicle0", VehicleUnderTest)
+
+    def test_vehicles(self):
+        self.check("/vehicles", FleetUnderTest)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,16 @@ from std_msgs.msg import Empty, String
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from quad_nav.errors import InputError, printable
-from quad_nav.files.values import BOOLEAN, Rule, choice, number, optional_text, text, value_faults
+from quad_nav.files.values import (
+    BOOLEAN,
+    Rule,
+    choice,
+    is_whole,
+    number,
+    optional_text,
+    text,
+    value_faults,
+)
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.vehicle.node import LAND_ALL_TOPIC
 from quad_nav.ros.vehicle.scene_topics import SceneLidars, SceneTopics
@@ -94,7 +103,7 @@ class VehicleFleet:
         """Land when the last robot has flown all its goals."""
         event = from_text(message.data) or {}
         robot = event.get("robot")
-        if not isinstance(robot, int):
+        if not (is_whole(robot) and 0 <= robot < self._robots):
             return
         if event.get("event") != "done":
             self._done.discard(robot)
