@@ -153,7 +153,7 @@ def _ranked(squared: NDArray[np.int64], cost_table: NDArray[np.uint8], radius_ce
         cost_table: uint8[n, n], their costs.
         radius_cells: Inflation radius.
     """
-    distances, ranks = np.unique(squared, return_inverse=True)
+    distances, ranks = np.unique(squared.ravel(), return_inverse=True)
     costs = np.zeros(len(distances), np.uint8)
     costs[ranks] = cost_table.ravel()
     costs = np.trim_zeros(costs[distances <= radius_cells**2], "b")
