@@ -54,6 +54,9 @@ class Crazyflies(unittest.TestCase):
         twist = self.odometry[number].twist.twist.linear
         return math.hypot(twist.x, twist.y)
 
+    def height_errors(self):
+        return [abs(one.pose.pose.position.z - 1.0) for one in self.odometry.values()]
+
     def wait(self, condition, what):
         end_s = time.monotonic() + PATIENCE_S
         while not condition():
@@ -64,8 +67,7 @@ class Crazyflies(unittest.TestCase):
     def test_a_flight(self):
         self.wait(lambda: self.states() == ["flying"] * 2, "flight of both")
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "motion of both")
-        for message in self.odometry.values():
-            self.assertAlmostEqual(message.pose.pose.position.z, 1.0, delta=0.1)
+        self.wait(lambda: max(self.height_errors()) < 0.05, "altitude of both")
         publisher = rospy.Publisher("/vehicles/land_all", Empty, queue_size=1)
         self.wait(lambda: publisher.get_num_connections() == 2, "subscribers")
         publisher.publish(Empty())

@@ -86,8 +86,9 @@ def test_a_flight_through_cflib(desk):
     assert desk.crazyflie.height_m == pytest.approx(0.5, abs=0.16)
     desk.command = Twist2D(0.2, 0.1, 0.4)
     desk.until(lambda: desk.link.estimate.odom_from_base.yaw_rad > 0.4)
-    assert desk.crazyflie.setpoints[-1][1:4] == pytest.approx((0.2, 0.1, 22.9183), abs=1e-3)
-    assert desk.link.estimate.linear_mps[0] == pytest.approx(0.2, abs=0.1)
+    flown = pytest.approx((0.2, 0.1, 22.9183), abs=1e-3)
+    desk.until(lambda: desk.crazyflie.setpoints[-1][1:4] == flown)
+    desk.until(lambda: desk.link.estimate.linear_mps[0] == pytest.approx(0.2, abs=0.05))
     assert desk.link.scan.ranges_m[2] == pytest.approx(0.8)
     age_s = time.monotonic() - desk.link.estimate.stamp_s
     assert 0.0 <= age_s < 5.0
