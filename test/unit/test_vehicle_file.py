@@ -86,11 +86,36 @@ def test_fault(change, text):
     assert any(text in line for line in faults(GOOD.replace(*change)))
 
 
-def test_the_test_file_and_the_documents_files_load(tmp_path):
-    assert len(load_vehicles(ROOT / "test/ros/two_vehicles.yaml")) == 2
+CRAZYFLIE = """
+vehicles:
+  - {number: 0, kind: crazyflie, address: "radio://0/80/2M", link_lost: falls, start: [1, 2, 3],
+     lidar: {multiranger: true}}
+"""
+
+
+def test_a_crazyflie():
+    (vehicle,) = read(CRAZYFLIE)
+    assert vehicle.kind == "crazyflie" and vehicle.lidar.is_multiranger
+
+
+@pytest.mark.parametrize(
+    "change, text",
+    [
+        ((" link_lost: falls,", ""), "vehicles[0].link_lost: a crazyflie that hears nothing stops"),
+        (("kind: crazyflie", "kind: mavlink"), "a mavlink vehicle has no such deck"),
+        (("multiranger", "obstacle_distance"), "a crazyflie vehicle has no such message"),
+    ],
+)
+def test_fault_of_a_crazyflie(change, text):
+    assert any(text in line for line in faults(CRAZYFLIE.replace(*change)))
+
+
+def test_the_test_files_and_the_documents_files_load(tmp_path):
+    for name in ("two_vehicles", "mixed_vehicles", "two_crazyflies"):
+        assert len(load_vehicles(ROOT / f"test/ros/{name}.yaml")) == 2
     page = (ROOT / "docs/vehicles.md").read_text()
     blocks = [part.split("```")[0] for part in page.split("```yaml\n")[1:]]
-    assert len(blocks) == 2
+    assert len(blocks) == 4
     for block in blocks:
         indent = len(block) - len(block.lstrip(" "))
         lines = "\n".join(line[indent:] for line in block.splitlines())
