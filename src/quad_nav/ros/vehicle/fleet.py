@@ -20,7 +20,6 @@ from quad_nav.files.values import (
     BOOLEAN,
     Rule,
     choice,
-    is_whole,
     number,
     optional_text,
     text,
@@ -103,7 +102,7 @@ class VehicleFleet:
         """Land when the last robot has flown all its goals."""
         event = from_text(message.data) or {}
         robot = event.get("robot")
-        if not (is_whole(robot) and 0 <= robot < self._robots):
+        if not isinstance(robot, int) or not 0 <= robot < self._robots:
             return
         if event.get("event") != "done":
             self._done.discard(robot)
