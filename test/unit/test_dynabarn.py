@@ -129,6 +129,16 @@ def test_the_speed_limit(worlds, given, limit):
     assert setup.contestant.simulation.flight.max_speed_mps == limit
 
 
+@pytest.mark.parametrize(
+    "given, speed", [((), 0.0), ((("fixes/moving_obstacle_evasion_speed", 0.4),), 0.4)]
+)
+def test_evasions_keep_to_the_speed_limit(worlds, given, speed):
+    """`config/moving` evades at up to 1 m/s."""
+    asked = options(worlds, config="moving", parameters=given)
+    setup = read_dynamic_setup(asked, "spline", 0.5)
+    assert setup.contestant.configuration.navigator.evasion.speed_mps == speed
+
+
 def test_a_free_way_is_a_success(worlds):
     """19 m to fly at 0.5 m/s: 38 s, and a little for starting."""
     setup = read_dynamic_setup(options(worlds, only=(3,)), "linear", 0.5)
