@@ -10,6 +10,8 @@ from quad_nav.scenario.simulator_setup import read_setup
 from quad_nav.sim.flight import AIRFRAMES, Airframe, AutopilotResponse, airframe_name
 from quad_nav.sim.scene import Scene, Walls
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation, SimulationParams
+from quad_nav.vehicle.autopilots import ARDUPILOT
+from quad_nav.vehicle.setpoints import PERIOD_S
 
 ROOM = Scene("room", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(30.0, 30.0, 0.0),))
 NARROW = Scene("narrow", 60.0, 60.0, 1.0, Walls(), (), (Pose2D(59.0, 30.0, 0.0),))
@@ -101,6 +103,11 @@ def test_stream_while_turning_lags_behind_the_heading(repeat_s, sent, turn_lead_
     angle_deg = math.degrees(math.atan2(twist.vy_mps, twist.vx_mps))
     # Recorded: 18 degrees at 20 Hz. The model: 0.5 rad/s times (delay + lag + half a period).
     assert angle_deg == pytest.approx(-lag_deg, abs=2.0)
+
+
+def test_the_bridge_in_the_airframe_is_that_of_real_vehicles():
+    response = AIRFRAMES["arducopter"].response
+    assert (response.repeat_s, response.turn_lead_s) == (PERIOD_S, ARDUPILOT.turn_lead_s)
 
 
 def test_hovers_when_commands_time_out():

@@ -39,7 +39,6 @@ _REOPEN_S = 1.0
 _SILENT_S, _CONNECT_S = 3.0, 60.0
 """A connection without data, and one that does not come about, are given up after these times."""
 _WANTED = (*POSITIONING, MULTIRANGER)
-_drivers: List[bool] = []
 
 
 class CrazyflieLink:
@@ -72,9 +71,8 @@ class CrazyflieLink:
                     " (Python 3.10 or later)"
                 ]
             )
-        if not _drivers:
+        if not cflib.crtp.CLASSES:
             cflib.crtp.init_drivers()
-            _drivers.append(True)
         self.adapter = CrazyflieAdapter(vehicle, machine)
         self.lock = Lock()
         self._vehicle, self._clock = vehicle, clock

@@ -164,7 +164,7 @@ class VehicleMachine:
     def answer(self, answer: Answer, now_s: float) -> None:
         """Take the autopilot's answer to an order."""
         if answer.is_accepted or answer.order is not self._order:
-            self._is_confirmed = answer.order is self._order
+            self._is_confirmed |= answer.order is self._order
             return
         what = f"the autopilot refuses to {answer.order.value}"
         reason = f"{what}: {answer.reason or 'without a reason'}"
