@@ -18,11 +18,12 @@ from typing import Callable, Dict, List, Mapping, Optional, Tuple
 
 import numpy as np
 
-from quad_nav.geometry import Pose3D, Scan, Twist2D, rotate
+from quad_nav.geometry import Pose3D, Scan, rotate
+from quad_nav.vehicle.adapter import VehicleAdapter
 from quad_nav.vehicle.arrival_clock import ArrivalClock
 from quad_nav.vehicle.frames import crazyflie_quaternion
 from quad_nav.vehicle.orders import Order, Output, State, Traits
-from quad_nav.vehicle.setpoints import SetpointClock, limited
+from quad_nav.vehicle.setpoints import limited
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate, Landed, Status, Vector, Velocity
 from quad_nav.vehicle.vehicle_file import Vehicle
@@ -65,24 +66,13 @@ _STOPPED: Mapping[int, str] = MappingProxyType(
 )
 
 
-class CrazyflieAdapter:
-    """The bridge of one Crazyflie.
-
-    Attributes:
-        machine: Its state machine.
-        estimate: Last estimate, for odometry; None before the first.
-        scan: Last scan of the Multi-ranger in the body frame; None before the first.
-    """
+class CrazyflieAdapter(VehicleAdapter[Call]):
+    """The bridge of one Crazyflie; its scans are those of the Multi-ranger."""
 
     def __init__(self, vehicle: Vehicle, machine: VehicleMachine) -> None:
         """Start without a link."""
-        self.machine = machine
-        self.estimate: Optional[Estimate] = None
-        self.scan: Optional[Scan] = None
-        self._vehicle = vehicle
-        self._texts: List[str] = []
+        super().__init__(vehicle, machine)
         self._clock = ArrivalClock()
-        self._setpoints = SetpointClock()
         self._motion: Tuple[Vector, Vector, float] = ((0.0,) * 3, (0.0,) * 3, -math.inf)
         self._info = 0
         self._is_armed = False  # by us
@@ -151,7 +141,7 @@ class CrazyflieAdapter:
         info, inputs = int(values[_INFO]), self.machine.inputs
         for bit, text in _STOPPED.items():
             if info & bit and not self._info & bit:
-                self._texts.append(f"the firmware has stopped the motors: {text}")
+                self.take_text(f"the firmware has stopped the motors: {text}")
         self._info = info
         inputs.landed = Landed.IN_AIR if info & _FLYING else Landed.ON_GROUND
         is_low = values[_POWER] >= _LOW_POWER
@@ -188,29 +178,7 @@ class CrazyflieAdapter:
         "ranges": _on_ranges,
     }
 
-    def take_text(self, text: str) -> None:
-        """Take a line of the Crazyflie's console."""
-        self._texts.append(text)
-
-    def pop_texts(self) -> List[Tuple[int, str]]:
-        """Return the texts since the last call, as warnings."""
-        texts, self._texts = self._texts, []
-        return [(4, text) for text in texts]
-
     # To the vehicle.
-
-    def follow(self, twist: Twist2D, now_s: float) -> Tuple[bool, List[Call]]:
-        """Take a velocity command.
-
-        Returns:
-            Whether the command is finite, and the set-point to send at once, if any.
-        """
-        if not self.machine.inputs.take_command(twist, now_s):
-            return False, []
-        is_flying = self.machine.state is State.FLYING
-        if not is_flying or not self._setpoints.may_follow_command(now_s):
-            return True, []
-        return True, self._hover(self.machine.commanded_velocity(now_s), now_s, by_command=True)
 
     def tick(self, now_s: float) -> Tuple[Output, List[Call]]:
         """Return what the state machine says, and what to send now."""
@@ -224,8 +192,8 @@ class CrazyflieAdapter:
             self._landing_s = now_s
         if self._landing_s is not None:
             calls += self._land(now_s)
-        elif self._setpoints.is_due(now_s) and output.velocity is not None:
-            calls += self._hover(output.velocity, now_s, by_command=False)
+        elif self._setpoints.is_due(now_s):
+            calls += self._setpoint(output.velocity, now_s, by_command=False)
         return output, calls
 
     def _obey(self, order: Order, now_s: float) -> List[Call]:
@@ -237,16 +205,16 @@ class CrazyflieAdapter:
             self._take_status(now_s)
         return self._stop(now_s) if order is Order.DISARM else []
 
-    def _hover(self, wanted: Velocity, now_s: float, by_command: bool) -> List[Call]:
+    def _setpoint(self, wanted: Optional[Velocity], now_s: float, by_command: bool) -> List[Call]:
         """Return a hover set-point; its height changes no faster than the limit."""
-        velocity = limited(wanted, self._vehicle.limits)
+        velocity = None if wanted is None else limited(wanted, self._vehicle.limits)
         if velocity is None or not self._is_armed:
             return []
         self._setpoints.sent(now_s, by_command)
         target_m = self.machine.ground_m + velocity.height_m
-        return [self._setpoint(velocity, target_m, now_s)]
+        return [self._hover_call(velocity, target_m, now_s)]
 
-    def _setpoint(self, velocity: Velocity, target_m: float, now_s: float) -> Call:
+    def _hover_call(self, velocity: Velocity, target_m: float, now_s: float) -> Call:
         elapsed_s = now_s - self._height_s
         if elapsed_s > 1.0:  # the first one: from where it is
             self._height_m, elapsed_s = self._present_m(), 0.0
@@ -270,7 +238,7 @@ class CrazyflieAdapter:
         if not self._setpoints.is_due(now_s):
             return []
         self._setpoints.sent(now_s, by_command=False)
-        return [self._setpoint(Velocity(), ground_m, now_s)]
+        return [self._hover_call(Velocity(), ground_m, now_s)]
 
     def _stop(self, now_s: float) -> List[Call]:
         self._is_armed, self._landing_s = False, None

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import os
 import queue
-from threading import Lock
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping
 
 from quad_nav.errors import InputError
-from quad_nav.geometry import Scan, Twist2D
 from quad_nav.vehicle.crazyflie_adapter import (
     BLOCKS,
     MULTIRANGER,
@@ -21,9 +19,8 @@ from quad_nav.vehicle.crazyflie_adapter import (
     Call,
     CrazyflieAdapter,
 )
-from quad_nav.vehicle.orders import Output
+from quad_nav.vehicle.link import VehicleLink
 from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Estimate
 from quad_nav.vehicle.vehicle_file import Vehicle
 
 try:
@@ -41,14 +38,11 @@ _SILENT_S, _CONNECT_S = 3.0, 60.0
 _WANTED = (*POSITIONING, MULTIRANGER)
 
 
-class CrazyflieLink:
+class CrazyflieLink(VehicleLink[Call]):
     """The bridge of one Crazyflie over a connection of cflib.
 
-    One thread calls `read`, another one `tick` and `follow`.
-
     Attributes:
-        adapter: Translates; the lock is held while it works.
-        lock: Held whenever the adapter or the state machine is used.
+        adapter: Translates.
     """
 
     def __init__(
@@ -74,31 +68,11 @@ class CrazyflieLink:
         if not cflib.crtp.CLASSES:
             cflib.crtp.init_drivers()
         self.adapter = CrazyflieAdapter(vehicle, machine)
-        self.lock = Lock()
-        self._vehicle, self._clock = vehicle, clock
+        super().__init__(vehicle, self.adapter, clock)
         self._events: queue.Queue[Callable[[], None]] = queue.Queue()
         self._crazyflie = self._make()
         self._is_open = self._is_ready = False  # ready: parameters and log blocks are there
         self._reopen_s = self._give_up_s = 0.0
-
-    @property
-    def machine(self) -> VehicleMachine:
-        """State machine of the vehicle."""
-        return self.adapter.machine
-
-    @property
-    def estimate(self) -> Optional[Estimate]:
-        """Last estimate, its stamp on our clock."""
-        return self.adapter.estimate
-
-    @property
-    def scan(self) -> Optional[Scan]:
-        """Last scan of the Multi-ranger."""
-        return self.adapter.scan
-
-    def pop_texts(self) -> Sequence[Tuple[int, str]]:
-        """Return the Crazyflie's texts since the last call, each with its severity."""
-        return self.adapter.pop_texts()
 
     def read(self, timeout_s: float) -> None:
         """Wait for something to come, and pass what is there to the adapter."""
@@ -183,20 +157,6 @@ class CrazyflieLink:
         old, self._crazyflie = self._crazyflie, self._make()
         if old.link is not None:
             old.link.close()
-
-    def follow(self, twist: Twist2D) -> bool:
-        """Take a velocity command, and send its set-point; return whether it is finite."""
-        with self.lock:
-            is_finite, calls = self.adapter.follow(twist, self._clock())
-        self._send(calls)
-        return is_finite
-
-    def tick(self) -> Output:
-        """Let the state machine work, and send what it wants."""
-        with self.lock:
-            output, calls = self.adapter.tick(self._clock())
-        self._send(calls)
-        return output
 
     def _send(self, calls: List[Call]) -> None:
         if not self._is_ready:

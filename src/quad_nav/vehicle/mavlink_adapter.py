@@ -9,8 +9,9 @@ import math
 from types import MappingProxyType
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
-from quad_nav.geometry import Pose3D, Quaternion, Scan, Twist2D, rotate
+from quad_nav.geometry import Pose3D, Quaternion, rotate
 from quad_nav.vehicle import failsafes
+from quad_nav.vehicle.adapter import VehicleAdapter
 from quad_nav.vehicle.autopilots import AUTOPILOT_COMPONENT, AUTOPILOTS
 from quad_nav.vehicle.exchanges import BEGIN_S, ClockSync, Message, MessageRates, Parameters
 from quad_nav.vehicle.frames import (
@@ -21,7 +22,7 @@ from quad_nav.vehicle.frames import (
     scan_from_obstacle_distance,
 )
 from quad_nav.vehicle.orders import IN_FLIGHT, Answer, Order, Output, State
-from quad_nav.vehicle.setpoints import SetpointClock, led, limited, setpoint_fields
+from quad_nav.vehicle.setpoints import led, limited, setpoint_fields
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate, Landed, Velocity
 from quad_nav.vehicle.vehicle_file import Vehicle
@@ -48,32 +49,25 @@ _IN_PROGRESS = 5  # MAV_RESULT
 # A ground station without an autopilot, active: both autopilots' failsafes count its heartbeats.
 _OUR_TYPE, _OUR_AUTOPILOT, _ACTIVE = 6, 8, 4
 _REBOOT_MS = 1000
-_MOST_TEXTS = 100
 _TEXT_BYTES = 50
 
 
-class MavlinkAdapter:
-    """The bridge of one vehicle that speaks MAVLink.
+class MavlinkAdapter(VehicleAdapter[Message]):
+    """The bridge of one vehicle that speaks MAVLink; its scans are those of OBSTACLE_DISTANCE.
 
     Attributes:
-        machine: Its state machine.
-        estimate: Last estimate, for odometry; None before the first.
-        scan: Last scan of OBSTACLE_DISTANCE in the body frame; None before the first.
-        texts: Texts of the autopilot since the last `pop_texts`.
+        clock: The autopilot's clock against ours.
+        parameters: The autopilot's parameters that matter.
     """
 
     def __init__(self, vehicle: Vehicle, machine: VehicleMachine) -> None:
         """Start without a link."""
-        self.machine = machine
-        self.estimate: Optional[Estimate] = None
-        self.scan: Optional[Scan] = None
-        self.texts: List[Tuple[int, str]] = []
-        self._vehicle, self._autopilot = vehicle, AUTOPILOTS[vehicle.autopilot]
+        super().__init__(vehicle, machine)
+        self._autopilot = AUTOPILOTS[vehicle.autopilot]
         self.clock = ClockSync()
         self.parameters = Parameters(failsafes.names(vehicle), self._autopilot.sends_bits)
         has_distances = vehicle.lidar is not None and vehicle.lidar.is_obstacle_distance
         self._rates = MessageRates({**_RATES_HZ, **(_DISTANCE_RATE if has_distances else {})})
-        self._setpoints = SetpointClock()
         self._first_s: Optional[float] = None  # first heartbeat
         self._boot_ms = 0
         self._attitude: Tuple[Quaternion, Tuple[float, float, float], float] = (
@@ -184,7 +178,7 @@ class MavlinkAdapter:
         text = self._whole_text(message)
         if text is None:
             return
-        self.texts = [*self.texts[-_MOST_TEXTS:], (message.severity, text)]
+        self.take_text(text, message.severity)
         for beginning in self._autopilot.complaints:
             if text.startswith(beginning):
                 self.machine.inputs.take_text(text, now_s)
@@ -239,25 +233,7 @@ class MavlinkAdapter:
         "OBSTACLE_DISTANCE": _on_distances,
     }
 
-    def pop_texts(self) -> List[Tuple[int, str]]:
-        """Return the autopilot's texts since the last call, each with its severity."""
-        texts, self.texts = self.texts, []
-        return texts
-
     # To the vehicle.
-
-    def follow(self, twist: Twist2D, now_s: float) -> Tuple[bool, List[Message]]:
-        """Take a velocity command.
-
-        Returns:
-            Whether the command is finite, and the set-point to send at once, if any.
-        """
-        if not self.machine.inputs.take_command(twist, now_s):
-            return False, []
-        is_flying = self.machine.state is State.FLYING
-        if not is_flying or not self._setpoints.may_follow_command(now_s):
-            return True, []
-        return True, self._setpoint(self.machine.commanded_velocity(now_s), now_s, by_command=True)
 
     def tick(self, now_s: float) -> Tuple[Output, List[Message]]:
         """Return what the state machine says, and the messages to send now."""

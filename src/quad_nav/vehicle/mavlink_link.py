@@ -7,20 +7,18 @@ connection is closed. It decides nothing.
 from __future__ import annotations
 
 import os
-from threading import Event, Lock
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from threading import Event
+from typing import Any, Callable, Dict, List
 
 os.environ["MAVLINK20"] = "1"  # pymavlink reads it at its import
 
 from quad_nav.errors import InputError
-from quad_nav.geometry import Scan, Twist2D
 from quad_nav.vehicle.autopilots import AUTOPILOT_COMPONENT
 from quad_nav.vehicle.exchanges import Message
 from quad_nav.vehicle.failsafes import OUR_SYSTEM
+from quad_nav.vehicle.link import VehicleLink
 from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
-from quad_nav.vehicle.orders import Output
 from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Estimate
 from quad_nav.vehicle.vehicle_file import Vehicle
 
 try:
@@ -37,14 +35,11 @@ _TARGETED = frozenset(
 )
 
 
-class MavlinkLink:
+class MavlinkLink(VehicleLink[Message]):
     """The bridge of one vehicle over a connection of pymavlink.
 
-    One thread calls `read`, another one `tick` and `follow`.
-
     Attributes:
-        adapter: Translates; the lock is held while it works.
-        lock: Held whenever the adapter or the state machine is used.
+        adapter: Translates.
     """
 
     def __init__(
@@ -65,8 +60,7 @@ class MavlinkLink:
                 [f"{vehicle.name}: pymavlink is missing; install requirements-mavlink.txt"]
             )
         self.adapter = MavlinkAdapter(vehicle, machine)
-        self.lock = Lock()
-        self._vehicle, self._clock = vehicle, clock
+        super().__init__(vehicle, self.adapter, clock)
         self._empty, self._reopen_s = 0, 0.0
         self._idle = Event()  # never set
         self._connection: Any = None
@@ -78,25 +72,6 @@ class MavlinkLink:
             raise InputError(
                 [f"{vehicle.name}: address {vehicle.address} cannot be opened: {error}"]
             ) from error
-
-    @property
-    def machine(self) -> VehicleMachine:
-        """State machine of the vehicle."""
-        return self.adapter.machine
-
-    @property
-    def estimate(self) -> Optional[Estimate]:
-        """Last estimate, its stamp on our clock."""
-        return self.adapter.estimate
-
-    @property
-    def scan(self) -> Optional[Scan]:
-        """Last scan of OBSTACLE_DISTANCE."""
-        return self.adapter.scan
-
-    def pop_texts(self) -> Sequence[Tuple[int, str]]:
-        """Return the autopilot's texts since the last call, each with its severity."""
-        return self.adapter.pop_texts()
 
     def _open(self) -> Any:
         # Without its own reconnection: it sleeps and prints in the thread that reads.
@@ -150,20 +125,6 @@ class MavlinkLink:
             self._connection = self._open()
         except (OSError, ValueError):
             self._connection = None
-
-    def follow(self, twist: Twist2D) -> bool:
-        """Take a velocity command, and send its set-point; return whether it is finite."""
-        with self.lock:
-            is_finite, messages = self.adapter.follow(twist, self._clock())
-        self._send(messages)
-        return is_finite
-
-    def tick(self) -> Output:
-        """Let the state machine work, and send what it wants."""
-        with self.lock:
-            output, messages = self.adapter.tick(self._clock())
-        self._send(messages)
-        return output
 
     def _send(self, messages: List[Message]) -> None:
         connection = self._connection
