@@ -11,10 +11,12 @@ from typing import Dict
 from unittest import mock
 
 import genpy
-from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+import rospy
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from fake_ros import FakePublisher, FakeRos, FakeService, deliver
 from geometry_msgs.msg import Twist, Vector3
+from move_base_msgs.msg import MoveBaseActionGoal
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Empty, String
 
@@ -22,7 +24,7 @@ sys.path.insert(1, str(Path(__file__).resolve().parents[1]))
 from vehicles.virtual_flight import Flight  # noqa: E402
 
 from quad_nav.geometry import Pose2D
-from quad_nav.ros.vehicle import fleet, node, topics
+from quad_nav.ros.vehicle import fleet, maneuvers, node, topics
 from quad_nav.vehicle.orders import Output, State
 from quad_nav.vehicle.vehicle_file import Lidar, Vehicle
 
@@ -78,7 +80,7 @@ class VehicleUnderTest:
         self._bridge = VirtualBridge()
         clock = SimpleNamespace(monotonic=lambda: self.now_s, time=lambda: self.now_s)
         clock.sleep = lambda _: self._node._tick()
-        for module in (node, topics):
+        for module in (node, topics, maneuvers):
             patch = mock.patch.object(module, "time", clock)
             patch.start()
             ros.exit_stack.callback(patch.stop)
@@ -91,6 +93,10 @@ class VehicleUnderTest:
             "/move_base0/status": self._status,
             node.LAND_ALL_TOPIC: Empty,
             DRIVER_TOPIC: self._scan,
+            "/vehicle0/take_off/goal": self._goal,
+            "/vehicle0/take_off/cancel": self._cancel,
+            "/vehicle0/land/goal": self._goal,
+            "/vehicle0/land/cancel": self._cancel,
         }
 
     @property
@@ -136,6 +142,12 @@ class VehicleUnderTest:
 
     def _status(self) -> GoalStatusArray:
         return GoalStatusArray(status_list=[GoalStatus(status=GoalStatus.ACTIVE)])
+
+    def _goal(self) -> MoveBaseActionGoal:
+        return MoveBaseActionGoal(goal_id=self._cancel())
+
+    def _cancel(self) -> GoalID:
+        return GoalID(rospy.Time.now(), f"test {self.now_s}")
 
     def _scan(self) -> LaserScan:
         return LaserScan(angle_increment=0.5, range_max=8.0, ranges=[1.0] * 12)

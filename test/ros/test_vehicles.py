@@ -10,13 +10,19 @@ import time
 import unittest
 from pathlib import Path
 
+import actionlib
 import rospy
 import rostest
 import tf2_ros
+from actionlib_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Empty, String
 from std_srvs.srv import Trigger
+
+from quad_nav.geometry import Pose3D
+from quad_nav.ros.common.nav_messages import pose_stamped
 
 VEHICLES = Path(__file__).resolve().parents[1] / "vehicles" / "udp_vehicles.py"
 PATIENCE_S = 60.0
@@ -79,6 +85,8 @@ class Vehicles(unittest.TestCase):
         self.a_pilot_takes_one_over()
         self.somebody_resumes_it()
         self.all_land()
+        self.actions_take_off_and_land()
+        self.a_cancelled_take_off_lands()
 
     def the_frames_agree(self):
         """A vehicle that stood at (3, -2) of its own frame is in map where its file says."""
@@ -117,6 +125,51 @@ class Vehicles(unittest.TestCase):
         self.assertLess(time.monotonic() - start_s, 1.0)
         self.wait(lambda: set(self.states.values()) <= {"landed", "not ready"}, "both on ground")
         self.assertEqual({one["armed"] for one in self.values.values()}, {"false"})
+
+    def act(self, name, **keywords):
+        """Send an action's goal; return its client and the heights of its feedback."""
+        client = actionlib.SimpleActionClient(f"/vehicle0/{name}", MoveBaseAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(PATIENCE_S)))
+        heights = []
+        client.send_goal(
+            MoveBaseGoal(**keywords),
+            feedback_cb=lambda one: heights.append(one.base_position.pose.position.z),
+        )
+        return client, heights
+
+    def wait_for_result(self, client):
+        self.assertTrue(client.wait_for_result(rospy.Duration(PATIENCE_S)), self.values[0])
+        return client.get_state(), client.get_goal_status_text()
+
+    def actions_take_off_and_land(self):
+        self.call("/mission/quad0/stop")
+        self.wait(lambda: self.states[0] in ("ready", "landed"), "readiness of vehicle 0")
+        client, _ = self.act(
+            "take_off", target_pose=pose_stamped(Pose3D(0, 0, 3), "odom0", rospy.Time())
+        )
+        state, text = self.wait_for_result(client)
+        self.assertEqual(state, GoalStatus.ABORTED, text)
+        self.assertIn(self.states[0], ("ready", "landed"))
+        self.assertIn("expected an empty goal", text)
+        client, heights = self.act("take_off")
+        self.assertEqual(self.wait_for_result(client), (GoalStatus.SUCCEEDED, "holding"))
+        self.assertLess(heights[0], 0.1)
+        self.assertGreater(heights[-1], 0.8)
+        client, heights = self.act("land")
+        self.wait(lambda: heights and heights[-1] < 0.8, "descent")
+        client.cancel_goal()  # a landing goes on
+        state, text = self.wait_for_result(client)
+        self.assertEqual(state, GoalStatus.SUCCEEDED, text)
+        self.assertLess(heights[-1], 0.1)
+
+    def a_cancelled_take_off_lands(self):
+        self.wait(lambda: self.states[0] in ("ready", "landed"), "readiness of vehicle 0")
+        client, heights = self.act("take_off")
+        self.wait(lambda: heights and heights[-1] > 0.2, "ascent")
+        client.cancel_goal()
+        self.assertEqual(self.wait_for_result(client), (GoalStatus.PREEMPTED, "landing"))
+        self.wait(lambda: self.states[0] in ("landed", "not ready", "ready"), "vehicle on ground")
+        self.assertEqual(self.values[0]["armed"], "false")
 
 
 if __name__ == "__main__":

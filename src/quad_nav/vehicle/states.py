@@ -18,6 +18,7 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.vehicle.inputs import Inputs
 from quad_nav.vehicle.orders import (
     IN_FLIGHT,
+    ON_GROUND,
     Answer,
     Order,
     Output,
@@ -94,7 +95,6 @@ class VehicleMachine:
         assert estimate is not None  # otherwise not ready
         self.odom_from_start = estimate.odom_from_base.to_2d()
         self.ground_m = estimate.odom_from_base.z_m
-        self.refusal = ""
         self.inputs.begin_flight(now_s)
         self._enter(State.ARMING, "", now_s)
         return Response(True, "taking off")
@@ -115,13 +115,13 @@ class VehicleMachine:
         """Ask for a landing; with ``is_stop_all`` not against the mode that a pilot has set."""
         status = self.inputs.status
         if self.state in (State.FLYING, State.HOLDING, State.TAKING_OFF):
-            self._land(reason, now_s)
+            self._enter(State.LANDING, reason, now_s)
         elif self.state is State.ARMING:
             self._give_up(reason, now_s)
         elif self.state is State.TAKEN_OVER and status is not None and status.is_armed:
             if is_stop_all and not status.is_controlled:
                 return Response(False, f"taken over: {self.reason}")
-            self._land(reason, now_s)
+            self._enter(State.LANDING, reason, now_s)
         elif self.state is State.NO_LINK:
             return Response(False, "no link")
         return Response(True, self.state.value)
@@ -171,7 +171,7 @@ class VehicleMachine:
         if self.state is State.ARMING:
             self._give_up(reason, now_s)
         elif self.state is State.TAKING_OFF and self._orders >= MOST_ORDERS:
-            self._land(reason, now_s)
+            self._enter(State.LANDING, reason, now_s)
         elif self.state is State.TAKEN_OVER:
             self._wants_control = False
             self._news.append(reason)
@@ -187,7 +187,7 @@ class VehicleMachine:
         elif found.reaction is Reaction.LINK_LOST:
             self._lose_link(found.reason, now_s)
         elif found.reaction is Reaction.LAND and self.state is not State.LANDING:
-            self._land(found.reason, now_s)
+            self._enter(State.LANDING, found.reason, now_s)
         elif found.reaction is Reaction.HOVER and self.state is State.FLYING:
             self._enter(State.HOLDING, found.reason, now_s)
 
@@ -221,9 +221,6 @@ class VehicleMachine:
     def _lose_link(self, reason: str, now_s: float) -> None:
         self._before_loss = self.state
         self._enter(State.NO_LINK, reason, now_s)
-
-    def _land(self, reason: str, now_s: float) -> None:
-        self._enter(State.LANDING, reason, now_s)
 
     # One step for each state; it returns the set-point.
 
@@ -284,7 +281,7 @@ class VehicleMachine:
     def _in_taking_off(self, now_s: float) -> Optional[Velocity]:
         inputs, elapsed_s = self.inputs, now_s - self._state_s
         if elapsed_s > TAKE_OFF_S:
-            self._land(f"take-off not finished after {TAKE_OFF_S:g} s", now_s)
+            self._enter(State.LANDING, f"take-off not finished after {TAKE_OFF_S:g} s", now_s)
             return None
         if not self.traits.takes_off_by_command:
             if inputs.height_m(self.ground_m) > self.altitude_m - NEAR_M:
@@ -397,4 +394,6 @@ class VehicleMachine:
         if state is not self.state:
             self._order, self._orders, self._state_s = None, 0, now_s
             self._grounded_s = None
+        if state not in ON_GROUND:
+            self.refusal = ""
         self.state, self.reason = state, reason

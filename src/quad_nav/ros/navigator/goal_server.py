@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Deque, Optional
 
-import actionlib
 import rospy
-from actionlib_msgs.msg import GoalID
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
 
@@ -21,12 +19,9 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import Outcome
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.nav_messages import goal_from_message, pose_stamped
+from quad_nav.ros.common.polled_actions import PolledActionServer
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.timing import Schedule
 from quad_nav.topics.publishing import Names, own_node
-from quad_nav.topics.validation import goal_id_problem
-
-MAX_STATUSES = 100  # of ended goals; actionlib keeps each for five seconds
 
 
 class GoalServer:
@@ -47,78 +42,23 @@ class GoalServer:
         self._transforms = transforms
         self._global_frame = global_frame
         self._current_goal = rospy.Publisher(names("~current_goal"), PoseStamped, queue_size=1)
-        self._server = actionlib.SimpleActionServer(
-            names("move_base"), MoveBaseAction, auto_start=False
-        )
-        self._server.register_goal_callback(None)
         self._warnings = ThrottledWarnings()
-        self._guard_callbacks()
+        self._server = PolledActionServer(
+            names("move_base"),
+            MoveBaseAction,
+            lambda line: self._warnings.warn(f"{robot}: {line}"),
+        )
         self._action_goal = rospy.Publisher(
             names("move_base/goal"), MoveBaseActionGoal, queue_size=1
         )
-        self._server.start()
         self._simple_goals: Deque[PoseStamped] = deque(maxlen=1)
-        self._status = Schedule(self._stop_status_thread())
-        self._status.start(0.0)
         self._simple = rospy.Subscriber(
             names("move_base_simple/goal"), PoseStamped, self._store, queue_size=1
         )
 
-    def _guard_callbacks(self) -> None:
-        """Let actionlib have only goals and cancel requests that it can handle.
-
-        One from the future would cancel or precede all goals until then, and it repeats the ids of
-        the last seconds in every status.
-        """
-        server = self._server.action_server
-        take_goal, take_cancel = server.internal_goal_callback, server.internal_cancel_callback
-
-        def on_goal(message: MoveBaseActionGoal) -> None:
-            if self._is_valid(message.goal_id, "goal"):
-                take_goal(message)
-
-        def on_cancel(message: GoalID) -> None:
-            if self._is_valid(message, "cancel request"):
-                with server.lock:
-                    take_cancel(message)
-                    for one in server.status_list:
-                        # actionlib logs errors for a request whose goal has not come.
-                        one.goal = one.goal or MoveBaseActionGoal(goal_id=one.status.goal_id)
-
-        # `start` subscribes with these.
-        server.internal_goal_callback, server.internal_cancel_callback = on_goal, on_cancel
-
-    def _is_valid(self, goal_id: GoalID, kind: str) -> bool:
-        problem = goal_id_problem(goal_id.id, goal_id.stamp.to_sec(), rospy.get_time())
-        if problem:
-            self._warnings.warn(f"{self._robot}: {kind} dropped: {problem}")
-            return False
-        server = self._server.action_server
-        with server.lock:
-            ended = [one for one in server.status_list if one.handle_destruction_time]
-            for one in ended[: max(len(server.status_list) - MAX_STATUSES, 0)]:
-                server.status_list.remove(one)
-        return True
-
-    def _stop_status_thread(self) -> float:
-        """Stop actionlib's status thread and return its frequency in Hz.
-
-        The thread wakes up with every message of `/clock`. `poll` publishes the status instead.
-        """
-        server = self._server.action_server
-        if server.status_timer is not None:
-            server.status_timer.shutdown()
-        return max(server.status_frequency, 0.0)
-
     def restart(self, now_s: float) -> None:
         """Restart the status schedule after a clock jump, and adapt stamps from the future."""
-        self._status.start(now_s)
-        server, now = self._server.action_server, rospy.Time.from_sec(now_s)
-        with server.lock:
-            server.last_cancel = min(server.last_cancel, now)
-            for one in server.status_list:
-                one.status.goal_id.stamp = min(one.status.goal_id.stamp, now)
-                one.handle_destruction_time = min(one.handle_destruction_time, now)
+        self._server.restart(now_s)
 
     def _store(self, message: PoseStamped) -> None:
         self._simple_goals.append(message)
@@ -135,8 +75,7 @@ class GoalServer:
     def poll(self, navigator: Navigator, now_s: float) -> None:
         """Pass a waiting goal or cancel to the navigator, if it accepts one now."""
         self._forward()
-        if self._status.pop(now_s):
-            self._server.action_server.publish_status()
+        self._server.publish_status(now_s)
         if not navigator.accepts_goal(now_s):
             return
         # A new goal is stored before it requests the preemption, so read them the other way round:

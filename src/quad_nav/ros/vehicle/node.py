@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Callable, Dict, List, Optional, Protocol, Sequence, Tuple
+from typing import Callable, Dict, List, Optional, Tuple
 
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
@@ -18,18 +18,20 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from quad_nav.errors import InputError, excerpt, printable
 from quad_nav.files.values import is_whole
-from quad_nav.geometry import Scan, Twist2D
+from quad_nav.geometry import Scan
 from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
 from quad_nav.ros.common.readiness import init_node
+from quad_nav.ros.vehicle.maneuvers import LAND, RESUMPTION, TAKE_OFF, Maneuver, ManeuverAction
 from quad_nav.ros.vehicle.topics import MissionPause, VehicleTopics, vehicle_health
 from quad_nav.topics.health import Health
 from quad_nav.topics.validation import CommandLease, twist_problem
 from quad_nav.vehicle import crazyflie_adapter
 from quad_nav.vehicle.autopilots import AUTOPILOTS
 from quad_nav.vehicle.crazyflie_link import CrazyflieLink
+from quad_nav.vehicle.link import VehicleLink
 from quad_nav.vehicle.mavlink_link import MavlinkLink
-from quad_nav.vehicle.orders import IN_FLIGHT, Output, Permissions, Response, State
+from quad_nav.vehicle.orders import IN_FLIGHT, Permissions, Response, State
 from quad_nav.vehicle.safety import COMMAND_HOVER_S
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate
@@ -38,54 +40,17 @@ from quad_nav.vehicle.vehicle_file import Vehicle, load_vehicles
 TICK_S = 0.025
 READ_S = 0.1
 STATE_PERIOD_S = 1.0
-TAKE_OFF_WAIT_S = 30.0
+MANEUVER_WAIT_S = 30.0
 SHUTDOWN_WAIT_S = 12.0
 """For a vehicle that needs us until it is down; roslaunch kills nodes after 15 s."""
 LAND_ALL_TOPIC = "/vehicles/land_all"
 _BUSY = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
 
 
-class Bridge(Protocol):
-    """Connection to one vehicle of any kind.
-
-    One thread calls `read`, another one `tick` and `follow`. Whoever uses the state machine or
-    the other attributes holds the lock.
-    """
-
-    lock: threading.Lock
-
-    @property
-    def machine(self) -> VehicleMachine:
-        """State machine of the vehicle."""
-
-    @property
-    def estimate(self) -> Optional[Estimate]:
-        """Last estimate, its stamp in monotonic time."""
-
-    @property
-    def scan(self) -> Optional[Scan]:
-        """Last scan of the vehicle's own sensors, its stamp in monotonic time."""
-
-    def pop_texts(self) -> Sequence[Tuple[int, str]]:
-        """Return the autopilot's texts since the last call, each with its severity (0 worst)."""
-
-    def read(self, timeout_s: float) -> None:
-        """Wait for something to come, and take it."""
-
-    def tick(self) -> Output:
-        """Let the state machine work, and send what it wants."""
-
-    def follow(self, twist: Twist2D) -> bool:
-        """Take a velocity command; return whether it is finite."""
-
-    def close(self) -> None:
-        """Close the connection."""
-
-
 class VehicleNode:
     """Topics and services of one vehicle."""
 
-    def __init__(self, vehicle: Vehicle, bridge: Bridge) -> None:
+    def __init__(self, vehicle: Vehicle, bridge: VehicleLink) -> None:
         """Advertise everything."""
         i = vehicle.number
         self._vehicle, self._bridge = vehicle, bridge
@@ -109,6 +74,10 @@ class VehicleNode:
                 ("land", self._land),
                 ("resume", self._resume),
             )
+        ]
+        self._actions = [
+            ManeuverAction(f"/vehicle{i}/{name}", maneuver, bridge, f"odom{i}", self._warn)
+            for name, maneuver in (("take_off", TAKE_OFF), ("land", LAND))
         ]
         publish_health(self._health)
 
@@ -166,6 +135,8 @@ class VehicleNode:
 
     def _tick(self) -> None:
         output = self._bridge.tick()
+        for action in self._actions:
+            action.poll()
         if output.pauses_mission:
             self._pause.pause()
         for line in output.news:
@@ -189,7 +160,7 @@ class VehicleNode:
     # Callbacks.
 
     def _follow(self, message: Twist) -> None:
-        twist, name = twist_from_message(message), self._vehicle.name
+        twist = twist_from_message(message)
         problem = twist_problem(twist)
         if not problem:
             node = excerpt(message._connection_header.get("callerid", "an unnamed node"))
@@ -198,7 +169,10 @@ class VehicleNode:
                 self._bridge.follow(twist)
                 return
             problem = f"from {node}: {holder} controls this vehicle, expected one node at a time"
-        self._warnings.warn(f"{name}: command dropped: {problem}")
+        self._warn(f"command dropped: {problem}")
+
+    def _warn(self, line: str) -> None:
+        self._warnings.warn(f"{self._vehicle.name}: {line}")
 
     def _on_navigator(self, message: GoalStatusArray) -> None:
         if not any(status.status in _BUSY for status in message.status_list):
@@ -210,44 +184,38 @@ class VehicleNode:
             self._bridge.machine.land(time.monotonic(), "all vehicles land", is_stop_all=True)
 
     def _land(self, _: TriggerRequest) -> TriggerResponse:
+        """Begin to land; the action waits for the end."""
         with self._bridge.lock:
-            response = self._bridge.machine.land(time.monotonic(), "asked to land")
+            response = LAND.begin(self._bridge.machine, time.monotonic())
         return TriggerResponse(response.is_accepted, response.text)
 
     def _resume(self, _: TriggerRequest) -> TriggerResponse:
-        with self._bridge.lock:
-            response = self._bridge.machine.resume(time.monotonic())
-        if response.is_accepted:
-            response = self._wait((State.FLYING, State.HOLDING, *_GROUND), (State.TAKEN_OVER,))
+        """Take control again, and resume the mission."""
+        response = self._finish(RESUMPTION)
         if response.is_accepted:
             self._pause.resume()
         return TriggerResponse(response.is_accepted, response.text)
 
     def _take_off(self, _: TriggerRequest) -> TriggerResponse:
         """Take off, and respond when the vehicle hovers or has given up."""
-        with self._bridge.lock:
-            response = self._bridge.machine.take_off(time.monotonic())
-        if response.is_accepted:
-            response = self._wait((State.FLYING, State.HOLDING), _UNTIL_HOVER)
+        response = self._finish(TAKE_OFF)
         return TriggerResponse(response.is_accepted, response.text)
 
-    def _wait(self, good: Sequence[State], pending: Sequence[State]) -> Response:
-        """Wait until the vehicle is in a good state or in none of the pending ones."""
-        end_s = time.monotonic() + TAKE_OFF_WAIT_S
+    def _finish(self, maneuver: Maneuver) -> Response:
+        """Begin a maneuver, and wait for its end."""
+        machine = self._bridge.machine
+        with self._bridge.lock:
+            response = maneuver.begin(machine, time.monotonic())
+        if not response.is_accepted:
+            return response
+        end_s = time.monotonic() + MANEUVER_WAIT_S
         while time.monotonic() < end_s and not rospy.is_shutdown():
             with self._bridge.lock:
-                machine = self._bridge.machine
-                state, reason = machine.state, machine.refusal or machine.reason
-            if state in good:
-                return Response(True, state.value)
-            if state not in pending:
-                return Response(False, f"{state.value}: {reason}")
+                outcome = maneuver.outcome(machine)
+            if outcome is not None:
+                return outcome
             time.sleep(TICK_S)
-        return Response(False, f"still {state.value} after {TAKE_OFF_WAIT_S:g} s")
-
-
-_GROUND = (State.READY, State.NOT_READY, State.LANDED)
-_UNTIL_HOVER = (State.ARMING, State.TAKING_OFF)
+        return Response(False, f"still {machine.state.value} after {MANEUVER_WAIT_S:g} s")
 
 
 def read_vehicle(parameters: Dict) -> Tuple[Vehicle, Permissions]:
@@ -276,7 +244,9 @@ def read_vehicle(parameters: Dict) -> Tuple[Vehicle, Permissions]:
     return vehicles[parameters["number"]], permissions
 
 
-def make_bridge(vehicle: Vehicle, permissions: Permissions, clock: Callable[[], float]) -> Bridge:
+def make_bridge(
+    vehicle: Vehicle, permissions: Permissions, clock: Callable[[], float]
+) -> VehicleLink:
     """Open the connection of a vehicle.
 
     Args:
