@@ -110,6 +110,10 @@ class Bodies:
         x, y, z, *quaternion = self.state.rows[robot, :7].tolist()
         return Pose3D(x, y, z - REST_M, tuple(quaternion))
 
+    def place(self, robot):
+        """Return the position (x, y, z) in ``map``."""
+        return tuple(self.state.rows[robot, :3].tolist())
+
     def velocity_mps(self, robot):
         """Return the velocity (x, y, z) in ``map``."""
         return tuple(self.state.rows[robot, 7:10].tolist())

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from vehicles.bodies import Bodies
 
 from quad_nav.sim.flight import Airframe, AutopilotResponse
 from quad_nav.vehicle.crazyflie_adapter import BLOCKS
@@ -169,9 +168,3 @@ class LogBlocks:
                     (name, int(now_s * 1e3) % (1 << 24), {k: values[k] for k in variables})
                 )
         return found
-
-
-def alone(**keywords):
-    """Return the bodies and a Crazyflie in an empty scene."""
-    bodies = Bodies(airframes=[AIRFRAME])
-    return bodies, Crazyflie(bodies, **keywords)

@@ -13,12 +13,12 @@ import random
 import statistics
 import sys
 
-from vehicles.crazyflie_flight import CrazyflieFlight
+from vehicles.crazyflie_flight import CrazyfliePair
 
 from quad_nav.geometry import Twist2D
 from quad_nav.vehicle.orders import State
 
-HOVER_MPS, DESCENT_M = 0.05, 0.02
+HOVER_MPS, DESCENT_M, NEIGHBOUR_M = 0.05, 0.02, 0.05
 COMMAND = Twist2D(0.3, 0.1, 0.2)
 
 
@@ -51,7 +51,8 @@ def _jump(flight):
 
 
 def _stop_all(flight):
-    flight.machine.land(flight.now_s, "all vehicles land", is_stop_all=True)
+    for one in (flight, flight.neighbour):
+        one.machine.land(flight.now_s, "all vehicles land", is_stop_all=True)
 
 
 def _leave(flight):
@@ -79,18 +80,22 @@ ROWS = {
 
 
 def fly_row(name, moment_s):
-    """Fly one row; return the time to a hover, or to the begin of the descent.
+    """Fly one row beside a Crazyflie that hovers.
+
+    Returns:
+        The time to a hover, or to the begin of the descent, and how far the other one moved.
 
     Raises:
         AssertionError: The bridge did something else.
     """
     fault, state, within_s, descends = ROWS[name]
-    flight = CrazyflieFlight()
+    flight = CrazyfliePair()
     try:
         flight.to_flight(COMMAND)
         flight.run(moment_s)
         assert flight.state is State.FLYING, (flight.state, flight.machine.reason)
         start_s, height_m = flight.now_s, flight.crazyflie.height_m
+        flight.mark()
         fault(flight)
         assert flight.run(within_s, lambda: flight.state is state), (flight.state, flight.news)
 
@@ -100,7 +105,11 @@ def fly_row(name, moment_s):
             return flight.crazyflie.speed_mps < HOVER_MPS
 
         assert flight.run(12.0, is_safe), (flight.state, flight.crazyflie.height_m)
-        return flight.now_s - start_s
+        time_s, neighbour = flight.now_s - start_s, flight.neighbour
+        wanted = State.LANDING if fault is _stop_all else State.FLYING
+        assert neighbour.state is wanted, (neighbour.state, neighbour.machine.reason)
+        assert fault is _stop_all or flight.neighbour_moved_m < NEIGHBOUR_M
+        return time_s, flight.neighbour_moved_m
     finally:
         flight.bodies.close()
 
@@ -109,16 +118,17 @@ def main():
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     moments, failed = random.Random(1), 0
     for name in ROWS:
-        times = []
+        flown = []
         for _ in range(repeats):
             try:
-                times.append(fly_row(name, moments.uniform(0.0, 4.0)))
+                flown.append(fly_row(name, moments.uniform(0.0, 4.0)))
             except AssertionError as error:
                 failed += 1
                 print(f"{name}: {error}")
+        times, moved = zip(*flown)
         print(
             f"| {name} | {statistics.median(times):.2f}, {max(times):.2f} |"
-            f" {len(times)} of {repeats}",
+            f" {len(times)} of {repeats} | the other one moved {max(moved):.3f} m",
             flush=True,
         )
     return 1 if failed else 0

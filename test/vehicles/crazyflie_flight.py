@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from vehicles.crazyflie import LogBlocks, alone
+import math
+
+from vehicles.bodies import Bodies
+from vehicles.crazyflie import AIRFRAME, Crazyflie, LogBlocks
 from vehicles.stand_in import advance
+from vehicles.virtual_flight import STARTS
 
 from quad_nav.geometry import Twist2D
 from quad_nav.sim.simulation import STEP_S
@@ -20,12 +24,13 @@ STEPS = 2  # of the simulation, between two ticks of the bridge
 class CrazyflieFlight:
     """A bridge and a Crazyflie, which exchange values without delay."""
 
-    def __init__(self, permissions=MAY_ARM, **keywords):
+    def __init__(self, permissions=MAY_ARM, bodies=None, robot=0, **keywords):
         limits = Limits(speed_mps=0.7)
         vehicle = Vehicle(0, "crazyflie", limits=limits, lidar=Lidar(is_multiranger=True))
         self.machine = VehicleMachine(vehicle.altitude_m, limits, TRAITS, permissions)
         self.adapter = CrazyflieAdapter(vehicle, self.machine)
-        self.bodies, self.crazyflie = alone(**keywords)
+        self.bodies = bodies or Bodies(airframes=[AIRFRAME])
+        self.crazyflie = Crazyflie(self.bodies, robot, **keywords)
         self.hears = self.is_heard = True
         self.command, self.calls, self.news = None, [], []
         self._log = LogBlocks(self.crazyflie)
@@ -50,6 +55,9 @@ class CrazyflieFlight:
 
     def _step(self):
         advance(self.bodies, [self.crazyflie], STEPS * STEP_S)
+        self._exchange()
+
+    def _exchange(self):
         now_s, calls = self.now_s, []
         for block, stamp_ms, values in self._log.due(now_s):
             if self.hears:
@@ -75,3 +83,38 @@ class CrazyflieFlight:
         self.run(2.0)
         assert self.state is State.FLYING
         return self
+
+
+class CrazyfliePair(CrazyflieFlight):
+    """The same beside a Crazyflie with a bridge of its own, which hovers.
+
+    Attributes:
+        neighbour: Its flight.
+        neighbour_moved_m: How far it has been from where it was at the last `mark`.
+    """
+
+    def __init__(self):
+        bodies = Bodies(starts=STARTS, airframes=[AIRFRAME] * 2)
+        super().__init__(bodies=bodies)
+        self.neighbour = CrazyflieFlight(bodies=bodies, robot=1)
+        self.neighbour.command = Twist2D()
+        self.mark()
+
+    def _step(self):
+        advance(self.bodies, [self.crazyflie, self.neighbour.crazyflie], STEPS * STEP_S)
+        self._exchange()
+        self.neighbour._exchange()
+        moved_m = math.dist(self.bodies.place(1), self._marked)
+        self.neighbour_moved_m = max(self.neighbour_moved_m, moved_m)
+
+    def mark(self):
+        """Measure from here on how far the neighbour moves."""
+        self._marked, self.neighbour_moved_m = self.bodies.place(1), 0.0
+
+    def to_hover(self):
+        neighbour = self.neighbour
+        assert self.run(5.0, lambda: neighbour.state is State.READY), neighbour.machine.reason
+        assert neighbour.machine.take_off(self.now_s).is_accepted
+        assert self.run(10.0, lambda: neighbour.state is State.FLYING), neighbour.machine.reason
+        self.run(2.0)  # the height settles
+        return super().to_hover()

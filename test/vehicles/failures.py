@@ -3,9 +3,10 @@
 
     PYTHONPATH=src:test python3 test/vehicles/failures.py [REPEATS] [AUTOPILOT]
 
-Prints how long the vehicle took to hover or to begin to land, and in how many flights it did what
-the row says. The vehicle is the stand-in with a simulated body, its seed another one in each
-flight; the clock is virtual.
+Prints how long the vehicle took to hover or to begin to land, in how many flights it did what the
+row says, and how far another vehicle beside it moved meanwhile, which hovers by its own bridge. The
+vehicles are stand-ins with simulated bodies, their seeds others in each flight; the clock is
+virtual.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ import random
 import statistics
 import sys
 
-from vehicles.virtual_flight import STAND_INS, Flight, StandInFlight
+from vehicles.virtual_flight import STAND_INS, Flight, PairFlight, StandInFlight
 
 from quad_nav.geometry import Twist2D
 from quad_nav.vehicle.orders import State
 
 HOVER_MPS = 0.05
+NEIGHBOUR_M = 0.05
+"""How far the other vehicle may be from its place; its estimate drifts."""
 
 
 def _change_mode(flight):
@@ -63,7 +66,8 @@ def _drain(flight):
 
 
 def _stop_all(flight):
-    flight.machine.land(flight.now_s, "all vehicles land", is_stop_all=True)
+    for one in (flight, flight.neighbour) if isinstance(flight, PairFlight) else (flight,):
+        one.machine.land(flight.now_s, "all vehicles land", is_stop_all=True)
 
 
 def _climb(flight):
@@ -76,6 +80,10 @@ def _leave(flight):
 
 def _hide(flight):
     flight.vehicle.hides_position = True
+
+
+def _mislead_barometer(flight):
+    flight.vehicle.estimator.baro_error_m = 2.0
 
 
 def _kill_bridge(flight):
@@ -107,6 +115,10 @@ ROWS = {
     "distance limit crossed": (_leave, State.LANDING, 0.1, False),
     "stop all": (_stop_all, State.LANDING, 0.1, False),
 }
+STAND_IN_ROWS = {
+    **ROWS,
+    "the barometer puts it on the ground": (_mislead_barometer, State.LANDING, 10.0, False),
+}
 LATE_S, ALWAYS_LATE_S = {"somebody disarms": 1.1}, 0.05
 """A real link is this much later; arming is told by the heartbeats, once a second."""
 STATES_WITHOUT_STREAM = (State.TAKEN_OVER, State.NO_LINK, State.LANDING)
@@ -121,13 +133,15 @@ def fly_row(name, autopilot, moment_s, command=COMMAND, make_flight=Flight, seed
     Raises:
         AssertionError: The bridge did something else.
     """
-    fault, state, within_s, pauses = ROWS[name]
-    if make_flight is StandInFlight:
+    fault, state, within_s, pauses = STAND_IN_ROWS[name]
+    if issubclass(make_flight, StandInFlight):
         within_s += LATE_S.get(name, ALWAYS_LATE_S)
     flight = make_flight(autopilot, seed=seed).to_flight(command)
     flight.run(moment_s)
     assert flight.state is State.FLYING, (flight.state, flight.machine.reason)
     start_s = flight.now_s
+    if make_flight is PairFlight:
+        flight.mark()
     fault(flight)
 
     def has_followed():
@@ -147,41 +161,105 @@ def fly_row(name, autopilot, moment_s, command=COMMAND, make_flight=Flight, seed
     if state in STATES_WITHOUT_STREAM and flight.state in STATES_WITHOUT_STREAM:
         assert flight.setpoints_since(silent_s) == []
     assert (flight.pauses > 0) == pauses, flight.pauses
+    if make_flight is PairFlight:
+        _check_neighbour(flight, name)
     return flight, reached_s, safe_s
 
 
+def _refuse_arming(flight, _):
+    flight.vehicle.refuses_arming = "Gyros inconsistent"
+
+
+def _cancel_take_off(flight, moment_s):
+    assert flight.run(5.0, lambda: flight.state is State.TAKING_OFF), flight.state
+    flight.run(moment_s / 4.0)  # the motors run up for longer
+    foreign = {"coordinate_frame": 8, "type_mask": 1479, "vx": 0.0, "vy": 0.0, "vz": 0.0}
+    flight.vehicle.receive("SET_POSITION_TARGET_LOCAL_NED", foreign, sender=(42, 1))
+
+
+# Name: fault, state that must follow, within s.
+TAKE_OFF_ROWS = {
+    "arming is refused": (_refuse_arming, State.NOT_READY, 5.0),
+    "a foreign set-point cancels the take-off": (_cancel_take_off, State.HOLDING, 18.0),
+}
+
+
+def fly_take_off_row(name, autopilot, moment_s, seed):
+    """Fail one take-off beside a vehicle that hovers; return the flight and the time.
+
+    Raises:
+        AssertionError: The bridge did something else.
+    """
+    fault, state, within_s = TAKE_OFF_ROWS[name]
+    flight = PairFlight(autopilot, seed=seed)
+    flight.neighbour_to_hover()
+    assert flight.run(10.0, lambda: flight.state is State.READY), flight.machine.reason
+    flight.run(moment_s)
+    flight.mark()
+    assert flight.machine.take_off(flight.now_s).is_accepted
+    start_s = flight.now_s
+    fault(flight, moment_s)
+    assert flight.run(within_s, lambda: flight.state is state), (flight.state, flight.news[-2:])
+    assert state is not State.NOT_READY or "Gyros inconsistent" in flight.machine.refusal
+    assert flight.vehicle.armed == (state is State.HOLDING)
+    _check_neighbour(flight, name)
+    return flight, flight.now_s - start_s
+
+
+def _check_neighbour(flight, name):
+    """Assert that the other vehicle hovers on; with all stopped it lands."""
+    neighbour = flight.neighbour
+    wanted = State.LANDING if name == "stop all" else State.FLYING
+    assert neighbour.state is wanted, (neighbour.state, neighbour.machine.reason)
+    assert neighbour.pauses == 0
+    if wanted is State.FLYING:
+        assert flight.neighbour_moved_m < NEIGHBOUR_M, flight.neighbour_moved_m
+
+
 def repeat(name, autopilot, repeats, moments):
-    """Fly a row many times; return the times to its state, those to safety, and the failures."""
-    reached, safe, failed = [], [], []
+    """Fly a row many times; return a tuple for each flight, and the failures.
+
+    A tuple has the time to the row's state, the time to safety, and how far the neighbour moved.
+    """
+    flown, failed = [], []
     for seed in range(repeats):
         moment_s, flight = moments.uniform(0.0, 4.0), None
         try:
-            flight, reached_s, safe_s = fly_row(
-                name, autopilot, moment_s, make_flight=StandInFlight, seed=seed
-            )
-            reached.append(reached_s)
-            safe.append(safe_s)
+            if name in TAKE_OFF_ROWS:
+                flight, reached_s = fly_take_off_row(name, autopilot, moment_s, seed)
+                safe_s = reached_s
+            else:
+                flight, reached_s, safe_s = fly_row(
+                    name, autopilot, moment_s, make_flight=PairFlight, seed=seed
+                )
+            flown.append((reached_s, safe_s, flight.neighbour_moved_m))
         except AssertionError as error:
             failed.append(f"seed {seed}, {moment_s:.2f} s: {error}")
         if flight is not None:
             flight.end()
-    return reached, safe, failed
+    return flown, failed
 
 
 def main():
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     autopilots = sys.argv[2:] or list(STAND_INS)
     moments = random.Random(20)
-    print(f"{'failure':30} {'autopilot':10} {'as said':>8} {'state s':>8} {'safe s':>7} {'max':>6}")
+    print(
+        f"{'failure':30} {'autopilot':10} {'as said':>8} {'state s':>8} {'safe s':>7} {'max':>6}"
+        f" {'other m':>8}"
+    )
     good = True
-    for name in ROWS:
+    for name in [*STAND_IN_ROWS, *TAKE_OFF_ROWS]:
         for autopilot in autopilots:
-            reached, safe, failed = repeat(name, autopilot, repeats, moments)
+            if name == "a foreign set-point cancels the take-off" and autopilot != "ardupilot":
+                continue  # PX4 takes off by set-points
+            flown, failed = repeat(name, autopilot, repeats, moments)
             good = good and not failed
-            line = f"{name:30} {autopilot:10} {len(safe):>4}/{repeats:<3}"
-            if safe:
+            line = f"{name:30} {autopilot:10} {len(flown):>4}/{repeats:<3}"
+            if flown:
+                reached, safe, moved = zip(*flown)
                 line += f" {statistics.median(reached):8.2f} {statistics.median(safe):7.2f}"
-                line += f" {max(safe):6.2f}"
+                line += f" {max(safe):6.2f} {max(moved):8.3f}"
             print("\n    ".join([line, *failed]), flush=True)
     return 0 if good else 1
 

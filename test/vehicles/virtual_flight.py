@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 from vehicles.ardupilot import ArduPilot
@@ -11,8 +12,9 @@ from vehicles.estimator import LocalFrame
 from vehicles.point_vehicle import ARDUPILOT, PX4, PointVehicle
 from vehicles.px4 import AIRFRAME as BARE_PX4
 from vehicles.px4 import Px4
+from vehicles.stand_in import advance
 
-from quad_nav.geometry import Twist2D
+from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.sim.simulation import STEP_S as STEP
 from quad_nav.vehicle.autopilots import AUTOPILOTS
 from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
@@ -28,6 +30,7 @@ STAND_INS = {
     "px4": (Px4, {"COM_OBL_RC_ACT": 4.0, "NAV_DLL_ACT": 3.0, "NAV_RCL_ACT": 3.0}),
 }
 AIRFRAMES = {"ardupilot": BARE_ARDUPILOT, "px4": BARE_PX4}
+STARTS = (Pose2D(200.0, 200.0, 0.0), Pose2D(200.0, 195.0, 0.0))
 KINDS = {"ardupilot": ARDUPILOT, "px4": PX4}
 
 
@@ -63,8 +66,11 @@ class Flight:
         return until is None
 
     def _step(self):
-        self.now_s += self.step_s
-        for name, fields in self.vehicle.advance(self.step_s):
+        self._exchange(self.now_s + self.step_s, self.vehicle.advance(self.step_s))
+
+    def _exchange(self, now_s, messages):
+        self.now_s = now_s
+        for name, fields in messages:
             if self.hears:
                 self.adapter.receive(name, 1, SimpleNamespace(**{"id": 0, **fields}), self.now_s)
         if self.is_alive:
@@ -129,11 +135,56 @@ class StandInFlight(Flight):
 
     step_s = 2.0 * STEP
 
+    def __init__(
+        self, autopilot="ardupilot", permissions=MAY_ARM, seed=0, bodies=None, robot=0, **limits
+    ):
+        self.bodies = bodies or Bodies(airframes=[AIRFRAMES[autopilot]])
+        self._robot = robot
+        super().__init__(autopilot, permissions, seed, **limits)
+
     def make_vehicle(self, autopilot, seed):
-        self.bodies = Bodies(airframes=[AIRFRAMES[autopilot]])
         stand_in, safe = STAND_INS[autopilot]
         frame = LocalFrame(3.0, -2.0, 0.6)
-        return stand_in(self.bodies, 0, frame, seed, 60.0 + seed % 7, safe)
+        return stand_in(self.bodies, self._robot, frame, seed, 60.0 + seed % 7, safe)
 
     def end(self):
         self.bodies.close()
+
+
+class PairFlight(StandInFlight):
+    """The same beside a vehicle of the same kind with a bridge of its own, which hovers.
+
+    Attributes:
+        neighbour: Its flight.
+        neighbour_moved_m: How far it has been from where it was at the last `mark`.
+    """
+
+    def __init__(self, autopilot="ardupilot", permissions=MAY_ARM, seed=0, **limits):
+        bodies = Bodies(starts=STARTS, airframes=[AIRFRAMES[autopilot]] * 2)
+        super().__init__(autopilot, permissions, seed, bodies, **limits)
+        self.neighbour = StandInFlight(autopilot, permissions, seed + 1000, bodies, 1, **limits)
+        self.neighbour.command = Twist2D()
+        self.mark()
+
+    def _step(self):
+        advance(self.bodies, [self.vehicle, self.neighbour.vehicle], self.step_s)
+        now_s = self.now_s + self.step_s
+        self._exchange(now_s, self.vehicle.messages())
+        self.neighbour._exchange(now_s, self.neighbour.vehicle.messages())
+        moved_m = math.dist(self.bodies.place(1), self._marked)
+        self.neighbour_moved_m = max(self.neighbour_moved_m, moved_m)
+
+    def mark(self):
+        """Measure from here on how far the neighbour moves."""
+        self._marked, self.neighbour_moved_m = self.bodies.place(1), 0.0
+
+    def neighbour_to_hover(self):
+        neighbour = self.neighbour
+        assert self.run(10.0, lambda: neighbour.state is State.READY), neighbour.machine.reason
+        assert neighbour.machine.take_off(self.now_s).is_accepted
+        assert self.run(20.0, lambda: neighbour.state is State.FLYING), neighbour.machine.reason
+        self.run(2.0)  # the height settles
+
+    def to_hover(self):
+        self.neighbour_to_hover()
+        return super().to_hover()
