@@ -31,6 +31,7 @@ from figures import JSON_HELP, LARGER, Figures
 from fleet import Clock, free_port, launch_fleet, used
 
 ROOT = Path(__file__).resolve().parents[1]
+QUIET_RVIZ = ROOT / "rviz" / "quiet_rviz.sh"
 FLAT = 0.05
 QUEUE = 1000
 RVIZ_AFTER = 2  # stretches
@@ -223,7 +224,7 @@ class Contacts:
 
 
 class Rviz:
-    """RViz as ``fleet.launch`` shows it, for a part of the flight."""
+    """RViz as ``fleet.launch`` shows it, with its priority, for a part of the flight."""
 
     def __init__(self, robots: int) -> None:
         self._robots = robots
@@ -240,7 +241,7 @@ class Rviz:
         virtual = [] if os.environ.get("DISPLAY") else ["xvfb-run", "-a"]
         node = [sys.executable, str(ROOT / "nodes" / "fleet_rviz"), "--robots", str(self._robots)]
         self._process = subprocess.Popen(
-            [*virtual, *node, "__name:=rviz_fleet"],
+            ["bash", str(QUIET_RVIZ), *virtual, *node, "__name:=rviz_fleet"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
