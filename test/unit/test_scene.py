@@ -98,6 +98,21 @@ def test_distances_of_many_points_equal_those_of_each():
         assert scene.flight_surface_distances_m(points).tolist() == expected
 
 
+def test_distances_of_many_points_are_those_to_the_nearest_of_many_round_obstacles():
+    random = np.random.default_rng(3)
+    cylinders = (Cylinder(f"c{k}", *random.uniform(0.0, 40.0, 2), 0.4, 2.0) for k in range(300))
+    solids = (*cylinders, Sphere("ball", 9.0, 9.0, 1.0, 0.5))
+    scene = Scene("s", 40.0, 40.0, 1.0, Walls(), solids, ())
+    for centre in random.uniform(1.0, 39.0, (20, 2)):
+        points = centre + random.uniform(-1.0, 1.0, (3, 4, 2))
+        distances = [
+            solid.surface_distance_m(points[..., 0], points[..., 1], 1.0)
+            for solid in (*scene.wall_boxes(), *solids)
+        ]
+        expected = np.min(distances, axis=0)
+        assert scene.flight_surface_distances_m(points).tolist() == expected.tolist()
+
+
 def test_a_written_scene_reads_the_same(tmp_path):
     scene = Scene(
         "hall",

@@ -41,17 +41,11 @@ def scan_points(
         float32[m, 3], metres in frame a, in the order of the beams.
     """
     ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
-    directions = _directions(
-        float(np.float32(scan.angle_min_rad)),
-        float(np.float32(scan.angle_increment_rad)),
-        len(ranges),
-    )
-    range_max = np.float32(scan.range_max_m)
-    inf_range = range_max - np.float32(0.0001) if inf_is_valid else np.float32(np.inf)
+    beams = scan.angle_min_rad, scan.angle_increment_rad, len(ranges)
     return project_scan(
         ranges,
-        directions,
-        (np.float32(scan.range_min_m), range_max, inf_range),
+        _directions(*beams),
+        _limits(scan.range_min_m, scan.range_max_m, inf_is_valid),
         a_from_sensor.quaternion,
         (a_from_sensor.x_m, a_from_sensor.y_m, a_from_sensor.z_m),
         heights_m,
@@ -87,6 +81,21 @@ def transform_points(
 
 @lru_cache(maxsize=64)
 def _directions(angle_min_rad: float, angle_increment_rad: float, n: int) -> NDArray[np.float64]:
-    """Return cosine and sine of each beam, float64[n, 2]; Python's are the C library's."""
-    angles = [angle_min_rad + k * angle_increment_rad for k in range(n)]
+    """Return cosine and sine of each beam, float64[n, 2]; Python's are the C library's.
+
+    The angles are those of a message, in float32.
+    """
+    first_rad = float(np.float32(angle_min_rad))
+    increment_rad = float(np.float32(angle_increment_rad))
+    angles = [first_rad + k * increment_rad for k in range(n)]
     return np.array([(math.cos(a), math.sin(a)) for a in angles]).reshape(n, 2)
+
+
+@lru_cache(maxsize=64)
+def _limits(
+    range_min_m: float, range_max_m: float, inf_is_valid: bool
+) -> Tuple[np.float32, np.float32, np.float32]:
+    """Return the limits of ranges, and what replaces +inf."""
+    range_max = np.float32(range_max_m)
+    inf_range = range_max - np.float32(0.0001) if inf_is_valid else np.float32(np.inf)
+    return np.float32(range_min_m), range_max, inf_range

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.costmap.observation import SourceParams
-from quad_nav.geometry import Pose2D, Pose3D, Scan, angle_difference
+from quad_nav.geometry import Pose3D, Scan, angle_difference
 from quad_nav.kernels.projection import count_returns
 
 _ELSEWHERE_M, _ELSEWHERE_RAD = 0.05, 0.05
@@ -58,9 +58,9 @@ class ScanValidator:
 
     def reset(self) -> None:
         """Forget earlier scans, after the clock has jumped."""
-        self._first_equal: Optional[Tuple[bytes, Pose2D]] = None  # content, pose of the first
-        self._previous_pose: Optional[Pose2D] = None
-        self._accepted: Optional[Tuple[Pose2D, int, int]] = None  # pose, beams, near returns
+        self._first_equal: Optional[Tuple[bytes, Pose3D]] = None  # content, pose of the first
+        self._previous_pose: Optional[Pose3D] = None
+        self._accepted: Optional[Tuple[Pose3D, int, int]] = None  # pose, beams, near returns
 
     def rejection_reason(self, scan: Scan, global_from_sensor: Pose3D, now_s: float) -> str:
         """Return the reason to reject a scan that arrives now, "" to accept it.
@@ -70,7 +70,7 @@ class ScanValidator:
             global_from_sensor: Pose of the LIDAR at the scan's stamp.
             now_s: Current time.
         """
-        here = global_from_sensor.to_2d()
+        here = global_from_sensor
         ranges = np.ascontiguousarray(scan.ranges_m, dtype=np.float32)
         returns, near = count_returns(
             ranges,
@@ -94,7 +94,7 @@ class ScanValidator:
             return ""
         return f"it is {age_s:.2f} s old, expected less than {limit_s:.2f} s"
 
-    def _repeated(self, ranges: NDArray[np.float32], here: Pose2D, returns: int) -> str:
+    def _repeated(self, ranges: NDArray[np.float32], here: Pose3D, returns: int) -> str:
         content, previous, self._previous_pose = ranges.tobytes(), self._previous_pose, here
         if (
             self._first_equal is None
@@ -108,16 +108,18 @@ class ScanValidator:
             return ""
         turn_rad = abs(angle_difference(here.yaw_rad, first.yaw_rad))
         return (
-            f"it is identical to a scan taken {here.distance_to(first):.2f} m and "
+            f"it is identical to a scan taken {_distance_m(here, first):.2f} m and "
             f"{turn_rad:.2f} rad from here"
         )
 
-    def _lost_returns(self, scan: Scan, here: Pose2D, returns: int) -> str:
+    def _lost_returns(self, scan: Scan, here: Pose3D, returns: int) -> str:
         beams = len(scan.ranges_m)
         if self._accepted is None or self._accepted[1] != beams:
             return ""
         there, _, near = self._accepted
-        if here.distance_to(there) > min(_HARDLY_MOVED_M, 0.25 * scan.range_max_m):
+        if near - returns <= _LOST_SHARE * beams:  # as mostly: the rest can only allow more
+            return ""
+        if _distance_m(here, there) > min(_HARDLY_MOVED_M, 0.25 * scan.range_max_m):
             return ""
         field_rad = beams * abs(scan.angle_increment_rad)
         may_leave = (
@@ -141,5 +143,9 @@ def _share(turn_rad: float, field_rad: float) -> float:
     return min(turn_rad / field_rad, 1.0) if field_rad > 0.0 else 1.0
 
 
-def _differ(a: Pose2D, b: Pose2D, by_m: float, by_rad: float) -> bool:
-    return a.distance_to(b) > by_m or abs(angle_difference(a.yaw_rad, b.yaw_rad)) > by_rad
+def _distance_m(a: Pose3D, b: Pose3D) -> float:
+    return math.hypot(b.x_m - a.x_m, b.y_m - a.y_m)
+
+
+def _differ(a: Pose3D, b: Pose3D, by_m: float, by_rad: float) -> bool:
+    return _distance_m(a, b) > by_m or abs(angle_difference(a.yaw_rad, b.yaw_rad)) > by_rad

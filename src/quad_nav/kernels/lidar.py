@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.rays import Triple, dot, enter_solid, through_slab, triple, turn
-from quad_nav.kernels.sectors import Axes, disc_around, rough_disc_sector, sector_of
+from quad_nav.kernels.sectors import Axes, columns_of, rough_sectors, sector_of
 
 _ROUNDING = 1e-6  # of a beam's number
 _RING_M, _RINGS = 1.0, 64  # rings around a LIDAR; the last one has no outer limit
@@ -86,11 +86,12 @@ def cast_scans(
         ranges: float64[n, m], filled with the distances to the first hits, metres; inf for
             none.
     """
+    columns = columns_of(solids.kinds, solids.centres, solids.rotations, solids.sizes)
     for k in range(origins.shape[0]):
         row, origin, rotation = ranges[k], triple(origins[k]), rotations[k]
         row[:] = math.inf
         _cast_at_floor(row, origin, rotation, beams)
-        _cast_at_solids(row, origin, rotation, beams, solids)
+        _cast_at_solids(row, origin, rotation, beams, solids, columns)
         if grid.members.shape[0] > 0:
             for beam in range(row.shape[0]):
                 direction = _in_map(rotation, beams.directions[beam])
@@ -136,10 +137,19 @@ def _cast_at_solids(
     rotation: NDArray[np.float64],
     beams: Beams,
     solids: Solids,
+    columns: NDArray[np.float64],
 ) -> None:
     """Shorten the beams, float64[m], to where they enter solids, near ones first.
 
     Most others are hidden behind the near ones, which a rough sector is enough to tell.
+
+    Args:
+        row: The beams' lengths.
+        origin: Position of the LIDAR.
+        rotation: float64[3, 3], axes of the LIDAR in ``map`` as columns.
+        beams: The beams.
+        solids: The solids.
+        columns: float64[8, s], ``sectors.columns_of`` them.
     """
     count = solids.kinds.shape[0]
     axes = (
@@ -147,21 +157,14 @@ def _cast_at_solids(
         (rotation[0, 1], rotation[1, 1], rotation[2, 1]),
         (rotation[0, 2], rotation[1, 2], rotation[2, 2]),
     )
-    discs = np.empty((count, 4))  # x, y, distance and radius
+    rough = np.empty((3, count))
+    rough_sectors(columns, origin, axes, rough)
     firsts, nexts = np.full(_RINGS, -1), np.empty(count, np.int64)  # lists of each ring's solids
     for solid in range(count):
-        centre, sizes = triple(solids.centres[solid]), triple(solids.sizes[solid])
-        offset = (centre[0] - origin[0], centre[1] - origin[1], centre[2] - origin[2])
-        axis = triple(solids.rotations[solid, 2])
-        x, y, radius = disc_around(solids.kinds[solid], offset, axis, sizes, axes)
-        distance = math.sqrt(x * x + y * y)
-        if distance - radius > beams.far_m:
-            continue
-        discs[solid, 0], discs[solid, 1] = x, y
-        discs[solid, 2], discs[solid, 3] = distance, radius
-        ring = min(int(max(distance - radius, 0.0) / _RING_M), _RINGS - 1)
-        nexts[solid] = firsts[ring]
-        firsts[ring] = solid
+        if rough[0, solid] <= beams.far_m:
+            ring = min(int(max(rough[0, solid], 0.0) / _RING_M), _RINGS - 1)
+            nexts[solid] = firsts[ring]
+            firsts[ring] = solid
     solid = firsts[0]
     while solid >= 0:
         _cast_at_solid(row, origin, axes, beams, solids, solid)
@@ -169,10 +172,8 @@ def _cast_at_solids(
     for ring in range(1, _RINGS):
         solid = firsts[ring]
         while solid >= 0:
-            x, y, distance, radius = discs[solid]
-            limit = distance - radius - _ROUNDING
-            first_rad, width_rad = rough_disc_sector(x, y, distance, radius)
-            first, last = _beams_of(first_rad, width_rad, beams)
+            limit = rough[0, solid] - _ROUNDING
+            first, last = _beams_of(rough[1, solid], rough[2, solid], beams)
             first_beam = int(math.ceil(first))
             begin, end = _trim(row, first_beam, int(math.floor(last)), limit)
             if begin <= end:

@@ -15,6 +15,8 @@ from quad_nav.kernels.cost_grid import CostmapView, cell_index, include
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.obstructed_cells import sector_of
 
+_STRIDE = 16  # beams
+
 
 class ObservationStack(NamedTuple):
     """Observations of one source in a ring of slots, metres in the frame of the costmap.
@@ -154,17 +156,17 @@ def include_rays(
     size_y, size_x = costs.shape
     high_x, high_y = origin_x + size_x * resolution, origin_y + size_y * resolution
     sensor_x, sensor_y = seen.sensors[slot, 0], seen.sensors[slot, 1]
-    drawn, reach = seen.drawn[slot], seen.reaches[slot]
+    drawn = seen.drawn
     include(bounds, sensor_x, sensor_y)
     known = (
-        drawn[4] == origin_x
-        and drawn[5] == origin_y
-        and drawn[6] == high_x
-        and drawn[7] == high_y
-        and drawn[8] == resolution
+        drawn[slot, 4] == origin_x
+        and drawn[slot, 5] == origin_y
+        and drawn[slot, 6] == high_x
+        and drawn[slot, 7] == high_y
+        and drawn[slot, 8] == resolution
     )
     if not known:
-        again = not math.isnan(drawn[8])
+        reach, again = seen.reaches[slot], not math.isnan(drawn[slot, 8])
         if again and math.isnan(reach[0]):
             _bounds_of_rays(costmap, seen, slot, range_m, False, reach)
         if (
@@ -175,11 +177,12 @@ def include_rays(
             and bounds[3] >= min(reach[3], high_y - 0.001)
         ):
             return
-        _bounds_of_rays(costmap, seen, slot, range_m, True, drawn[:4])
-        drawn[4], drawn[5], drawn[6], drawn[7] = origin_x, origin_y, high_x, high_y
-        drawn[8] = resolution
-    include(bounds, drawn[0], drawn[1])
-    include(bounds, drawn[2], drawn[3])
+        _bounds_of_rays(costmap, seen, slot, range_m, True, drawn[slot, :4])
+        drawn[slot, 4], drawn[slot, 5] = origin_x, origin_y
+        drawn[slot, 6], drawn[slot, 7] = high_x, high_y
+        drawn[slot, 8] = resolution
+    include(bounds, drawn[slot, 0], drawn[slot, 1])
+    include(bounds, drawn[slot, 2], drawn[slot, 3])
 
 
 @njit(cache=True, nogil=True)
@@ -197,19 +200,28 @@ def _bounds_of_rays(
     high_x, high_y = low_x + size_x * resolution, low_y + size_y * resolution
     x0, y0 = seen.sensors[slot, 0], seen.sensors[slot, 1]
     bounds[0], bounds[1], bounds[2], bounds[3] = x0, y0, x0, y0
-    surely_near = (1.0 - 1e-9) * range_m * range_m
-    for k in range(seen.counts[slot, 0]):
-        x, y = float(seen.ends[slot, k, 0]), float(seen.ends[slot, k, 1])
-        if in_grid:
-            x, y = clip_to_grid(x0, y0, x, y, low_x, low_y, high_x, high_y)
-            if (
-                cell_index(x, low_x, resolution, size_x) < 0
-                or cell_index(y, low_y, resolution, size_y) < 0
-            ):
-                continue
-        dx, dy = x - x0, y - y0
-        scale = 1.0
-        if dx * dx + dy * dy > surely_near:  # hypot is slow, and most points are near
-            length = math.hypot(dx, dy)
-            scale = range_m / length if length > range_m else 1.0
-        include(bounds, x0 + dx * scale, y0 + dy * scale)
+    square_range, near = range_m * range_m, 1.0 - 1e-9
+    count = seen.counts[slot, 0]
+    for first in range(_STRIDE):  # beams all around first: few later ones reach farther
+        for k in range(first, count, _STRIDE):
+            x, y = float(seen.ends[slot, k, 0]), float(seen.ends[slot, k, 1])
+            if in_grid:
+                x, y = clip_to_grid(x0, y0, x, y, low_x, low_y, high_x, high_y)
+                if (
+                    cell_index(x, low_x, resolution, size_x) < 0
+                    or cell_index(y, low_y, resolution, size_y) < 0
+                ):
+                    continue
+            dx, dy = x - x0, y - y0
+            square, scale = dx * dx + dy * dy, 1.0
+            if square > near * square_range:
+                # hypot is slow: it is left out for ends that are surely within the bounds.
+                reach_x = x0 - bounds[0] if dx < 0.0 else bounds[2] - x0
+                reach_y = y0 - bounds[1] if dy < 0.0 else bounds[3] - y0
+                if dx * dx * square_range <= near * (
+                    reach_x * reach_x * square
+                ) and dy * dy * square_range <= near * (reach_y * reach_y * square):
+                    continue
+                length = math.hypot(dx, dy)
+                scale = range_m / length if length > range_m else 1.0
+            include(bounds, x0 + dx * scale, y0 + dy * scale)

@@ -12,60 +12,47 @@ from numpy.typing import NDArray
 
 from quad_nav.kernels.jit import njit
 
-
-@njit(cache=True, nogil=True)
-def project_ranges(
-    ranges: NDArray[np.float32],
-    directions: NDArray[np.float64],
-    range_min: np.float32,
-    range_max: np.float32,
-    inf_range: np.float32,
-) -> NDArray[np.float32]:
-    """Convert ranges in [range_min, range_max) to points, in order.
-
-    Args:
-        ranges: float32[n], metres.
-        directions: float64[n, 2], cosine and sine of each beam.
-        range_min: float32, metres.
-        range_max: float32, metres.
-        inf_range: float32, replaces +inf.
-
-    Returns:
-        float32[m, 3], metres in the sensor's frame.
-    """
-    points = np.zeros((len(ranges), 3), np.float32)
-    m = 0
-    for k in range(len(ranges)):
-        beam = inf_range if ranges[k] == np.inf else ranges[k]
-        if range_min <= beam < range_max:
-            points[m, 0] = np.float64(beam) * directions[k, 0]
-            points[m, 1] = np.float64(beam) * directions[k, 1]
-            m += 1
-    return points[:m]
+Quaternion = Tuple[float, float, float, float]
+Row = Tuple[np.float32, np.float32, np.float32]
 
 
 @njit(cache=True, nogil=True)
-def _rotation(x: np.float32, y: np.float32, z: np.float32, w: np.float32) -> NDArray[np.float32]:
-    """Return the rotation matrix, float32[3, 3], every step rounded to float32."""
+def _rotation(quaternion: Quaternion) -> Tuple[Row, Row, Row]:
+    """Return the rows of the rotation matrix, every step rounded to float32."""
+    x, y = np.float32(quaternion[0]), np.float32(quaternion[1])
+    z, w = np.float32(quaternion[2]), np.float32(quaternion[3])
     one, two = np.float32(1.0), np.float32(2.0)
     tx, ty, tz = two * x, two * y, two * z
-    rotation = np.empty((3, 3), np.float32)
-    rotation[0, 0] = one - (ty * y + tz * z)
-    rotation[0, 1] = ty * x - tz * w
-    rotation[0, 2] = tz * x + ty * w
-    rotation[1, 0] = ty * x + tz * w
-    rotation[1, 1] = one - (tx * x + tz * z)
-    rotation[1, 2] = tz * y - tx * w
-    rotation[2, 0] = tz * x - ty * w
-    rotation[2, 1] = tz * y + tx * w
-    rotation[2, 2] = one - (tx * x + ty * y)
-    return rotation
+    return (
+        (one - (ty * y + tz * z), ty * x - tz * w, tz * x + ty * w),
+        (ty * x + tz * w, one - (tx * x + tz * z), tz * y - tx * w),
+        (tz * x - ty * w, tz * y + tx * w, one - (tx * x + ty * y)),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _shift(translation: Tuple[float, float, float]) -> Row:
+    """Return a translation in float32."""
+    return np.float32(translation[0]), np.float32(translation[1]), np.float32(translation[2])
+
+
+@njit(cache=True, nogil=True)
+def _moved(
+    rotation: Tuple[Row, Row, Row], shift: Row, x: np.float32, y: np.float32, z: np.float32
+) -> Row:
+    """Return a point in the other frame."""
+    to_x, to_y, to_z = rotation
+    return (
+        to_x[0] * x + to_x[1] * y + to_x[2] * z + shift[0],
+        to_y[0] * x + to_y[1] * y + to_y[2] * z + shift[1],
+        to_z[0] * x + to_z[1] * y + to_z[2] * z + shift[2],
+    )
 
 
 @njit(cache=True, nogil=True)
 def transform_between_heights(
     points: NDArray[np.float32],
-    quaternion: Tuple[float, float, float, float],
+    quaternion: Quaternion,
     translation: Tuple[float, float, float],
     min_z: float,
     max_z: float,
@@ -82,23 +69,13 @@ def transform_between_heights(
     Returns:
         float32[m, 3], metres in the new frame.
     """
-    rotation = _rotation(
-        np.float32(quaternion[0]),
-        np.float32(quaternion[1]),
-        np.float32(quaternion[2]),
-        np.float32(quaternion[3]),
-    )
-    tx, ty, tz = translation
-    shift = (np.float32(tx), np.float32(ty), np.float32(tz))
+    rotation, shift = _rotation(quaternion), _shift(translation)
     moved = np.empty_like(points)
     m = 0
     for k in range(len(points)):
-        x, y, z = points[k, 0], points[k, 1], points[k, 2]
-        for row in range(3):
-            moved[m, row] = (
-                rotation[row, 0] * x + rotation[row, 1] * y + rotation[row, 2] * z + shift[row]
-            )
-        if min_z <= np.float64(moved[m, 2]) <= max_z:
+        x, y, z = _moved(rotation, shift, points[k, 0], points[k, 1], points[k, 2])
+        if min_z <= np.float64(z) <= max_z:
+            moved[m, 0], moved[m, 1], moved[m, 2] = x, y, z
             m += 1
     return moved[:m].copy()
 
@@ -119,17 +96,19 @@ def outside_circles(
     kept = np.empty_like(points)
     m = 0
     for k in range(len(points)):
-        x, y = np.float64(points[k, 0]), np.float64(points[k, 1])
-        outside = True
-        for c in range(len(circles)):
-            dx, dy, radius = x - circles[c, 0], y - circles[c, 1], circles[c, 2]
-            if dx * dx + dy * dy <= radius * radius:
-                outside = False
-                break
-        if outside:
+        if _is_outside(np.float64(points[k, 0]), np.float64(points[k, 1]), circles):
             kept[m] = points[k]
             m += 1
     return kept[:m].copy()
+
+
+@njit(cache=True, nogil=True)
+def _is_outside(x: float, y: float, circles: NDArray[np.float64]) -> bool:
+    for c in range(circles.shape[0]):
+        dx, dy, radius = x - circles[c, 0], y - circles[c, 1], circles[c, 2]
+        if dx * dx + dy * dy <= radius * radius:
+            return False
+    return True
 
 
 @njit(cache=True, nogil=True)
@@ -137,7 +116,7 @@ def project_scan(
     ranges: NDArray[np.float32],
     directions: NDArray[np.float64],
     limits: Tuple[np.float32, np.float32, np.float32],
-    quaternion: Tuple[float, float, float, float],
+    quaternion: Quaternion,
     translation: Tuple[float, float, float],
     heights: Tuple[float, float],
     circles: NDArray[np.float64],
@@ -145,9 +124,10 @@ def project_scan(
     """Convert ranges to points in another frame, within heights and in no circle.
 
     Args:
-        ranges: float32[n], as for ``project_ranges``.
-        directions: float64[n, 2], as for ``project_ranges``.
-        limits: float32, range_min, range_max and inf_range of ``project_ranges``.
+        ranges: float32[n], metres.
+        directions: float64[n, 2], cosine and sine of each beam.
+        limits: float32, metres: ranges in [limits[0], limits[1]) count, and limits[2] replaces
+            +inf.
         quaternion: As for ``transform_between_heights``.
         translation: As for ``transform_between_heights``.
         heights: min_z and max_z of ``transform_between_heights``.
@@ -156,9 +136,23 @@ def project_scan(
     Returns:
         float32[m, 3], metres in the other frame, in the order of the beams.
     """
-    points = project_ranges(ranges, directions, limits[0], limits[1], limits[2])
-    points = transform_between_heights(points, quaternion, translation, heights[0], heights[1])
-    return outside_circles(points, circles) if circles.shape[0] > 0 else points
+    range_min, range_max, inf_range = limits
+    rotation, shift = _rotation(quaternion), _shift(translation)
+    points = np.empty((ranges.shape[0], 3), np.float32)
+    zero, m = np.float32(0.0), 0
+    for k in range(ranges.shape[0]):
+        beam = inf_range if ranges[k] == np.inf else ranges[k]
+        if not range_min <= beam < range_max:
+            continue
+        ahead = np.float32(np.float64(beam) * directions[k, 0])
+        left = np.float32(np.float64(beam) * directions[k, 1])
+        x, y, z = _moved(rotation, shift, ahead, left, zero)
+        if heights[0] <= np.float64(z) <= heights[1] and _is_outside(
+            np.float64(x), np.float64(y), circles
+        ):
+            points[m, 0], points[m, 1], points[m, 2] = x, y, z
+            m += 1
+    return points[:m]
 
 
 @njit(cache=True, nogil=True)

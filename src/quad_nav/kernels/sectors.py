@@ -14,6 +14,9 @@ from __future__ import annotations
 import math
 from typing import Tuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.rays import BOX, CYLINDER, Triple, dot, enter_box
 
@@ -103,52 +106,75 @@ def _disc_sector(x: float, y: float, radius: float) -> Tuple[float, float]:
 
 
 @njit(cache=True, nogil=True)
-def disc_around(kind: int, offset: Triple, axis: Triple, sizes: Triple, axes: Axes) -> Triple:
-    """Return x, y and radius of a disc in a LIDAR's plane that holds all of a solid in the plane.
+def columns_of(
+    kinds: NDArray[np.int64],
+    centres: NDArray[np.float64],
+    rotations: NDArray[np.float64],
+    sizes: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return what ``rough_sectors`` needs of solids; the arguments are those of ``lidar.Solids``.
 
-    The plane cuts the tube around a standing solid in an ellipse with the long half
-    radius / cos(tilt). Around a lying solid there is a ball.
+    Returns:
+        float64[8, s]: centres x, y and z, the solids' z axes x, y and z in ``map``, and the radii
+        of a tube around each axis and of a ball.
+    """
+    count = kinds.shape[0]
+    columns = np.empty((8, count))
+    for k in range(count):
+        for axis in range(3):
+            columns[axis, k] = centres[k, axis]
+            columns[3 + axis, k] = rotations[k, 2, axis]
+        square = sizes[k, 0] * sizes[k, 0]
+        if kinds[k] == BOX:
+            square += sizes[k, 1] * sizes[k, 1]
+        columns[6, k] = math.sqrt(square)
+        columns[7, k] = math.sqrt(square + sizes[k, 2] * sizes[k, 2])
+    return columns
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # nothing is divided by 0
+def rough_sectors(
+    columns: NDArray[np.float64], origin: Triple, axes: Axes, rough: NDArray[np.float64]
+) -> None:
+    """Find how near solids can be to a LIDAR, and sectors that hold those of the solids.
+
+    A disc in the LIDAR's plane holds all of a solid in the plane: the plane cuts the tube around a
+    standing solid in an ellipse with the long half radius / cos(tilt). Around a lying solid there
+    is a ball. There are no branches, so that the compiler makes vectors of the solids.
 
     Args:
-        kind: Kind of the solid.
-        offset: From the LIDAR to the solid's centre in ``map``, metres.
-        axis: The solid's z axis in ``map``.
-        sizes: Sizes of the solid.
+        columns: float64[8, s], of ``columns_of``.
+        origin: Position of the LIDAR in ``map``, metres.
         axes: Axes of the LIDAR.
+        rough: float64[3, s], filled with the distance to the disc, negative inside of it, and the
+            sector's first bearing and width; that of a near disc may be too narrow.
     """
     ahead, left, up = axes
-    square = sizes[0] * sizes[0]
-    if kind == BOX:
-        square += sizes[1] * sizes[1]
-    cosine = dot(up, axis)
-    if abs(cosine) <= _STANDING:
-        square += sizes[2] * sizes[2]
-        return dot(ahead, offset), dot(left, offset), math.sqrt(square)
-    along = -dot(up, offset) / cosine  # to where the axis meets the plane
-    x = dot(ahead, offset) + along * dot(ahead, axis)
-    y = dot(left, offset) + along * dot(left, axis)
-    return x, y, math.sqrt(square) / abs(cosine)
+    for k in range(columns.shape[1]):
+        offset = (columns[0, k] - origin[0], columns[1, k] - origin[1], columns[2, k] - origin[2])
+        axis = (columns[3, k], columns[4, k], columns[5, k])
+        cosine = dot(up, axis)
+        stands = abs(cosine) > _STANDING
+        divisor = cosine if stands else 1.0
+        along = -dot(up, offset) / divisor if stands else 0.0  # to where the axis meets the plane
+        x = dot(ahead, offset) + along * dot(ahead, axis)
+        y = dot(left, offset) + along * dot(left, axis)
+        radius = columns[6, k] / abs(divisor) if stands else columns[7, k]
+        distance = math.sqrt(x * x + y * y)
+        sine = radius / (distance if distance > radius else radius)
+        # The arcsine is convex: below 1/2 at most pi/3 times its sine.
+        half_rad = (1.05 if sine < 0.5 else 0.5 * math.pi) * sine + _ROUGH_RAD
+        rough[0, k] = distance - radius
+        rough[1, k] = _rough_bearing(x, y) - half_rad
+        rough[2, k] = 2.0 * half_rad
 
 
-@njit(cache=True, nogil=True)
-def rough_disc_sector(x: float, y: float, distance: float, radius: float) -> Tuple[float, float]:
-    """Return a sector that holds that of a disc around (x, y), ``distance`` > 0 away."""
-    sine = radius / distance
-    if sine >= 1.0:
-        return FULL
-    # The arcsine is convex: below 1/2 at most pi/3 times its sine.
-    half_rad = (1.05 if sine < 0.5 else 0.5 * math.pi) * sine + _ROUGH_RAD
-    return _rough_bearing(x, y) - half_rad, 2.0 * half_rad
-
-
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _rough_bearing(x: float, y: float) -> float:
     """Return atan2(y, x) to 0.004 rad (Rajan et al., IEEE Signal Processing Magazine, 2006)."""
     along, across = max(abs(x), abs(y)), min(abs(x), abs(y))
-    z = across / along if along > 0.0 else 0.0
+    z = across / (along if along > 0.0 else 1.0)
     angle = z * (math.pi / 4.0 + 0.273 * (1.0 - z))
-    if abs(y) > abs(x):
-        angle = math.pi / 2.0 - angle
-    if x < 0.0:
-        angle = math.pi - angle
+    angle = math.pi / 2.0 - angle if abs(y) > abs(x) else angle
+    angle = math.pi - angle if x < 0.0 else angle
     return -angle if y < 0.0 else angle

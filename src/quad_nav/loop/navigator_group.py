@@ -106,11 +106,13 @@ class LoopRobot:
 
     def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> str:
         """Hand a scan that arrives now to the costmaps; return why not, "" if they have it."""
-        at = {
-            frame: SensorPose(pose, pose)
-            for frame, pose in self._in_costmaps(map_from_lidar, now_s).items()
-        }
-        poses = [at[sink.costmap.params.global_frame] for sink in self._intake.sinks]
+        sinks = self._intake.sinks
+        if self._frames.are_fixed:
+            poses = [SensorPose(map_from_lidar, map_from_lidar)] * len(sinks)
+        else:
+            in_costmaps = self._in_costmaps(map_from_lidar, now_s)
+            at = {frame: SensorPose(pose, pose) for frame, pose in in_costmaps.items()}
+            poses = [at[sink.costmap.params.global_frame] for sink in sinks]
         return self._intake.add_scan(scan, poses, scan.stamp_s, now_s)
 
     def is_due(self, now_s: float) -> bool:

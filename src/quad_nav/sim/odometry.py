@@ -54,17 +54,12 @@ class OdomFrames:
 
     def __init__(self, drift: OdomDrift, n_robots: int, seed: int) -> None:
         """Choose the directions of ``n_robots`` frames at random, by the seed."""
-        self._drift = drift
+        self._drift, self.are_fixed = drift, drift.is_zero
         self._directions: List[Tuple[float, float]] = []
         for robot in range(n_robots):
             angle_rad = 2.0 * math.pi * np.random.default_rng([seed, 3, robot]).random()
             self._directions.append((math.cos(angle_rad), math.sin(angle_rad)))
         self._first_turns_left = bool(np.random.default_rng([seed, 3]).integers(2))
-
-    @property
-    def are_fixed(self) -> bool:
-        """True if every odometry frame is ``map``."""
-        return self._drift.is_zero
 
     def map_from_odom(self, robot: int, elapsed_s: float) -> Pose2D:
         """Return the pose of ``odom{robot}`` in ``map``, ``elapsed_s`` after the start."""
@@ -78,8 +73,9 @@ class OdomFrames:
 
     def map_from_frame(self, frame: str, robot: int, elapsed_s: float) -> Pose2D:
         """Return the pose of a frame in ``map``: of ``odom{robot}``; any other frame is ``map``."""
-        is_odom = frame.lstrip("/") == f"odom{robot}"
-        return self.map_from_odom(robot, elapsed_s) if is_odom else _IDENTITY
+        if self.are_fixed or frame.lstrip("/") != f"odom{robot}":
+            return _IDENTITY
+        return self.map_from_odom(robot, elapsed_s)
 
 
 def pose_in(map_from_frame: Pose2D, map_from_base: Pose3D) -> Pose3D:

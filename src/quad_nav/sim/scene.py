@@ -226,8 +226,10 @@ class Scene:
         """
         x_m, y_m = positions_m[0]
         reach_m = float(np.hypot(*(positions_m - positions_m[0]).T).max())
-        boxes = self._boxes.within(x_m, y_m, self.altitude_m, 2 * reach_m)
-        return [*boxes, *self._round_obstacles]
+        near: List[Obstacle] = [*self._boxes.within(x_m, y_m, self.altitude_m, 2 * reach_m)]
+        if self._round_obstacles:
+            near += self._rounds.within(x_m, y_m, self.altitude_m, 2 * reach_m)
+        return near
 
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Obstacle:
         """Return the obstacle or wall whose surface is nearest to a point."""
@@ -297,8 +299,7 @@ class _Boxes:
     def within(self, x_m: float, y_m: float, z_m: float, margin_m: float) -> List[Box]:
         """Return the boxes that are up to ``margin_m`` further away than the nearest one."""
         distances_m = self._surface_distances_m(x_m, y_m, z_m)
-        near = distances_m <= distances_m.min() + margin_m + 1e-9
-        return [self.boxes[k] for k in np.flatnonzero(near)]
+        return [self.boxes[k] for k in _within(distances_m, margin_m)]
 
     def _surface_distances_m(self, x_m: float, y_m: float, z_m: float) -> Floats:
         """Return the distances float64[n] to the boxes; see ``Box.surface_distance_m``."""
@@ -319,12 +320,27 @@ class _Rounds:
         self._are_spheres = np.array([isinstance(o, Sphere) for o in rounds])
 
     def nearest(self, x_m: float, y_m: float, z_m: float) -> Union[Cylinder, Sphere]:
-        """Return the one whose surface is nearest; see ``Cylinder.surface_distance_m``."""
+        """Return the one whose surface is nearest."""
+        return self._rounds[int(np.argmin(self._surface_distances_m(x_m, y_m, z_m)))]
+
+    def within(
+        self, x_m: float, y_m: float, z_m: float, margin_m: float
+    ) -> List[Union[Cylinder, Sphere]]:
+        """Return those that are up to ``margin_m`` further away than the nearest one."""
+        distances_m = self._surface_distances_m(x_m, y_m, z_m)
+        return [self._rounds[k] for k in _within(distances_m, margin_m)]
+
+    def _surface_distances_m(self, x_m: float, y_m: float, z_m: float) -> Floats:
+        """Return the distances float64[n]; see ``Cylinder.surface_distance_m``."""
         dx, dy, dz = ((x_m, y_m, z_m) - self._centres).T
         beside = np.hypot(dx, dy)
         upright_m = _signed_distance((beside - self._radii, np.abs(dz) - self._half_heights))
-        distances_m = np.where(self._are_spheres, np.hypot(beside, dz) - self._radii, upright_m)
-        return self._rounds[int(np.argmin(distances_m))]
+        return np.where(self._are_spheres, np.hypot(beside, dz) - self._radii, upright_m)
+
+
+def _within(distances_m: Floats, margin_m: float) -> NDArray[np.intp]:
+    """Return the indices of distances, float64[n], up to ``margin_m`` above the least."""
+    return np.flatnonzero(distances_m <= distances_m.min() + margin_m + 1e-9)
 
 
 def _outside_slab(z_m: float, bottom_m: float, height_m: float) -> float:
