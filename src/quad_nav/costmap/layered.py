@@ -119,6 +119,8 @@ class LayeredCostmap:
             name: layer_params.make_layer(params.spec, params.rolling_window, default_cost)
             for name, layer_params in params.layers
         }
+        layers = self.layers.values()
+        self._static_layers = [layer for layer in layers if isinstance(layer, StaticLayer)]
         self.set_footprint(params.unpadded_footprint)
         if static_map is not None:
             self.set_map(static_map)
@@ -275,9 +277,9 @@ class LayeredCostmap:
     @property
     def map_frames(self) -> Tuple[str, ...]:
         """Frames of the maps that need a transform: those of a rolling window in another frame."""
-        if not self.params.rolling_window:
+        if not self.params.rolling_window or not self._static_layers:
             return ()
-        frames = {layer.map_frame for layer in self._static_layers()}
+        frames = {layer.map_frame for layer in self._static_layers}
         return tuple(sorted(frames - {"", self.params.global_frame}))
 
     def set_map_poses(self, map_from_global: Mapping[str, Optional[Pose3D]]) -> None:
@@ -291,7 +293,7 @@ class LayeredCostmap:
                 or missing if unknown.
         """
         self._map_poses = {**map_from_global, self.params.global_frame: Pose3D(0.0, 0.0, 0.0)}
-        for layer in self._static_layers():
+        for layer in self._static_layers:
             layer.map_from_global = self._map_poses.get(layer.map_frame)
 
     def reconfigure(self, params: CostmapParams) -> None:
@@ -322,9 +324,6 @@ class LayeredCostmap:
             self._master.resize(spec)
             for layer in self.layers.values():
                 layer.resize(spec)
-
-    def _static_layers(self) -> List[StaticLayer]:
-        return [layer for layer in self.layers.values() if isinstance(layer, StaticLayer)]
 
     def _enabled_layers(self) -> List[Layer]:
         return [layer for layer in self.layers.values() if layer.params.enabled]

@@ -85,6 +85,7 @@ class ScanIntake:
         is_tracked = tracker is not None and tracker.frame in frames
         self._tracking_sink = frames.index(tracker.frame) if tracker and is_tracked else None
         self._keys = [sink.layer.projection_key(sink.source.name) for sink in self.sinks]
+        self._buffers = [sink.layer.buffers[sink.source.name] for sink in self.sinks]
         self._params = params
         self._validator = ScanValidator(sink.source for sink in self.sinks)
 
@@ -177,12 +178,12 @@ class ScanIntake:
         if self._params.reject_implausible_scans:
             received_s = min(received_s, stamp_s)
         made: List[_Made] = []
-        for sink, key, pose in zip(self.sinks, self._keys, poses):
+        for sink, key, buffer, pose in zip(self.sinks, self._keys, self._buffers, poses):
             observation = _find_equal(made, key, pose)
             if observation is None:
                 observation = make(sink, pose)
                 made.append((key, pose, observation))
-            sink.layer.add_observation(sink.source.name, observation, received_s)
+            buffer.add(observation, received_s)
 
 
 def _find_equal(made: Sequence[_Made], key: _Key, pose: SensorPose) -> Optional[Observation]:

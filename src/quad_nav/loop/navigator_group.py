@@ -141,9 +141,7 @@ class LoopRobot:
         for costmap in costmaps:
             if costmap.map_frames:
                 costmap.set_map_poses(self._map_poses(costmap, now_s))
-        poses = self._in_costmaps(state.map_from_base, now_s)
-        in_global, in_local = (poses[one.params.global_frame].to_2d() for one in costmaps)
-        located = RobotPoses(in_global, in_local)
+        located = self._located(state.map_from_base, now_s)
         map_from_global = self.map_from_global(now_s)
         if map_from_global != _IDENTITY:
             peers = [peer.relative_to(map_from_global) for peer in peers]
@@ -190,6 +188,16 @@ class LoopRobot:
         frame = costmap.params.global_frame
         pose = self.map_from(frame, now_s).to_3d()
         return dict.fromkeys(costmap.map_frames, pose)
+
+    def _located(self, map_from_base: Pose3D, now_s: float) -> RobotPoses:
+        """Express the robot's pose in the frames of the costmaps."""
+        if self._frames.are_fixed:
+            pose = map_from_base.to_2d()
+            return RobotPoses(pose, pose)
+        at = self._in_costmaps(map_from_base, now_s)
+        costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
+        in_global, in_local = (at[one.params.global_frame].to_2d() for one in costmaps)
+        return RobotPoses(in_global, in_local)
 
     def _in_costmaps(self, map_from_pose: Pose3D, now_s: float) -> Dict[str, Pose3D]:
         """Express a pose in ``map`` in the frames of the costmaps, by their names."""

@@ -88,7 +88,7 @@ class PeerTracker:
         return messages
 
     def _in_reach(self, now_s: float, pose: Optional[Pose2D], peers: Sequence[Peer]) -> List[Peer]:
-        if pose is None:
+        if pose is None or not peers:
             return []
         reach_m = self.reach_m
         return [
