@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Callable, List, Optional, Tuple, Union
 
 import numpy as np
@@ -207,6 +208,7 @@ def _make_stack(slots: int, width: int) -> ObservationStack:
     )
 
 
+@lru_cache(maxsize=64)  # the scans of all robots often have one stamp, and rounding is slow
 def _nanoseconds(seconds: float) -> int:
     """Return whole nanoseconds, which ROS compares; so 0.3 s is never above 0.3 s."""
     return round(seconds * 1e9)

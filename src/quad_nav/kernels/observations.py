@@ -140,10 +140,10 @@ def include_rays(
 ) -> None:
     """Grow bounds by the sensor, and by what each of its rays reaches within the grid.
 
-    Bounds of the rays in the grid are kept for later updates with the same grid. In another
-    grid they are not worked out if they lie within ``bounds`` already: a ray in the grid is a
-    part of the ray without one, and ends in the grid. The last millimetre of a grid makes no
-    other cell.
+    Bounds of the rays in the grid are kept for later updates with the same grid. They are not
+    worked out if ``bounds`` hold the whole grid already, nor, in another grid, if the rays lie
+    within ``bounds``: a ray in the grid is a part of the ray without one, and ends in the grid.
+    The last millimetre of a grid makes no other cell.
 
     Args:
         costmap: The costmap.
@@ -158,6 +158,13 @@ def include_rays(
     sensor_x, sensor_y = seen.sensors[slot, 0], seen.sensors[slot, 1]
     drawn = seen.drawn
     include(bounds, sensor_x, sensor_y)
+    if (
+        bounds[0] <= origin_x
+        and bounds[1] <= origin_y
+        and bounds[2] >= high_x - 0.001
+        and bounds[3] >= high_y - 0.001
+    ):
+        return
     known = (
         drawn[slot, 4] == origin_x
         and drawn[slot, 5] == origin_y
