@@ -31,6 +31,21 @@ def test_a_disc_leaves_what_is_higher_and_what_is_off_the_grid():
     assert cells[0, 0] == 7 and (cells.ravel()[1:] == 9).all()
 
 
+def test_many_discs_raise_the_cells_of_each():
+    random = np.random.default_rng(4)
+    cells, expected = np.full((2, 60, 50), 3, dtype=np.uint8)
+    along = np.linspace(5.0, 60.0, 40)  # overlapping discs that leave the grid, then others
+    centres = np.vstack(
+        (np.column_stack((along, 0.5 * along)), random.uniform(-5.0, 65.0, (20, 2)))
+    )
+    raise_discs(cells, 0.0, 0.0, 1.0, centres, 6.3, 7)
+    for centre in centres:
+        y, x = np.mgrid[0:60, 0:50] + 0.5
+        expected[(x - centre[0]) ** 2 + (y - centre[1]) ** 2 <= 6.3**2] = 7
+    assert 1000 < (expected == 3).sum() < 2000
+    np.testing.assert_array_equal(cells, expected)
+
+
 def test_the_nearest_cell_is_found_round_a_wall():
     blocked = np.zeros((5, 5), dtype=np.uint8)
     blocked[0:4, 2] = 1

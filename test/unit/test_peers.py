@@ -20,7 +20,7 @@ from quad_nav.peers.peer import (
     priority_of,
     resample,
 )
-from quad_nav.peers.peer_costs import is_met
+from quad_nav.peers.peer_costs import places_met
 from quad_nav.peers.right_of_way import (
     Yield,
     YieldDecision,
@@ -147,8 +147,8 @@ def test_a_robot_resumes_its_goal_when_that_meets_the_peer_no_more():
 def test_only_places_that_the_robot_reaches_before_the_peer_has_passed_cost_more():
     """From (3, -3) it is 3.3, 2.5 and 2.1 m to within 0.9 m; it flies 0.45, 1.95 and 3.45 m."""
     places = np.array([[0.0, 0.0], [1.5, 0.0], [3.0, 0.0]])
-    mask = is_met(places, np.array([0.0, 5.0, 10.0]), Pose2D(3.0, -3.0), 0.9, 0.3)
-    assert mask.tolist() == [False, False, True]
+    met = places_met(places, np.array([0.0, 5.0, 10.0]), Pose2D(3.0, -3.0), 0.9, 0.3)
+    assert met.tolist() == [[3.0, 0.0]]
 
 
 @pytest.mark.parametrize(

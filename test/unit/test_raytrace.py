@@ -58,6 +58,27 @@ def cleared_by_all_lines(costmap, seen, newest, count, range_m):
     return bounds
 
 
+def test_bounds_hold_the_rays_up_to_the_range_and_no_more():
+    random = np.random.default_rng(8)
+    costs = np.zeros((400, 400), np.uint8)
+    for range_m in (0.5, 2.0, 30.0):
+        for width_rad in (0.3, 2.0, 6.2):
+            angles = random.uniform(-3.0, 1.0) + np.linspace(0.0, width_rad, 100)
+            lengths = random.uniform(0.0, 8.0, 100)
+            sensor = np.array((20.0, 19.0, 0.0))
+            steps = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(100)))
+            points = (sensor + lengths[:, None] * steps).astype(np.float32)
+            seen, newest = stack_of([sensor], points, 100, range_m)
+            bounds = np.array(NOWHERE)
+            include_rays(CostmapView(costs, 0.0, 0.0, 0.1), seen, newest, range_m, bounds)
+            ends = [sensor[:2]]
+            for x, y in points[:, :2].astype(float) - sensor[:2]:
+                scale = min(1.0, range_m / math.hypot(x, y))
+                ends.append(sensor[:2] + np.array((x, y)) * scale)
+            expected = [*np.min(ends, axis=0), *np.max(ends, axis=0)]
+            assert bounds.tolist() == expected
+
+
 @pytest.mark.parametrize("obstructed", [0, 3, 40, 400, 5000])
 @pytest.mark.parametrize("range_m", [1.0, 10.0])
 def test_the_outcome_is_that_of_all_lines(obstructed, range_m):

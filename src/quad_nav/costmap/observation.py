@@ -133,13 +133,16 @@ class ObservationBuffer:
         if self._unstored:
             slots, width = self._stack.sectors.shape
             fresh = self.observations[: self._unstored]
-            most = max([len(one.points) for one in fresh], default=0)
+            points = [one.points for one in fresh]
+            most = max(map(len, points), default=0)
             if kept > slots or most > width:
+                slots, width = max(slots, kept + kept // 2), max(width, most)
+                self._stack = _make_stack(slots, width)
                 fresh = self.observations
-                self._stack = _make_stack(max(slots, kept + kept // 2), max(width, most))
-            for one in reversed(fresh):
-                self._newest = (self._newest + 1) % len(self._stack.sectors)
-                store_observation(self._stack, self._newest, one.sensor, one.points, ranges)
+                points = [one.points for one in fresh]
+            for one, own in zip(reversed(fresh), reversed(points)):
+                self._newest = (self._newest + 1) % slots
+                store_observation(self._stack, self._newest, one.sensor, own, ranges)
                 if one.some_mark:
                     store_marks(self._stack, self._newest, one.sensor, one.marks, ranges)
             self._unstored = 0

@@ -77,6 +77,37 @@ def nearest_in_time(
 
 
 @njit(cache=True, nogil=True)
+def reached_in_time(
+    path: NDArray[np.float64],
+    times: NDArray[np.float64],
+    robot: Tuple[float, float],
+    radius: float,
+    speed: float,
+    tolerance: float,
+) -> NDArray[np.float64]:
+    """Return the positions of a peer that a robot can reach until the peer has passed them.
+
+    Args:
+        path: float64[k, 2], metres.
+        times: float64[k], seconds from now at which the peer is there.
+        robot: Position of the robot.
+        radius: Distance within which the robot is at a position.
+        speed: Speed of the robot.
+        tolerance: Seconds after which the peer has passed.
+
+    Returns:
+        float64[m, 2], in the order of the path.
+    """
+    reached, m = np.empty_like(path), 0
+    for k in range(path.shape[0]):
+        away = math.hypot(path[k, 0] - robot[0], path[k, 1] - robot[1]) - radius
+        if away <= speed * (times[k] + tolerance):
+            reached[m, 0], reached[m, 1] = path[k, 0], path[k, 1]
+            m += 1
+    return reached[:m]
+
+
+@njit(cache=True, nogil=True)
 def raise_discs(
     cells: NDArray[np.uint8],
     origin_x_m: float,
@@ -98,16 +129,22 @@ def raise_discs(
         value: What the cells are raised to.
     """
     size_y, size_x = cells.shape
+    firsts, ends = np.zeros(size_y, np.int64), np.zeros(size_y, np.int64)  # raised in each row
     for k in range(centres.shape[0]):
         x = (centres[k, 0] - origin_x_m) / resolution_m - 0.5
         y = (centres[k, 1] - origin_y_m) / resolution_m - 0.5
         reach = radius_m / resolution_m
         for row in range(max(0, math.ceil(y - reach)), min(size_y - 1, math.floor(y + reach)) + 1):
             half = math.sqrt(max(reach * reach - (row - y) * (row - y), 0.0))
-            for column in range(
-                max(0, math.ceil(x - half)), min(size_x - 1, math.floor(x + half)) + 1
-            ):
+            begin = max(0, math.ceil(x - half))
+            end = min(size_x - 1, math.floor(x + half)) + 1
+            for column in range(begin, min(end, firsts[row])):
                 cells[row, column] = max(cells[row, column], np.uint8(value))
+            for column in range(max(begin, ends[row]), end):
+                cells[row, column] = max(cells[row, column], np.uint8(value))
+            if begin <= ends[row] and firsts[row] <= end:  # the discs of a path overlap
+                begin, end = min(begin, firsts[row]), max(end, ends[row])
+            firsts[row], ends[row] = begin, end
 
 
 @njit(cache=True, nogil=True)

@@ -233,7 +233,8 @@ class PeerCoordinator:
         self, now_s: float, pose: Pose2D, local_from_global: Pose2D, strangers: Optional[Tracks]
     ) -> None:
         if strangers is None or not self.params.yield_to_strangers:
-            self._stand_off.restart()
+            if self._stand_off.is_watching:
+                self._stand_off.restart()
             return
         places = strangers.states[:, :2]
         if len(places) and local_from_global != Pose2D(0.0, 0.0):

@@ -18,6 +18,7 @@ from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.peer_layer import PeerArea, PeerLayer
 from quad_nav.geometry import Pose2D
 from quad_nav.grid import LETHAL
+from quad_nav.kernels.peers import reached_in_time
 from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
 from quad_nav.peers.right_of_way import HORIZON_S, TIME_TOLERANCE_S, predict_peer
 
@@ -59,14 +60,13 @@ class PeerCosts:
             (self._global, in_global, self._areas(in_global[:, :2], pose, priority)),
             (self._local, in_local, self._obstacles(in_local[:, :2], pose)),
         ):
-            points = circles[:, :2]
             for layer in costmap.layers.values():
                 if isinstance(layer, PeerLayer):
                     layer.set_areas(areas)
                 elif isinstance(layer, ObstacleLayer):
                     layer.excluded_circles = circles
-                    for x_m, y_m in points[newcomers]:  # marked as obstacles until now
-                        layer.free_square(float(x_m), float(y_m), 2.0 * radius_m)
+                    for x_m, y_m, _ in circles[newcomers].tolist():  # marked until now
+                        layer.free_square(x_m, y_m, 2.0 * radius_m)
 
     def _areas(
         self, positions: NDArray[np.float64], pose: Pose2D, priority: float
@@ -89,8 +89,8 @@ class PeerCosts:
                 areas.append(PeerArea(positions[k : k + 1], radius_m, _STATIONARY_COST))
             elif peer.intention.priority > priority:
                 path = predict_peer(peer, tracker.cruise_mps, _PATH_TIMES_S)
-                ahead = is_met(path, _PATH_TIMES_S, pose, radius_m, tracker.cruise_mps)
-                areas += [PeerArea(path[ahead], radius_m, _PATH_COST)] if ahead.any() else []
+                met = places_met(path, _PATH_TIMES_S, pose, radius_m, tracker.cruise_mps)
+                areas += [PeerArea(met, radius_m, _PATH_COST)] if len(met) else []
         return areas
 
     def _obstacles(self, positions: NDArray[np.float64], pose: Pose2D) -> List[PeerArea]:
@@ -115,14 +115,14 @@ class PeerCosts:
         return obstacles
 
 
-def is_met(
+def places_met(
     path: NDArray[np.float64],
     times_s: NDArray[np.float64],
     pose: Pose2D,
     radius_m: float,
     cruise_mps: float,
-) -> NDArray[np.bool_]:
-    """Return a mask bool[k] of the places of a peer that the robot can reach before it has passed.
+) -> NDArray[np.float64]:
+    """Return the places of a peer, float64[m, 2], that the robot can reach before it has passed.
 
     Args:
         path: Positions of the peer, float64[k, 2] in ``map``.
@@ -131,6 +131,5 @@ def is_met(
         radius_m: Distance from a place within which the robot is at it.
         cruise_mps: Speed of the robot.
     """
-    offsets_m = path - np.array([pose.x_m, pose.y_m])
-    away_m = np.hypot(offsets_m[:, 0].copy(), offsets_m[:, 1].copy()) - radius_m
-    return np.asarray(away_m <= cruise_mps * (times_s + TIME_TOLERANCE_S))
+    robot = (pose.x_m, pose.y_m)
+    return reached_in_time(path, times_s, robot, radius_m, cruise_mps, TIME_TOLERANCE_S)

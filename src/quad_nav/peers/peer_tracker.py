@@ -6,7 +6,7 @@ import math
 from typing import Dict, List, Optional, Sequence, Set
 
 from quad_nav.costmap.layered import LayeredCostmap
-from quad_nav.costmap.obstacle import ObstacleLayer
+from quad_nav.costmap.obstacle import ObstacleLayer, ObstacleLayerParams
 from quad_nav.geometry import Pose2D
 from quad_nav.peers.peer import Peer
 from quad_nav.peers.right_of_way import HORIZON_S
@@ -38,7 +38,15 @@ class PeerTracker:
             global_costmap: Costmap in ``map``; its obstacle layers extend the reach.
             local_costmap: Costmap with the footprint of the robot; extends the reach as well.
         """
-        self._global, self._local = global_costmap, local_costmap
+        self._local = local_costmap
+        self._obstacle_layers = [
+            layer
+            for costmap in (global_costmap, local_costmap)
+            for layer in costmap.layers.values()
+            if isinstance(layer, ObstacleLayer)
+        ]
+        self._compared: List[ObstacleLayerParams] = []  # whose longest range is known
+        self._longest_m = 0.0
         self.cruise_mps = CRUISE_MPS
         self.margin_m = 0.0
         self.restart()
@@ -143,15 +151,12 @@ class PeerTracker:
 
     def _obstacle_range_m(self) -> float:
         """Return the largest range at which an obstacle layer marks points."""
-        longest_m: Optional[float] = None
-        for costmap in (self._global, self._local):
-            for layer in costmap.layers.values():
-                if isinstance(layer, ObstacleLayer):
-                    params = layer.params
-                    for source in params.sources:
-                        range_m = source.obstacle_range_m
-                        if range_m is None:
-                            range_m = params.obstacle_range_m
-                        if longest_m is None or range_m > longest_m:
-                            longest_m = range_m
-        return 0.0 if longest_m is None else longest_m
+        params = [layer.params for layer in self._obstacle_layers]
+        if params != self._compared:  # mostly the same objects
+            self._compared = params
+            own_m = [(source.obstacle_range_m, one) for one in params for source in one.sources]
+            self._longest_m = max(
+                (one.obstacle_range_m if range_m is None else range_m for range_m, one in own_m),
+                default=0.0,
+            )
+        return self._longest_m

@@ -71,6 +71,11 @@ class StandOff:
         self._has_arrived = False
         self.start_goal()
 
+    @property
+    def is_watching(self) -> bool:
+        """True if strangers were observed since the last ``restart``."""
+        return bool(self._trail)
+
     def start_goal(self) -> None:
         """Count progress anew, for another goal."""
         self._stall = StallTimer()
@@ -130,6 +135,8 @@ class StandOff:
             if self._keeps_out(now_s, pose, current.holding_point):
                 return current
             self.start_goal()
+            return None
+        if not self.is_watching:
             return None
         if self._stall.has_moved(now_s, pose, _STALL_M) or not math.isfinite(self._patience_s):
             self._patience_s = patience_s * (1.0 + 2.0 * self._draw(pose))
