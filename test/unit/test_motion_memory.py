@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from quad_nav.kernels.motion_memory import NONE, replay
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -59,11 +60,13 @@ def test_an_obstacle_that_moves_otherwise_recalls_nothing(shift, speed):
     assert memory.recall(8, TIMES).known == 0
 
 
-def test_an_obstacle_seen_for_less_than_half_a_second_recalls_nothing():
+def test_an_obstacle_seen_for_less_than_a_quarter_of_a_second_recalls_nothing():
     memory = watched()
-    for k in range(5):
-        memory.add(tracks(20.0 + 0.1 * k, 8, corner(0.1 * k)))
+    for k in range(3):
+        memory.add(tracks(20.0 + 0.1 * k, 8, corner(2.0 + 0.1 * k)))
     assert memory.recall(8, TIMES).known == 0
+    memory.add(tracks(20.3, 8, corner(2.3)))
+    assert memory.recall(8, TIMES).known > 30
 
 
 def test_an_obstacle_does_not_recall_itself():
@@ -91,3 +94,100 @@ def test_the_acceleration_is_that_of_the_last_half_second():
         memory.add(tracks(0.1 * k, 7, [0.0, 0.0, 1.0, 0.1 * k]))
     np.testing.assert_allclose(memory.acceleration(7), [0.0, 1.0])
     np.testing.assert_allclose(memory.acceleration(8), [0.0, 0.0])
+
+
+def unsure(now_s, number, state, spread_m):
+    seen = tracks(now_s, number, state)
+    seen.covariances[0, 0, 0] = seen.covariances[0, 1, 1] = spread_m**2
+    return seen
+
+
+def test_what_is_predicted_of_a_hidden_obstacle_is_not_remembered():
+    memory = MotionMemory()
+    for k in range(41):
+        memory.add(unsure(0.1 * k, 7, [0.1 * k, 0.0, 1.0, 0.0], 0.1 if k < 20 else 0.2))
+    for k in range(21):
+        memory.add(tracks(20.0 + 0.1 * k, 8, [0.1 * k - 0.5, 0.0, 1.0, 0.0]))
+    recalled = memory.recall(8, TIMES)  # at (1.5, 0), and the other was seen until (1.9, 0)
+    assert recalled.known == 6  # 0 to 0.4 s, and 0.1 s more for which it still counts
+
+
+def test_a_track_that_goes_on_where_one_ended_continues_it():
+    """It is hidden from 2.9 s to 4 s, at 1 m/s, and has another number then."""
+    memory = MotionMemory()
+    for k in [*range(30), *range(40, 81)]:
+        memory.add(tracks(0.1 * k, 7 if k < 30 else 9, [0.1 * k, 0.0, 1.0, 0.0]))
+    for k in range(21):
+        memory.add(tracks(20.0 + 0.1 * k, 8, [0.1 * k, 0.0, 1.0, 0.0]))
+    recalled = memory.recall(8, TIMES)
+    assert recalled.known == 61
+    np.testing.assert_allclose(recalled.moves, np.column_stack([TIMES, 0.0 * TIMES]), atol=1e-9)
+
+
+def test_a_track_whose_states_do_not_follow_from_each_other_is_cut():
+    """At 4 s it is 1 m to the side: another obstacle was taken for it."""
+    memory = MotionMemory()
+    for k in range(81):
+        memory.add(tracks(0.1 * k, 7, [0.1 * k, 0.0 if k < 40 else 1.0, 1.0, 0.0]))
+    for k in range(21):
+        memory.add(tracks(20.0 + 0.1 * k, 8, [0.1 * k, 0.0, 1.0, 0.0]))
+    recalled = memory.recall(8, TIMES)  # at (2, 0), and the other was there until (3.9, 0)
+    assert recalled.known == 21
+    np.testing.assert_allclose(recalled.moves[60], [6.0, 0.0], atol=1e-9)
+
+
+def test_an_obstacle_that_leaves_the_path_of_the_other_recalls_it_no_more():
+    memory = watched()
+    for k in range(21):
+        memory.add(tracks(20.0 + 0.1 * k, 8, corner(0.1 * k)))
+    assert memory.recall(8, TIMES).known == 61
+    for k in range(21, 31):
+        memory.add(tracks(20.0 + 0.1 * k, 8, [0.1 * k, 0.06 * (k - 20), 1.0, 0.6]))
+    assert memory.recall(8, TIMES).known == 0  # 0.6 m beside it, more than 0.2 m
+
+
+def test_a_hidden_obstacle_stays_on_the_path_that_it_repeats():
+    """It was seen up to the corner. Its track goes straight on, the other turned."""
+    memory = watched()
+    for k in range(41):
+        memory.add(tracks(20.0 + 0.1 * k, 8, corner(0.1 * k)))
+    assert memory.recall(8, TIMES).known > 30
+    for k in range(41, 46):
+        memory.add(unsure(20.0 + 0.1 * k, 8, [0.1 * k, 0.0, 1.0, 0.0], 0.3))
+    recalled = memory.recall(8, TIMES)  # the track is at (4.5, 0), the other was at (4, 0.5)
+    np.testing.assert_allclose(recalled.moves[0], [-0.5, 0.5], atol=0.06)
+    np.testing.assert_allclose(recalled.moves[10], [-0.5, 1.5], atol=0.06)
+
+
+def test_between_two_samples_the_motion_is_a_cubic():
+    """From rest at (0, 0) to (2, 0) at 2 m/s in 2 s: x = u^2 (3 - 2u) 2 - u^2 (1 - u) 4 = 2 u^2."""
+    samples = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [2.0, 2.0, 0.0, 2.0, 0.0]])
+    places = np.empty((4, 2))
+    known = replay(samples, np.array([1, NONE]), 0, np.array([0.0, 1.0, 2.0, 3.0]), places)
+    np.testing.assert_allclose(places, [[0.0, 0.0], [0.5, 0.0], [2.0, 0.0], [4.0, 0.0]])
+    assert known == 3
+
+
+def test_an_obstacle_that_stays_hidden_is_known_while_the_motion_that_it_repeats_is():
+    """It was seen up to (2, 0), and its track ended 1.5 s later; the other turns at (4, 0)."""
+    memory = watched()
+    for k in range(21):
+        memory.add(tracks(20.0 + 0.1 * k, 8, corner(0.1 * k)))
+    assert memory.recall(8, TIMES).known == 61 and memory.hidden(TIMES) == []
+    for k in range(21, 35):
+        memory.add(unsure(20.0 + 0.1 * k, 8, [0.1 * k, 0.0, 1.0, 0.0], 0.3))
+    memory.add(Tracks.none(23.5))
+    ((places, radius_m, known),) = memory.hidden(TIMES)
+    np.testing.assert_allclose(places[[0, 20]], [[3.5, 0.0], [4.0, 1.5]], atol=0.12)
+    assert radius_m == 0.5 and 45 <= known <= 47  # the other was seen until 8 s
+    memory.add(tracks(24.0, 9, [4.0, 0.0, 0.0, 1.0]))  # there it is
+    assert memory.hidden(TIMES) == []
+
+
+def test_an_obstacle_whose_place_was_seen_empty_is_not_hidden():
+    memory = watched()
+    for k in range(21):
+        memory.add(tracks(20.0 + 0.1 * k, 8, corner(0.1 * k)))
+    assert memory.recall(8, TIMES).known == 61
+    memory.add(Tracks.none(22.3))  # the track ended after 0.3 s
+    assert memory.hidden(TIMES) == []

@@ -176,3 +176,14 @@ def test_without_a_plan_there_is_no_command_either_way():
     control = supervised()
     control.set_plan(line(50.0, 0.0, 51.0, 0.0))
     assert command_of(control, discs([1.0, 0.0, -1.0, 0.0])) == (False, None)
+
+
+def test_hidden_obstacles_that_the_memory_knows_follow_those_of_the_tracks():
+    """One at (3, 1) without a track, known for the first of two times, seen from (1, 0)."""
+    places = np.array([[3.0, 1.0], [3.0, 3.0]])
+    memory = MotionMemory()
+    memory.hidden = lambda times_s: [(places, 0.4, 1)]
+    found = predict(tracks([1.0, 0.0, 0.5, -1.0]), memory, np.array([0.0, 2.0]), (1.0, 0.0))
+    assert found.shape == (2, 2, 4)
+    np.testing.assert_allclose(found[0, 1], [2.0, 1.0, 0.4, 0.12])
+    np.testing.assert_allclose(found[1, 1], [2.0, 3.0, 0.4, 0.12 + 2.0 * 0.1])

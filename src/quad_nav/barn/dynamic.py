@@ -97,7 +97,7 @@ def read_dynamic_setup(
     Raises:
         InputError: Every fault in them.
     """
-    # The benchmark's speed limit holds for evasions too.
+    # The benchmark's speed limit holds for evasions too, unless the user sets another for them.
     options = replace(options, parameters=(_NO_FASTER_EVASION, *options.parameters))
     problems: List[str] = []
     worlds: Tuple[DynamicWorld, ...] = ()
@@ -115,7 +115,15 @@ def read_dynamic_setup(
         raise InputError(problems + error.problems) from error
     if problems:
         raise InputError(problems)
-    return DynamicSetup(contestant, worlds, options.runs, interpolation)
+    return DynamicSetup(_fast_enough(contestant), worlds, options.runs, interpolation)
+
+
+def _fast_enough(contestant: Contestant) -> Contestant:
+    """Let the body fly as fast as its configuration lets it evade."""
+    simulation, evasion = contestant.simulation, contestant.configuration.navigator.evasion
+    speed_mps = max(simulation.flight.max_speed_mps, evasion.speed_mps)
+    flight = replace(simulation.flight, max_speed_mps=speed_mps)
+    return replace(contestant, simulation=replace(simulation, flight=flight))
 
 
 def _speed_limits(contestant: Contestant, speed_mps: float) -> List[Tuple[str, float]]:

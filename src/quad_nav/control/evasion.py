@@ -149,7 +149,7 @@ def predicted_discs(
     near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
     times = np.arange(_STEPS * _SUBSTEPS + 1) * (step_s / _SUBSTEPS)
     discs = predict(now.chosen(near), around.memory, times, (around.pose.x_m, around.pose.y_m))
-    discs[:, :, 2] = radii[near]
+    discs[:, :, 2] = discs[:, :, 2] + around.radius_m + params.clearance_m
     return discs
 
 

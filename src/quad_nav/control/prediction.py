@@ -8,7 +8,7 @@ went. The standard deviation of a prediction grows linearly with time.
 from __future__ import annotations
 
 import math
-from typing import Tuple
+from typing import List, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 _SIGMA_M, _SIGMA_MPS = 0.08, 0.05  # least uncertainty of a prediction, and its growth
 _MAX_SIGMA_MPS = 0.1
-_RECALLED_SIGMA_MPS = 0.03
+_RECALLED_SIGMA_M, _RECALLED_SIGMA_MPS = 0.12, 0.03
 _ACCELERATES_S = 0.5  # for which an obstacle keeps its acceleration
 _ROLLOUT_STEP_S = 0.05  # longest time between two predictions of a rollout
 
@@ -42,7 +42,8 @@ def predict(
 
     Returns:
         float64[t, n, 4]: x and y relative to the origin, radius, standard deviation of the
-        position.
+        position. Obstacles that are hidden and have no track, but that the memory knows, follow
+        those of the tracks.
     """
     discs = np.empty((len(times_s), len(tracks), 4))
     offsets = tracks.states[:, :2] - np.array(origin)
@@ -53,7 +54,20 @@ def predict(
     growth = np.clip(np.sqrt(velocity), _SIGMA_MPS, _MAX_SIGMA_MPS)
     discs[:, :, 3] = np.sqrt(position + _SIGMA_M**2) + times_s[:, None] * growth
     _recall(memory, tracks.numbers, times_s, discs)
-    return discs
+    return np.concatenate([discs, *_hidden(memory, times_s, origin)], axis=1)
+
+
+def _hidden(memory: MotionMemory, times_s: Floats, origin: Tuple[float, float]) -> List[Floats]:
+    """Return the discs float64[t, 1, 4] of obstacles without a track that the memory knows."""
+    found = []
+    for places, radius_m, known in memory.hidden(times_s):
+        disc = np.empty((len(times_s), 1, 4))
+        disc[:, 0, :2] = places - np.array(origin)
+        disc[:, 0, 2] = radius_m
+        growth = np.where(np.arange(len(times_s)) < known, _RECALLED_SIGMA_MPS, _MAX_SIGMA_MPS)
+        disc[:, 0, 3] = _RECALLED_SIGMA_M + times_s * growth
+        found.append(disc)
+    return found
 
 
 def _recall(
@@ -68,7 +82,7 @@ def _recall(
             discs[:, k, :2] += turned[:, None] * memory.acceleration(number)
         else:
             discs[:, k, :2] = discs[0, k, :2] + recalled.moves
-            known = discs[0, k, 3] + times_s * _RECALLED_SIGMA_MPS
+            known = min(discs[0, k, 3], _RECALLED_SIGMA_M) + times_s * _RECALLED_SIGMA_MPS
             discs[: recalled.known, k, 3] = known[: recalled.known]
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from quad_nav.kernels.jit import njit
 
 NONE = -1
+_STILL_S = 0.15  # after the last sample of a track, for which it still counts as known
 
 
 @njit(cache=True, nogil=True)
@@ -28,7 +29,7 @@ def recall(
 
     Args:
         samples: float64[n, 5].
-        earlier: int64[n], index of the sample of the same track half a second before, or NONE.
+        earlier: int64[n], index of the sample of the same track a moment before, or NONE.
         now: Index of the sample to compare with.
         scales: Differences in place and in velocity that count as 1.
         before_s: Samples of less than this before are no candidates.
@@ -68,27 +69,45 @@ def replay(
     times: NDArray[np.float64],
     places: NDArray[np.float64],
 ) -> int:
-    """Fill where the obstacle of a sample went afterwards.
+    """Fill where the obstacle of a sample was at some times.
+
+    Between two samples it is on the cubic with their places and velocities (Hermite).
 
     Args:
         samples: float64[n, 5].
         later: int64[n], index of the next sample of the same track, or NONE.
         start: Index of the sample.
-        times: float64[t], times after the sample, increasing from 0.
-        places: float64[t, 2], filled with positions relative to that of the sample; after the
-            end of the track the obstacle keeps its velocity.
+        times: float64[t], times from that of the sample on, increasing.
+        places: float64[t, 2], filled with the places; after the end of the track the obstacle keeps
+            its velocity.
 
     Returns:
         Number of times up to the end of the track.
     """
     at, known = start, 0
     for k in range(times.shape[0]):
-        time = samples[start, 0] + times[k]
-        while later[at] != NONE and samples[later[at], 0] <= time:
+        while later[at] != NONE and samples[later[at], 0] <= times[k]:
             at = later[at]
-        beyond = time - samples[at, 0]
-        places[k, 0] = samples[at, 1] + beyond * samples[at, 3] - samples[start, 1]
-        places[k, 1] = samples[at, 2] + beyond * samples[at, 4] - samples[start, 2]
-        if later[at] != NONE or beyond <= 0.15:
-            known = k + 1
+        beyond = times[k] - samples[at, 0]
+        if later[at] == NONE:
+            for axis in range(2):
+                places[k, axis] = samples[at, 1 + axis] + beyond * samples[at, 3 + axis]
+            if beyond <= _STILL_S:
+                known = k + 1
+            continue
+        known = k + 1
+        _between(samples[at], samples[later[at]], beyond, places[k])
     return known
+
+
+@njit(cache=True, nogil=True)
+def _between(
+    a: NDArray[np.float64], b: NDArray[np.float64], beyond: float, place: NDArray[np.float64]
+) -> None:
+    """Fill float64[2], the place some time after sample a on the way to sample b."""
+    step = b[0] - a[0]
+    u = beyond / step
+    ahead = u * u * (3.0 - 2.0 * u)
+    for axis in range(2):
+        place[axis] = (1.0 - ahead) * a[1 + axis] + ahead * b[1 + axis]
+        place[axis] += u * (1.0 - u) * step * ((1.0 - u) * a[3 + axis] - u * b[3 + axis])

@@ -2,8 +2,15 @@
 
 Many things that move do it again and again: shuttles, conveyors, doors, people between the same
 doors, the obstacles of benchmarks. The memory keeps the states of all tracks for some minutes. Of
-an obstacle that is where another was before, with the same velocity, both now and half a second
-ago, it recalls what the other did next. Nothing is known beforehand: it learns in flight.
+an obstacle that is where another was before, with the same velocity, both now and a quarter of a
+second ago, it recalls what the other did next, as long as the obstacle stays on the other's path.
+Nothing is known beforehand: it learns in flight.
+
+A wrong recollection is worse than none, so only what was well seen is remembered: a track that is
+predicted while hidden, or whose states do not follow from each other, as where two tracks were
+mistaken for each other, is cut. A track that begins where one that ended a moment before would be
+now continues it: something hid the obstacle for that time. An obstacle that stays hidden for longer
+than its track lasts is still known while the motion that it repeats is.
 
 Source: prediction by the nearest recorded trajectories as in M. Bennewitz, W. Burgard,
 G. Cielniak, S. Thrun, "Learning Motion Patterns of People for Compliant Robot Motion", IJRR
@@ -12,8 +19,9 @@ G. Cielniak, S. Thrun, "Learning Motion Patterns of People for Compliant Robot M
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Dict, List
+import math
+from dataclasses import dataclass, field
+from typing import Dict, List, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +32,20 @@ from quad_nav.tracking.tracks import Tracks
 Floats = NDArray[np.float64]
 
 _PERIOD_S = 0.1  # between two samples of a track
-_EARLIER = 5  # samples between those that have to be alike
-_SCALE_M, _SCALE_MPS = 0.5, 0.5  # differences that count as 1
+_EARLIER_S, _TOO_EARLY_S = 0.25, 1.0  # time between two samples that have to be alike
+_TURNS_S = 0.45  # time over which accelerations are taken
+_SCALE_M, _SCALE_MPS = 0.2, 0.4  # differences that count as 1
 _BEFORE_S = 5.0
+_SEEN_M = 0.125  # standard deviation of positions; a hidden obstacle's grows beyond
+_HIDDEN_S = 1.6  # time for which a hidden obstacle stays on a recalled path
+_UNSEEN_S, _GONE_S = 0.8, 12.0  # a track that ends so much after it was seen is hidden; how long
+_MET_M = 0.8  # distance at which a track is that of an obstacle that was hidden
+_BREAK_M, _BREAK_MPS = 0.15, 0.25  # by how much a sample may be off the last one's motion
+_JOIN_S, _JOIN_M, _JOIN_MPS = 4.0, 0.35, 2.0  # gap, offset and change of velocity at a join
+_JOIN_SAMPLES = 6  # of a track before it is joined: its velocity is known then
 _MAX_ACCELERATION_MPS2 = 2.5
 _CAPACITY = 40_000  # samples; 200 s of 20 tracks
+_RECENT = 10  # samples of a track, one second
 
 
 @dataclass(frozen=True)
@@ -36,12 +53,24 @@ class Recalled:
     """What the memory recalls of one obstacle.
 
     Attributes:
-        moves: float64[t, 2], positions relative to the present one, metres.
+        moves: float64[t, 2], positions relative to the track's present one, metres. The first is
+            not zero if the obstacle is hidden and its track has left the path.
         known: Number of the times that the memory covers.
     """
 
     moves: Floats
     known: int
+
+
+@dataclass
+class _Trail:
+    """Samples of a track that is seen now, and the past motion that it repeats."""
+
+    radius_m: float = 0.0
+    rows: List[int] = field(default_factory=list)  # the last ones
+    count: int = 0
+    alike: int = NONE  # row of the sample that moved alike
+    lag_s: float = 0.0  # by which the obstacle repeats it later
 
 
 class MotionMemory:
@@ -57,7 +86,11 @@ class MotionMemory:
         self._earlier = np.empty(1024, np.int64)
         self._later = np.empty(1024, np.int64)
         self._count = 0
-        self._recent: Dict[int, List[int]] = {}
+        self._now_s = -math.inf
+        self._places: Dict[int, Floats] = {}
+        self._trails: Dict[int, _Trail] = {}
+        self._ends: List[int] = []  # last samples of trails that ended
+        self._hidden: List[_Trail] = []  # of obstacles that are hidden, and repeat a motion
 
     @property
     def span_s(self) -> float:
@@ -67,33 +100,113 @@ class MotionMemory:
 
     def add(self, tracks: Tracks) -> None:
         """Remember the states of tracks, at most once in each period."""
-        last_s = self._samples[self._count - 1, 0] if self._count else -np.inf
-        if tracks.time_s < last_s - _BEFORE_S:
+        if tracks.time_s < self._now_s - _BEFORE_S:
             self.reset()
-        elif tracks.time_s < last_s + 0.9 * _PERIOD_S:
+        elif tracks.time_s < self._now_s + 0.9 * _PERIOD_S:
             return
+        self._now_s = tracks.time_s
         self._reserve(len(tracks))
-        recent: Dict[int, List[int]] = {}
-        for number, state in zip(tracks.numbers.tolist(), tracks.states):
-            row, own = self._count, self._recent.get(number, [])
-            self._samples[row, 0], self._samples[row, 1:] = tracks.time_s, state
-            self._later[row] = NONE
-            self._earlier[row] = own[-_EARLIER] if len(own) >= _EARLIER else NONE
-            if own:
-                self._later[own[-1]] = row
-            recent[number] = [*own[-_EARLIER:], row]
-            self._count += 1
-        self._recent = recent
+        self._places = dict(zip(tracks.numbers.tolist(), tracks.states[:, :2]))
+        for number in [one for one in self._trails if one not in self._places]:
+            trail = self._trails.pop(number)
+            self._end(trail)
+            if self._now_s - self._samples[trail.rows[-1], 0] >= _UNSEEN_S:
+                self._hidden.append(trail)
+        spread = np.trace(tracks.covariances[:, :2, :2], axis1=1, axis2=2) / 2.0
+        for row in np.flatnonzero(spread <= _SEEN_M**2).tolist():
+            self._add(int(tracks.numbers[row]), tracks.states[row], float(tracks.radii_m[row]))
+        self._hidden = [trail for trail in self._hidden if self._is_hidden(trail)]
+
+    def _is_hidden(self, trail: _Trail) -> bool:
+        """Return whether an obstacle without a track is still known to be somewhere."""
+        if trail.alike == NONE or self._now_s - self._samples[trail.rows[-1], 0] > _GONE_S:
+            return False
+        place = np.zeros((1, 2))
+        if not self._replay(trail, np.zeros(1), place):
+            return False
+        return all(math.dist(place[0], seen) > _MET_M for seen in self._places.values())
+
+    def _replay(self, trail: _Trail, times_s: Floats, places: Floats) -> int:
+        """Fill float64[t, 2] at times after now; return how many of them are known."""
+        past_s = self._now_s - trail.lag_s + times_s
+        return int(replay(self._samples[: self._count], self._later, trail.alike, past_s, places))
+
+    def hidden(self, times_s: Floats) -> List[Tuple[Floats, float, int]]:
+        """Return the obstacles that have no track, but repeat a motion that is known.
+
+        Args:
+            times_s: float64[t], times after the last tracks, increasing from 0.
+
+        Returns:
+            For each its places float64[t, 2], its radius, and the number of times that are known.
+        """
+        found = []
+        for trail in self._hidden:
+            places = np.empty((len(times_s), 2))
+            found.append((places, trail.radius_m, self._replay(trail, times_s, places)))
+        return found
+
+    def _add(self, number: int, state: Floats, radius_m: float) -> None:
+        """Remember a state of a track that is seen."""
+        row = self._count
+        self._count += 1
+        self._samples[row, 0], self._samples[row, 1:] = self._now_s, state
+        self._later[row] = NONE
+        trail = self._trails.setdefault(number, _Trail())
+        if trail.rows and not self._continues(trail.rows[-1], row, _BREAK_M, math.inf):
+            self._end(trail)
+            trail = self._trails[number] = _Trail()
+        self._earlier[row] = self._before(trail, _EARLIER_S)
+        if trail.rows:
+            self._later[trail.rows[-1]] = row
+        trail.rows, trail.radius_m = [*trail.rows[-_RECENT:], row], radius_m
+        trail.count += 1
+        if trail.count == _JOIN_SAMPLES:
+            self._join(trail.rows[_JOIN_SAMPLES // 2])
+
+    def _before(self, trail: _Trail, least_s: float) -> int:
+        """Return the last sample of a trail that is so old, NONE if there is none or an older."""
+        for row in reversed(trail.rows):
+            apart_s = self._now_s - self._samples[row, 0]
+            if apart_s >= least_s:
+                return row if apart_s <= _TOO_EARLY_S else NONE
+        return NONE
+
+    def _continues(self, a: int, b: int, offset_m: float, change_mps: float) -> bool:
+        """Return whether sample b follows from a: as if the velocity changed evenly."""
+        gap_s, dx, dy, du, dv = (self._samples[b] - self._samples[a]).tolist()
+        mean_u, mean_v = (0.5 * (self._samples[a, 3:] + self._samples[b, 3:])).tolist()
+        off_m = math.hypot(dx - gap_s * mean_u, dy - gap_s * mean_v)
+        off = off_m / (offset_m + _BREAK_MPS * gap_s)
+        return off * off + (du * du + dv * dv) / change_mps**2 < 1.0
+
+    def _end(self, trail: _Trail) -> None:
+        if trail.rows:
+            self._ends.append(trail.rows[-1])
+
+    def _join(self, begin: int) -> None:
+        """Let a trail that has begun continue the one that ended last and leads to it."""
+        start_s = self._samples[begin, 0]
+        self._ends = [end for end in self._ends if start_s - self._samples[end, 0] <= _JOIN_S]
+        for end in reversed(self._ends):
+            if self._samples[end, 0] < start_s and self._continues(end, begin, _JOIN_M, _JOIN_MPS):
+                self._later[end] = begin
+                self._ends.remove(end)
+                return
 
     def acceleration(self, number: int) -> Floats:
         """Return how the velocity of a track changes, float64[2] in m/s^2, over half a second.
 
-        It is zero for a track that is younger, and no more than ``_MAX_ACCELERATION_MPS2``.
+        It is zero for a track that is younger or hidden, and no more than
+        ``_MAX_ACCELERATION_MPS2``.
         """
-        rows = self._recent.get(number)
-        if not rows or self._earlier[rows[-1]] == NONE:
+        trail = self._trails.get(number)
+        if trail is None or self._samples[trail.rows[-1], 0] < self._now_s:
             return np.zeros(2)
-        now, earlier = self._samples[rows[-1]], self._samples[self._earlier[rows[-1]]]
+        before = self._before(trail, _TURNS_S)
+        if before == NONE:
+            return np.zeros(2)
+        now, earlier = self._samples[trail.rows[-1]], self._samples[before]
         change: Floats = (now[3:] - earlier[3:]) / (now[0] - earlier[0])
         return change * min(1.0, _MAX_ACCELERATION_MPS2 / max(float(np.hypot(*change)), 1e-9))
 
@@ -105,14 +218,36 @@ class MotionMemory:
             times_s: float64[t], times after the last ones, increasing from 0.
         """
         moves = np.zeros((len(times_s), 2))
-        rows = self._recent.get(number)
-        if not rows:
+        trail = self._trails.get(number)
+        if trail is None or self._now_s - self._samples[trail.rows[-1], 0] > _HIDDEN_S:
             return Recalled(moves, 0)
-        samples = self._samples[: self._count]
-        alike = recall(samples, self._earlier, rows[-1], (_SCALE_M, _SCALE_MPS), _BEFORE_S)
-        if alike == NONE:
+        seen = trail.rows[-1]
+        past = self._place(trail, self._samples[seen, 0])
+        if trail.alike == NONE:
             return Recalled(moves, 0)
-        return Recalled(moves, replay(samples, self._later, alike, times_s, moves))
+        known = self._replay(trail, times_s, moves)
+        moves += self._samples[seen, 1:3] - past - self._places[number]
+        return Recalled(moves, known)
+
+    def _place(self, trail: _Trail, seen_s: float) -> Floats:
+        """Return where the past motion was that a trail repeats, float64[2].
+
+        A trail that repeats none, or that has left it, looks for another.
+        """
+        samples, past = self._samples[: self._count], np.zeros((1, 2))
+        seen = trail.rows[-1]
+        if trail.alike != NONE:
+            known = replay(
+                samples, self._later, trail.alike, np.array([seen_s - trail.lag_s]), past
+            )
+            off_m = math.hypot(*(samples[seen, 1:3] - past[0]))
+            if known and off_m <= _SCALE_M:
+                return past[0]
+        trail.alike = recall(samples, self._earlier, seen, (_SCALE_M, _SCALE_MPS), _BEFORE_S)
+        if trail.alike != NONE:
+            trail.lag_s = seen_s - samples[trail.alike, 0]
+            past[0] = samples[trail.alike, 1:3]
+        return past[0]
 
     def _reserve(self, count: int) -> None:
         """Make room for samples; drop the older half if there are too many."""
@@ -130,7 +265,10 @@ class MotionMemory:
         for indices in (self._earlier, self._later):
             moved = indices[kept] - count
             indices[: self._count] = np.where(moved >= 0, moved, NONE)
-        self._recent = {
-            number: [row - count for row in rows if row >= count]
-            for number, rows in self._recent.items()
-        }
+        self._ends = [row - count for row in self._ends if row >= count]
+        self._hidden = []
+        for number, trail in list(self._trails.items()):
+            trail.rows = [row - count for row in trail.rows if row >= count]
+            trail.alike = trail.alike - count if trail.alike >= count else NONE
+            if not trail.rows:
+                del self._trails[number]
