@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, GridSpec
-from quad_nav.kernels.cost_grid import CostmapView, fill_polygon, raise_to
+from quad_nav.kernels.cost_grid import CostmapView, fill_polygon, raise_to, reset_to
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class CostGrid:
 
     def reset(self, window: Optional[Window] = None) -> None:
         """Give the window, or everything, the default cost."""
-        self.costs[window.slices if window else ...] = self.default_cost
+        reset_to(self.costs[window.slices] if window else self.costs, self.default_cost)
 
     def centre_on(self, x_m: float, y_m: float) -> Tuple[int, int]:
         """Move the grid by whole cells so that a point is in its middle; keep what still fits.

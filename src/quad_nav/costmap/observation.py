@@ -203,7 +203,7 @@ def _make_stack(slots: int, width: int) -> ObservationStack:
     return ObservationStack(
         np.empty((slots, 3)),
         np.empty((slots, width, 2), np.float32),
-        np.empty((slots, width), np.int32),
+        np.empty((slots, width), np.int16),
         np.empty((slots, width, 2), np.float32),
         np.zeros((slots, 2), np.int64),
         np.empty((slots, 4)),

@@ -34,6 +34,7 @@ _C_TYPES = {
     types.float32: "float",
     types.int64: "int64_t",
     types.int32: "int32_t",
+    types.int16: "int16_t",
     types.uint8: "uint8_t",
     types.uint32: "uint32_t",
     types.uint64: "uint64_t",

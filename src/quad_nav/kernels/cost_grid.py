@@ -167,15 +167,45 @@ def _span_line(
 
 
 @njit(cache=True, nogil=True)
+def reset_to(cells: NDArray[np.uint8], cost: int) -> None:
+    """Give all cells a cost; rows that have it are not written to.
+
+    The system gives memory to a new grid when it is written to: large maps are mostly free.
+
+    Args:
+        cells: uint8[H, W], changed in place.
+        cost: The cost.
+    """
+    wanted = np.uint8(cost)
+    for y in range(cells.shape[0]):
+        differences = np.uint8(0)
+        for x in range(cells.shape[1]):  # a loop that the compiler makes vectors of
+            differences |= cells[y, x] ^ wanted
+        if differences != 0:
+            for x in range(cells.shape[1]):
+                cells[y, x] = wanted
+
+
+@njit(cache=True, nogil=True)
 def raise_to(below: NDArray[np.uint8], above: NDArray[np.uint8]) -> None:
     """Keep the higher cost of each cell; unknown is the lowest.
+
+    Rows in which nothing is raised are not written to, as in ``reset_to``.
 
     Args:
         below: uint8[H, W], raised in place.
         above: uint8[H, W].
     """
     for y in range(below.shape[0]):
-        for x in range(below.shape[1]):
-            cost, other = below[y, x], above[y, x]
-            if cost == UNKNOWN or (other != UNKNOWN and other > cost):
-                below[y, x] = other
+        any_higher = False
+        for x in range(below.shape[1]):  # a loop that the compiler makes vectors of
+            any_higher |= _is_raised(below[y, x], above[y, x])
+        if any_higher:
+            for x in range(below.shape[1]):
+                if _is_raised(below[y, x], above[y, x]):
+                    below[y, x] = above[y, x]
+
+
+@njit(cache=True, nogil=True)
+def _is_raised(cost: np.uint8, other: np.uint8) -> bool:
+    return (cost == UNKNOWN) | ((other != UNKNOWN) & (other > cost))

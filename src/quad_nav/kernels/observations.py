@@ -27,7 +27,7 @@ class ObservationStack(NamedTuple):
 
     sensors: NDArray[np.float64]  # [slots, 3], where the rays start
     ends: NDArray[np.float32]  # [slots, n, 2], points that rays lead to
-    sectors: NDArray[np.int32]  # [slots, n], sectors that these rays point into
+    sectors: NDArray[np.int16]  # [slots, n], sectors that these rays point into
     marks: NDArray[np.float32]  # [slots, n, 2], points that mark
     counts: NDArray[np.int64]  # [slots, 2], numbers of rays and of marks
     reaches: NDArray[np.float64]  # [slots, 4], bounds of the rays without a grid; NaN if unknown
@@ -206,13 +206,16 @@ def _bounds_of_rays(
     size_y, size_x = costs.shape
     high_x, high_y = low_x + size_x * resolution, low_y + size_y * resolution
     x0, y0 = seen.sensors[slot, 0], seen.sensors[slot, 1]
-    bounds[0], bounds[1], bounds[2], bounds[3] = x0, y0, x0, y0
+    min_x, min_y, max_x, max_y = x0, y0, x0, y0
     square_range, near = range_m * range_m, 1.0 - 1e-9
     count = seen.counts[slot, 0]
     for first in range(_STRIDE):  # beams all around first: few later ones reach farther
         for k in range(first, count, _STRIDE):
             x, y = float(seen.ends[slot, k, 0]), float(seen.ends[slot, k, 1])
-            if in_grid:
+            if in_grid and not (
+                low_x + resolution < x < high_x - resolution
+                and low_y + resolution < y < high_y - resolution
+            ):
                 x, y = clip_to_grid(x0, y0, x, y, low_x, low_y, high_x, high_y)
                 if (
                     cell_index(x, low_x, resolution, size_x) < 0
@@ -223,12 +226,14 @@ def _bounds_of_rays(
             square, scale = dx * dx + dy * dy, 1.0
             if square > near * square_range:
                 # hypot is slow: it is left out for ends that are surely within the bounds.
-                reach_x = x0 - bounds[0] if dx < 0.0 else bounds[2] - x0
-                reach_y = y0 - bounds[1] if dy < 0.0 else bounds[3] - y0
+                reach_x = x0 - min_x if dx < 0.0 else max_x - x0
+                reach_y = y0 - min_y if dy < 0.0 else max_y - y0
                 if dx * dx * square_range <= near * (
                     reach_x * reach_x * square
                 ) and dy * dy * square_range <= near * (reach_y * reach_y * square):
                     continue
                 length = math.hypot(dx, dy)
                 scale = range_m / length if length > range_m else 1.0
-            include(bounds, x0 + dx * scale, y0 + dy * scale)
+            x, y = x0 + dx * scale, y0 + dy * scale
+            min_x, min_y, max_x, max_y = min(min_x, x), min(min_y, y), max(max_x, x), max(max_y, y)
+    bounds[0], bounds[1], bounds[2], bounds[3] = min_x, min_y, max_x, max_y

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.grid import FREE, LETHAL
-from quad_nav.kernels.cost_grid import CostmapView, cell_index, cell_of, include
+from quad_nav.kernels.cost_grid import CostmapView, cell_index, cell_of
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.observations import ObservationStack, clip_to_grid, include_rays
 from quad_nav.kernels.obstructed_cells import (
@@ -219,6 +219,7 @@ def mark_all_points(
     """
     costs, origin_x, origin_y, resolution = costmap
     size_y, size_x = costs.shape
+    min_x, min_y, max_x, max_y = bounds[0], bounds[1], bounds[2], bounds[3]
     for one in range(count):
         slot = (newest - one) % seen.sensors.shape[0]
         for k in range(seen.counts[slot, 1]):
@@ -227,4 +228,6 @@ def mark_all_points(
             cell_y = cell_index(y, origin_y, resolution, size_y)
             if cell_x >= 0 and cell_y >= 0:
                 costs[cell_y, cell_x] = LETHAL
-                include(bounds, x, y)
+                min_x, max_x = min(min_x, x), max(max_x, x)
+                min_y, max_y = min(min_y, y), max(max_y, y)
+    bounds[0], bounds[1], bounds[2], bounds[3] = min_x, min_y, max_x, max_y
