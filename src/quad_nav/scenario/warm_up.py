@@ -123,7 +123,7 @@ def _oncoming_peer(here: Pose2D, now_s: float) -> Peer:
 
 
 def _add_scans(navigator: Navigator, here: Pose2D) -> None:
-    """Add a scan with an obstacle 2 m behind the robot to every obstacle layer."""
+    """Add a cloud, and a scan with an obstacle 2 m behind the robot, to every obstacle layer."""
     angles = np.linspace(-math.pi, math.pi, 64, endpoint=False)
     ranges = np.where(np.abs(angles) > 3.0, 2.0, np.inf).astype(np.float32)
     scan = Scan(0.0, -math.pi, 2 * math.pi / 64, 0.02, 60.0, ranges)
@@ -134,6 +134,8 @@ def _add_scans(navigator: Navigator, here: Pose2D) -> None:
         for layer in costmap.layers.values():
             if isinstance(layer, ObstacleLayer):
                 for source in layer.params.sources:
+                    cloud = np.zeros((1, 3), np.float32)
+                    layer.add_cloud(source.name, cloud, lidar, 0.0, 0.0)
                     seen = layer.observe_scan(source.name, scan, lidar, None, is_moving)
                     layer.add_observation(source.name, seen, 0.0)
 
