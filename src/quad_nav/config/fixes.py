@@ -248,6 +248,15 @@ _SWITCHES: Tuple[Switch, ...] = (
         (PeerParams,),
     ),
     (
+        flag(
+            "plan_behind_moving_obstacles",
+            False,
+            "plan_behind_strangers",
+            "Global plans pass behind tracked obstacles.",
+        ),
+        (PeerParams,),
+    ),
+    (
         double(
             "stranger_patience",
             3.0,

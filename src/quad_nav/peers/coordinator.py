@@ -51,6 +51,7 @@ class PeerParams:
         timeout_s: Age from which the state of a peer is ignored.
         yield_when_idle: A robot without a goal leaves the path of a peer, and comes back.
         yield_to_strangers: Make room for a tracked obstacle that keeps the robot from its goal.
+        plan_behind_strangers: Plans pass behind tracked obstacles.
         stranger_patience_s: Time without progress until the robot makes room for a stranger; a
             random time of up to twice as much is added.
     """
@@ -60,6 +61,7 @@ class PeerParams:
     timeout_s: float = 0.5
     yield_when_idle: bool = True
     yield_to_strangers: bool = False
+    plan_behind_strangers: bool = False
     stranger_patience_s: float = 3.0
 
 
@@ -117,6 +119,7 @@ class PeerCoordinator:
         self._progress = StallTimer()
         self._limited = StallTimer()
         self._tracks = False  # moving obstacles are tracked
+        self._crossing = False  # plans pass behind some
 
     @property
     def peers(self) -> Sequence[Peer]:
@@ -222,24 +225,24 @@ class PeerCoordinator:
             self.params.margin_m,
             self.params.timeout_s,
         )
-        changed = had_peers or bool(self._tracker.peers)
-        if changed and pose is not None and local_from_global is not None:
-            self._costs.update(pose, local_from_global, self.priority)
-        if pose is not None and local_from_global is not None:
-            self._observe_strangers(now_s, pose, local_from_global, strangers)
+        if pose is None or local_from_global is None:
+            return messages
+        in_map = None if strangers is None else _in_map(strangers, local_from_global)
+        crossing = in_map if self.params.plan_behind_strangers and in_map else None
+        if had_peers or self._tracker.peers or crossing or self._crossing:
+            self._costs.update(
+                pose, local_from_global, self.priority, crossing.at(now_s) if crossing else None
+            )
+        self._crossing = crossing is not None
+        self._observe_strangers(now_s, pose, in_map)
         return messages
 
-    def _observe_strangers(
-        self, now_s: float, pose: Pose2D, local_from_global: Pose2D, strangers: Optional[Tracks]
-    ) -> None:
+    def _observe_strangers(self, now_s: float, pose: Pose2D, strangers: Optional[Tracks]) -> None:
         if strangers is None or not self.params.yield_to_strangers:
             if self._stand_off.is_watching:
                 self._stand_off.restart()
             return
-        places = strangers.states[:, :2]
-        if len(places) and local_from_global != Pose2D(0.0, 0.0):
-            places = local_from_global.inverse().transform_points(places)
-        self._stand_off.observe(now_s, pose, places)
+        self._stand_off.observe(now_s, pose, strangers.states[:, :2])
 
     # -- decide --------------------------------------------------------------------------
 
@@ -341,6 +344,12 @@ class PeerCoordinator:
             return False
         self._limited.restart(now_s)
         return True
+
+
+def _in_map(tracks: Tracks, local_from_global: Pose2D) -> Tracks:
+    if not len(tracks) or local_from_global == Pose2D(0.0, 0.0):
+        return tracks
+    return tracks.transformed(local_from_global.inverse())
 
 
 def _straight_to(goal: Pose2D) -> NDArray[np.float64]:
