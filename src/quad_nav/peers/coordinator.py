@@ -225,17 +225,19 @@ class PeerCoordinator:
             self.params.margin_m,
             self.params.timeout_s,
         )
-        if pose is None or local_from_global is None:
-            return messages
-        in_map = None if strangers is None else _in_map(strangers, local_from_global)
-        crossing = in_map if self.params.plan_behind_strangers and in_map else None
-        if had_peers or self._tracker.peers or crossing or self._crossing:
-            self._costs.update(
-                pose, local_from_global, self.priority, crossing.at(now_s) if crossing else None
-            )
-        self._crossing = crossing is not None
-        self._observe_strangers(now_s, pose, in_map)
+        if pose is not None and local_from_global is not None:
+            in_map = None if strangers is None else _in_map(strangers, local_from_global)
+            crossing = in_map.at(now_s) if in_map and self.params.plan_behind_strangers else None
+            self._update_costs(pose, local_from_global, had_peers, crossing)
+            self._observe_strangers(now_s, pose, in_map)
         return messages
+
+    def _update_costs(
+        self, pose: Pose2D, local_from_global: Pose2D, had_peers: bool, crossing: Optional[Tracks]
+    ) -> None:
+        if had_peers or self._tracker.peers or crossing or self._crossing:
+            self._costs.update(pose, local_from_global, self.priority, crossing)
+        self._crossing = crossing is not None
 
     def _observe_strangers(self, now_s: float, pose: Pose2D, strangers: Optional[Tracks]) -> None:
         if strangers is None or not self.params.yield_to_strangers:
