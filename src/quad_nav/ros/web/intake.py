@@ -17,6 +17,8 @@ from genpy import DeserializationError
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 
 RETRY_S = 1.0
+PAUSE_S = 0.02
+"""Between two subscriptions: hundreds at once would stall the nodes that publish."""
 
 
 @functools.lru_cache(maxsize=None)
@@ -121,10 +123,13 @@ class Subscriptions:
                 del self._open[name]
                 subscriber.unregister()
         for name, topic in wanted.items():
-            if name not in self._open:
-                self._open[name] = (
-                    topic,
-                    rospy.Subscriber(
-                        name, topic.message_type, topic.callback, queue_size=10, tcp_nodelay=True
-                    ),
-                )
+            if name in self._open:
+                continue
+            self._open[name] = (
+                topic,
+                rospy.Subscriber(
+                    name, topic.message_type, topic.callback, queue_size=10, tcp_nodelay=True
+                ),
+            )
+            if self._changed.wait(PAUSE_S):
+                return  # something else is wanted by now
