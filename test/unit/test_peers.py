@@ -76,7 +76,7 @@ def test_velocities_are_rotated_into_the_map_and_extrapolated():
 def test_a_peer_without_an_intention_is_expected_straight_on_and_goes_first():
     assert assumed_intention(peer(0.0, 0.0, 0.01)).priority == IDLE_PRIORITY
     intention = assumed_intention(peer(1.0, 0.0, 0.2))
-    assert intention.priority == HIGHEST_PRIORITY == 0.0
+    assert intention.priority == HIGHEST_PRIORITY == 1.0
     np.testing.assert_allclose(intention.path, [[1.0, 0.0], [2.0, 0.0]])
 
 

@@ -231,6 +231,15 @@ _SWITCHES: Tuple[Switch, ...] = (
     ),
     (
         flag(
+            "roundabouts",
+            True,
+            "roundabouts",
+            "Where the ways of four robots or more meet, all keep right of a circle.",
+        ),
+        (PeerParams,),
+    ),
+    (
+        flag(
             "yield_when_idle",
             True,
             "yield_when_idle",

@@ -26,6 +26,7 @@ from quad_nav.peers.peer import (
 from quad_nav.peers.peer_costs import PeerCosts
 from quad_nav.peers.peer_tracker import PeerTracker
 from quad_nav.peers.right_of_way import STRANGER, Yield, YieldDecision
+from quad_nav.peers.roundabout import Roundabout
 from quad_nav.peers.stand_off import StandOff
 from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell
 from quad_nav.peers.yielding import YieldRules
@@ -49,6 +50,7 @@ class PeerParams:
         margin_m: Distance that each of two robots keeps its footprint from the bisector
             between them; hulls stay twice as far apart.
         timeout_s: Age from which the state of a peer is ignored.
+        roundabouts: Where four robots or more meet, all keep right of a circle.
         yield_when_idle: A robot without a goal leaves the path of a peer, and comes back.
         yield_to_strangers: Make room for a tracked obstacle that keeps the robot from its goal.
         plan_behind_strangers: Plans pass behind tracked obstacles.
@@ -59,6 +61,7 @@ class PeerParams:
     avoid_peers: bool = True
     margin_m: float = 0.05
     timeout_s: float = 0.5
+    roundabouts: bool = True
     yield_when_idle: bool = True
     yield_to_strangers: bool = False
     plan_behind_strangers: bool = False
@@ -111,15 +114,16 @@ class PeerCoordinator:
         self.is_yield_manoeuvre = False
         self._number = number
         self._tracker = PeerTracker(global_costmap, local_costmap)
-        self._costs = PeerCosts(self._tracker, global_costmap, local_costmap)
-        self._rules = YieldRules(self._tracker, global_costmap)
+        self._roundabout = Roundabout(self._tracker, global_costmap)
+        self._costs = PeerCosts(self._tracker, self._roundabout, global_costmap, local_costmap)
+        self._rules = YieldRules(self._tracker, self._roundabout, global_costmap)
         self._stand_off = StandOff(self._tracker, global_costmap, number)
         self._goal_set_s = -IDLE_PRIORITY
         self._path = NO_PATH
         self._progress = StallTimer()
         self._limited = StallTimer()
         self._tracks = False  # moving obstacles are tracked
-        self._crossing = False  # plans pass behind some
+        self._has_costs = False  # in the costmaps
 
     @property
     def peers(self) -> Sequence[Peer]:
@@ -134,7 +138,7 @@ class PeerCoordinator:
     @property
     def reach_m(self) -> float:
         """Distance up to which peers matter; ``observe`` ignores the others."""
-        return self._tracker.reach_m
+        return max(self._tracker.reach_m, self._roundabout.reach_m)
 
     @property
     def priority(self) -> float:
@@ -162,12 +166,14 @@ class PeerCoordinator:
         self._progress = StallTimer()
         self._limited = StallTimer()
         self._stand_off.start_goal()
+        self._roundabout.start(goal)
 
     def end_goal(self) -> None:
         """Make the robot idle; a parking pose that it has not reached stays."""
         self.decision, self.is_yield_manoeuvre = None, False
         self._goal_set_s = -IDLE_PRIORITY
         self._path = NO_PATH
+        self._roundabout.start(None)
 
     def end_manoeuvre(self, succeeded: bool) -> None:
         """End a yielding manoeuvre; the robot is at its parking pose if it succeeded."""
@@ -188,6 +194,7 @@ class PeerCoordinator:
         self._tracker.restart()
         self._rules.restart()
         self._stand_off.restart()
+        self._roundabout.restart()
 
     # -- observe -------------------------------------------------------------------------
 
@@ -215,7 +222,6 @@ class PeerCoordinator:
         Returns:
             Messages about peers that were lost or came back, for the log.
         """
-        had_peers = bool(self._tracker.peers)
         self._tracks = strangers is not None
         self._tracker.cruise_mps = cruise_mps
         messages = self._tracker.observe(
@@ -225,19 +231,31 @@ class PeerCoordinator:
             self.params.margin_m,
             self.params.timeout_s,
         )
+        messages += self._update_roundabout(now_s, pose, peers)
         if pose is not None and local_from_global is not None:
             in_map = None if strangers is None else _in_map(strangers, local_from_global)
             crossing = in_map.at(now_s) if in_map and self.params.plan_behind_strangers else None
-            self._update_costs(pose, local_from_global, had_peers, crossing)
+            self._update_costs(pose, local_from_global, crossing)
             self._observe_strangers(now_s, pose, in_map)
         return messages
 
+    def _update_roundabout(
+        self, now_s: float, pose: Optional[Pose2D], peers: Sequence[Peer]
+    ) -> List[str]:
+        if not (self.params.avoid_peers and self.params.roundabouts):
+            self._roundabout.restart()
+        elif pose is not None:
+            return self._roundabout.update(now_s, pose, peers, self.params.timeout_s)
+        return []
+
     def _update_costs(
-        self, pose: Pose2D, local_from_global: Pose2D, had_peers: bool, crossing: Optional[Tracks]
+        self, pose: Pose2D, local_from_global: Pose2D, crossing: Optional[Tracks]
     ) -> None:
-        if had_peers or self._tracker.peers or crossing or self._crossing:
+        in_roundabout = self._roundabout.centre is not None
+        costs = bool(self._tracker.peers) or in_roundabout or crossing is not None
+        if costs or self._has_costs:
             self._costs.update(pose, local_from_global, self.priority, crossing)
-        self._crossing = crossing is not None
+        self._has_costs = costs
 
     def _observe_strangers(self, now_s: float, pose: Pose2D, strangers: Optional[Tracks]) -> None:
         if strangers is None or not self.params.yield_to_strangers:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from quad_nav.geometry import Pose2D, Twist2D
 
 NO_PATH = np.zeros((0, 2))
-HIGHEST_PRIORITY = 0.0
+HIGHEST_PRIORITY = 1.0  # above that of every goal
 IDLE_PRIORITY = -4.0e9  # below that of every goal; a ROS stamp can still hold 4.0e9 s
 _NUMBER_S = 0.01
 _STATIONARY_MPS = 0.05

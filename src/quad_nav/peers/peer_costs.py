@@ -2,8 +2,9 @@
 
 In the global costmap, places near a stationary peer and along the path of a peer of higher
 priority cost more, so plans avoid them where there is room. So do places ahead of tracked
-obstacles that the robot can reach before these have passed: plans pass behind them. In the local
-costmap, stationary peers are obstacles. Obstacle layers ignore LIDAR points on known peers.
+obstacles that the robot can reach before these have passed: plans pass behind them. So does the
+circle of a roundabout with all to its left: plans keep right. In the local costmap, stationary
+peers are obstacles. Obstacle layers ignore LIDAR points on known peers.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from quad_nav.grid import LETHAL
 from quad_nav.kernels.peers import reached_in_time
 from quad_nav.peers.peer_tracker import TOLERANCE_M, PeerTracker
 from quad_nav.peers.right_of_way import HORIZON_S, TIME_TOLERANCE_S, predict_peer
+from quad_nav.peers.roundabout import Roundabout
 from quad_nav.tracking.tracks import Tracks
 
 _SAME_FRAME = Pose2D(0.0, 0.0, 0.0)
@@ -37,10 +39,14 @@ class PeerCosts:
     """Writes the tracked peers to the layers of a robot's two costmaps."""
 
     def __init__(
-        self, tracker: PeerTracker, global_costmap: LayeredCostmap, local_costmap: LayeredCostmap
+        self,
+        tracker: PeerTracker,
+        roundabout: Roundabout,
+        global_costmap: LayeredCostmap,
+        local_costmap: LayeredCostmap,
     ) -> None:
         """Write to the peer layers and obstacle layers of both costmaps."""
-        self._tracker = tracker
+        self._tracker, self._roundabout = tracker, roundabout
         self._global, self._local = global_costmap, local_costmap
 
     def update(
@@ -85,7 +91,7 @@ class PeerCosts:
     def _areas(
         self, positions: NDArray[np.float64], pose: Pose2D, priority: float
     ) -> List[PeerArea]:
-        """Return the areas of the global costmap: stationary peers, and paths that go first.
+        """Return the areas of the global costmap: stationary peers, paths that go first, circles.
 
         Of a path only those places count that the robot can reach before the peer has passed
         them: so it plans to pass behind the peer.
@@ -101,10 +107,13 @@ class PeerCosts:
         for k, peer in enumerate(tracker.peers):
             if peer.name in tracker.stationary:
                 areas.append(PeerArea(positions[k : k + 1], radius_m, _STATIONARY_COST))
-            elif peer.intention.priority > priority:
+            elif peer.intention.priority > priority and peer.name not in self._roundabout.members:
                 path = predict_peer(peer, tracker.cruise_mps, _PATH_TIMES_S)
                 met = places_met(path, _PATH_TIMES_S, pose, radius_m, tracker.cruise_mps)
                 areas += [PeerArea(met, radius_m, _PATH_COST)] if len(met) else []
+        if self._roundabout.centre is not None:
+            barrier = self._roundabout.barrier(pose)
+            areas.append(PeerArea(barrier, self._roundabout.radius_m, _PATH_COST))
         return areas
 
     def _crossings(self, strangers: Tracks, pose: Pose2D) -> List[PeerArea]:

@@ -21,6 +21,7 @@ from quad_nav.peers.right_of_way import (
     meets,
     predict_peer,
 )
+from quad_nav.peers.roundabout import Roundabout
 
 _MIN_WAIT_S = 1.0
 _CHECK_PERIOD_S = 1.0  # of whether a holding point can still be reached
@@ -30,14 +31,17 @@ _PATH_AHEAD_M = 8.0  # length of a peer's path that a holding point keeps clear
 class YieldRules:
     """Decides whether one robot yields, to which peer and how."""
 
-    def __init__(self, tracker: PeerTracker, global_costmap: LayeredCostmap) -> None:
+    def __init__(
+        self, tracker: PeerTracker, roundabout: Roundabout, global_costmap: LayeredCostmap
+    ) -> None:
         """Decide for the robot whose peers ``tracker`` tracks.
 
         Args:
             tracker: The peers and their distances.
+            roundabout: The robot does not yield to its members, unless they stand.
             global_costmap: Costmap in which holding points are searched.
         """
-        self._tracker = tracker
+        self._tracker, self._roundabout = tracker, roundabout
         self._global = global_costmap
         self.restart()
 
@@ -90,6 +94,10 @@ class YieldRules:
         separation_m = self._tracker.min_separation_m
         return all(np.hypot(*(path - at).T).min() > separation_m for path in paths)
 
+    def _passes(self, peer: Peer) -> bool:
+        """Return whether a peer passes in a roundabout, where nobody yields."""
+        return peer.name in self._roundabout.members and peer.name not in self._tracker.stationary
+
     def _decide_anew(
         self, now_s: float, pose: Pose2D, path: NDArray[np.float64], priority: float
     ) -> Optional[YieldDecision]:
@@ -98,7 +106,7 @@ class YieldRules:
             np.array([pose.x_m, pose.y_m]),
             path,
             priority,
-            tracker.peers,
+            [peer for peer in tracker.peers if not self._passes(peer)],
             tracker.min_separation_m,
             tracker.cruise_mps,
             tracker.stationary,
@@ -121,6 +129,8 @@ class YieldRules:
         """Return the decision to make room until the way is clear or the peer parks, then None."""
         peer = next((p for p in self._tracker.peers if p.name == current.peer), None)
         if peer is None or peer.intention.priority <= priority or peer.is_parked:
+            return None
+        if self._passes(peer):
             return None
         ahead = _path_ahead(peer)
         separation_m = self._tracker.min_separation_m + TOLERANCE_M
