@@ -32,7 +32,7 @@ from quad_nav.timing import StallTimer
 Floats = NDArray[np.float64]
 
 _FEWEST_PEERS = 3
-_PERIOD_S = 0.5  # of looking for meetings
+_PERIOD_S = 1.0  # of looking for meetings
 _SPACING_FACTOR = 1.3  # of the robots on the circle, in minimum separations
 _INSIDE_M = 0.4  # a start or goal is so far outside of the circle
 _DISCS = 4  # of the barrier to the left
