@@ -18,6 +18,7 @@ UPSTREAM = {
     "stop_after_rotation": False,
     "avoid_peers": False,
     "yield_when_idle": False,
+    "roundabouts": False,
     "notice_silence_at_once": False,
     "draw_all_map_updates": False,
     "restore_static_map": False,

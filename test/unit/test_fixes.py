@@ -46,8 +46,8 @@ def test_fixes_are_on_by_default_and_each_can_be_switched_off():
     assert upstream.navigator.progress == ProgressParams(0.0, 0.1, 1.0)
     assert defaults.navigator.escape_collision and defaults.navigator.sensor_timeout_s == 1.0
     assert not upstream.navigator.escape_collision and upstream.navigator.sensor_timeout_s == 0.0
-    assert defaults.peers == PeerParams(True, 0.05, 0.5, True)
-    assert upstream.peers == PeerParams(False, 0.05, 0.5, False)
+    assert defaults.peers == PeerParams(True, 0.05, 0.5, True, True)
+    assert upstream.peers == PeerParams(False, 0.05, 0.5, False, False)
     assert defaults.scan_validator.reject_implausible_scans
     assert not upstream.scan_validator.reject_implausible_scans
 

@@ -231,19 +231,19 @@ _SWITCHES: Tuple[Switch, ...] = (
     ),
     (
         flag(
-            "roundabouts",
+            "yield_when_idle",
             True,
-            "roundabouts",
-            "Where the ways of four robots or more meet, all keep right of a circle.",
+            "yield_when_idle",
+            "A robot without a goal leaves the path of a peer, and comes back.",
         ),
         (PeerParams,),
     ),
     (
         flag(
-            "yield_when_idle",
+            "roundabouts",
             True,
-            "yield_when_idle",
-            "A robot without a goal leaves the path of a peer, and comes back.",
+            "roundabouts",
+            "Where the ways of four robots or more meet, all keep right of a circle.",
         ),
         (PeerParams,),
     ),

@@ -50,8 +50,8 @@ class PeerParams:
         margin_m: Distance that each of two robots keeps its footprint from the bisector
             between them; hulls stay twice as far apart.
         timeout_s: Age from which the state of a peer is ignored.
-        roundabouts: Where four robots or more meet, all keep right of a circle.
         yield_when_idle: A robot without a goal leaves the path of a peer, and comes back.
+        roundabouts: Where four robots or more meet, all keep right of a circle.
         yield_to_strangers: Make room for a tracked obstacle that keeps the robot from its goal.
         plan_behind_strangers: Plans pass behind tracked obstacles.
         stranger_patience_s: Time without progress until the robot makes room for a stranger; a
@@ -61,8 +61,8 @@ class PeerParams:
     avoid_peers: bool = True
     margin_m: float = 0.05
     timeout_s: float = 0.5
-    roundabouts: bool = True
     yield_when_idle: bool = True
+    roundabouts: bool = True
     yield_to_strangers: bool = False
     plan_behind_strangers: bool = False
     stranger_patience_s: float = 3.0
