@@ -1,7 +1,7 @@
 """Roundabouts where four robots meet at (5, 5), at 8 s, on a map of 10 m x 10 m.
 
-The minimum separation is 0.8 m, as the safety radius is 0.35 m and the margin 0. So robots are
-1.3 * 0.8 m = 1.04 m apart on a circle, and the circle of four has a radius of 0.662 m.
+The safety radius is 0.35 m, as the margin is 0, and the speed 0.3 m/s. So robots are
+2 * (0.35 m + 0.3 m/s * 0.6 s) = 1.06 m apart on a circle, and that of four has a radius of 0.675 m.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ TREE = {
 }
 START, GOAL = Pose2D(2.6, 5.0), Pose2D(8.0, 5.0)
 TIMEOUT_S = 0.5
-RADIUS_M = 4 * 1.04 / (2 * math.pi)
+RADIUS_M = 4 * 1.06 / (2 * math.pi)
 
 
 def peer(name: str, start, goal, priority: float = -1.0) -> Peer:
@@ -64,7 +64,7 @@ def update(roundabout, peers, pose=START, now_s=0.0):
 
 
 def test_four_that_meet_keep_right_of_a_circle_with_room_for_all(roundabout):
-    assert update(roundabout, ALL) == ["keeping right of (5.00, 5.00) by 0.66 m, as do 3 peers"]
+    assert update(roundabout, ALL) == ["keeping right of (5.00, 5.00) by 0.67 m, as do 3 peers"]
     np.testing.assert_allclose(roundabout.centre, (5.0, 5.0))
     assert roundabout.radius_m == pytest.approx(RADIUS_M)
     assert roundabout.members == {"quad1", "quad2", "quad3"}
@@ -138,7 +138,7 @@ def test_a_goal_in_the_circle_is_flown_to_straight(roundabout):
 
 @pytest.mark.parametrize("y_m, leaves", [(4.4, False), (4.2, True)])
 def test_it_ends_where_the_way_to_the_goal_is_clear_of_the_circle(roundabout, y_m, leaves):
-    """From (5, y) to (8, 5) the circle's centre is 0.588 m or 0.773 m to the left."""
+    """From (5, y) to (8, 5) the circle's centre is 0.588 m or 0.773 m to the left of 0.641 m."""
     update(roundabout, ALL)
     update(roundabout, [], Pose2D(5.0, y_m), now_s=1.0)
     assert (roundabout.centre is None) == leaves
@@ -168,6 +168,9 @@ def test_members_do_not_yield_and_their_paths_cost_nothing(navigator):
     for _ in range(2):
         coordinator.observe(0.0, START, in_frame, first, 0.3)
     assert coordinator.decide(0.0, START, GOAL).messages == ()
+    obstacles = coordinator._costs._obstacles(np.zeros((3, 2)), START, in_frame)
+    assert [area.points.tolist() for area in obstacles] == [[[5.0, 5.0]]]
+    assert obstacles[0].radius_m == pytest.approx(coordinator._roundabout.radius_m - 0.35)
     areas = coordinator._costs._areas(np.array([(p.x_m, p.y_m) for p in first]), START, -1.0)
     assert [(len(area.points), area.cost) for area in areas] == [(4, 100)]
 

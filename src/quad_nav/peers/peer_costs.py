@@ -4,7 +4,7 @@ In the global costmap, places near a stationary peer and along the path of a pee
 priority cost more, so plans avoid them where there is room. So do places ahead of tracked
 obstacles that the robot can reach before these have passed: plans pass behind them. So does the
 circle of a roundabout with all to its left: plans keep right. In the local costmap, stationary
-peers are obstacles. Obstacle layers ignore LIDAR points on known peers.
+peers and the circle are obstacles. Obstacle layers ignore LIDAR points on known peers.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class PeerCosts:
             costly += self._crossings(strangers, pose)
         for costmap, circles, areas in (
             (self._global, in_global, costly),
-            (self._local, in_local, self._obstacles(in_local[:, :2], pose)),
+            (self._local, in_local, self._obstacles(in_local[:, :2], pose, local_from_global)),
         ):
             for layer in costmap.layers.values():
                 if isinstance(layer, PeerLayer):
@@ -133,25 +133,34 @@ class PeerCosts:
             areas += [PeerArea(met, reach_m, _PATH_COST)] if len(met) else []
         return areas
 
-    def _obstacles(self, positions: NDArray[np.float64], pose: Pose2D) -> List[PeerArea]:
-        """Return the obstacles of the local costmap: stationary peers with their safety radius.
+    def _obstacles(
+        self, positions: NDArray[np.float64], pose: Pose2D, local_from_global: Pose2D
+    ) -> List[PeerArea]:
+        """Return the obstacles of the local costmap: stationary peers and the circle of a roundabout.
 
-        No area contains the robot itself, because then no trajectory would be legal.
+        They keep the robot's centre off. No area contains the robot itself, because then no
+        trajectory would be legal.
 
         Args:
             positions: Of the peers, float64[n, 2] in the frame of the local costmap.
             pose: Pose of the robot in ``map``.
+            local_from_global: Transform from ``map`` to the frame of the local costmap.
         """
-        tracker = self._tracker
+        tracker, here = self._tracker, (pose.x_m, pose.y_m)
+        kept_off = [
+            (positions[k], math.dist((peer.x_m, peer.y_m), here), 2.0 * tracker.safety_radius_m)
+            for k, peer in enumerate(tracker.peers)
+            if peer.name in tracker.stationary
+        ]
+        centre, circle_m = self._roundabout.centre, self._roundabout.radius_m
+        if centre is not None:
+            in_local = local_from_global.transform_points(centre[None, :])[0]
+            kept_off.append((in_local, math.dist(centre, here), circle_m))
         obstacles = []
-        for k, peer in enumerate(tracker.peers):
-            if peer.name not in tracker.stationary:
-                continue
-            distance_m = math.hypot(peer.x_m - pose.x_m, peer.y_m - pose.y_m)
-            radius_m = min(2.0 * tracker.safety_radius_m, distance_m - _OUTSIDE_M)
-            radius_m = radius_m - tracker.radius_m
+        for place, away_m, keep_m in kept_off:
+            radius_m = min(keep_m, away_m - _OUTSIDE_M) - tracker.radius_m
             if radius_m > 0.0:
-                obstacles.append(PeerArea(positions[k : k + 1], radius_m, LETHAL))
+                obstacles.append(PeerArea(place[None, :], radius_m, LETHAL))
         return obstacles
 
 

@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 
 _FEWEST_PEERS = 3
 _PERIOD_S = 1.0  # of looking for meetings
-_SPACING_FACTOR = 1.3  # of the robots on the circle, in minimum separations
+_REACTION_S = 0.6  # for which the cells expect a robot to go on: period, latency and coasting
 _INSIDE_M = 0.4  # a start or goal is so far outside of the circle
 _DISCS = 4  # of the barrier to the left
 _PASSED_M = 0.2
@@ -162,7 +162,8 @@ class Roundabout:
 
     def _radius_m(self, robots: int, centre: Floats, at: Floats, to: Floats) -> float:
         """Return the radius of a circle with room for robots, without start and goal in it."""
-        spacing_m = _SPACING_FACTOR * self._tracker.min_separation_m
+        tracker = self._tracker
+        spacing_m = 2.0 * (tracker.safety_radius_m + tracker.cruise_mps * _REACTION_S)
         outside_m = min(math.dist(centre, at), math.dist(centre, to)) - _INSIDE_M
         return min(robots * spacing_m / (2.0 * math.pi), outside_m)
 
