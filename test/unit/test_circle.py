@@ -161,6 +161,20 @@ LATE = replace(RUN, run=1, seed=8, arrivals_s=(40.0, 50.0), gap_m=0.1)
 LOST = replace(RUN, run=2, seed=9, arrivals_s=(20.0, None), contacts=("quad0 touches quad1",))
 
 
+def test_four_that_meet_fly_round_the_middle_in_one_direction():
+    """Straight on it takes 25 s to come within 0.4 m of the goals, 8 m away."""
+    in_turn = only(robots=(4,), parameters=(("fixes/roundabouts", False),), radius_m=4.0)
+    rounds = only(robots=(4,), radius_m=4.0)
+    before, now = fly_quad(in_turn, 0), fly_quad(rounds, 0)
+    assert before.succeeded and now.succeeded
+    assert now.last_arrival_s < 28.0 < before.last_arrival_s
+    for k in range(4):  # counter-clockwise about (0, 0)
+        x, y = now.tracks_m[:, k].T
+        assert np.hypot(x, y).min() > 0.5
+        turned = np.diff(np.unwrap(np.arctan2(y, x)))
+        assert turned[np.hypot(x, y)[1:] < 2.0].min() > 0.0
+
+
 def test_statistics_of_flights():
     row = circle_statistics([RUN, LATE, LOST])
     assert (row.runs, row.successes, row.touched) == (3, 2, 1)

@@ -170,7 +170,7 @@ def test_members_do_not_yield_and_their_paths_cost_nothing(navigator):
     assert coordinator.decide(0.0, START, GOAL).messages == ()
     obstacles = coordinator._costs._obstacles(np.zeros((3, 2)), START, in_frame)
     assert [area.points.tolist() for area in obstacles] == [[[5.0, 5.0]]]
-    assert obstacles[0].radius_m == pytest.approx(coordinator._roundabout.radius_m - 0.35)
+    assert obstacles[0].radius_m == pytest.approx(coordinator._roundabout.radius_m - 0.35 - 0.1)
     areas = coordinator._costs._areas(np.array([(p.x_m, p.y_m) for p in first]), START, -1.0)
     assert [(len(area.points), area.cost) for area in areas] == [(4, 100)]
 

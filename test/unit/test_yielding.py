@@ -105,28 +105,6 @@ def test_head_on_one_robot_goes_straight_and_the_other_passes_beside_it():
     assert fleet.nearest_m > 2 * RADIUS_M
 
 
-def cross(fixes=None):
-    """Four robots fly to each other's places, 3 m from (5, 5); return them and when all arrive."""
-    angles = 0.5 * np.pi * np.arange(4)
-    places = [Pose2D(5 - 3 * math.cos(a), 5 - 3 * math.sin(a), a) for a in angles]
-    fleet = Fleet(*places, fixes=fixes)
-    for navigator, goal in zip(fleet.navigators, places[2:] + places[:2]):
-        navigator.set_goal(goal, 0.0)
-    fleet.fly(120.0, until=lambda: all(fleet.outcomes))
-    assert all(outcomes[0].succeeded for outcomes in fleet.outcomes)
-    assert fleet.nearest_m > 2 * RADIUS_M
-    return fleet
-
-
-def test_four_that_meet_fly_round_the_place_and_nobody_yields():
-    fleet = cross()
-    assert fleet.yielded == [False] * 4
-    assert ["as do 3 peers" in notes[0] for notes in fleet.notes] == [True] * 4
-    yielding = cross({"roundabouts": False})
-    assert any(yielding.yielded)
-    assert fleet.now_s < 25.0 < yielding.now_s  # 20 s straight on at 0.3 m/s
-
-
 def test_without_avoid_peers_they_do_not_avoid_each_other():
     fleet = Fleet(Pose2D(2.0, 5.0), Pose2D(8.0, 5.0, math.pi), fixes={"avoid_peers": False})
     fleet.navigators[0].set_goal(Pose2D(8.0, 5.0), 0.0)

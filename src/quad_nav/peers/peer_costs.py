@@ -136,7 +136,7 @@ class PeerCosts:
     def _obstacles(
         self, positions: NDArray[np.float64], pose: Pose2D, local_from_global: Pose2D
     ) -> List[PeerArea]:
-        """Return the obstacles of the local costmap: stationary peers and the circle of a roundabout.
+        """Return the obstacles of the local costmap: stationary peers, and a circle.
 
         They keep the robot's centre off. No area contains the robot itself, because then no
         trajectory would be legal.
@@ -155,7 +155,7 @@ class PeerCosts:
         centre, circle_m = self._roundabout.centre, self._roundabout.radius_m
         if centre is not None:
             in_local = local_from_global.transform_points(centre[None, :])[0]
-            kept_off.append((in_local, math.dist(centre, here), circle_m))
+            kept_off.append((in_local, math.dist(centre, here), circle_m - TOLERANCE_M))
         obstacles = []
         for place, away_m, keep_m in kept_off:
             radius_m = min(keep_m, away_m - _OUTSIDE_M) - tracker.radius_m
