@@ -88,6 +88,14 @@ def test_it_grows_with_who_comes_and_does_not_shrink(roundabout):
     assert roundabout.radius_m == pytest.approx(RADIUS_M * 5 / 4)
 
 
+@pytest.mark.filterwarnings("error")
+def test_who_may_not_move_meets_nobody(roundabout):
+    roundabout._tracker.cruise_mps = 0.0
+    for _ in range(2):
+        assert roundabout.update(0.0, START, ALL, TIMEOUT_S) == []
+    assert roundabout.centre is None
+
+
 def test_who_sends_no_intention_does_not_keep_right(roundabout):
     silent = peer("quad3", (5.0, 7.4), (5.0, 2.0), HIGHEST_PRIORITY)
     update(roundabout, [EAST, SOUTH, silent])

@@ -140,7 +140,7 @@ class Roundabout:
             for peer in peers
             if not peer.is_parked and peer.intention.priority < HIGHEST_PRIORITY
         ]
-        if len(under_way) < _FEWEST_PEERS:
+        if len(under_way) < _FEWEST_PEERS or self._tracker.cruise_mps <= 0.0:
             return
         met, places = find_meetings(
             at,
