@@ -10,7 +10,7 @@ import pytest
 from quad_nav.control.evasion import EvasionParams, Surroundings, evade, predicted_discs
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
-from quad_nav.kernels.space_time import SpaceTime, command_costs, fill_costs, threat
+from quad_nav.kernels.space_time import SpaceTime, Standing, command_costs, fill_costs, threat
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -57,13 +57,30 @@ def test_threat_grows_inside_and_falls_off_outside():
 
 
 def test_a_command_into_an_obstacle_costs_its_time_inside():
-    standing = np.tile([0.33, 0.0, 0.2, 1e-6], (6, 1, 1))
-    blocked = np.zeros((15, 15), bool)
+    discs = np.tile([0.33, 0.0, 0.2, 1e-6], (6, 1, 1))
+    standing = Standing(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
     costs = np.zeros((2, 15, 15))
     commands = np.array([[0.5, 0.0], [-0.5, 0.0]])
-    found = command_costs(SEARCH, standing, blocked, costs, (0.5, 0.0), commands)
+    found = command_costs(SEARCH, discs, standing, costs, (0.5, 0.0), commands)
     # After 0.3, 0.4 and 0.5 s, 0.1 s each, the robot is 0.02, 0.07 and 0.12 m deep.
     np.testing.assert_allclose(found, [50.0 * 0.1 * (1.2 + 1.7 + 2.2), 0.0])
+
+
+def test_a_command_leaves_room_to_stop_before_what_stands():
+    """After 0.5 s at 0.5 m/s the robot is at 0.25 m, and stops at 0.25 + 0.5 / 3 = 0.417 m."""
+    costs, none = np.zeros((2, 15, 15)), np.zeros((6, 0, 4))
+    commands = np.array([[0.5, 0.0], [-0.5, 0.0]])
+    blocked = np.ones((1, 1), bool)
+
+    def found(wall_x_m):
+        wall = Standing(blocked, wall_x_m, -5.0, 10.0)
+        return command_costs(SEARCH, none, wall, costs, (0.5, 0.0), commands)
+
+    np.testing.assert_array_equal(found(0.42), [0.0, 0.0])
+    # While it stops it is at 0.396 m after 0.7 s, and beyond after 0.8, 0.9 and 1 s.
+    np.testing.assert_allclose(found(0.40), [100.0 * 0.1 * 3, 0.0])
+    # During the step it is at 0.2 m and 0.25 m; all of the stop is behind the wall, too.
+    np.testing.assert_allclose(found(0.18), [100.0 * 0.1 * (2 + 10), 0.0])
 
 
 def test_waiting_costs_less_than_the_way_through():

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
-from quad_nav.kernels.space_time import SpaceTime, command_costs, fill_costs
+from quad_nav.kernels.space_time import SpaceTime, Standing, command_costs, fill_costs
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -115,14 +115,15 @@ def evade(
         return wish
     middle = _STEPS * _REACH_CELLS + 3
     offsets = np.arange(-middle, middle + 1) * search.cell_m
-    blocked = _blocked(around, offsets)
+    standing = _standing(around)
+    blocked = _blocked(standing, offsets)
     to_go = _to_go(around, offsets, route)
     costs = np.full((_STEPS + 1, len(offsets), len(offsets)), math.inf)
     fill_costs(search, discs, blocked, to_go, costs)
     pose = around.pose
     commands = _commands(around.max_speed_mps, pose.rotate(wish.vx_mps, wish.vy_mps))
     moving = pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
-    found = command_costs(search, discs, blocked, costs, moving, commands)
+    found = command_costs(search, discs, standing, costs, moving, commands)
     found += _CHANGE_S / around.max_speed_mps * np.hypot(*(commands - last).T)
     best = int(np.argmin(found[1:])) + 1
     if found[0] <= found[best] + _WISH_S:
@@ -176,21 +177,27 @@ def _commands(max_speed_mps: float, wished: Tuple[float, float]) -> Floats:
     return np.concatenate([[wished], np.zeros((1, 2)), *(speed * ring for speed in speeds)])
 
 
-def _blocked(around: Surroundings, offsets: Floats) -> NDArray[np.bool_]:
+def _standing(around: Surroundings) -> Standing:
+    """Return what stands, in metres relative to the robot."""
+    spec, costs = around.spec, around.costs
+    return Standing(
+        (costs >= INSCRIBED) & (costs != UNKNOWN),
+        spec.origin_x_m - around.pose.x_m,
+        spec.origin_y_m - around.pose.y_m,
+        spec.resolution_m,
+    )
+
+
+def _blocked(standing: Standing, offsets: Floats) -> NDArray[np.bool_]:
     """Return the cells of the search where the robot's circle hits what stands, bool[M, M]."""
-    spec = around.spec
+    size_y, size_x = standing.blocked.shape
     columns, rows = (
-        np.floor((at_m + offsets - origin_m) / spec.resolution_m).astype(np.int64)
-        for at_m, origin_m in (
-            (around.pose.x_m, spec.origin_x_m),
-            (around.pose.y_m, spec.origin_y_m),
-        )
+        np.floor((offsets - origin_m) / standing.resolution_m).astype(np.int64)
+        for origin_m in (standing.x_m, standing.y_m)
     )
-    inside = (
-        ((rows >= 0) & (rows < spec.size_y))[:, None] & (columns >= 0) & (columns < spec.size_x)
-    )
-    costs = around.costs[np.clip(rows, 0, spec.size_y - 1)][:, np.clip(columns, 0, spec.size_x - 1)]
-    return inside & (costs >= INSCRIBED) & (costs != UNKNOWN)
+    inside = ((rows >= 0) & (rows < size_y))[:, None] & (columns >= 0) & (columns < size_x)
+    at = np.clip(rows, 0, size_y - 1)[:, None], np.clip(columns, 0, size_x - 1)
+    return inside & standing.blocked[at]
 
 
 def _to_go(around: Surroundings, offsets: Floats, route: Floats) -> Floats:

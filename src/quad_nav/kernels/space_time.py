@@ -20,6 +20,22 @@ _DEEP_M = 0.1  # depth inside a disc at which the threat is 2
 _FAR = 3.0  # standard deviations at which the threat ends
 
 
+class Standing(NamedTuple):
+    """What stands, on the costmap's grid.
+
+    Attributes:
+        blocked: bool[H, W], cells where the robot's circle hits something.
+        x_m: Corner of cell (0, 0).
+        y_m: Corner of cell (0, 0).
+        resolution_m: Size of a cell.
+    """
+
+    blocked: NDArray[np.bool_]
+    x_m: float
+    y_m: float
+    resolution_m: float
+
+
 class SpaceTime(NamedTuple):
     """Resolution and costs of the search."""
 
@@ -110,19 +126,20 @@ def _least(costs: NDArray[np.float64], row: int, column: int, reach: int) -> flo
 def command_costs(
     search: SpaceTime,
     discs: NDArray[np.float64],
-    blocked: NDArray[np.bool_],
+    standing: Standing,
     costs: NDArray[np.float64],
     velocity: Tuple[float, float],
     commands: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the cost of each command, held for a step, and of the best motion afterwards.
 
-    The robot approaches the command as a first-order lag.
+    The robot approaches the command as a first-order lag. What stands has to leave it room to stop
+    after the step: the best motion knows no inertia.
 
     Args:
         search: Resolution and costs.
         discs: As for ``fill_costs``.
-        blocked: bool[M, M].
+        standing: What stands.
         costs: float64[steps + 1, M, M], of ``fill_costs``.
         velocity: Present velocity of the robot, vx and vy in m/s.
         commands: float64[c, 2], vx and vy in m/s.
@@ -130,23 +147,55 @@ def command_costs(
     Returns:
         float64[c].
     """
-    middle = costs.shape[1] // 2
     found = np.empty(commands.shape[0])
     for n in range(commands.shape[0]):
         vx, vy = commands[n, 0], commands[n, 1]
-        cost, x, y = 0.0, 0.0, 0.0
+        cost, x, y, lag = 0.0, 0.0, 0.0, 0.0
         for k in range(1, _SUBSTEPS + 1):
             time = k * search.step_s / _SUBSTEPS
-            lag = (1.0 - math.exp(-search.gain_per_s * time)) / search.gain_per_s
+            lag = _lag(search, time)
             x = velocity[0] * lag + vx * (time - lag)
             y = velocity[1] * lag + vy * (time - lag)
             rate = search.risk_per_s * threat(discs, k, x, y)
-            row, column = int(round(y / search.cell_m)), int(round(x / search.cell_m))
-            if blocked[_inside(row + middle, middle), _inside(column + middle, middle)]:
+            if _is_blocked(standing, x, y):
                 rate += search.blocked_per_s
             cost += rate * search.step_s / _SUBSTEPS
+        left = 1.0 - search.gain_per_s * lag  # part of the old velocity after the step
+        stopping = vx + (velocity[0] - vx) * left, vy + (velocity[1] - vy) * left
+        cost += _stopping_cost(search, standing, (x, y), stopping)
         found[n] = cost + _between(costs[1], x / search.cell_m, y / search.cell_m)
     return found
+
+
+@njit(cache=True, nogil=True)
+def _lag(search: SpaceTime, time: float) -> float:
+    """Return the time for which a velocity goes on that decays for a time."""
+    return (1.0 - math.exp(-search.gain_per_s * time)) / search.gain_per_s
+
+
+@njit(cache=True, nogil=True)
+def _stopping_cost(
+    search: SpaceTime,
+    standing: Standing,
+    start: Tuple[float, float],
+    velocity: Tuple[float, float],
+) -> float:
+    """Return the cost of what stands on the way to a stop."""
+    cost = 0.0
+    for k in range(1, 2 * _SUBSTEPS + 1):
+        lag = _lag(search, k * search.step_s / _SUBSTEPS)
+        if _is_blocked(standing, start[0] + velocity[0] * lag, start[1] + velocity[1] * lag):
+            cost += search.blocked_per_s * search.step_s / _SUBSTEPS
+    return cost
+
+
+@njit(cache=True, nogil=True)
+def _is_blocked(standing: Standing, x: float, y: float) -> bool:
+    """Return whether something stands at a point; nothing is known outside of the grid."""
+    column = math.floor((x - standing.x_m) / standing.resolution_m)
+    row = math.floor((y - standing.y_m) / standing.resolution_m)
+    size_y, size_x = standing.blocked.shape
+    return 0 <= row < size_y and 0 <= column < size_x and standing.blocked[row, column]
 
 
 @njit(cache=True, nogil=True)
