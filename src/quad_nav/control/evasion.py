@@ -7,7 +7,8 @@ there. Dynamic programming from the end of the horizon gives the cost of the bes
 cell and step; the commands of a polar grid, and the command that the navigator wishes, are
 followed through one step with the body's lag and take the rest from there. The robot goes behind,
 in front, back or waits as it costs least against all obstacles together. It keeps the wish where
-nothing is much better.
+nothing is much better. Peers are in the way as well: commands are judged as the robot's Voronoi
+cell will leave them, and peers are expected to keep their velocities.
 
 Sources: P. Fiorini, Z. Shiller, "Motion Planning in Dynamic Environments Using Velocity
 Obstacles", IJRR 17(7), 1998: obstacles that keep their velocities, judged in the plane of
@@ -24,6 +25,7 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
@@ -66,7 +68,7 @@ class EvasionParams:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The robot among what stands, in the local costmap's frame.
+    """The robot among its peers and what stands, in the local costmap's frame.
 
     Attributes:
         spec: Grid of the local costmap.
@@ -77,6 +79,7 @@ class Surroundings:
         max_speed_mps: Greatest speed of the robot in any direction.
         is_following: The robot follows a plan; else it stays near a point.
         memory: The memory of how obstacles have moved.
+        neighbours: The peers.
     """
 
     spec: GridSpec
@@ -87,6 +90,7 @@ class Surroundings:
     max_speed_mps: float
     is_following: bool
     memory: MotionMemory
+    neighbours: Neighbours = NO_NEIGHBOURS
 
 
 def evade(
@@ -113,23 +117,33 @@ def evade(
     discs = predicted_discs(params, around, tracks, now_s, search.step_s)
     if not discs.shape[1] and around.is_following:
         return wish
-    middle = _STEPS * _REACH_CELLS + 3
-    offsets = np.arange(-middle, middle + 1) * search.cell_m
-    standing = _standing(around)
-    blocked = _blocked(standing, offsets)
-    to_go = _to_go(around, offsets, route)
-    costs = np.full((_STEPS + 1, len(offsets), len(offsets)), math.inf)
-    fill_costs(search, discs, blocked, to_go, costs)
+    peers = around.neighbours.discs(around.pose, _times(search.step_s))
+    discs = np.concatenate([discs, peers], axis=1)
     pose = around.pose
     commands = _commands(around.max_speed_mps, pose.rotate(wish.vx_mps, wish.vy_mps))
-    moving = pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
-    found = command_costs(search, discs, standing, costs, moving, commands)
+    found = _costs_of(commands, around, search, discs, route)
     found += _CHANGE_S / around.max_speed_mps * np.hypot(*(commands - last).T)
     best = int(np.argmin(found[1:])) + 1
     if found[0] <= found[best] + _WISH_S:
         return wish
     vx_mps, vy_mps = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(*commands[best].tolist())
     return Twist2D(vx_mps, vy_mps, wish.vyaw_radps)
+
+
+def _costs_of(
+    commands: Floats, around: Surroundings, search: SpaceTime, discs: Floats, route: Floats
+) -> Floats:
+    """Return the cost of each command, float64[c]; they are float64[c, 2]."""
+    middle = _STEPS * _REACH_CELLS + 3
+    offsets = np.arange(-middle, middle + 1) * search.cell_m
+    standing = _standing(around)
+    costs = np.full((_STEPS + 1, len(offsets), len(offsets)), math.inf)
+    blocked, to_go = _blocked(standing, offsets), _to_go(around, offsets, route)
+    fill_costs(search, discs, blocked, to_go, costs)
+    moving = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
+    flown = around.neighbours.limited(commands)
+    found: Floats = command_costs(search, discs, standing, costs, moving, flown)
+    return found
 
 
 def predicted_discs(
@@ -148,10 +162,16 @@ def predicted_discs(
     horizon_s = _STEPS * step_s
     reach_m = radii + (speeds + around.max_speed_mps) * horizon_s
     near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
-    times = np.arange(_STEPS * _SUBSTEPS + 1) * (step_s / _SUBSTEPS)
-    discs = predict(now.chosen(near), around.memory, times, (around.pose.x_m, around.pose.y_m))
+    place = around.pose.x_m, around.pose.y_m
+    discs = predict(now.chosen(near), around.memory, _times(step_s), place)
     discs[:, :, 2] = discs[:, :, 2] + around.radius_m + params.clearance_m
     return discs
+
+
+def _times(step_s: float) -> Floats:
+    """Return the times of predictions, five in each step and the end."""
+    times: Floats = np.arange(_STEPS * _SUBSTEPS + 1) * (step_s / _SUBSTEPS)
+    return times
 
 
 def _search_of(max_speed_mps: float) -> SpaceTime:

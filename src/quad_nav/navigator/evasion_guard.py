@@ -7,7 +7,7 @@ without a goal. A robot that stands still stays near the point where it stopped,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Optional
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.evasion import EvasionParams, Surroundings, evade
+from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import NO_DISCS, rollout_discs
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.layered import LayeredCostmap
@@ -68,6 +69,7 @@ class EvasionGuard:
         tracks: Tracks,
         plan: Optional[Floats],
         limits: SpeedLimits,
+        neighbours: Neighbours = NO_NEIGHBOURS,
     ) -> None:
         """Replace the command of a step by that which moving obstacles threaten least.
 
@@ -79,6 +81,7 @@ class EvasionGuard:
             plan: float64[n, 3], the plan that the robot follows, in the global costmap's frame;
                 None if it follows none.
             limits: Greatest speeds of the robot.
+            neighbours: The peers.
         """
         local_from_global = poses.local_from_global
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
@@ -88,18 +91,25 @@ class EvasionGuard:
         if not len(tracks) and not is_displaced:
             return self._end(tick)
         route = self._route(plan, local_from_global)
-        wish = tick.command or Twist2D()
-        wish = _return(wish, route[0], poses.in_local, limits) if is_displaced else wish
-        around = self._surroundings(poses.in_local, velocity, limits, plan is not None)
-        last = self._last if len(tracks) else poses.in_local.rotate(wish.vx_mps, wish.vy_mps)
-        command = evade(self.params, around, tracks, tick.now_s, route, wish, last)
-        self._last = poses.in_local.rotate(command.vx_mps, command.vy_mps)
+        pose, wish = poses.in_local, tick.command or Twist2D()
+        wish = _return(wish, route[0], pose, limits) if is_displaced else wish
+        around = self._surroundings(pose, velocity, limits, plan is not None, neighbours)
+        command = self._choose(around, tracks, tick.now_s, route, wish)
         if command is wish and not is_displaced:
             return self._end(tick)
-        turn_radps = 0.0 if plan is None else self._turn(tick.now_s, route, poses.in_local, limits)
-        tick.command = Twist2D(command.vx_mps, command.vy_mps, turn_radps)
+        turn_radps = 0.0 if plan is None else self._turn(tick.now_s, route, pose, limits)
+        tick.command = replace(command, vyaw_radps=turn_radps)
         tick.evades = self.is_evading = True
         return None
+
+    def _choose(
+        self, around: Surroundings, tracks: Tracks, now_s: float, route: Floats, wish: Twist2D
+    ) -> Twist2D:
+        pose = around.pose
+        last = self._last if len(tracks) else pose.rotate(wish.vx_mps, wish.vy_mps)
+        command = evade(self.params, around, tracks, now_s, route, wish, last)
+        self._last = pose.rotate(command.vx_mps, command.vy_mps)
+        return command
 
     def predict(self, now_s: float, pose: Pose2D, tracks: Tracks, rollout_s: float) -> MovingDiscs:
         """Return what a local planner's rollouts of a duration are judged against.
@@ -117,7 +127,12 @@ class EvasionGuard:
         return rollout_discs(tracks.at(now_s), self._memory, pose, radius_m, clearance_m, rollout_s)
 
     def _surroundings(
-        self, pose: Pose2D, velocity: Twist2D, limits: SpeedLimits, is_following: bool
+        self,
+        pose: Pose2D,
+        velocity: Twist2D,
+        limits: SpeedLimits,
+        is_following: bool,
+        neighbours: Neighbours,
     ) -> Surroundings:
         costmap = self._costmap
         return Surroundings(
@@ -129,6 +144,7 @@ class EvasionGuard:
             max(self.params.speed_mps, limits.speed_mps),
             is_following,
             self._memory,
+            neighbours,
         )
 
     def _turn(self, now_s: float, route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:

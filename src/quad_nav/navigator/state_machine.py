@@ -12,6 +12,7 @@ import math
 from typing import Optional, Sequence
 
 from quad_nav.control.controller import LocalPlanner
+from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import NO_DISCS
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.errors import PlanningError
@@ -163,9 +164,16 @@ class StateMachine:
             return
         follows = tick.control is not None and self.state is State.CONTROLLING
         plan = self.control.plan if follows else None
-        self.guard.check(tick, poses, velocity, self.control.tracks, plan, limits)
+        neighbours = self._neighbours(poses, velocity)
+        self.guard.check(tick, poses, velocity, self.control.tracks, plan, limits, neighbours)
         if tick.evades:
             self.control.restart_timers(tick.now_s)
+
+    def _neighbours(self, poses: RobotPoses, velocity: Twist2D) -> Neighbours:
+        if poses.in_global is None or poses.local_from_global is None or not self.control.tracks:
+            return NO_NEIGHBOURS
+        period_s = 1.0 / self.params.controller_frequency_hz
+        return self._peers.neighbours(poses.in_global, velocity, poses.local_from_global, period_s)
 
     def limit_command(self, tick: Tick, pose: Optional[Pose2D], velocity: Twist2D) -> None:
         """Limit the final command so that it cannot lead to a collision with a peer."""

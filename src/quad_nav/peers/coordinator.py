@@ -13,6 +13,7 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.control.neighbours import Neighbours
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.peers.peer import (
@@ -28,7 +29,7 @@ from quad_nav.peers.peer_tracker import PeerTracker
 from quad_nav.peers.right_of_way import STRANGER, Yield, YieldDecision
 from quad_nav.peers.roundabout import Roundabout
 from quad_nav.peers.stand_off import StandOff
-from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell
+from quad_nav.peers.voronoi_cell import LimitedCommand, limit_to_cell, neighbours_of
 from quad_nav.peers.yielding import YieldRules
 from quad_nav.timing import StallTimer
 from quad_nav.tracking.tracks import Tracks
@@ -349,10 +350,33 @@ class PeerCoordinator:
             pose,
             velocity,
             command,
-            [*self._tracker.peers, *self._tracker.silent] if self._tracks else self._tracker.peers,
+            self._cell_peers,
             self._tracker.safety_radius_m,
             control_period_s + LATENCY_S,
         )
+
+    def neighbours(
+        self,
+        pose: Pose2D,
+        velocity: Twist2D,
+        local_from_global: Pose2D,
+        control_period_s: float,
+    ) -> Neighbours:
+        """Return the peers for the evasion of moving obstacles; arguments as for ``limit``."""
+        return neighbours_of(
+            pose,
+            velocity,
+            self._cell_peers,
+            self._tracker.safety_radius_m,
+            control_period_s + LATENCY_S,
+            local_from_global,
+        )
+
+    @property
+    def _cell_peers(self) -> List[Peer]:
+        """Peers that bound the robot's Voronoi cell."""
+        tracker = self._tracker
+        return [*tracker.peers, *tracker.silent] if self._tracks else tracker.peers
 
     def is_blocked(self, now_s: float, pose: Pose2D) -> bool:
         """Return whether limited commands have kept the robot in place; then restart the count.
