@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import List
@@ -126,6 +127,8 @@ def test_moving_obstacles_are_where_the_simulation_has_them():
         simulation=SimulationParams(beams),
     )
     setup, clock = read_setup(options), Clock(0.005)
+    people = replace(setup.scene.walkers, reacting=False)  # else only the flight knows where
+    setup = replace(setup, scene=replace(setup.scene, walkers=people))
     page = FakePage(clock)
     fly(setup, [WebView(page, FlightActions(rate=0.0), clock)])
     last = page.state.item("obstacles").arrays["poses"]
