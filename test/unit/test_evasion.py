@@ -10,7 +10,13 @@ import pytest
 from quad_nav.control.evasion import EvasionParams, Surroundings, evade, predicted_discs
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
-from quad_nav.kernels.space_time import SpaceTime, Standing, command_costs, fill_costs, threat
+from quad_nav.kernels.space_time import (
+    SpaceTime,
+    StandingObstacles,
+    command_costs,
+    fill_costs,
+    threat,
+)
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -58,7 +64,7 @@ def test_threat_grows_inside_and_falls_off_outside():
 
 def test_a_command_into_an_obstacle_costs_its_time_inside():
     discs = np.tile([0.33, 0.0, 0.2, 1e-6], (6, 1, 1))
-    standing = Standing(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
     costs = np.zeros((2, 15, 15))
     commands = np.array([[0.5, 0.0], [-0.5, 0.0]])
     found = command_costs(SEARCH, discs, standing, costs, (0.5, 0.0), commands)
@@ -66,14 +72,14 @@ def test_a_command_into_an_obstacle_costs_its_time_inside():
     np.testing.assert_allclose(found, [50.0 * 0.1 * (1.2 + 1.7 + 2.2), 0.0])
 
 
-def test_a_command_leaves_room_to_stop_before_what_stands():
+def test_a_command_leaves_room_to_stop_before_a_standing_obstacle():
     """After 0.5 s at 0.5 m/s the robot is at 0.25 m, and stops at 0.25 + 0.5 / 3 = 0.417 m."""
     costs, none = np.zeros((2, 15, 15)), np.zeros((6, 0, 4))
     commands = np.array([[0.5, 0.0], [-0.5, 0.0]])
     blocked = np.ones((1, 1), bool)
 
     def found(wall_x_m):
-        wall = Standing(blocked, wall_x_m, -5.0, 10.0)
+        wall = StandingObstacles(blocked, wall_x_m, -5.0, 10.0)
         return command_costs(SEARCH, none, wall, costs, (0.5, 0.0), commands)
 
     np.testing.assert_array_equal(found(0.42), [0.0, 0.0])

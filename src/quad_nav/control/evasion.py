@@ -29,7 +29,7 @@ from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
-from quad_nav.kernels.space_time import SpaceTime, Standing, command_costs, fill_costs
+from quad_nav.kernels.space_time import SpaceTime, StandingObstacles, command_costs, fill_costs
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -133,7 +133,7 @@ def evade(
 def _costs_of(
     commands: Floats, around: Surroundings, search: SpaceTime, discs: Floats, route: Floats
 ) -> Floats:
-    """Return the cost of each command, float64[c]; they are float64[c, 2]."""
+    """Return the cost of each of the commands, float64[c]; the commands are float64[c, 2]."""
     middle = _STEPS * _REACH_CELLS + 3
     offsets = np.arange(-middle, middle + 1) * search.cell_m
     standing = _standing(around)
@@ -197,10 +197,10 @@ def _commands(max_speed_mps: float, wished: Tuple[float, float]) -> Floats:
     return np.concatenate([[wished], np.zeros((1, 2)), *(speed * ring for speed in speeds)])
 
 
-def _standing(around: Surroundings) -> Standing:
-    """Return what stands, in metres relative to the robot."""
+def _standing(around: Surroundings) -> StandingObstacles:
+    """Return the cells of the local costmap where the robot's circle hits an obstacle."""
     spec, costs = around.spec, around.costs
-    return Standing(
+    return StandingObstacles(
         (costs >= INSCRIBED) & (costs != UNKNOWN),
         spec.origin_x_m - around.pose.x_m,
         spec.origin_y_m - around.pose.y_m,
@@ -208,7 +208,7 @@ def _standing(around: Surroundings) -> Standing:
     )
 
 
-def _blocked(standing: Standing, offsets: Floats) -> NDArray[np.bool_]:
+def _blocked(standing: StandingObstacles, offsets: Floats) -> NDArray[np.bool_]:
     """Return the cells of the search where the robot's circle hits what stands, bool[M, M]."""
     size_y, size_x = standing.blocked.shape
     columns, rows = (

@@ -1,7 +1,7 @@
 """Neighbours: the peers around a robot that evades, and the room that they leave it.
 
-The robot's Voronoi cell has the last word on its commands, see ``peers/voronoi_cell.py``. The
-evasion has to know it, else it chooses ways that the cell closes.
+The robot's Voronoi cell limits its final command, see ``peers/voronoi_cell.py``. The evasion takes
+the same limit into account, so that it does not choose a command that the cell stops.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ class Neighbours:
     hold_s: float = 0.0
 
     def limited(self, commands: Floats) -> Floats:
-        """Return velocities as the cell leaves them, float64[c, 2] in m/s; 0 if it stops them.
+        """Return velocities cut to the cell, float64[c, 2] in m/s; 0 where it stops the robot.
+
+        The way is taken as straight; ``limit_to_cell`` follows the arc of the final command.
 
         Args:
             commands: float64[c, 2], velocities in m/s.
@@ -50,7 +52,7 @@ class Neighbours:
         return limited
 
     def discs(self, pose: Pose2D, times_s: Floats) -> Floats:
-        """Return where the centres of peers that keep their velocities keep the robot's away.
+        """Return discs that the robot's centre has to avoid if peers keep their velocities.
 
         Args:
             pose: Pose of the robot.

@@ -20,13 +20,15 @@ _DEEP_M = 0.1  # depth inside a disc at which the threat is 2
 _FAR = 3.0  # standard deviations at which the threat ends
 
 
-class Standing(NamedTuple):
-    """What stands, on the costmap's grid.
+class StandingObstacles(NamedTuple):
+    """Obstacles that do not move, as cells of the local costmap.
+
+    Positions are relative to the robot, as everywhere in this module.
 
     Attributes:
         blocked: bool[H, W], cells where the robot's circle hits something.
-        x_m: Corner of cell (0, 0).
-        y_m: Corner of cell (0, 0).
+        x_m: x of the corner of cell (0, 0).
+        y_m: y of the corner of cell (0, 0).
         resolution_m: Size of a cell.
     """
 
@@ -126,20 +128,20 @@ def _least(costs: NDArray[np.float64], row: int, column: int, reach: int) -> flo
 def command_costs(
     search: SpaceTime,
     discs: NDArray[np.float64],
-    standing: Standing,
+    standing: StandingObstacles,
     costs: NDArray[np.float64],
     velocity: Tuple[float, float],
     commands: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the cost of each command, held for a step, and of the best motion afterwards.
 
-    The robot approaches the command as a first-order lag. What stands has to leave it room to stop
-    after the step: the best motion knows no inertia.
+    The robot approaches the command as a first-order lag. A command after which it cannot stop
+    before a standing obstacle costs extra, because the best motion afterwards ignores inertia.
 
     Args:
         search: Resolution and costs.
         discs: As for ``fill_costs``.
-        standing: What stands.
+        standing: Obstacles that do not move.
         costs: float64[steps + 1, M, M], of ``fill_costs``.
         velocity: Present velocity of the robot, vx and vy in m/s.
         commands: float64[c, 2], vx and vy in m/s.
@@ -176,7 +178,7 @@ def _lag(search: SpaceTime, time: float) -> float:
 @njit(cache=True, nogil=True)
 def _stopping_cost(
     search: SpaceTime,
-    standing: Standing,
+    standing: StandingObstacles,
     start: Tuple[float, float],
     velocity: Tuple[float, float],
 ) -> float:
@@ -190,7 +192,7 @@ def _stopping_cost(
 
 
 @njit(cache=True, nogil=True)
-def _is_blocked(standing: Standing, x: float, y: float) -> bool:
+def _is_blocked(standing: StandingObstacles, x: float, y: float) -> bool:
     """Return whether something stands at a point; nothing is known outside of the grid."""
     column = math.floor((x - standing.x_m) / standing.resolution_m)
     row = math.floor((y - standing.y_m) / standing.resolution_m)

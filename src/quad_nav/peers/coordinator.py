@@ -1,7 +1,8 @@
 """Coordination of one robot with its peers.
 
-The navigator asks three things: ``observe`` updates the peers, ``decide`` says whether the
-robot yields, ``limit`` keeps a command inside the robot's Voronoi cell. A robot without a goal
+The navigator asks four things: ``observe`` updates the peers, ``decide`` says whether the
+robot yields, ``neighbours`` returns the peers for the evasion of moving obstacles, ``limit`` keeps
+a command inside the robot's Voronoi cell. A robot without a goal
 makes room by a yielding manoeuvre: it flies to a holding point and back to its parking pose.
 """
 
@@ -356,20 +357,16 @@ class PeerCoordinator:
         )
 
     def neighbours(
-        self,
-        pose: Pose2D,
-        velocity: Twist2D,
-        local_from_global: Pose2D,
-        control_period_s: float,
+        self, pose: Pose2D, velocity: Twist2D, local_from_map: Pose2D, control_period_s: float
     ) -> Neighbours:
-        """Return the peers for the evasion of moving obstacles; arguments as for ``limit``."""
+        """Return the peers, in the local costmap's frame; other arguments are as for ``limit``."""
         return neighbours_of(
             pose,
             velocity,
             self._cell_peers,
             self._tracker.safety_radius_m,
             control_period_s + LATENCY_S,
-            local_from_global,
+            local_from_map,
         )
 
     @property

@@ -100,10 +100,10 @@ def neighbours_of(
     hold_s: float,
     local_from_map: Pose2D,
 ) -> Neighbours:
-    """Return the peers and the room of the cell for the evasion of moving obstacles.
+    """Return the peers, and how far a command may go towards each of them inside the cell.
 
     Args:
-        pose: As for ``limit_to_cell``, as the others.
+        pose: Robot pose in ``map``.
         velocity: Current velocity in the robot's frame.
         peers: Peers whose state is fresh.
         safety_radius_m: Robot radius plus margin.
