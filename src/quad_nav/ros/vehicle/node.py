@@ -290,6 +290,9 @@ def main() -> int:
     nodes.append(VehicleNode(vehicle, bridge))
     try:
         nodes[0].run()
+    except rospy.ROSException:
+        if not rospy.core.is_shutdown_requested():  # at shutdown rospy closes the topics
+            raise
     finally:
         bridge.close()
     return 0
