@@ -1,16 +1,18 @@
 """DynaBARN: protocol, set-up and flights.
 
 The protocol is that of the challenge's own runner: from the open side of a field of 20 m by 20 m
-straight across it, through obstacles that move along keyframes and do not react to it. It leaves
-two things open. The phase of the obstacles differs from run to run there: the robot starts some
-seconds of wall time after them; here it follows from the seed. Positions between keyframes are
-Gazebo's spline, or straight lines as in the paper: an option.
+straight across it, through obstacles that move along keyframes and do not react to it. The clock
+starts when the robot has left its start. The protocol leaves two things open. The phase of the
+obstacles differs from run to run there: the robot starts some seconds of wall time after them; here
+it follows from the seed. Positions between keyframes are Gazebo's spline, or straight lines as in
+the paper: an option.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Iterator, List, NamedTuple, Tuple
+from typing import Iterator, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from quad_nav.mission.goal_file import GoalSequence, SequenceSettings
 from quad_nav.mission.robot_goals import RobotGoals, WatchedGoalFile
 from quad_nav.mission.summary import MissionSummary
 from quad_nav.offline import workers
-from quad_nav.offline.flight import StopAtContact
+from quad_nav.offline.flight import Flight, FlightObserver, StopAtContact
 from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.scenario.rules import steps_per_scan
@@ -35,6 +37,8 @@ from quad_nav.sim.movers import Movers
 GOAL_M: Tuple[float, float] = (-9.0, 0.0)
 GOAL_TOLERANCE_M = 1.0
 TIME_LIMIT_S = 100.0
+LEFT_M = 0.1
+"""Distance from the start at which the clock starts."""
 AREA: Tuple[float, float, float, float] = (-10.0, -10.0, 12.0, 10.0)
 """Least x and y, greatest x and y of field and start, m."""
 PHASE_S = 100.0
@@ -46,7 +50,10 @@ PUBLISHED = {"easy": 0.78, "medium": 0.43, "hard": 0.17}
 """Success rates of move_base with DWA in Gazebo, read off Fig. 5 of A. Nair et al., SSRR 2022."""
 
 _PHASE_STREAM = 6
-_GOALS = GoalSequence((Goal(*GOAL_M),), SequenceSettings(GOAL_TOLERANCE_M, TIME_LIMIT_S, retries=0))
+
+
+def _goals(timeout_s: float) -> GoalSequence:
+    return GoalSequence((Goal(*GOAL_M),), SequenceSettings(GOAL_TOLERANCE_M, timeout_s, retries=0))
 
 
 @dataclass(frozen=True)
@@ -56,10 +63,48 @@ class DynamicRun(Run):
     Attributes:
         difficulty: 0 easy, 1 medium, 2 hard.
         phase_s: Time by which the obstacles were ahead of the clock.
+        waited_s: Time at the start; ``time_s`` begins after it.
     """
 
     difficulty: int = 0
     phase_s: float = 0.0
+    waited_s: float = 0.0
+
+
+class ProtocolClock(FlightObserver):
+    """Clock that starts when the robot leaves its start; it stops the flight at the time limit.
+
+    Attributes:
+        now_s: Simulation time.
+        left_s: Time at which the robot left its start, None before.
+    """
+
+    def __init__(self) -> None:
+        """Start with a robot at its start."""
+        self.now_s = 0.0
+        self.left_s: Optional[float] = None
+
+    @property
+    def waited_s(self) -> float:
+        """Time that the robot has spent at its start."""
+        return self.now_s if self.left_s is None else self.left_s
+
+    @property
+    def time_s(self) -> float:
+        """Time since the robot left its start."""
+        return self.now_s - self.waited_s
+
+    @property
+    def stop_reason(self) -> str:
+        """A reason after the time limit."""
+        return f"time limit of {TIME_LIMIT_S:g} s" if self.time_s >= TIME_LIMIT_S else ""
+
+    def on_move(self, flight: Flight) -> None:
+        """Keep the time, and notice that the robot leaves."""
+        self.now_s = flight.now_s
+        x_m, y_m = flight.states.poses[0, :2].tolist()
+        if self.left_s is None and math.hypot(x_m - START.x_m, y_m - START.y_m) >= LEFT_M:
+            self.left_s = self.now_s
 
 
 @dataclass(frozen=True)
@@ -106,11 +151,12 @@ def read_dynamic_setup(
     except InputError as error:
         problems += error.problems
     try:
-        contestant = read_contestant(options, _GOALS, AREA)
+        goals = _goals(TIME_LIMIT_S)
+        contestant = read_contestant(options, goals, AREA)
         if max_vel_x_mps > 0.0:
             limits = _speed_limits(contestant, max_vel_x_mps)
             options = replace(options, parameters=(*options.parameters, *limits))
-            contestant = read_contestant(options, _GOALS, AREA)
+            contestant = read_contestant(options, goals, AREA)
     except InputError as error:
         raise InputError(problems + error.problems) from error
     if problems:
@@ -150,12 +196,13 @@ def flight_setup(
     A phase at which an obstacle is at the start is replaced by a later one.
     """
     seed, radius_m = contestant.seed + run, contestant.simulation.airframe.radius_m
+    goals = _goals(contestant.configuration.navigator.evasion.watch_s + TIME_LIMIT_S)
     phase_s = phase_of(seed, world.number)
     while _start_distance_m(world, interpolation, phase_s) <= radius_m:
         phase_s += 1.0
     return FlightSetup(
         world.scene(interpolation, phase_s),
-        (RobotGoals("quad0", WatchedGoalFile("dynabarn"), _GOALS),),
+        (RobotGoals("quad0", WatchedGoalFile("dynabarn"), goals),),
         (contestant.configuration,),
         contestant.name,
         contestant.simulation,
@@ -196,10 +243,13 @@ def fly_world(
     """Fly through a world until the goal, the first contact or the time limit."""
     setup = flight_setup(contestant, world, interpolation, run)
     phase_s = setup.scene.motion_phase_s or 0.0
-    return judge(fly(setup, (StopAtContact(),)), world, run, phase_s)
+    clock = ProtocolClock()
+    return judge(fly(setup, (StopAtContact(), clock)), clock, world, run, phase_s)
 
 
-def judge(summary: MissionSummary, world: DynamicWorld, run: int, phase_s: float) -> DynamicRun:
+def judge(
+    summary: MissionSummary, clock: ProtocolClock, world: DynamicWorld, run: int, phase_s: float
+) -> DynamicRun:
     """Score a flight by the benchmark's protocol; a contact at the goal is a collision."""
     robot = summary.robots[0]
     leg = robot.legs[0]
@@ -211,7 +261,7 @@ def judge(summary: MissionSummary, world: DynamicWorld, run: int, phase_s: float
         run,
         summary.seed,
         outcome,
-        TIME_LIMIT_S if outcome is Outcome.TIME_OUT else leg.time_s or 0.0,
+        TIME_LIMIT_S if outcome is Outcome.TIME_OUT else clock.time_s,
         0.0,
         robot.path_length_m,
         robot.min_clearance_m,
@@ -221,4 +271,5 @@ def judge(summary: MissionSummary, world: DynamicWorld, run: int, phase_s: float
         (touched.x_m, touched.y_m) if touched else None,
         world.difficulty,
         phase_s,
+        clock.waited_s,
     )

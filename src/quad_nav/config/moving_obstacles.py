@@ -131,6 +131,19 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
     ),
     (
         double(
+            "moving_obstacle_watch",
+            0.0,
+            "watch_s",
+            "seconds",
+            "Time for which a robot that tracks three or more moving obstacles watches them before"
+            " its first goal, to learn which motions are periodic.",
+            low=0,
+            high=1000,
+        ),
+        (EvasionParams,),
+    ),
+    (
+        double(
             "moving_obstacle_evasion_speed",
             0.0,
             "speed_mps",

@@ -57,12 +57,14 @@ class EvasionParams:
         clearance_m: Distance that the robot keeps from where obstacles are predicted.
         glance_rad: Angle by which a robot that evades looks to both sides of its way, for what a
             LIDAR that does not see all around hides; it turns steadily at pi.
+        watch_s: Time for which the robot watches three or more obstacles before its first goal.
         speed_mps: Greatest speed while the robot evades; 0 for that of the local planner.
     """
 
     avoid_moving_obstacles: bool = False
     clearance_m: float = 0.1
     glance_rad: float = 0.0
+    watch_s: float = 0.0
     speed_mps: float = 0.0
 
 

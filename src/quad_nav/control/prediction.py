@@ -2,19 +2,21 @@
 
 An obstacle keeps its acceleration of the last half second for another half second, then its
 velocity. Where the memory of this flight recalls one that moved alike, it goes where that one
-went. The standard deviation of a prediction grows linearly with time.
+went. Obstacles with a periodic motion are where they were a period ago, seen or hidden. The
+standard deviation of a prediction grows linearly with time.
 """
 
 from __future__ import annotations
 
 import math
-from typing import List, Tuple
+from typing import Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
 from quad_nav.kernels.moving_discs import MovingDiscs
+from quad_nav.kernels.periodic_motion import follow_replays
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -23,9 +25,14 @@ Floats = NDArray[np.float64]
 _SIGMA_M, _SIGMA_MPS = 0.08, 0.05  # least uncertainty of a prediction, and its growth
 _MAX_SIGMA_MPS = 0.1
 _RECALLED_SIGMA_M, _RECALLED_SIGMA_MPS = 0.12, 0.03
+_REPLAYED_SIGMA_M = 0.08  # of periodic motions; it does not grow
+_SAME = 0.4, 0.8, 0.6  # differences of a track and its replay in m and m/s, later ones in m
+_NEAR_M = 8.0  # replays farther away are of no interest
 _ACCELERATES_S = 0.5  # for which an obstacle keeps its acceleration
 _ROLLOUT_STEP_S = 0.05  # longest time between two predictions of a rollout
 
+FAR_M = 1e6
+"""Coordinates of a disc that is nowhere at a time."""
 NO_DISCS = MovingDiscs(np.empty((1, 0, 4)), 0.0)
 
 
@@ -42,8 +49,8 @@ def predict(
 
     Returns:
         float64[t, n, 4]: x and y relative to the origin, radius, standard deviation of the
-        position. Obstacles that are hidden and have no track, but that the memory knows, follow
-        those of the tracks.
+        position. The discs of periodic motions follow those of the tracks. A disc is out of reach,
+        ``FAR_M`` away, at times at which nothing is known of it or another disc has its place.
     """
     discs = np.empty((len(times_s), len(tracks), 4))
     offsets = tracks.states[:, :2] - np.array(origin)
@@ -54,20 +61,22 @@ def predict(
     growth = np.clip(np.sqrt(velocity), _SIGMA_MPS, _MAX_SIGMA_MPS)
     discs[:, :, 3] = np.sqrt(position + _SIGMA_M**2) + times_s[:, None] * growth
     _recall(memory, tracks.numbers, times_s, discs)
-    return np.concatenate([discs, *_hidden(memory, times_s, origin)], axis=1)
+    replays = memory.replay(tracks.time_s + times_s)
+    if not len(replays.radii_m):
+        return discs
+    places, velocities = replays.places - np.array(origin), replays.velocities
+    follow_replays(discs, tracks.states[:, 2:], places, velocities, times_s, _SAME, FAR_M)
+    return np.concatenate([discs, _replayed(places, replays.radii_m, times_s)], axis=1)
 
 
-def _hidden(memory: MotionMemory, times_s: Floats, origin: Tuple[float, float]) -> List[Floats]:
-    """Return the discs float64[t, 1, 4] of obstacles without a track that the memory knows."""
-    found = []
-    for places, radius_m, known in memory.hidden(times_s):
-        disc = np.empty((len(times_s), 1, 4))
-        disc[:, 0, :2] = places - np.array(origin)
-        disc[:, 0, 2] = radius_m
-        growth = np.where(np.arange(len(times_s)) < known, _RECALLED_SIGMA_MPS, _MAX_SIGMA_MPS)
-        disc[:, 0, 3] = _RECALLED_SIGMA_M + times_s * growth
-        found.append(disc)
-    return found
+def _replayed(places: Floats, radii_m: Floats, times_s: Floats) -> Floats:
+    """Return the discs of replays, float64[t, m, 4]."""
+    discs = np.empty((*places.shape[:2], 4))
+    discs[:, :, :2] = np.where(np.isfinite(places), places, FAR_M)
+    discs[:, :, 2] = radii_m
+    discs[:, :, 3] = _REPLAYED_SIGMA_M
+    near = np.hypot(discs[:, :, 0], discs[:, :, 1]).min(axis=0) < _NEAR_M
+    return discs[:, near]
 
 
 def _recall(

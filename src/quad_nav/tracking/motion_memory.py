@@ -9,8 +9,8 @@ Nothing is known beforehand: it learns in flight.
 A wrong recollection is worse than none, so only what was well seen is remembered: a track that is
 predicted while hidden, or whose states do not follow from each other, as where two tracks were
 mistaken for each other, is cut. A track that begins where one that ended a moment before would be
-now continues it: something hid the obstacle for that time. An obstacle that stays hidden for longer
-than its track lasts is still known while the motion that it repeats is.
+now continues it: something hid the obstacle for that time. Motions that repeat after a fixed time
+are known even while their obstacles are hidden, see ``periodic_motion.py``.
 
 Source: prediction by the nearest recorded trajectories as in M. Bennewitz, W. Burgard,
 G. Cielniak, S. Thrun, "Learning Motion Patterns of People for Compliant Robot Motion", IJRR
@@ -21,12 +21,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Dict, List, Tuple
+from typing import Dict, List
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.kernels.motion_memory import NONE, recall, replay
+from quad_nav.tracking.periodic_motion import PeriodicMotion, Replays
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]
@@ -38,8 +39,6 @@ _SCALE_M, _SCALE_MPS = 0.2, 0.4  # differences that count as 1
 _BEFORE_S = 5.0
 _SEEN_M = 0.125  # standard deviation of positions; a hidden obstacle's grows beyond
 _HIDDEN_S = 1.6  # time for which a hidden obstacle stays on a recalled path
-_UNSEEN_S, _GONE_S = 0.8, 12.0  # a track that ends so much after it was seen is hidden; how long
-_MET_M = 0.8  # distance at which a track is that of an obstacle that was hidden
 _BREAK_M, _BREAK_MPS = 0.15, 0.25  # by how much a sample may be off the last one's motion
 _JOIN_S, _JOIN_M, _JOIN_MPS = 4.0, 0.35, 2.0  # gap, offset and change of velocity at a join
 _JOIN_SAMPLES = 6  # of a track before it is joined: its velocity is known then
@@ -66,7 +65,6 @@ class Recalled:
 class _Trail:
     """Samples of a track that is seen now, and the past motion that it repeats."""
 
-    radius_m: float = 0.0
     rows: List[int] = field(default_factory=list)  # the last ones
     count: int = 0
     alike: int = NONE  # row of the sample that moved alike
@@ -90,7 +88,7 @@ class MotionMemory:
         self._places: Dict[int, Floats] = {}
         self._trails: Dict[int, _Trail] = {}
         self._ends: List[int] = []  # last samples of trails that ended
-        self._hidden: List[_Trail] = []  # of obstacles that are hidden, and repeat a motion
+        self._periodic = PeriodicMotion()
 
     @property
     def span_s(self) -> float:
@@ -110,43 +108,22 @@ class MotionMemory:
         for number in [one for one in self._trails if one not in self._places]:
             trail = self._trails.pop(number)
             self._end(trail)
-            if self._now_s - self._samples[trail.rows[-1], 0] >= _UNSEEN_S:
-                self._hidden.append(trail)
         spread = np.trace(tracks.covariances[:, :2, :2], axis1=1, axis2=2) / 2.0
-        for row in np.flatnonzero(spread <= _SEEN_M**2).tolist():
-            self._add(int(tracks.numbers[row]), tracks.states[row], float(tracks.radii_m[row]))
-        self._hidden = [trail for trail in self._hidden if self._is_hidden(trail)]
-
-    def _is_hidden(self, trail: _Trail) -> bool:
-        """Return whether an obstacle without a track is still known to be somewhere."""
-        if trail.alike == NONE or self._now_s - self._samples[trail.rows[-1], 0] > _GONE_S:
-            return False
-        place = np.zeros((1, 2))
-        if not self._replay(trail, np.zeros(1), place):
-            return False
-        return all(math.dist(place[0], seen) > _MET_M for seen in self._places.values())
+        seen = tracks.chosen(spread <= _SEEN_M**2)
+        for number, state in zip(seen.numbers.tolist(), seen.states):
+            self._add(number, state)
+        self._periodic.add(self._now_s, seen.numbers, seen.states, seen.radii_m)
 
     def _replay(self, trail: _Trail, times_s: Floats, places: Floats) -> int:
         """Fill float64[t, 2] at times after now; return how many of them are known."""
         past_s = self._now_s - trail.lag_s + times_s
         return int(replay(self._samples[: self._count], self._later, trail.alike, past_s, places))
 
-    def hidden(self, times_s: Floats) -> List[Tuple[Floats, float, int]]:
-        """Return the obstacles that have no track, but repeat a motion that is known.
+    def replay(self, times_s: Floats) -> Replays:
+        """Return where obstacles with a periodic motion are, at times float64[t] from now on."""
+        return self._periodic.replay(times_s)
 
-        Args:
-            times_s: float64[t], times after the last tracks, increasing from 0.
-
-        Returns:
-            For each its places float64[t, 2], its radius, and the number of times that are known.
-        """
-        found = []
-        for trail in self._hidden:
-            places = np.empty((len(times_s), 2))
-            found.append((places, trail.radius_m, self._replay(trail, times_s, places)))
-        return found
-
-    def _add(self, number: int, state: Floats, radius_m: float) -> None:
+    def _add(self, number: int, state: Floats) -> None:
         """Remember a state of a track that is seen."""
         row = self._count
         self._count += 1
@@ -159,7 +136,7 @@ class MotionMemory:
         self._earlier[row] = self._before(trail, _EARLIER_S)
         if trail.rows:
             self._later[trail.rows[-1]] = row
-        trail.rows, trail.radius_m = [*trail.rows[-_RECENT:], row], radius_m
+        trail.rows = [*trail.rows[-_RECENT:], row]
         trail.count += 1
         if trail.count == _JOIN_SAMPLES:
             self._join(trail.rows[_JOIN_SAMPLES // 2])
@@ -266,7 +243,6 @@ class MotionMemory:
             moved = indices[kept] - count
             indices[: self._count] = np.where(moved >= 0, moved, NONE)
         self._ends = [row - count for row in self._ends if row >= count]
-        self._hidden = []
         for number, trail in list(self._trails.items()):
             trail.rows = [row - count for row in trail.rows if row >= count]
             trail.alike = trail.alike - count if trail.alike >= count else NONE

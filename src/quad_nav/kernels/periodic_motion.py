@@ -1,0 +1,315 @@
+"""Votes for the periods of motions, and replays of motions whose period is known.
+
+``tracking/periodic_motion.py`` has the reasoning. Samples are rows of float64[n, 5]: time in s,
+position in m and velocity in m/s in one fixed frame, in the order of their times. Each belongs to a
+trail, an uninterrupted piece of a track.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
+
+NONE = -1
+_ASIDE_M = 0.15  # offset across the direction of motion, which no lag explains
+_SAME_LAG_S = 0.12
+_MOST = 64  # trails that one sample votes for
+_MAX_GAP_S = 1.0  # between two samples of a trail
+_RECENT_VOTES = 30  # a lag is the mean of about so many votes
+
+
+class Votes(NamedTuple):
+    """Lags after which trails repeat others, with the number of samples that vote for each.
+
+    Attributes:
+        lags: float64[c], seconds.
+        counts: int64[c], number of samples.
+        trails: int64[c], trail of each lag.
+        following: int64[c], next lag of the same trail, or NONE.
+        heads: int64[m], first lag of each trail, or NONE.
+    """
+
+    lags: NDArray[np.float64]
+    counts: NDArray[np.int64]
+    trails: NDArray[np.int64]
+    following: NDArray[np.int64]
+    heads: NDArray[np.int64]
+
+
+class Trails(NamedTuple):
+    """Trails of samples.
+
+    Attributes:
+        samples: float64[n, 5].
+        later: int64[n], index of the next sample of the same trail, or NONE.
+        owners: int64[n], trail of each sample.
+        spans: int64[m, 2], first and last sample of each trail; NONE for a forgotten trail.
+        periods: float64[m], period of each trail in s, 0 if it is not known.
+    """
+
+    samples: NDArray[np.float64]
+    later: NDArray[np.int64]
+    owners: NDArray[np.int64]
+    spans: NDArray[np.int64]
+    periods: NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def vote(
+    trails: Trails,
+    row: int,
+    scales: Tuple[float, float],
+    before_s: float,
+    votes: Votes,
+    count: int,
+) -> int:
+    """Add the votes of one sample: one for each trail that has a sample alike in the past.
+
+    Both trails get the vote. The lag is corrected by the offset along the direction of motion.
+
+    Args:
+        trails: The trails.
+        row: Index of the sample.
+        scales: Differences in place and in velocity that count as 1.
+        before_s: Samples of less than this before do not count.
+        votes: The votes, changed in place.
+        count: Number of lags in ``votes``.
+
+    Returns:
+        The number of lags, at most the room that there is.
+    """
+    samples, owners = trails.samples, trails.owners
+    found, nearest, lags = np.empty(_MOST, np.int64), np.empty(_MOST), np.empty(_MOST)
+    size = 0
+    for k in range(row):
+        if samples[k, 0] > samples[row, 0] - before_s:
+            break
+        apart, lag = _likeness(samples, k, row, scales)
+        if apart >= 1.0:
+            continue
+        at = 0
+        while at < size and found[at] != owners[k]:
+            at += 1
+        if at == _MOST or (at < size and apart >= nearest[at]):
+            continue
+        size = max(size, at + 1)
+        found[at], nearest[at], lags[at] = owners[k], apart, lag
+    for at in range(size):
+        count = _add_vote(votes, count, owners[row], lags[at])
+        if found[at] != owners[row]:
+            count = _add_vote(votes, count, found[at], lags[at])
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _likeness(
+    samples: NDArray[np.float64], a: int, b: int, scales: Tuple[float, float]
+) -> Tuple[float, float]:
+    """Return the squared difference of two samples in scales, 1 if unlike, and the lag of b."""
+    dx, dy = samples[b, 1] - samples[a, 1], samples[b, 2] - samples[a, 2]
+    if abs(dx) >= scales[0] or abs(dy) >= scales[0]:
+        return 1.0, 0.0
+    du, dv = samples[b, 3] - samples[a, 3], samples[b, 4] - samples[a, 4]
+    apart = (dx * dx + dy * dy) / scales[0] ** 2 + (du * du + dv * dv) / scales[1] ** 2
+    if apart >= 1.0:
+        return 1.0, 0.0
+    vx, vy = 0.5 * (samples[a, 3] + samples[b, 3]), 0.5 * (samples[a, 4] + samples[b, 4])
+    squared = max(vx * vx + vy * vy, 1e-6)
+    if abs(dx * vy - dy * vx) > _ASIDE_M * math.sqrt(squared):
+        return 1.0, 0.0
+    return apart, samples[b, 0] - samples[a, 0] - (dx * vx + dy * vy) / squared
+
+
+@njit(cache=True, nogil=True)
+def _add_vote(votes: Votes, count: int, trail: int, lag: float) -> int:
+    """Add a vote to the lag of a trail that is the same, or to a new one; return the count."""
+    at = votes.heads[trail]
+    while at != NONE:
+        if abs(votes.lags[at] - lag) < _SAME_LAG_S:
+            votes.counts[at] += 1
+            votes.lags[at] += (lag - votes.lags[at]) / min(votes.counts[at], _RECENT_VOTES)
+            return count
+        at = votes.following[at]
+    if count < votes.lags.shape[0]:
+        votes.lags[count], votes.counts[count], votes.trails[count] = lag, 1, trail
+        votes.following[count] = votes.heads[trail]
+        votes.heads[trail] = count
+        return count + 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def replay_all(
+    trails: Trails,
+    times: NDArray[np.float64],
+    beyond_s: float,
+    places: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    owners: NDArray[np.int64],
+) -> int:
+    """Fill where the trails whose period is known are at some times, the latest trail first.
+
+    Args:
+        trails: The trails.
+        times: float64[t], increasing.
+        beyond_s: Time before the first and after the last sample of a trail for which it is known:
+            the velocity stays.
+        places: float64[t, c, 2], filled; NaN where a trail is not known.
+        velocities: float64[t, c, 2], filled likewise.
+        owners: int64[c], filled with the trail of each column.
+
+    Returns:
+        Number of columns, at most c.
+    """
+    count, first, last = 0, times[0], times[-1]
+    for trail in range(trails.spans.shape[0] - 1, -1, -1):
+        period, begin, end = trails.periods[trail], trails.spans[trail, 0], trails.spans[trail, 1]
+        if period <= 0.0 or begin == NONE:
+            continue
+        start = trails.samples[begin, 0] - beyond_s
+        stop = trails.samples[end, 0] + beyond_s
+        turn = max(1, math.ceil((first - stop) / period))
+        while start + turn * period <= last and count < owners.shape[0]:
+            places[:, count], velocities[:, count] = math.nan, math.nan
+            _replay(trails, trail, times, turn * period, beyond_s, places, velocities, count)
+            owners[count] = trail
+            count += 1
+            turn += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _replay(
+    trails: Trails,
+    trail: int,
+    times: NDArray[np.float64],
+    shift: float,
+    beyond_s: float,
+    places: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    column: int,
+) -> None:
+    """Fill one column: a trail, later by ``shift``."""
+    samples, later = trails.samples, trails.later
+    at, end = trails.spans[trail, 0], trails.spans[trail, 1]
+    for k in range(times.shape[0]):
+        time = times[k] - shift
+        while at != end and samples[later[at], 0] <= time:
+            at = later[at]
+        ahead = time - samples[at, 0]
+        if at == end or ahead < 0.0:
+            if abs(ahead) <= beyond_s:
+                velocities[k, column] = samples[at, 3:]
+                places[k, column] = samples[at, 1:3] + ahead * samples[at, 3:]
+            continue
+        step = samples[later[at], 0] - samples[at, 0]
+        if step <= _MAX_GAP_S:
+            u = ahead / step
+            velocities[k, column] = (1.0 - u) * samples[at, 3:] + u * samples[later[at], 3:]
+            _between(samples[at], samples[later[at]], u, places[k, column])
+
+
+@njit(cache=True, nogil=True)
+def _between(
+    a: NDArray[np.float64], b: NDArray[np.float64], u: float, place: NDArray[np.float64]
+) -> None:
+    """Fill float64[2] with the cubic from sample a (u = 0) to sample b (u = 1)."""
+    step = b[0] - a[0]
+    ahead = u * u * (3.0 - 2.0 * u)
+    for axis in range(2):
+        place[axis] = (1.0 - ahead) * a[1 + axis] + ahead * b[1 + axis]
+        place[axis] += u * (1.0 - u) * step * ((1.0 - u) * a[3 + axis] - u * b[3 + axis])
+
+
+@njit(cache=True, nogil=True)
+def drop_repeats(places: NDArray[np.float64], apart_m: float) -> None:
+    """Set places to NaN that repeat those of an earlier column at the same time.
+
+    Args:
+        places: float64[t, c, 2], changed in place.
+        apart_m: Places that are nearer than this are the same obstacle.
+    """
+    for k in range(places.shape[0]):
+        for column in range(places.shape[1]):
+            for other in range(column):
+                dx = places[k, column, 0] - places[k, other, 0]
+                dy = places[k, column, 1] - places[k, other, 1]
+                if dx * dx + dy * dy < apart_m * apart_m:
+                    places[k, column] = math.nan
+                    break
+
+
+@njit(cache=True, nogil=True)
+def follow_replays(
+    discs: NDArray[np.float64],
+    motions: NDArray[np.float64],
+    places: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    times: NDArray[np.float64],
+    same: Tuple[float, float, float],
+    nowhere: float,
+) -> None:
+    """Leave the discs of tracks that have a replay to it; after its end they keep its velocity.
+
+    A disc is nowhere while the replay is known, and where another replay has its place.
+
+    Args:
+        discs: float64[t, n, 4], changed in place: x, y, radius, standard deviation.
+        motions: float64[n, 2], velocities of the tracks.
+        places: float64[t, m, 2] of the replays, NaN where one is not known.
+        velocities: float64[t, m, 2].
+        times: float64[t].
+        same: Differences of place and velocity between a track and its replay that count as 1, and
+            the distance to a replay within which a disc is of the same obstacle.
+        nowhere: Coordinates of a disc that is nowhere.
+    """
+    for n in range(discs.shape[1]):
+        column = _replay_of(discs[0, n, 0], discs[0, n, 1], motions[n], places, velocities, same)
+        if column == NONE:
+            continue
+        last, is_over = 0, False
+        for k in range(times.shape[0]):
+            is_over = is_over or math.isnan(places[k, column, 0])
+            if not is_over:
+                last = k
+                discs[k, n, :2] = nowhere
+                continue
+            ahead = times[k] - times[last]
+            discs[k, n, :2] = places[last, column] + ahead * velocities[last, column]
+            if _is_near(discs[k, n, 0], discs[k, n, 1], places[k], same[2]):
+                discs[k, n, :2] = nowhere
+
+
+@njit(cache=True, nogil=True)
+def _replay_of(
+    x: float,
+    y: float,
+    motion: NDArray[np.float64],
+    places: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    same: Tuple[float, float, float],
+) -> int:
+    """Return the replay that is most alike at the first time, NONE if none is."""
+    best, least = NONE, 1.0
+    for column in range(places.shape[1]):
+        dx, dy = places[0, column, 0] - x, places[0, column, 1] - y
+        du, dv = velocities[0, column, 0] - motion[0], velocities[0, column, 1] - motion[1]
+        apart = (dx * dx + dy * dy) / same[0] ** 2 + (du * du + dv * dv) / same[1] ** 2
+        if apart < least:
+            best, least = column, apart
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _is_near(x: float, y: float, places: NDArray[np.float64], apart: float) -> bool:
+    """Return whether one of float64[m, 2] is near a point."""
+    for column in range(places.shape[0]):
+        dx, dy = places[column, 0] - x, places[column, 1] - y
+        if dx * dx + dy * dy < apart * apart:
+            return True
+    return False

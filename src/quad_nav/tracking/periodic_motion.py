@@ -1,0 +1,289 @@
+"""Periodic motion: obstacles that repeat their motion after a fixed time are known beforehand.
+
+Shuttles, conveyors, swing doors and the obstacles of benchmarks repeat their motion after a period.
+Tracks alone do not show it: they break whenever something hides an obstacle. So each sample of a
+track votes: for every trail, an uninterrupted piece of a track, that was once in the same place
+with the same velocity, it votes for the time since then. Chance votes have lags of any length;
+those of a period add up. A lag for which many samples of several trails vote is a period. Each
+trail has the period that most of its own votes are for. A trail that nothing votes for, because it
+was hidden before, has that of the trail that it continues, or that continues it.
+
+A trail with a period is replayed: the obstacle is where it was a whole number of periods ago,
+whether it is seen now or hidden.
+
+Source: the voting is that of P. V. C. Hough, "Method and Means for Recognizing Complex Patterns",
+US patent 3069654, 1962, with one parameter, the period.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Dict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.kernels.periodic_motion import NONE, Trails, Votes, drop_repeats, replay_all, vote
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_CAPACITY = 60_000  # samples; 300 s of 20 tracks
+_SCALE_M, _SCALE_MPS = 0.3, 0.6  # differences that count as 1
+_SHORTEST_S = 9.0  # period
+_BREAK_M, _BREAK_MPS = 0.15, 0.25  # by how much a sample may be off the last one's motion
+_MIN_SAMPLES = 3  # of a trail, before its samples vote
+_MAX_SAMPLES = 20  # longer tracks are cut: some pass from one obstacle to another
+_STRONG = 12  # votes for one lag of one trail that propose a period
+_LAGS, _VOTES = 6, 40  # of trails and of samples that make a proposed period one
+_OWN_VOTES, _OWN_SHARE = 3, 0.2  # of a trail for its period, and their part of all possible ones
+_EXACT_VOTES = 8  # of a trail, from which on its own lags are more exact than the common period
+_TOLERANCE_S, _TOLERANCE_PER_TURN_S = 0.05, 0.02
+_JOIN_TURNS = 2  # a trail that nothing has voted for in so many turns is of something else
+_JOIN_S, _JOIN_M, _JOIN_MPS = 1.5, 0.2, 0.25  # gap at a join, offset and its growth
+_LABEL_PERIOD_S = 1.0
+_BEYOND_S = 0.3
+_SAME_M = 0.4  # two replays of one obstacle are nearer
+_COLUMNS = 400  # replays at a time
+_ROOM = 128  # new lags for each sample: two for each trail that it votes for
+
+
+@dataclass(frozen=True)
+class Replays:
+    """Where obstacles with a period are, a column for each replayed trail.
+
+    Attributes:
+        places: float64[t, n, 2], m; NaN where a trail is not known.
+        velocities: float64[t, n, 2], m/s.
+        radii_m: float64[n].
+    """
+
+    places: Floats
+    velocities: Floats
+    radii_m: Floats
+
+
+NO_REPLAYS = Replays(np.empty((0, 0, 2)), np.empty((0, 0, 2)), np.empty(0))
+
+
+class PeriodicMotion:
+    """Trails of tracked obstacles and their periods."""
+
+    def __init__(self) -> None:
+        """Know nothing yet."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._samples = np.empty((1024, 5))
+        self._later, self._owners = np.empty(1024, np.int64), np.empty(1024, np.int64)
+        self._count = 0
+        self._spans = np.empty((0, 2), np.int64)
+        self._radii_m, self._periods = np.empty(0), np.empty(0)
+        self._sizes = np.empty(0, np.int64)
+        self._votes = Votes(np.empty(0), *(np.empty(0, np.int64) for _ in range(4)))
+        self._lags = 0
+        self._trails: Dict[int, int] = {}  # of the tracks that were seen last
+        self._labelled_s = -math.inf
+
+    @property
+    def is_empty(self) -> bool:
+        """True while no trail has a period."""
+        return not self._periods.any()
+
+    def add(self, now_s: float, numbers: Integers, states: Floats, radii_m: Floats) -> None:
+        """Take the states of the tracks that are seen well now, at increasing times.
+
+        Args:
+            now_s: The time.
+            numbers: int64[n], numbers of the tracks.
+            states: float64[n, 4], positions and velocities.
+            radii_m: float64[n].
+        """
+        seen = numbers.tolist()
+        self._reserve(len(seen))
+        trails = {}
+        for number, state, radius_m in zip(seen, states, radii_m.tolist()):
+            trail = self._trails.get(number, NONE)
+            if trail == NONE or not self._continues(trail, now_s, state):
+                trail = self._begin(radius_m)
+            trails[number] = trail
+            self._add(trail, now_s, state)
+        self._trails = trails
+        if now_s >= self._labelled_s + _LABEL_PERIOD_S:
+            self._labelled_s = now_s
+            self._label()
+
+    def _continues(self, trail: int, now_s: float, state: Floats) -> bool:
+        """Return whether a state follows from a short trail, as if the velocity changed evenly."""
+        if self._sizes[trail] >= _MAX_SAMPLES:
+            return False
+        time_s, x_m, y_m, vx_mps, vy_mps = self._samples[self._spans[trail, 1]].tolist()
+        gap_s, mean = now_s - time_s, 0.5 * (state[2:] + (vx_mps, vy_mps))
+        off_m = math.hypot(*(state[:2] - (x_m, y_m) - gap_s * mean))
+        return off_m <= _BREAK_M + _BREAK_MPS * gap_s
+
+    def _begin(self, radius_m: float) -> int:
+        """Begin a trail and return its index."""
+        self._spans = np.append(self._spans, [[NONE, NONE]], axis=0)
+        self._radii_m = np.append(self._radii_m, radius_m)
+        self._periods, self._sizes = np.append(self._periods, 0.0), np.append(self._sizes, 0)
+        self._votes = self._votes._replace(heads=np.append(self._votes.heads, NONE))
+        return len(self._spans) - 1
+
+    def _add(self, trail: int, now_s: float, state: Floats) -> None:
+        row = self._count
+        self._count += 1
+        self._samples[row, 0], self._samples[row, 1:] = now_s, state
+        self._later[row], self._owners[row] = NONE, trail
+        if self._spans[trail, 0] == NONE:
+            self._spans[trail, 0] = row
+        else:
+            self._later[self._spans[trail, 1]] = row
+        self._spans[trail, 1] = row
+        self._sizes[trail] += 1
+        if self._sizes[trail] >= _MIN_SAMPLES:
+            scales = _SCALE_M, _SCALE_MPS
+            self._lags = vote(self._view(), row, scales, _SHORTEST_S, self._votes, self._lags)
+
+    def _view(self) -> Trails:
+        rows = slice(self._count)
+        return Trails(
+            self._samples[rows],
+            self._later[rows],
+            self._owners[rows],
+            self._spans,
+            self._periods,
+        )
+
+    def _label(self) -> None:
+        """Find the periods, and the one of each trail."""
+        lags, counts = self._votes.lags[: self._lags], self._votes.counts[: self._lags]
+        periods = _proposed(lags[counts >= _STRONG], counts[counts >= _STRONG])
+        self._periods = np.zeros(len(self._spans))
+        if not len(periods):
+            return
+        turns = np.maximum(np.rint(lags[:, None] / periods), 1.0)
+        off = np.abs(lags[:, None] - turns * periods)
+        fits = off < _TOLERANCE_S + _TOLERANCE_PER_TURN_S * turns
+        weights = fits * counts[:, None].astype(float)
+        first = fits & (turns == 1.0)
+        sound = (first.sum(axis=0) >= _LAGS) & ((first * weights).sum(axis=0) >= _VOTES)
+        shape = len(self._spans), len(periods)
+        support, exact = np.zeros(shape), np.zeros(shape)
+        trails = self._votes.trails[: self._lags]
+        np.add.at(support, trails, weights * sound)
+        np.add.at(exact, trails, weights * sound * lags[:, None] / turns)
+        rows, best = np.arange(len(support)), support.argmax(axis=1)
+        most = support[rows, best]
+        own = exact[rows, best] / np.maximum(most, 1.0)
+        found = np.where(most >= _EXACT_VOTES, own, periods[best])
+        wanted = np.maximum(_OWN_SHARE * self._chances(found), _OWN_VOTES)
+        self._periods = np.where(most >= wanted, found, 0.0)
+        self._join()
+
+    def _chances(self, periods: Floats) -> Floats:
+        """Return how many votes each trail would have had of an obstacle that is always seen.
+
+        Args:
+            periods: float64[m], a period for each trail.
+        """
+        times_s = self._samples[np.maximum(self._spans[:, 1], 0), 0]
+        before = np.floor((times_s - self._samples[0, 0]) / periods)
+        after = np.floor((self._samples[self._count - 1, 0] - times_s) / periods)
+        chances: Floats = self._sizes * (before + after)
+        return chances
+
+    def _join(self) -> None:
+        """Give trails without a period that of the one that they continue or are continued by."""
+        whole = (self._spans[:, 0] != NONE) & (self._sizes >= _MIN_SAMPLES)
+        known = np.flatnonzero(whole & (self._periods > 0.0))
+        if not len(known):
+            return
+        unknown = np.flatnonzero(whole & (self._periods == 0.0))
+        begins, ends = (self._samples[self._spans[known, side]] for side in (0, 1))
+        begin, end = (self._samples[self._spans[unknown, side], None] for side in (0, 1))
+        offsets = np.minimum(_offsets(ends, begin), _offsets(end, begins))
+        nearest = offsets.argmin(axis=1)
+        is_joined = offsets[np.arange(len(unknown)), nearest] < 1.0
+        joined, periods = unknown[is_joined], np.zeros(len(self._spans)) + math.inf
+        periods[joined] = self._periods[known[nearest[is_joined]]]
+        joined = joined[self._chances(periods)[joined] <= _JOIN_TURNS * self._sizes[joined]]
+        self._periods[joined] = periods[joined]
+
+    def replay(self, times_s: Floats) -> Replays:
+        """Return where obstacles with a period are.
+
+        Args:
+            times_s: float64[t], increasing, from now on.
+        """
+        if self.is_empty:
+            return NO_REPLAYS
+        places = np.empty((len(times_s), _COLUMNS, 2))
+        velocities, owners = np.empty_like(places), np.empty(_COLUMNS, np.int64)
+        count = replay_all(self._view(), times_s, _BEYOND_S, places, velocities, owners)
+        places, velocities = places[:, :count], velocities[:, :count]
+        drop_repeats(places, _SAME_M)
+        kept = np.isfinite(places[:, :, 0]).any(axis=0)
+        return Replays(places[:, kept], velocities[:, kept], self._radii_m[owners[:count][kept]])
+
+    def _reserve(self, count: int) -> None:
+        """Make room for samples and votes; drop the older half if there are too many samples."""
+        if self._count + count > _CAPACITY:
+            self._drop(self._count // 2)
+        while self._count + count > len(self._samples):
+            self._samples = np.concatenate([self._samples, np.empty_like(self._samples)])
+            self._later = np.concatenate([self._later, np.empty_like(self._later)])
+            self._owners = np.concatenate([self._owners, np.empty_like(self._owners)])
+        if self._lags + _ROOM * count > len(self._votes.lags):
+            self._votes = _enlarged(self._votes, max(len(self._votes.lags), _ROOM * count))
+
+    def _drop(self, count: int) -> None:
+        """Drop the first samples; trails that have lost one are forgotten."""
+        kept = slice(count, self._count)
+        self._count -= count
+        self._samples[: self._count] = self._samples[kept].copy()
+        self._owners[: self._count] = self._owners[kept].copy()
+        later = self._later[kept] - count
+        self._later[: self._count] = np.where(later >= 0, later, NONE)
+        lost = self._spans[:, 0] < count
+        self._spans = np.where(lost[:, None], NONE, self._spans - count)
+        self._trails = {number: one for number, one in self._trails.items() if not lost[one]}
+
+
+def _enlarged(votes: Votes, more: int) -> Votes:
+    """Return votes with room for more lags."""
+    none = np.zeros(more, np.int64)
+    return Votes(
+        np.append(votes.lags, np.zeros(more)),
+        np.append(votes.counts, none),
+        np.append(votes.trails, none),
+        np.append(votes.following, none),
+        votes.heads,
+    )
+
+
+def _proposed(lags: Floats, counts: Integers) -> Floats:
+    """Return the means of lags that many votes are for, float64[p], one for those that agree."""
+    order = np.argsort(lags)
+    lags, weights = lags[order], counts[order].astype(float)
+    if not len(lags):
+        return lags
+    starts = np.flatnonzero(np.append(True, np.diff(lags) > _TOLERANCE_S))
+    means: Floats = np.add.reduceat(lags * weights, starts) / np.add.reduceat(weights, starts)
+    return means
+
+
+def _offsets(a: Floats, b: Floats) -> Floats:
+    """Return by how much samples b are off the motions of samples a, in tolerances.
+
+    They are float64[..., 5]; it is infinite where b is not after a, or too late.
+    """
+    gap_s = b[..., 0] - a[..., 0]
+    mean = 0.5 * (a[..., 3:] + b[..., 3:])
+    off = b[..., 1:3] - a[..., 1:3] - gap_s[..., None] * mean
+    off_m = np.hypot(off[..., 0], off[..., 1])
+    is_near = (gap_s > 0.0) & (gap_s < _JOIN_S)
+    offsets: Floats = np.where(is_near, off_m / (_JOIN_M + _JOIN_MPS * np.abs(gap_s)), math.inf)
+    return offsets
