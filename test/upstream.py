@@ -11,6 +11,7 @@ UPSTREAM = {
     "redraw_cleared_costmaps": False,
     "limit_all_speeds": False,
     "reject_colliding_escape": False,
+    "end_blocked_escape": False,
     "escape_collision": False,
     "command_in_first_cycle": False,
     "stop_while_planning": False,

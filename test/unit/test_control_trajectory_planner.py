@@ -18,7 +18,10 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL
 
 PARAMS = TrajectoryPlannerParams(
-    holonomic_robot=False, reject_colliding_escape=False, predict_goal_turn=False
+    holonomic_robot=False,
+    reject_colliding_escape=False,
+    end_blocked_escape=False,
+    predict_goal_turn=False,
 )
 
 
@@ -238,6 +241,28 @@ def test_an_escape_must_lead_out_of_the_collision():
     with pytest.raises(NoValidTrajectory, match="collides"):
         fixed.compute_velocity(WINDOW, costs, ORIGIN, REST)
     assert not fixed.oscillation.escaping
+
+
+@pytest.mark.parametrize("ends", [False, True])
+@pytest.mark.parametrize("is_blocked", [False, True])
+def test_an_escape_with_no_way_back_ends(ends, is_blocked):
+    params = replace(PARAMS, reject_colliding_escape=True, end_blocked_escape=ends)
+    costs = free()
+    if is_blocked:
+        costs[:, 24] = LETHAL  # 0.1 m back, the outline touches this wall at x = -0.30
+    planner = planner_at(line(0.0, 0.0, 4.0, 0.0), params)
+    state = planner.oscillation
+    state.begin_escape(ORIGIN)
+    state.stuck_left = state.stuck_right = True  # no turn in place either
+
+    if is_blocked and not ends:
+        with pytest.raises(NoValidTrajectory, match="collides"):
+            planner.compute_velocity(WINDOW, costs, ORIGIN, REST)
+        assert state.escaping
+        return
+    vx_mps = planner.compute_velocity(WINDOW, costs, ORIGIN, REST).command.vx_mps
+    assert vx_mps == pytest.approx(0.55 if is_blocked else -0.1)
+    assert state.escaping is not is_blocked
 
 
 @pytest.mark.parametrize(

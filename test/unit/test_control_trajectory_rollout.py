@@ -19,7 +19,10 @@ from quad_nav.kernels.collision import highest_near
 from quad_nav.kernels.velocity_search import spaced
 
 PARAMS = TrajectoryPlannerParams(
-    holonomic_robot=False, reject_colliding_escape=False, predict_goal_turn=False
+    holonomic_robot=False,
+    reject_colliding_escape=False,
+    end_blocked_escape=False,
+    predict_goal_turn=False,
 )
 
 

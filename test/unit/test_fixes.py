@@ -81,6 +81,7 @@ def test_switches_reach_planner_and_recoveries(fixes):
     navigator = navigator_with(fixes)
     on = not fixes
     assert navigator.controller.params.reject_colliding_escape is on
+    assert navigator.controller.params.end_blocked_escape is on
     assert navigator.controller.params.predict_goal_turn is on
     assert navigator.recoveries[1].behaviour.params.stop_after_rotation is on
     dwa = build_navigator(

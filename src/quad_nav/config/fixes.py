@@ -130,6 +130,16 @@ _SWITCHES: Tuple[Switch, ...] = (
     ),
     (
         flag(
+            "end_blocked_escape",
+            True,
+            "end_blocked_escape",
+            "End an escape backwards where neither turns nor the way back are valid, and try"
+            " forward trajectories again.",
+        ),
+        (TrajectoryPlannerParams,),
+    ),
+    (
+        flag(
             "escape_collision",
             True,
             "escape_collision",

@@ -67,6 +67,7 @@ class TrajectoryPlannerParams:
 
     # Fixed upstream bugs; False restores upstream behaviour
     reject_colliding_escape: bool = True  # escape backwards only where nothing is hit
+    end_blocked_escape: bool = True  # an escape that cannot go on allows forward samples again
     predict_goal_turn: bool = True  # turn no farther in one control period than is left
 
     @property

@@ -8,6 +8,9 @@ The first stage that yields a legal trajectory wins:
 2. sideways, for a holonomic robot, by the same rule.
 3. backwards at ``escape_vel_mps``: taken even if it collides, unless path or goal are out of
    reach. With ``reject_colliding_escape`` it must lead out of the collision.
+
+An escape lasts until the robot has moved or turned far enough. With ``end_blocked_escape`` it also
+ends where no stage yields a trajectory, and the first two are tried again.
 """
 
 from __future__ import annotations
@@ -54,8 +57,20 @@ def choose_trajectory(
         The trajectory; its cost is negative if none is legal.
     """
     window = velocity_window(rollout, params, control_period_s)
-    rules = _sample_rules(params, oscillation)
-    sample, cost, facing = rollout.search(window, rules)
+    best = _search(rollout, params, oscillation, window)
+    if best is None and _ends_blocked_escape(rollout, params, oscillation):
+        best = _search(rollout, params, oscillation, window)
+    return _escape(rollout, params, oscillation) if best is None else best
+
+
+def _search(
+    rollout: Rollout,
+    params: TrajectoryPlannerParams,
+    oscillation: Oscillation,
+    window: VelocityWindow,
+) -> Optional[Trajectory]:
+    """Return the trajectory of the first two stages, None if none is legal."""
+    sample, cost, facing = rollout.search(window, _sample_rules(params, oscillation))
     if cost != NO_SAMPLE:
         oscillation.record_turn(sample, rollout.pose)
         return _follow(rollout, params, oscillation, sample)
@@ -64,7 +79,19 @@ def choose_trajectory(
         if best is not None:
             oscillation.record_strafe(best.sample, rollout.pose)
             return _follow(rollout, params, oscillation, best.sample)
-    return _escape(rollout, params, oscillation)
+    return None
+
+
+def _ends_blocked_escape(
+    rollout: Rollout, params: TrajectoryPlannerParams, oscillation: Oscillation
+) -> bool:
+    """End an escape whose way back is blocked; return whether it has ended."""
+    if not (params.end_blocked_escape and oscillation.escaping):
+        return False
+    back = rollout.trajectory((params.escape_vel_mps, 0.0, 0.0))
+    is_blocked = back.cost == OUT_OF_REACH or _is_refused(rollout, params, back)
+    oscillation.escaping = not is_blocked
+    return is_blocked
 
 
 def velocity_window(
@@ -136,17 +163,22 @@ def _escape(
 ) -> Trajectory:
     trajectory = rollout.trajectory((params.escape_vel_mps, 0.0, 0.0))
     oscillation.forget_if_moved(rollout.pose, params.oscillation_reset_dist_m)
-    is_refused = (
-        params.reject_colliding_escape
-        and trajectory.cost == COLLIDES
-        and not _leads_out(rollout, params)
-    )
+    is_refused = _is_refused(rollout, params, trajectory)
     if trajectory.cost > OUT_OF_REACH and not is_refused:
         oscillation.begin_escape(rollout.pose)
     _end_escape(rollout, params, oscillation)
     if trajectory.cost == COLLIDES and not is_refused:
         return Trajectory(trajectory.sample, _ESCAPE_COST, trajectory.points)
     return trajectory
+
+
+def _is_refused(rollout: Rollout, params: TrajectoryPlannerParams, escape: Trajectory) -> bool:
+    """Return whether an escape backwards is not taken because it collides."""
+    return (
+        params.reject_colliding_escape
+        and escape.cost == COLLIDES
+        and not _leads_out(rollout, params)
+    )
 
 
 def _leads_out(rollout: Rollout, params: TrajectoryPlannerParams) -> bool:
