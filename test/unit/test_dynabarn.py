@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from click.testing import CliRunner
 from quad_nav.barn.dynamic import (
     PHASE_S,
     DynamicRun,
+    ProtocolClock,
     flight_setup,
     fly_world,
     phase_of,
@@ -159,6 +161,37 @@ def test_an_obstacle_that_comes_is_a_collision(tmp_path):
     assert run.outcome is Outcome.COLLISION
     assert run.touched == "obstacle 0" and run.time_s < 4.0
     assert run.touched_at_m == pytest.approx((11.0, 0.0), abs=0.5)
+
+
+def clock_of(*places):
+    """Return a clock that has seen a robot at (time in s, x in m), on y = 0."""
+    clock = ProtocolClock()
+    for now_s, x_m in places:
+        states = SimpleNamespace(poses=np.array([[x_m, 0.0, 0.0]]))
+        clock.on_move(SimpleNamespace(now_s=now_s, states=states))
+    return clock
+
+
+def test_the_clock_starts_when_the_robot_leaves_its_start():
+    waiting = clock_of((0.5, 11.0), (80.0, 10.95))
+    assert (waiting.waited_s, waiting.time_s, waiting.stop_reason) == (80.0, 0.0, "")
+    flying = clock_of((0.5, 11.0), (80.0, 10.89), (179.5, 2.0))
+    assert (flying.waited_s, flying.time_s, flying.stop_reason) == (80.0, 99.5, "")
+    late = clock_of((80.0, 10.89), (180.0, 2.0))
+    assert late.stop_reason == "time limit of 100 s"
+
+
+def test_a_robot_watches_before_it_flies(tmp_path):
+    """Three obstacles run to and fro far from its way: it leaves after 6 s, then flies 38 s."""
+    paths = [([0.0, 8.0, 16.0], [[5.0, y], [-5.0, y], [5.0, y]]) for y in (6.0, 7.5, 9.0)]
+    path = write_worlds(tmp_path / "w.npz", w0=(0, *paths))
+    parameters = (("fixes/moving_obstacle_watch", 6.0),)
+    asked = options(path, config="moving", parameters=parameters)
+    setup = read_dynamic_setup(asked, "linear", 0.5)
+    run = fly_world(setup.contestant, setup.worlds[0], "linear", 0)
+    assert run.outcome is Outcome.SUCCESS
+    assert run.waited_s == pytest.approx(6.4, abs=0.4)
+    assert run.time_s == pytest.approx(38.5, abs=3.0)
 
 
 RUN = DynamicRun(3, 0, 0, Outcome.SUCCESS, 40.0, 0.0, 19.0, 0.3, 0, difficulty=0, phase_s=12.5)

@@ -166,28 +166,3 @@ def test_between_two_samples_the_motion_is_a_cubic():
     known = replay(samples, np.array([1, NONE]), 0, np.array([0.0, 1.0, 2.0, 3.0]), places)
     np.testing.assert_allclose(places, [[0.0, 0.0], [0.5, 0.0], [2.0, 0.0], [4.0, 0.0]])
     assert known == 3
-
-
-def test_an_obstacle_that_stays_hidden_is_known_while_the_motion_that_it_repeats_is():
-    """It was seen up to (2, 0), and its track ended 1.5 s later; the other turns at (4, 0)."""
-    memory = watched()
-    for k in range(21):
-        memory.add(tracks(20.0 + 0.1 * k, 8, corner(0.1 * k)))
-    assert memory.recall(8, TIMES).known == 61 and memory.hidden(TIMES) == []
-    for k in range(21, 35):
-        memory.add(unsure(20.0 + 0.1 * k, 8, [0.1 * k, 0.0, 1.0, 0.0], 0.3))
-    memory.add(Tracks.none(23.5))
-    ((places, radius_m, known),) = memory.hidden(TIMES)
-    np.testing.assert_allclose(places[[0, 20]], [[3.5, 0.0], [4.0, 1.5]], atol=0.12)
-    assert radius_m == 0.5 and 45 <= known <= 47  # the other was seen until 8 s
-    memory.add(tracks(24.0, 9, [4.0, 0.0, 0.0, 1.0]))  # there it is
-    assert memory.hidden(TIMES) == []
-
-
-def test_an_obstacle_whose_place_was_seen_empty_is_not_hidden():
-    memory = watched()
-    for k in range(21):
-        memory.add(tracks(20.0 + 0.1 * k, 8, corner(0.1 * k)))
-    assert memory.recall(8, TIMES).known == 61
-    memory.add(Tracks.none(22.3))  # the track ended after 0.3 s
-    assert memory.hidden(TIMES) == []

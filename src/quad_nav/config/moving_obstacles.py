@@ -135,8 +135,8 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
             0.0,
             "watch_s",
             "seconds",
-            "Time for which a robot that tracks three or more moving obstacles watches them before"
-            " its first goal, to learn which motions are periodic.",
+            "Time for which a robot that tracks three or more moving obstacles hovers before its"
+            " first goal and watches them, to learn which motions are periodic.",
             low=0,
             high=1000,
         ),

@@ -57,7 +57,8 @@ class EvasionParams:
         clearance_m: Distance that the robot keeps from where obstacles are predicted.
         glance_rad: Angle by which a robot that evades looks to both sides of its way, for what a
             LIDAR that does not see all around hides; it turns steadily at pi.
-        watch_s: Time for which the robot watches three or more obstacles before its first goal.
+        watch_s: Time for which the robot hovers before its first goal, and watches three or more
+            obstacles.
         speed_mps: Greatest speed while the robot evades; 0 for that of the local planner.
     """
 

@@ -114,7 +114,8 @@ class EvasionGuard:
         return command
 
     def watches(self, now_s: float, tracks: Tracks) -> bool:
-        """Return whether the robot waits before its first goal, to learn how obstacles move."""
+        """Return whether the robot hovers before its first goal, to learn how obstacles move."""
+        self._memory.add(tracks)
         self._watches_since_s = min(self._watches_since_s, now_s)
         self._has_seen_many |= len(tracks) >= _MANY
         watch_s = self.params.watch_s

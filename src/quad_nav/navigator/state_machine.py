@@ -164,8 +164,10 @@ class StateMachine:
             return
         follows = tick.control is not None and self.state is State.CONTROLLING
         if follows and self.guard.watches(tick.now_s, self.control.tracks):
-            follows, tick.command = False, Twist2D()
+            tick.command = Twist2D()
             self.control.restart_timers(tick.now_s)
+            self._peers.restart_patience()
+            return
         plan = self.control.plan if follows else None
         neighbours = self._neighbours(poses, velocity)
         self.guard.check(tick, poses, velocity, self.control.tracks, plan, limits, neighbours)

@@ -100,11 +100,11 @@ def track_obstacle() -> None:
 
 
 def evade_obstacle() -> None:
-    """Evade an obstacle that comes as another one did before, so that every kernel is called."""
+    """Evade an obstacle that comes every ten seconds, so that every kernel is called."""
     memory = MotionMemory()
     one = Tracks(0.0, np.array([0]), np.zeros((1, 4)), np.eye(4)[np.newaxis], np.array([0.3]))
-    for step in range(20):
-        number, at = divmod(step, 10)
+    for step in range(96):
+        number, at = divmod(step, 24)
         states = np.array([[2.0 - 0.1 * at, 0.0, -1.0, 0.0]])
         now_s = 10.0 * number + 0.1 * at
         one = replace(one, time_s=now_s, numbers=np.array([number]), states=states)

@@ -1,0 +1,153 @@
+"""Periodic motion: obstacles that repeat their motion are known beforehand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from quad_nav.kernels.periodic_motion import NONE, Trails, drop_repeats, follow_replays, replay_all
+from quad_nav.tracking.motion_memory import MotionMemory
+from quad_nav.tracking.periodic_motion import PeriodicMotion
+from quad_nav.tracking.tracks import Tracks
+
+PERIOD_S, RADIUS_M = 20.0, 3.0
+AHEAD_S = np.arange(0.0, 6.05, 0.5)
+
+
+def circling(time_s):
+    """Return the state of an obstacle on a circle of 3 m, 0.94 m/s."""
+    angle, rate = 2.0 * math.pi * time_s / PERIOD_S, 2.0 * math.pi / PERIOD_S
+    x, y = RADIUS_M * math.cos(angle), RADIUS_M * math.sin(angle)
+    return [x, y, -rate * y, rate * x]
+
+
+def watched(until_s, state=circling, hidden=lambda time_s: False):
+    """Watch an obstacle whose track has another number every 1.5 s."""
+    motion = PeriodicMotion()
+    for k in range(round(until_s * 10) + 1):
+        seen = 0 if hidden(0.1 * k) else 1
+        states = np.array([state(0.1 * k)])[:seen]
+        motion.add(0.1 * k, np.array([k // 15])[:seen], states, np.array([0.4])[:seen])
+    return motion
+
+
+def places(times_s):
+    return np.array([circling(time_s)[:2] for time_s in times_s])
+
+
+def known_places(replays):
+    """Return the only place at each time."""
+    known = np.isfinite(replays.places[:, :, 0])
+    assert (known.sum(axis=1) == 1).all()
+    return replays.places[known]
+
+
+def test_an_obstacle_is_where_it_was_a_period_ago():
+    replays = watched(60.0).replay(60.0 + AHEAD_S)
+    np.testing.assert_allclose(known_places(replays), places(60.0 + AHEAD_S), atol=0.02)
+    assert set(replays.radii_m.tolist()) == {0.4}
+
+
+def test_in_its_first_period_nothing_is_known():
+    motion = watched(19.0)
+    assert motion.is_empty
+    assert motion.replay(19.0 + AHEAD_S).places.shape[1] == 0
+
+
+def test_a_hidden_obstacle_is_known_too():
+    """Nothing is seen from 60 s on."""
+    motion = watched(70.0, hidden=lambda time_s: time_s > 60.0)
+    np.testing.assert_allclose(
+        known_places(motion.replay(70.0 + AHEAD_S)), places(70.0 + AHEAD_S), atol=0.02
+    )
+
+
+def test_where_it_is_always_hidden_nothing_is_known():
+    """It is hidden for 6 s of each period, longer than a trail counts beyond its ends."""
+    motion = watched(80.0, hidden=lambda time_s: time_s % PERIOD_S > 14.0)
+    replays = motion.replay(np.array([81.0, 97.0]))
+    known = np.isfinite(replays.places[:, :, 0]).any(axis=1)
+    assert known.tolist() == [True, False]
+
+
+def test_an_obstacle_that_wanders_has_no_period():
+    rng = np.random.default_rng(3)
+    speeds = rng.normal(0.0, 0.8, (200, 2))
+
+    def wandering(time_s):
+        at = int(time_s)
+        place = speeds[:at].sum(axis=0) + (time_s - at) * speeds[at]
+        return [*place, *speeds[at]]
+
+    assert watched(90.0, wandering).is_empty
+
+
+def test_the_older_half_is_dropped_when_the_memory_is_full():
+    motion = PeriodicMotion()
+    motion._count = 0
+    for k in range(700):
+        states = np.array([circling(0.1 * k)] * 100)
+        motion.add(0.1 * k, np.arange(100), states, np.full(100, 0.4))
+        if k == 620:
+            assert motion._count < 40_000
+    assert known_places(motion.replay(np.array([70.0]))).shape == (1, 2)
+
+
+def test_motion_memory_replays_what_it_has_seen_well():
+    memory = MotionMemory()
+    for k in range(601):
+        states = np.array([circling(0.1 * k)])
+        seen = Tracks(0.1 * k, np.array([7]), states, np.zeros((1, 4, 4)), np.array([0.4]))
+        memory.add(seen)
+    replays = memory.replay(60.0 + AHEAD_S)
+    np.testing.assert_allclose(known_places(replays), places(60.0 + AHEAD_S), atol=0.02)
+    memory.reset()
+    assert memory.replay(60.0 + AHEAD_S).places.shape[1] == 0
+
+
+def test_a_trail_is_replayed_a_whole_number_of_periods_later():
+    """Samples at 0 and 1 s, 1 m/s, period 10 s; 0.3 s beyond the ends count."""
+    samples = np.array([[0.0, 0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 0.0, 1.0, 0.0]])
+    trails = Trails(
+        samples, np.array([1, NONE]), np.zeros(2, np.int64), np.array([[0, 1]]), np.array([10.0])
+    )
+    times = np.array([19.5, 19.75, 20.5, 21.25, 21.5])
+    found, velocities = np.empty((5, 4, 2)), np.empty((5, 4, 2))
+    owners = np.empty(4, np.int64)
+    assert replay_all(trails, times, 0.3, found, velocities, owners) == 1
+    np.testing.assert_allclose(
+        found[:, 0, 0], [math.nan, -0.25, 0.5, 1.25, math.nan], equal_nan=True
+    )
+    np.testing.assert_allclose(velocities[1:4, 0], [[1.0, 0.0]] * 3)
+
+
+def test_replays_of_one_obstacle_count_once():
+    found = np.array([[[0.0, 0.0], [0.3, 0.0], [0.6, 0.0]], [[0.0, 0.0], [5.0, 0.0], [5.0, 0.5]]])
+    drop_repeats(found, 0.4)
+    assert np.isnan(found[:, :, 0]).tolist() == [[False, True, False], [False, False, False]]
+
+
+@pytest.mark.parametrize(
+    "speed, expected",
+    [(1.0, [1e6, 1e6, 2.0, 1e6]), (-1.0, [0.0, -1.0, -2.0, -3.0])],
+    ids=["its replay", "another motion"],
+)
+def test_a_track_leaves_its_place_to_its_replay(speed, expected):
+    """The replay is known for 0 and 1 s; at 3 s another one is where the obstacle would be."""
+    times = np.arange(4.0)
+    discs = np.full((4, 1, 4), 0.5)
+    discs[:, 0, 0], discs[:, 0, 1] = speed * times, 0.0
+    nan = math.nan
+    found = np.array(
+        [
+            [[0.1, 0.0], [nan, nan]],
+            [[1.0, 0.0], [nan, nan]],
+            [[nan, nan], [nan, nan]],
+            [[nan, nan], [3.0, 0.0]],
+        ]
+    )
+    velocities = np.full((4, 2, 2), [1.0, 0.0])
+    follow_replays(discs, np.array([[speed, 0.0]]), found, velocities, times, (0.4, 0.8, 0.6), 1e6)
+    np.testing.assert_allclose(discs[:, 0, 0], expected)
