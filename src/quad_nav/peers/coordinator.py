@@ -1,9 +1,8 @@
 """Coordination of one robot with its peers.
 
-The navigator asks four things: ``observe`` updates the peers, ``decide`` says whether the
-robot yields, ``neighbours`` returns the peers for the evasion of moving obstacles, ``limit`` keeps
-a command inside the robot's Voronoi cell. A robot without a goal
-makes room by a yielding manoeuvre: it flies to a holding point and back to its parking pose.
+The navigator asks four things: ``observe`` updates the peers, ``decide`` says whether the robot
+yields, ``neighbours`` returns the peers for evasions, ``limit`` keeps a command inside the robot's
+Voronoi cell. A robot without a goal yields by a manoeuvre: to a holding point, and back.
 """
 
 from __future__ import annotations
