@@ -84,15 +84,15 @@ def test_an_obstacle_that_wanders_has_no_period():
     assert watched(90.0, wandering).is_empty
 
 
-def test_the_older_half_is_dropped_when_the_memory_is_full():
+def test_a_full_memory_learns_anew():
+    """100 tracks at 10 Hz fill it in 60 s."""
     motion = PeriodicMotion()
-    motion._count = 0
-    for k in range(700):
+    for k in range(605):
+        if k == 599:
+            assert not motion.is_empty
         states = np.array([circling(0.1 * k)] * 100)
         motion.add(0.1 * k, np.arange(100), states, np.full(100, 0.4))
-        if k == 620:
-            assert motion._count < 40_000
-    assert known_places(motion.replay(np.array([70.0]))).shape == (1, 2)
+    assert motion.is_empty
 
 
 def test_motion_memory_replays_what_it_has_seen_well():

@@ -29,7 +29,7 @@ from quad_nav.kernels.periodic_motion import NONE, Trails, Votes, drop_repeats, 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_CAPACITY = 60_000  # samples; 300 s of 20 tracks
+_CAPACITY = 60_000  # samples, 300 s of 20 tracks; then it learns anew
 _SCALE_M, _SCALE_MPS = 0.3, 0.6  # differences that count as 1
 _SHORTEST_S = 9.0  # period
 _BREAK_M, _BREAK_MPS = 0.15, 0.25  # by how much a sample may be off the last one's motion
@@ -51,7 +51,7 @@ _ROOM = 128  # new lags for each sample: two for each trail that it votes for
 
 @dataclass(frozen=True)
 class Replays:
-    """Where obstacles with a period are, a column for each replayed trail.
+    """Places of obstacles with a period; each column is one replayed trail.
 
     Attributes:
         places: float64[t, n, 2], m; NaN where a trail is not known.
@@ -229,27 +229,15 @@ class PeriodicMotion:
         return Replays(places[:, kept], velocities[:, kept], self._radii_m[owners[:count][kept]])
 
     def _reserve(self, count: int) -> None:
-        """Make room for samples and votes; drop the older half if there are too many samples."""
+        """Make room for samples and votes; forget everything if there are too many samples."""
         if self._count + count > _CAPACITY:
-            self._drop(self._count // 2)
+            self.reset()
         while self._count + count > len(self._samples):
             self._samples = np.concatenate([self._samples, np.empty_like(self._samples)])
             self._later = np.concatenate([self._later, np.empty_like(self._later)])
             self._owners = np.concatenate([self._owners, np.empty_like(self._owners)])
         if self._lags + _ROOM * count > len(self._votes.lags):
             self._votes = _enlarged(self._votes, max(len(self._votes.lags), _ROOM * count))
-
-    def _drop(self, count: int) -> None:
-        """Drop the first samples; trails that have lost one are forgotten."""
-        kept = slice(count, self._count)
-        self._count -= count
-        self._samples[: self._count] = self._samples[kept].copy()
-        self._owners[: self._count] = self._owners[kept].copy()
-        later = self._later[kept] - count
-        self._later[: self._count] = np.where(later >= 0, later, NONE)
-        lost = self._spans[:, 0] < count
-        self._spans = np.where(lost[:, None], NONE, self._spans - count)
-        self._trails = {number: one for number, one in self._trails.items() if not lost[one]}
 
 
 def _enlarged(votes: Votes, more: int) -> Votes:
