@@ -256,7 +256,8 @@ def follow_replays(
 ) -> None:
     """Leave the discs of tracks that have a replay to it; after its end they keep its velocity.
 
-    A disc is nowhere while the replay is known, and where another replay has its place.
+    Where the replay ends and another is alike, the other continues it. A disc is nowhere while a
+    replay is known, and where another replay has its place.
 
     Args:
         discs: float64[t, n, 4], changed in place: x, y, radius, standard deviation.
@@ -268,40 +269,78 @@ def follow_replays(
             the distance to a replay within which a disc is of the same obstacle.
         nowhere: Coordinates of a disc that is nowhere.
     """
+    state = np.empty(4)
     for n in range(discs.shape[1]):
-        column = _replay_of(discs[0, n, 0], discs[0, n, 1], motions[n], places, velocities, same)
-        if column == NONE:
-            continue
-        last, is_over = 0, False
+        state[:2], state[2:] = discs[0, n, :2], motions[n]
+        column, since, follows = NONE, 0.0, False
         for k in range(times.shape[0]):
-            is_over = is_over or math.isnan(places[k, column, 0])
-            if not is_over:
-                last = k
+            if column == NONE or math.isnan(places[k, column, 0]):
+                column = _replay_of(state, times[k] - since, places[k], velocities[k], same)
+                if column == NONE and follows:
+                    column = _begun(state, times[k] - since, places[k - 1], places[k], same[2])
+            if column != NONE:
+                state[:2], state[2:] = places[k, column], velocities[k, column]
+                since, follows = times[k], True
                 discs[k, n, :2] = nowhere
-                continue
-            ahead = times[k] - times[last]
-            discs[k, n, :2] = places[last, column] + ahead * velocities[last, column]
-            if _is_near(discs[k, n, 0], discs[k, n, 1], places[k], same[2]):
-                discs[k, n, :2] = nowhere
+            elif not follows:
+                break
+            else:
+                discs[k, n, :2] = state[:2] + (times[k] - since) * state[2:]
+                if _is_near(discs[k, n, 0], discs[k, n, 1], places[k], same[2]):
+                    discs[k, n, :2] = nowhere
 
 
 @njit(cache=True, nogil=True)
 def _replay_of(
-    x: float,
-    y: float,
-    motion: NDArray[np.float64],
+    state: NDArray[np.float64],
+    ahead: float,
     places: NDArray[np.float64],
     velocities: NDArray[np.float64],
     same: Tuple[float, float, float],
 ) -> int:
-    """Return the replay that is most alike at the first time, NONE if none is."""
+    """Return the replay that is most alike after a time, NONE if none is.
+
+    Args:
+        state: float64[4], position and velocity of an obstacle.
+        ahead: Time for which it goes on.
+        places: float64[m, 2].
+        velocities: float64[m, 2].
+        same: As for ``follow_replays``.
+    """
     best, least = NONE, 1.0
-    for column in range(places.shape[1]):
-        dx, dy = places[0, column, 0] - x, places[0, column, 1] - y
-        du, dv = velocities[0, column, 0] - motion[0], velocities[0, column, 1] - motion[1]
+    for column in range(places.shape[0]):
+        dx = places[column, 0] - state[0] - ahead * state[2]
+        dy = places[column, 1] - state[1] - ahead * state[3]
+        du, dv = velocities[column, 0] - state[2], velocities[column, 1] - state[3]
         apart = (dx * dx + dy * dy) / same[0] ** 2 + (du * du + dv * dv) / same[1] ** 2
         if apart < least:
             best, least = column, apart
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _begun(
+    state: NDArray[np.float64],
+    ahead: float,
+    before: NDArray[np.float64],
+    places: NDArray[np.float64],
+    apart: float,
+) -> int:
+    """Return a replay that begins near an obstacle, whatever its velocity, NONE if none does.
+
+    Args:
+        state: float64[4], position and velocity of the obstacle.
+        ahead: Time for which it goes on.
+        before: float64[m, 2], places at the time before.
+        places: float64[m, 2], places now.
+        apart: Greatest distance.
+    """
+    x, y = state[0] + ahead * state[2], state[1] + ahead * state[3]
+    best, least = NONE, apart
+    for column in range(places.shape[0]):
+        distance = math.hypot(places[column, 0] - x, places[column, 1] - y)
+        if distance < least and math.isnan(before[column, 0]):
+            best, least = column, distance
     return best
 
 

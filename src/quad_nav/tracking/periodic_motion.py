@@ -171,11 +171,12 @@ class PeriodicMotion:
         first = fits & (turns == 1.0)
         sound = (first.sum(axis=0) >= _LAGS) & ((first * weights).sum(axis=0) >= _VOTES)
         shape = len(self._spans), len(periods)
-        support, exact = np.zeros(shape), np.zeros(shape)
+        support, exact, near = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         trails = self._votes.trails[: self._lags]
         np.add.at(support, trails, weights * sound)
         np.add.at(exact, trails, weights * sound * lags[:, None] / turns)
-        rows, best = np.arange(len(support)), support.argmax(axis=1)
+        np.add.at(near, trails, weights * sound / turns)  # a multiple counts less: not half of it
+        rows, best = np.arange(len(support)), near.argmax(axis=1)
         most = support[rows, best]
         own = exact[rows, best] / np.maximum(most, 1.0)
         found = np.where(most >= _EXACT_VOTES, own, periods[best])
