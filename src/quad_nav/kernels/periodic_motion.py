@@ -50,6 +50,9 @@ class Trails(NamedTuple):
         owners: int64[n], trail of each sample.
         spans: int64[m, 2], first and last sample of each trail; NONE for a forgotten trail.
         periods: float64[m], period of each trail in s, 0 if it is not known.
+        nexts: int64[m], trail that the obstacle of each trail was seen on next, after a gap, or
+            NONE.
+        gaps: float64[m], time from the end of a trail to the begin of its next one, s.
     """
 
     samples: NDArray[np.float64]
@@ -57,6 +60,8 @@ class Trails(NamedTuple):
     owners: NDArray[np.int64]
     spans: NDArray[np.int64]
     periods: NDArray[np.float64]
+    nexts: NDArray[np.int64]
+    gaps: NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
@@ -172,7 +177,7 @@ def replay_all(
         if period <= 0.0 or begin == NONE:
             continue
         start = trails.samples[begin, 0] - beyond_s
-        stop = trails.samples[end, 0] + beyond_s
+        stop = trails.samples[end, 0] + max(beyond_s, trails.gaps[trail])
         turn = max(1, math.ceil((first - stop) / period))
         while start + turn * period <= last and count < owners.shape[0]:
             places[:, count], velocities[:, count] = math.nan, math.nan
@@ -194,36 +199,108 @@ def _replay(
     velocities: NDArray[np.float64],
     column: int,
 ) -> None:
-    """Fill one column: a trail, later by ``shift``."""
-    samples, later = trails.samples, trails.later
+    """Fill one column: a trail, later by ``shift``, and the gap to its next one."""
+    samples, later, gap = trails.samples, trails.later, trails.gaps[trail]
     at, end = trails.spans[trail, 0], trails.spans[trail, 1]
     for k in range(times.shape[0]):
         time = times[k] - shift
         while at != end and samples[later[at], 0] <= time:
             at = later[at]
         ahead = time - samples[at, 0]
-        if at == end or ahead < 0.0:
+        if at == end and 0.0 <= ahead < gap:
+            following = samples[trails.spans[trails.nexts[trail], 0]]
+            _between(samples[at], following, ahead / gap, gap, places, velocities, k, column)
+        elif at == end or ahead < 0.0:
             if abs(ahead) <= beyond_s:
                 velocities[k, column] = samples[at, 3:]
                 places[k, column] = samples[at, 1:3] + ahead * samples[at, 3:]
-            continue
-        step = samples[later[at], 0] - samples[at, 0]
-        if step <= _MAX_GAP_S:
-            u = ahead / step
-            velocities[k, column] = (1.0 - u) * samples[at, 3:] + u * samples[later[at], 3:]
-            _between(samples[at], samples[later[at]], u, places[k, column])
+        else:
+            step = samples[later[at], 0] - samples[at, 0]
+            if step <= _MAX_GAP_S:
+                following = samples[later[at]]
+                _between(samples[at], following, ahead / step, step, places, velocities, k, column)
 
 
 @njit(cache=True, nogil=True)
 def _between(
-    a: NDArray[np.float64], b: NDArray[np.float64], u: float, place: NDArray[np.float64]
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    u: float,
+    step: float,
+    places: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    k: int,
+    column: int,
 ) -> None:
-    """Fill float64[2] with the cubic from sample a (u = 0) to sample b (u = 1)."""
-    step = b[0] - a[0]
+    """Fill in the cubic from sample a (u = 0) to sample b (u = 1), ``step`` seconds later."""
     ahead = u * u * (3.0 - 2.0 * u)
     for axis in range(2):
-        place[axis] = (1.0 - ahead) * a[1 + axis] + ahead * b[1 + axis]
-        place[axis] += u * (1.0 - u) * step * ((1.0 - u) * a[3 + axis] - u * b[3 + axis])
+        place = (1.0 - ahead) * a[1 + axis] + ahead * b[1 + axis]
+        place += u * (1.0 - u) * step * ((1.0 - u) * a[3 + axis] - u * b[3 + axis])
+        places[k, column, axis] = place
+        velocities[k, column, axis] = (1.0 - u) * a[3 + axis] + u * b[3 + axis]
+
+
+@njit(cache=True, nogil=True)
+def link(trails: Trails, same_s: float, longest_s: float, limits: Tuple[float, float]) -> None:
+    """Fill ``nexts`` and ``gaps`` of trails with a period.
+
+    The next trail has the same period and begins, some periods earlier or later, soon after the
+    end. Where another trail of the same period goes on at the end there is no gap.
+
+    Args:
+        trails: The trails; ``nexts`` and ``gaps`` are changed in place.
+        same_s: Difference of periods that are the same.
+        longest_s: Longest gap.
+        limits: Distance in m by which another trail may be off at the end, and part of the faster
+            end's speed that is the greatest mean speed in the gap.
+    """
+    samples, spans, periods = trails.samples, trails.spans, trails.periods
+    for a in range(spans.shape[0]):
+        trails.nexts[a], trails.gaps[a] = NONE, 0.0
+        if periods[a] <= 0.0 or spans[a, 0] == NONE:
+            continue
+        least, end = longest_s, samples[spans[a, 1]]
+        for b in range(spans.shape[0]):
+            if b == a or abs(periods[b] - periods[a]) > same_s or spans[b, 0] == NONE:
+                continue
+            begin, last = samples[spans[b, 0]], samples[spans[b, 1]]
+            gap = (begin[0] - end[0]) % periods[a]
+            before = periods[a] - gap  # by which b begins before the end of a
+            if before < last[0] - begin[0] and _goes_on(trails, b, begin[0] + before, end, limits):
+                trails.nexts[a], trails.gaps[a] = NONE, 0.0
+                break
+            if gap < least and _leads_to(end, begin, gap, limits):
+                least = gap
+                trails.nexts[a], trails.gaps[a] = b, gap
+
+
+@njit(cache=True, nogil=True)
+def _goes_on(
+    trails: Trails,
+    trail: int,
+    time: float,
+    end: NDArray[np.float64],
+    limits: Tuple[float, float],
+) -> bool:
+    """Return whether a trail is at a time where another ends."""
+    at = trails.spans[trail, 0]
+    while trails.later[at] != NONE and trails.samples[at, 0] < time:
+        at = trails.later[at]
+    ahead = time - trails.samples[at, 0]
+    dx = trails.samples[at, 1] + ahead * trails.samples[at, 3] - end[1]
+    dy = trails.samples[at, 2] + ahead * trails.samples[at, 4] - end[2]
+    return math.hypot(dx, dy) < limits[0]
+
+
+@njit(cache=True, nogil=True)
+def _leads_to(
+    end: NDArray[np.float64], begin: NDArray[np.float64], gap: float, limits: Tuple[float, float]
+) -> bool:
+    """Return whether an obstacle can get from one sample to another in a time."""
+    fast = max(math.hypot(end[3], end[4]), math.hypot(begin[3], begin[4]))
+    way = math.hypot(begin[1] - end[1], begin[2] - end[2])
+    return way < limits[0] + limits[1] * fast * gap
 
 
 @njit(cache=True, nogil=True)

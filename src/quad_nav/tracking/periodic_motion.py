@@ -24,7 +24,15 @@ from typing import Dict
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.periodic_motion import NONE, Trails, Votes, drop_repeats, replay_all, vote
+from quad_nav.kernels.periodic_motion import (
+    NONE,
+    Trails,
+    Votes,
+    drop_repeats,
+    link,
+    replay_all,
+    vote,
+)
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -37,12 +45,16 @@ _MIN_SAMPLES = 3  # of a trail, before its samples vote
 _MAX_SAMPLES = 20  # longer tracks are cut: some pass from one obstacle to another
 _STRONG = 12  # votes for one lag of one trail that propose a period
 _LAGS, _VOTES = 6, 40  # of trails and of samples that make a proposed period one
-_OWN_VOTES, _OWN_SHARE = 3, 0.2  # of a trail for its period, and their part of all possible ones
+_OWN_VOTES, _OWN_SHARE = 3, 0.1  # of a trail for its period, and their part of all possible ones
 _EXACT_VOTES = 8  # of a trail, from which on its own lags are more exact than the common period
+_SHARED = 0.4  # part of a multiple's trails that vote for the period as well
 _TOLERANCE_S, _TOLERANCE_PER_TURN_S = 0.05, 0.02
 _JOIN_TURNS = 2  # a trail that nothing has voted for in so many turns is of something else
+_JOINS = 5  # trails in a row that have their period from others
 _JOIN_S, _JOIN_M, _JOIN_MPS = 1.5, 0.2, 0.25  # gap at a join, offset and its growth
 _LABEL_PERIOD_S = 1.0
+_SAME_S, _GAP_S = 0.12, 3.0  # difference of the periods of one obstacle, longest gap of its trails
+_LINK_M, _LINK_SPEED = 0.4, 1.2
 _BEYOND_S = 0.3
 _SAME_M = 0.4  # two replays of one obstacle are nearer
 _COLUMNS = 400  # replays at a time
@@ -81,6 +93,7 @@ class PeriodicMotion:
         self._count = 0
         self._spans = np.empty((0, 2), np.int64)
         self._radii_m, self._periods = np.empty(0), np.empty(0)
+        self._nexts, self._gaps = np.empty(0, np.int64), np.empty(0)
         self._sizes = np.empty(0, np.int64)
         self._votes = Votes(np.empty(0), *(np.empty(0, np.int64) for _ in range(4)))
         self._lags = 0
@@ -114,6 +127,7 @@ class PeriodicMotion:
         if now_s >= self._labelled_s + _LABEL_PERIOD_S:
             self._labelled_s = now_s
             self._label()
+            link(self._view(), _SAME_S, _GAP_S, (_LINK_M, _LINK_SPEED))
 
     def _continues(self, trail: int, now_s: float, state: Floats) -> bool:
         """Return whether a state follows from a short trail, as if the velocity changed evenly."""
@@ -129,6 +143,7 @@ class PeriodicMotion:
         self._spans = np.append(self._spans, [[NONE, NONE]], axis=0)
         self._radii_m = np.append(self._radii_m, radius_m)
         self._periods, self._sizes = np.append(self._periods, 0.0), np.append(self._sizes, 0)
+        self._nexts, self._gaps = np.append(self._nexts, NONE), np.append(self._gaps, 0.0)
         self._votes = self._votes._replace(heads=np.append(self._votes.heads, NONE))
         return len(self._spans) - 1
 
@@ -155,6 +170,8 @@ class PeriodicMotion:
             self._owners[rows],
             self._spans,
             self._periods,
+            self._nexts,
+            self._gaps,
         )
 
     def _label(self) -> None:
@@ -170,19 +187,26 @@ class PeriodicMotion:
         weights = fits * counts[:, None].astype(float)
         first = fits & (turns == 1.0)
         sound = (first.sum(axis=0) >= _LAGS) & ((first * weights).sum(axis=0) >= _VOTES)
-        shape = len(self._spans), len(periods)
-        support, exact, near = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         trails = self._votes.trails[: self._lags]
-        np.add.at(support, trails, weights * sound)
-        np.add.at(exact, trails, weights * sound * lags[:, None] / turns)
-        np.add.at(near, trails, weights * sound / turns)  # a multiple counts less: not half of it
+        firsts = self._by_trail(trails, first * weights)
+        sound &= ~_multiples(periods, firsts > 0.0, sound)
+        support = self._by_trail(trails, weights * sound)
+        exact = self._by_trail(trails, weights * sound * lags[:, None] / turns)
+        near = self._by_trail(trails, weights * sound / turns)  # half a period has less votes
         rows, best = np.arange(len(support)), near.argmax(axis=1)
         most = support[rows, best]
         own = exact[rows, best] / np.maximum(most, 1.0)
         found = np.where(most >= _EXACT_VOTES, own, periods[best])
         wanted = np.maximum(_OWN_SHARE * self._chances(found), _OWN_VOTES)
         self._periods = np.where(most >= wanted, found, 0.0)
-        self._join()
+        for _ in range(_JOINS):
+            self._join()
+
+    def _by_trail(self, trails: Integers, values: Floats) -> Floats:
+        """Return the sums over the lags of each trail, float64[m, p], of float64[c, p]."""
+        sums = np.zeros((len(self._spans), values.shape[1]))
+        np.add.at(sums, trails, values)
+        return sums
 
     def _chances(self, periods: Floats) -> Floats:
         """Return how many votes each trail would have had of an obstacle that is always seen.
@@ -262,6 +286,28 @@ def _proposed(lags: Floats, counts: Integers) -> Floats:
     starts = np.flatnonzero(np.append(True, np.diff(lags) > _TOLERANCE_S))
     means: Floats = np.add.reduceat(lags * weights, starts) / np.add.reduceat(weights, starts)
     return means
+
+
+def _multiples(
+    periods: Floats, voters: NDArray[np.bool_], sound: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return which periods are multiples of a sound one, bool[p].
+
+    Many trails that vote for a multiple vote for the period as well; where a period is twice that
+    of another obstacle by chance, few do.
+
+    Args:
+        periods: float64[p].
+        voters: bool[m, p], trails that vote for each period.
+        sound: bool[p].
+    """
+    turns = np.rint(periods[:, None] / periods)
+    off = np.abs(periods[:, None] - turns * periods)
+    is_multiple = (turns >= 2.0) & (off < _TOLERANCE_S + _TOLERANCE_PER_TURN_S * turns) & sound
+    counts = voters.T.astype(float) @ voters
+    shared = counts / np.maximum(counts.diagonal()[:, None], 1.0)
+    found: NDArray[np.bool_] = (is_multiple & (shared >= _SHARED)).any(axis=1)
+    return found
 
 
 def _offsets(a: Floats, b: Floats) -> Floats:
