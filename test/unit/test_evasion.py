@@ -10,13 +10,8 @@ import pytest
 from quad_nav.control.evasion import EvasionParams, Surroundings, evade, predicted_discs
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
-from quad_nav.kernels.space_time import (
-    SpaceTime,
-    StandingObstacles,
-    command_costs,
-    fill_costs,
-    threat,
-)
+from quad_nav.kernels.evasion_commands import Body, StandingObstacles, command_costs
+from quad_nav.kernels.space_time import SpaceTime, fill_costs, threat
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -24,7 +19,7 @@ ON = EvasionParams(True, clearance_m=0.1)
 ORIGIN = Pose2D(0.0, 0.0)
 STILL = (0.0, 0.0)
 HOVER = np.zeros((1, 2))
-SEARCH = SpaceTime(0.125, 0.5, 0.5, 3.0, 50.0, 0.0, 100.0, 0.05)
+SEARCH = SpaceTime(0.125, 0.5, 0.5, 50.0, 0.0, 100.0, 0.05)
 
 
 def around(pose=ORIGIN, costs=None, is_following=False):
@@ -63,30 +58,55 @@ def test_threat_grows_inside_and_falls_off_outside():
 
 
 def test_a_command_into_an_obstacle_costs_its_time_inside():
-    discs = np.tile([0.33, 0.0, 0.2, 1e-6], (6, 1, 1))
+    discs = np.tile([0.57, 0.0, 0.2, 1e-6], (11, 1, 1))
     standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
-    costs = np.zeros((2, 15, 15))
-    commands = np.array([[0.5, 0.0], [-0.5, 0.0]])
-    found = command_costs(SEARCH, discs, standing, costs, (0.5, 0.0), commands)
-    # After 0.3, 0.4 and 0.5 s, 0.1 s each, the robot is 0.02, 0.07 and 0.12 m deep.
-    np.testing.assert_allclose(found, [50.0 * 0.1 * (1.2 + 1.7 + 2.2), 0.0])
+    costs, commands = np.zeros((3, 15, 15)), np.array([[0.5, 0.0], [-0.5, 0.0]])
+    start, hover = (0.5, 0.0, 0.0, 0.0), np.zeros((1, 2))
+    body = Body(0.01, 1e3, 2.0)  # keeps its velocity
+    found = command_costs(SEARCH, body, discs, standing, costs, start, commands, hover)
+    # After 0.8, 0.9 and 1 s, 0.1 s each, the robot is 0.03, 0.08 and 0.13 m deep.
+    np.testing.assert_allclose(found, 50.0 * 0.1 * (1.3 + 1.8 + 2.3), rtol=1e-3)
+
+
+def test_the_best_second_command_counts():
+    """A robot that goes on for a second is at 0.5 m; one that turns back stays before 0.42 m."""
+    discs = np.tile([0.67, 0.0, 0.25, 1e-6], (11, 1, 1))
+    standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    ahead, back = np.array([[0.5, 0.0]]), np.array([[-0.5, 0.0]])
+    costs, start, body = np.zeros((3, 15, 15)), (0.5, 0.0, 0.0, 0.0), Body(3.125, 0.08, 2.0)
+    on, turned = (
+        command_costs(SEARCH, body, discs, standing, costs, start, ahead, second)[0]
+        for second in (ahead, back)
+    )
+    # After 0.9 and 1 s, 0.1 s each, it is 0.03 and 0.08 m deep.
+    assert on == pytest.approx(50.0 * 0.1 * (1.3 + 1.8))
+    assert turned == 0.0
+
+
+def test_the_body_approaches_a_command_as_in_flight():
+    """Its position runs 0.32 s after the integral of the command, and its stop takes as long."""
+    far = np.tile(np.arange(15.0), (15, 1))  # costs 1 for each cell in x
+    costs = np.stack([far, far, far])
+    standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    none, body = np.zeros((11, 0, 4)), Body(25.0 / 8.0, 2.0 / 25.0, 2.0)
+    commands, start = np.array([[0.5, 0.0]]), (0.0, 0.0, 0.0, 0.0)
+    found = command_costs(SEARCH, body, none, standing, costs, start, commands, commands)
+    assert found[0] - 7.0 == pytest.approx(0.5 / 0.125, abs=0.1)  # within 0.1 cells, 1.3 cm
 
 
 def test_a_command_leaves_room_to_stop_before_a_standing_obstacle():
-    """After 0.5 s at 0.5 m/s the robot is at 0.25 m, and stops at 0.25 + 0.5 / 3 = 0.417 m."""
-    costs, none = np.zeros((2, 15, 15)), np.zeros((6, 0, 4))
-    commands = np.array([[0.5, 0.0], [-0.5, 0.0]])
-    blocked = np.ones((1, 1), bool)
+    """After 1 s at 0.5 m/s the robot is at 0.5 m, and stops at 0.5 + 0.5 / 2 = 0.75 m."""
+    costs, none = np.zeros((3, 15, 15)), np.zeros((11, 0, 4))
+    blocked, body = np.ones((1, 1), bool), Body(2.0, 1e3, 2.0)
+    ahead, start = np.array([[0.5, 0.0]]), (0.5, 0.0, 0.0, 0.0)
 
     def found(wall_x_m):
         wall = StandingObstacles(blocked, wall_x_m, -5.0, 10.0)
-        return command_costs(SEARCH, none, wall, costs, (0.5, 0.0), commands)
+        return command_costs(SEARCH, body, none, wall, costs, start, ahead, ahead)[0]
 
-    np.testing.assert_array_equal(found(0.42), [0.0, 0.0])
-    # While it stops it is at 0.396 m after 0.7 s, and beyond after 0.8, 0.9 and 1 s.
-    np.testing.assert_allclose(found(0.40), [100.0 * 0.1 * 3, 0.0])
-    # During the step it is at 0.2 m and 0.25 m; all of the stop is behind the wall, too.
-    np.testing.assert_allclose(found(0.18), [100.0 * 0.1 * (2 + 10), 0.0])
+    assert found(0.76) == 0.0
+    # Of five places on the way to the stop, 0.7 m and 0.75 m are behind the wall.
+    assert found(0.68) == pytest.approx(100.0 * 0.1 * 2)
 
 
 def test_waiting_costs_less_than_the_way_through():
@@ -99,6 +119,14 @@ def test_waiting_costs_less_than_the_way_through():
     # From the middle one step of 0.25 m to the left of the disc, 0.5 s of way left after it.
     assert costs[1, 7, 7] == pytest.approx(0.05 * 1.0 * 0.5 + 0.5)
     assert costs[1, 7, 9] == pytest.approx((50.0 * 3.0 + 0.05 * 0.5) * 0.5)
+
+
+def test_a_fast_obstacle_threatens_between_the_steps():
+    """At 2 m/s it is 0.4 m away from a cell at the step, and on it 0.2 s later, half as much."""
+    discs = np.array([[[-0.4 + 0.2 * (k - 5), 0.0, 0.2, 1e-6]] for k in range(11)])
+    costs, to_go = np.full((3, 15, 15), np.inf), np.zeros((15, 15))
+    fill_costs(SEARCH, discs, np.zeros((15, 15), bool), to_go, costs)
+    assert costs[1, 7, 7] == pytest.approx(0.5 * 50.0 * 3.0 * 0.5)
 
 
 def test_a_hovering_robot_evades_sideways():

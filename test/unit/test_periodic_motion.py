@@ -7,9 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from quad_nav.kernels.periodic_motion import NONE, Trails, drop_repeats, follow_replays, replay_all
+from quad_nav.kernels.periodic_motion import (
+    NONE,
+    Trails,
+    drop_repeats,
+    follow_replays,
+    link,
+    replay_all,
+)
 from quad_nav.tracking.motion_memory import MotionMemory
-from quad_nav.tracking.periodic_motion import PeriodicMotion
+from quad_nav.tracking.periodic_motion import PeriodicMotion, multiples
 from quad_nav.tracking.tracks import Tracks
 
 PERIOD_S, RADIUS_M = 20.0, 3.0
@@ -107,12 +114,26 @@ def test_motion_memory_replays_what_it_has_seen_well():
     assert memory.replay(60.0 + AHEAD_S).places.shape[1] == 0
 
 
+def trails_of(samples, spans, period_s):
+    """Return trails of consecutive samples, float64[n, 5], between first and last rows."""
+    later = np.array([k + 1 for k in range(len(samples))])
+    later[[last for _, last in spans]] = NONE
+    count = len(spans)
+    owners = np.concatenate([np.full(b + 1 - a, k) for k, (a, b) in enumerate(spans)])
+    return Trails(
+        np.array(samples, float),
+        later,
+        owners,
+        np.array(spans),
+        np.full(count, period_s),
+        np.full(count, NONE),
+        np.zeros(count),
+    )
+
+
 def test_a_trail_is_replayed_a_whole_number_of_periods_later():
     """Samples at 0 and 1 s, 1 m/s, period 10 s; 0.3 s beyond the ends count."""
-    samples = np.array([[0.0, 0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 0.0, 1.0, 0.0]])
-    trails = Trails(
-        samples, np.array([1, NONE]), np.zeros(2, np.int64), np.array([[0, 1]]), np.array([10.0])
-    )
+    trails = trails_of([[0, 0, 0, 1, 0], [1, 1, 0, 1, 0]], [(0, 1)], 10.0)
     times = np.array([19.5, 19.75, 20.5, 21.25, 21.5])
     found, velocities = np.empty((5, 4, 2)), np.empty((5, 4, 2))
     owners = np.empty(4, np.int64)
@@ -121,6 +142,40 @@ def test_a_trail_is_replayed_a_whole_number_of_periods_later():
         found[:, 0, 0], [math.nan, -0.25, 0.5, 1.25, math.nan], equal_nan=True
     )
     np.testing.assert_allclose(velocities[1:4, 0], [[1.0, 0.0]] * 3)
+
+
+@pytest.mark.parametrize(
+    "begin_s, place_m, gap_s",
+    [(3.0, 3.0, 2.0), (33.0, 3.0, 2.0), (5.0, 5.0, 0.0), (3.0, 8.0, 0.0), (0.5, 0.5, 0.0)],
+    ids=["2 s later", "periods later", "too long", "too far", "it goes on"],
+)
+def test_a_trail_leads_to_the_one_after_the_gap(begin_s, place_m, gap_s):
+    """At 1 m/s; the first ends at 1 s and 1 m, the other begins at a time and a place."""
+    rows = [[0, 0, 0, 1, 0], [1, 1, 0, 1, 0]]
+    rows += [[begin_s + k, place_m + k, 0, 1, 0] for k in range(2)]
+    trails = trails_of(rows, [(0, 1), (2, 3)], 10.0)
+    link(trails, 0.1, 3.0, (0.4, 1.2))
+    assert trails.nexts[0] == (1 if gap_s else NONE)
+    assert trails.gaps[0] == pytest.approx(gap_s)
+
+
+def test_a_gap_is_replayed_as_a_cubic():
+    """Around a corner in 2 s at 1 m/s: half of the way is at (0.75, 0.25) from (0, 0) to (1, 1)."""
+    rows = [[0, -1, 0, 1, 0], [1, 0, 0, 1, 0], [3, 1, 1, 0, 1], [4, 1, 2, 0, 1]]
+    trails = trails_of(rows, [(0, 1), (2, 3)], 10.0)
+    link(trails, 0.1, 3.0, (0.4, 1.2))
+    found, velocities = np.empty((1, 4, 2)), np.empty((1, 4, 2))
+    replay_all(trails, np.array([12.0]), 0.3, found, velocities, np.empty(4, np.int64))
+    np.testing.assert_allclose(found[0, 0], [0.75, 0.25])
+    np.testing.assert_allclose(velocities[0, 0], [0.5, 0.5])
+
+
+def test_a_multiple_of_a_period_is_none():
+    """Trails 0 to 4 vote for 10 and 20 s; trails 5 to 9 for 60 s, which is 3 times 20 by chance."""
+    voters = np.zeros((10, 3), bool)
+    voters[:5, :2], voters[5:, 2] = True, True
+    found = multiples(np.array([10.0, 20.0, 60.0]), voters, np.ones(3, bool))
+    assert found.tolist() == [False, True, False]
 
 
 def test_replays_of_one_obstacle_count_once():
@@ -151,3 +206,17 @@ def test_a_track_leaves_its_place_to_its_replay(speed, expected):
     velocities = np.full((4, 2, 2), [1.0, 0.0])
     follow_replays(discs, np.array([[speed, 0.0]]), found, velocities, times, (0.4, 0.8, 0.6), 1e6)
     np.testing.assert_allclose(discs[:, 0, 0], expected)
+
+
+@pytest.mark.parametrize("turned_mps", [1.0, -1.0], ids=["goes on", "has turned"])
+def test_a_track_follows_the_replay_that_begins_where_one_ends(turned_mps):
+    """The first is known for 0 and 1 s, the other from 2 s on; it may have turned in between."""
+    times = np.arange(5.0)
+    discs = np.full((5, 1, 4), 0.5)
+    discs[:, 0, 0], discs[:, 0, 1] = times, 0.0
+    found, velocities = np.full((5, 2, 2), math.nan), np.full((5, 2, 2), math.nan)
+    found[:2, 0], velocities[:2, 0] = [[0.0, 0.0], [1.0, 0.0]], [1.0, 0.0]
+    found[2:, 1] = [[2.0 + turned_mps * k, 0.0] for k in range(3)]
+    velocities[2:, 1] = [turned_mps, 0.0]
+    follow_replays(discs, np.array([[1.0, 0.0]]), found, velocities, times, (0.4, 0.8, 0.6), 1e6)
+    np.testing.assert_allclose(discs[:, 0, 0], 1e6)

@@ -5,10 +5,11 @@ near the predicted discs of the obstacles cost their threat, which falls off as 
 uncertainty of the prediction, and positions far from the end of the plan cost the time to fly
 there. Dynamic programming from the end of the horizon gives the cost of the best motion from each
 cell and step; the commands of a polar grid, and the command that the navigator wishes, are
-followed through one step with the body's lag and take the rest from there. The robot goes behind,
-in front, back or waits as it costs least against all obstacles together. It keeps the wish where
-nothing is much better. Peers are in the way as well: commands are judged as the robot's Voronoi
-cell will leave them, and peers are expected to keep their velocities.
+followed with the response of the body, each with the best of some second commands, and take the
+rest from there, where the body would come to rest. The robot goes behind, in front, back or waits
+as it costs least against all obstacles together. It keeps the wish where nothing is much better.
+Peers are in the way as well: commands are judged as the robot's Voronoi cell will leave them, and
+peers are expected to keep their velocities.
 
 Sources: P. Fiorini, Z. Shiller, "Motion Planning in Dynamic Environments Using Velocity
 Obstacles", IJRR 17(7), 1998: obstacles that keep their velocities, judged in the plane of
@@ -29,7 +30,8 @@ from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
-from quad_nav.kernels.space_time import SpaceTime, StandingObstacles, command_costs, fill_costs
+from quad_nav.kernels.evasion_commands import Body, StandingObstacles, command_costs
+from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -37,15 +39,15 @@ Floats = NDArray[np.float64]
 
 STEP_S = 0.5
 _STEPS = 12
-_SUBSTEPS = 5  # predictions in each step
 _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
-_GAIN_PER_S = 3.0  # of the body's velocity loop
+_BODY = Body(25.0 / 8.0, 2.0 / 25.0, 2.0)  # of sim/flight.py: gain, lag, acceleration
 _FADE_PER_S = 0.35
 _RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 14.0, 100.0, 0.05
 _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _SPEEDS, _COURSES = 4, 24
+_SECOND_SPEEDS, _SECOND_COURSES = 2, 12
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ def evade(
     discs = np.concatenate([discs, peers], axis=1)
     pose = around.pose
     commands = _commands(around.max_speed_mps, pose.rotate(wish.vx_mps, wish.vy_mps))
-    found = _costs_of(commands, around, search, discs, route)
+    found = _costs_of(commands, around, search, discs, route, last)
     found += _CHANGE_S / around.max_speed_mps * np.hypot(*(commands - last).T)
     best = int(np.argmin(found[1:])) + 1
     if found[0] <= found[best] + _WISH_S:
@@ -134,7 +136,12 @@ def evade(
 
 
 def _costs_of(
-    commands: Floats, around: Surroundings, search: SpaceTime, discs: Floats, route: Floats
+    commands: Floats,
+    around: Surroundings,
+    search: SpaceTime,
+    discs: Floats,
+    route: Floats,
+    last: Tuple[float, float],
 ) -> Floats:
     """Return the cost of each of the commands, float64[c]; the commands are float64[c, 2]."""
     middle = _STEPS * _REACH_CELLS + 3
@@ -144,9 +151,18 @@ def _costs_of(
     blocked, to_go = _blocked(standing, offsets), _to_go(around, offsets, route)
     fill_costs(search, discs, blocked, to_go, costs)
     moving = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
+    start = (*moving, *_acceleration(moving, last))
     flown = around.neighbours.limited(commands)
-    found: Floats = command_costs(search, discs, standing, costs, moving, flown)
+    seconds = _polar(around.max_speed_mps, _SECOND_SPEEDS, _SECOND_COURSES)
+    found: Floats = command_costs(search, _BODY, discs, standing, costs, start, flown, seconds)
     return found
+
+
+def _acceleration(velocity: Tuple[float, float], command: Tuple[float, float]) -> Tuple[float, ...]:
+    """Return the acceleration of a body that follows a command, m/s^2."""
+    ax, ay = (_BODY.gain_per_s * (c - v) for c, v in zip(command, velocity))
+    shorten = _BODY.acceleration_mps2 / max(math.hypot(ax, ay), _BODY.acceleration_mps2)
+    return float(shorten * ax), float(shorten * ay)
 
 
 def predicted_discs(
@@ -173,7 +189,7 @@ def predicted_discs(
 
 def _times(step_s: float) -> Floats:
     """Return the times of predictions, five in each step and the end."""
-    times: Floats = np.arange(_STEPS * _SUBSTEPS + 1) * (step_s / _SUBSTEPS)
+    times: Floats = np.arange(_STEPS * SUBSTEPS + 1) * (step_s / SUBSTEPS)
     return times
 
 
@@ -184,7 +200,6 @@ def _search_of(max_speed_mps: float) -> SpaceTime:
         cell_m,
         cell_m * _REACH_CELLS / max_speed_mps,
         max_speed_mps,
-        _GAIN_PER_S,
         _RISK_PER_S,
         _FADE_PER_S,
         _BLOCKED_PER_S,
@@ -194,10 +209,15 @@ def _search_of(max_speed_mps: float) -> SpaceTime:
 
 def _commands(max_speed_mps: float, wished: Tuple[float, float]) -> Floats:
     """Return the wish, the hover and a polar grid of velocities, float64[c, 2]."""
-    courses = np.arange(_COURSES) * (2.0 * math.pi / _COURSES)
-    ring = np.column_stack([np.cos(courses), np.sin(courses)])
-    speeds = max_speed_mps * np.arange(1, _SPEEDS + 1) / _SPEEDS
-    return np.concatenate([[wished], np.zeros((1, 2)), *(speed * ring for speed in speeds)])
+    return np.concatenate([[wished], _polar(max_speed_mps, _SPEEDS, _COURSES)])
+
+
+def _polar(max_speed_mps: float, speeds: int, courses: int) -> Floats:
+    """Return the hover and a polar grid of velocities, float64[c, 2]."""
+    angles = np.arange(courses) * (2.0 * math.pi / courses)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    steps = max_speed_mps * np.arange(1, speeds + 1) / speeds
+    return np.concatenate([np.zeros((1, 2)), *(speed * ring for speed in steps)])
 
 
 def _standing(around: Surroundings) -> StandingObstacles:

@@ -15,27 +15,12 @@ from numpy.typing import NDArray
 
 from quad_nav.kernels.jit import njit
 
-_SUBSTEPS = 5
+SUBSTEPS = 5
+"""Predictions in each step."""
+FAR = 3.0
+"""Standard deviations from a disc at which its threat ends."""
 _DEEP_M = 0.1  # depth inside a disc at which the threat is 2
-_FAR = 3.0  # standard deviations at which the threat ends
-
-
-class StandingObstacles(NamedTuple):
-    """Obstacles that do not move, as cells of the local costmap.
-
-    Positions are relative to the robot, as everywhere in this module.
-
-    Attributes:
-        blocked: bool[H, W], cells where the robot's circle hits something.
-        x_m: x of the corner of cell (0, 0).
-        y_m: y of the corner of cell (0, 0).
-        resolution_m: Size of a cell.
-    """
-
-    blocked: NDArray[np.bool_]
-    x_m: float
-    y_m: float
-    resolution_m: float
+_DURING = 0, 2  # predictions of a step that count: fast obstacles are gone at the next step
 
 
 class SpaceTime(NamedTuple):
@@ -44,7 +29,6 @@ class SpaceTime(NamedTuple):
     cell_m: float
     step_s: float
     max_speed_mps: float
-    gain_per_s: float  # of the body's velocity loop
     risk_per_s: float  # cost of a second at the rim of an obstacle
     fade_per_s: float  # rate at which predictions lose their weight
     blocked_per_s: float  # cost of a second on a blocked cell
@@ -65,17 +49,21 @@ def threat(discs: NDArray[np.float64], k: int, x: float, y: float) -> float:
     """
     total = 0.0
     for n in range(discs.shape[1]):
-        dx, dy = x - discs[k, n, 0], y - discs[k, n, 1]
-        radius, sigma = discs[k, n, 2], discs[k, n, 3]
-        squared = dx * dx + dy * dy
-        if squared >= (radius + _FAR * sigma) ** 2:
-            continue
-        beyond = math.sqrt(squared) - radius
-        if beyond <= 0.0:
-            total += 1.0 - beyond / _DEEP_M
-        else:
-            total += math.exp(-0.5 * (beyond / sigma) ** 2)
+        total += _threat_of(discs[k, n], x, y)
     return total
+
+
+@njit(cache=True, nogil=True)
+def _threat_of(disc: NDArray[np.float64], x: float, y: float) -> float:
+    """Return the threat of one disc, float64[4], at a point."""
+    dx, dy, radius, sigma = x - disc[0], y - disc[1], disc[2], disc[3]
+    squared = dx * dx + dy * dy
+    if squared >= (radius + FAR * sigma) ** 2:
+        return 0.0
+    beyond = math.sqrt(squared) - radius
+    if beyond <= 0.0:
+        return 1.0 - beyond / _DEEP_M
+    return math.exp(-0.5 * (beyond / sigma) ** 2)
 
 
 @njit(cache=True, nogil=True)
@@ -98,19 +86,46 @@ def fill_costs(
     steps, middle = costs.shape[0] - 1, costs.shape[1] // 2
     reach = int(search.max_speed_mps * search.step_s / search.cell_m + 1e-6)
     costs[steps] = to_go
+    threats = np.zeros(to_go.shape)
     for k in range(steps - 1, 0, -1):
         risk = search.risk_per_s * math.exp(-search.fade_per_s * k * search.step_s)
         near = min(k * reach + 2, middle - reach)
+        threats[:] = 0.0
+        for later in _DURING:
+            _add_threats(discs[k * SUBSTEPS + later], search.cell_m, near, threats)
         for row in range(middle - near, middle + near + 1):
             for column in range(middle - near, middle + near + 1):
-                x, y = (column - middle) * search.cell_m, (row - middle) * search.cell_m
-                cost = risk * threat(discs, k * _SUBSTEPS, x, y)
+                cost = risk * threats[row, column] / len(_DURING)
                 cost += search.away_per_s * to_go[row, column]
                 if blocked[row, column]:
                     cost += search.blocked_per_s
                 costs[k, row, column] = cost * search.step_s + _least(
                     costs[k + 1], row, column, reach
                 )
+
+
+@njit(cache=True, nogil=True)
+def _add_threats(
+    discs: NDArray[np.float64], cell: float, near: int, threats: NDArray[np.float64]
+) -> None:
+    """Add the threat of discs, float64[n, 4], at the cells up to ``near`` cells from the middle."""
+    middle = threats.shape[0] // 2
+    for n in range(discs.shape[0]):
+        far = discs[n, 2] + FAR * discs[n, 3]
+        left, right = _cells(discs[n, 0], far, cell, near)
+        low, high = _cells(discs[n, 1], far, cell, near)
+        for row in range(low, high + 1):
+            for column in range(left, right + 1):
+                threats[middle + row, middle + column] += _threat_of(
+                    discs[n], column * cell, row * cell
+                )
+
+
+@njit(cache=True, nogil=True)
+def _cells(place: float, far: float, cell: float, near: int) -> Tuple[int, int]:
+    """Return the first and the last cell from the middle that are less than ``far`` away."""
+    first, last = math.ceil((place - far) / cell), math.floor((place + far) / cell)
+    return max(int(first), -near), min(int(last), near)
 
 
 @njit(cache=True, nogil=True)
@@ -122,97 +137,3 @@ def _least(costs: NDArray[np.float64], row: int, column: int, reach: int) -> flo
             if i * i + j * j <= reach * reach:
                 least = min(least, costs[row + i, column + j])
     return least
-
-
-@njit(cache=True, nogil=True)
-def command_costs(
-    search: SpaceTime,
-    discs: NDArray[np.float64],
-    standing: StandingObstacles,
-    costs: NDArray[np.float64],
-    velocity: Tuple[float, float],
-    commands: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the cost of each command, held for a step, and of the best motion afterwards.
-
-    The robot approaches the command as a first-order lag. A command after which it cannot stop
-    before a standing obstacle costs extra, because the best motion afterwards ignores inertia.
-
-    Args:
-        search: Resolution and costs.
-        discs: As for ``fill_costs``.
-        standing: Obstacles that do not move.
-        costs: float64[steps + 1, M, M], of ``fill_costs``.
-        velocity: Present velocity of the robot, vx and vy in m/s.
-        commands: float64[c, 2], vx and vy in m/s.
-
-    Returns:
-        float64[c].
-    """
-    found = np.empty(commands.shape[0])
-    for n in range(commands.shape[0]):
-        vx, vy = commands[n, 0], commands[n, 1]
-        cost, x, y, lag = 0.0, 0.0, 0.0, 0.0
-        for k in range(1, _SUBSTEPS + 1):
-            time = k * search.step_s / _SUBSTEPS
-            lag = _lag(search, time)
-            x = velocity[0] * lag + vx * (time - lag)
-            y = velocity[1] * lag + vy * (time - lag)
-            rate = search.risk_per_s * threat(discs, k, x, y)
-            if _is_blocked(standing, x, y):
-                rate += search.blocked_per_s
-            cost += rate * search.step_s / _SUBSTEPS
-        left = 1.0 - search.gain_per_s * lag  # part of the old velocity after the step
-        stopping = vx + (velocity[0] - vx) * left, vy + (velocity[1] - vy) * left
-        cost += _stopping_cost(search, standing, (x, y), stopping)
-        found[n] = cost + _between(costs[1], x / search.cell_m, y / search.cell_m)
-    return found
-
-
-@njit(cache=True, nogil=True)
-def _lag(search: SpaceTime, time: float) -> float:
-    """Return the time for which a velocity goes on that decays for a time."""
-    return (1.0 - math.exp(-search.gain_per_s * time)) / search.gain_per_s
-
-
-@njit(cache=True, nogil=True)
-def _stopping_cost(
-    search: SpaceTime,
-    standing: StandingObstacles,
-    start: Tuple[float, float],
-    velocity: Tuple[float, float],
-) -> float:
-    """Return the cost of what stands on the way to a stop."""
-    cost = 0.0
-    for k in range(1, 2 * _SUBSTEPS + 1):
-        lag = _lag(search, k * search.step_s / _SUBSTEPS)
-        if _is_blocked(standing, start[0] + velocity[0] * lag, start[1] + velocity[1] * lag):
-            cost += search.blocked_per_s * search.step_s / _SUBSTEPS
-    return cost
-
-
-@njit(cache=True, nogil=True)
-def _is_blocked(standing: StandingObstacles, x: float, y: float) -> bool:
-    """Return whether something stands at a point; nothing is known outside of the grid."""
-    column = math.floor((x - standing.x_m) / standing.resolution_m)
-    row = math.floor((y - standing.y_m) / standing.resolution_m)
-    size_y, size_x = standing.blocked.shape
-    return 0 <= row < size_y and 0 <= column < size_x and standing.blocked[row, column]
-
-
-@njit(cache=True, nogil=True)
-def _inside(index: int, middle: int) -> int:
-    return min(max(index, 0), 2 * middle)
-
-
-@njit(cache=True, nogil=True)
-def _between(costs: NDArray[np.float64], x: float, y: float) -> float:
-    """Interpolate float64[M, M] at (x, y) cells from the middle."""
-    middle = costs.shape[0] // 2
-    column, row = math.floor(x), math.floor(y)
-    right, up = x - column, y - row
-    i, j = _inside(int(row) + middle, middle), _inside(int(column) + middle, middle)
-    k, m = _inside(i + 1, middle), _inside(j + 1, middle)
-    return (1.0 - up) * ((1.0 - right) * costs[i, j] + right * costs[i, m]) + up * (
-        (1.0 - right) * costs[k, j] + right * costs[k, m]
-    )

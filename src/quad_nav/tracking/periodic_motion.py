@@ -24,15 +24,8 @@ from typing import Dict
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.periodic_motion import (
-    NONE,
-    Trails,
-    Votes,
-    drop_repeats,
-    link,
-    replay_all,
-    vote,
-)
+from quad_nav.kernels.period_votes import Votes, vote
+from quad_nav.kernels.periodic_motion import NONE, Trails, drop_repeats, link, replay_all
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -189,7 +182,7 @@ class PeriodicMotion:
         sound = (first.sum(axis=0) >= _LAGS) & ((first * weights).sum(axis=0) >= _VOTES)
         trails = self._votes.trails[: self._lags]
         firsts = self._by_trail(trails, first * weights)
-        sound &= ~_multiples(periods, firsts > 0.0, sound)
+        sound &= ~multiples(periods, firsts > 0.0, sound)
         support = self._by_trail(trails, weights * sound)
         exact = self._by_trail(trails, weights * sound * lags[:, None] / turns)
         near = self._by_trail(trails, weights * sound / turns)  # half a period has less votes
@@ -288,7 +281,7 @@ def _proposed(lags: Floats, counts: Integers) -> Floats:
     return means
 
 
-def _multiples(
+def multiples(
     periods: Floats, voters: NDArray[np.bool_], sound: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """Return which periods are multiples of a sound one, bool[p].

@@ -1,0 +1,195 @@
+"""Costs of velocity commands: the body's response to two of them, then the best motion.
+
+``control/evasion.py`` has the reasoning, ``space_time.py`` the best motion, frames and times.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.kernels.jit import njit
+from quad_nav.kernels.space_time import FAR, SUBSTEPS, SpaceTime, threat
+
+_FIRST, _BOTH = 4, 10  # predictions during the first command, and during both
+_PARTS = 2  # steps of the body's motion between two predictions
+
+
+class StandingObstacles(NamedTuple):
+    """Obstacles that do not move, as cells of the local costmap.
+
+    Positions are relative to the robot, as everywhere in this module.
+
+    Attributes:
+        blocked: bool[H, W], cells where the robot's circle hits something.
+        x_m: x of the corner of cell (0, 0).
+        y_m: y of the corner of cell (0, 0).
+        resolution_m: Size of a cell.
+    """
+
+    blocked: NDArray[np.bool_]
+    x_m: float
+    y_m: float
+    resolution_m: float
+
+
+class Body(NamedTuple):
+    """Response of the body to a velocity command, see ``control/evasion.py``."""
+
+    gain_per_s: float  # of the velocity loop
+    lag_s: float  # of the acceleration
+    acceleration_mps2: float  # greatest
+
+
+@njit(cache=True, nogil=True)
+def command_costs(
+    search: SpaceTime,
+    body: Body,
+    discs: NDArray[np.float64],
+    standing: StandingObstacles,
+    costs: NDArray[np.float64],
+    start: Tuple[float, float, float, float],
+    commands: NDArray[np.float64],
+    seconds: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the cost of each command, of the best second one, and of the best motion afterwards.
+
+    A second command after which the body cannot stop before a standing obstacle costs extra,
+    because the best motion afterwards ignores inertia.
+
+    Args:
+        search: Resolution and costs.
+        body: Response of the body.
+        discs: As for ``fill_costs``.
+        standing: Obstacles that do not move.
+        costs: float64[steps + 1, M, M], of ``fill_costs``.
+        start: Present velocity of the robot, m/s, and acceleration, m/s^2, along x and y.
+        commands: float64[c, 2], vx and vy in m/s.
+        seconds: float64[d, 2], commands that may follow each of them, besides itself.
+
+    Returns:
+        float64[c].
+    """
+    found = np.empty(commands.shape[0])
+    first, moving = np.empty(6), np.empty(6)
+    discs = _near(search, discs)
+    for n in range(commands.shape[0]):
+        first[:2], first[2:] = 0.0, start
+        cost = _follow(search, body, discs, standing, first, commands[n], 0, _FIRST)
+        least = math.inf
+        for m in range(seconds.shape[0] + 1):
+            moving[:] = first
+            second = commands[n] if m == seconds.shape[0] else seconds[m]
+            after = _follow(search, body, discs, standing, moving, second, _FIRST, _BOTH)
+            if after < least:
+                least = min(least, after + _end_cost(search, body, standing, costs, moving))
+        found[n] = cost + least
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _near(search: SpaceTime, discs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the discs that the robot may come near during the commands, float64[t, m, 4]."""
+    chosen = np.zeros(discs.shape[1], np.bool_)
+    for n in range(discs.shape[1]):
+        for k in range(_BOTH + 1):
+            reach = search.max_speed_mps * k * search.step_s / SUBSTEPS
+            far = discs[k, n, 2] + FAR * discs[k, n, 3] + reach
+            if math.hypot(discs[k, n, 0], discs[k, n, 1]) < far:
+                chosen[n] = True
+    return discs[: _BOTH + 1, chosen]
+
+
+@njit(cache=True, nogil=True)
+def _follow(
+    search: SpaceTime,
+    body: Body,
+    discs: NDArray[np.float64],
+    standing: StandingObstacles,
+    moving: NDArray[np.float64],
+    command: NDArray[np.float64],
+    begin: int,
+    end: int,
+) -> float:
+    """Move the body, float64[6], under a command from one prediction to another.
+
+    Returns:
+        The cost on the way.
+    """
+    dt = search.step_s / SUBSTEPS
+    rest = math.exp(-dt / _PARTS / body.lag_s)
+    cost = 0.0
+    for k in range(begin + 1, end + 1):
+        for _ in range(_PARTS):
+            _move(body, moving, command, dt / _PARTS, rest)
+        rate = search.risk_per_s * threat(discs, k, moving[0], moving[1])
+        if _is_blocked(standing, moving[0], moving[1]):
+            rate += search.blocked_per_s
+        cost += rate * dt
+    return cost
+
+
+@njit(cache=True, nogil=True)
+def _move(
+    body: Body, moving: NDArray[np.float64], command: NDArray[np.float64], dt: float, rest: float
+) -> None:
+    """Move the body by a step: position, velocity and acceleration, float64[6]."""
+    ax = body.gain_per_s * (command[0] - moving[2])
+    ay = body.gain_per_s * (command[1] - moving[3])
+    shorten = body.acceleration_mps2 / max(math.hypot(ax, ay), body.acceleration_mps2)
+    for i, wanted in ((0, ax * shorten), (1, ay * shorten)):
+        moving[4 + i] = wanted + (moving[4 + i] - wanted) * rest
+        moving[i] += dt * (moving[2 + i] + 0.5 * dt * moving[4 + i])
+        moving[2 + i] += dt * moving[4 + i]
+
+
+@njit(cache=True, nogil=True)
+def _end_cost(
+    search: SpaceTime,
+    body: Body,
+    standing: StandingObstacles,
+    costs: NDArray[np.float64],
+    moving: NDArray[np.float64],
+) -> float:
+    """Return the cost of the best motion after the second command, from where the body stops."""
+    lag_s = 1.0 / body.gain_per_s
+    speed = math.hypot(moving[2], moving[3])
+    over = max(speed - body.acceleration_mps2 / body.gain_per_s, 0.0)
+    lag_s += 0.5 * over * over / body.acceleration_mps2 / max(speed, 1e-9)
+    x, y = moving[0] + lag_s * moving[2], moving[1] + lag_s * moving[3]
+    cost = 0.0
+    for k in range(1, SUBSTEPS + 1):
+        at = lag_s * k / SUBSTEPS
+        if _is_blocked(standing, moving[0] + at * moving[2], moving[1] + at * moving[3]):
+            cost += search.blocked_per_s * search.step_s / SUBSTEPS
+    return cost + _between(costs[_BOTH // SUBSTEPS], x / search.cell_m, y / search.cell_m)
+
+
+@njit(cache=True, nogil=True)
+def _is_blocked(standing: StandingObstacles, x: float, y: float) -> bool:
+    """Return whether something stands at a point; nothing is known outside of the grid."""
+    column = math.floor((x - standing.x_m) / standing.resolution_m)
+    row = math.floor((y - standing.y_m) / standing.resolution_m)
+    size_y, size_x = standing.blocked.shape
+    return 0 <= row < size_y and 0 <= column < size_x and standing.blocked[row, column]
+
+
+@njit(cache=True, nogil=True)
+def _inside(index: int, middle: int) -> int:
+    return min(max(index, 0), 2 * middle)
+
+
+@njit(cache=True, nogil=True)
+def _between(costs: NDArray[np.float64], x: float, y: float) -> float:
+    """Interpolate float64[M, M] at (x, y) cells from the middle."""
+    middle = costs.shape[0] // 2
+    column, row = math.floor(x), math.floor(y)
+    right, up = x - column, y - row
+    i, j = _inside(int(row) + middle, middle), _inside(int(column) + middle, middle)
+    k, m = _inside(i + 1, middle), _inside(j + 1, middle)
+    return (1.0 - up) * ((1.0 - right) * costs[i, j] + right * costs[i, m]) + up * (
+        (1.0 - right) * costs[k, j] + right * costs[k, m]
+    )
