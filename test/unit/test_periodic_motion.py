@@ -7,11 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from quad_nav.control.prediction import predict
 from quad_nav.kernels.periodic_motion import (
     NONE,
     Trails,
     drop_repeats,
     follow_replays,
+    forget_after,
     link,
     replay_all,
 )
@@ -102,12 +104,18 @@ def test_a_full_memory_learns_anew():
     assert motion.is_empty
 
 
+def seen_tracks(time_s, states):
+    """Return tracks numbered from 7 on that are seen well."""
+    n = len(states)
+    return Tracks(
+        time_s, np.arange(7, 7 + n), np.array(states), np.zeros((n, 4, 4)), np.full(n, 0.4)
+    )
+
+
 def test_motion_memory_replays_what_it_has_seen_well():
     memory = MotionMemory()
     for k in range(601):
-        states = np.array([circling(0.1 * k)])
-        seen = Tracks(0.1 * k, np.array([7]), states, np.zeros((1, 4, 4)), np.array([0.4]))
-        memory.add(seen)
+        memory.add(seen_tracks(0.1 * k, [circling(0.1 * k)]))
     replays = memory.replay(60.0 + AHEAD_S)
     np.testing.assert_allclose(known_places(replays), places(60.0 + AHEAD_S), atol=0.02)
     memory.reset()
@@ -220,3 +228,25 @@ def test_a_track_follows_the_replay_that_begins_where_one_ends(turned_mps):
     velocities[2:, 1] = [turned_mps, 0.0]
     follow_replays(discs, np.array([[1.0, 0.0]]), found, velocities, times, (0.4, 0.8, 0.6), 1e6)
     np.testing.assert_allclose(discs[:, 0, 0], 1e6)
+
+
+def test_discs_without_a_replay_are_forgotten_after_a_while():
+    """The first has none; the other has one until 2 s."""
+    discs = np.zeros((6, 2, 4))
+    discs[:3, 1, :2] = 1e6
+    forget_after(discs, np.arange(6.0), 1.5, 1e6)
+    assert (discs[:, 0, 0] == 1e6).tolist() == [False, False, True, True, True, True]
+    assert (discs[:, 1, 0] == 1e6).tolist() == [True, True, True, False, True, True]
+
+
+@pytest.mark.parametrize("others, known", [(1, False), (2, True)])
+def test_where_most_obstacles_repeat_their_motion_others_are_known_for_a_while(others, known):
+    """One obstacle has a period; one or two that come later are predicted for 1.5 s or longer."""
+    memory = MotionMemory()
+    for k in range(601):
+        memory.add(seen_tracks(0.1 * k, [circling(0.1 * k)]))
+    strangers = [[-20.0, 3.0 * n, 1.0, 0.0] for n in range(others)]
+    tracks = seen_tracks(60.0, [circling(60.0), *strangers])
+    discs = predict(tracks, memory, np.array([0.0, 1.0, 2.0]))
+    np.testing.assert_allclose(discs[:2, 1, 0], [-20.0, -19.0])
+    assert (abs(discs[2, 1, 0]) < 1e3) == known

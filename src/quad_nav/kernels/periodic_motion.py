@@ -224,7 +224,7 @@ def follow_replays(
     times: NDArray[np.float64],
     same: Tuple[float, float, float],
     nowhere: float,
-) -> None:
+) -> int:
     """Leave the discs of tracks that have a replay to it; after its end they keep its velocity.
 
     Where the replay ends and another is alike, the other continues it. A disc is nowhere while a
@@ -239,8 +239,11 @@ def follow_replays(
         same: Differences of place and velocity between a track and its replay that count as 1, and
             the distance to a replay within which a disc is of the same obstacle.
         nowhere: Coordinates of a disc that is nowhere.
+
+    Returns:
+        Number of tracks that have a replay now.
     """
-    state = np.empty(4)
+    state, count = np.empty(4), 0
     for n in range(discs.shape[1]):
         state[:2], state[2:] = discs[0, n, :2], motions[n]
         column, since, follows = NONE, 0.0, False
@@ -259,6 +262,30 @@ def follow_replays(
                 discs[k, n, :2] = state[:2] + (times[k] - since) * state[2:]
                 if _is_near(discs[k, n, 0], discs[k, n, 1], places[k], same[2]):
                     discs[k, n, :2] = nowhere
+        count += 1 if follows else 0
+    return count
+
+
+@njit(cache=True, nogil=True)
+def forget_after(
+    discs: NDArray[np.float64], times: NDArray[np.float64], longest: float, nowhere: float
+) -> None:
+    """Let discs be nowhere that have no replay for a time.
+
+    Args:
+        discs: float64[t, n, 4], as ``follow_replays`` leaves them, changed in place.
+        times: float64[t], from 0 on.
+        longest: The time, from now on or since a disc was nowhere.
+        nowhere: Coordinates of a disc that is nowhere.
+    """
+    for n in range(discs.shape[1]):
+        since = 0.0
+        for k in range(times.shape[0]):
+            if discs[k, n, 0] == nowhere:
+                since = times[k]
+            elif times[k] - since > longest:
+                discs[k:, n, :2] = nowhere
+                break
 
 
 @njit(cache=True, nogil=True)
