@@ -47,7 +47,7 @@ _JOINS = 5  # trails in a row that have their period from others
 _JOIN_S, _JOIN_M, _JOIN_MPS = 1.5, 0.2, 0.25  # gap at a join, offset and its growth
 _LABEL_PERIOD_S = 1.0
 _SAME_S, _GAP_S = 0.12, 3.0  # difference of the periods of one obstacle, longest gap of its trails
-_LINK_M, _LINK_SPEED = 0.4, 1.2
+_LINK_M, _LINK_SPEED = 0.4, 1.2  # offset, and mean speed in a gap in times of the faster end
 _BEYOND_S = 0.3
 _SAME_M = 0.4  # two replays of one obstacle are nearer
 _COLUMNS = 400  # replays at a time
@@ -185,7 +185,7 @@ class PeriodicMotion:
         sound &= ~multiples(periods, firsts > 0.0, sound)
         support = self._by_trail(trails, weights * sound)
         exact = self._by_trail(trails, weights * sound * lags[:, None] / turns)
-        near = self._by_trail(trails, weights * sound / turns)  # half a period has less votes
+        near = self._by_trail(trails, weights * sound / turns)  # half a period has fewer votes
         rows, best = np.arange(len(support)), near.argmax(axis=1)
         most = support[rows, best]
         own = exact[rows, best] / np.maximum(most, 1.0)
