@@ -31,14 +31,14 @@ from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
 from quad_nav.kernels.evasion_commands import Body, StandingObstacles, command_costs
-from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
+from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs, fill_way
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
 Floats = NDArray[np.float64]
 
 STEP_S = 0.5
-_STEPS = 12
+_HORIZON_S, _WINDOW_M = 6.0, 5.0
 _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
 _BODY = Body(25.0 / 8.0, 2.0 / 25.0, 2.0)  # of sim/flight.py: gain, lag, acceleration
@@ -144,11 +144,12 @@ def _costs_of(
     last: Tuple[float, float],
 ) -> Floats:
     """Return the cost of each of the commands, float64[c]; the commands are float64[c, 2]."""
-    middle = _STEPS * _REACH_CELLS + 3
+    steps = _steps(search.step_s)
+    middle = min(steps * _REACH_CELLS + 3, int(_WINDOW_M / search.cell_m))
     offsets = np.arange(-middle, middle + 1) * search.cell_m
     standing = _standing(around)
-    costs = np.full((_STEPS + 1, len(offsets), len(offsets)), math.inf)
-    blocked, to_go = _blocked(standing, offsets), _to_go(around, offsets, route)
+    costs = np.full((steps + 1, len(offsets), len(offsets)), math.inf)
+    blocked, to_go = _blocked(standing, offsets), _to_go(around, search, len(offsets), route)
     fill_costs(search, discs, blocked, to_go, costs)
     moving = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
     start = (*moving, *_acceleration(moving, last))
@@ -178,7 +179,7 @@ def predicted_discs(
     offsets = now.states[:, :2] - np.array([around.pose.x_m, around.pose.y_m])
     speeds = np.hypot(now.states[:, 2], now.states[:, 3])
     radii = now.radii_m + around.radius_m + params.clearance_m
-    horizon_s = _STEPS * step_s
+    horizon_s = _steps(step_s) * step_s
     reach_m = radii + (speeds + around.max_speed_mps) * horizon_s
     near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
     place = around.pose.x_m, around.pose.y_m
@@ -187,9 +188,14 @@ def predicted_discs(
     return discs
 
 
+def _steps(step_s: float) -> int:
+    """Return the number of steps up to the horizon."""
+    return round(_HORIZON_S / step_s)
+
+
 def _times(step_s: float) -> Floats:
     """Return the times of predictions, five in each step and the end."""
-    times: Floats = np.arange(_STEPS * SUBSTEPS + 1) * (step_s / SUBSTEPS)
+    times: Floats = np.arange(_steps(step_s) * SUBSTEPS + 1) * (step_s / SUBSTEPS)
     return times
 
 
@@ -243,12 +249,11 @@ def _blocked(standing: StandingObstacles, offsets: Floats) -> NDArray[np.bool_]:
     return inside & standing.blocked[at]
 
 
-def _to_go(around: Surroundings, offsets: Floats, route: Floats) -> Floats:
-    """Return the time to the end of the route from each cell, float64[M, M]."""
+def _to_go(around: Surroundings, search: SpaceTime, size: int, route: Floats) -> Floats:
+    """Return the time to the end of the route from each cell, float64[size, size]."""
     legs = np.hypot(*np.diff(route, axis=0).T)
     left = np.concatenate([np.cumsum(legs[::-1])[::-1], [0.0]])
-    x = around.pose.x_m + offsets
-    y = around.pose.y_m + offsets
-    away = np.hypot(x[None, :, None] - route[:, 0], y[:, None, None] - route[:, 1])
-    to_go: Floats = (away + left).min(axis=2) / around.max_speed_mps
+    way = np.empty((size, size))
+    fill_way(route - (around.pose.x_m, around.pose.y_m), left, search.cell_m, way)
+    to_go: Floats = way / around.max_speed_mps
     return to_go

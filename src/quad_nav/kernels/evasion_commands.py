@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.space_time import FAR, SUBSTEPS, SpaceTime, threat
 
-_FIRST, _BOTH = 4, 10  # predictions during the first command, and during both
+_FIRST_S, _BOTH_S = 0.4, 1.0  # durations of the first command, and of both
 _PARTS = 2  # steps of the body's motion between two predictions
 
 
@@ -75,32 +75,34 @@ def command_costs(
     """
     found = np.empty(commands.shape[0])
     first, moving = np.empty(6), np.empty(6)
-    discs = _near(search, discs)
+    period_s = search.step_s / SUBSTEPS
+    one, both = round(_FIRST_S / period_s), SUBSTEPS * round(_BOTH_S / search.step_s)
+    discs, costs_after = _near(search, discs, both), costs[both // SUBSTEPS]
     for n in range(commands.shape[0]):
         first[:2], first[2:] = 0.0, start
-        cost = _follow(search, body, discs, standing, first, commands[n], 0, _FIRST)
+        cost = _follow(search, body, discs, standing, first, commands[n], 0, one)
         least = math.inf
         for m in range(seconds.shape[0] + 1):
             moving[:] = first
             second = commands[n] if m == seconds.shape[0] else seconds[m]
-            after = _follow(search, body, discs, standing, moving, second, _FIRST, _BOTH)
+            after = _follow(search, body, discs, standing, moving, second, one, both)
             if after < least:
-                least = min(least, after + _end_cost(search, body, standing, costs, moving))
+                least = min(least, after + _end_cost(search, body, standing, costs_after, moving))
         found[n] = cost + least
     return found
 
 
 @njit(cache=True, nogil=True)
-def _near(search: SpaceTime, discs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the discs that the robot may come near during the commands, float64[t, m, 4]."""
+def _near(search: SpaceTime, discs: NDArray[np.float64], last: int) -> NDArray[np.float64]:
+    """Return the discs that the robot may come near up to a prediction, float64[t, m, 4]."""
     chosen = np.zeros(discs.shape[1], np.bool_)
     for n in range(discs.shape[1]):
-        for k in range(_BOTH + 1):
+        for k in range(last + 1):
             reach = search.max_speed_mps * k * search.step_s / SUBSTEPS
             far = discs[k, n, 2] + FAR * discs[k, n, 3] + reach
             if math.hypot(discs[k, n, 0], discs[k, n, 1]) < far:
                 chosen[n] = True
-    return discs[: _BOTH + 1, chosen]
+    return discs[: last + 1, chosen]
 
 
 @njit(cache=True, nogil=True)
@@ -165,7 +167,7 @@ def _end_cost(
         at = lag_s * k / SUBSTEPS
         if _is_blocked(standing, moving[0] + at * moving[2], moving[1] + at * moving[3]):
             cost += search.blocked_per_s * search.step_s / SUBSTEPS
-    return cost + _between(costs[_BOTH // SUBSTEPS], x / search.cell_m, y / search.cell_m)
+    return cost + _between(costs, x / search.cell_m, y / search.cell_m)
 
 
 @njit(cache=True, nogil=True)
