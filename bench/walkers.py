@@ -1,11 +1,12 @@
 """Fly among people, and count contacts: how many, and what the quadcopter did then.
 
-    python bench/walkers.py                                  # arena and corridor, 2 and 8 robots
+    python bench/walkers.py                                  # arena and hallway, 2 and 8 robots
     python bench/walkers.py 2in12 corridor --seeds 10 --set fixes/avoid_moving_obstacles=false
 
-``8in12`` are eight quadcopters with a random mission in an arena of 12 m, ``corridor`` is that of
-``goals/encounters``; people walk in both. Of the contacts with people, in the period of odometry
-(25 ms) before the touch the quadcopter
+``8in12`` are eight quadcopters with a random mission in an arena of 12 m. ``8hallway`` are eight
+in a hallway of 4 m by 24 m, half of them at each end, which fly to the other end and back.
+``corridor`` is that of ``goals/encounters``, too narrow for two. People walk in all of them. Of the
+contacts with people, in the period of odometry (25 ms) before the touch the quadcopter
 
 * *moved* if its speed was above 0.05 m/s, in any direction;
 * *moved into* the person if its velocity had a part above 0.05 m/s from its centre towards the
@@ -17,22 +18,32 @@ Contacts with anything else are in the column ``others``.
 
 from __future__ import annotations
 
+import math
+import re
 import sys
+import tempfile
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, List, Optional, Sequence, Tuple
 
 import click
 import numpy as np
 import tabulate
-from encounters import options_of, parameter
+from encounters import JITTER_M, options_of, parameter
 
+from quad_nav.geometry import Pose2D
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.offline.run import fly
 from quad_nav.offline.workers import LocalWorkers, fly_all
-from quad_nav.scenario.flight_setup import FlightSetup, read_setup
+from quad_nav.scenario.flight_setup import FlightOptions, FlightSetup, read_setup
+from quad_nav.scenario.random_mission import RandomMission
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.motion import Walkers
+from quad_nav.sim.scene import Scene, Walls
+from quad_nav.sim.simulation import SimulationParams
 
+HALLWAY = re.compile(r"(\d+)hallway")
+HALLWAY_M = 24.0, 4.0
 MOVED_MPS = 0.05
 PERIOD_S = 0.025
 
@@ -109,10 +120,37 @@ class Touches(FlightObserver):
         )
 
 
+def hallway(robots: int) -> RandomMission:
+    """Return a hallway with half of the robots at each end, which fly to the other end and back."""
+    length_m, width_m = HALLWAY_M
+    starts, goals = [], []
+    for robot in range(robots):
+        row, place = divmod(robot // 2, 2)
+        x_m, y_m = 1.0 + 1.5 * row, width_m * (0.3 if place else 0.7)
+        ends = (x_m, length_m - x_m) if robot % 2 == 0 else (length_m - x_m, x_m)
+        starts.append(Pose2D(ends[0], y_m, math.pi * (robot % 2)))
+        goals.append(((ends[1], y_m), (ends[0], y_m)))
+    scene = Scene("hallway", length_m, width_m, 1.0, Walls(), (), tuple(starts))
+    return RandomMission(scene, tuple(goals))
+
+
+def mission_options(task: Task, folder: Path) -> FlightOptions:
+    """Return the options of a flight; files that it needs are written to a folder."""
+    named = HALLWAY.fullmatch(task.name)
+    if not named:
+        return options_of(task.name, task.seed, task.config)
+    scene, goals = folder / "hallway.yaml", folder / "goals"
+    hallway(int(named[1])).write(scene, goals)
+    jitter = SimulationParams(jitter_m=JITTER_M)
+    return FlightOptions(scene, goals, task.config, seed=task.seed, simulation=jitter)
+
+
 def setup_of(task: Task) -> FlightSetup:
     """Return the flight with people in its scene."""
-    options = options_of(task.name, task.seed, task.config)
-    setup = read_setup(replace(options, parameters=task.parameters, time_limit_s=task.time_limit_s))
+    with tempfile.TemporaryDirectory() as folder:
+        options = mission_options(task, Path(folder))
+        options = replace(options, parameters=task.parameters, time_limit_s=task.time_limit_s)
+        setup = read_setup(options)
     walkers = Walkers(task.people, reacting=task.reacting) if task.people else None
     return replace(setup, scene=replace(setup.scene, walkers=walkers))
 
@@ -173,7 +211,10 @@ def main(
     jobs: int,
 ) -> None:
     """Fly among people and print a table of the results."""
-    names, given = names or ("2in12", "8in12", "corridor"), tuple(map(parameter, parameters))
+    names, given = (
+        names or ("2in12", "8in12", "2hallway", "8hallway"),
+        tuple(map(parameter, parameters)),
+    )
     tasks = [
         (k, Task(name, seed, config, given, people, reacting, time_limit))
         for k, (name, seed) in enumerate(

@@ -11,7 +11,7 @@ from quad_nav.control.evasion import EvasionParams, Surroundings, evade, predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
 from quad_nav.kernels.evasion_commands import Body, StandingObstacles, command_costs
-from quad_nav.kernels.space_time import SpaceTime, fill_costs, fill_way, threat
+from quad_nav.kernels.space_time import SpaceTime, fill_costs, threat
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -130,15 +130,6 @@ def test_waiting_costs_less_than_the_way_through():
     # From the middle one step of 0.25 m to the left of the disc, 0.5 s of way left after it.
     assert costs[1, 7, 7] == pytest.approx(0.05 * 1.0 * 0.5 + 0.5)
     assert costs[1, 7, 9] == pytest.approx((50.0 * 3.0 + 0.05 * 0.5) * 0.5)
-
-
-def test_the_way_of_a_cell_leads_straight_to_the_route():
-    """The route leads from (1, 0) to (1, 2)."""
-    route, left, way = np.array([[1.0, 0.0], [1.0, 2.0]]), np.array([2.0, 0.0]), np.empty((3, 3))
-    fill_way(route, left, 1.0, way)
-    assert way[1, 2] == 2.0  # on the corner, as far as straight to the end
-    assert way[1, 0] == pytest.approx(math.sqrt(8.0))  # straight to the end instead of 2 + 2
-    assert way[2, 1] == pytest.approx(math.sqrt(2.0))
 
 
 def test_a_fast_obstacle_threatens_between_the_steps():

@@ -31,7 +31,7 @@ from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
 from quad_nav.kernels.evasion_commands import Body, StandingObstacles, command_costs
-from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs, fill_way
+from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -43,7 +43,7 @@ _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
 _BODY = Body(25.0 / 8.0, 2.0 / 25.0, 2.0)  # of sim/flight.py: gain, lag, acceleration
 _FADE_PER_S = 0.35
-_RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 14.0, 100.0, 0.05
+_RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 40.0, 100.0, 0.05
 _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _SPEEDS, _COURSES = 4, 24
@@ -149,7 +149,7 @@ def _costs_of(
     offsets = np.arange(-middle, middle + 1) * search.cell_m
     standing = _standing(around)
     costs = np.full((steps + 1, len(offsets), len(offsets)), math.inf)
-    blocked, to_go = _blocked(standing, offsets), _to_go(around, search, len(offsets), route)
+    blocked, to_go = _blocked(standing, offsets), _to_go(around, offsets, route[-1])
     fill_costs(search, discs, blocked, to_go, costs)
     moving = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
     start = (*moving, *_acceleration(moving, last))
@@ -249,11 +249,8 @@ def _blocked(standing: StandingObstacles, offsets: Floats) -> NDArray[np.bool_]:
     return inside & standing.blocked[at]
 
 
-def _to_go(around: Surroundings, search: SpaceTime, size: int, route: Floats) -> Floats:
-    """Return the time to the end of the route from each cell, float64[size, size]."""
-    legs = np.hypot(*np.diff(route, axis=0).T)
-    left = np.concatenate([np.cumsum(legs[::-1])[::-1], [0.0]])
-    way = np.empty((size, size))
-    fill_way(route - (around.pose.x_m, around.pose.y_m), left, search.cell_m, way)
-    to_go: Floats = way / around.max_speed_mps
+def _to_go(around: Surroundings, offsets: Floats, end: Floats) -> Floats:
+    """Return the time straight to the end of the route from each cell, float64[M, M]."""
+    x, y = (offsets + place_m for place_m in (around.pose.x_m, around.pose.y_m))
+    to_go: Floats = np.hypot(x - end[0], y[:, None] - end[1]) / around.max_speed_mps
     return to_go

@@ -105,29 +105,6 @@ def fill_costs(
 
 
 @njit(cache=True, nogil=True)
-def fill_way(
-    route: NDArray[np.float64], left: NDArray[np.float64], cell: float, way: NDArray[np.float64]
-) -> None:
-    """Fill the length of the way along a route from each cell: straight to it, then along it.
-
-    Args:
-        route: float64[n, 2], points relative to the robot.
-        left: float64[n], length of the route from each of them, metres.
-        cell: Size of a cell, metres.
-        way: float64[M, M], written, metres.
-    """
-    middle = way.shape[0] // 2
-    for row in range(way.shape[0]):
-        for column in range(way.shape[1]):
-            x, y = (column - middle) * cell, (row - middle) * cell
-            least = math.inf
-            for n in range(route.shape[0]):
-                dx, dy = x - route[n, 0], y - route[n, 1]
-                least = min(least, math.sqrt(dx * dx + dy * dy) + left[n])
-            way[row, column] = least
-
-
-@njit(cache=True, nogil=True)
 def _add_threats(
     discs: NDArray[np.float64], cell: float, near: int, threats: NDArray[np.float64]
 ) -> None:
