@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from quad_nav.control.evasion import EvasionParams, Surroundings, evade, predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
 from quad_nav.kernels.evasion_commands import Body, StandingObstacles, command_costs
-from quad_nav.kernels.space_time import SpaceTime, fill_costs, threat
+from quad_nav.kernels.space_time import SpaceTime, fill_costs, haste_per_s, threat
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -19,13 +20,14 @@ ON = EvasionParams(True, clearance_m=0.1)
 ORIGIN = Pose2D(0.0, 0.0)
 STILL = (0.0, 0.0)
 HOVER = np.zeros((1, 2))
-SEARCH = SpaceTime(0.125, 0.5, 0.5, 50.0, 0.0, 100.0, 0.05)
+SEARCH = SpaceTime(0.125, 0.5, 0.5, 0.5, 1.3, 50.0, 0.0, 100.0, 0.05)
 
 
-def around(pose=ORIGIN, costs=None, is_following=False):
+def around(pose=ORIGIN, costs=None, is_following=False, max_speed_mps=0.5):
     spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
     costs = np.zeros(spec.shape, np.uint8) if costs is None else costs
-    return Surroundings(spec, costs, pose, Twist2D(), 0.25, 0.5, is_following, MotionMemory())
+    memory, speeds_mps = MotionMemory(), (max_speed_mps, 0.5)
+    return Surroundings(spec, costs, pose, Twist2D(), 0.25, *speeds_mps, is_following, memory)
 
 
 def tracks(*states):
@@ -70,7 +72,7 @@ def test_a_command_into_an_obstacle_costs_its_time_inside():
 
 def test_commands_last_as_long_for_a_fast_robot():
     """At 2 m/s it is at 2 m after 1 s, the end of the second command, and 0.03 m deep."""
-    fast = SEARCH._replace(cell_m=0.2, step_s=0.2, max_speed_mps=2.0)
+    fast = SEARCH._replace(cell_m=0.2, step_s=0.2, max_speed_mps=2.0, usual_speed_mps=2.0)
     discs = np.tile([2.17, 0.0, 0.2, 1e-6], (31, 1, 1))
     standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
     costs, ahead = np.zeros((7, 31, 31)), np.array([[2.0, 0.0]])
@@ -118,6 +120,31 @@ def test_a_command_leaves_room_to_stop_before_a_standing_obstacle():
     assert found(0.76) == 0.0
     # Of five places on the way to the stop, 0.7 m and 0.75 m are behind the wall.
     assert found(0.68) == pytest.approx(100.0 * 0.1 * 2)
+
+
+def test_the_best_motion_goes_on_from_where_and_when_the_body_rests():
+    """At 0.5 m/s it rests 0.25 m and half a second later: half a step of each of two costs."""
+    columns = np.arange(33) - 16.0
+    costs = np.stack([factor * np.tile(columns, (33, 1)) for factor in (0.0, 0.0, 1.0, 3.0, 7.0)])
+    slow = SEARCH._replace(step_s=1.0, cell_m=0.25, max_speed_mps=0.5)
+    open_air = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    none, ahead, start = np.zeros((26, 0, 4)), np.array([[0.5, 0.0]]), (0.5, 0.0, 0.0, 0.0)
+    found = command_costs(slow, Body(2.0, 1e3, 2.0), none, open_air, costs, start, ahead, ahead)
+    # After 1 s it is at 0.5 m, and rests at 0.75 m, cell 3, at 1.5 s.
+    assert found[0] == pytest.approx(3.0 * (0.0 + 1.0) / 2.0)
+
+
+def test_speed_above_the_usual_costs_what_it_gains():
+    """At 2 m/s instead of 0.5 m/s, a second costs three quarters of the haste."""
+    fast = SEARCH._replace(cell_m=0.2, step_s=0.2, max_speed_mps=2.0)
+    assert haste_per_s(fast, 2.0) == pytest.approx(1.3 * 0.75)
+    assert haste_per_s(fast, 0.5) == haste_per_s(fast, 0.2) == 0.0
+    to_go = np.tile(np.abs(np.arange(-15, 16) * 0.2 - 2.0) / 2.0, (31, 1))  # 2 m ahead
+    costs = np.full((7, 31, 31), np.inf)
+    fill_costs(fast, np.zeros((31, 0, 4)), np.zeros((31, 31), bool), to_go, costs)
+    # Five steps at 1 m/s: half of the way is left, each step costs 0.2 s * 1.3 * 0.25 for its
+    # haste, and 0.2 s * 0.05 of the way that is left then.
+    assert costs[1, 15, 15] == pytest.approx(0.5 + 5 * 0.065 + 0.01 * (1.0 + 0.9 + 0.8 + 0.7 + 0.6))
 
 
 def test_waiting_costs_less_than_the_way_through():
@@ -171,6 +198,31 @@ def test_a_wall_closes_a_side():
 def test_an_obstacle_that_passes_leaves_the_wish_as_it_is():
     wish = Twist2D(0.0, 0.0, 0.3)
     assert evade(ON, around(), tracks([3.0, 2.5, -1.0, 0.0]), 10.0, HOVER, wish, STILL) is wish
+
+
+def test_a_robot_that_nothing_threatens_any_more_slows_down():
+    """One that has evaded at 1.5 m/s goes on at its usual 0.5 m/s, although 2 m/s are faster."""
+    wish, ahead = Twist2D(0.5), np.array([[15.0, 0.0]])
+    fast = around(is_following=True, max_speed_mps=2.0)
+    flying = replace(fast, velocity=Twist2D(1.5))
+    passed = tracks([-3.0, 2.0, -1.0, 0.0])
+    assert evade(ON, flying, passed, 10.0, ahead, wish, (1.5, 0.0)) is wish
+
+
+@pytest.mark.parametrize("speed_mps", [0.5, 2.0, 4.0, 6.0])
+def test_every_command_has_a_cost(speed_mps, monkeypatch):
+    """Also at the greatest speed, from where the robot rests far away."""
+    found = []
+
+    def recorded(*arguments):
+        found.append(command_costs(*arguments))
+        return found[-1]
+
+    monkeypatch.setattr("quad_nav.control.evasion.command_costs", recorded)
+    ahead, one, wish = np.array([[4.0, 0.0]]), tracks([2.0, 0.2, -1.0, 0.0]), Twist2D(speed_mps)
+    flying = replace(around(is_following=True, max_speed_mps=speed_mps), velocity=wish)
+    evade(ON, flying, one, 10.0, ahead, wish, (speed_mps, 0.0))
+    assert np.isfinite(found).all()
 
 
 def test_no_obstacle_leaves_the_wish_as_it_is():

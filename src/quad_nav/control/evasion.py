@@ -30,7 +30,13 @@ from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
-from quad_nav.kernels.evasion_commands import Body, StandingObstacles, command_costs
+from quad_nav.kernels.evasion_commands import (
+    BOTH_S,
+    Body,
+    StandingObstacles,
+    command_costs,
+    rest_s,
+)
 from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
@@ -38,12 +44,13 @@ from quad_nav.tracking.tracks import Tracks
 Floats = NDArray[np.float64]
 
 STEP_S = 0.5
-_HORIZON_S, _WINDOW_M = 6.0, 5.0
+_HORIZON_S, _WINDOW_M = 6.0, 5.0  # the least window, from the robot to each side
 _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
 _BODY = Body(25.0 / 8.0, 2.0 / 25.0, 2.0)  # of sim/flight.py: gain, lag, acceleration
 _FADE_PER_S = 0.35
 _RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 40.0, 100.0, 0.05
+_HASTE = 1.3  # what a second gains at the greatest speed: 1 and _AWAY_PER_S for each second left
 _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _SPEEDS, _COURSES = 4, 24
@@ -81,7 +88,8 @@ class Surroundings:
         pose: Pose of the robot.
         velocity: Velocity of the robot, in its own frame.
         radius_m: Radius of the robot.
-        max_speed_mps: Greatest speed of the robot in any direction.
+        max_speed_mps: Greatest speed of the robot in any direction, while it evades.
+        usual_speed_mps: Greatest speed otherwise.
         is_following: The robot follows a plan; else it stays near a point.
         memory: The memory of how obstacles have moved.
         neighbours: The peers.
@@ -93,6 +101,7 @@ class Surroundings:
     velocity: Twist2D
     radius_m: float
     max_speed_mps: float
+    usual_speed_mps: float
     is_following: bool
     memory: MotionMemory
     neighbours: Neighbours = NO_NEIGHBOURS
@@ -118,7 +127,7 @@ def evade(
         wish: The command of the navigator, in the robot's frame.
         last: The last command's velocity along the axes of the costmap's frame, m/s.
     """
-    search = _search_of(around.max_speed_mps)
+    search = _search_of(around.max_speed_mps, around.usual_speed_mps)
     discs = predicted_discs(params, around, tracks, now_s, search.step_s)
     if not discs.shape[1] and around.is_following:
         return wish
@@ -144,8 +153,7 @@ def _costs_of(
     last: Tuple[float, float],
 ) -> Floats:
     """Return the cost of each of the commands, float64[c]; the commands are float64[c, 2]."""
-    steps = _steps(search.step_s)
-    middle = min(steps * _REACH_CELLS + 3, int(_WINDOW_M / search.cell_m))
+    steps, middle = _steps(search.step_s), _middle(search)
     offsets = np.arange(-middle, middle + 1) * search.cell_m
     standing = _standing(around)
     costs = np.full((steps + 1, len(offsets), len(offsets)), math.inf)
@@ -157,6 +165,14 @@ def _costs_of(
     seconds = _polar(around.max_speed_mps, _SECOND_SPEEDS, _SECOND_COURSES)
     found: Floats = command_costs(search, _BODY, discs, standing, costs, start, flown, seconds)
     return found
+
+
+def _middle(search: SpaceTime) -> int:
+    """Return the number of cells to each side: all within reach, or more than two commands need."""
+    speed_mps = search.max_speed_mps
+    window_m = max(_WINDOW_M, speed_mps * (BOTH_S + rest_s(_BODY, speed_mps) + search.step_s))
+    within_reach = _steps(search.step_s) * _REACH_CELLS
+    return min(within_reach, math.ceil(window_m / search.cell_m)) + _REACH_CELLS
 
 
 def _acceleration(velocity: Tuple[float, float], command: Tuple[float, float]) -> Tuple[float, ...]:
@@ -199,13 +215,15 @@ def _times(step_s: float) -> Floats:
     return times
 
 
-def _search_of(max_speed_mps: float) -> SpaceTime:
+def _search_of(max_speed_mps: float, usual_speed_mps: float) -> SpaceTime:
     """Return the search of a robot: cells are smaller than obstacles, steps are as long."""
     cell_m = min(max_speed_mps * STEP_S / _REACH_CELLS, _MAX_CELL_M)
     return SpaceTime(
         cell_m,
         cell_m * _REACH_CELLS / max_speed_mps,
         max_speed_mps,
+        usual_speed_mps,
+        _HASTE,
         _RISK_PER_S,
         _FADE_PER_S,
         _BLOCKED_PER_S,

@@ -12,9 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.kernels.jit import njit
-from quad_nav.kernels.space_time import FAR, SUBSTEPS, SpaceTime, threat
+from quad_nav.kernels.space_time import (
+    FAR,
+    SUBSTEPS,
+    SpaceTime,
+    filled_cells,
+    haste_per_s,
+    threat,
+)
 
-_FIRST_S, _BOTH_S = 0.4, 1.0  # durations of the first command, and of both
+BOTH_S = 1.0
+"""Duration of the first and the second command together."""
+_FIRST_S = 0.4
 _PARTS = 2  # steps of the body's motion between two predictions
 
 
@@ -76,8 +85,8 @@ def command_costs(
     found = np.empty(commands.shape[0])
     first, moving = np.empty(6), np.empty(6)
     period_s = search.step_s / SUBSTEPS
-    one, both = round(_FIRST_S / period_s), SUBSTEPS * round(_BOTH_S / search.step_s)
-    discs, costs_after = _near(search, discs, both), costs[both // SUBSTEPS]
+    one, both = round(_FIRST_S / period_s), SUBSTEPS * round(BOTH_S / search.step_s)
+    discs = _near(search, discs, both)
     for n in range(commands.shape[0]):
         first[:2], first[2:] = 0.0, start
         cost = _follow(search, body, discs, standing, first, commands[n], 0, one)
@@ -87,7 +96,7 @@ def command_costs(
             second = commands[n] if m == seconds.shape[0] else seconds[m]
             after = _follow(search, body, discs, standing, moving, second, one, both)
             if after < least:
-                least = min(least, after + _end_cost(search, body, standing, costs_after, moving))
+                least = min(least, after + _end_cost(search, body, standing, costs, moving))
         found[n] = cost + least
     return found
 
@@ -130,6 +139,7 @@ def _follow(
         rate = search.risk_per_s * threat(discs, k, moving[0], moving[1])
         if _is_blocked(standing, moving[0], moving[1]):
             rate += search.blocked_per_s
+        rate += haste_per_s(search, math.hypot(moving[2], moving[3]))
         cost += rate * dt
     return cost
 
@@ -149,6 +159,18 @@ def _move(
 
 
 @njit(cache=True, nogil=True)
+def rest_s(body: Body, speed_mps: float) -> float:
+    """Return for how long a body would fly on at its speed to get as far as it does until it rests.
+
+    Below the speed from which its velocity loop brakes with less than its greatest acceleration,
+    the way to rest is that of an exponential decay.
+    """
+    over = max(speed_mps - body.acceleration_mps2 / body.gain_per_s, 0.0)
+    braking_s = 0.5 * over * over / body.acceleration_mps2 / max(speed_mps, 1e-9)
+    return 1.0 / body.gain_per_s + braking_s
+
+
+@njit(cache=True, nogil=True)
 def _end_cost(
     search: SpaceTime,
     body: Body,
@@ -156,18 +178,20 @@ def _end_cost(
     costs: NDArray[np.float64],
     moving: NDArray[np.float64],
 ) -> float:
-    """Return the cost of the best motion after the second command, from where the body stops."""
-    lag_s = 1.0 / body.gain_per_s
+    """Return the cost from the end of the second command on: the way to rest, the best motion."""
     speed = math.hypot(moving[2], moving[3])
-    over = max(speed - body.acceleration_mps2 / body.gain_per_s, 0.0)
-    lag_s += 0.5 * over * over / body.acceleration_mps2 / max(speed, 1e-9)
-    x, y = moving[0] + lag_s * moving[2], moving[1] + lag_s * moving[3]
-    cost = 0.0
+    later_s = rest_s(body, speed)
+    cost = later_s * haste_per_s(search, speed)
     for k in range(1, SUBSTEPS + 1):
-        at = lag_s * k / SUBSTEPS
+        at = later_s * k / SUBSTEPS
         if _is_blocked(standing, moving[0] + at * moving[2], moving[1] + at * moving[3]):
             cost += search.blocked_per_s * search.step_s / SUBSTEPS
-    return cost + _between(costs, x / search.cell_m, y / search.cell_m)
+    x, y = moving[0] + later_s * moving[2], moving[1] + later_s * moving[3]
+    step = round(BOTH_S / search.step_s) + later_s / search.step_s
+    before = min(int(step), costs.shape[0] - 2)
+    part = min(step - before, 1.0)
+    cost += (1.0 - part) * _cost_at(search, costs, before, x, y)
+    return cost + part * _cost_at(search, costs, before + 1, x, y)
 
 
 @njit(cache=True, nogil=True)
@@ -180,18 +204,16 @@ def _is_blocked(standing: StandingObstacles, x: float, y: float) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _inside(index: int, middle: int) -> int:
-    return min(max(index, 0), 2 * middle)
-
-
-@njit(cache=True, nogil=True)
-def _between(costs: NDArray[np.float64], x: float, y: float) -> float:
-    """Interpolate float64[M, M] at (x, y) cells from the middle."""
-    middle = costs.shape[0] // 2
-    column, row = math.floor(x), math.floor(y)
-    right, up = x - column, y - row
-    i, j = _inside(int(row) + middle, middle), _inside(int(column) + middle, middle)
-    k, m = _inside(i + 1, middle), _inside(j + 1, middle)
-    return (1.0 - up) * ((1.0 - right) * costs[i, j] + right * costs[i, m]) + up * (
-        (1.0 - right) * costs[k, j] + right * costs[k, m]
+def _cost_at(search: SpaceTime, costs: NDArray[np.float64], step: int, x: float, y: float) -> float:
+    """Interpolate the costs of a step, float64[steps + 1, M, M], where it has some."""
+    middle = costs.shape[1] // 2
+    last = filled_cells(search, step, middle) - 1e-6
+    across = min(max(x / search.cell_m, -last), last)
+    along = min(max(y / search.cell_m, -last), last)
+    column, row = math.floor(across), math.floor(along)
+    right, up = across - column, along - row
+    i, j = int(row) + middle, int(column) + middle
+    at = costs[step, i : i + 2, j : j + 2]
+    return (1.0 - up) * ((1.0 - right) * at[0, 0] + right * at[0, 1]) + up * (
+        (1.0 - right) * at[1, 0] + right * at[1, 1]
     )

@@ -29,6 +29,8 @@ class SpaceTime(NamedTuple):
     cell_m: float
     step_s: float
     max_speed_mps: float
+    usual_speed_mps: float
+    haste: float  # cost of a second, for each max_speed_mps above the usual speed
     risk_per_s: float  # cost of a second at the rim of an obstacle
     fade_per_s: float  # rate at which predictions lose their weight
     blocked_per_s: float  # cost of a second on a blocked cell
@@ -67,6 +69,12 @@ def _threat_of(disc: NDArray[np.float64], x: float, y: float) -> float:
 
 
 @njit(cache=True, nogil=True)
+def haste_per_s(search: SpaceTime, speed_mps: float) -> float:
+    """Return the cost of a second at a speed: that of flying faster than usual."""
+    return search.haste * max(speed_mps - search.usual_speed_mps, 0.0) / search.max_speed_mps
+
+
+@njit(cache=True, nogil=True)
 def fill_costs(
     search: SpaceTime,
     discs: NDArray[np.float64],
@@ -84,12 +92,11 @@ def fill_costs(
         costs: float64[steps + 1, M, M], filled from step 1 on, as far as the robot may be.
     """
     steps, middle = costs.shape[0] - 1, costs.shape[1] // 2
-    reach = int(search.max_speed_mps * search.step_s / search.cell_m + 1e-6)
-    costs[steps] = to_go
+    costs[steps], moves = to_go, _moves(search)
     threats = np.zeros(to_go.shape)
     for k in range(steps - 1, 0, -1):
         risk = search.risk_per_s * math.exp(-search.fade_per_s * k * search.step_s)
-        near = min(k * reach + 2, middle - reach)
+        near = filled_cells(search, k, middle)
         threats[:] = 0.0
         for later in _DURING:
             _add_threats(discs[k * SUBSTEPS + later], search.cell_m, near, threats)
@@ -100,8 +107,20 @@ def fill_costs(
                 if blocked[row, column]:
                     cost += search.blocked_per_s
                 costs[k, row, column] = cost * search.step_s + _least(
-                    costs[k + 1], row, column, reach
+                    costs[k + 1], row, column, moves
                 )
+
+
+@njit(cache=True, nogil=True)
+def filled_cells(search: SpaceTime, k: int, middle: int) -> int:
+    """Return how many cells from the middle a step before the last one has costs."""
+    return min(k * _reach(search) + 2, middle - _reach(search))
+
+
+@njit(cache=True, nogil=True)
+def _reach(search: SpaceTime) -> int:
+    """Return how many cells the robot flies in a step."""
+    return int(search.max_speed_mps * search.step_s / search.cell_m + 1e-6)
 
 
 @njit(cache=True, nogil=True)
@@ -129,11 +148,23 @@ def _cells(place: float, far: float, cell: float, near: int) -> Tuple[int, int]:
 
 
 @njit(cache=True, nogil=True)
-def _least(costs: NDArray[np.float64], row: int, column: int, reach: int) -> float:
-    """Return the least cost within ``reach`` cells, float64[M, M]."""
-    least = math.inf
+def _moves(search: SpaceTime) -> NDArray[np.float64]:
+    """Return the cost of each move of a step, float64[2 reach + 1, 2 reach + 1]."""
+    reach = _reach(search)
+    moves = np.full((2 * reach + 1, 2 * reach + 1), math.inf)
     for i in range(-reach, reach + 1):
         for j in range(-reach, reach + 1):
             if i * i + j * j <= reach * reach:
-                least = min(least, costs[row + i, column + j])
+                speed = math.hypot(i, j) * search.cell_m / search.step_s
+                moves[reach + i, reach + j] = haste_per_s(search, speed) * search.step_s
+    return moves
+
+
+@njit(cache=True, nogil=True)
+def _least(costs: NDArray[np.float64], row: int, column: int, moves: NDArray[np.float64]) -> float:
+    """Return the least cost of a move and of the cell, float64[M, M], where it leads."""
+    least, reach = math.inf, moves.shape[0] // 2
+    for i in range(-reach, reach + 1):
+        for j in range(-reach, reach + 1):
+            least = min(least, moves[reach + i, reach + j] + costs[row + i, column + j])
     return least

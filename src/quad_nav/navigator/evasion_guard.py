@@ -153,6 +153,7 @@ class EvasionGuard:
             velocity,
             costmap.inscribed_radius_m,
             max(self.params.speed_mps, limits.speed_mps),
+            limits.speed_mps,
             is_following,
             self._memory,
             neighbours,
