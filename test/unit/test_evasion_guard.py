@@ -11,7 +11,7 @@ import pytest
 from quad_nav.config import load
 from quad_nav.control.evasion import EvasionParams
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import GridSpec
+from quad_nav.grid import LETHAL, GridSpec
 from quad_nav.navigator.evasion_guard import EvasionGuard, SpeedLimits, speed_limits
 from quad_nav.navigator.tick import RobotPoses, Tick
 from quad_nav.tracking.tracks import Tracks
@@ -44,6 +44,20 @@ def checked(guard, tracks, pose=HERE, plan=None, command=None, now_s=0.0):
 def test_without_tracks_the_command_stays(guard):
     tick = checked(guard, Tracks.none(0.0), command=AHEAD)
     assert tick.command is AHEAD and not tick.evades and not guard.is_evading
+
+
+@pytest.mark.parametrize("speed_mps, brakes", [(0.5, False), (1.5, True)])
+def test_a_robot_that_is_still_fast_brakes_before_a_wall(guard, speed_mps, brakes):
+    """From 1.5 m/s it rests after 0.56 m at 2 m/s^2, and what it flies until it tilts."""
+    guard.params = replace(guard.params, speed_mps=2.0)
+    wall_x_m, spec = 0.6, guard._costmap.spec
+    guard._costmap.costs[:, int((wall_x_m - spec.origin_x_m) / spec.resolution_m) :] = LETHAL
+    tick, plan = Tick(0.0), np.array([[3.0, 0.0, 0.0]])
+    tick.command = Twist2D(vx_mps=0.5)
+    velocity = Twist2D(vx_mps=speed_mps)
+    guard.check(tick, RobotPoses(HERE, HERE), velocity, Tracks.none(0.0), plan, LIMITS)
+    assert tick.evades == brakes
+    assert (tick.command.vx_mps <= 0.0) == brakes
 
 
 def test_an_obstacle_that_goes_away_changes_nothing(guard):

@@ -53,6 +53,7 @@ _RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 40.0, 100.0, 0.05
 _HASTE = 1.3  # what a second gains at the greatest speed: 1 and _AWAY_PER_S for each second left
 _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
+_FASTER_MPS = 0.2
 _SPEEDS, _COURSES = 4, 24
 _SECOND_SPEEDS, _SECOND_COURSES = 2, 12
 
@@ -106,6 +107,12 @@ class Surroundings:
     memory: MotionMemory
     neighbours: Neighbours = NO_NEIGHBOURS
 
+    @property
+    def is_fast(self) -> bool:
+        """The robot is faster than the navigator expects: it has evaded."""
+        speed_mps = math.hypot(self.velocity.vx_mps, self.velocity.vy_mps)
+        return speed_mps > self.usual_speed_mps + _FASTER_MPS
+
 
 def evade(
     params: EvasionParams,
@@ -129,7 +136,7 @@ def evade(
     """
     search = _search_of(around.max_speed_mps, around.usual_speed_mps)
     discs = predicted_discs(params, around, tracks, now_s, search.step_s)
-    if not discs.shape[1] and around.is_following:
+    if not discs.shape[1] and around.is_following and not around.is_fast:
         return wish
     peers = around.neighbours.discs(around.pose, _times(search.step_s))
     discs = np.concatenate([discs, peers], axis=1)

@@ -1,7 +1,8 @@
 """Evasion guard: the last word on the command when moving obstacles come near.
 
 It acts in every state: while the robot follows a plan, waits for a peer, recovers, or hovers
-without a goal. A robot that stands still stays near the point where it stopped, and returns to it.
+without a goal, and after an evasion until the robot is as slow again as the navigator expects. A
+robot that stands still stays near the point where it stopped, and returns to it.
 """
 
 from __future__ import annotations
@@ -89,13 +90,13 @@ class EvasionGuard:
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
             return None
         self._memory.add(tracks)
-        is_displaced = self._is_displaced(plan, poses.in_global)
-        if not len(tracks) and not is_displaced:
+        pose, is_displaced = poses.in_local, self._is_displaced(plan, poses.in_global)
+        around = self._surroundings(pose, velocity, limits, plan is not None, neighbours)
+        if not len(tracks) and not is_displaced and not around.is_fast:
             return self._end(tick)
         route = self._route(plan, local_from_global)
-        pose, wish = poses.in_local, tick.command or Twist2D()
+        wish = tick.command or Twist2D()
         wish = _return(wish, route[0], pose, limits) if is_displaced else wish
-        around = self._surroundings(pose, velocity, limits, plan is not None, neighbours)
         command = self._choose(around, tracks, tick.now_s, route, wish)
         if command is wish and not is_displaced:
             return self._end(tick)
@@ -108,7 +109,8 @@ class EvasionGuard:
         self, around: Surroundings, tracks: Tracks, now_s: float, route: Floats, wish: Twist2D
     ) -> Twist2D:
         pose = around.pose
-        last = self._last if len(tracks) else pose.rotate(wish.vx_mps, wish.vy_mps)
+        is_evasion = len(tracks) or around.is_fast
+        last = self._last if is_evasion else pose.rotate(wish.vx_mps, wish.vy_mps)
         command = evade(self.params, around, tracks, now_s, route, wish, last)
         self._last = pose.rotate(command.vx_mps, command.vy_mps)
         return command
