@@ -6,8 +6,10 @@ uncertainty of the prediction, and positions far from the end of the plan cost t
 there. Dynamic programming from the end of the horizon gives the cost of the best motion from each
 cell and step; the commands of a polar grid, and the command that the navigator wishes, are
 followed with the response of the body, each with the best of some second commands, and take the
-rest from there, where the body would come to rest. The robot goes behind, in front, back or waits
-as it costs least against all obstacles together. It keeps the wish where nothing is much better.
+rest from there, where and when the body would come to rest. A speed above that of the local planner
+costs what it gains on the way, so that a robot is fast only to get out of the way. The
+robot goes behind, in front, back or waits as it costs least against all obstacles together. It
+keeps the wish where nothing is much better.
 Peers are in the way as well: commands are judged as the robot's Voronoi cell will leave them, and
 peers are expected to keep their velocities.
 
@@ -53,7 +55,7 @@ _RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 40.0, 100.0, 0.05
 _HASTE = 1.3  # what a second gains at the greatest speed: 1 and _AWAY_PER_S for each second left
 _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
-_FASTER_MPS = 0.2
+_FASTER_MPS = 0.2  # above its usual speed: the robot has evaded
 _SPEEDS, _COURSES = 4, 24
 _SECOND_SPEEDS, _SECOND_COURSES = 2, 12
 
