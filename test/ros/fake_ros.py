@@ -75,6 +75,7 @@ class FakePublisher:
         self.resolved_name, self.data_class = rospy.resolve_name(name), data_class
         self.type = data_class._type
         self.last: Optional[genpy.Message] = None
+        self.impl = self
         FakePublisher.all[self.resolved_name] = self
 
     def publish(self, *args: Any, **kwds: Any) -> None:
@@ -83,6 +84,9 @@ class FakePublisher:
 
     def get_num_connections(self) -> int:
         return 1
+
+    def has_connection(self, node: str) -> bool:
+        return True
 
     def unregister(self) -> None:
         del FakePublisher.all[self.resolved_name]

@@ -103,6 +103,20 @@ class Goals(FlightCase):
         actions.set_preempted.assert_not_called()
         self.assertTrue(accept.called)
 
+    def test_goal_waits_until_the_node_is_connected_to_its_own_topic(self):
+        server = GoalServer.__new__(GoalServer)
+        server._server, server._action_goal = mock.Mock(), mock.Mock()
+        server._simple_goals = deque([goal_pose(3.0, 3.0)])
+        navigator = mock.Mock()
+        navigator.accepts_goal.return_value = False
+        server._action_goal.impl.has_connection.return_value = False
+        server.poll(navigator, 1.0)
+        server._action_goal.publish.assert_not_called()
+        server._action_goal.impl.has_connection.return_value = True
+        server.poll(navigator, 1.05)
+        server.poll(navigator, 1.1)
+        server._action_goal.publish.assert_called_once()
+
     def test_zero_quaternion_is_aborted_with_the_reason(self):
         count = self.results[0].count
         self.goal_topics[0].publish(goal_pose(3.0, 3.0, w=0.0))

@@ -54,22 +54,26 @@ class UpstreamCase(FlightCase):
         cls.start()
 
     def rest(self, i):
-        """Cancel robot i's goal and wait until it has stopped."""
-        topic = self.cancel_topics[i]
+        """Cancel robot i's goal, if it has one, and wait until it has stopped.
+
+        A cancel without a goal leaves no trace: it could arrive late and cancel the next goal.
+        """
+        topic, now = self.cancel_topics[i], rospy.Time.now()
         self.wait(lambda: topic.get_num_connections() > 0, f"a listener on {topic.name}")
-        topic.publish(GoalID())
-        cancelled = rospy.Time.now()
-        self.wait(lambda: self.is_idle(i, cancelled), f"robot {i} without a goal")
+        self.wait(lambda: self.is_newer(i, now), f"a status of robot {i}")
+        if not self.is_idle(i):
+            topic.publish(GoalID())
+            self.wait(lambda: self.is_idle(i), f"robot {i} without a goal")
         self.wait(lambda: self.speed(i) < 0.02, f"robot {i} standing")
 
-    def is_idle(self, i, since):
-        """Half a second after a time, no goal is waiting or active."""
+    def is_newer(self, i, time):
+        """The last status is half a second younger: a goal sent before is in it."""
         message = self.statuses[i].message
-        return (
-            message is not None
-            and message.header.stamp > since + rospy.Duration(0.5)
-            and all(s.status not in UNFINISHED for s in message.status_list)
-        )
+        return message is not None and message.header.stamp > time + rospy.Duration(0.5)
+
+    def is_idle(self, i):
+        """No goal is waiting or active."""
+        return all(s.status not in UNFINISHED for s in self.statuses[i].message.status_list)
 
     def send(self, i, goal):
         topic = self.goal_topics[i]

@@ -65,12 +65,20 @@ class GoalServer:
 
     def _forward(self) -> None:
         """Publish the newest simple goal as an action goal, as C++ move_base does."""
-        if not self._simple_goals:
+        if not self._simple_goals or not self._hears_itself():
             return
         goal = MoveBaseActionGoal()
         goal.header.stamp = rospy.Time.now()
         goal.goal.target_pose = self._simple_goals.pop()
         self._action_goal.publish(goal)
+
+    def _hears_itself(self) -> bool:
+        """Return whether this node's action server is connected to its own topic.
+
+        The connection is made through the master, like any other. On a busy machine it takes a
+        while after the start, and a goal published before that is lost.
+        """
+        return bool(self._action_goal.impl.has_connection(rospy.get_name()))
 
     def poll(self, navigator: Navigator, now_s: float) -> None:
         """Pass a waiting goal or cancel to the navigator, if it accepts one now."""
