@@ -18,14 +18,20 @@ LIDAR = Pose3D(0.0, 0.0, 1.0)
 ROOM = (-6.0, -6.0, 6.0, 6.0)
 
 
+def tilted(pitch_rad):
+    return Pose3D(0.0, 0.0, 1.0, (0.0, math.sin(pitch_rad / 2.0), 0.0, math.cos(pitch_rad / 2.0)))
+
+
 def pose_at(x_m, y_m, yaw_rad=0.0):
     return Pose3D(x_m, y_m, 1.0, quaternion_from_yaw(yaw_rad))
 
 
 def scan_of(stamp_s, discs=(), pose=LIDAR, room=ROOM, noise_m=0.0, seed=0):
-    """Cast beams at discs (x, y, radius) in a rectangular room (min x, min y, max x, max y)."""
-    angles = -math.pi + STEP_RAD * np.arange(BEAMS) + pose.yaw_rad
-    along = np.column_stack([np.cos(angles), np.sin(angles)])
+    """Cast beams at upright discs (x, y, radius) in a room (min x, min y, max x, max y)."""
+    angles = -math.pi + STEP_RAD * np.arange(BEAMS)
+    along = np.column_stack([np.cos(angles), np.sin(angles)]) @ pose.rotation[:2, :2].T
+    level = np.hypot(*along.T)
+    along /= level[:, None]
     here = np.array([pose.x_m, pose.y_m])
     with np.errstate(divide="ignore"):
         far = np.where(along > 0, np.array(room[2:]) - here, here - np.array(room[:2]))
@@ -37,7 +43,7 @@ def scan_of(stamp_s, discs=(), pose=LIDAR, room=ROOM, noise_m=0.0, seed=0):
         depth = middle**2 - off @ off + radius_m**2
         hit = middle - np.sqrt(np.maximum(depth, 0.0))
         ranges = np.where((depth >= 0.0) & (hit > 0.0), np.minimum(ranges, hit), ranges)
-    ranges = ranges + noise_m * np.random.default_rng([seed, round(1e6 * stamp_s)]).normal(
+    ranges = ranges / level + noise_m * np.random.default_rng([seed, round(1e6 * stamp_s)]).normal(
         size=BEAMS
     )
     return Scan(stamp_s, -math.pi, STEP_RAD, 0.02, 60.0, ranges.astype(np.float32))
@@ -136,6 +142,41 @@ def test_two_obstacles_that_pass_each_other_keep_their_numbers():
     velocities = dict(zip(tracker.tracks.numbers.tolist(), tracker.tracks.states[:, 3]))
     assert set(velocities) == {1, 2}
     assert sorted(velocities.values()) == pytest.approx([-1.0, 1.0], abs=0.1)
+
+
+def test_who_comes_out_of_a_long_shadow_is_tracked_where_it_was_free_long_ago():
+    """One stands at (2, 0) from 4 s to 10 s and hides the other; the shadow is 2.5 m wide there."""
+
+    def discs_at(t):
+        hider = (2.0, min(t - 4.0, 0.0) - 2.0 * max(t - 10.0, 0.0), 0.5)
+        return (hider, (5.0, 10.0 - t, 0.25)) if t >= 9.5 else (hider,)
+
+    for now_s, _, tracker in track(discs_at, times(10.9, 20.0)):
+        seen = np.hypot(*(tracker.tracks.states[:, :2] - (5.0, 10.0 - now_s)).T) < 0.2
+    assert seen.any()
+
+
+def test_a_lidar_that_tilts_follows_an_obstacle_that_turns_back():
+    """At 5 m its beams are 0.7 m off the level; with a constant velocity it would be at 0.5 m."""
+    *_, (_, _, tracker) = track(
+        lambda t: ((5.0, -abs(t - 2.0), 0.3),),
+        times(2.5, 20.0),
+        lambda t: tilted(0.14 if t > 2.0 else 0.0),
+    )
+    np.testing.assert_allclose(tracker.tracks.states[:, :2], [(5.0, -0.5)], atol=0.15)
+
+
+def test_a_lidar_that_tilts_and_looks_over_an_obstacle_does_not_lose_it():
+    """At 5 m its beams are 1 m above the level."""
+    tracks = {}
+    for now_s, _, tracker in track(
+        lambda t: ((5.0, -2.0 + t, 0.3),) if t < 2.0 else (),
+        times(2.6, 20.0),
+        lambda t: tilted(-0.2 if t >= 2.0 else 0.0),
+    ):
+        tracks[round(now_s, 2)] = tracker.tracks
+    assert tracks[2.6].numbers.tolist() == tracks[1.9].numbers.tolist() == [1]
+    assert tracks[2.6].states[0, 1] == pytest.approx(0.6, abs=0.1)
 
 
 def test_an_obstacle_that_stops_becomes_a_standing_one():

@@ -16,6 +16,7 @@ from quad_nav.kernels.jit import njit
 UNKNOWN, OCCUPIED, FREED = 0, 1, 2
 """Evidence about a point: unseen or in doubt, occupied earlier, free space earlier."""
 _MAX_SIDE_BEAMS = 64
+_STANDS = 3  # recent scans that see a point occupied
 
 
 class ScanView(NamedTuple):
@@ -38,6 +39,15 @@ class EarlierScans(NamedTuple):
     rotations: NDArray[np.float64]  # [slots, 3, 3], frame from sensor
 
 
+class Order(NamedTuple):
+    """In which order earlier scans are asked."""
+
+    slots: NDArray[
+        np.int64
+    ]  # [k], the recent ones first, then the others; the oldest of each first
+    recent: int  # number of recent ones
+
+
 class Doubts(NamedTuple):
     """Limits of what a scan can tell."""
 
@@ -46,6 +56,7 @@ class Doubts(NamedTuple):
     low_z: float  # metres in the fixed frame; lower points are left out
     high_z: float  # metres; higher points are left out
     level: float  # metres off a sensor's plane; points farther off are in doubt
+    upright: float  # metres off the scan's plane; points farther off are left out
     margin: float  # metres by which a point is inside of free space, in depth and to the sides
 
 
@@ -124,10 +135,33 @@ def _evidence(
 
 
 @njit(cache=True, nogil=True)
+def _ask(
+    earlier: EarlierScans,
+    order: Order,
+    is_thorough: bool,
+    scan: ScanView,
+    doubts: Doubts,
+    point: Tuple[float, float, float],
+) -> int:
+    """Return what the earlier scans tell about a point, see ``compare_scan``."""
+    occupied = 0
+    for i in range(order.slots.shape[0]):
+        if i == order.recent and occupied >= _STANDS:
+            break
+        found = _evidence(earlier, order.slots[i], scan, doubts, point)
+        if found == FREED:
+            return FREED
+        occupied += found == OCCUPIED
+        if occupied and not is_thorough:
+            break
+    return OCCUPIED if occupied else UNKNOWN
+
+
+@njit(cache=True, nogil=True)
 def compare_scan(
     scan: ScanView,
     earlier: EarlierScans,
-    order: NDArray[np.int64],
+    order: Order,
     is_thorough: bool,
     step: int,
     doubts: Doubts,
@@ -139,9 +173,10 @@ def compare_scan(
     Args:
         scan: The scan.
         earlier: Earlier scans.
-        order: int64[k], slots to compare with, the oldest first.
-        is_thorough: Ask every slot until one finds the point freed. Otherwise the first slot
-            that knows about a point decides.
+        order: Slots to compare with.
+        is_thorough: Ask every slot until one finds the point freed; the older ones only if few of
+            the recent ones see it occupied, because what was there for so long has stopped.
+            Otherwise the first slot that knows about a point decides.
         step: 1 for all beams, 2 for every other one.
         doubts: Limits.
         points: float64[n, 3], written: the points in the fixed frame; NaN where there is none.
@@ -160,23 +195,15 @@ def compare_scan(
         sx, sy = one * scan.directions[k, 0], one * scan.directions[k, 1]
         up = rotation[2, 0] * sx + rotation[2, 1] * sy
         z = scan.origin[2] + up
-        if abs(up) > doubts.level or z < doubts.low_z or z > doubts.high_z:
+        if abs(up) > doubts.upright or z < doubts.low_z or z > doubts.high_z:
             continue
         x = scan.origin[0] + rotation[0, 0] * sx + rotation[0, 1] * sy
         y = scan.origin[1] + rotation[1, 0] * sx + rotation[1, 1] * sy
         points[k, 0], points[k, 1], points[k, 2] = x, y, z
-        told = UNKNOWN
-        for slot in order:
-            found = _evidence(earlier, slot, scan, doubts, (x, y, z))
-            if found == FREED:
-                told = FREED
-                break
-            if found == OCCUPIED:
-                told = OCCUPIED
-                if not is_thorough:
-                    break
-        evidence[k] = told
-        freed += told == FREED
+        if abs(up) > doubts.level:
+            continue
+        evidence[k] = _ask(earlier, order, is_thorough, scan, doubts, (x, y, z))
+        freed += evidence[k] == FREED
     return freed
 
 

@@ -2,7 +2,9 @@
 
 A point moves if it lies where an earlier scan saw free space. So walls that come into view, the
 edges of standing things seen from elsewhere, and what was hidden before do not move: no earlier
-beam passed there. A point that an earlier scan saw occupied stands. Everything else is in doubt.
+beam passed there. A point that earlier scans saw occupied stands. Everything else is in doubt.
+What has stood for two seconds counts as standing; otherwise one scan of the last 16 s that saw free
+space is enough, so that who comes out of another one's shadow moves where it was free before.
 
 Sources: free space that is violated: C.-C. Wang, C. Thorpe, S. Thrun, "Online simultaneous
 localization and mapping with detection and tracking of moving objects", ICRA 2003, section IV; by
@@ -26,6 +28,7 @@ from quad_nav.geometry import Pose3D, Scan, angle_difference
 from quad_nav.kernels.earlier_scans import (
     Doubts,
     EarlierScans,
+    Order,
     ScanView,
     compare_scan,
     find_clusters,
@@ -35,12 +38,13 @@ from quad_nav.tracking.tracks import TrackerParams
 Floats = NDArray[np.float64]
 Heights = Tuple[float, float]
 
-SPACING_S, SLOTS = 0.4, 5
-"""Earlier scans: the time from one to the next, and their number."""
+SPACING_S, SLOTS, RECENT = 0.4, 40, 5
+"""Earlier scans: the time from one to the next, their number, and how many of them are recent."""
 RANGE_NOISE_M = 0.02
 """Standard deviation of ranges, of common LIDARs."""
-LEVEL_M = 0.3
-"""Height above or below a LIDAR's plane in which its beams speak for upright things."""
+LEVEL_M, UPRIGHT_M = 0.3, 0.8
+"""Heights above or below a LIDAR's plane, which tilts in flight: in the first its beams speak for
+upright things, in the second they still show where one is that is tracked."""
 _INCIDENCE_RAD = math.radians(10.0)
 _IDLE_STEP = 3  # where nothing moved, one of three beams is compared: a track needs three
 _IDLE_PERIOD_S = 0.1  # where nothing moved, scans that come earlier are left out
@@ -126,8 +130,8 @@ class MovingPoints:
         found = find_clusters(view, points, evidence, _INCIDENCE_RAD, RANGE_NOISE_M, labels, rows)
         return ScanClusters(view, points, labels, rows[:found])
 
-    def _slots(self, beams: int) -> Tuple[EarlierScans, NDArray[np.int64]]:
-        """Return the earlier scans, and the numbers of their slots, the oldest first."""
+    def _slots(self, beams: int) -> Tuple[EarlierScans, Order]:
+        """Return the earlier scans, and the order in which they are asked."""
         if self._earlier is None:
             self._earlier = EarlierScans(
                 np.full((SLOTS, beams), np.nan, np.float32),
@@ -135,7 +139,9 @@ class MovingPoints:
                 np.zeros((SLOTS, 3, 3)),
             )
         order = np.argsort(self._stamps_s, kind="stable")
-        return self._earlier, order[np.isfinite(self._stamps_s[order])]
+        order = order[np.isfinite(self._stamps_s[order])]
+        order = np.concatenate([order[-RECENT:], order[:-RECENT]])
+        return self._earlier, Order(order, RECENT)
 
     def _check_continuity(self, scan: Scan, pose: Pose3D) -> None:
         beams = (scan.angle_min_rad, scan.angle_increment_rad, len(scan.ranges_m))
@@ -161,7 +167,7 @@ class MovingPoints:
 
 def _doubts(scan: Scan, heights_m: Heights, params: TrackerParams) -> Doubts:
     nearest_m, farthest_m = max(scan.range_min_m, 1e-3), min(scan.range_max_m, params.range_m)
-    return Doubts(nearest_m, farthest_m, *heights_m, LEVEL_M, params.margin_m)
+    return Doubts(nearest_m, farthest_m, *heights_m, LEVEL_M, UPRIGHT_M, params.margin_m)
 
 
 def _view(scan: Scan, pose: Pose3D) -> ScanView:

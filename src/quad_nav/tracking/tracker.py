@@ -25,7 +25,7 @@ from quad_nav.geometry import Pose3D, Scan
 from quad_nav.tracking.association import assign
 from quad_nav.tracking.discs import Outlines, Radius, fit, outlines
 from quad_nav.tracking.kalman import Filters
-from quad_nav.tracking.moving_points import Heights, MovingPoints, ScanClusters
+from quad_nav.tracking.moving_points import LEVEL_M, Heights, MovingPoints, ScanClusters
 from quad_nav.tracking.tracks import TrackerParams, Tracks
 
 Floats = NDArray[np.float64]
@@ -188,11 +188,15 @@ class ObstacleTracker:
     def _usable(
         self, clusters: ScanClusters, seen: Outlines, known_circles: Floats
     ) -> NDArray[np.bool_]:
-        """Return which clusters may be obstacles that move, bool[m]."""
+        """Return which clusters may be obstacles that move, bool[m].
+
+        What is all in doubt and of which an edge is hidden may be a part of a wall.
+        """
         usable = (
             (clusters.rows[:, 3] == 0)
             & (clusters.rows[:, 1] >= _MIN_POINTS)
             & (seen.radii_m <= self.params.max_radius_m)
+            & ((clusters.rows[:, 2] > 0) | seen.is_whole)
         )
         for x_m, y_m, radius_m in known_circles:
             usable &= np.hypot(seen.centres[:, 0] - x_m, seen.centres[:, 1] - y_m) > radius_m
@@ -336,9 +340,9 @@ def _sees_through(clusters: ScanClusters, state: Floats, radius_m: float) -> boo
     """Return whether the LIDAR sees what is behind the middle half of a disc."""
     view = clusters.view
     away = np.array([state[0] - view.origin[0], state[1] - view.origin[1], 0.0])
-    x_m, y_m, _ = (view.rotation.T @ away).tolist()
+    x_m, y_m, z_m = (view.rotation.T @ away).tolist()
     distance_m = math.hypot(x_m, y_m)
-    if distance_m <= radius_m:
+    if distance_m <= radius_m or abs(z_m) > LEVEL_M:
         return False
     n = len(view.ranges)
     middle = (math.atan2(y_m, x_m) - view.angle_min) / view.increment
