@@ -161,6 +161,7 @@ LATE = replace(RUN, run=1, seed=8, arrivals_s=(40.0, 50.0), gap_m=0.1)
 LOST = replace(RUN, run=2, seed=9, arrivals_s=(20.0, None), contacts=("quad0 touches quad1",))
 
 
+@pytest.mark.slow
 def test_four_that_meet_fly_round_the_middle_in_one_direction():
     """Straight on it takes 25 s to come within 0.4 m of the goals, 8 m away."""
     in_turn = only(robots=(4,), parameters=(("fixes/roundabouts", False),), radius_m=4.0)

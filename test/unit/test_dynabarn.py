@@ -181,6 +181,7 @@ def test_the_clock_starts_when_the_robot_leaves_its_start():
     assert late.stop_reason == "time limit of 100 s"
 
 
+@pytest.mark.slow
 def test_a_robot_watches_before_it_flies(tmp_path):
     """Three obstacles run to and fro far from its way: it leaves after 6 s, then flies 38 s."""
     paths = [([0.0, 8.0, 16.0], [[5.0, y], [-5.0, y], [5.0, y]]) for y in (6.0, 7.5, 9.0)]

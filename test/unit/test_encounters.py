@@ -43,6 +43,7 @@ def test_every_scene_has_goals_and_every_goal_a_scene():
         assert all(robot.sequence.settings.loop == (name in LOOPS) for robot in setup.robots)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, seed", [(name, 50 + k) for k, name in enumerate(SCENES)])
 def test_every_robot_reaches_its_goals_without_contacts(name, seed):
     summary = fly(setup_of(name, seed))

@@ -143,6 +143,7 @@ def test_scenes_of_maps(tree):
     targets.run("map_yaml", as_yaml(tree))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["base_local_planner", "costmap_common", "local_costmap", "global_costmap"]
 )

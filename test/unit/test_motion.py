@@ -351,6 +351,7 @@ def crowded():
     return replace(scene, walkers=Walkers(10))
 
 
+@pytest.mark.slow
 def test_people_walk_at_their_speeds_without_touching_anything(crowded):
     times_s = np.arange(0.0, 300.0, 0.2)
     places = Movers(crowded, 3).poses_at(times_s)[..., :2]
@@ -439,6 +440,7 @@ def hovering(scene, seed, *advances):
     return result
 
 
+@pytest.mark.slow
 def test_people_who_react_walk_round_quadcopters(crowded):
     """Of those who do not, some walk into one of the two that hover; seeds 0 and 1."""
     reacting = replace(crowded, walkers=Walkers(10, reacting=True))

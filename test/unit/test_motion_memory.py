@@ -80,6 +80,7 @@ def test_a_clock_that_jumps_back_empties_the_memory():
     assert memory.span_s == 0.0
 
 
+@pytest.mark.slow
 def test_the_older_half_is_dropped_when_the_memory_is_full():
     memory = MotionMemory()
     for k in range(45_000):

@@ -180,6 +180,7 @@ def test_without_drift_the_frame_of_a_costmap_changes_no_bit(tmp_path):
             assert np.array_equal(getattr(one, field), getattr(other, field)), field
 
 
+@pytest.mark.slow
 def test_static_walls_stay_in_place_in_a_rolling_costmap_that_drifts(tmp_path):
     """LIDARs mark nothing here: only the static map keeps the robots from the walls."""
     walls = Walls()

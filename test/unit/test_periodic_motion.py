@@ -53,6 +53,7 @@ def known_places(replays):
     return replays.places[known]
 
 
+@pytest.mark.slow
 def test_an_obstacle_is_where_it_was_a_period_ago():
     replays = watched(60.0).replay(60.0 + AHEAD_S)
     np.testing.assert_allclose(known_places(replays), places(60.0 + AHEAD_S), atol=0.02)
@@ -93,6 +94,7 @@ def test_an_obstacle_that_wanders_has_no_period():
     assert watched(90.0, wandering).is_empty
 
 
+@pytest.mark.slow
 def test_a_full_memory_learns_anew():
     """100 tracks at 10 Hz fill it in 60 s."""
     motion = PeriodicMotion()

@@ -69,6 +69,7 @@ def written(monkeypatch):
     return found
 
 
+@pytest.mark.slow
 def test_no_source_of_formulas_in_reports_of_flights(written):
     near = flight(robot(0, (1.0, 2.0), (0.5, 0.0)), robot(1, (6.0, 3.0), (-0.5, 0.0)))
     for trace in (fleet(3), near):

@@ -21,6 +21,7 @@ def test_a_scene_a_world_a_map_and_goals_are_shown():
     assert shown == ["", "yaml", "world", "yaml", "yaml"]  # the last one has people
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_it_flies_to_every_goal(command, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)

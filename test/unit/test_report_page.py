@@ -40,6 +40,7 @@ def page_of(count: int) -> Page:
     return flight_page(fleet(count), wall_time_s=2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 20])
 @pytest.mark.filterwarnings("error")
 def test_page_of_so_many(count):

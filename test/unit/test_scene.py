@@ -166,6 +166,7 @@ def test_arena_leaves_the_tutorial_goals_free():
         assert scene.surface_distance_m(start.x_m, start.y_m, 1.0) > 0.8
 
 
+@pytest.mark.slow
 def test_arena_passages_let_an_inflated_quadcopter_through():
     scene = load_scene(ARENA)
     solids = [

@@ -123,6 +123,7 @@ def test_the_bridge_passes_on_why_arming_was_refused(autopilot):
     flight.end()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay_s, loss_share", [(0.3, 0.0), (0.0, 0.2), (0.1, 0.15)])
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
 def test_the_bridge_flies_over_a_bad_link(autopilot, delay_s, loss_share):

@@ -300,6 +300,7 @@ edits = st.tuples(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.lists(edits, min_size=1, max_size=3))
 def test_changed_values_are_used_or_refused(changes):
@@ -307,6 +308,7 @@ def test_changed_values_are_used_or_refused(changes):
     targets.run("study", b"\n".join(lines))
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(st.data())
 def test_changed_bytes_are_used_or_refused(data):

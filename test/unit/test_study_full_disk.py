@@ -54,6 +54,7 @@ def new_study(folder):
     return setup, folder / "out" / "study.db"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("free_pages", [0, 1, 3, 8])
 def test_a_study_stops_with_its_best_on_a_full_disk_and_resumes(tmp_path, monkeypatch, free_pages):
     setup, path = new_study(tmp_path)

@@ -89,6 +89,7 @@ def test_no_candidate_of_a_generation_knows_of_another(tmp_path):
     assert propose(SYNTHETIC_SPACE, first, 1, 8, 4) != [trial[3] for trial in trials[8:]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flights", [5, 60])
 def test_an_interrupted_search_ends_as_an_uninterrupted_one_and_flies_nothing_again(
     tmp_path, flights
@@ -107,6 +108,7 @@ def test_a_search_can_be_made_longer(tmp_path):
     assert run(tmp_path / "parts", SearchOptions(20, 4, 8, 3))[0] == whole
 
 
+@pytest.mark.slow
 def test_kill_9_loses_nothing(tmp_path):
     whole, all_flown = run(tmp_path / "whole")
     code = """

@@ -213,6 +213,7 @@ def test_a_recordings_scene_refers_to_no_file(tmp_path):
     assert "scene: refers to another file" in refusal(read_trace, path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["flight.bag", "flight.mcap"])
 def test_a_recording_that_unpacks_to_far_more_is_refused(tmp_path, monkeypatch, name):
     path = recording(tmp_path / name, " " * 200_000_000 + "{}")
@@ -224,6 +225,7 @@ def test_a_recording_that_unpacks_to_far_more_is_refused(tmp_path, monkeypatch, 
     assert len(read_trace(path).robots) == 1
 
 
+@pytest.mark.slow
 def test_worlds_that_include_each_other_come_to_an_end(tmp_path):
     # Each has the next one twice, and the last one the first: 2^16 models within 16 levels.
     for k in range(20):
