@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 
 GATE = 13.8
 """Squared Mahalanobis distance, chi-square with 2 degrees of freedom, 0.1 %."""
+_FARTHEST_M = 1.0  # whatever the gate: a hidden track's uncertainty grows, and parts have no place
 _WHOLE_M, _PART_M = 0.12, 0.3  # standard deviations of outlines' centres
 
 
@@ -37,7 +38,8 @@ def assign(
         return []
     distances = _distances(states, covariances, seen.centres[rows], seen.is_whole[rows])
     pairs: List[Tuple[int, int]] = []
-    tracks, columns = np.nonzero(distances < GATE)
+    away_m = np.hypot(*(states[:, None, :2] - seen.centres[rows]).transpose(2, 0, 1))
+    tracks, columns = np.nonzero((distances < GATE) & (away_m < _FARTHEST_M))
     order = np.argsort(distances[tracks, columns], kind="stable")
     free_tracks, free_columns = np.ones(len(states), bool), np.ones(len(rows), bool)
     for track, column in zip(tracks[order].tolist(), columns[order].tolist()):
