@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from quad_nav.geometry import Pose3D, Scan, quaternion_from_yaw
 from quad_nav.tracking.association import assign
-from quad_nav.tracking.discs import Outlines, Radius
+from quad_nav.tracking.discs import Outlines
 from quad_nav.tracking.tracker import ObstacleTracker
 from quad_nav.tracking.tracks import TrackerParams
 
@@ -182,42 +181,17 @@ def test_a_lidar_that_tilts_and_looks_over_an_obstacle_does_not_lose_it():
     assert tracks[2.6].states[0, 1] == pytest.approx(0.6, abs=0.1)
 
 
-def test_a_hidden_obstacle_takes_no_cluster_from_afar():
-    """Its place is known to 2 m after a while, so that the gate is 7 m wide."""
+def test_a_part_far_from_a_track_is_not_its_obstacle():
+    """The place is known to 2 m, so that the gate is 7 m wide; the centre of a part is a guess."""
     states, covariances = np.zeros((1, 4)), np.diag([4.0, 4.0, 1.0, 1.0])[None]
-    usable, no = np.ones(1, bool), np.zeros(1)
 
-    def pairs(x_m):
-        outline = Outlines(np.array([[x_m, 0.0]]), no + 0.3, no > 1.0, no + 5.0)
-        return assign(states, covariances, outline, usable)
+    def pairs(x_m, is_whole):
+        five, usable = np.full(1, 5.0), np.ones(1, bool)
+        seen = Outlines(np.array([[x_m, 0.0]]), 0.06 * five, np.array([is_whole]), five)
+        return assign(states, covariances, seen, usable)
 
-    assert pairs(0.95) == [(0, 0)] and pairs(1.05) == []
-
-
-def test_a_hidden_obstacle_is_forgotten_when_its_place_is_unknown():
-    """With accelerations of 1.5 m/s2 the place is known to 1 m after 3 s, at 20 scans a second.
-
-    The variance grows by 1.5^2 / 20 * t^3 / 3, and with that of the velocity. The pillar's shadow
-    begins at y = -5 tan asin(1.2 / 2) = -3.75 m, where the obstacle is after 2.25 s.
-    """
-    patient, counts = replace(ON, lost_after_s=100.0), {}
-    for now_s, _, tracker in track(
-        lambda t: ((2.0, 0.0, 1.2), (5.0, min(t - 6.0, 0.0), 0.25)),
-        times(12.0, 20.0),
-        params=patient,
-    ):
-        counts[round(now_s, 2)] = len(tracker.tracks)
-    forgotten_s = max(time_s for time_s, count in counts.items() if count)
-    assert 2.3 < forgotten_s - 2.25 < 3.2
-
-
-def test_a_disc_does_not_grow_by_what_touches_the_obstacle_for_a_scan():
-    radius = Radius(circle_m=0.25, reach_m=0.25, views=20)
-    radius.hold(1.25)
-    assert radius.outer_m == pytest.approx(0.45)
-    for _ in range(20):
-        radius.hold(1.25)
-    assert radius.outer_m == pytest.approx(1.25, abs=0.1)
+    assert pairs(0.95, False) == pairs(5.0, True) == [(0, 0)]
+    assert pairs(1.05, False) == pairs(8.0, True) == []
 
 
 def test_an_obstacle_that_stops_becomes_a_standing_one():

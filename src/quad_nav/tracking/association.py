@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 
 GATE = 13.8
 """Squared Mahalanobis distance, chi-square with 2 degrees of freedom, 0.1 %."""
-_FARTHEST_M = 1.0  # whatever the gate: a hidden track's uncertainty grows, and parts have no place
 _WHOLE_M, _PART_M = 0.12, 0.3  # standard deviations of outlines' centres
+_PART_FAR_M = 1.0  # the disc of a part is fitted near the track, so the part has to be near
 
 
 def assign(
@@ -39,7 +39,8 @@ def assign(
     distances = _distances(states, covariances, seen.centres[rows], seen.is_whole[rows])
     pairs: List[Tuple[int, int]] = []
     away_m = np.hypot(*(states[:, None, :2] - seen.centres[rows]).transpose(2, 0, 1))
-    tracks, columns = np.nonzero((distances < GATE) & (away_m < _FARTHEST_M))
+    is_near = seen.is_whole[rows] | (away_m < _PART_FAR_M)
+    tracks, columns = np.nonzero((distances < GATE) & is_near)
     order = np.argsort(distances[tracks, columns], kind="stable")
     free_tracks, free_columns = np.ones(len(states), bool), np.ones(len(rows), bool)
     for track, column in zip(tracks[order].tolist(), columns[order].tolist()):

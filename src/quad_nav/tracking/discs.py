@@ -30,7 +30,6 @@ _POSE_NOISE_M = 0.02  # of the LIDAR
 _GUESS_M = 0.3
 _UNKNOWN_RADIUS_M = 0.15  # standard deviation of ``FIRST_RADIUS_M``
 _SLOWEST = 0.05  # weight of a new view of an obstacle that is known for long
-_GROW = 0.2  # part of what is seen beyond the reach, for each view: others may touch it for one
 _SHRINK = 0.98  # of the reach beyond the radius, for each view
 
 
@@ -82,8 +81,7 @@ class Radius:
     def hold(self, farthest_m: float) -> None:
         """Take the distance of the farthest point of a view from the fitted centre."""
         beyond_m = max(self.reach_m - self.circle_m, 0.0) * _SHRINK
-        beyond_m += _GROW * max(farthest_m - self.circle_m - beyond_m, 0.0)
-        self.reach_m = self.circle_m + beyond_m
+        self.reach_m = max(self.circle_m + beyond_m, farthest_m)
 
 
 @dataclass(frozen=True)

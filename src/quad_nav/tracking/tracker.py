@@ -39,7 +39,6 @@ _MOVED_M = 0.12
 _SIGNIFICANT = 13.8  # chi-square, 2 degrees of freedom, 0.1 %
 _SEEN_THROUGH_S = 0.3  # patience with a track at whose place there is nothing
 _RESTART_S = 1.5  # time in which a track is confirmed, or measured from another start
-_LOST_M = 1.0  # standard deviation of the place of a hidden obstacle at which its track ends
 _TENTATIVE_S = 0.3  # patience with a track that is not confirmed
 _IN_DOUBT_S = 0.6  # time for which a track may be in space that was never seen: slivers of walls
 _BESIDE_M = 0.15
@@ -254,13 +253,8 @@ class ObstacleTracker:
             elif _sees_through(clusters, self._states[track], life.radius.circle_m):
                 keep[track] = unseen_s <= _SEEN_THROUGH_S
             else:
-                keep[track] = unseen_s <= self.params.lost_after_s and self._is_known(track)
+                keep[track] = unseen_s <= self.params.lost_after_s
         self._keep(keep)
-
-    def _is_known(self, track: int) -> bool:
-        """Return whether the place of a track is known well enough to be of use."""
-        covariance = self._filters.covariances[track]
-        return bool(max(covariance[0, 0], covariance[1, 1]) <= _LOST_M**2)
 
     def _stands(self, track: int, clusters: ScanClusters, seen: Outlines) -> bool:
         """Return whether a track that was not seen has become a standing cluster."""
