@@ -87,6 +87,7 @@ class MovingPoints:
         """Forget earlier scans, after a jump of clock or pose, or with other beams."""
         self._earlier: Optional[EarlierScans] = None
         self._stamps_s = np.full(SLOTS, -math.inf)
+        self._order = Order(np.empty(0, np.int64), RECENT)
         self._compared_s = self._newest_s = -math.inf
         self._previous: Optional[Pose3D] = None
         self._beams = (0.0, 0.0, 0)
@@ -138,10 +139,7 @@ class MovingPoints:
                 np.zeros((SLOTS, 3)),
                 np.zeros((SLOTS, 3, 3)),
             )
-        order = np.argsort(self._stamps_s, kind="stable")
-        order = order[np.isfinite(self._stamps_s[order])]
-        order = np.concatenate([order[-RECENT:], order[:-RECENT]])
-        return self._earlier, Order(order, RECENT)
+        return self._earlier, self._order
 
     def _check_continuity(self, scan: Scan, pose: Pose3D) -> None:
         beams = (scan.angle_min_rad, scan.angle_increment_rad, len(scan.ranges_m))
@@ -161,6 +159,9 @@ class MovingPoints:
         self._newest_s = stamp_s
         slot = int(np.argmin(self._stamps_s))
         self._stamps_s[slot] = stamp_s
+        order = np.argsort(self._stamps_s)
+        order = order[np.isfinite(self._stamps_s[order])]
+        self._order = Order(np.concatenate([order[-RECENT:], order[:-RECENT]]), RECENT)
         earlier.ranges[slot] = view.ranges
         earlier.origins[slot], earlier.rotations[slot] = view.origin, view.rotation
 
