@@ -16,7 +16,7 @@ from quad_nav.kernels.jit import njit
 UNKNOWN, OCCUPIED, FREED = 0, 1, 2
 """Evidence about a point: unseen or in doubt, occupied earlier, free space earlier."""
 _MAX_SIDE_BEAMS = 64
-_STANDS = 3  # recent scans that see a point occupied
+_STANDS = 3  # recent scans that see a point occupied, and none free: it stands
 
 
 class ScanView(NamedTuple):
@@ -40,11 +40,9 @@ class EarlierScans(NamedTuple):
 
 
 class Order(NamedTuple):
-    """In which order earlier scans are asked."""
+    """In which order earlier scans are asked: the recent ones first, the oldest of each first."""
 
-    slots: NDArray[
-        np.int64
-    ]  # [k], the recent ones first, then the others; the oldest of each first
+    slots: NDArray[np.int64]  # [k]
     recent: int  # number of recent ones
 
 
@@ -174,9 +172,9 @@ def compare_scan(
         scan: The scan.
         earlier: Earlier scans.
         order: Slots to compare with.
-        is_thorough: Ask every slot until one finds the point freed; the older ones only if few of
-            the recent ones see it occupied, because what was there for so long has stopped.
-            Otherwise the first slot that knows about a point decides.
+        is_thorough: Ask every slot until one finds the point freed. The older ones are not asked
+            about a point that three recent ones see occupied: what is there stands. Otherwise the
+            first slot that knows about a point decides.
         step: 1 for all beams, 2 for every other one.
         doubts: Limits.
         points: float64[n, 3], written: the points in the fixed frame; NaN where there is none.

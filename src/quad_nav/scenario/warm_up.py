@@ -102,7 +102,8 @@ def track_obstacle() -> None:
 def evade_obstacle() -> None:
     """Evade an obstacle that comes every ten seconds, so that every kernel is called."""
     memory = MotionMemory()
-    one = Tracks(0.0, np.array([0]), np.zeros((1, 4)), np.eye(4)[np.newaxis], np.array([0.3]))
+    well_seen = 1e-4 * np.eye(4)[np.newaxis]  # the memory keeps nothing else
+    one = Tracks(0.0, np.array([0]), np.zeros((1, 4)), well_seen, np.array([0.3]))
     for step in range(96):
         number, at = divmod(step, 24)
         states = np.array([[2.0 - 0.1 * at, 0.0, -1.0, 0.0]])

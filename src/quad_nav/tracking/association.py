@@ -27,6 +27,8 @@ def assign(
 ) -> List[Tuple[int, int]]:
     """Return pairs of tracks and clusters, each of them at most once.
 
+    A cluster of which an edge is hidden is paired only with a track within 1 m.
+
     Args:
         states: float64[m, 4] of the tracks, predicted.
         covariances: float64[m, 4, 4] of the states.

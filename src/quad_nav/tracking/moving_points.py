@@ -117,7 +117,7 @@ class MovingPoints:
         view = _view(scan, frame_from_sensor)
         count = len(view.ranges)
         points, evidence = np.empty((count, 3)), np.empty(count, np.uint8)
-        earlier, order = self._slots(count)
+        earlier, order = self._slots(count), self._order
         doubts = _doubts(scan, heights_m, params)
         is_idle = not is_thorough and not compare_scan(
             view, earlier, order, False, _IDLE_STEP, doubts, points, evidence
@@ -131,15 +131,15 @@ class MovingPoints:
         found = find_clusters(view, points, evidence, _INCIDENCE_RAD, RANGE_NOISE_M, labels, rows)
         return ScanClusters(view, points, labels, rows[:found])
 
-    def _slots(self, beams: int) -> Tuple[EarlierScans, Order]:
-        """Return the earlier scans, and the order in which they are asked."""
+    def _slots(self, beams: int) -> EarlierScans:
+        """Return the earlier scans."""
         if self._earlier is None:
             self._earlier = EarlierScans(
                 np.full((SLOTS, beams), np.nan, np.float32),
                 np.zeros((SLOTS, 3)),
                 np.zeros((SLOTS, 3, 3)),
             )
-        return self._earlier, self._order
+        return self._earlier
 
     def _check_continuity(self, scan: Scan, pose: Pose3D) -> None:
         beams = (scan.angle_min_rad, scan.angle_increment_rad, len(scan.ranges_m))

@@ -3,8 +3,8 @@
 A cluster of points in space that was free begins a track. A track is confirmed when it has moved
 and its velocity is larger than what its uncertainty explains; only then it is told to others. A
 track that is not seen is predicted for a while if something hides it, and ends soon if the LIDAR
-sees through it. An obstacle that has stopped is no longer in space that was free: its track ends,
-and it is a standing obstacle again.
+sees through the place. An obstacle that has stood for 2 s is a standing obstacle again: its track
+ends.
 
 Sources: detection and tracking as in C.-C. Wang, C. Thorpe, S. Thrun, ICRA 2003, section V; gates,
 global nearest neighbours and M of N detections as in S. Blackman, R. Popoli, "Design and Analysis
@@ -190,7 +190,8 @@ class ObstacleTracker:
     ) -> NDArray[np.bool_]:
         """Return which clusters may be obstacles that move, bool[m].
 
-        What is all in doubt and of which an edge is hidden may be a part of a wall.
+        A cluster with no point in space that was free counts only if both of its edges are in
+        sight; otherwise it may be a part of a wall.
         """
         usable = (
             (clusters.rows[:, 3] == 0)
