@@ -11,8 +11,14 @@ import pytest
 from quad_nav.control.evasion import EvasionParams, Surroundings, evade, predicted_discs
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
-from quad_nav.kernels.evasion_commands import Body, StandingObstacles, command_costs
+from quad_nav.kernels.evasion_commands import Body, command_costs
 from quad_nav.kernels.space_time import SpaceTime, fill_costs, haste_per_s, threat
+from quad_nav.kernels.standing_obstacles import (
+    StandingObstacles,
+    fill_gaps,
+    overlap_cost,
+    overlap_costs,
+)
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -61,7 +67,7 @@ def test_threat_grows_inside_and_falls_off_outside():
 
 def test_a_command_into_an_obstacle_costs_its_time_inside():
     discs = np.tile([0.57, 0.0, 0.2, 1e-6], (11, 1, 1))
-    standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    standing = StandingObstacles(np.ones((1, 1)), 0.0, 0.0, 1.0)
     costs, commands = np.zeros((3, 15, 15)), np.array([[0.5, 0.0], [-0.5, 0.0]])
     start, hover = (0.5, 0.0, 0.0, 0.0), np.zeros((1, 2))
     body = Body(0.01, 1e3, 2.0)  # keeps its velocity
@@ -74,7 +80,7 @@ def test_commands_last_as_long_for_a_fast_robot():
     """At 2 m/s it is at 2 m after 1 s, the end of the second command, and 0.03 m deep."""
     fast = SEARCH._replace(cell_m=0.2, step_s=0.2, max_speed_mps=2.0, usual_speed_mps=2.0)
     discs = np.tile([2.17, 0.0, 0.2, 1e-6], (31, 1, 1))
-    standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    standing = StandingObstacles(np.ones((1, 1)), 0.0, 0.0, 1.0)
     costs, ahead = np.zeros((7, 31, 31)), np.array([[2.0, 0.0]])
     body, start = Body(0.01, 1e3, 2.0), (2.0, 0.0, 0.0, 0.0)
     found = command_costs(fast, body, discs, standing, costs, start, ahead, ahead)
@@ -84,7 +90,7 @@ def test_commands_last_as_long_for_a_fast_robot():
 def test_the_best_second_command_counts():
     """A robot that goes on for a second is at 0.5 m; one that turns back stays before 0.42 m."""
     discs = np.tile([0.67, 0.0, 0.25, 1e-6], (11, 1, 1))
-    standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    standing = StandingObstacles(np.ones((1, 1)), 0.0, 0.0, 1.0)
     ahead, back = np.array([[0.5, 0.0]]), np.array([[-0.5, 0.0]])
     costs, start, body = np.zeros((3, 15, 15)), (0.5, 0.0, 0.0, 0.0), Body(3.125, 0.08, 2.0)
     on, turned = (
@@ -100,7 +106,7 @@ def test_the_body_approaches_a_command_as_in_flight():
     """Its position runs 0.32 s after the integral of the command, and its stop takes as long."""
     far = np.tile(np.arange(15.0), (15, 1))  # costs 1 for each cell in x
     costs = np.stack([far, far, far])
-    standing = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    standing = StandingObstacles(np.ones((1, 1)), 0.0, 0.0, 1.0)
     none, body = np.zeros((11, 0, 4)), Body(25.0 / 8.0, 2.0 / 25.0, 2.0)
     commands, start = np.array([[0.5, 0.0]]), (0.0, 0.0, 0.0, 0.0)
     found = command_costs(SEARCH, body, none, standing, costs, start, commands, commands)
@@ -110,11 +116,11 @@ def test_the_body_approaches_a_command_as_in_flight():
 def test_a_command_leaves_room_to_stop_before_a_standing_obstacle():
     """After 1 s at 0.5 m/s the robot is at 0.5 m, and stops at 0.5 + 0.5 / 2 = 0.75 m."""
     costs, none = np.zeros((3, 15, 15)), np.zeros((11, 0, 4))
-    blocked, body = np.ones((1, 1), bool), Body(2.0, 1e3, 2.0)
+    rim, body = np.zeros((1, 1)), Body(2.0, 1e3, 2.0)
     ahead, start = np.array([[0.5, 0.0]]), (0.5, 0.0, 0.0, 0.0)
 
     def found(wall_x_m):
-        wall = StandingObstacles(blocked, wall_x_m, -5.0, 10.0)
+        wall = StandingObstacles(rim, wall_x_m, -5.0, 10.0)
         return command_costs(SEARCH, body, none, wall, costs, start, ahead, ahead)[0]
 
     assert found(0.76) == 0.0
@@ -122,12 +128,35 @@ def test_a_command_leaves_room_to_stop_before_a_standing_obstacle():
     assert found(0.68) == pytest.approx(100.0 * 0.1 * 2)
 
 
+def test_overlap_costs_more_the_deeper_it_is():
+    """A lethal cell with its centre at 0, and a robot of 0.30 m: the rim is at 0.30 m."""
+    costs, gaps = np.zeros((21, 21), np.uint8), np.empty((21, 21))
+    costs[10, 10] = 254
+    fill_gaps(costs, 0.05, 0.3, gaps)
+    standing = StandingObstacles(gaps, -0.525, -0.525, 0.05)
+    assert overlap_cost(standing, 0.36, 0.0) == pytest.approx(0.0)
+    assert overlap_cost(standing, 0.325, 0.0) == pytest.approx(0.25)  # half of the margin is left
+    assert overlap_cost(standing, 0.3, 0.0) == pytest.approx(1.0)
+    assert overlap_cost(standing, 0.0, -0.2) == pytest.approx(3.0)  # 0.1 m deep
+    assert overlap_cost(standing, -0.18, 0.24) == pytest.approx(1.0, abs=0.05)  # hypot is 0.30
+    assert overlap_cost(standing, 0.6, 0.0) == 0.0  # outside of the grid
+    grid = overlap_costs(standing, np.array([-0.2, 0.0, 0.3]))
+    assert grid[1].tolist() == pytest.approx([3.0, 7.0, 1.0])
+    assert grid[:, 1].tolist() == pytest.approx([3.0, 7.0, 1.0])
+
+
+def test_inscribed_cells_without_a_lethal_one_are_at_the_rim():
+    costs, gaps = np.full((3, 3), 253, np.uint8), np.empty((3, 3))
+    fill_gaps(costs, 0.05, 0.3, gaps)
+    assert gaps.tolist() == np.zeros((3, 3)).tolist()
+
+
 def test_the_best_motion_goes_on_from_where_and_when_the_body_rests():
     """At 0.5 m/s it rests 0.25 m and half a second later: half a step of each of two costs."""
     columns = np.arange(33) - 16.0
     costs = np.stack([factor * np.tile(columns, (33, 1)) for factor in (0.0, 0.0, 1.0, 3.0, 7.0)])
     slow = SEARCH._replace(step_s=1.0, cell_m=0.25, max_speed_mps=0.5)
-    open_air = StandingObstacles(np.zeros((1, 1), bool), 0.0, 0.0, 1.0)
+    open_air = StandingObstacles(np.ones((1, 1)), 0.0, 0.0, 1.0)
     none, ahead, start = np.zeros((26, 0, 4)), np.array([[0.5, 0.0]]), (0.5, 0.0, 0.0, 0.0)
     found = command_costs(slow, Body(2.0, 1e3, 2.0), none, open_air, costs, start, ahead, ahead)
     # After 1 s it is at 0.5 m, and rests at 0.75 m, cell 3, at 1.5 s.
@@ -141,7 +170,7 @@ def test_speed_above_the_usual_costs_what_it_gains():
     assert haste_per_s(fast, 0.5) == haste_per_s(fast, 0.2) == 0.0
     to_go = np.tile(np.abs(np.arange(-15, 16) * 0.2 - 2.0) / 2.0, (31, 1))  # 2 m ahead
     costs = np.full((7, 31, 31), np.inf)
-    fill_costs(fast, np.zeros((31, 0, 4)), np.zeros((31, 31), bool), to_go, costs)
+    fill_costs(fast, np.zeros((31, 0, 4)), np.zeros((31, 31)), to_go, costs)
     # Five steps at 1 m/s: half of the way is left, each step costs 0.2 s * 1.3 * 0.25 for its
     # haste, and 0.2 s * 0.05 of the way that is left then.
     assert costs[1, 15, 15] == pytest.approx(0.5 + 5 * 0.065 + 0.01 * (1.0 + 0.9 + 0.8 + 0.7 + 0.6))
@@ -153,7 +182,7 @@ def test_waiting_costs_less_than_the_way_through():
     away = np.abs(np.arange(-7, 8) * 0.125 - 0.5) / 0.5
     to_go = np.tile(away, (15, 1))
     costs = np.full((3, 15, 15), np.inf)
-    fill_costs(SEARCH, discs, np.zeros((15, 15), bool), to_go, costs)
+    fill_costs(SEARCH, discs, np.zeros((15, 15)), to_go, costs)
     # From the middle one step of 0.25 m to the left of the disc, 0.5 s of way left after it.
     assert costs[1, 7, 7] == pytest.approx(0.05 * 1.0 * 0.5 + 0.5)
     assert costs[1, 7, 9] == pytest.approx((50.0 * 3.0 + 0.05 * 0.5) * 0.5)
@@ -163,7 +192,7 @@ def test_a_fast_obstacle_threatens_between_the_steps():
     """At 2 m/s it is 0.4 m away from a cell at the step, and on it 0.2 s later, half as much."""
     discs = np.array([[[-0.4 + 0.2 * (k - 5), 0.0, 0.2, 1e-6]] for k in range(11)])
     costs, to_go = np.full((3, 15, 15), np.inf), np.zeros((15, 15))
-    fill_costs(SEARCH, discs, np.zeros((15, 15), bool), to_go, costs)
+    fill_costs(SEARCH, discs, np.zeros((15, 15)), to_go, costs)
     assert costs[1, 7, 7] == pytest.approx(0.5 * 50.0 * 3.0 * 0.5)
 
 

@@ -31,15 +31,15 @@ from numpy.typing import NDArray
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import INSCRIBED, UNKNOWN, GridSpec
+from quad_nav.grid import GridSpec
 from quad_nav.kernels.evasion_commands import (
     BOTH_S,
     Body,
-    StandingObstacles,
     command_costs,
     rest_s,
 )
 from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
+from quad_nav.kernels.standing_obstacles import StandingObstacles, fill_gaps, overlap_costs
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.tracks import Tracks
 
@@ -166,8 +166,8 @@ def _costs_of(
     offsets = np.arange(-middle, middle + 1) * search.cell_m
     standing = _standing(around)
     costs = np.full((steps + 1, len(offsets), len(offsets)), math.inf)
-    blocked, to_go = _blocked(standing, offsets), _to_go(around, offsets, route[-1])
-    fill_costs(search, discs, blocked, to_go, costs)
+    overlaps, to_go = overlap_costs(standing, offsets), _to_go(around, offsets, route[-1])
+    fill_costs(search, discs, overlaps, to_go, costs)
     moving = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
     start = (*moving, *_acceleration(moving, last))
     flown = around.neighbours.limited(commands)
@@ -254,26 +254,12 @@ def _polar(max_speed_mps: float, speeds: int, courses: int) -> Floats:
 
 
 def _standing(around: Surroundings) -> StandingObstacles:
-    """Return the cells of the local costmap where the robot's circle hits an obstacle."""
-    spec, costs = around.spec, around.costs
-    return StandingObstacles(
-        (costs >= INSCRIBED) & (costs != UNKNOWN),
-        spec.origin_x_m - around.pose.x_m,
-        spec.origin_y_m - around.pose.y_m,
-        spec.resolution_m,
-    )
-
-
-def _blocked(standing: StandingObstacles, offsets: Floats) -> NDArray[np.bool_]:
-    """Return the cells of the search where the robot's circle hits what stands, bool[M, M]."""
-    size_y, size_x = standing.blocked.shape
-    columns, rows = (
-        np.floor((offsets - origin_m) / standing.resolution_m).astype(np.int64)
-        for origin_m in (standing.x_m, standing.y_m)
-    )
-    inside = ((rows >= 0) & (rows < size_y))[:, None] & (columns >= 0) & (columns < size_x)
-    at = np.clip(rows, 0, size_y - 1)[:, None], np.clip(columns, 0, size_x - 1)
-    return inside & standing.blocked[at]
+    """Return the distances from what stands in the local costmap."""
+    spec = around.spec
+    gaps = np.empty(around.costs.shape)
+    fill_gaps(around.costs, spec.resolution_m, around.radius_m, gaps)
+    x_m, y_m = spec.origin_x_m - around.pose.x_m, spec.origin_y_m - around.pose.y_m
+    return StandingObstacles(gaps, x_m, y_m, spec.resolution_m)
 
 
 def _to_go(around: Surroundings, offsets: Floats, end: Floats) -> Floats:

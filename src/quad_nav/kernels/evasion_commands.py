@@ -20,29 +20,12 @@ from quad_nav.kernels.space_time import (
     haste_per_s,
     threat,
 )
+from quad_nav.kernels.standing_obstacles import StandingObstacles, overlap_cost
 
 BOTH_S = 1.0
 """Duration of the first and the second command together."""
 _FIRST_S = 0.4
 _PARTS = 2  # steps of the body's motion between two predictions
-
-
-class StandingObstacles(NamedTuple):
-    """Obstacles that do not move, as cells of the local costmap.
-
-    Positions are relative to the robot, as everywhere in this module.
-
-    Attributes:
-        blocked: bool[H, W], cells where the robot's circle hits something.
-        x_m: x of the corner of cell (0, 0).
-        y_m: y of the corner of cell (0, 0).
-        resolution_m: Size of a cell.
-    """
-
-    blocked: NDArray[np.bool_]
-    x_m: float
-    y_m: float
-    resolution_m: float
 
 
 class Body(NamedTuple):
@@ -137,8 +120,7 @@ def _follow(
         for _ in range(_PARTS):
             _move(body, moving, command, dt / _PARTS, rest)
         rate = search.risk_per_s * threat(discs, k, moving[0], moving[1])
-        if _is_blocked(standing, moving[0], moving[1]):
-            rate += search.blocked_per_s
+        rate += search.blocked_per_s * overlap_cost(standing, moving[0], moving[1])
         rate += haste_per_s(search, math.hypot(moving[2], moving[3]))
         cost += rate * dt
     return cost
@@ -184,23 +166,14 @@ def _end_cost(
     cost = later_s * haste_per_s(search, speed)
     for k in range(1, SUBSTEPS + 1):
         at = later_s * k / SUBSTEPS
-        if _is_blocked(standing, moving[0] + at * moving[2], moving[1] + at * moving[3]):
-            cost += search.blocked_per_s * search.step_s / SUBSTEPS
+        overlap = overlap_cost(standing, moving[0] + at * moving[2], moving[1] + at * moving[3])
+        cost += search.blocked_per_s * overlap * search.step_s / SUBSTEPS
     x, y = moving[0] + later_s * moving[2], moving[1] + later_s * moving[3]
     step = round(BOTH_S / search.step_s) + later_s / search.step_s
     before = min(int(step), costs.shape[0] - 2)
     part = min(step - before, 1.0)
     cost += (1.0 - part) * _cost_at(search, costs, before, x, y)
     return cost + part * _cost_at(search, costs, before + 1, x, y)
-
-
-@njit(cache=True, nogil=True)
-def _is_blocked(standing: StandingObstacles, x: float, y: float) -> bool:
-    """Return whether something stands at a point; nothing is known outside of the grid."""
-    column = math.floor((x - standing.x_m) / standing.resolution_m)
-    row = math.floor((y - standing.y_m) / standing.resolution_m)
-    size_y, size_x = standing.blocked.shape
-    return 0 <= row < size_y and 0 <= column < size_x and standing.blocked[row, column]
 
 
 @njit(cache=True, nogil=True)

@@ -78,7 +78,7 @@ def haste_per_s(search: SpaceTime, speed_mps: float) -> float:
 def fill_costs(
     search: SpaceTime,
     discs: NDArray[np.float64],
-    blocked: NDArray[np.bool_],
+    overlaps: NDArray[np.float64],
     to_go: NDArray[np.float64],
     costs: NDArray[np.float64],
 ) -> None:
@@ -87,7 +87,7 @@ def fill_costs(
     Args:
         search: Resolution and costs.
         discs: float64[steps * 5 + 1, n, 4], as for ``threat``, five for each step.
-        blocked: bool[M, M], cells where the robot hits what stands.
+        overlaps: float64[M, M], ``overlap_cost`` with what stands.
         to_go: float64[M, M], cost of the way that is left after the horizon.
         costs: float64[steps + 1, M, M], filled from step 1 on, as far as the robot may be.
     """
@@ -104,8 +104,7 @@ def fill_costs(
             for column in range(middle - near, middle + near + 1):
                 cost = risk * threats[row, column] / len(_DURING)
                 cost += search.away_per_s * to_go[row, column]
-                if blocked[row, column]:
-                    cost += search.blocked_per_s
+                cost += search.blocked_per_s * overlaps[row, column]
                 costs[k, row, column] = cost * search.step_s + _least(
                     costs[k + 1], row, column, moves
                 )
