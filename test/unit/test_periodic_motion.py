@@ -188,6 +188,24 @@ def test_a_multiple_of_a_period_is_none():
     assert found.tolist() == [False, True, False]
 
 
+@pytest.mark.slow
+def test_an_obstacle_with_twice_the_period_of_others_is_not_where_half_a_period_leads():
+    """Three obstacles with 10 s, and one with 20 s around (20, 0)."""
+    motion = PeriodicMotion()
+    for k in range(801):
+        x, y, vx, vy = circling(0.1 * k)
+        shorter = np.array(circling(0.2 * k)) * [1.0, 1.0, 2.0, 2.0]
+        shorter = shorter + np.array(
+            [[0.0, 0.0, 0.0, 0.0], [0.0, 20.0, 0.0, 0.0], [0.0, -20.0, 0.0, 0.0]]
+        )
+        states = np.concatenate([shorter, [[x + 20.0, y, vx, vy]]])
+        motion.add(0.1 * k, np.arange(4) + 4 * (k // 15), states, np.full(4, 0.4))
+    replays = motion.replay(80.0 + AHEAD_S)
+    for k, (x, y) in enumerate(places(80.0 + AHEAD_S)):
+        there = replays.places[k, replays.places[k, :, 0] > 10.0]
+        np.testing.assert_allclose(there, [[x + 20.0, y]], atol=0.02)
+
+
 def test_replays_of_one_obstacle_count_once():
     found = np.array([[[0.0, 0.0], [0.3, 0.0], [0.6, 0.0]], [[0.0, 0.0], [5.0, 0.0], [5.0, 0.5]]])
     drop_repeats(found, 0.4)

@@ -5,8 +5,9 @@ Tracks alone do not show it: they break whenever something hides an obstacle. So
 track votes: for every trail, an uninterrupted piece of a track, that was once in the same place
 with the same velocity, it votes for the time since then. Chance votes have lags of any length;
 those of a period add up. A lag for which many samples of several trails vote is a period. Each
-trail has the period that most of its own votes are for. A trail that nothing votes for, because it
-was hidden before, has that of the trail that it continues, or that continues it.
+trail has the period that most of its own votes are for, or twice that if nothing was there after
+one, three or five of them: then it is the period of other obstacles. A trail that nothing votes
+for, because it was hidden before, has that of the trail that it continues, or that continues it.
 
 A trail with a period is replayed: the obstacle is where it was a whole number of periods ago,
 whether it is seen now or hidden.
@@ -40,6 +41,7 @@ _STRONG = 12  # votes for one lag of one trail that propose a period
 _LAGS, _VOTES = 6, 40  # of trails and of samples that make a proposed period one
 _OWN_VOTES, _OWN_SHARE = 3, 0.1  # of a trail for its period, and their part of all possible ones
 _EXACT_VOTES = 8  # of a trail, from which on its own lags are more exact than the common period
+_ODD_SHARE = 0.1  # of a trail's votes that odd multiples of its period have at least
 _SHARED = 0.4  # part of a multiple's trails that vote for the period as well
 _TOLERANCE_S, _TOLERANCE_PER_TURN_S = 0.05, 0.02
 _JOIN_TURNS = 2  # a trail that nothing has voted for in so many turns is of something else
@@ -190,6 +192,9 @@ class PeriodicMotion:
         most = support[rows, best]
         own = exact[rows, best] / np.maximum(most, 1.0)
         found = np.where(most >= _EXACT_VOTES, own, periods[best])
+        odd = self._by_trail(trails, weights * sound * (turns % 2.0))[rows, best]
+        is_half = (most >= _EXACT_VOTES) & (odd < _ODD_SHARE * most)
+        found = np.where(is_half, 2.0 * found, found)
         wanted = np.maximum(_OWN_SHARE * self._chances(found), _OWN_VOTES)
         self._periods = np.where(most >= wanted, found, 0.0)
         for _ in range(_JOINS):
