@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from quad_nav.control.evasion import EvasionParams, Surroundings, evade, predicted_discs
+from quad_nav.control.evasion import (
+    EvasionParams,
+    Surroundings,
+    evade,
+    predicted_discs,
+    prediction_times,
+)
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
 from quad_nav.kernels.evasion_commands import Body, command_costs
@@ -26,6 +33,7 @@ ON = EvasionParams(True, clearance_m=0.1)
 ORIGIN = Pose2D(0.0, 0.0)
 STILL = (0.0, 0.0)
 HOVER = np.zeros((1, 2))
+TIMES_S = prediction_times(MotionMemory(), 0.5)
 SEARCH = SpaceTime(0.125, 0.5, 0.5, 0.5, 1.3, 50.0, 0.0, 100.0, 0.05)
 
 
@@ -44,17 +52,23 @@ def tracks(*states):
 
 
 def test_discs_move_on_with_their_velocity_and_uncertainty():
-    discs = predicted_discs(ON, around(), tracks([3.0, 1.0, -1.0, 0.0]), 10.5, 0.5)
+    discs = predicted_discs(ON, around(), tracks([3.0, 1.0, -1.0, 0.0]), 10.5, TIMES_S)
     assert discs.shape == (61, 1, 4)  # 6 s, five times in each step of 0.5 s
     np.testing.assert_allclose(discs[0, 0, :3], [2.5, 1.0, 0.85])
     np.testing.assert_allclose(discs[20, 0, :3], [0.5, 1.0, 0.85])
     np.testing.assert_allclose(discs[[0, 20], 0, 3], [0.08, 0.08 + 2.0 * 0.05])
 
 
+def test_motions_that_repeat_are_predicted_for_longer():
+    assert TIMES_S[-1] == 6.0
+    times_s = prediction_times(SimpleNamespace(knows_periods=True), 0.5)
+    assert (times_s[-1], len(times_s)) == (10.0, 101)
+
+
 def test_obstacles_out_of_reach_have_no_discs():
     # within 6 s: 0.85 m of radii, 6 m of its own way and 3 m of the robot's
     near, far = [9.8, 0.0, -1.0, 0.0], [9.9, 0.0, -1.0, 0.0]
-    assert predicted_discs(ON, around(), tracks(near, far), 10.0, 0.5).shape[1] == 1
+    assert predicted_discs(ON, around(), tracks(near, far), 10.0, TIMES_S).shape[1] == 1
 
 
 def test_threat_grows_inside_and_falls_off_outside():

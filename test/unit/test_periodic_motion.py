@@ -120,7 +120,9 @@ def test_motion_memory_replays_what_it_has_seen_well():
         memory.add(seen_tracks(0.1 * k, [circling(0.1 * k)]))
     replays = memory.replay(60.0 + AHEAD_S)
     np.testing.assert_allclose(known_places(replays), places(60.0 + AHEAD_S), atol=0.02)
+    assert memory.knows_periods
     memory.reset()
+    assert not memory.knows_periods
     assert memory.replay(60.0 + AHEAD_S).places.shape[1] == 0
 
 

@@ -46,7 +46,8 @@ from quad_nav.tracking.tracks import Tracks
 Floats = NDArray[np.float64]
 
 STEP_S = 0.5
-_HORIZON_S, _WINDOW_M = 6.0, 5.0  # the least window, from the robot to each side
+_HORIZON_S, _KNOWN_HORIZON_S = 6.0, 10.0  # the second one where motions repeat
+_WINDOW_M = 5.0  # the least window, from the robot to each side
 _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
 _BODY = Body(25.0 / 8.0, 2.0 / 25.0, 2.0)  # of sim/flight.py: gain, lag, acceleration
@@ -137,10 +138,11 @@ def evade(
         last: The last command's velocity along the axes of the costmap's frame, m/s.
     """
     search = _search_of(around.max_speed_mps, around.usual_speed_mps)
-    discs = predicted_discs(params, around, tracks, now_s, search.step_s)
+    times_s = prediction_times(around.memory, search.step_s)
+    discs = predicted_discs(params, around, tracks, now_s, times_s)
     if not discs.shape[1] and around.is_following and not around.is_fast:
         return wish
-    peers = around.neighbours.discs(around.pose, _times(search.step_s))
+    peers = around.neighbours.discs(around.pose, times_s)
     discs = np.concatenate([discs, peers], axis=1)
     pose = around.pose
     commands = _commands(around.max_speed_mps, pose.rotate(wish.vx_mps, wish.vy_mps))
@@ -162,7 +164,8 @@ def _costs_of(
     last: Tuple[float, float],
 ) -> Floats:
     """Return the cost of each of the commands, float64[c]; the commands are float64[c, 2]."""
-    steps, middle = _steps(search.step_s), _middle(search)
+    steps = len(discs) // SUBSTEPS
+    middle = _middle(search, steps)
     offsets = np.arange(-middle, middle + 1) * search.cell_m
     standing = _standing(around)
     costs = np.full((steps + 1, len(offsets), len(offsets)), math.inf)
@@ -176,12 +179,11 @@ def _costs_of(
     return found
 
 
-def _middle(search: SpaceTime) -> int:
+def _middle(search: SpaceTime, steps: int) -> int:
     """Return the number of cells to each side: all within reach, or more than two commands need."""
     speed_mps = search.max_speed_mps
     window_m = max(_WINDOW_M, speed_mps * (BOTH_S + rest_s(_BODY, speed_mps) + search.step_s))
-    within_reach = _steps(search.step_s) * _REACH_CELLS
-    return min(within_reach, math.ceil(window_m / search.cell_m)) + _REACH_CELLS
+    return min(steps * _REACH_CELLS, math.ceil(window_m / search.cell_m)) + _REACH_CELLS
 
 
 def _acceleration(velocity: Tuple[float, float], command: Tuple[float, float]) -> Tuple[float, ...]:
@@ -192,35 +194,40 @@ def _acceleration(velocity: Tuple[float, float], command: Tuple[float, float]) -
 
 
 def predicted_discs(
-    params: EvasionParams, around: Surroundings, tracks: Tracks, now_s: float, step_s: float
+    params: EvasionParams, around: Surroundings, tracks: Tracks, now_s: float, times_s: Floats
 ) -> Floats:
     """Return where the obstacles will be that can come near within the horizon.
 
+    Args:
+        params: The parameters.
+        around: The robot among what stands.
+        tracks: The moving obstacles, in the local costmap's frame.
+        now_s: Present time.
+        times_s: float64[t], times after now.
+
     Returns:
-        float64[t, n, 4], five times in each step: x and y relative to the robot, radius with that
-        of the robot and the clearance, standard deviation of the position.
+        float64[t, n, 4]: x and y relative to the robot, radius with that of the robot and the
+        clearance, standard deviation of the position.
     """
     now = tracks.at(now_s)
     offsets = now.states[:, :2] - np.array([around.pose.x_m, around.pose.y_m])
     speeds = np.hypot(now.states[:, 2], now.states[:, 3])
     radii = now.radii_m + around.radius_m + params.clearance_m
-    horizon_s = _steps(step_s) * step_s
-    reach_m = radii + (speeds + around.max_speed_mps) * horizon_s
+    reach_m = radii + (speeds + around.max_speed_mps) * float(times_s[-1])
     near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
     place = around.pose.x_m, around.pose.y_m
-    discs = predict(now.chosen(near), around.memory, _times(step_s), place)
+    discs = predict(now.chosen(near), around.memory, times_s, place)
     discs[:, :, 2] = discs[:, :, 2] + around.radius_m + params.clearance_m
     return discs
 
 
-def _steps(step_s: float) -> int:
-    """Return the number of steps up to the horizon."""
-    return round(_HORIZON_S / step_s)
+def prediction_times(memory: MotionMemory, step_s: float) -> Floats:
+    """Return the times of predictions, five in each step of the search and the end.
 
-
-def _times(step_s: float) -> Floats:
-    """Return the times of predictions, five in each step and the end."""
-    times: Floats = np.arange(_steps(step_s) * SUBSTEPS + 1) * (step_s / SUBSTEPS)
+    Motions that repeat are known for longer than others: a longer horizon finds ways through.
+    """
+    horizon_s = _KNOWN_HORIZON_S if memory.knows_periods else _HORIZON_S
+    times: Floats = np.arange(round(horizon_s / step_s) * SUBSTEPS + 1) * (step_s / SUBSTEPS)
     return times
 
 

@@ -96,6 +96,11 @@ class MotionMemory:
         samples = self._samples[: self._count]
         return float(samples[-1, 0] - samples[0, 0]) if self._count else 0.0
 
+    @property
+    def knows_periods(self) -> bool:
+        """True where an obstacle repeats its motion after a fixed time."""
+        return not self._periodic.is_empty
+
     def add(self, tracks: Tracks) -> None:
         """Remember the states of tracks, at most once in each period."""
         if tracks.time_s < self._now_s - _BEFORE_S:
