@@ -263,7 +263,7 @@ def test_discs_without_a_replay_are_forgotten_after_a_while():
 
 @pytest.mark.parametrize("others, known", [(1, False), (2, True)])
 def test_where_most_obstacles_repeat_their_motion_others_are_known_for_a_while(others, known):
-    """One obstacle has a period; one or two that come later are predicted for 1.5 s or longer."""
+    """One obstacle has a period; one or two that come later are predicted for 1 s or longer."""
     memory = MotionMemory()
     for k in range(601):
         memory.add(seen_tracks(0.1 * k, [circling(0.1 * k)]))
@@ -272,3 +272,16 @@ def test_where_most_obstacles_repeat_their_motion_others_are_known_for_a_while(o
     discs = predict(tracks, memory, np.array([0.0, 1.0, 2.0]))
     np.testing.assert_allclose(discs[:2, 1, 0], [-20.0, -19.0])
     assert (abs(discs[2, 1, 0]) < 1e3) == known
+
+
+@pytest.mark.parametrize("spread_m, known", [(0.12, True), (0.13, False)])
+def test_where_most_obstacles_repeat_their_motion_others_are_known_while_they_are_seen(
+    spread_m, known
+):
+    memory = MotionMemory()
+    for k in range(601):
+        memory.add(seen_tracks(0.1 * k, [circling(0.1 * k)]))
+    tracks = seen_tracks(60.0, [circling(60.0), [-20.0, 3.0, 1.0, 0.0]])
+    tracks.covariances[1, :2, :2] = spread_m**2 * np.eye(2)
+    discs = predict(tracks, memory, np.array([0.0, 1.0]))
+    assert (abs(discs[:, 1, 0]) < 1e3).tolist() == [known, known]

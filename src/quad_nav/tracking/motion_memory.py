@@ -37,7 +37,8 @@ _EARLIER_S, _TOO_EARLY_S = 0.25, 1.0  # time between two samples that have to be
 _TURNS_S = 0.45  # time over which accelerations are taken
 _SCALE_M, _SCALE_MPS = 0.2, 0.4  # differences that count as 1
 _BEFORE_S = 5.0
-_SEEN_M = 0.125  # standard deviation of positions; a hidden obstacle's grows beyond
+SEEN_M = 0.125
+"""Standard deviation of positions of obstacles that are seen; that of hidden ones grows beyond."""
 _HIDDEN_S = 1.6  # time for which a hidden obstacle stays on a recalled path
 _BREAK_M, _BREAK_MPS = 0.15, 0.25  # by how much a sample may be off the last one's motion
 _JOIN_S, _JOIN_M, _JOIN_MPS = 4.0, 0.35, 2.0  # gap, offset and change of velocity at a join
@@ -114,7 +115,7 @@ class MotionMemory:
             trail = self._trails.pop(number)
             self._end(trail)
         spread = np.trace(tracks.covariances[:, :2, :2], axis1=1, axis2=2) / 2.0
-        seen = tracks.chosen(spread <= _SEEN_M**2)
+        seen = tracks.chosen(spread <= SEEN_M**2)
         for number, state in zip(seen.numbers.tolist(), seen.states):
             self._add(number, state)
         self._periodic.add(self._now_s, seen.numbers, seen.states, seen.radii_m)
