@@ -61,7 +61,7 @@ def test_discs_move_on_with_their_velocity_and_uncertainty():
 
 def test_motions_that_repeat_are_predicted_for_longer():
     assert TIMES_S[-1] == 6.0
-    times_s = prediction_times(SimpleNamespace(knows_periods=True), 0.5)
+    times_s = prediction_times(SimpleNamespace(most_repeat=True), 0.5)
     assert (times_s[-1], len(times_s)) == (10.0, 101)
 
 

@@ -94,6 +94,17 @@ def test_an_obstacle_that_wanders_has_no_period():
     assert watched(90.0, wandering).is_empty
 
 
+def test_periods_are_everywhere_where_most_obstacles_repeat_their_motion():
+    """One obstacle circles, two fly straight on."""
+    motion = PeriodicMotion()
+    for k in range(601):
+        straight = [[0.05 * k, y, 0.5, 0.0] for y in (10.0, 20.0)]
+        states = np.array([circling(0.1 * k), *straight])
+        motion.add(0.1 * k, np.arange(3) + 3 * (k // 15), states, np.full(3, 0.4))
+    assert not motion.is_empty
+    assert not motion.is_everywhere
+
+
 @pytest.mark.slow
 def test_a_full_memory_learns_anew():
     """100 tracks at 10 Hz fill it in 60 s."""
@@ -120,9 +131,9 @@ def test_motion_memory_replays_what_it_has_seen_well():
         memory.add(seen_tracks(0.1 * k, [circling(0.1 * k)]))
     replays = memory.replay(60.0 + AHEAD_S)
     np.testing.assert_allclose(known_places(replays), places(60.0 + AHEAD_S), atol=0.02)
-    assert memory.knows_periods
+    assert memory.most_repeat
     memory.reset()
-    assert not memory.knows_periods
+    assert not memory.most_repeat
     assert memory.replay(60.0 + AHEAD_S).places.shape[1] == 0
 
 

@@ -46,7 +46,7 @@ from quad_nav.tracking.tracks import Tracks
 Floats = NDArray[np.float64]
 
 STEP_S = 0.5
-_HORIZON_S, _KNOWN_HORIZON_S = 6.0, 10.0  # the second one where motions repeat
+_HORIZON_S, _KNOWN_HORIZON_S = 6.0, 10.0  # the second one where most motions repeat
 _WINDOW_M = 5.0  # the least window, from the robot to each side
 _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
@@ -226,7 +226,7 @@ def prediction_times(memory: MotionMemory, step_s: float) -> Floats:
 
     Motions that repeat are known for longer than others: a longer horizon finds ways through.
     """
-    horizon_s = _KNOWN_HORIZON_S if memory.knows_periods else _HORIZON_S
+    horizon_s = _KNOWN_HORIZON_S if memory.most_repeat else _HORIZON_S
     times: Floats = np.arange(round(horizon_s / step_s) * SUBSTEPS + 1) * (step_s / SUBSTEPS)
     return times
 

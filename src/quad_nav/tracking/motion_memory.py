@@ -98,9 +98,9 @@ class MotionMemory:
         return float(samples[-1, 0] - samples[0, 0]) if self._count else 0.0
 
     @property
-    def knows_periods(self) -> bool:
-        """True where an obstacle repeats its motion after a fixed time."""
-        return not self._periodic.is_empty
+    def most_repeat(self) -> bool:
+        """True where most obstacles repeat their motion after a fixed time."""
+        return self._periodic.is_everywhere
 
     def add(self, tracks: Tracks) -> None:
         """Remember the states of tracks, at most once in each period."""

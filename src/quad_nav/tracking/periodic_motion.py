@@ -100,6 +100,12 @@ class PeriodicMotion:
         """True while no trail has a period."""
         return not self._periods.any()
 
+    @property
+    def is_everywhere(self) -> bool:
+        """True while most trails have a period."""
+        whole = self._sizes >= _MIN_SAMPLES
+        return bool(2 * np.count_nonzero(self._periods[whole]) > np.count_nonzero(whole))
+
     def add(self, now_s: float, numbers: Integers, states: Floats, radii_m: Floats) -> None:
         """Take the states of the tracks that are seen well now, at increasing times.
 
