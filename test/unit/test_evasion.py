@@ -17,7 +17,7 @@ from quad_nav.control.evasion import (
     prediction_times,
 )
 from quad_nav.geometry import Pose2D, Twist2D
-from quad_nav.grid import LETHAL, GridSpec
+from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
 from quad_nav.kernels.evasion_commands import Body, command_costs
 from quad_nav.kernels.space_time import SpaceTime, fill_costs, haste_per_s, threat
 from quad_nav.kernels.standing_obstacles import (
@@ -145,7 +145,7 @@ def test_a_command_leaves_room_to_stop_before_a_standing_obstacle():
 def test_overlap_costs_more_the_deeper_it_is():
     """A lethal cell with its centre at 0, and a robot of 0.30 m: the rim is at 0.30 m."""
     costs, gaps = np.zeros((21, 21), np.uint8), np.empty((21, 21))
-    costs[10, 10] = 254
+    costs[10, 10] = LETHAL
     fill_gaps(costs, 0.05, 0.3, gaps)
     standing = StandingObstacles(gaps, -0.525, -0.525, 0.05)
     assert overlap_cost(standing, 0.36, 0.0) == pytest.approx(0.0)
@@ -160,7 +160,7 @@ def test_overlap_costs_more_the_deeper_it_is():
 
 
 def test_inscribed_cells_without_a_lethal_one_are_at_the_rim():
-    costs, gaps = np.full((3, 3), 253, np.uint8), np.empty((3, 3))
+    costs, gaps = np.full((3, 3), INSCRIBED, np.uint8), np.empty((3, 3))
     fill_gaps(costs, 0.05, 0.3, gaps)
     assert gaps.tolist() == np.zeros((3, 3)).tolist()
 

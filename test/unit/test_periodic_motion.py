@@ -94,7 +94,7 @@ def test_an_obstacle_that_wanders_has_no_period():
     assert watched(90.0, wandering).is_empty
 
 
-def test_periods_are_everywhere_where_most_obstacles_repeat_their_motion():
+def test_one_of_three_obstacles_that_repeats_its_motion_is_not_most():
     """One obstacle circles, two fly straight on."""
     motion = PeriodicMotion()
     for k in range(601):
@@ -102,7 +102,7 @@ def test_periods_are_everywhere_where_most_obstacles_repeat_their_motion():
         states = np.array([circling(0.1 * k), *straight])
         motion.add(0.1 * k, np.arange(3) + 3 * (k // 15), states, np.full(3, 0.4))
     assert not motion.is_empty
-    assert not motion.is_everywhere
+    assert not motion.most_repeat
 
 
 @pytest.mark.slow

@@ -32,12 +32,7 @@ from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.evasion_commands import (
-    BOTH_S,
-    Body,
-    command_costs,
-    rest_s,
-)
+from quad_nav.kernels.evasion_commands import BOTH_S, Body, command_costs, rest_s
 from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
 from quad_nav.kernels.standing_obstacles import StandingObstacles, fill_gaps, overlap_costs
 from quad_nav.tracking.motion_memory import MotionMemory

@@ -33,7 +33,7 @@ class SpaceTime(NamedTuple):
     haste: float  # cost of a second, for each max_speed_mps above the usual speed
     risk_per_s: float  # cost of a second at the rim of an obstacle
     fade_per_s: float  # rate at which predictions lose their weight
-    blocked_per_s: float  # cost of a second on a blocked cell
+    blocked_per_s: float  # cost of a second at the rim of what stands
     away_per_s: float  # part of the cost to go that a second costs
 
 

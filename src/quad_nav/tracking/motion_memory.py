@@ -100,7 +100,7 @@ class MotionMemory:
     @property
     def most_repeat(self) -> bool:
         """True where most obstacles repeat their motion after a fixed time."""
-        return self._periodic.is_everywhere
+        return self._periodic.most_repeat
 
     def add(self, tracks: Tracks) -> None:
         """Remember the states of tracks, at most once in each period."""

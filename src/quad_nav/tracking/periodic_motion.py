@@ -101,7 +101,7 @@ class PeriodicMotion:
         return not self._periods.any()
 
     @property
-    def is_everywhere(self) -> bool:
+    def most_repeat(self) -> bool:
         """True while most trails have a period."""
         whole = self._sizes >= _MIN_SAMPLES
         return bool(2 * np.count_nonzero(self._periods[whole]) > np.count_nonzero(whole))
