@@ -65,22 +65,20 @@ def command_costs(
     Returns:
         float64[c].
     """
-    found = np.empty(commands.shape[0])
-    first, moving = np.empty(6), np.empty(6)
     period_s = search.step_s / SUBSTEPS
     one, both = round(_FIRST_S / period_s), SUBSTEPS * round(BOTH_S / search.step_s)
     discs = _near(search, discs, both)
-    for n in range(commands.shape[0]):
-        first[:2], first[2:] = 0.0, start
-        cost = _follow(search, body, discs, standing, first, commands[n], 0, one)
-        least = math.inf
-        for m in range(seconds.shape[0] + 1):
-            moving[:] = first
-            second = commands[n] if m == seconds.shape[0] else seconds[m]
-            after = _follow(search, body, discs, standing, moving, second, one, both)
-            if after < least:
-                least = min(least, after + _end_cost(search, body, standing, costs, moving))
-        found[n] = cost + least
+    moving, found = np.zeros((6, len(commands))), np.empty(len(commands))
+    for i in range(len(start)):
+        moving[2 + i] = start[i]
+    ways = _follow(search, body, moving, commands, one)
+    later, then = np.empty((6, len(seconds) + 1)), np.concatenate((seconds, seconds[:1]))
+    for n in range(len(commands)):
+        later.T[:], then[-1] = moving[:, n], commands[n]
+        later_ways = _follow(search, body, later, then, both - one)
+        ends = _end_costs(search, body, standing, costs, later)
+        found[n] = _way_cost(search, discs, standing, ways[:, :, n], math.inf)
+        found[n] += _least_cost(search, discs[one:], standing, later_ways, ends)
     return found
 
 
@@ -101,43 +99,96 @@ def _near(search: SpaceTime, discs: NDArray[np.float64], last: int) -> NDArray[n
 def _follow(
     search: SpaceTime,
     body: Body,
-    discs: NDArray[np.float64],
-    standing: StandingObstacles,
     moving: NDArray[np.float64],
-    command: NDArray[np.float64],
-    begin: int,
-    end: int,
-) -> float:
-    """Move the body, float64[6], under a command from one prediction to another.
+    commands: NDArray[np.float64],
+    predictions: int,
+) -> NDArray[np.float64]:
+    """Move bodies, each under a command, from one prediction to a later one.
+
+    Args:
+        search: Resolution.
+        body: Response of the bodies.
+        moving: float64[6, c], positions, velocities and accelerations.
+        commands: float64[c, 2].
+        predictions: The number of predictions.
 
     Returns:
-        The cost on the way.
+        float64[predictions, 3, c], x, y and speed at the time of each.
     """
+    ways = np.empty((predictions, 3, len(commands)))
     dt = search.step_s / SUBSTEPS
     rest = math.exp(-dt / _PARTS / body.lag_s)
-    cost = 0.0
-    for k in range(begin + 1, end + 1):
+    for k in range(predictions):
         for _ in range(_PARTS):
-            _move(body, moving, command, dt / _PARTS, rest)
-        rate = search.risk_per_s * threat(discs, k, moving[0], moving[1])
-        rate += search.blocked_per_s * overlap_cost(standing, moving[0], moving[1])
-        rate += haste_per_s(search, math.hypot(moving[2], moving[3]))
+            _move(body, moving, commands, dt / _PARTS, rest)
+        ways[k, :2] = moving[:2]
+        ways[k, 2] = np.sqrt(moving[2] ** 2 + moving[3] ** 2)
+    return ways
+
+
+@njit(cache=True, nogil=True)
+def _least_cost(
+    search: SpaceTime,
+    discs: NDArray[np.float64],
+    standing: StandingObstacles,
+    ways: NDArray[np.float64],
+    ends: NDArray[np.float64],
+) -> float:
+    """Return the least cost of ways, float64[n, 3, c], with those from their ends on, float64[c].
+
+    The cheapest ends come first, so that most ways are not followed.
+    """
+    least = math.inf
+    for m in np.argsort(ends):
+        if ends[m] >= least:
+            break
+        cost = _way_cost(search, discs, standing, ways[:, :, m], least - ends[m])
+        least = min(least, cost + ends[m])
+    return least
+
+
+@njit(cache=True, nogil=True)
+def _way_cost(
+    search: SpaceTime,
+    discs: NDArray[np.float64],
+    standing: StandingObstacles,
+    way: NDArray[np.float64],
+    enough: float,
+) -> float:
+    """Return the cost of a way, float64[n, 3] of x, y and speed; a part of it if that is enough.
+
+    The discs are float64[t, m, 4] from where the way begins on.
+    """
+    dt = search.step_s / SUBSTEPS
+    cost = 0.0
+    for k in range(len(way)):
+        if cost >= enough:
+            break
+        x, y, speed = way[k, 0], way[k, 1], way[k, 2]
+        rate = search.risk_per_s * threat(discs, k + 1, x, y)
+        rate += search.blocked_per_s * overlap_cost(standing, x, y)
+        rate += haste_per_s(search, speed)
         cost += rate * dt
     return cost
 
 
 @njit(cache=True, nogil=True)
 def _move(
-    body: Body, moving: NDArray[np.float64], command: NDArray[np.float64], dt: float, rest: float
+    body: Body, moving: NDArray[np.float64], commands: NDArray[np.float64], dt: float, rest: float
 ) -> None:
-    """Move the body by a step: position, velocity and acceleration, float64[6]."""
-    ax = body.gain_per_s * (command[0] - moving[2])
-    ay = body.gain_per_s * (command[1] - moving[3])
-    shorten = body.acceleration_mps2 / max(math.hypot(ax, ay), body.acceleration_mps2)
-    for i, wanted in ((0, ax * shorten), (1, ay * shorten)):
-        moving[4 + i] = wanted + (moving[4 + i] - wanted) * rest
-        moving[i] += dt * (moving[2 + i] + 0.5 * dt * moving[4 + i])
-        moving[2 + i] += dt * moving[4 + i]
+    """Move bodies by a step: positions, velocities and accelerations, float64[6, c]."""
+    x, y, vx, vy, ax, ay = moving
+    for n in range(len(commands)):
+        wanted_x = body.gain_per_s * (commands[n, 0] - vx[n])
+        wanted_y = body.gain_per_s * (commands[n, 1] - vy[n])
+        wanted = math.sqrt(wanted_x * wanted_x + wanted_y * wanted_y)
+        shorten = body.acceleration_mps2 / max(wanted, body.acceleration_mps2)
+        ax[n] = shorten * wanted_x + (ax[n] - shorten * wanted_x) * rest
+        ay[n] = shorten * wanted_y + (ay[n] - shorten * wanted_y) * rest
+        x[n] += dt * (vx[n] + 0.5 * dt * ax[n])
+        y[n] += dt * (vy[n] + 0.5 * dt * ay[n])
+        vx[n] += dt * ax[n]
+        vy[n] += dt * ay[n]
 
 
 @njit(cache=True, nogil=True)
@@ -150,6 +201,21 @@ def rest_s(body: Body, speed_mps: float) -> float:
     over = max(speed_mps - body.acceleration_mps2 / body.gain_per_s, 0.0)
     braking_s = 0.5 * over * over / body.acceleration_mps2 / max(speed_mps, 1e-9)
     return 1.0 / body.gain_per_s + braking_s
+
+
+@njit(cache=True, nogil=True)
+def _end_costs(
+    search: SpaceTime,
+    body: Body,
+    standing: StandingObstacles,
+    costs: NDArray[np.float64],
+    moving: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the costs from the end of second commands on, float64[c]; bodies are float64[6, c]."""
+    found = np.empty(moving.shape[1])
+    for n in range(len(found)):
+        found[n] = _end_cost(search, body, standing, costs, moving[:, n])
+    return found
 
 
 @njit(cache=True, nogil=True)
@@ -186,7 +252,6 @@ def _cost_at(search: SpaceTime, costs: NDArray[np.float64], step: int, x: float,
     column, row = math.floor(across), math.floor(along)
     right, up = across - column, along - row
     i, j = int(row) + middle, int(column) + middle
-    at = costs[step, i : i + 2, j : j + 2]
-    return (1.0 - up) * ((1.0 - right) * at[0, 0] + right * at[0, 1]) + up * (
-        (1.0 - right) * at[1, 0] + right * at[1, 1]
-    )
+    low = (1.0 - right) * costs[step, i, j] + right * costs[step, i, j + 1]
+    high = (1.0 - right) * costs[step, i + 1, j] + right * costs[step, i + 1, j + 1]
+    return (1.0 - up) * low + up * high

@@ -8,7 +8,7 @@ count from now. Coordinates are metres relative to the robot, along the axes of 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Tuple
+from typing import List, NamedTuple, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,15 +51,14 @@ def threat(discs: NDArray[np.float64], k: int, x: float, y: float) -> float:
     """
     total = 0.0
     for n in range(discs.shape[1]):
-        total += _threat_of(discs[k, n], x, y)
+        dx, dy = x - discs[k, n, 0], y - discs[k, n, 1]
+        total += _threat_of(discs[k, n, 2], discs[k, n, 3], dx * dx + dy * dy)
     return total
 
 
 @njit(cache=True, nogil=True)
-def _threat_of(disc: NDArray[np.float64], x: float, y: float) -> float:
-    """Return the threat of one disc, float64[4], at a point."""
-    dx, dy, radius, sigma = x - disc[0], y - disc[1], disc[2], disc[3]
-    squared = dx * dx + dy * dy
+def _threat_of(radius: float, sigma: float, squared: float) -> float:
+    """Return the threat of a disc at a squared distance from its middle."""
     if squared >= (radius + FAR * sigma) ** 2:
         return 0.0
     beyond = math.sqrt(squared) - radius
@@ -101,13 +100,12 @@ def fill_costs(
         for later in _DURING:
             _add_threats(discs[k * SUBSTEPS + later], search.cell_m, near, threats)
         for row in range(middle - near, middle + near + 1):
+            _fill_least(costs[k + 1], row, middle - near, moves, costs[k, row])
             for column in range(middle - near, middle + near + 1):
                 cost = risk * threats[row, column] / len(_DURING)
                 cost += search.away_per_s * to_go[row, column]
                 cost += search.blocked_per_s * overlaps[row, column]
-                costs[k, row, column] = cost * search.step_s + _least(
-                    costs[k + 1], row, column, moves
-                )
+                costs[k, row, column] += cost * search.step_s
 
 
 @njit(cache=True, nogil=True)
@@ -132,11 +130,13 @@ def _add_threats(
         far = discs[n, 2] + FAR * discs[n, 3]
         left, right = _cells(discs[n, 0], far, cell, near)
         low, high = _cells(discs[n, 1], far, cell, near)
+        radius, sigma = discs[n, 2], discs[n, 3]
         for row in range(low, high + 1):
+            dy = row * cell - discs[n, 1]
             for column in range(left, right + 1):
-                threats[middle + row, middle + column] += _threat_of(
-                    discs[n], column * cell, row * cell
-                )
+                dx = column * cell - discs[n, 0]
+                threat_here = _threat_of(radius, sigma, dx * dx + dy * dy)
+                threats[middle + row, middle + column] += threat_here
 
 
 @njit(cache=True, nogil=True)
@@ -147,23 +147,39 @@ def _cells(place: float, far: float, cell: float, near: int) -> Tuple[int, int]:
 
 
 @njit(cache=True, nogil=True)
-def _moves(search: SpaceTime) -> NDArray[np.float64]:
-    """Return the cost of each move of a step, float64[2 reach + 1, 2 reach + 1]."""
+def _moves(search: SpaceTime) -> List[Tuple[int, int, float]]:
+    """Return the moves of a step: rows, columns and cost."""
     reach = _reach(search)
-    moves = np.full((2 * reach + 1, 2 * reach + 1), math.inf)
+    moves = []
     for i in range(-reach, reach + 1):
         for j in range(-reach, reach + 1):
             if i * i + j * j <= reach * reach:
                 speed = math.hypot(i, j) * search.cell_m / search.step_s
-                moves[reach + i, reach + j] = haste_per_s(search, speed) * search.step_s
+                moves.append((i, j, haste_per_s(search, speed) * search.step_s))
     return moves
 
 
 @njit(cache=True, nogil=True)
-def _least(costs: NDArray[np.float64], row: int, column: int, moves: NDArray[np.float64]) -> float:
-    """Return the least cost of a move and of the cell, float64[M, M], where it leads."""
-    least, reach = math.inf, moves.shape[0] // 2
-    for i in range(-reach, reach + 1):
-        for j in range(-reach, reach + 1):
-            least = min(least, moves[reach + i, reach + j] + costs[row + i, column + j])
-    return least
+def _fill_least(
+    costs: NDArray[np.float64],
+    row: int,
+    first: int,
+    moves: List[Tuple[int, int, float]],
+    least: NDArray[np.float64],
+) -> None:
+    """Fill the least cost of a move from each cell of a row and of the cell where it leads.
+
+    Args:
+        costs: float64[M, M] of the next step.
+        row: The row.
+        first: Its first cell; as many at its end are left out.
+        moves: As from ``_moves``.
+        least: float64[M].
+    """
+    end = len(least) - first
+    filled = least[first:end]
+    filled[:] = math.inf
+    for i, j, cost in moves:
+        reached = costs[row + i, first + j : end + j]
+        for n in range(len(filled)):
+            filled[n] = min(filled[n], cost + reached[n])
