@@ -26,8 +26,11 @@ from quad_nav.barn.dynamic_worlds import load_dynamic_worlds
 from quad_nav.barn.protocol import Outcome
 from quad_nav.barn.setup import BarnOptions
 from quad_nav.cli.dynabarn import dynabarn
+from quad_nav.config.files import leaves
 from quad_nav.errors import InputError
 from quad_nav.sim.movers import Movers
+
+ROOT = Path(__file__).resolve().parents[2]
 
 WALL = [[-10.0, 0.0, 0.5, 20.0, 0.0]]
 ASIDE = ([0.0, 10.0], [[0.0, 8.0], [2.0, 8.0]])  # far from the straight way
@@ -142,6 +145,24 @@ def test_evasions_keep_to_the_speed_limit_unless_another_one_is_set(worlds, give
     assert contestant.simulation.flight.max_speed_mps == body
 
 
+def test_config_dynabarn_is_config_moving_but_for_body_place_and_watching():
+    def parameters(name):
+        files = (ROOT / "config" / name).glob("*.yaml")
+        found = [leaf for file in files for leaf in leaves(file, {"i": "0"}).items()]
+        assert len(found) == len(dict(found))
+        return dict(found)
+
+    moving, ours = parameters("moving"), parameters("dynabarn")
+    assert {path for path in {*moving, *ours} if moving.get(path) != ours.get(path)} == {
+        "robot_radius",
+        *(f"global_costmap/{name}" for name in ("width", "height", "origin_x", "origin_y")),
+        "fixes/moving_obstacle_evasion_speed",
+        "fixes/moving_obstacle_timeout",
+        "fixes/moving_obstacle_watch",
+        "fixes/yield_to_strangers",
+    }
+
+
 def test_a_free_way_is_a_success(worlds):
     """19 m to fly at 0.5 m/s: 38 s, and a little for starting."""
     setup = read_dynamic_setup(options(worlds, only=(3,)), "linear", 0.5)
@@ -224,6 +245,7 @@ def test_the_command(worlds, tmp_path):
     result = CliRunner().invoke(dynabarn, [*given, "--interpolation", "linear"])
     assert result.exit_code == 0, result.output
     figures = json.loads(out.read_text())
+    assert figures["config"] == "dynabarn"
     assert figures["figures"]["easy"]["successes"] == 1
     assert figures["interpolation"] == "linear" and figures["max_speed_mps"] == 0.5
     missing = CliRunner().invoke(dynabarn, ["--worlds", str(worlds), "--only", "x"])

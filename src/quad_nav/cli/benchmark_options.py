@@ -19,25 +19,6 @@ _CONFIGURATION = (
         help="Override a parameter, for example global_costmap/width=60; repeatable.",
     ),
 )
-_WORLDS = (
-    click.option(
-        "--worlds",
-        required=True,
-        type=A_FILE,
-        help="File with the worlds (.npz), see docs/barn.md.",
-    ),
-    click.option(
-        "--config",
-        default="barn",
-        show_default=True,
-        metavar="NAME|FOLDER",
-        help="move_base's parameters: a shipped configuration or a folder, as the challenge's.",
-    ),
-    click.option(
-        "--only", metavar="NUMBERS", default="", help="Fly only these worlds, for example 0,6,12."
-    ),
-    click.option("--per-world", is_flag=True, help="Print a row for each world."),
-)
 _FLIGHTS = (
     click.option(
         "--runs",
@@ -79,9 +60,31 @@ _FLIGHTS = (
 )
 
 
-def world_options(command: F) -> F:
-    """Add the options of a benchmark with worlds."""
-    return _with(command, _WORLDS)
+def world_options(config: str) -> Callable[[F], F]:
+    """Return what adds the options of a benchmark with worlds, with this default configuration."""
+    options = (
+        click.option(
+            "--worlds",
+            required=True,
+            type=A_FILE,
+            help="File with the worlds (.npz), see docs/barn.md.",
+        ),
+        click.option(
+            "--config",
+            default=config,
+            show_default=True,
+            metavar="NAME|FOLDER",
+            help="move_base's parameters: a shipped configuration or a folder, as the challenge's.",
+        ),
+        click.option(
+            "--only",
+            metavar="NUMBERS",
+            default="",
+            help="Fly only these worlds, for example 0,6,12.",
+        ),
+        click.option("--per-world", is_flag=True, help="Print a row for each world."),
+    )
+    return lambda command: _with(command, options)
 
 
 def flight_options(command: F) -> F:
