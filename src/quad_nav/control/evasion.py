@@ -45,7 +45,7 @@ _HORIZON_S, _KNOWN_HORIZON_S = 6.0, 10.0  # the second one where most motions re
 _WINDOW_M = 5.0  # the least window, from the robot to each side
 _REACH_CELLS = 2  # cells that the robot flies in a step
 _MAX_CELL_M = 0.2
-_BODY = Body(25.0 / 8.0, 2.0 / 25.0, 2.0)  # of sim/flight.py: gain, lag, acceleration
+_BODY = Body(gain_per_s=25.0 / 8.0, lag_s=2.0 / 25.0, acceleration_mps2=2.0)  # of sim/flight.py
 _FADE_PER_S = 0.35
 _RISK_PER_S, _BLOCKED_PER_S, _AWAY_PER_S = 40.0, 100.0, 0.05
 _HASTE = 1.3  # what a second gains at the greatest speed: 1 and _AWAY_PER_S for each second left
@@ -230,15 +230,15 @@ def _search_of(max_speed_mps: float, usual_speed_mps: float) -> SpaceTime:
     """Return the search of a robot: cells are smaller than obstacles, steps are as long."""
     cell_m = min(max_speed_mps * STEP_S / _REACH_CELLS, _MAX_CELL_M)
     return SpaceTime(
-        cell_m,
-        cell_m * _REACH_CELLS / max_speed_mps,
-        max_speed_mps,
-        usual_speed_mps,
-        _HASTE,
-        _RISK_PER_S,
-        _FADE_PER_S,
-        _BLOCKED_PER_S,
-        _AWAY_PER_S,
+        cell_m=cell_m,
+        step_s=cell_m * _REACH_CELLS / max_speed_mps,
+        max_speed_mps=max_speed_mps,
+        usual_speed_mps=usual_speed_mps,
+        haste=_HASTE,
+        risk_per_s=_RISK_PER_S,
+        fade_per_s=_FADE_PER_S,
+        blocked_per_s=_BLOCKED_PER_S,
+        away_per_s=_AWAY_PER_S,
     )
 
 

@@ -149,16 +149,16 @@ class EvasionGuard:
     ) -> Surroundings:
         costmap = self._costmap
         return Surroundings(
-            costmap.spec,
-            costmap.costs,
-            pose,
-            velocity,
-            costmap.inscribed_radius_m,
-            max(self.params.speed_mps, limits.speed_mps),
-            limits.speed_mps,
-            is_following,
-            self._memory,
-            neighbours,
+            spec=costmap.spec,
+            costs=costmap.costs,
+            pose=pose,
+            velocity=velocity,
+            radius_m=costmap.inscribed_radius_m,
+            max_speed_mps=max(self.params.speed_mps, limits.speed_mps),
+            usual_speed_mps=limits.speed_mps,
+            is_following=is_following,
+            memory=self._memory,
+            neighbours=neighbours,
         )
 
     def _turn(self, now_s: float, route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:
