@@ -221,7 +221,9 @@ def test_an_obstacle_with_twice_the_period_of_others_is_not_where_half_a_period_
 
 def test_replays_of_one_obstacle_count_once():
     found = np.array([[[0.0, 0.0], [0.3, 0.0], [0.6, 0.0]], [[0.0, 0.0], [5.0, 0.0], [5.0, 0.5]]])
-    drop_repeats(found, 0.4)
+    radii = np.array([0.9, 0.5, 0.7])
+    drop_repeats(found, radii, 0.4)
+    assert radii.tolist() == [0.5, 0.5, 0.7]  # one that looked larger, beside another one
     assert np.isnan(found[:, :, 0]).tolist() == [[False, True, False], [False, False, False]]
 
 
@@ -272,17 +274,31 @@ def test_discs_without_a_replay_are_forgotten_after_a_while():
     assert (discs[:, 1, 0] == 1e6).tolist() == [True, True, True, False, True, True]
 
 
-@pytest.mark.parametrize("others, known", [(1, False), (2, True)])
-def test_where_most_obstacles_repeat_their_motion_others_are_known_for_a_while(others, known):
-    """One obstacle has a period; one or two that come later are predicted for 1 s or longer."""
+@pytest.mark.parametrize("is_new, known", [(True, False), (False, True)])
+def test_where_most_obstacles_repeat_their_motion_others_are_known_for_a_while(is_new, known):
+    """One obstacle has a period; two fly straight on, at the end or all the time."""
     memory = MotionMemory()
     for k in range(601):
-        memory.add(seen_tracks(0.1 * k, [circling(0.1 * k)]))
-    strangers = [[-20.0, 3.0 * n, 1.0, 0.0] for n in range(others)]
-    tracks = seen_tracks(60.0, [circling(60.0), *strangers])
+        straight = [[0.1 * k - 80.0, 30.0 * n, 1.0, 0.0] for n in (1, 2)]
+        tracks = seen_tracks(0.1 * k, [circling(0.1 * k), *straight])
+        memory.add(tracks.chosen(np.array([True, *[k > 590 or not is_new] * 2])))
     discs = predict(tracks, memory, np.array([0.0, 1.0, 2.0]))
     np.testing.assert_allclose(discs[:2, 1, 0], [-20.0, -19.0])
     assert (abs(discs[2, 1, 0]) < 1e3) == known
+
+
+@pytest.mark.parametrize("apart_m, known", [(0.39, False), (0.41, True)])
+def test_where_most_obstacles_repeat_their_motion_a_track_that_holds_one_of_them_is_none(
+    apart_m, known
+):
+    """A track with a radius of 0.4 m beside an obstacle with a period has another velocity."""
+    memory = MotionMemory()
+    for k in range(601):
+        memory.add(seen_tracks(0.1 * k, [circling(0.1 * k)]))
+    x, y, vx, vy = circling(60.0)
+    tracks = seen_tracks(60.0, [[x + apart_m, y, -2.0 * vx, -2.0 * vy]])
+    discs = predict(tracks, memory, np.array([0.0, 0.5]))
+    assert (abs(discs[0, 0, 0]) < 1e3) == known
 
 
 @pytest.mark.parametrize("spread_m, known", [(0.12, True), (0.13, False)])

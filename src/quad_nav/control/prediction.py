@@ -4,8 +4,8 @@ An obstacle keeps its acceleration of the last half second for another half seco
 velocity. Where the memory of this flight recalls one that moved alike, it goes where that one
 went. Obstacles with a periodic motion are where they were a period ago, seen or hidden. Where most
 obstacles have one, the others are new ways of theirs, and constant velocities do not hold for long:
-they are predicted for a second while they are seen, and not while they are hidden. The standard
-deviation of a prediction grows linearly with time.
+they are predicted for a second while they are seen, and not while they are hidden or while one with
+a period is in their discs. The standard deviation of a prediction grows linearly with time.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _MAX_SIGMA_MPS = 0.1
 _RECALLED_SIGMA_M, _RECALLED_SIGMA_MPS = 0.12, 0.03
 _REPLAYED_SIGMA_M = 0.08  # of periodic motions; it does not grow
 _SAME = 0.4, 0.8, 0.6  # differences of a track and its replay in m and m/s, later ones in m
-_MOST_REPEAT, _UNKNOWN_S = 0.5, 1.0  # where so many repeat their motion, others are known so long
+_UNKNOWN_S = 1.0  # for which others are known where most repeat their motion
 _NEAR_M = 8.0  # replays farther away are of no interest
 _ACCELERATES_S = 0.5  # for which an obstacle keeps its acceleration
 _ROLLOUT_STEP_S = 0.05  # longest time between two predictions of a rollout
@@ -68,12 +68,24 @@ def predict(
     if not len(replays.radii_m):
         return discs
     places, velocities = replays.places - np.array(origin), replays.velocities
-    count = follow_replays(discs, tracks.states[:, 2:], places, velocities, times_s, _SAME, FAR_M)
-    if count >= _MOST_REPEAT * len(tracks):
+    follow_replays(discs, tracks.states[:, 2:], places, velocities, times_s, _SAME, FAR_M)
+    if memory.most_repeat:
         is_hidden = position > SEEN_M**2  # most of these are not there: they have turned
-        discs[:, is_hidden & (discs[0, :, 0] != FAR_M), :2] = FAR_M
+        is_known = _holds_any(offsets, tracks.radii_m, places[0])
+        discs[:, (is_hidden | is_known) & (discs[0, :, 0] != FAR_M), :2] = FAR_M
         forget_after(discs, times_s, _UNKNOWN_S, FAR_M)
     return np.concatenate([discs, _replayed(places, replays.radii_m, times_s)], axis=1)
+
+
+def _holds_any(centres: Floats, radii_m: Floats, places: Floats) -> NDArray[np.bool_]:
+    """Return which discs, float64[n, 2] and float64[n], hold any of the places, float64[m, 2].
+
+    Where places of replays are in the disc of a track that has no replay, obstacles pass each other
+    there and look like one, whose velocity is none of theirs.
+    """
+    apart = np.hypot(*(centres[:, None] - places).transpose(2, 0, 1))
+    holds: NDArray[np.bool_] = (apart < radii_m[:, None]).any(axis=1)
+    return holds
 
 
 def _replayed(places: Floats, radii_m: Floats, times_s: Floats) -> Floats:

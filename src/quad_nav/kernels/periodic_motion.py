@@ -198,11 +198,15 @@ def _leads_to(
 
 
 @njit(cache=True, nogil=True)
-def drop_repeats(places: NDArray[np.float64], apart_m: float) -> None:
+def drop_repeats(places: NDArray[np.float64], radii: NDArray[np.float64], apart_m: float) -> None:
     """Set places to NaN that repeat those of an earlier column at the same time.
+
+    Obstacles that pass each other look like one that is larger: of the radii of the columns, the
+    least counts.
 
     Args:
         places: float64[t, c, 2], changed in place.
+        radii: float64[c], changed in place.
         apart_m: Places that are nearer than this are the same obstacle.
     """
     for k in range(places.shape[0]):
@@ -212,6 +216,7 @@ def drop_repeats(places: NDArray[np.float64], apart_m: float) -> None:
                 dy = places[k, column, 1] - places[k, other, 1]
                 if dx * dx + dy * dy < apart_m * apart_m:
                     places[k, column] = math.nan
+                    radii[other] = min(radii[other], radii[column])
                     break
 
 
@@ -224,7 +229,7 @@ def follow_replays(
     times: NDArray[np.float64],
     same: Tuple[float, float, float],
     nowhere: float,
-) -> int:
+) -> None:
     """Leave the discs of tracks that have a replay to it; after its end they keep its velocity.
 
     Where the replay ends and another is alike, the other continues it. A disc is nowhere while a
@@ -239,11 +244,8 @@ def follow_replays(
         same: Differences of place and velocity between a track and its replay that count as 1, and
             the distance to a replay within which a disc is of the same obstacle.
         nowhere: Coordinates of a disc that is nowhere.
-
-    Returns:
-        Number of tracks that have a replay now.
     """
-    state, count = np.empty(4), 0
+    state = np.empty(4)
     for n in range(discs.shape[1]):
         state[:2], state[2:] = discs[0, n, :2], motions[n]
         column, since, follows = NONE, 0.0, False
@@ -262,8 +264,6 @@ def follow_replays(
                 discs[k, n, :2] = state[:2] + (times[k] - since) * state[2:]
                 if _is_near(discs[k, n, 0], discs[k, n, 1], places[k], same[2]):
                     discs[k, n, :2] = nowhere
-        count += 1 if follows else 0
-    return count
 
 
 @njit(cache=True, nogil=True)

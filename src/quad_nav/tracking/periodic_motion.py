@@ -121,9 +121,10 @@ class PeriodicMotion:
         for number, state, radius_m in zip(seen, states, radii_m.tolist()):
             trail = self._trails.get(number, NONE)
             if trail == NONE or not self._continues(trail, now_s, state):
-                trail = self._begin(radius_m)
+                trail = self._begin()
             trails[number] = trail
             self._add(trail, now_s, state)
+            self._radii_m[trail] = min(self._radii_m[trail], radius_m)
         self._trails = trails
         if now_s >= self._labelled_s + _LABEL_PERIOD_S:
             self._labelled_s = now_s
@@ -139,10 +140,10 @@ class PeriodicMotion:
         off_m = math.hypot(*(state[:2] - (x_m, y_m) - gap_s * mean))
         return off_m <= _BREAK_M + _BREAK_MPS * gap_s
 
-    def _begin(self, radius_m: float) -> int:
+    def _begin(self) -> int:
         """Begin a trail and return its index."""
         self._spans = np.append(self._spans, [[NONE, NONE]], axis=0)
-        self._radii_m = np.append(self._radii_m, radius_m)
+        self._radii_m = np.append(self._radii_m, math.inf)
         self._periods, self._sizes = np.append(self._periods, 0.0), np.append(self._sizes, 0)
         self._nexts, self._gaps = np.append(self._nexts, NONE), np.append(self._gaps, 0.0)
         self._votes = self._votes._replace(heads=np.append(self._votes.heads, NONE))
@@ -253,9 +254,10 @@ class PeriodicMotion:
         velocities, owners = np.empty_like(places), np.empty(_COLUMNS, np.int64)
         count = replay_all(self._view(), times_s, _BEYOND_S, places, velocities, owners)
         places, velocities = places[:, :count], velocities[:, :count]
-        drop_repeats(places, _SAME_M)
+        radii_m = self._radii_m[owners[:count]]
+        drop_repeats(places, radii_m, _SAME_M)
         kept = np.isfinite(places[:, :, 0]).any(axis=0)
-        return Replays(places[:, kept], velocities[:, kept], self._radii_m[owners[:count][kept]])
+        return Replays(places[:, kept], velocities[:, kept], radii_m[kept])
 
     def _reserve(self, count: int) -> None:
         """Make room for samples and votes; forget everything if there are too many samples."""
