@@ -29,7 +29,7 @@ from quad_nav.tracking.tracks import Tracks
 Floats = NDArray[np.float64]
 
 _AT_POINT_M = 0.15
-_MANY, _LOOK_S = 3, 1.5  # obstacles that are worth watching, and the time until they have tracks
+_MANY, _LOOK_S = 3, 3.0  # obstacles that are worth watching, and the time until they have tracks
 _ROUTE_POINTS = 40
 _AHEAD_M = 1.5
 _TURN_GAIN_PER_S = 2.0
@@ -61,7 +61,7 @@ class EvasionGuard:
         self._costmap = local_costmap
         self._last = (0.0, 0.0)
         self._memory = MotionMemory()
-        self._watches_since_s, self._has_seen_many = math.inf, False
+        self._watches_since_s, self._has_seen_many, self._has_watched = math.inf, False, False
         self._point: Optional[Pose2D] = None  # where a robot that follows no plan stopped
 
     def check(
@@ -117,12 +117,15 @@ class EvasionGuard:
 
     def watches(self, now_s: float, tracks: Tracks) -> bool:
         """Return whether the robot hovers before its first goal, to learn how obstacles move."""
+        if self._has_watched:
+            return False
         self._memory.add(tracks)
         self._watches_since_s = min(self._watches_since_s, now_s)
         self._has_seen_many |= len(tracks) >= _MANY
         watch_s = self.params.watch_s
         limit_s = watch_s if self._has_seen_many else min(watch_s, _LOOK_S)
-        return now_s - self._watches_since_s < limit_s
+        self._has_watched = now_s - self._watches_since_s >= limit_s
+        return not self._has_watched
 
     def predict(self, now_s: float, pose: Pose2D, tracks: Tracks, rollout_s: float) -> MovingDiscs:
         """Return what a local planner's rollouts of a duration are judged against.
