@@ -145,7 +145,7 @@ def test_evasions_keep_to_the_speed_limit_unless_another_one_is_set(worlds, give
     assert contestant.simulation.flight.max_speed_mps == body
 
 
-def test_config_dynabarn_is_config_moving_but_for_body_place_and_watching():
+def test_config_dynabarn_is_config_moving_but_for_body_place_speed_and_watching():
     def parameters(name):
         files = (ROOT / "config" / name).glob("*.yaml")
         found = [leaf for file in files for leaf in leaves(file, {"i": "0"}).items()]
@@ -156,6 +156,7 @@ def test_config_dynabarn_is_config_moving_but_for_body_place_and_watching():
     assert {path for path in {*moving, *ours} if moving.get(path) != ours.get(path)} == {
         "robot_radius",
         *(f"global_costmap/{name}" for name in ("width", "height", "origin_x", "origin_y")),
+        "TrajectoryPlannerROS/max_vel_x",
         "fixes/moving_obstacle_evasion_speed",
         "fixes/moving_obstacle_timeout",
         "fixes/moving_obstacle_watch",
