@@ -60,18 +60,21 @@ _FLIGHTS = (
 )
 
 
-def world_options(config: str) -> Callable[[F], F]:
-    """Return what adds the options of a benchmark with worlds, with this default configuration."""
+def world_options(benchmark: str) -> Callable[[F], F]:
+    """Return what adds the options of a benchmark with worlds.
+
+    Its default configuration and its page in ``docs/`` have its name.
+    """
     options = (
         click.option(
             "--worlds",
             required=True,
             type=A_FILE,
-            help="File with the worlds (.npz), see docs/barn.md.",
+            help=f"File with the worlds (.npz), see docs/{benchmark}.md.",
         ),
         click.option(
             "--config",
-            default=config,
+            default=benchmark,
             show_default=True,
             metavar="NAME|FOLDER",
             help="move_base's parameters: a shipped configuration or a folder, as the challenge's.",
