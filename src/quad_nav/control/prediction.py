@@ -3,9 +3,10 @@
 An obstacle keeps its acceleration of the last half second for another half second, then its
 velocity. Where the memory of this flight recalls one that moved alike, it goes where that one
 went. Obstacles with a periodic motion are where they were a period ago, seen or hidden. Where most
-obstacles have one, the others are new ways of theirs, and constant velocities do not hold for long:
-they are predicted for a second while they are seen, and not while they are hidden or while one with
-a period is in their discs. The standard deviation of a prediction grows linearly with time.
+obstacles have one, a track without a period is of an obstacle on a way that was not seen before,
+and it turns soon: it is predicted for a second while it is seen, and not while it is hidden or
+while an obstacle with a period is in its disc. The standard deviation of a prediction grows
+linearly with time.
 """
 
 from __future__ import annotations
@@ -71,8 +72,8 @@ def predict(
     follow_replays(discs, tracks.states[:, 2:], places, velocities, times_s, _SAME, FAR_M)
     if memory.most_repeat:
         is_hidden = position > SEEN_M**2  # most of these are not there: they have turned
-        is_known = _holds_any(offsets, tracks.radii_m, places[0])
-        discs[:, (is_hidden | is_known) & (discs[0, :, 0] != FAR_M), :2] = FAR_M
+        holds_replay = _holds_any(offsets, tracks.radii_m, places[0])
+        discs[:, (is_hidden | holds_replay) & (discs[0, :, 0] != FAR_M), :2] = FAR_M
         forget_after(discs, times_s, _UNKNOWN_S, FAR_M)
     return np.concatenate([discs, _replayed(places, replays.radii_m, times_s)], axis=1)
 

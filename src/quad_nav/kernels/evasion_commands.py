@@ -72,7 +72,8 @@ def command_costs(
     for i in range(len(start)):
         moving[2 + i] = start[i]
     ways = _follow(search, body, moving, commands, one)
-    later, then = np.empty((6, len(seconds) + 1)), np.concatenate((seconds, seconds[:1]))
+    later, then = np.empty((6, len(seconds) + 1)), np.empty((len(seconds) + 1, 2))
+    then[:-1] = seconds
     for n in range(len(commands)):
         later.T[:], then[-1] = moving[:, n], commands[n]
         later_ways = _follow(search, body, later, then, both - one)
