@@ -19,6 +19,7 @@ from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.record_file import create
 from quad_nav.recording.recorder import Recorder
 from quad_nav.sim.contacts import Contact
+from quad_nav.topics.markers import CYLINDER, Marker
 
 # Stamps are whole nanoseconds; contacts are written with six digits; yaws come from quaternions.
 TIME_S, SIX_DIGITS, YAW_RAD = 1e-9, 1e-5, 1e-12
@@ -214,6 +215,26 @@ def test_information_of_several_nodes_is_merged(tmp_path):
     trace = read_trace(path)
     assert (trace.seed, trace.robot_radius_m) == (4, 0.25)
     assert trace.robots[0].times_s.tolist() == [2.0]
+
+
+def test_a_person_who_is_not_in_the_scene_is_refused(tmp_path):
+    scene = {
+        "name": "room",
+        "size": [10.0, 10.0],
+        "altitude": 1.0,
+        "starts": [[1.0, 1.0, 0.0]],
+        "walkers": {"count": 2, "reacting": True},
+    }
+    third = Marker("map", "moving", 2, CYLINDER, (3.0, 3.0, 0.9), (0.5, 0.5, 1.8), (1, 0, 0, 1))
+    path = bag(
+        tmp_path / "odd.bag",
+        ("/quad/flight", 1, messages.text(json.dumps({"scene": scene}))),
+        ("/odom0", 10**9, odometry(10**9, 0.0)),
+        ("/simulation/obstacles", 10**9, messages.marker_array([third])),
+    )
+    with pytest.raises(InputError) as error:
+        read_trace(path)
+    assert error.value.problems == [f"{path}: /simulation/obstacles: marker 2; expected 0 to 1"]
 
 
 def test_navfn_s_plan_published_twice_is_one(tmp_path):

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import functools
 import re
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import limit_memory
@@ -22,10 +23,13 @@ from quad_nav.recording.bag_info import (
     checked_pose,
     require_finite,
 )
+from quad_nav.recording.bag_people import read_people
 from quad_nav.recording.bag_robot import BagRobot
+from quad_nav.recording.flight_clock import FlightClock
 from quad_nav.recording.messages import pose_from, stamp_ns
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.sim.contacts import Contact
+from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.scene_file import scene_from_document
 from quad_nav.topics.flight_info import (
@@ -86,9 +90,15 @@ def read_recording(path: Path, progress: Progress = no_progress) -> TraceReader:
     Raises:
         InputError: The file is not a recording, or is damaged.
     """
+    with _limited_memory(path):
+        return _read(path, progress)
+
+
+@contextmanager
+def _limited_memory(path: Path) -> Iterator[None]:
     try:
         with limit_memory(MAX_MEMORY_BYTES):
-            return _read(path, progress)
+            yield
     except MemoryError as error:
         raise InputError(
             [
@@ -222,6 +232,7 @@ class TraceReader:
         Raises:
             InputError: The recording has no odometry, too long a flight or an invalid scene.
         """
+        scene = self._scene(path)
         robots = self._flown_robots(path)
         start_s = self.start_s
         infos = self.info.get("robots", [])
@@ -236,13 +247,14 @@ class TraceReader:
             self.info.get("title", path.stem),
             traces,
             contacts,
-            self._scene(path),
+            scene,
             self.info.get("robot_radius_m", BODY_RADIUS_M),
             self.info.get("seed"),
             self.info.get("config", ""),
             self.info.get("versions", {}),
             self.info.get("reason", ""),
             self.info.get("jitter_m"),
+            self._people(path, scene, max(one.times_s[-1] for one in traces)),
         )
 
     @property
@@ -270,6 +282,17 @@ class TraceReader:
                     ]
                 )
         return robots
+
+    @property
+    def clock(self) -> FlightClock:
+        """The clock of the flight; there must be odometry."""
+        return FlightClock(self.clocks_ns, self.start_s)
+
+    def _people(self, path: Path, scene: Optional[Scene], end_s: float) -> Optional[CrowdRecord]:
+        if scene is None or not scene.people_react:
+            return None
+        with _limited_memory(path):
+            return read_people(path, scene, self.clock, end_s)
 
     def _scene(self, path: Path) -> Optional[Scene]:
         document = self.info.get("scene")

@@ -89,11 +89,8 @@ class RecordedFlight:
         self._tracks = [RobotTrack(robot) for robot in trace.robots]
         self.start_s = min(float(robot.times_s[0]) for robot in trace.robots)
         self.end_s = max(float(robot.times_s[-1]) for robot in trace.robots)
-        clocks = np.array(reader.clocks_ns, np.int64).reshape(-1, 2)
-        self._times = {
-            topic: _flight_times_s(self._index.times_ns(topic), clocks, reader.start_s)
-            for topic in self._index.kinds
-        }
+        clock, index = reader.clock, self._index
+        self._times = {topic: clock.times_s(index.times_ns(topic)) for topic in index.kinds}
         self._topics = self._topics_by_layer()
         obstacles_s = self._times.get(OBSTACLES_TOPIC)
         self._obstacles = ObstacleTrack(trace.scene, trace.seed, self._index, obstacles_s)
@@ -314,14 +311,3 @@ def _is_wanted(topic: str, kind: str) -> bool:
         kind == expected and re.fullmatch(pattern, topic) is not None
         for pattern, expected in _LAYERS.values()
     )
-
-
-def _flight_times_s(
-    stamps_ns: NDArray[np.int64], clocks_ns: NDArray[np.int64], start_s: float
-) -> NDArray[np.float64]:
-    """Convert times of recording to times of the flight: the last time on ``/clock`` before."""
-    if len(clocks_ns):
-        numbers = np.searchsorted(clocks_ns[:, 0], stamps_ns, side="right") - 1
-        stamps_ns = clocks_ns[np.maximum(numbers, 0), 1]
-    times_s: NDArray[np.float64] = np.maximum.accumulate(stamps_ns / 1e9 - start_s)
-    return times_s

@@ -6,6 +6,7 @@ for a stopped clock.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any, Dict, List
 
@@ -63,7 +64,7 @@ class Recorder(FlightObserver):
     def on_start(self, flight: Flight) -> None:
         """Write the scene, the goals and the initial state."""
         self._flight = flight
-        self._next_obstacles_s = 0.0
+        self._obstacles_s = -math.inf  # when they were written last
         self._navigators = [
             NavigatorTopics(index, flight.offline_robots[index], self._topics)
             for index in range(len(flight.robots))
@@ -132,11 +133,8 @@ class Recorder(FlightObserver):
             _SIMULATOR,
             latched=True,
         )
-        movers = flight.simulation.movers
-        if movers and now_s >= self._next_obstacles_s - 1e-6:
-            self._next_obstacles_s = now_s + OBSTACLES_PERIOD_S
-            shown = messages.marker_array(moving_markers(movers, now_s))
-            self._write(OBSTACLES_TOPIC, stamp, shown, _SIMULATOR)
+        if now_s >= self._obstacles_s + OBSTACLES_PERIOD_S - 1e-6:
+            self._write_obstacles(flight)
         for robot, state in enumerate(flight.states):
             self._write_odometry(robot, state, stamp)
             self._write_flown_path(robot, state, now_s)
@@ -164,8 +162,16 @@ class Recorder(FlightObserver):
 
     def on_end(self, flight: Flight) -> None:
         """Write the final flight information and complete the file."""
+        if self._obstacles_s < flight.now_s:
+            self._write_obstacles(flight)
         self._write_flight()
         self._topics.close()
+
+    def _write_obstacles(self, flight: Flight) -> None:
+        self._obstacles_s, movers = flight.now_s, flight.simulation.movers
+        if movers:
+            shown = messages.marker_array(moving_markers(movers, flight.now_s))
+            self._write(OBSTACLES_TOPIC, stamp_at(flight.now_s), shown, _SIMULATOR)
 
     def _transforms(self, robot: int, map_from_base: Pose3D, stamp: int) -> List[Any]:
         odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"

@@ -6,6 +6,7 @@ A trace comes from a running flight (``TraceObserver``) or from a recording (``b
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, List, Mapping, Optional, Tuple
 
 import numpy as np
@@ -17,6 +18,8 @@ from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
 from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.offline.flight import Flight, FlightObserver
 from quad_nav.sim.contacts import Contact
+from quad_nav.sim.crowd_record import CrowdRecord
+from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import Scene
 from quad_nav.topics.right_of_way import RightOfWay
 from quad_nav.versions import versions
@@ -88,7 +91,8 @@ class RobotTrace:
 class FlightTrace:
     """Trace of all robots of a flight, with its contacts and scene.
 
-    ``jitter_m`` is the largest displacement of a start position; None if it is unknown.
+    ``jitter_m`` is the largest displacement of a start position; None if it is unknown. ``people``
+    says where people were who react to quadcopters; None if there are none, or it is unknown.
     """
 
     title: str
@@ -101,6 +105,14 @@ class FlightTrace:
     versions: Mapping[str, str] = field(default_factory=dict)
     reason: str = ""
     jitter_m: Optional[float] = None
+    people: Optional[CrowdRecord] = None
+
+    @cached_property
+    def movers(self) -> Optional[Movers]:
+        """The moving obstacles of the scene; None without any, or without a scene."""
+        if self.scene is None or not self.scene.moving_shapes:
+            return None
+        return Movers(self.scene, self.seed, record=self.people)
 
 
 class _RobotRecord:
@@ -126,10 +138,14 @@ class TraceObserver(FlightObserver):
         self._quaternions: List[NDArray[np.float64]] = []
         self._robots: List[_RobotRecord] = []
         self._flight: Optional[Flight] = None
+        self._people: Optional[CrowdRecord] = None
 
     def on_start(self, flight: Flight) -> None:
         """Start the trace."""
         self._flight = flight
+        scene = flight.setup.scene
+        if scene.walkers is not None and scene.people_react:
+            self._people = CrowdRecord(scene.walkers.count)
         self._robots = [_RobotRecord() for _ in flight.robots]
         self.on_move(flight)
 
@@ -139,6 +155,10 @@ class TraceObserver(FlightObserver):
         self._times_s.append(flight.now_s)
         self._positions.append(bodies.positions_m)
         self._quaternions.append(bodies.quaternions)
+        if self._people is not None:
+            movers = flight.simulation.movers
+            positions = movers.poses(flight.now_s)[len(flight.setup.scene.moving) :, :2]
+            self._people.add(flight.now_s, positions)
         for record, state in zip(self._robots, flight.states):
             twist = state.twist
             record.velocities.append((twist.vx_mps, twist.vy_mps, twist.vyaw_radps))
@@ -199,6 +219,7 @@ class TraceObserver(FlightObserver):
             versions(),
             reason,
             setup.simulation.jitter_m,
+            self._people,
         )
 
     def _robot_traces(self, flight: Flight) -> Tuple[RobotTrace, ...]:

@@ -21,9 +21,8 @@ from quad_nav.files.output import replacing
 from quad_nav.geometry import Pose2D
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks, resampled_tracks
-from quad_nav.report.scene_drawing import draw_scene, extent, moving_patch
+from quad_nav.report.scene_drawing import draw_moving, draw_scene, extent
 from quad_nav.report.style import ALARM, colour, styled
-from quad_nav.sim.movers import Movers
 
 _WIDTH_IN, _DPI = 5.4, 100
 _FRAMES_PER_S = 10
@@ -105,8 +104,6 @@ class _View:
         self.figure, self._axes = _empty_scene(trace, self._tracks)
         self._canvas: Any = FigureCanvasAgg(self.figure)
         self._title = self._axes.set_title("")
-        scene = trace.scene
-        self._movers = Movers(scene, trace.seed) if scene and scene.moving_shapes else None
         self._moving: List[Patch] = []
         self._robots = [_MovingRobot(self._axes, k, trace) for k in range(len(trace.robots))]
         self._contacts: Line2D = self._axes.plot(
@@ -124,12 +121,9 @@ class _View:
         )
         for robot in self._robots:
             robot.show(self._tracks, time_s)
-        if self._movers is not None:
-            for patch in self._moving:
-                patch.remove()
-            self._moving = [moving_patch(solid) for solid in self._movers.at(time_s)]
-            for patch in self._moving:
-                self._axes.add_patch(patch)
+        for patch in self._moving:
+            patch.remove()
+        self._moving = draw_moving(self._axes, self._trace, time_s)
         speed = f"   × {self._speed}" if self._speed > 1 else ""
         self._title.set_text(f"{time_s:.1f} s{speed}")
 

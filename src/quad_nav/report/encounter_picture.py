@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.encounters import Encounter, separation_text
 from quad_nav.report.measures import Tracks, pair_separations_m
-from quad_nav.report.scene_drawing import draw_hull, draw_scene
+from quad_nav.report.scene_drawing import draw_hull, draw_moving, draw_scene
 from quad_nav.report.style import ALARM, QUIET, colour, new_figure
 
 _FRAMES = 5
@@ -63,6 +63,7 @@ def _draw_frame(
         encounter.y_m + _HALF_SIZE_M,
     )
     draw_scene(axes, trace.scene, shown)
+    draw_moving(axes, trace, time_s)
     offsets_m = np.abs(tracks.positions_m[:, now] - (encounter.x_m, encounter.y_m)).max(axis=1)
     for k in np.flatnonzero(offsets_m < _HALF_SIZE_M + _NEAR_M):
         _draw_robot(axes, tracks, int(k), now, trace.robot_radius_m)

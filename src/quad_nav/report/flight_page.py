@@ -51,13 +51,14 @@ def flight_page(trace: FlightTrace, wall_time_s: Optional[float] = None) -> Page
 
 
 def _paths(trace: FlightTrace, tracks: Tracks, shown: Sequence[Encounter]) -> Section:
+    obstacles = " and what moves by itself" if trace.movers is not None else ""
     return Section(
         "paths",
         "Paths",
         "Goal 0.2 is the second goal of quadcopter 0. Squares are start positions, discs the "
-        "quadcopters, at the end or at the time of the slider. Drag to zoom, double-click to zoom "
-        "out. A click in the legend hides a quadcopter, a double click all others. Check whether "
-        "paths keep to the middle of gaps, and whether they circle.",
+        f"quadcopters{obstacles}, at the end or at the time of the slider. Drag to zoom, "
+        "double-click to zoom out. A click in the legend hides a quadcopter, a double click all "
+        "others. Check whether paths keep to the middle of gaps, and whether they circle.",
         plots=(paths_plot(trace, tracks, shown),),
         paper=(
             picture("paths", "Paths over the scene", lambda: paths_picture(trace, tracks, shown)),

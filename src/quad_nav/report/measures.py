@@ -93,9 +93,12 @@ def clearances_m(tracks: Tracks, trace: FlightTrace) -> NDArray[np.float64]:
     """Return each robot's clearance, shape (n, t); NaN without a scene."""
     if trace.scene is None or tracks.positions_m.size == 0:
         return np.full(tracks.yaws_rad.shape, np.nan)
-    surface_distance = Movers(trace.scene, trace.seed).flight_surface_distances_m
+    movers = trace.movers or Movers(trace.scene)
     return distances.clearances_m(
-        tracks.positions_m, tracks.times_s, surface_distance, trace.robot_radius_m
+        tracks.positions_m,
+        tracks.times_s,
+        movers.flight_surface_distances_m,
+        trace.robot_radius_m,
     )
 
 

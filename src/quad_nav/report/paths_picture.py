@@ -16,7 +16,14 @@ from matplotlib.textpath import TextPath
 from quad_nav.recording.trace import FlightTrace, RobotTrace
 from quad_nav.report.encounters import LETTERS, Encounter
 from quad_nav.report.measures import Tracks, goal_end_s, position_m, trace_span_s
-from quad_nav.report.scene_drawing import draw_hull, draw_motions, draw_scene, extent, outlines
+from quad_nav.report.scene_drawing import (
+    MOVING,
+    draw_hull,
+    draw_motions,
+    draw_scene,
+    extent,
+    outlines,
+)
 from quad_nav.report.style import (
     ALARM,
     QUIET,
@@ -167,6 +174,8 @@ def _symbols(trace: FlightTrace, lettered: bool) -> List[Any]:
         found.append(symbol(_letter(LETTERS[0]), "close encounter"))
     if trace.contacts:
         found.append(symbol("X", "contact", color=ALARM, mec="white", ms=10))
+    if trace.movers is not None:
+        found.append(symbol("o", "moving obstacle", color=MOVING, alpha=0.7, ms=10))
     if trace.scene is not None and outlines(trace.scene)[1]:
         label = "not at the flying altitude"
         found.append(Line2D([], [], ls=":", lw=1.0, color=QUIET, label=label))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, List, Optional, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quad_nav.recording.trace import FlightTrace, GoalTrace, RobotTrace
 from quad_nav.report.encounters import LETTERS, Encounter, separation_text
 from quad_nav.report.measures import Tracks, goal_end_s, speed_mps
+from quad_nav.report.paths_animation import animation, controls
 from quad_nav.report.plot import (
     ALARM,
     QUIET,
@@ -21,17 +21,12 @@ from quad_nav.report.plot import (
     numbers,
     plot_text,
     rgb,
+    robot_marks,
     sample,
 )
 from quad_nav.report.scene_drawing import Extent, extent, outlines
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.scene import Scene
-
-MOST_FRAMES = 200
-"""Number of frames of an animation."""
-_FRAME_S = 0.1  # shortest time between two frames, in simulated time
-_FRAME_MS = 60  # wall time between two frames
-_FULL_SIZE_UP_TO = 10  # robots; with more, symbols are smaller
 
 
 def paths_plot(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter]) -> Plot:
@@ -43,15 +38,15 @@ def paths_plot(trace: FlightTrace, tracks: Tracks, marked: Sequence[Encounter]) 
         traces += _robot_traces(k, robot, count)
     traces += contact_traces(trace.contacts) + _letters(marked)
     first = len(traces)
-    frames, traces_now = _animation(trace, tracks, first)
-    traces += traces_now
+    frames, moving = animation(trace, tracks, first)
+    traces += moving
     return Plot(
         "paths",
         "Paths over the scene",
         traces,
         layout(
             **map_axes(region),
-            **_controls(frames),
+            **controls(frames),
             margin={"l": 50, "r": 12, "t": 28, "b": 100 if frames else 44},
         ),
         frames,
@@ -140,7 +135,7 @@ def _robot_traces(number: int, robot: RobotTrace, count: int) -> List[Json]:
     found = [path_trace(number, robot, count, robot.name, **group)]
     found.append(
         {
-            **_marks(number, robot.positions_m[:1, :2], [str(number)], "square", 15, count),
+            **robot_marks(number, robot.positions_m[:1, :2], [str(number)], "square", 15, count),
             **group,
             "hovertemplate": f"<b>{plot_text(robot.name)}</b><br>start<extra></extra>",
         }
@@ -148,7 +143,7 @@ def _robot_traces(number: int, robot: RobotTrace, count: int) -> List[Json]:
     places = {(goal.index, goal.pose.x_m, goal.pose.y_m): goal for goal in robot.goals}
     if places:
         goals = list(places.values())
-        marks = _marks(
+        marks = robot_marks(
             number,
             np.array([(goal.pose.x_m, goal.pose.y_m) for goal in goals]),
             [f"{number}.{goal.index + 1}" for goal in goals],
@@ -177,33 +172,6 @@ def _goal_text(goal: GoalTrace, robot: RobotTrace) -> str:
         error = goal.yaw_error_rad
         return f"reached in {spent}" + (f", yaw error {error:.2f} rad" if error is not None else "")
     return f"{plot_text(goal.reason or 'not ended')} after {spent}"
-
-
-def _marks(
-    number: int,
-    places_m: NDArray[np.float64],
-    texts: Sequence[str],
-    symbol: str,
-    size: float,
-    count: int,
-    alpha: float = 1.0,
-) -> Json:
-    scale = min(1.0, (_FULL_SIZE_UP_TO / count) ** 0.25)
-    return {
-        "type": "scatter",
-        "mode": "markers+text",
-        "x": numbers(places_m[:, 0]),
-        "y": numbers(places_m[:, 1]),
-        "text": list(texts),
-        "textfont": {"size": round(10 * scale**0.7, 1), "color": "#fff"},
-        "marker": {
-            "symbol": symbol,
-            "size": round(size * scale, 1),
-            "color": rgb(number, alpha),
-            "line": {"color": rgb(number), "width": 2},
-        },
-        "showlegend": False,
-    }
 
 
 def contact_traces(contacts: Sequence[Contact]) -> List[Json]:
@@ -256,77 +224,3 @@ def _letters(marked: Sequence[Encounter]) -> List[Json]:
 def _encounter_text(encounter: Encounter) -> str:
     names = " and ".join(map(plot_text, encounter.names))
     return f"{names}<br>{separation_text(encounter.separation_m)} at {encounter.time_s:.1f} s"
-
-
-def _animation(trace: FlightTrace, tracks: Tracks, first: int) -> Tuple[List[Json], List[Json]]:
-    """Return frames of the robots' positions, and the traces, from number ``first``, that move."""
-    flown = [k for k, robot in enumerate(trace.robots) if len(robot.times_s)]
-    if not flown or len(tracks.times_s) < 2:
-        return [], []
-    begin_s, end_s = tracks.times_s[[0, -1]]
-    count = int(min(MOST_FRAMES, max((end_s - begin_s) / _FRAME_S, 1))) + 1
-    shown = [tracks.index_at(time_s) for time_s in np.linspace(begin_s, end_s, count)]
-    moving = [
-        {
-            **_marks(
-                k, tracks.positions_m[k, -1:], [f"<b>{k}</b>"], "circle", 28, len(flown), 0.25
-            ),
-            "legendgroup": f"robot{k}",
-            "textposition": "top center",
-            "textfont": {"size": 13, "color": rgb(k)},
-            "hoverinfo": "skip",
-        }
-        for k in flown
-    ]
-    indices = list(range(first, first + len(flown)))
-    frames = []
-    for now in shown:
-        x, y = (
-            numbers(tracks.positions_m[flown, now, 0]),
-            numbers(tracks.positions_m[flown, now, 1]),
-        )
-        data = [{"x": [x[k]], "y": [y[k]]} for k in range(len(flown))]
-        name = f"{tracks.times_s[now]:.1f}"
-        frames.append({"name": name, "data": data, "traces": indices})
-    return frames, moving
-
-
-def _controls(frames: Sequence[Json]) -> Json:
-    """Return the slider over the frames and the buttons beside it."""
-    if not frames:
-        return {}
-    at_once = {"mode": "immediate", "transition": {"duration": 0}}
-    play = {**at_once, "fromcurrent": True, "frame": {"duration": _FRAME_MS, "redraw": False}}
-    jump = {**at_once, "frame": {"duration": 0, "redraw": False}}
-    place = {"x": 0, "y": 0, "xanchor": "left", "yanchor": "top"}
-    buttons = {
-        **place,
-        "type": "buttons",
-        "direction": "right",
-        "showactive": False,
-        "buttons": [
-            {"label": "▶", "method": "animate", "args": [None, play]},
-            {"label": "❚❚", "method": "animate", "args": [[None], jump]},
-        ],
-        "pad": {"t": 58, "r": 8},
-        "bgcolor": "#fff",
-        "bordercolor": "#a0a8b0",
-    }
-    return {"updatemenus": [buttons], "sliders": [{**place, **_slider(frames, jump)}]}
-
-
-def _slider(frames: Sequence[Json], jump: Json) -> Json:
-    return {
-        "x": 0.2,
-        "len": 0.8,
-        "pad": {"t": 44},
-        "active": len(frames) - 1,
-        "steps": [
-            {"label": frame["name"], "method": "animate", "args": [[frame["name"]], jump]}
-            for frame in frames
-        ],
-        "currentvalue": {"prefix": "time ", "suffix": " s", "font": {"size": 12}},
-        "font": {"size": 11},
-        "ticklen": 3,
-        "minorticklen": 0,
-    }

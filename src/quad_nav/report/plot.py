@@ -27,6 +27,7 @@ DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 """Line patterns; robots with similar colours have different ones."""
 _LONGEST_TEXT = 80
 _MOST_POINTS = 40_000  # of all lines of a panel: more make the page slow
+_FULL_SIZE_UP_TO = 10  # robots; with more, symbols are smaller
 _FEWEST, _MOST = 120, 1500  # points of one line
 
 
@@ -220,3 +221,41 @@ _DRAW = """
   });
 })();
 """
+
+
+def robot_marks(
+    number: int,
+    places_m: NDArray[np.float64],
+    texts: Sequence[str],
+    symbol: str,
+    size: float,
+    count: int,
+    alpha: float = 1.0,
+) -> Json:
+    """Return a trace of marks in a robot's colour, each with a text.
+
+    Args:
+        number: Number of the robot.
+        places_m: float64[k, 2].
+        texts: Texts in the marks.
+        symbol: Symbol of plotly.js.
+        size: Size of the symbols, pixels; with many robots they are smaller.
+        count: Number of robots in the plot.
+        alpha: Opacity of the fill.
+    """
+    scale = min(1.0, (_FULL_SIZE_UP_TO / count) ** 0.25)
+    return {
+        "type": "scatter",
+        "mode": "markers+text",
+        "x": numbers(places_m[:, 0]),
+        "y": numbers(places_m[:, 1]),
+        "text": list(texts),
+        "textfont": {"size": round(10 * scale**0.7, 1), "color": "#fff"},
+        "marker": {
+            "symbol": symbol,
+            "size": round(size * scale, 1),
+            "color": rgb(number, alpha),
+            "line": {"color": rgb(number), "width": 2},
+        },
+        "showlegend": False,
+    }

@@ -16,11 +16,13 @@ from quad_nav.geometry import Pose2D
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.report.measures import Tracks
 from quad_nav.report.style import colour
-from quad_nav.sim.movers import Motions, Movers
+from quad_nav.sim.movers import Motions
 from quad_nav.sim.scene import Box, Obstacle, Scene
 
 Extent = Tuple[float, float, float, float]
 MOVING = "#cc5c33"
+CIRCLE_CORNERS = 32
+"""Corners of the outline of a round obstacle."""
 _SOLID, _EDGE = "#b9bfc6", "#7c858e"
 _PATH_POINTS = 1000
 _MOTION_STEP_S, _JUMP_M = 0.1, 1.0
@@ -54,16 +56,24 @@ def draw_scene(axes: Axes, scene: Optional[Scene], near: Optional[Extent] = None
 
 def draw_motions(axes: Axes, trace: FlightTrace, span: Tuple[float, float]) -> None:
     """Draw the paths of moving obstacles in a time span, and where they are at its end."""
-    if trace.scene is None or not trace.scene.moving_shapes:
+    movers = trace.movers
+    if movers is None:
         return
-    movers = Movers(trace.scene, trace.seed)
     times_s = np.arange(span[0], span[1], _MOTION_STEP_S)
     for track in np.swapaxes(movers.poses_at(np.append(times_s, span[1])), 0, 1):
         steps_m = np.hypot(*np.diff(track[:, :2], axis=0).T)
         track[1:][steps_m > _JUMP_M] = np.nan  # no line where a loop starts again
-        axes.plot(track[:, 0], track[:, 1], color=MOVING, lw=0.7, alpha=0.5, zorder=2)
-    for solid in movers.at(span[1]):
-        axes.add_patch(moving_patch(solid))
+        axes.plot(track[:, 0], track[:, 1], color=MOVING, lw=0.6, alpha=0.25, zorder=2)
+    draw_moving(axes, trace, span[1])
+
+
+def draw_moving(axes: Axes, trace: FlightTrace, time_s: float) -> List[Patch]:
+    """Draw the moving obstacles where they are at a time; return what is drawn."""
+    solids = [] if trace.movers is None else trace.movers.at(time_s)
+    patches = [moving_patch(solid) for solid in solids]
+    for patch in patches:
+        axes.add_patch(patch)
+    return patches
 
 
 def draw_starting(axes: Axes, scene: Scene, moving: Sequence[Obstacle]) -> None:
@@ -116,14 +126,19 @@ def _meets(solid: Obstacle, altitude_m: float) -> bool:
     return solid.bottom_m <= altitude_m <= solid.bottom_m + solid.height_m
 
 
-def outline(solid: Obstacle) -> NDArray[np.float64]:
-    """Return the closed outline, shape (k, 2) in ``map``, of an obstacle."""
+def outline(solid: Obstacle, corners: int = CIRCLE_CORNERS) -> NDArray[np.float64]:
+    """Return the closed outline, shape (k, 2) in ``map``, of an obstacle.
+
+    Args:
+        solid: The obstacle.
+        corners: Corners of the outline of a round one.
+    """
     if isinstance(solid, Box):
         x_m, y_m = solid.size_x_m / 2, solid.size_y_m / 2
-        corners = [(x_m, y_m), (-x_m, y_m), (-x_m, -y_m), (x_m, -y_m), (x_m, y_m)]
+        vertices = [(x_m, y_m), (-x_m, y_m), (-x_m, -y_m), (x_m, -y_m), (x_m, y_m)]
         pose = Pose2D(solid.x_m, solid.y_m, solid.yaw_rad)
-        return np.array([pose.transform(*corner) for corner in corners])
-    turns = np.linspace(0.0, 2 * np.pi, 33)
+        return np.array([pose.transform(*vertex) for vertex in vertices])
+    turns = np.linspace(0.0, 2 * np.pi, corners + 1)
     return np.column_stack(
         [solid.x_m + solid.radius_m * np.cos(turns), solid.y_m + solid.radius_m * np.sin(turns)]
     )

@@ -24,10 +24,12 @@ from quad_nav.scenario.coverage import scene_bounds
 from quad_nav.scenario.flight_facts import ros_facts
 from quad_nav.scenario.rules import RANDOM, RULES, START_S, optional
 from quad_nav.scenario.scenario import Scenario, ScenarioRequest, read_configurations, read_scenario
+from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 
 START_SERVICE = "/simulation/start"
+_KEPT_PLACES = 600  # of each person: a minute
 DEFAULTS: Dict[str, Any] = {
     "robots": 2,
     "goals": "",
@@ -69,15 +71,16 @@ _RULES: Dict[str, Rule] = {
 class MissionSetup:
     """A mission that can be flown.
 
-    ``surface_distance`` and ``altitude_m`` are None if the scene is unknown. ``start_service`` is
-    called before the first goal is sent, ``end_service`` before the node exits, if they have
+    ``scene`` and ``surface_distance`` are None if the scene is unknown. ``surface_distance`` reads
+    ``people``, where people are who react to quadcopters; None if there are none. ``start_service``
+    is called before the first goal is sent, ``end_service`` before the node exits, if they have
     names. ``parameters`` are the navigators' trees, {} for one whose parameters are unknown.
     ``facts`` are for the summary.
     """
 
     robots: Tuple[RobotGoals, ...]
     robot_radius_m: float
-    altitude_m: Optional[float]
+    scene: Optional[Scene]
     surface_distance: Optional[SurfaceDistance]
     simulation: bool
     ready_timeout_s: float
@@ -90,6 +93,7 @@ class MissionSetup:
     notes: Tuple[str, ...] = ()
     start_service: str = ""
     end_service: str = ""
+    people: Optional[CrowdRecord] = None
 
 
 def read_setup(
@@ -153,12 +157,16 @@ def _odometry_drifts(all_parameters: Mapping[str, Any]) -> bool:
 def _mission_setup(
     values: Mapping[str, Any], scenario: Scenario, warnings: Tuple[str, ...], journals: Path
 ) -> MissionSetup:
-    scene = scenario.scene
+    scene, people, movers = scenario.scene, None, None
+    if scene is not None:
+        if scene.walkers is not None and scene.people_react:
+            people = CrowdRecord(scene.walkers.count, _KEPT_PLACES)
+        movers = Movers(scene, values["seed"], START_S, people)
     return MissionSetup(
         scenario.robots,
         scenario.robot_radius_m,
-        scene.altitude_m if scene else None,
-        Movers(scene, values["seed"], START_S).flight_surface_distances_m if scene else None,
+        scene,
+        movers.flight_surface_distances_m if movers else None,
         values["simulation"],
         float(values["ready_timeout"]),
         values["exit_when_done"],
@@ -169,6 +177,7 @@ def _mission_setup(
         notes=scenario.notes,
         start_service=values["start_service"] or (START_SERVICE if values["simulation"] else ""),
         end_service=values["end_service"],
+        people=people,
     )
 
 

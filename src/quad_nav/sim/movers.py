@@ -1,20 +1,21 @@
 """Moving obstacles of a scene: where they are at any time of a flight.
 
 Their poses depend on the scene, the seed and the time alone: the simulator, a log and a report
-compute the same ones. Poses of people who react to quadcopters are in the simulation only, which
-calls ``react``.
+compute the same ones. Where people are who react to quadcopters depends on the flight: the
+simulation calls ``react``, others give a record of it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Sequence
+from typing import List, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import rotate_vectors
 from quad_nav.kernels.keyframes import Keyframes, fill_poses
+from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.motion import SPLINE, Motion
 from quad_nav.sim.scene import Box, Obstacle, Scene, placed
 from quad_nav.sim.walkers import REACTION_S, Crowd, round_down, walks
@@ -59,6 +60,7 @@ class Movers:
         scene: The scene.
         seed: Seed of the random phases and of the walkers.
         start_s: Time on the clock at which the motions begin.
+        record: Where people were who react to quadcopters; without it they walk by ``react``.
 
     Raises:
         InputError: The scene has no room for its walkers.
@@ -68,15 +70,27 @@ class Movers:
         start_s: As given.
     """
 
-    def __init__(self, scene: Scene, seed: Optional[int] = 0, start_s: float = 0.0) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        seed: Optional[int] = 0,
+        start_s: float = 0.0,
+        record: Optional[CrowdRecord] = None,
+    ) -> None:
         self.shapes = scene.moving_shapes
         self.start_s = start_s
         self._scene = scene
         motions = [obstacle.motion for obstacle in scene.moving]
         phases = phases_s(motions, scene.motion_phase_s, seed or 0)
-        reacting = scene.walkers is not None and scene.walkers.reacting
-        self._crowd = Crowd(scene, seed or 0) if reacting else None
-        people = walks(scene, seed or 0) if scene.walkers is not None and not reacting else ()
+        self._reacting: Optional[Crowd] = None
+        self._people: Union[Crowd, CrowdRecord, None] = None
+        people: Sequence[Motion] = ()
+        if not scene.people_react:
+            people = walks(scene, seed or 0) if scene.walkers is not None else ()
+        elif record is None:
+            self._reacting = self._people = Crowd(scene, seed or 0)
+        else:
+            self._people = record
         self._motions = Motions([*motions, *people], [*phases, *(0.0 for _ in people)])
 
     def __len__(self) -> int:
@@ -89,12 +103,13 @@ class Movers:
     def poses_at(self, times_s: Floats) -> Floats:
         """Return the poses at many times float64[t] on the clock, float64[t, m, 3].
 
-        Those of people who react are NaN before ``react`` or a minute later.
+        Those of people who react are NaN before ``react`` or a minute later, and where the record
+        does not have them.
         """
         poses = self._motions.poses(times_s - self.start_s)
-        if self._crowd is None:
+        if self._people is None:
             return poses
-        return np.concatenate([poses, self._crowd.poses(times_s - self.start_s)], axis=1)
+        return np.concatenate([poses, self._people.poses(times_s - self.start_s)], axis=1)
 
     def react(self, now_s: float, rows: Floats, radius_m: float) -> float:
         """Let people react to quadcopters, at least once in each period.
@@ -107,10 +122,10 @@ class Movers:
         Returns:
             Time on the clock up to which all poses are known; +inf if nobody reacts.
         """
-        if self._crowd is None:
+        if self._reacting is None:
             return math.inf
         elapsed_s = now_s - self.start_s
-        self._crowd.react(elapsed_s, np.ascontiguousarray(rows[:, [0, 1, 7, 8]]), radius_m)
+        self._reacting.react(elapsed_s, np.ascontiguousarray(rows[:, [0, 1, 7, 8]]), radius_m)
         return self.start_s + (round_down(elapsed_s) + 1) * REACTION_S
 
     def flight_surface_distances_m(self, positions_m: Floats, times_s: Floats) -> Floats:

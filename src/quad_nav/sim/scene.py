@@ -249,6 +249,11 @@ class Scene:
             )
         return (*(obstacle.shape for obstacle in self.moving), *people)
 
+    @property
+    def people_react(self) -> bool:
+        """There are walkers, and they react to quadcopters."""
+        return self.walkers is not None and self.walkers.reacting
+
     def wall_boxes(self) -> List[Box]:
         """Return the walls as boxes; the southern and northern ones include the corners."""
         t, h = self.walls.thickness_m, self.walls.height_m

@@ -22,10 +22,9 @@ the start, and then played forwards and backwards in turn, so that no person jum
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import replace
 from functools import lru_cache
-from typing import Deque, List, Tuple
+from typing import List, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,7 +94,9 @@ class Crowd:
         self._ground = ground_of(scene)
         random = np.random.default_rng([seed, _STREAM])
         self._people = people_of(scene, scene.walkers, self._ground, random)
-        self._kept: Deque[Floats] = deque([self._people.positions.copy()], _KEPT)
+        count = scene.walkers.count
+        self._places = np.empty((2 * _KEPT, count, 2))  # in order, up to _end
+        self._places[0], self._end = self._people.positions, 1
         self._last = 0  # number of the newest places
 
     def react(self, time_s: float, others: Floats, radius_m: float) -> None:
@@ -109,12 +110,15 @@ class Crowd:
         if round_down(time_s) < self._last:
             return
         step_people(self._people, others, radius_m, self._ground, MODEL, REACHED_M, REACTION_S)
-        self._kept.append(self._people.positions.copy())
+        if self._end == len(self._places):
+            self._places[:_KEPT], self._end = self._places[-_KEPT:], _KEPT
+        self._places[self._end] = self._people.positions
+        self._end += 1
         self._last += 1
 
     def poses(self, times_s: Floats) -> Floats:
         """Return the poses float64[t, n, 3] at float64[t]; NaN where they are not known."""
-        kept = np.array(self._kept)
+        kept = self._places[max(self._end - _KEPT, 0) : self._end]
         first = self._last + 1 - len(kept)
         at = times_s / REACTION_S - first
         poses = np.full((len(times_s), kept.shape[1], 3), np.nan)

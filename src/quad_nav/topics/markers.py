@@ -121,6 +121,18 @@ def moving_poses(markers: Sequence[Any], count: int) -> NDArray[np.float64]:
     return poses
 
 
+def people_positions(markers: Sequence[Any], scene: Scene) -> NDArray[np.float64]:
+    """Return where a message on ``OBSTACLES_TOPIC`` says that a scene's people are.
+
+    Returns:
+        float64[n, 2], metres in `map`; NaN for people without a marker.
+
+    Raises:
+        ValueError: As ``moving_poses``.
+    """
+    return moving_poses(markers, len(scene.moving_shapes))[len(scene.moving) :, :2]
+
+
 def quadcopter_markers(n_robots: int) -> List[Marker]:
     """Return body, arms, rotors and LIDAR of each quadcopter, locked to `base_link{i}`."""
     return [marker for robot in range(n_robots) for marker in _quadcopter(robot)]

@@ -154,9 +154,9 @@ def scan_from_message(message: LaserScan) -> Scan:
     )
 
 
-def marker_array(shown: Sequence[markers.Marker]) -> MarkerArray:
-    """Convert markers."""
-    return MarkerArray([_marker_message(marker) for marker in shown])
+def marker_array(shown: Sequence[markers.Marker], stamp_s: float = 0.0) -> MarkerArray:
+    """Convert markers; with a stamp of 0 they hold at any time."""
+    return MarkerArray([_marker_message(marker, stamp_s) for marker in shown])
 
 
 def replacing_markers(shown: Sequence[markers.Marker]) -> MarkerArray:
@@ -166,7 +166,7 @@ def replacing_markers(shown: Sequence[markers.Marker]) -> MarkerArray:
     return MarkerArray([clear, *marker_array(shown).markers])
 
 
-def _marker_message(marker: markers.Marker) -> Marker:
+def _marker_message(marker: markers.Marker, stamp_s: float) -> Marker:
     message = Marker(
         ns=marker.namespace,
         id=marker.number,
@@ -179,5 +179,5 @@ def _marker_message(marker: markers.Marker) -> Marker:
         frame_locked=marker.frame_locked,
         points=[Point(*point) for point in marker.points_m],
     )
-    message.header.frame_id = marker.frame
+    message.header.frame_id, message.header.stamp = marker.frame, time_message(stamp_s)
     return message

@@ -31,6 +31,7 @@ from quad_nav.ros.sequencer.flight_record import FlightRecord
 from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress_message
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.mission_stop import MissionStop
+from quad_nav.ros.sequencer.people import PeopleTopic
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.ros.sequencer.robot_thread import RobotThread
 from quad_nav.ros.sequencer.state_feed import StateFeed
@@ -99,6 +100,8 @@ class MissionRunner:
         self._contacts = rospy.Subscriber(
             "/simulation/contacts", DiagnosticStatus, self._on_contact, queue_size=100
         )
+        if setup.scene is not None and setup.people is not None:
+            self._people = PeopleTopic(setup.scene, setup.people, self._record)
         if setup.simulation:
             self._resets = rospy.Subscriber(RESET_TOPIC, Time, self._on_reset)
 
@@ -278,8 +281,9 @@ class MissionRunner:
 
     def _publish_goals(self) -> None:
         heights = [robot.pose.z_m for robot in self.robots if robot.pose is not None]
-        altitude_m = self._setup.altitude_m
-        if altitude_m is None:
+        if self._setup.scene is not None:
+            altitude_m = self._setup.scene.altitude_m
+        else:
             altitude_m = heights[0] if heights else 0.0
         self._goals.publish(
             replacing_markers(goal_markers([robot.sequencer for robot in self.robots], altitude_m))

@@ -129,7 +129,8 @@ class SimulatorTopics:
         if is_due or listeners > self._obstacles_listeners:
             self._obstacles_s = now_s
             if listeners:
-                self._obstacles.publish(marker_array(moving_markers(movers, now_s)))
+                shown = moving_markers(movers, now_s)
+                self._obstacles.publish(marker_array(shown, now_s))
         self._obstacles_listeners = listeners
 
     def publish_scans(self) -> None:
