@@ -14,7 +14,13 @@ from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple
 
 from quad_nav.errors import InputError
 from quad_nav.files.user_files import limit_memory
-from quad_nav.recording.bag_file import Message, Progress, no_progress, read_messages
+from quad_nav.recording.bag_file import (
+    FlightClock,
+    Message,
+    Progress,
+    no_progress,
+    read_messages,
+)
 from quad_nav.recording.bag_info import (
     MAX_ROBOTS,
     MAX_SECONDS,
@@ -23,10 +29,9 @@ from quad_nav.recording.bag_info import (
     checked_pose,
     require_finite,
 )
-from quad_nav.recording.bag_people import read_people
 from quad_nav.recording.bag_robot import BagRobot
-from quad_nav.recording.flight_clock import FlightClock
 from quad_nav.recording.messages import pose_from, stamp_ns
+from quad_nav.recording.recorded_obstacles import read_people
 from quad_nav.recording.trace import FlightTrace
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.crowd_record import CrowdRecord

@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import Dict, Iterator, List, Optional
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Odometry
 from std_msgs.msg import String, Time
 from std_srvs.srv import Trigger
@@ -28,16 +27,15 @@ from quad_nav.ros.common.diagnostics import DiagnosticsTopic, ThrottledWarnings
 from quad_nav.ros.common.readiness import Need
 from quad_nav.ros.common.transforms import TransformUnavailable
 from quad_nav.ros.sequencer.flight_record import FlightRecord
-from quad_nav.ros.sequencer.mission_diagnostics import contact_from_message, progress_message
+from quad_nav.ros.sequencer.mission_diagnostics import progress_message
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.mission_stop import MissionStop
-from quad_nav.ros.sequencer.people import PeopleTopic
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.ros.sequencer.robot_thread import RobotThread
+from quad_nav.ros.sequencer.simulator_topics import ContactTopic, PeopleTopic
 from quad_nav.ros.sequencer.state_feed import StateFeed
 from quad_nav.scenario.mission_setup import MissionSetup
 from quad_nav.topics.flight_info import (
-    CONTACT_STATUS,
     FLIGHT_TOPIC,
     RESET_TOPIC,
     mission_info,
@@ -97,18 +95,17 @@ class MissionRunner:
         goals = {robot.name: robot.sequence for robot in setup.robots}
         self._flight.publish(to_text(mission_info(goals, setup.parameters, setup.robot_radius_m)))
         self._publish_goals()
-        self._contacts = rospy.Subscriber(
-            "/simulation/contacts", DiagnosticStatus, self._on_contact, queue_size=100
-        )
+        names = [robot.name for robot in setup.robots]
+        self._contacts = ContactTopic(names, self._record, self._warnings)
         if setup.scene is not None and setup.people is not None:
-            self._people = PeopleTopic(setup.scene, setup.people, self._record)
+            self._people = PeopleTopic(setup.scene, setup.people, self._record, self._warnings)
         if setup.simulation:
             self._resets = rospy.Subscriber(RESET_TOPIC, Time, self._on_reset)
 
     @property
     def _hears_contacts(self) -> bool:
         """Whether a node publishes contacts, as `vehicles` does if it has the bodies."""
-        return bool(self._contacts.get_num_connections())
+        return self._contacts.has_publisher
 
     @property
     def is_done(self) -> bool:
@@ -288,27 +285,6 @@ class MissionRunner:
         self._goals.publish(
             replacing_markers(goal_markers([robot.sequencer for robot in self.robots], altitude_m))
         )
-
-    def _on_contact(self, message: DiagnosticStatus) -> None:
-        if message.name != CONTACT_STATUS:
-            return
-        now_s = rospy.get_time()
-        try:
-            contact = contact_from_message(message)
-            if contact.time_s > now_s + MAX_LEAD_S:
-                raise ValueError(f"contact at {contact.time_s:.2f} s, /clock is at {now_s:.2f} s")
-            if not any(contact.involves(robot.name) for robot in self.robots):
-                raise ValueError(f"contact of {contact.robot}, expected a robot of this mission")
-        except ValueError as error:
-            name = self._contacts.resolved_name
-            self._warnings.warn(f"{name}: message dropped: {error}", kind=name)
-            return
-        if self._record.add_contact(contact, now_s):
-            self._warnings.warn(
-                f"{contact.robot}: CONTACT with {contact.other} at"
-                f" ({contact.x_m:.2f}, {contact.y_m:.2f}) m",
-                kind=f"{contact.robot}: CONTACT with {contact.other}",
-            )
 
     def _on_reset(self, message: Time) -> None:
         reset_s, now_s = message.data.to_sec(), rospy.get_time()
