@@ -166,7 +166,7 @@ def _mission_setup(
         scenario.robots,
         scenario.robot_radius_m,
         scene,
-        movers.flight_surface_distances_m if movers else None,
+        None if movers is None else movers.flight_surface_distances_m,
         values["simulation"],
         float(values["ready_timeout"]),
         values["exit_when_done"],
