@@ -10,6 +10,7 @@ from hand_made_traces import SCENE, flight, robot
 from matplotlib.patches import Circle
 from recorded_flight import setup
 
+from quad_nav.files.shipped import shipped
 from quad_nav.offline.run import fly
 from quad_nav.recording.bag_trace import read_trace
 from quad_nav.recording.recorder import Recorder
@@ -19,6 +20,8 @@ from quad_nav.report.encounters import encounters
 from quad_nav.report.measures import clearances_m, resampled_tracks
 from quad_nav.report.paths_picture import paths_picture
 from quad_nav.report.paths_plot import paths_plot
+from quad_nav.scenario import mission_setup
+from quad_nav.scenario.rules import START_S
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.crowd_record import CrowdRecord
 from quad_nav.sim.motion import Walkers
@@ -128,6 +131,24 @@ def middles(outlines):
     ends = np.append(np.flatnonzero(np.isnan(x)), len(x))
     starts = np.append(0, ends[:-1] + 1)
     return np.array([[v[a : b - 1].mean() for v in (x, y)] for a, b in zip(starts, ends)])
+
+
+@pytest.mark.parametrize("reacting", [False, True])
+def test_a_mission_under_ros_measures_the_distance_from_what_stands_and_from_people(
+    tmp_path, reacting
+):
+    """A wall is 1.5 m from the start (1.5, 1.5); a person of 0.25 m stands 1 m from it."""
+    scene, goals = "arena.yaml", shipped("goals")
+    if reacting:
+        scene, goals = "examples/walkers.yaml", shipped("goals", "examples/walkers")
+    parameters = {"goals": str(goals), "scene": str(shipped("scenes", scene))}
+    mission = mission_setup.read_setup(parameters, "sequencer", tmp_path / "r.json", tmp_path)
+    place, now_s = np.array([[1.5, 1.5]]), np.array([START_S + 2.0])
+    assert mission.surface_distance(place, now_s) == pytest.approx(1.5)
+    assert (mission.people is not None) == reacting
+    if reacting:
+        mission.people.add(2.0, np.array([[2.5, 1.5], *5 * [[6.0, 9.0]]]))
+        assert mission.surface_distance(place, now_s) == pytest.approx(0.75)
 
 
 def test_people_of_whom_nothing_is_recorded_are_left_out():

@@ -294,7 +294,7 @@ class TraceReader:
         return FlightClock(self.clocks_ns, self.start_s)
 
     def _people(self, path: Path, scene: Optional[Scene], end_s: float) -> Optional[CrowdRecord]:
-        if scene is None or not scene.people_react:
+        if scene is None:
             return None
         with _limited_memory(path):
             return read_people(path, scene, self.clock, end_s)

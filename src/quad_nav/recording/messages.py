@@ -275,29 +275,31 @@ def diagnostic(
     return message("diagnostic_msgs/DiagnosticStatus", level, name, content, hardware_id, pairs)
 
 
-def marker_array(shown: Sequence[Marker], replaces_all: bool = False) -> Any:
+def marker_array(shown: Sequence[Marker], replaces_all: bool = False, stamp: int = 0) -> Any:
     """Build a ``visualization_msgs/MarkerArray``.
 
     Args:
         shown: Markers to add.
         replaces_all: Delete all markers of the topic first.
+        stamp: Time of the markers, ns; 0 if they hold at any time.
     """
-    markers = [_marker(one) for one in shown]
+    markers = [_marker(one, stamp) for one in shown]
     if replaces_all:
         clear = _marker(
-            Marker("map", "", 0, 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+            Marker("map", "", 0, 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)),
+            stamp,
         )
         clear.action = constant("visualization_msgs/Marker", "DELETEALL")
         markers.insert(0, clear)
     return message("visualization_msgs/MarkerArray", markers)
 
 
-def _marker(one: Marker) -> Any:
+def _marker(one: Marker, stamp: int) -> Any:
     place = Pose3D(*one.place_m, quaternion_from_yaw(one.yaw_rad))
     colours: List[Any] = []
     return message(
         "visualization_msgs/Marker",
-        header(one.frame, 0),
+        header(one.frame, stamp),
         one.namespace,
         one.number,
         one.kind,

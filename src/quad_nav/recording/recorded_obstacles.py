@@ -93,12 +93,14 @@ class ObstacleTrack:
         return [] if self._scene is None else moving_solids(self._scene, self.poses(time_s))
 
 
-def read_people(path: Path, scene: Scene, clock: FlightClock, end_s: float) -> CrowdRecord:
-    """Read the positions of a scene's people from ``/simulation/obstacles``.
+def read_people(
+    path: Path, scene: Scene, clock: FlightClock, end_s: float
+) -> Optional[CrowdRecord]:
+    """Read where people are who react, from ``/simulation/obstacles``; None if nobody does.
 
     Args:
         path: The recording.
-        scene: The scene, with people who react.
+        scene: The scene.
         clock: The clock of the flight.
         end_s: Time of the last pose of a robot: up to then people stand where they were seen last,
             if that was in the topic's last period.
@@ -106,6 +108,9 @@ def read_people(path: Path, scene: Scene, clock: FlightClock, end_s: float) -> C
     Raises:
         InputError: The file is damaged, or a message is not of this scene.
     """
+    record = CrowdRecord.of(scene)
+    if record is None:
+        return None
     stamps_ns: List[int] = []
     positions: List[Floats] = []
     for message in read_messages(path, _is_wanted):
@@ -114,7 +119,6 @@ def read_people(path: Path, scene: Scene, clock: FlightClock, end_s: float) -> C
         except ValueError as error:
             raise InputError([f"{path}: {OBSTACLES_TOPIC}: {error}"]) from error
         stamps_ns.append(message.stamp_ns)
-    record = CrowdRecord(len(scene.moving_shapes) - len(scene.moving))
     times_s = clock.times_s(np.array(stamps_ns, np.int64)).tolist()
     if times_s and 0.0 < end_s - times_s[-1] <= _PERIOD_S:
         times_s.append(end_s)

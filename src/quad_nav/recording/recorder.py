@@ -170,8 +170,9 @@ class Recorder(FlightObserver):
     def _write_obstacles(self, flight: Flight) -> None:
         self._obstacles_s, movers = flight.now_s, flight.simulation.movers
         if movers:
-            shown = messages.marker_array(moving_markers(movers, flight.now_s))
-            self._write(OBSTACLES_TOPIC, stamp_at(flight.now_s), shown, _SIMULATOR)
+            stamp = stamp_at(flight.now_s)
+            shown = messages.marker_array(moving_markers(movers, flight.now_s), stamp=stamp)
+            self._write(OBSTACLES_TOPIC, stamp, shown, _SIMULATOR)
 
     def _transforms(self, robot: int, map_from_base: Pose3D, stamp: int) -> List[Any]:
         odom, base, lidar = f"odom{robot}", f"base_link{robot}", f"Lidar{robot}"

@@ -143,9 +143,7 @@ class TraceObserver(FlightObserver):
     def on_start(self, flight: Flight) -> None:
         """Start the trace."""
         self._flight = flight
-        scene = flight.setup.scene
-        if scene.walkers is not None and scene.people_react:
-            self._people = CrowdRecord(scene.walkers.count)
+        self._people = CrowdRecord.of(flight.setup.scene)
         self._robots = [_RobotRecord() for _ in flight.robots]
         self.on_move(flight)
 
@@ -156,9 +154,8 @@ class TraceObserver(FlightObserver):
         self._positions.append(bodies.positions_m)
         self._quaternions.append(bodies.quaternions)
         if self._people is not None:
-            movers = flight.simulation.movers
-            positions = movers.poses(flight.now_s)[len(flight.setup.scene.moving) :, :2]
-            self._people.add(flight.now_s, positions)
+            poses = flight.simulation.movers.poses(flight.now_s)
+            self._people.add(flight.now_s, poses[flight.setup.scene.walker_rows, :2])
         for record, state in zip(self._robots, flight.states):
             twist = state.twist
             record.velocities.append((twist.vx_mps, twist.vy_mps, twist.vyaw_radps))

@@ -157,11 +157,9 @@ def _odometry_drifts(all_parameters: Mapping[str, Any]) -> bool:
 def _mission_setup(
     values: Mapping[str, Any], scenario: Scenario, warnings: Tuple[str, ...], journals: Path
 ) -> MissionSetup:
-    scene, people, movers = scenario.scene, None, None
-    if scene is not None:
-        if scene.walkers is not None and scene.people_react:
-            people = CrowdRecord(scene.walkers.count, _KEPT_PLACES)
-        movers = Movers(scene, values["seed"], START_S, people)
+    scene = scenario.scene
+    people = None if scene is None else CrowdRecord.of(scene, _KEPT_PLACES)
+    movers = None if scene is None else Movers(scene, values["seed"], START_S, people)
     return MissionSetup(
         scenario.robots,
         scenario.robot_radius_m,

@@ -1,4 +1,4 @@
-"""Where people who react to quadcopters were, as it was seen during a flight."""
+"""Positions of people who react to quadcopters, recorded during a flight."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Deque, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from quad_nav.sim.scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +29,13 @@ class CrowdRecord:
         self._count = count
         self._samples: Deque[Tuple[float, Floats]] = deque(maxlen=kept)
         self._arrays: Optional[Tuple[Floats, Floats]] = None  # of the samples
+
+    @staticmethod
+    def of(scene: Scene, kept: Optional[int] = None) -> Optional[CrowdRecord]:
+        """Return an empty record for a scene; None if it has no people who react."""
+        if scene.walkers is None or not scene.people_react:
+            return None
+        return CrowdRecord(scene.walkers.count, kept)
 
     def add(self, time_s: float, positions_m: Floats) -> None:
         """Add positions in ``map``, float64[n, 2], NaN where unknown.

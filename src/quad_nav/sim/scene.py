@@ -250,6 +250,11 @@ class Scene:
         return (*(obstacle.shape for obstacle in self.moving), *people)
 
     @property
+    def walker_rows(self) -> slice:
+        """Rows of the walkers in ``moving_shapes``; they are the last ones."""
+        return slice(len(self.moving), None)
+
+    @property
     def people_react(self) -> bool:
         """There are walkers, and they react to quadcopters."""
         return self.walkers is not None and self.walkers.reacting

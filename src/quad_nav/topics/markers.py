@@ -130,7 +130,7 @@ def people_positions(markers: Sequence[Any], scene: Scene) -> NDArray[np.float64
     Raises:
         ValueError: As ``moving_poses``.
     """
-    return moving_poses(markers, len(scene.moving_shapes))[len(scene.moving) :, :2]
+    return moving_poses(markers, len(scene.moving_shapes))[scene.walker_rows, :2]
 
 
 def quadcopter_markers(n_robots: int) -> List[Marker]:

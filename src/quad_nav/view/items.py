@@ -80,7 +80,7 @@ class ObstacleItems:
             headings[walks] = np.arctan2(dy_m, dx_m)[walks]
         self._poses, self._headings = poses, headings
         shown = poses.astype(np.float32)
-        people = slice(len(scene.moving), None)
+        people = scene.walker_rows
         shown[people, 2] = headings[people]
         return [Item("obstacles", None, {"poses": shown})]
 

@@ -1,4 +1,4 @@
-"""What the simulator tells a mission: contacts, and people who react to quadcopters."""
+"""Subscribers to the simulator's contacts and to the people who react to quadcopters."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ContactTopic:
 
     @property
     def has_publisher(self) -> bool:
-        """Whether a node publishes contacts."""
+        """True while a node publishes contacts."""
         return bool(self._topic.get_num_connections())
 
     def _add(self, message: DiagnosticStatus) -> None:
