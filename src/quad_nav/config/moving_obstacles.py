@@ -154,4 +154,17 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
         ),
         (EvasionParams,),
     ),
+    (
+        double(
+            "moving_obstacle_deviation",
+            0.0,
+            "deviation_mps",
+            "metres/s",
+            "How fast a tracked obstacle may leave its prediction: a robot that flies sideways is"
+            " at rest before such an obstacle reaches it; 0: no limit.",
+            low=0,
+            high=10,
+        ),
+        (EvasionParams,),
+    ),
 )

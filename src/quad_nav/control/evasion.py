@@ -10,6 +10,9 @@ rest from there, where and when the body would come to rest. A speed above that 
 costs what it gains on the way, so that a robot is fast only to get out of the way. The
 robot goes behind, in front, back or waits as it costs least against all obstacles together. It
 keeps the wish where nothing is much better.
+People turn, and they go around a robot that rests. With ``deviation_mps`` the robot flies only
+commands after which it can rest before an obstacle reaches it that leaves its prediction, and
+brakes if there is none: passive safety.
 Peers are in the way as well: commands are judged as the robot's Voronoi cell will leave them, and
 peers are expected to keep their velocities.
 
@@ -32,7 +35,9 @@ from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.evasion_commands import BOTH_S, Body, command_costs, rest_s
+from quad_nav.kernels.body_response import Body, rest_s
+from quad_nav.kernels.evasion_commands import BOTH_S, command_costs
+from quad_nav.kernels.passive_safety import rest_in_time
 from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
 from quad_nav.kernels.standing_obstacles import StandingObstacles, fill_gaps, overlap_costs
 from quad_nav.tracking.motion_memory import MotionMemory
@@ -52,6 +57,7 @@ _HASTE = 1.3  # what a second gains at the greatest speed: 1 and _AWAY_PER_S for
 _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _FASTER_MPS = 0.2  # above its usual speed: the robot has evaded
+_HOLD_S = 0.2  # until the next command acts
 _SPEEDS, _COURSES = 4, 24
 _SECOND_SPEEDS, _SECOND_COURSES = 2, 12
 
@@ -68,6 +74,8 @@ class EvasionParams:
         watch_s: Time for which the robot hovers before its first goal, and watches three or more
             obstacles.
         speed_mps: Greatest speed while the robot evades; 0 for that of the local planner.
+        deviation_mps: How fast an obstacle may leave its prediction: the robot flies so that it
+            rests before such an obstacle reaches it; 0 for no such limit.
     """
 
     avoid_moving_obstacles: bool = False
@@ -75,6 +83,7 @@ class EvasionParams:
     glance_rad: float = 0.0
     watch_s: float = 0.0
     speed_mps: float = 0.0
+    deviation_mps: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -134,44 +143,85 @@ def evade(
     """
     search = _search_of(around.max_speed_mps, around.usual_speed_mps)
     times_s = prediction_times(around.memory, search.step_s)
-    discs = predicted_discs(params, around, tracks, now_s, times_s)
-    if not discs.shape[1] and around.is_following and not around.is_fast:
+    strangers = predicted_discs(params, around, tracks, now_s, times_s)
+    if not strangers.shape[1] and around.is_following and not around.is_fast:
         return wish
-    peers = around.neighbours.discs(around.pose, times_s)
-    discs = np.concatenate([discs, peers], axis=1)
-    pose = around.pose
-    commands = _commands(around.max_speed_mps, pose.rotate(wish.vx_mps, wish.vy_mps))
-    found = _costs_of(commands, around, search, discs, route, last)
+    commands = _commands(around.max_speed_mps, around.pose.rotate(wish.vx_mps, wish.vy_mps))
+    found = _costs_of(commands, params, around, search, strangers, route, last)
+    if np.isinf(found).all():
+        return Twist2D(-around.velocity.vx_mps, -around.velocity.vy_mps, wish.vyaw_radps)
     found += _CHANGE_S / around.max_speed_mps * np.hypot(*(commands - last).T)
     best = int(np.argmin(found[1:])) + 1
     if found[0] <= found[best] + _WISH_S:
         return wish
-    vx_mps, vy_mps = Pose2D(0.0, 0.0, -pose.yaw_rad).rotate(*commands[best].tolist())
+    vx_mps, vy_mps = Pose2D(0.0, 0.0, -around.pose.yaw_rad).rotate(*commands[best].tolist())
     return Twist2D(vx_mps, vy_mps, wish.vyaw_radps)
 
 
 def _costs_of(
     commands: Floats,
+    params: EvasionParams,
     around: Surroundings,
     search: SpaceTime,
-    discs: Floats,
+    strangers: Floats,
     route: Floats,
     last: Tuple[float, float],
 ) -> Floats:
-    """Return the cost of each of the commands, float64[c]; the commands are float64[c, 2]."""
-    steps = len(discs) // SUBSTEPS
-    middle = _middle(search, steps)
-    offsets = np.arange(-middle, middle + 1) * search.cell_m
-    standing = _standing(around)
-    costs = np.full((steps + 1, len(offsets), len(offsets)), math.inf)
-    overlaps, to_go = overlap_costs(standing, offsets), _to_go(around, offsets, route[-1])
-    fill_costs(search, discs, overlaps, to_go, costs)
+    """Return the cost of each of the commands, float64[c]; the commands are float64[c, 2].
+
+    It is infinite after those after which the robot might not rest in time.
+    """
     moving = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
     start = (*moving, *_acceleration(moving, last))
     flown = around.neighbours.limited(commands)
-    seconds = _polar(around.max_speed_mps, _SECOND_SPEEDS, _SECOND_COURSES)
-    found: Floats = command_costs(search, _BODY, discs, standing, costs, start, flown, seconds)
+    standing = _standing(around)
+    found = np.full(len(commands), math.inf)
+    is_safe = _rest_in_time(params, search, strangers, standing, start, flown)
+    if is_safe.any():
+        times_s = search.step_s / SUBSTEPS * np.arange(len(strangers))
+        discs = np.concatenate([strangers, around.neighbours.discs(around.pose, times_s)], axis=1)
+        costs = _search(around, search, discs, standing, route)
+        seconds = _polar(around.max_speed_mps, _SECOND_SPEEDS, _SECOND_COURSES)
+        found = command_costs(search, _BODY, discs, standing, costs, start, flown, seconds)
+        found[~is_safe] = math.inf
     return found
+
+
+def _rest_in_time(
+    params: EvasionParams,
+    search: SpaceTime,
+    discs: Floats,
+    standing: StandingObstacles,
+    start: Tuple[float, ...],
+    flown: Floats,
+) -> NDArray[np.bool_]:
+    """Return after which commands the robot can rest before an obstacle reaches it, bool[c]."""
+    if params.deviation_mps <= 0.0 or not discs.shape[1]:
+        return np.ones(len(flown), np.bool_)
+    bodies = discs - np.array([0.0, 0.0, params.clearance_m, 0.0])
+    period_s = search.step_s / SUBSTEPS
+    hold = max(round(_HOLD_S / period_s), 1)
+    safe: NDArray[np.bool_] = rest_in_time(
+        _BODY, bodies, period_s, params.deviation_mps, standing, start, flown, hold
+    )
+    return safe
+
+
+def _search(
+    around: Surroundings,
+    search: SpaceTime,
+    discs: Floats,
+    standing: StandingObstacles,
+    route: Floats,
+) -> Floats:
+    """Return the cost of the best motion from each step and cell, float64[steps + 1, M, M]."""
+    steps = len(discs) // SUBSTEPS
+    middle = _middle(search, steps)
+    offsets = np.arange(-middle, middle + 1) * search.cell_m
+    costs = np.full((steps + 1, len(offsets), len(offsets)), math.inf)
+    overlaps, to_go = overlap_costs(standing, offsets), _to_go(around, offsets, route[-1])
+    fill_costs(search, discs, overlaps, to_go, costs)
+    return costs
 
 
 def _middle(search: SpaceTime, steps: int) -> int:

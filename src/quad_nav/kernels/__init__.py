@@ -9,6 +9,7 @@ Reading order: ``jit``, ``library`` and ``build_library`` (compiled kernels with
 ``projection``, ``observations``, ``raytrace`` with ``obstructed_cells``, ``voxels``, ``inflation``
 (``costmap``);
 ``wave``, ``descent``, ``global_planner`` (``plan``); ``collision``, ``map_grid``, ``rollout``,
-``dwa``, ``space_time``, ``standing_obstacles``, ``evasion_commands`` (``control``); ``peers``;
+``dwa``, ``space_time``, ``standing_obstacles``, ``body_response``, ``evasion_commands``,
+``passive_safety`` (``control``); ``peers``;
 ``flight_law``, ``rigid_body``, ``rays``, ``sectors``, ``lidar``, ``rectangles`` (``sim``).
 """

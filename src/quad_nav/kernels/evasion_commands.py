@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Tuple
+from typing import Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.kernels.body_response import Body, move_bodies, rest_s
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.space_time import (
     FAR,
@@ -25,15 +26,6 @@ from quad_nav.kernels.standing_obstacles import StandingObstacles, overlap_cost
 BOTH_S = 1.0
 """Duration of the first and the second command together."""
 _FIRST_S = 0.4
-_PARTS = 2  # steps of the body's motion between two predictions
-
-
-class Body(NamedTuple):
-    """Response of the body to a velocity command, see ``control/evasion.py``."""
-
-    gain_per_s: float  # of the velocity loop
-    lag_s: float  # of the acceleration
-    acceleration_mps2: float  # greatest
 
 
 @njit(cache=True, nogil=True)
@@ -118,10 +110,8 @@ def _follow(
     """
     ways = np.empty((predictions, 3, len(commands)))
     dt = search.step_s / SUBSTEPS
-    rest = math.exp(-dt / _PARTS / body.lag_s)
     for k in range(predictions):
-        for _ in range(_PARTS):
-            _move(body, moving, commands, dt / _PARTS, rest)
+        move_bodies(body, moving, commands, dt)
         ways[k, :2] = moving[:2]
         ways[k, 2] = np.sqrt(moving[2] ** 2 + moving[3] ** 2)
     return ways
@@ -171,37 +161,6 @@ def _way_cost(
         rate += haste_per_s(search, speed)
         cost += rate * dt
     return cost
-
-
-@njit(cache=True, nogil=True)
-def _move(
-    body: Body, moving: NDArray[np.float64], commands: NDArray[np.float64], dt: float, rest: float
-) -> None:
-    """Move bodies by a step: positions, velocities and accelerations, float64[6, c]."""
-    x, y, vx, vy, ax, ay = moving
-    for n in range(len(commands)):
-        wanted_x = body.gain_per_s * (commands[n, 0] - vx[n])
-        wanted_y = body.gain_per_s * (commands[n, 1] - vy[n])
-        wanted = math.sqrt(wanted_x * wanted_x + wanted_y * wanted_y)
-        shorten = body.acceleration_mps2 / max(wanted, body.acceleration_mps2)
-        ax[n] = shorten * wanted_x + (ax[n] - shorten * wanted_x) * rest
-        ay[n] = shorten * wanted_y + (ay[n] - shorten * wanted_y) * rest
-        x[n] += dt * (vx[n] + 0.5 * dt * ax[n])
-        y[n] += dt * (vy[n] + 0.5 * dt * ay[n])
-        vx[n] += dt * ax[n]
-        vy[n] += dt * ay[n]
-
-
-@njit(cache=True, nogil=True)
-def rest_s(body: Body, speed_mps: float) -> float:
-    """Return for how long a body would fly on at its speed to get as far as it does until it rests.
-
-    Below the speed from which its velocity loop brakes with less than its greatest acceleration,
-    the way to rest is that of an exponential decay.
-    """
-    over = max(speed_mps - body.acceleration_mps2 / body.gain_per_s, 0.0)
-    braking_s = 0.5 * over * over / body.acceleration_mps2 / max(speed_mps, 1e-9)
-    return 1.0 / body.gain_per_s + braking_s
 
 
 @njit(cache=True, nogil=True)

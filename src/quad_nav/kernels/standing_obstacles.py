@@ -80,7 +80,7 @@ def overlap_cost(standing: StandingObstacles, x: float, y: float) -> float:
 
     It grows with the overlap, so that a robot that is too near leaves by the nearest way.
     """
-    gap = _gap_at(standing, x, y)
+    gap = gap_at(standing, x, y)
     if gap >= MARGIN_M:
         return 0.0
     if gap > 0.0:
@@ -89,7 +89,7 @@ def overlap_cost(standing: StandingObstacles, x: float, y: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _gap_at(standing: StandingObstacles, x: float, y: float) -> float:
+def gap_at(standing: StandingObstacles, x: float, y: float) -> float:
     """Interpolate the gaps at a point; nothing is known outside of the grid."""
     gaps = standing.gaps
     across = (x - standing.x_m) / standing.resolution_m
