@@ -26,7 +26,6 @@ from quad_nav.barn.dynamic_worlds import load_dynamic_worlds
 from quad_nav.barn.protocol import Outcome
 from quad_nav.barn.setup import BarnOptions
 from quad_nav.cli.dynabarn import dynabarn
-from quad_nav.config.files import leaves
 from quad_nav.errors import InputError
 from quad_nav.sim.movers import Movers
 
@@ -143,25 +142,6 @@ def test_evasions_keep_to_the_speed_limit_unless_another_one_is_set(worlds, give
     assert contestant.configuration.navigator.evasion.speed_mps == speed
     assert contestant.configuration.local_planner.max_vel_x_mps == 0.5
     assert contestant.simulation.flight.max_speed_mps == body
-
-
-def test_config_dynabarn_is_config_moving_but_for_body_place_speed_and_watching():
-    def parameters(name):
-        files = (ROOT / "config" / name).glob("*.yaml")
-        found = [leaf for file in files for leaf in leaves(file, {"i": "0"}).items()]
-        assert len(found) == len(dict(found))
-        return dict(found)
-
-    moving, ours = parameters("moving"), parameters("dynabarn")
-    assert {path for path in {*moving, *ours} if moving.get(path) != ours.get(path)} == {
-        "robot_radius",
-        *(f"global_costmap/{name}" for name in ("width", "height", "origin_x", "origin_y")),
-        "TrajectoryPlannerROS/max_vel_x",
-        "fixes/moving_obstacle_evasion_speed",
-        "fixes/moving_obstacle_timeout",
-        "fixes/moving_obstacle_watch",
-        "fixes/yield_to_strangers",
-    }
 
 
 def test_a_free_way_is_a_success(worlds):

@@ -1,0 +1,43 @@
+"""Shipped configurations that are `config/moving` but for some parameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from quad_nav.config.files import leaves
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def parameters(name):
+    files = (ROOT / "config" / name).glob("*.yaml")
+    found = [leaf for file in files for leaf in leaves(file, {"i": "0"}).items()]
+    assert len(found) == len(dict(found))
+    return dict(found)
+
+
+@pytest.mark.parametrize(
+    "name, differences",
+    [
+        ("people", {"fixes/moving_obstacle_deviation", "fixes/moving_obstacle_evasion_speed"}),
+        (
+            "dynabarn",
+            {
+                "robot_radius",
+                *(f"global_costmap/{name}" for name in ("width", "height", "origin_x", "origin_y")),
+                "TrajectoryPlannerROS/max_vel_x",
+                "fixes/moving_obstacle_evasion_speed",
+                "fixes/moving_obstacle_timeout",
+                "fixes/moving_obstacle_watch",
+                "fixes/yield_to_strangers",
+            },
+        ),
+    ],
+)
+def test_a_configuration_differs_from_config_moving_in_these_alone(name, differences):
+    moving, other = parameters("moving"), parameters(name)
+    assert {
+        path for path in {*moving, *other} if moving.get(path) != other.get(path)
+    } == differences
