@@ -180,7 +180,7 @@ def _costs_of(
     if is_safe.any():
         times_s = search.step_s / SUBSTEPS * np.arange(len(strangers))
         discs = np.concatenate([strangers, around.neighbours.discs(around.pose, times_s)], axis=1)
-        costs = _search(around, search, discs, standing, route)
+        costs = _motion_costs(around, search, discs, standing, route)
         seconds = _polar(around.max_speed_mps, _SECOND_SPEEDS, _SECOND_COURSES)
         found = command_costs(search, _BODY, discs, standing, costs, start, flown, seconds)
         found[~is_safe] = math.inf
@@ -207,7 +207,7 @@ def _rest_in_time(
     return safe
 
 
-def _search(
+def _motion_costs(
     around: Surroundings,
     search: SpaceTime,
     discs: Floats,

@@ -96,7 +96,7 @@ class ObstacleTrack:
 def read_people(
     path: Path, scene: Scene, clock: FlightClock, end_s: float
 ) -> Optional[CrowdRecord]:
-    """Read where people are who react, from ``/simulation/obstacles``; None if nobody does.
+    """Read the places of people who react from ``/simulation/obstacles``; None without such people.
 
     Args:
         path: The recording.
