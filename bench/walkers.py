@@ -9,6 +9,8 @@ in a hallway of 4 m by 24 m, half of them at each end, which fly to the other en
 contacts with people, in the period of odometry (25 ms) before the touch the quadcopter
 
 * *moved* if its speed was above 0.05 m/s, in any direction;
+* *was pushed* if it moved and had begun to touch something in the second before: a person who does
+  not stop pushes it on, into the next one;
 * *moved into* the person if its velocity had a part above 0.05 m/s from its centre towards the
   point of the touch. The others were run into while the quadcopter stood, or fled.
 
@@ -24,7 +26,7 @@ import sys
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import click
 import numpy as np
@@ -45,6 +47,7 @@ from quad_nav.sim.simulation import SimulationParams
 HALLWAY = re.compile(r"(\d+)hallway")
 HALLWAY_M = 24.0, 4.0
 MOVED_MPS = 0.05
+PUSHED_S = 1.0
 PERIOD_S = 0.025
 
 
@@ -63,7 +66,7 @@ class Task:
 
 @dataclass(frozen=True)
 class WalkersResult:
-    """Contacts of one flight, of those with people how many moved and moved into the person.
+    """Contacts of one flight, and those with people at which the quadcopter did something.
 
     ``person_mps`` are the people's speeds towards the quadcopter at the contacts.
     """
@@ -72,6 +75,7 @@ class WalkersResult:
     seed: int
     contacts: int
     moved: int
+    pushed: int
     moved_into: int
     others: int
     person_mps: Tuple[float, ...]
@@ -85,7 +89,8 @@ class Touches(FlightObserver):
 
     def __init__(self) -> None:
         self.speeds_mps: List[Tuple[float, float, float]] = []  # of both ways, and any direction
-        self.others = 0
+        self.pushed = self.others = 0
+        self._touched_s: Dict[int, float] = {}
         self._flight: Optional[Flight] = None
         self._velocities = self._places = np.zeros((0, 2))
 
@@ -102,6 +107,8 @@ class Touches(FlightObserver):
     def on_contact(self, contact: Contact) -> None:
         """Keep the speeds of a robot and a person who touch."""
         robot = int(contact.robot[len("quad") :])
+        since_s = contact.time_s - self._touched_s.get(robot, -math.inf)
+        self._touched_s[robot] = contact.time_s
         if not contact.other.startswith("person_"):
             self.others += 1
             return
@@ -111,13 +118,10 @@ class Touches(FlightObserver):
         away = np.array([contact.x_m, contact.y_m]) - self._places[robot]
         away /= np.hypot(*away)
         velocity = self._velocities[robot]
-        self.speeds_mps.append(
-            (
-                float(velocity @ away),
-                float((before - now) @ away / PERIOD_S),
-                float(np.hypot(*velocity)),
-            )
-        )
+        speed_mps = float(np.hypot(*velocity))
+        self.pushed += speed_mps > MOVED_MPS and since_s < PUSHED_S
+        person_mps = float((before - now) @ away / PERIOD_S)
+        self.speeds_mps.append((float(velocity @ away), person_mps, speed_mps))
 
 
 def hallway(robots: int) -> RandomMission:
@@ -165,6 +169,7 @@ def fly_task(task: Task) -> WalkersResult:
         task.seed,
         len(touches.speeds_mps),
         sum(speed_mps > MOVED_MPS for _, _, speed_mps in touches.speeds_mps),
+        touches.pushed,
         sum(towards_mps > MOVED_MPS for towards_mps, _, _ in touches.speeds_mps),
         touches.others,
         tuple(person_mps for _, person_mps, _ in touches.speeds_mps),
@@ -181,6 +186,7 @@ def row(name: str, flights: Sequence[WalkersResult]) -> List[str]:
         str(len(flights)),
         str(sum(one.contacts for one in flights)),
         str(sum(one.moved for one in flights)),
+        str(sum(one.pushed for one in flights)),
         str(sum(one.moved_into for one in flights)),
         f"{np.mean(persons):.2f}" if persons else "",
         str(sum(one.others for one in flights)),
@@ -231,6 +237,7 @@ def main(
         "flights",
         "contacts\nwith people",
         "quadcopter\nmoved",
+        "was\npushed",
         "moved into\nthe person",
         "person\nm/s",
         "others",

@@ -51,12 +51,14 @@ class EvasionGuard:
 
     Attributes:
         params: The parameters; they may change in flight.
+        period_s: Time between two commands; it may change in flight.
         is_evading: The guard chose the last command.
     """
 
     def __init__(self, params: EvasionParams, local_costmap: LayeredCostmap) -> None:
         """Guard a robot that hovers."""
         self.params = params
+        self.period_s = 0.1
         self.is_evading = False
         self._costmap = local_costmap
         self._last = (0.0, 0.0)
@@ -162,6 +164,7 @@ class EvasionGuard:
             is_following=is_following,
             memory=self._memory,
             neighbours=neighbours,
+            period_s=self.period_s,
         )
 
     def _turn(self, now_s: float, route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:

@@ -159,6 +159,7 @@ class StateMachine:
     def evade(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
         """Replace a command that moving obstacles threaten; without a goal, hover or evade."""
         self.guard.params = self.params.evasion
+        self.guard.period_s = self._period_s
         limits = speed_limits(self.control.limiter.usual)
         if self.control.tracks is None or limits is None:
             return
@@ -177,16 +178,20 @@ class StateMachine:
     def _neighbours(self, poses: RobotPoses, velocity: Twist2D) -> Neighbours:
         if poses.in_global is None or poses.local_from_global is None or not self.control.tracks:
             return NO_NEIGHBOURS
-        period_s = 1.0 / self.params.controller_frequency_hz
-        return self._peers.neighbours(poses.in_global, velocity, poses.local_from_global, period_s)
+        return self._peers.neighbours(
+            poses.in_global, velocity, poses.local_from_global, self._period_s
+        )
+
+    @property
+    def _period_s(self) -> float:
+        """Time between two control cycles."""
+        return 1.0 / self.params.controller_frequency_hz
 
     def limit_command(self, tick: Tick, pose: Optional[Pose2D], velocity: Twist2D) -> None:
         """Limit the final command so that it cannot lead to a collision with a peer."""
         if tick.command is None or pose is None:
             return
-        limited = self._peers.limit(
-            pose, velocity, tick.command, 1.0 / self.params.controller_frequency_hz
-        )
+        limited = self._peers.limit(pose, velocity, tick.command, self._period_s)
         tick.command, tick.limited_by = limited.command, limited.limited_by
         if limited.limited_by:
             self.control.restart_timers(tick.now_s)
