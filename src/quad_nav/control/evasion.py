@@ -35,7 +35,7 @@ from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
-from quad_nav.kernels.body_response import Body, brake, rest_s
+from quad_nav.kernels.body_response import Body, rest_s
 from quad_nav.kernels.evasion_commands import BOTH_S, command_costs
 from quad_nav.kernels.passive_safety import rest_in_time
 from quad_nav.kernels.space_time import SUBSTEPS, SpaceTime, fill_costs
@@ -57,7 +57,7 @@ _HASTE = 1.3  # what a second gains at the greatest speed: 1 and _AWAY_PER_S for
 _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest speed's difference
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _FASTER_MPS = 0.2  # above its usual speed: the robot has evaded
-_HOLD_PERIODS = 1.5  # for which a command acts; the velocity is up to half a period old
+_HOLD_PERIODS = 2.0  # for which a command acts; the velocity is up to a period old
 _SPEEDS, _COURSES = 4, 24
 _SECOND_SPEEDS, _SECOND_COURSES = 2, 12
 
@@ -117,11 +117,6 @@ class Surroundings:
     period_s: float = 0.1
 
     @property
-    def hold_s(self) -> float:
-        """Time from when the velocity was measured until the next but one command."""
-        return _HOLD_PERIODS * self.period_s
-
-    @property
     def is_fast(self) -> bool:
         """The robot is faster than the navigator expects: it has evaded."""
         speed_mps = math.hypot(self.velocity.vx_mps, self.velocity.vy_mps)
@@ -156,22 +151,13 @@ def evade(
     commands = _commands(around.max_speed_mps, around.pose.rotate(wish.vx_mps, wish.vy_mps))
     found = _costs_of(commands, params, around, search, strangers, route, last)
     if np.isinf(found).all():
-        return _braking(around, last, wish.vyaw_radps)
+        return Twist2D(-around.velocity.vx_mps, -around.velocity.vy_mps, wish.vyaw_radps)
     found += _CHANGE_S / around.max_speed_mps * np.hypot(*(commands - last).T)
     best = int(np.argmin(found[1:])) + 1
     if found[0] <= found[best] + _WISH_S:
         return wish
     vx_mps, vy_mps = Pose2D(0.0, 0.0, -around.pose.yaw_rad).rotate(*commands[best].tolist())
     return Twist2D(vx_mps, vy_mps, wish.vyaw_radps)
-
-
-def _braking(around: Surroundings, last: Tuple[float, float], vyaw_radps: float) -> Twist2D:
-    """Return the command that brings the robot to rest as soon as it can."""
-    moving, command = np.zeros((6, 1)), np.empty((1, 2))
-    moving[2:, 0] = _start(around, last)
-    brake(_BODY, moving, around.hold_s, command)
-    vx_mps, vy_mps = Pose2D(0.0, 0.0, -around.pose.yaw_rad).rotate(*command[0].tolist())
-    return Twist2D(vx_mps, vy_mps, vyaw_radps)
 
 
 def _costs_of(
@@ -187,7 +173,8 @@ def _costs_of(
 
     It is infinite after those after which the robot might not rest in time.
     """
-    start = _start(around, last)
+    moving = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
+    start = (*moving, *_acceleration(moving, last))
     flown = around.neighbours.limited(commands)
     standing = _standing(around)
     found = np.full(len(commands), math.inf)
@@ -216,7 +203,7 @@ def _rest_in_time(
         return np.ones(len(flown), np.bool_)
     bodies = discs - np.array([0.0, 0.0, params.clearance_m, 0.0])
     period_s = search.step_s / SUBSTEPS
-    hold = max(round(around.hold_s / period_s), 1)
+    hold = max(round(_HOLD_PERIODS * around.period_s / period_s), 1)
     safe: NDArray[np.bool_] = rest_in_time(
         _BODY, bodies, period_s, params.deviation_mps, standing, start, flown, hold
     )
@@ -247,12 +234,11 @@ def _middle(search: SpaceTime, steps: int) -> int:
     return min(steps * _REACH_CELLS, math.ceil(window_m / search.cell_m)) + _REACH_CELLS
 
 
-def _start(around: Surroundings, last: Tuple[float, float]) -> Tuple[float, ...]:
-    """Return the robot's velocity, m/s, and its acceleration under the last command, m/s^2."""
-    velocity = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
-    ax, ay = (_BODY.gain_per_s * (c - v) for c, v in zip(last, velocity))
+def _acceleration(velocity: Tuple[float, float], command: Tuple[float, float]) -> Tuple[float, ...]:
+    """Return the acceleration of a body that follows a command, m/s^2."""
+    ax, ay = (_BODY.gain_per_s * (c - v) for c, v in zip(command, velocity))
     shorten = _BODY.acceleration_mps2 / max(math.hypot(ax, ay), _BODY.acceleration_mps2)
-    return (*velocity, shorten * ax, shorten * ay)
+    return float(shorten * ax), float(shorten * ay)
 
 
 def predicted_discs(

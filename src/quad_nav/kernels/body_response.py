@@ -51,31 +51,6 @@ def move_bodies(
 
 
 @njit(cache=True, nogil=True)
-def brake(
-    body: Body, moving: NDArray[np.float64], period_s: float, commands: NDArray[np.float64]
-) -> None:
-    """Fill the commands that bring bodies to rest as soon as they can, without overshoot.
-
-    The acceleration fades with the lag, which adds its part to the velocity: the sum changes by
-    what is commanded, and is to be gone when the next command acts.
-
-    Args:
-        body: Response of the bodies.
-        moving: float64[6, c], as for ``move_bodies``.
-        period_s: Time until the next command.
-        commands: float64[c, 2], filled, m/s.
-    """
-    _, _, vx, vy, ax, ay = moving
-    for n in range(len(commands)):
-        left_x, left_y = vx[n] + body.lag_s * ax[n], vy[n] + body.lag_s * ay[n]
-        wanted = math.sqrt(left_x * left_x + left_y * left_y) / period_s
-        shorten = body.acceleration_mps2 / max(wanted, body.acceleration_mps2)
-        per_s = shorten * (1.0 / (period_s * body.gain_per_s) + 0.5)  # the velocity changes too
-        commands[n, 0] = vx[n] - per_s * left_x
-        commands[n, 1] = vy[n] - per_s * left_y
-
-
-@njit(cache=True, nogil=True)
 def rest_s(body: Body, speed_mps: float) -> float:
     """Return for how long a body would fly on at its speed to get as far as it does until it rests.
 

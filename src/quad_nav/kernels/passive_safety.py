@@ -12,12 +12,12 @@ from typing import Tuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.body_response import Body, brake, move_bodies
+from quad_nav.kernels.body_response import Body, move_bodies
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.standing_obstacles import StandingObstacles, gap_at
 
-AT_REST_MPS = 0.02
-"""Speed below which a robot rests; those that fly differ from this response by some 0.03 m/s."""
+AT_REST_MPS = 0.05
+"""Speed below which a robot rests."""
 _DEEPER_M = 0.01  # by which standing obstacles may be overlapped more than now
 
 
@@ -63,7 +63,7 @@ def rest_in_time(
             is_reached = _reaches(discs[k], deviation_mps * k * period_s, x, y)
             rests[c] = not is_reached and gap_at(standing, x, y) >= deepest
         if k >= hold:
-            brake(body, moving, period_s, flown)
+            flown[:] = -moving[2:4].T
             if not np.any(rests & (speeds >= AT_REST_MPS)):
                 break
     return rests
