@@ -98,7 +98,11 @@ def test_a_robot_that_cannot_rest_in_time_brakes():
 
 
 def test_a_slower_control_cycle_needs_more_room():
-    """0.8 m to a person who stands: 0.4 m to rest in 0.6 s at 10 Hz; 1.3 m in 2.4 s at 1 Hz."""
+    """A person stands 0.8 m ahead of the hull, the robot flies at 0.5 m/s.
+
+    At 10 Hz it rests 0.2 m further on after 0.6 s, and the person may have come 0.3 m nearer. At
+    1 Hz it flies on for 1 m before it brakes.
+    """
     wish, ahead = Twist2D(vx_mps=0.5), person(1.4, 0.0, 0.0, 0.0)
     assert command_of(PEOPLE, ahead, wish, wish) is wish
     assert command_of(PEOPLE, ahead, wish, wish, period_s=1.0).vx_mps < 0.0
