@@ -8,15 +8,24 @@ import numpy as np
 import pytest
 
 from quad_nav.control.prediction import predict
+from quad_nav.kernels.period_votes import (
+    LAGS,
+    NEAR,
+    ODD,
+    SUPPORT,
+    Votes,
+    first_turns,
+    sums_of_turns,
+)
 from quad_nav.kernels.periodic_motion import (
     NONE,
     Trails,
     drop_repeats,
     follow_replays,
     forget_after,
-    link,
     replay_all,
 )
+from quad_nav.kernels.trail_links import continued_trails, link
 from quad_nav.tracking.motion_memory import MotionMemory
 from quad_nav.tracking.periodic_motion import PeriodicMotion, multiples
 from quad_nav.tracking.tracks import Tracks
@@ -197,8 +206,44 @@ def test_a_multiple_of_a_period_is_none():
     """Trails 0 to 4 vote for 10 and 20 s; trails 5 to 9 for 60 s, which is 3 times 20 by chance."""
     voters = np.zeros((10, 3), bool)
     voters[:5, :2], voters[5:, 2] = True, True
-    found = multiples(np.array([10.0, 20.0, 60.0]), voters, np.ones(3, bool))
+    found = multiples(np.array([10.0, 20.0, 60.0]), voters)
     assert found.tolist() == [False, True, False]
+
+
+def test_votes_count_for_every_number_of_turns():
+    """Trail 0 votes 3 times for 10.02 s, once for 30 s; trail 1 twice for 20.1 s, once for 14 s."""
+    votes = Votes(
+        np.array([10.02, 30.0, 20.1, 14.0]),
+        np.array([3, 1, 2, 1]),
+        np.array([0, 0, 1, 1]),
+        np.full(4, NONE),
+        np.zeros(2, np.int64),
+    )
+    heard, by_trail = first_turns(votes, 4, np.array([10.0, 20.1]), (0.05, 0.03))
+    assert heard.tolist() == [1, 1]
+    assert by_trail.tolist() == [[3.0, 0.0], [0.0, 2.0]]
+    sums = sums_of_turns(votes, 4, np.array([10.0]), (0.05, 0.03))[:, :, 0]
+    expected = np.empty((4, 2))
+    expected[NEAR] = 3.0 + 1.0 / 3.0, 2.0 / 2.0
+    expected[SUPPORT] = 4.0, 2.0
+    expected[LAGS] = 3.0 * 10.02 + 30.0 / 3.0, 2.0 * 20.1 / 2.0
+    expected[ODD] = 4.0, 0.0
+    np.testing.assert_allclose(sums, expected, rtol=1e-12)
+
+
+def test_a_trail_continues_the_one_that_leads_to_it():
+    """Trail 0 ends at (1, 0) at 1 s with 1 m/s; at 2 s it would be at (2, 0)."""
+    ends = [[0.0, 0.0], [1.0, 0.0], [2.1, 0.0], [3.0, 0.0], [2.3, 0.0], [4.0, 0.0], [8.0, 0.0]]
+    stamps_s = [0.0, 1.0, 2.0, 3.0, 2.0, 4.0, 9.0]
+    samples = np.array([[t, x, y, 1.0, 0.0] for t, (x, y) in zip(stamps_s, ends)])
+    spans = np.array([[0, 1], [2, 3], [4, 5], [6, 6]])
+    none = np.full(4, NONE)
+    trails = Trails(samples, np.full(7, NONE), none, spans, np.zeros(4), none, np.zeros(4))
+    limits = 0.2, 0.25  # 0.45 m after a second
+    every = np.arange(4)
+    assert continued_trails(trails, every[:1], every[1:], 1.5, limits).tolist() == [1]
+    assert continued_trails(trails, every[1:], every[:1], 1.5, limits).tolist() == [0, 0, NONE]
+    assert continued_trails(trails, every[1:], every[:1], 0.9, limits).tolist() == [NONE] * 3
 
 
 @pytest.mark.slow

@@ -18,6 +18,8 @@ _ASIDE_M = 0.15  # offset across the direction of motion, which no lag explains
 _SAME_LAG_S = 0.12
 _MOST = 64  # trails that one sample votes for
 _RECENT_VOTES = 30  # a lag is the mean of about so many votes
+NEAR, SUPPORT, LAGS, ODD = range(4)
+"""Rows of ``sums_of_turns``."""
 
 
 class Votes(NamedTuple):
@@ -120,3 +122,67 @@ def _add_vote(votes: Votes, count: int, trail: int, lag: float) -> int:
         votes.heads[trail] = count
         return count + 1
     return count
+
+
+@njit(cache=True, nogil=True)
+def first_turns(
+    votes: Votes, count: int, periods: NDArray[np.float64], tolerances: Tuple[float, float]
+) -> Tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return how many lags are one turn of each period, int64[p], and each trail's votes for them.
+
+    Args:
+        votes: The votes.
+        count: Number of lags in ``votes``.
+        periods: float64[p].
+        tolerances: By how much a lag may be off: in s, and more in s for each turn.
+
+    Returns:
+        int64[p] and float64[m, p].
+    """
+    heard = np.zeros(len(periods), np.int64)
+    by_trail = np.zeros((len(votes.heads), len(periods)))
+    for c in range(count):
+        for p in range(len(periods)):
+            if _turns(votes.lags[c], periods[p], tolerances) == 1.0:
+                heard[p] += 1
+                by_trail[votes.trails[c], p] += votes.counts[c]
+    return heard, by_trail
+
+
+@njit(cache=True, nogil=True)
+def sums_of_turns(
+    votes: Votes, count: int, periods: NDArray[np.float64], tolerances: Tuple[float, float]
+) -> NDArray[np.float64]:
+    """Return sums over the votes of each trail for any number of turns of each period.
+
+    Args:
+        votes: The votes.
+        count: Number of lags in ``votes``.
+        periods: float64[p].
+        tolerances: As for ``first_turns``.
+
+    Returns:
+        float64[4, m, p]: at ``NEAR`` each vote is divided by its number of turns, so that half a
+        period has fewer; at ``SUPPORT`` it counts once; at ``LAGS`` it is the lag of one turn, in
+        s; at ``ODD`` it counts if the number of turns is odd.
+    """
+    sums = np.zeros((4, len(votes.heads), len(periods)))
+    for c in range(count):
+        trail, weight, lag = votes.trails[c], float(votes.counts[c]), votes.lags[c]
+        for p in range(len(periods)):
+            turns = _turns(lag, periods[p], tolerances)
+            if turns > 0.0:
+                sums[NEAR, trail, p] += weight / turns
+                sums[SUPPORT, trail, p] += weight
+                sums[LAGS, trail, p] += weight * lag / turns
+                sums[ODD, trail, p] += weight * (turns % 2.0)
+    return sums
+
+
+@njit(cache=True, nogil=True)
+def _turns(lag: float, period: float, tolerances: Tuple[float, float]) -> float:
+    """Return how many turns of a period a lag is, 0 if it is between two numbers of turns."""
+    turns = max(np.rint(lag / period), 1.0)
+    if abs(lag - turns * period) < tolerances[0] + tolerances[1] * turns:
+        return turns
+    return 0.0

@@ -136,68 +136,6 @@ def _between(
 
 
 @njit(cache=True, nogil=True)
-def link(trails: Trails, same_s: float, longest_s: float, limits: Tuple[float, float]) -> None:
-    """Fill ``nexts`` and ``gaps`` of trails with a period.
-
-    The next trail has the same period and begins, some periods earlier or later, soon after the
-    end. Where another trail of the same period goes on at the end there is no gap.
-
-    Args:
-        trails: The trails; ``nexts`` and ``gaps`` are changed in place.
-        same_s: Difference of periods that are the same.
-        longest_s: Longest gap.
-        limits: Distance in m by which another trail may be off at the end, and part of the faster
-            end's speed that is the greatest mean speed in the gap.
-    """
-    samples, spans, periods = trails.samples, trails.spans, trails.periods
-    for a in range(spans.shape[0]):
-        trails.nexts[a], trails.gaps[a] = NONE, 0.0
-        if periods[a] <= 0.0 or spans[a, 0] == NONE:
-            continue
-        least, end = longest_s, samples[spans[a, 1]]
-        for b in range(spans.shape[0]):
-            if b == a or abs(periods[b] - periods[a]) > same_s or spans[b, 0] == NONE:
-                continue
-            begin, last = samples[spans[b, 0]], samples[spans[b, 1]]
-            gap = (begin[0] - end[0]) % periods[a]
-            before = periods[a] - gap  # by which b begins before the end of a
-            if before < last[0] - begin[0] and _goes_on(trails, b, begin[0] + before, end, limits):
-                trails.nexts[a], trails.gaps[a] = NONE, 0.0
-                break
-            if gap < least and _leads_to(end, begin, gap, limits):
-                least = gap
-                trails.nexts[a], trails.gaps[a] = b, gap
-
-
-@njit(cache=True, nogil=True)
-def _goes_on(
-    trails: Trails,
-    trail: int,
-    time: float,
-    end: NDArray[np.float64],
-    limits: Tuple[float, float],
-) -> bool:
-    """Return whether a trail is at a time where another ends."""
-    at = trails.spans[trail, 0]
-    while trails.later[at] != NONE and trails.samples[at, 0] < time:
-        at = trails.later[at]
-    ahead = time - trails.samples[at, 0]
-    dx = trails.samples[at, 1] + ahead * trails.samples[at, 3] - end[1]
-    dy = trails.samples[at, 2] + ahead * trails.samples[at, 4] - end[2]
-    return math.hypot(dx, dy) < limits[0]
-
-
-@njit(cache=True, nogil=True)
-def _leads_to(
-    end: NDArray[np.float64], begin: NDArray[np.float64], gap: float, limits: Tuple[float, float]
-) -> bool:
-    """Return whether an obstacle can get from one sample to another in a time."""
-    fast = max(math.hypot(end[3], end[4]), math.hypot(begin[3], begin[4]))
-    way = math.hypot(begin[1] - end[1], begin[2] - end[2])
-    return way < limits[0] + limits[1] * fast * gap
-
-
-@njit(cache=True, nogil=True)
 def drop_repeats(places: NDArray[np.float64], radii: NDArray[np.float64], apart_m: float) -> None:
     """Set places to NaN that repeat those of an earlier column at the same time.
 

@@ -25,8 +25,18 @@ from typing import Dict
 import numpy as np
 from numpy.typing import NDArray
 
-from quad_nav.kernels.period_votes import Votes, vote
-from quad_nav.kernels.periodic_motion import NONE, Trails, drop_repeats, link, replay_all
+from quad_nav.kernels.period_votes import (
+    LAGS,
+    NEAR,
+    ODD,
+    SUPPORT,
+    Votes,
+    first_turns,
+    sums_of_turns,
+    vote,
+)
+from quad_nav.kernels.periodic_motion import NONE, Trails, drop_repeats, replay_all
+from quad_nav.kernels.trail_links import continued_trails, link
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -183,35 +193,25 @@ class PeriodicMotion:
         self._periods = np.zeros(len(self._spans))
         if not len(periods):
             return
-        turns = np.maximum(np.rint(lags[:, None] / periods), 1.0)
-        off = np.abs(lags[:, None] - turns * periods)
-        fits = off < _TOLERANCE_S + _TOLERANCE_PER_TURN_S * turns
-        weights = fits * counts[:, None].astype(float)
-        first = fits & (turns == 1.0)
-        sound = (first.sum(axis=0) >= _LAGS) & ((first * weights).sum(axis=0) >= _VOTES)
-        trails = self._votes.trails[: self._lags]
-        firsts = self._by_trail(trails, first * weights)
-        sound &= ~multiples(periods, firsts > 0.0, sound)
-        support = self._by_trail(trails, weights * sound)
-        exact = self._by_trail(trails, weights * sound * lags[:, None] / turns)
-        near = self._by_trail(trails, weights * sound / turns)  # half a period has fewer votes
-        rows, best = np.arange(len(support)), near.argmax(axis=1)
-        most = support[rows, best]
-        own = exact[rows, best] / np.maximum(most, 1.0)
-        found = np.where(most >= _EXACT_VOTES, own, periods[best])
-        odd = self._by_trail(trails, weights * sound * (turns % 2.0))[rows, best]
-        is_half = (most >= _EXACT_VOTES) & (odd < _ODD_SHARE * most)
+        tolerances = _TOLERANCE_S, _TOLERANCE_PER_TURN_S
+        heard, firsts = first_turns(self._votes, self._lags, periods, tolerances)
+        is_sound = (heard >= _LAGS) & (firsts.sum(axis=0) >= _VOTES)
+        periods, firsts = periods[is_sound], firsts[:, is_sound]
+        periods = periods[~multiples(periods, firsts > 0.0)]
+        if not len(periods):
+            return
+        sums = sums_of_turns(self._votes, self._lags, periods, tolerances)
+        rows, best = np.arange(len(self._spans)), sums[NEAR].argmax(axis=1)
+        support, lag_sums, odd = (sums[kind, rows, best] for kind in (SUPPORT, LAGS, ODD))
+        own = lag_sums / np.maximum(support, 1.0)
+        found = np.where(support >= _EXACT_VOTES, own, periods[best])
+        is_half = (support >= _EXACT_VOTES) & (odd < _ODD_SHARE * support)
         found = np.where(is_half, 2.0 * found, found)
         wanted = np.maximum(_OWN_SHARE * self._chances(found), _OWN_VOTES)
-        self._periods = np.where(most >= wanted, found, 0.0)
+        self._periods = np.where(support >= wanted, found, 0.0)
         for _ in range(_JOINS):
-            self._join()
-
-    def _by_trail(self, trails: Integers, values: Floats) -> Floats:
-        """Return the sums over the lags of each trail, float64[m, p], of float64[c, p]."""
-        sums = np.zeros((len(self._spans), values.shape[1]))
-        np.add.at(sums, trails, values)
-        return sums
+            if not self._join():
+                break
 
     def _chances(self, periods: Floats) -> Floats:
         """Return how many votes each trail would have had of an obstacle that is always seen.
@@ -225,22 +225,23 @@ class PeriodicMotion:
         chances: Floats = self._sizes * (before + after)
         return chances
 
-    def _join(self) -> None:
-        """Give trails without a period that of the one that they continue or are continued by."""
+    def _join(self) -> bool:
+        """Give trails without a period that of the one that they continue or are continued by.
+
+        Returns:
+            Whether there was any.
+        """
         whole = (self._spans[:, 0] != NONE) & (self._sizes >= _MIN_SAMPLES)
         known = np.flatnonzero(whole & (self._periods > 0.0))
-        if not len(known):
-            return
         unknown = np.flatnonzero(whole & (self._periods == 0.0))
-        begins, ends = (self._samples[self._spans[known, side]] for side in (0, 1))
-        begin, end = (self._samples[self._spans[unknown, side], None] for side in (0, 1))
-        offsets = np.minimum(_offsets(ends, begin), _offsets(end, begins))
-        nearest = offsets.argmin(axis=1)
-        is_joined = offsets[np.arange(len(unknown)), nearest] < 1.0
-        joined, periods = unknown[is_joined], np.zeros(len(self._spans)) + math.inf
-        periods[joined] = self._periods[known[nearest[is_joined]]]
+        limits = _JOIN_M, _JOIN_MPS
+        joined_to = continued_trails(self._view(), unknown, known, _JOIN_S, limits)
+        is_joined = joined_to != NONE
+        joined, periods = unknown[is_joined], np.full(len(self._spans), math.inf)
+        periods[joined] = self._periods[joined_to[is_joined]]
         joined = joined[self._chances(periods)[joined] <= _JOIN_TURNS * self._sizes[joined]]
         self._periods[joined] = periods[joined]
+        return len(joined) > 0
 
     def replay(self, times_s: Floats) -> Replays:
         """Return where obstacles with a period are.
@@ -291,13 +292,11 @@ def _proposed(lags: Floats, counts: Integers) -> Floats:
         return lags
     starts = np.flatnonzero(np.append(True, np.diff(lags) > _TOLERANCE_S))
     means: Floats = np.add.reduceat(lags * weights, starts) / np.add.reduceat(weights, starts)
-    return means
+    return means[means > 0.0]
 
 
-def multiples(
-    periods: Floats, voters: NDArray[np.bool_], sound: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Return which periods are multiples of a sound one, bool[p].
+def multiples(periods: Floats, voters: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which periods are multiples of another one, bool[p].
 
     Many trails that vote for a multiple vote for the period as well; where a period is twice that
     of another obstacle by chance, few do.
@@ -305,26 +304,11 @@ def multiples(
     Args:
         periods: float64[p].
         voters: bool[m, p], trails that vote for each period.
-        sound: bool[p].
     """
     turns = np.rint(periods[:, None] / periods)
     off = np.abs(periods[:, None] - turns * periods)
-    is_multiple = (turns >= 2.0) & (off < _TOLERANCE_S + _TOLERANCE_PER_TURN_S * turns) & sound
+    is_multiple = (turns >= 2.0) & (off < _TOLERANCE_S + _TOLERANCE_PER_TURN_S * turns)
     counts = voters.T.astype(float) @ voters
     shared = counts / np.maximum(counts.diagonal()[:, None], 1.0)
     found: NDArray[np.bool_] = (is_multiple & (shared >= _SHARED)).any(axis=1)
     return found
-
-
-def _offsets(a: Floats, b: Floats) -> Floats:
-    """Return by how much samples b are off the motions of samples a, in tolerances.
-
-    They are float64[..., 5]; it is infinite where b is not after a, or too late.
-    """
-    gap_s = b[..., 0] - a[..., 0]
-    mean = 0.5 * (a[..., 3:] + b[..., 3:])
-    off = b[..., 1:3] - a[..., 1:3] - gap_s[..., None] * mean
-    off_m = np.hypot(off[..., 0], off[..., 1])
-    is_near = (gap_s > 0.0) & (gap_s < _JOIN_S)
-    offsets: Floats = np.where(is_near, off_m / (_JOIN_M + _JOIN_MPS * np.abs(gap_s)), math.inf)
-    return offsets
