@@ -41,7 +41,7 @@ def around(pose=ORIGIN, costs=None, is_following=False, max_speed_mps=0.5):
     spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
     costs = np.zeros(spec.shape, np.uint8) if costs is None else costs
     memory, speeds_mps = MotionMemory(), (max_speed_mps, 0.5)
-    return Surroundings(spec, costs, pose, Twist2D(), 0.25, *speeds_mps, is_following, memory)
+    return Surroundings(spec, costs, pose, Twist2D(), 0.25, *speeds_mps, is_following, memory, 0.1)
 
 
 def tracks(*states):

@@ -26,7 +26,7 @@ def guard():
     spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
     costs = np.zeros(spec.shape, np.uint8)
     costmap = SimpleNamespace(spec=spec, costs=costs, inscribed_radius_m=0.3)
-    return EvasionGuard(EvasionParams(avoid_moving_obstacles=True), costmap)
+    return EvasionGuard(EvasionParams(avoid_moving_obstacles=True), costmap, 0.1)
 
 
 def one_track(x_m, y_m, vx_mps, vy_mps, now_s=0.0):

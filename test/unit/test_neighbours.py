@@ -71,7 +71,7 @@ def test_an_evasion_takes_the_side_that_peers_leave_free():
         spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
         costs = np.zeros(spec.shape, np.uint8)
         around = Surroundings(
-            spec, costs, HERE, Twist2D(), 0.25, 0.5, 0.5, False, MotionMemory(), neighbours
+            spec, costs, HERE, Twist2D(), 0.25, 0.5, 0.5, False, MotionMemory(), 0.1, neighbours
         )
         states = np.array([[2.0, 0.05, -1.0, 0.0]])
         coming = Tracks(0.0, np.arange(1), states, np.zeros((1, 4, 4)), np.full(1, 0.3))

@@ -71,8 +71,7 @@ def command_of(params, tracks, velocity=None, wish=None, period_s=0.1):
     spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
     velocity, costs = velocity or Twist2D(), np.zeros(spec.shape, np.uint8)
     here, memory = Pose2D(0.0, 0.0), MotionMemory()
-    around = Surroundings(spec, costs, here, velocity, 0.35, 2.0, 0.5, True, memory)
-    around = replace(around, period_s=period_s)
+    around = Surroundings(spec, costs, here, velocity, 0.35, 2.0, 0.5, True, memory, period_s)
     last = velocity.vx_mps, velocity.vy_mps
     end = np.array([[4.0, 0.0]])
     return evade(params, around, tracks, 0.0, end, wish or Twist2D(vx_mps=0.5), last)

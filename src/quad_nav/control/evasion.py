@@ -100,8 +100,8 @@ class Surroundings:
         usual_speed_mps: Greatest speed otherwise.
         is_following: The robot follows a plan; else it stays near a point.
         memory: The memory of how obstacles have moved.
-        neighbours: The peers.
         period_s: Time between two commands.
+        neighbours: The peers.
     """
 
     spec: GridSpec
@@ -113,8 +113,8 @@ class Surroundings:
     usual_speed_mps: float
     is_following: bool
     memory: MotionMemory
+    period_s: float
     neighbours: Neighbours = NO_NEIGHBOURS
-    period_s: float = 0.1
 
     @property
     def is_fast(self) -> bool:

@@ -55,10 +55,12 @@ class EvasionGuard:
         is_evading: The guard chose the last command.
     """
 
-    def __init__(self, params: EvasionParams, local_costmap: LayeredCostmap) -> None:
+    def __init__(
+        self, params: EvasionParams, local_costmap: LayeredCostmap, period_s: float
+    ) -> None:
         """Guard a robot that hovers."""
         self.params = params
-        self.period_s = 0.1
+        self.period_s = period_s
         self.is_evading = False
         self._costmap = local_costmap
         self._last = (0.0, 0.0)
@@ -163,8 +165,8 @@ class EvasionGuard:
             usual_speed_mps=limits.speed_mps,
             is_following=is_following,
             memory=self._memory,
-            neighbours=neighbours,
             period_s=self.period_s,
+            neighbours=neighbours,
         )
 
     def _turn(self, now_s: float, route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:

@@ -74,7 +74,7 @@ class StateMachine:
         self.control = ControlSupervisor(controller)
         self.recovery = RecoverySequence(recoveries, global_costmap, local_costmap)
         self._global, self._local = global_costmap, local_costmap
-        self.guard = EvasionGuard(params.evasion, local_costmap)
+        self.guard = EvasionGuard(params.evasion, local_costmap, self._period_s)
         self._updates = updates
         self._peers = peers
         self._search = PlanSearch(params.planner_frequency_hz)

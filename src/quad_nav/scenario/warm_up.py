@@ -112,7 +112,8 @@ def evade_obstacle() -> None:
         memory.add(one)
     spec = GridSpec(40, 40, 0.1, -2.0, -2.0)
     costs = np.zeros(spec.shape, np.uint8)
-    around = Surroundings(spec, costs, Pose2D(0.0, 0.0), Twist2D(), 0.3, 0.5, 0.5, False, memory)
+    still = Pose2D(0.0, 0.0), Twist2D()
+    around = Surroundings(spec, costs, *still, 0.3, 0.5, 0.5, False, memory, period_s=0.1)
     params = EvasionParams(True, deviation_mps=0.5)
     evade(params, around, one, one.time_s, np.zeros((1, 2)), Twist2D(), (0.0, 0.0))
 
