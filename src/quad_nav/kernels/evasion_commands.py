@@ -69,9 +69,9 @@ def command_costs(
     for n in range(len(commands)):
         later.T[:], then[-1] = moving[:, n], commands[n]
         later_ways = _follow(search, body, later, then, both - one)
-        ends = _end_costs(search, body, standing, costs, later)
+        ends = _end_costs(search, body, costs, later)
         found[n] = _way_cost(search, discs, standing, ways[:, :, n], math.inf)
-        found[n] += _least_cost(search, discs[one:], standing, later_ways, ends)
+        found[n] += _least_cost(search, body, discs[one:], standing, later_ways, later, ends)
     return found
 
 
@@ -120,21 +120,26 @@ def _follow(
 @njit(cache=True, nogil=True)
 def _least_cost(
     search: SpaceTime,
+    body: Body,
     discs: NDArray[np.float64],
     standing: StandingObstacles,
     ways: NDArray[np.float64],
+    moving: NDArray[np.float64],
     ends: NDArray[np.float64],
 ) -> float:
-    """Return the least cost of ways, float64[n, 3, c], with those from their ends on, float64[c].
+    """Return the least cost of ways, float64[n, 3, c], with those from their ends on.
 
-    The cheapest ends come first, so that most ways are not followed.
+    The bodies, float64[6, c], are those at the ends, ``ends`` as from ``_end_costs``. The ends that
+    cost least in the open come first, so that most ways are not followed.
     """
-    least = math.inf
-    for m in np.argsort(ends):
-        if ends[m] >= least:
+    least, in_the_open = math.inf, ends[0] + ends[1] + ends[2]
+    for m in np.argsort(in_the_open):
+        if in_the_open[m] >= least:
             break
-        cost = _way_cost(search, discs, standing, ways[:, :, m], least - ends[m])
-        least = min(least, cost + ends[m])
+        end = _rest_cost(search, body, standing, moving[:, m], ends[0, m]) + ends[1, m] + ends[2, m]
+        if end < least:
+            cost = _way_cost(search, discs, standing, ways[:, :, m], least - end)
+            least = min(least, cost + end)
     return least
 
 
@@ -165,41 +170,49 @@ def _way_cost(
 
 @njit(cache=True, nogil=True)
 def _end_costs(
-    search: SpaceTime,
-    body: Body,
-    standing: StandingObstacles,
-    costs: NDArray[np.float64],
-    moving: NDArray[np.float64],
+    search: SpaceTime, body: Body, costs: NDArray[np.float64], moving: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the costs from the end of second commands on, float64[c]; bodies are float64[6, c]."""
-    found = np.empty(moving.shape[1])
-    for n in range(len(found)):
-        found[n] = _end_cost(search, body, standing, costs, moving[:, n])
+    """Return the costs from the end of second commands on, without what stands.
+
+    Args:
+        search: Resolution and costs.
+        body: Response of the bodies.
+        costs: As for ``command_costs``.
+        moving: float64[6, c], the bodies at the end of the commands.
+
+    Returns:
+        float64[3, c]: haste on the way to rest, and the best motion from there on, in two parts:
+        from the step before the body rests, and from the step after.
+    """
+    found = np.empty((3, moving.shape[1]))
+    for n in range(moving.shape[1]):
+        speed = math.hypot(moving[2, n], moving[3, n])
+        later_s = rest_s(body, speed)
+        x, y = moving[0, n] + later_s * moving[2, n], moving[1, n] + later_s * moving[3, n]
+        step = round(BOTH_S / search.step_s) + later_s / search.step_s
+        before = min(int(step), costs.shape[0] - 2)
+        part = min(step - before, 1.0)
+        found[0, n] = later_s * haste_per_s(search, speed)
+        found[1, n] = (1.0 - part) * _cost_at(search, costs, before, x, y)
+        found[2, n] = part * _cost_at(search, costs, before + 1, x, y)
     return found
 
 
 @njit(cache=True, nogil=True)
-def _end_cost(
+def _rest_cost(
     search: SpaceTime,
     body: Body,
     standing: StandingObstacles,
-    costs: NDArray[np.float64],
     moving: NDArray[np.float64],
+    haste: float,
 ) -> float:
-    """Return the cost from the end of the second command on: the way to rest, the best motion."""
-    speed = math.hypot(moving[2], moving[3])
-    later_s = rest_s(body, speed)
-    cost = later_s * haste_per_s(search, speed)
+    """Return the haste, and what stands on the way to rest of a body, float64[6]."""
+    later_s, cost = rest_s(body, math.hypot(moving[2], moving[3])), haste
     for k in range(1, SUBSTEPS + 1):
         at = later_s * k / SUBSTEPS
         overlap = overlap_cost(standing, moving[0] + at * moving[2], moving[1] + at * moving[3])
         cost += search.blocked_per_s * overlap * search.step_s / SUBSTEPS
-    x, y = moving[0] + later_s * moving[2], moving[1] + later_s * moving[3]
-    step = round(BOTH_S / search.step_s) + later_s / search.step_s
-    before = min(int(step), costs.shape[0] - 2)
-    part = min(step - before, 1.0)
-    cost += (1.0 - part) * _cost_at(search, costs, before, x, y)
-    return cost + part * _cost_at(search, costs, before + 1, x, y)
+    return cost
 
 
 @njit(cache=True, nogil=True)
