@@ -103,6 +103,33 @@ def test_an_obstacle_that_wanders_has_no_period():
     assert watched(90.0, wandering).is_empty
 
 
+def wandering(rng, count, until_s):
+    """Return the states at each 0.1 s of people who walk to random places in a square of 12 m."""
+    states, stamps_s = [], np.arange(0.0, until_s + 0.05, 0.1)
+    for _ in range(count):
+        ways = rng.uniform(-6.0, 6.0, (400, 2))
+        legs = np.diff(ways, axis=0)
+        speeds_mps = rng.uniform(0.5, 1.5, len(legs))
+        begins_s = np.cumsum(np.append(0.0, np.hypot(*legs.T) / speeds_mps))
+        leg = np.searchsorted(begins_s, stamps_s, side="right") - 1
+        velocities = legs[leg] / (begins_s[leg + 1] - begins_s[leg])[:, None]
+        places = ways[leg] + (stamps_s - begins_s[leg])[:, None] * velocities
+        states.append(np.concatenate([places, velocities], axis=1))
+    return np.array(states).transpose(1, 0, 2)
+
+
+@pytest.mark.slow
+def test_among_people_who_wander_only_a_shuttle_has_a_period():
+    """After five minutes of ten people, each of whom passes where others were many times."""
+    motion, people = PeriodicMotion(), wandering(np.random.default_rng(0), 10, 300.0)
+    for k, states in enumerate(people):
+        states = np.concatenate([states, [circling(0.1 * k)]])
+        motion.add(0.1 * k, np.arange(11) + 11 * (k // 15), states, np.full(11, 0.3))
+    assert not motion.most_repeat
+    replays = motion.replay(300.0 + AHEAD_S)
+    np.testing.assert_allclose(known_places(replays), places(300.0 + AHEAD_S), atol=0.02)
+
+
 def test_one_of_three_obstacles_that_repeats_its_motion_is_not_most():
     """One obstacle circles, two fly straight on."""
     motion = PeriodicMotion()

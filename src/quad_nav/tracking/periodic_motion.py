@@ -49,6 +49,7 @@ _MIN_SAMPLES = 3  # of a trail, before its samples vote
 _MAX_SAMPLES = 20  # longer tracks are cut: some pass from one obstacle to another
 _STRONG = 12  # votes for one lag of one trail that propose a period
 _LAGS, _VOTES = 6, 40  # of trails and of samples that make a proposed period one
+_CHANCE_SIGMAS = 10.0  # standard deviations above the mean number of lags that chance explains
 _OWN_VOTES, _OWN_SHARE = 3, 0.1  # of a trail for its period, and their part of all possible ones
 _EXACT_VOTES = 8  # of a trail, from which on its own lags are more exact than the common period
 _ODD_SHARE = 0.1  # of a trail's votes that odd multiples of its period have at least
@@ -195,7 +196,8 @@ class PeriodicMotion:
             return
         tolerances = _TOLERANCE_S, _TOLERANCE_PER_TURN_S
         heard, firsts = first_turns(self._votes, self._lags, periods, tolerances)
-        is_sound = (heard >= _LAGS) & (firsts.sum(axis=0) >= _VOTES)
+        wanted = np.maximum(self._chance_lags(periods), _LAGS)
+        is_sound = (heard >= wanted) & (firsts.sum(axis=0) >= _VOTES)
         periods, firsts = periods[is_sound], firsts[:, is_sound]
         periods = periods[~multiples(periods, firsts > 0.0)]
         if not len(periods):
@@ -212,6 +214,18 @@ class PeriodicMotion:
         for _ in range(_JOINS):
             if not self._join():
                 break
+
+    def _chance_lags(self, periods: Floats) -> Floats:
+        """Return how many lags periods, float64[p], have at most by chance, float64[p].
+
+        Of all lags that are observed in a time T, the part 2 (T - lag) / T^2 is in each second if
+        they are chance, and their number varies as that of independent events.
+        """
+        time_s = self._samples[self._count - 1, 0] - self._samples[0, 0]
+        width_s = 2.0 * (_TOLERANCE_S + _TOLERANCE_PER_TURN_S)
+        part = width_s * 2.0 * np.maximum(time_s - periods, 0.0) / time_s**2
+        most: Floats = self._lags * part + _CHANCE_SIGMAS * np.sqrt(self._lags * part)
+        return most
 
     def _chances(self, periods: Floats) -> Floats:
         """Return how many votes each trail would have had of an obstacle that is always seen.
