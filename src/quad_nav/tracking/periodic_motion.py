@@ -4,10 +4,11 @@ Shuttles, conveyors, swing doors and the obstacles of benchmarks repeat their mo
 Tracks alone do not show it: they break whenever something hides an obstacle. So each sample of a
 track votes: for every trail, an uninterrupted piece of a track, that was once in the same place
 with the same velocity, it votes for the time since then. Chance votes have lags of any length;
-those of a period add up. A lag for which many samples of several trails vote is a period. Each
-trail has the period that most of its own votes are for, or twice that if nothing was there after
-one, three or five of them: then it is the period of other obstacles. A trail that nothing votes
-for, because it was hidden before, has that of the trail that it continues, or that continues it.
+those of a period add up. A lag for which many samples of more trails vote than chance explains is a
+period. Each trail has the period that most of its own votes are for, or twice that if nothing was
+there after one, three or five of them: then it is the period of other obstacles. A trail that
+nothing votes for, because it was hidden before, has that of the trail that it continues, or that
+continues it.
 
 A trail with a period is replayed: the obstacle is where it was a whole number of periods ago,
 whether it is seen now or hidden.
