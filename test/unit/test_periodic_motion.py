@@ -9,9 +9,9 @@ import pytest
 
 from quad_nav.control.prediction import predict
 from quad_nav.kernels.period_votes import (
-    LAGS,
     NEAR,
     ODD,
+    ONE_TURN,
     SUPPORT,
     Votes,
     first_turns,
@@ -246,14 +246,14 @@ def test_votes_count_for_every_number_of_turns():
         np.full(4, NONE),
         np.zeros(2, np.int64),
     )
-    heard, by_trail = first_turns(votes, 4, np.array([10.0, 20.1]), (0.05, 0.03))
-    assert heard.tolist() == [1, 1]
+    lag_counts, by_trail = first_turns(votes, 4, np.array([10.0, 20.1]), (0.05, 0.03))
+    assert lag_counts.tolist() == [1, 1]
     assert by_trail.tolist() == [[3.0, 0.0], [0.0, 2.0]]
     sums = sums_of_turns(votes, 4, np.array([10.0]), (0.05, 0.03))[:, :, 0]
     expected = np.empty((4, 2))
     expected[NEAR] = 3.0 + 1.0 / 3.0, 2.0 / 2.0
     expected[SUPPORT] = 4.0, 2.0
-    expected[LAGS] = 3.0 * 10.02 + 30.0 / 3.0, 2.0 * 20.1 / 2.0
+    expected[ONE_TURN] = 3.0 * 10.02 + 30.0 / 3.0, 2.0 * 20.1 / 2.0
     expected[ODD] = 4.0, 0.0
     np.testing.assert_allclose(sums, expected, rtol=1e-12)
 

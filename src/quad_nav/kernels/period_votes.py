@@ -18,7 +18,7 @@ _ASIDE_M = 0.15  # offset across the direction of motion, which no lag explains
 _SAME_LAG_S = 0.12
 _MOST = 64  # trails that one sample votes for
 _RECENT_VOTES = 30  # a lag is the mean of about so many votes
-NEAR, SUPPORT, LAGS, ODD = range(4)
+NEAR, SUPPORT, ONE_TURN, ODD = range(4)
 """Rows of ``sums_of_turns``."""
 
 
@@ -139,14 +139,14 @@ def first_turns(
     Returns:
         int64[p] and float64[m, p].
     """
-    heard = np.zeros(len(periods), np.int64)
+    lag_counts = np.zeros(len(periods), np.int64)
     by_trail = np.zeros((len(votes.heads), len(periods)))
     for c in range(count):
         for p in range(len(periods)):
             if _turns(votes.lags[c], periods[p], tolerances) == 1.0:
-                heard[p] += 1
+                lag_counts[p] += 1
                 by_trail[votes.trails[c], p] += votes.counts[c]
-    return heard, by_trail
+    return lag_counts, by_trail
 
 
 @njit(cache=True, nogil=True)
@@ -162,9 +162,9 @@ def sums_of_turns(
         tolerances: As for ``first_turns``.
 
     Returns:
-        float64[4, m, p]: at ``NEAR`` each vote is divided by its number of turns, so that half a
-        period has fewer; at ``SUPPORT`` it counts once; at ``LAGS`` it is the lag of one turn, in
-        s; at ``ODD`` it counts if the number of turns is odd.
+        float64[4, m, p]: at ``NEAR`` each vote counts as the inverse of its number of turns, so
+        that half a period has fewer; at ``SUPPORT`` as 1; at ``ONE_TURN`` as the time of one turn,
+        in s; at ``ODD`` as 1 if the number of turns is odd.
     """
     sums = np.zeros((4, len(votes.heads), len(periods)))
     for c in range(count):
@@ -174,7 +174,7 @@ def sums_of_turns(
             if turns > 0.0:
                 sums[NEAR, trail, p] += weight / turns
                 sums[SUPPORT, trail, p] += weight
-                sums[LAGS, trail, p] += weight * lag / turns
+                sums[ONE_TURN, trail, p] += weight * lag / turns
                 sums[ODD, trail, p] += weight * (turns % 2.0)
     return sums
 

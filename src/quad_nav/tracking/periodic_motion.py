@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.kernels.period_votes import (
-    LAGS,
     NEAR,
     ODD,
+    ONE_TURN,
     SUPPORT,
     Votes,
     first_turns,
@@ -196,16 +196,16 @@ class PeriodicMotion:
         if not len(periods):
             return
         tolerances = _TOLERANCE_S, _TOLERANCE_PER_TURN_S
-        heard, firsts = first_turns(self._votes, self._lags, periods, tolerances)
-        wanted = np.maximum(self._chance_lags(periods), _LAGS)
-        is_sound = (heard >= wanted) & (firsts.sum(axis=0) >= _VOTES)
+        lag_counts, firsts = first_turns(self._votes, self._lags, periods, tolerances)
+        is_sound = (lag_counts >= _LAGS) & (firsts.sum(axis=0) >= _VOTES)
+        is_sound &= lag_counts >= self._chance_lags(periods)
         periods, firsts = periods[is_sound], firsts[:, is_sound]
         periods = periods[~multiples(periods, firsts > 0.0)]
         if not len(periods):
             return
         sums = sums_of_turns(self._votes, self._lags, periods, tolerances)
         rows, best = np.arange(len(self._spans)), sums[NEAR].argmax(axis=1)
-        support, lag_sums, odd = (sums[kind, rows, best] for kind in (SUPPORT, LAGS, ODD))
+        support, lag_sums, odd = (sums[kind, rows, best] for kind in (SUPPORT, ONE_TURN, ODD))
         own = lag_sums / np.maximum(support, 1.0)
         found = np.where(support >= _EXACT_VOTES, own, periods[best])
         is_half = (support >= _EXACT_VOTES) & (odd < _ODD_SHARE * support)
@@ -219,8 +219,8 @@ class PeriodicMotion:
     def _chance_lags(self, periods: Floats) -> Floats:
         """Return how many lags periods, float64[p], have at most by chance, float64[p].
 
-        Of all lags that are observed in a time T, the part 2 (T - lag) / T^2 is in each second if
-        they are chance, and their number varies as that of independent events.
+        If all lags are chance, the part 2 (T - lag) / T^2 of those that are observed in a time T is
+        in each second, and their number varies as that of independent events.
         """
         time_s = self._samples[self._count - 1, 0] - self._samples[0, 0]
         width_s = 2.0 * (_TOLERANCE_S + _TOLERANCE_PER_TURN_S)
