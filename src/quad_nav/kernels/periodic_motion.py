@@ -149,6 +149,8 @@ def drop_repeats(places: NDArray[np.float64], radii: NDArray[np.float64], apart_
     """
     for k in range(places.shape[0]):
         for column in range(places.shape[1]):
+            if math.isnan(places[k, column, 0]):
+                continue
             for other in range(column):
                 dx = places[k, column, 0] - places[k, other, 0]
                 dy = places[k, column, 1] - places[k, other, 1]
