@@ -123,13 +123,15 @@ def fit(clusters: ScanClusters, row: int, guess: Floats, radius: Radius, is_whol
     noise_m = math.hypot(RANGE_NOISE_M, _SHAPE_NOISE_M)
     fit_disc(clusters.points, first, beams, guess, radius.circle_m, noise_m, _GUESS_M, fitted)
     x, y, xx, yy, xy, farthest_m = fitted.tolist()
-    away = np.array([x - view.origin[0], y - view.origin[1]])
-    distance_m = max(float(np.hypot(away[0], away[1])), 1e-6)
-    away /= distance_m
+    away_x, away_y = x - float(view.origin[0]), y - float(view.origin[1])
+    distance_m = max(float(np.hypot(away_x, away_y)), 1e-6)
+    away_x, away_y = away_x / distance_m, away_y / distance_m
     spacing_m = distance_m * abs(view.increment)
     depth_m = _UNKNOWN_RADIUS_M if not radius.views else 0.5 * spacing_m / math.sqrt(radius.views)
-    noise = np.array([[xx, xy], [xy, yy]]) + depth_m**2 * np.outer(away, away)
-    noise += _POSE_NOISE_M**2 * np.eye(2)
+    depth, pose = depth_m**2, _POSE_NOISE_M**2
+    xx, yy = xx + depth * (away_x * away_x) + pose, yy + depth * (away_y * away_y) + pose
+    xy += depth * (away_x * away_y)
+    noise = np.array([[xx, xy], [xy, yy]])
     return DiscFit(np.array([x, y]), noise, farthest_m, _bias(spacing_m, radius, is_whole))
 
 
