@@ -103,7 +103,7 @@ def test_an_obstacle_that_wanders_has_no_period():
     assert watched(90.0, wandering).is_empty
 
 
-def wandering(rng, count, until_s):
+def people_who_wander(rng, count, until_s):
     """Return the states at each 0.1 s of people who walk to random places in a square of 12 m."""
     states, stamps_s = [], np.arange(0.0, until_s + 0.05, 0.1)
     for _ in range(count):
@@ -121,7 +121,7 @@ def wandering(rng, count, until_s):
 @pytest.mark.slow
 def test_among_people_who_wander_only_a_shuttle_has_a_period():
     """After five minutes of ten people, each of whom passes where others were many times."""
-    motion, people = PeriodicMotion(), wandering(np.random.default_rng(0), 10, 300.0)
+    motion, people = PeriodicMotion(), people_who_wander(np.random.default_rng(0), 10, 300.0)
     for k, states in enumerate(people):
         states = np.concatenate([states, [circling(0.1 * k)]])
         motion.add(0.1 * k, np.arange(11) + 11 * (k // 15), states, np.full(11, 0.3))

@@ -206,7 +206,7 @@ def _rest_cost(
     moving: NDArray[np.float64],
     haste: float,
 ) -> float:
-    """Return the haste, and what stands on the way to rest of a body, float64[6]."""
+    """Return haste and the cost of what stands on the way to rest of a body, float64[6]."""
     later_s, cost = rest_s(body, math.hypot(moving[2], moving[3])), haste
     for k in range(1, SUBSTEPS + 1):
         at = later_s * k / SUBSTEPS

@@ -1,4 +1,4 @@
-"""Which trails are of one obstacle: pieces of its motion before and after something hid it.
+"""Links between trails of the same obstacle, where something hid it or its track broke.
 
 ``tracking/periodic_motion.py`` has the reasoning, ``periodic_motion.py`` the trails.
 """

@@ -210,7 +210,7 @@ class PeriodicMotion:
         found = np.where(support >= _EXACT_VOTES, own, periods[best])
         is_half = (support >= _EXACT_VOTES) & (odd < _ODD_SHARE * support)
         found = np.where(is_half, 2.0 * found, found)
-        wanted = np.maximum(_OWN_SHARE * self._chances(found), _OWN_VOTES)
+        wanted = np.maximum(_OWN_SHARE * self._possible_votes(found), _OWN_VOTES)
         self._periods = np.where(support >= wanted, found, 0.0)
         for _ in range(_JOINS):
             if not self._join():
@@ -228,7 +228,7 @@ class PeriodicMotion:
         most: Floats = self._lags * part + _CHANCE_SIGMAS * np.sqrt(self._lags * part)
         return most
 
-    def _chances(self, periods: Floats) -> Floats:
+    def _possible_votes(self, periods: Floats) -> Floats:
         """Return how many votes each trail would have had of an obstacle that is always seen.
 
         Args:
@@ -237,8 +237,8 @@ class PeriodicMotion:
         times_s = self._samples[np.maximum(self._spans[:, 1], 0), 0]
         before = np.floor((times_s - self._samples[0, 0]) / periods)
         after = np.floor((self._samples[self._count - 1, 0] - times_s) / periods)
-        chances: Floats = self._sizes * (before + after)
-        return chances
+        possible: Floats = self._sizes * (before + after)
+        return possible
 
     def _join(self) -> bool:
         """Give trails without a period that of the one that they continue or are continued by.
@@ -254,7 +254,7 @@ class PeriodicMotion:
         is_joined = joined_to != NONE
         joined, periods = unknown[is_joined], np.full(len(self._spans), math.inf)
         periods[joined] = self._periods[joined_to[is_joined]]
-        joined = joined[self._chances(periods)[joined] <= _JOIN_TURNS * self._sizes[joined]]
+        joined = joined[self._possible_votes(periods)[joined] <= _JOIN_TURNS * self._sizes[joined]]
         self._periods[joined] = periods[joined]
         return len(joined) > 0
 
