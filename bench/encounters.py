@@ -43,6 +43,7 @@ USUAL = (
     "four_ways",
     "corridor",
     "parked_on_way",
+    "parked_at_wall",
     "parked_on_goal",
     "parked_in_corridor",
     "8in12",

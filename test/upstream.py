@@ -12,6 +12,7 @@ UPSTREAM = {
     "limit_all_speeds": False,
     "reject_colliding_escape": False,
     "end_blocked_escape": False,
+    "plan_inside_map": False,
     "escape_collision": False,
     "command_in_first_cycle": False,
     "stop_while_planning": False,

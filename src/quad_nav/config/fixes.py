@@ -181,6 +181,16 @@ _SWITCHES: Tuple[Switch, ...] = (
     ),
     (
         flag(
+            "plan_inside_map",
+            True,
+            "plan_inside_map",
+            "Plans keep the robot's inscribed radius from the edge of a global costmap that does"
+            " not roll, if start and goal do.",
+        ),
+        (NavigatorParams,),
+    ),
+    (
+        flag(
             "predict_goal_turn",
             True,
             "predict_goal_turn",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from quad_nav.control.controller import LocalPlanner
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.map_edge import closed_edge
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.navigator.costmap_updates import CostmapUpdates
 from quad_nav.navigator.params import NavigatorParams
@@ -282,6 +283,7 @@ class Navigator:
             PlanningError: There is no plan, not even within the tolerance of the goal.
         """
         costmap, add_goal = self.global_costmap, self.params.make_plan_add_unreachable_goal
-        return plan_near(
-            self.planner, costmap.spec, costmap.costs, start, goal, tolerance_m, add_goal
-        )
+        with closed_edge(costmap, start, goal, self.params.plan_inside_map):
+            return plan_near(
+                self.planner, costmap.spec, costmap.costs, start, goal, tolerance_m, add_goal
+            )

@@ -15,6 +15,7 @@ from quad_nav.control.controller import LocalPlanner
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import NO_DISCS
 from quad_nav.costmap.layered import LayeredCostmap
+from quad_nav.costmap.map_edge import closed_edge
 from quad_nav.errors import PlanningError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.kernels.moving_discs import MovingDiscs
@@ -218,7 +219,8 @@ class StateMachine:
         try:
             if start is None or target is None:
                 raise PlanningError("robot pose unknown")
-            plan = self.planner.make_plan(costmap.spec, costmap.costs, start, target)
+            with closed_edge(costmap, start, target, self.params.plan_inside_map):
+                plan = self.planner.make_plan(costmap.spec, costmap.costs, start, target)
         except PlanningError as error:
             tick.planning_failed = str(error)
             if self._peers.holding_point is not None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from quad_nav.config import Configuration
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
+from quad_nav.costmap.map_edge import closed_edge
 from quad_nav.costmap.static import StaticLayerParams, StaticMap
 from quad_nav.errors import InputError, PlanningError
 from quad_nav.geometry import Pose2D
@@ -163,7 +164,8 @@ class MissionPreview:
                 continue
             goal_name = f"goal {index + 1}"
             try:
-                plan = planner.make_plan(costmap.spec, costmap.costs.copy(), here, goal.pose)
+                with closed_edge(costmap, here, goal.pose, configuration.navigator.plan_inside_map):
+                    plan = planner.make_plan(costmap.spec, costmap.costs.copy(), here, goal.pose)
             except PlanningError as error:
                 warnings.append(
                     f"quad{number}: {goal_name} ({goal.x_m:g}, {goal.y_m:g}): no path from {name}"
