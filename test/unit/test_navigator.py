@@ -29,6 +29,7 @@ FORWARD = Twist2D(vx_mps=0.3)
 @dataclass
 class CostmapParams:
     update_frequency_hz: float
+    rolling_window: bool = False
 
 
 class FakeCostmap:
@@ -37,7 +38,7 @@ class FakeCostmap:
         self.spec = GridSpec(10, 10, 1.0)
         self.costs = np.zeros((10, 10), dtype=np.uint8)
         self.footprint = np.zeros((0, 2))
-        self.circumscribed_radius_m = 0.0
+        self.inscribed_radius_m = self.circumscribed_radius_m = 0.0
         self.layers = {}
         self.updates = []
         self.stale = []
