@@ -189,7 +189,10 @@ class UpstreamTopics(UpstreamCase):
         cleared and its surroundings inflated: 0.75 m around the robot, in the middle of the window.
         """
         updates = self.of(1, "local_costmap/costmap_updates")
-        self.assertLessEqual(len(self.of(1, "local_costmap/costmap")), 2)
+        grids = self.of(1, "local_costmap/costmap")[1:]  # the first was for the new listener
+        origins = [(grid.info.origin.position.x, grid.info.origin.position.y) for grid in grids]
+        self.assertLessEqual(len(origins), 2)  # on a cell's border, rounding may move it by a cell
+        self.assertEqual(len(set(origins)), len(origins))
         self.assertEqual({update.header.frame_id for update in updates}, {"map"})
         areas = [(update.x, update.y, update.width, update.height) for update in updates]
         whole = (0, 0, WINDOW_CELLS, WINDOW_CELLS)
