@@ -13,7 +13,7 @@ from quad_nav.grid import GridSpec
 from quad_nav.kernels.body_response import Body
 from quad_nav.kernels.passive_safety import rest_in_time
 from quad_nav.kernels.standing_obstacles import MARGIN_M, StandingObstacles
-from quad_nav.tracking.motion_memory import MotionMemory
+from quad_nav.tracking.motion_memory import MotionMemory, Recalled
 from quad_nav.tracking.tracks import Tracks
 
 PERIOD_S = 0.02
@@ -67,10 +67,17 @@ def test_a_command_comes_into_no_standing_obstacle_before_the_robot_rests():
         assert rests(3.0, AHEAD, standing=wall) is is_safe
 
 
-def command_of(params, tracks, velocity=None, wish=None, period_s=0.1):
+class RecallsATurn(MotionMemory):
+    """It recalls that an obstacle like this turned, and went away along x at 1 m/s."""
+
+    def recall(self, number, times_s):
+        return Recalled(np.column_stack([times_s, 0.0 * times_s]), len(times_s))
+
+
+def command_of(params, tracks, velocity=None, wish=None, period_s=0.1, memory=None):
     spec = GridSpec(160, 160, 0.05, -4.0, -4.0)
     velocity, costs = velocity or Twist2D(), np.zeros(spec.shape, np.uint8)
-    here, memory = Pose2D(0.0, 0.0), MotionMemory()
+    here, memory = Pose2D(0.0, 0.0), memory or MotionMemory()
     around = Surroundings(spec, costs, here, velocity, 0.35, 2.0, 0.5, True, memory, period_s)
     last = velocity.vx_mps, velocity.vy_mps
     end = np.array([[4.0, 0.0]])
@@ -110,3 +117,11 @@ def test_a_slower_control_cycle_needs_more_room():
 def test_a_person_far_away_leaves_the_wish_as_it_is():
     wish = Twist2D(vx_mps=0.5)
     assert command_of(PEOPLE, person(4.0, 3.0, 0.0, 1.0), wish=wish) is wish
+
+
+def test_a_person_who_turned_here_before_may_come_on():
+    """The robot is at rest, the person 0.5 m from its hull comes nearer at 1 m/s."""
+    coming, wish = person(1.1, 0.0, -1.0, 0.0), Twist2D(vx_mps=0.5)
+    trusting = replace(PEOPLE, deviation_mps=0.0)
+    assert command_of(trusting, coming, wish=wish, memory=RecallsATurn()).vx_mps > 0.0
+    assert command_of(PEOPLE, coming, wish=wish, memory=RecallsATurn()).vx_mps <= 0.0

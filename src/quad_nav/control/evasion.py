@@ -12,7 +12,7 @@ robot goes behind, in front, back or waits as it costs least against all obstacl
 keeps the wish where nothing is much better.
 People turn, and they go around a robot that rests. With ``deviation_mps`` the robot flies only
 commands after which it can rest before an obstacle reaches it that leaves its prediction, and
-brakes if there is none: passive safety.
+brakes if there is none: passive safety. It holds for predictions with and without the memory.
 Peers are in the way as well: commands are judged as the robot's Voronoi cell will leave them, and
 peers are expected to keep their velocities.
 
@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
-from quad_nav.control.prediction import predict
+from quad_nav.control.prediction import extrapolate, predict
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.kernels.body_response import Body, rest_s
@@ -149,7 +149,11 @@ def evade(
     if not strangers.shape[1] and around.is_following and not around.is_fast:
         return wish
     commands = _commands(around.max_speed_mps, around.pose.rotate(wish.vx_mps, wish.vy_mps))
-    found = _costs_of(commands, params, around, search, strangers, route, last)
+    possible = strangers
+    if params.deviation_mps > 0.0:  # who turned here before may go on this time
+        plain = predicted_discs(params, around, tracks, now_s, times_s, recalls=False)
+        possible = np.concatenate([strangers, plain], axis=1)
+    found = _costs_of(commands, params, around, search, strangers, possible, route, last)
     if np.isinf(found).all():
         return Twist2D(-around.velocity.vx_mps, -around.velocity.vy_mps, wish.vyaw_radps)
     found += _CHANGE_S / around.max_speed_mps * np.hypot(*(commands - last).T)
@@ -166,19 +170,21 @@ def _costs_of(
     around: Surroundings,
     search: SpaceTime,
     strangers: Floats,
+    possible: Floats,
     route: Floats,
     last: Tuple[float, float],
 ) -> Floats:
     """Return the cost of each of the commands, float64[c]; the commands are float64[c, 2].
 
-    It is infinite after those after which the robot might not rest in time.
+    It is infinite after those after which the robot might not rest in time before one of the
+    possible obstacles.
     """
     moving = around.pose.rotate(around.velocity.vx_mps, around.velocity.vy_mps)
     start = (*moving, *_acceleration(moving, last))
     flown = around.neighbours.limited(commands)
     standing = _standing(around)
     found = np.full(len(commands), math.inf)
-    is_safe = _rest_in_time(params, around, search, strangers, standing, start, flown)
+    is_safe = _rest_in_time(params, around, search, possible, standing, start, flown)
     if is_safe.any():
         times_s = search.step_s / SUBSTEPS * np.arange(len(strangers))
         discs = np.concatenate([strangers, around.neighbours.discs(around.pose, times_s)], axis=1)
@@ -242,7 +248,12 @@ def _acceleration(velocity: Tuple[float, float], command: Tuple[float, float]) -
 
 
 def predicted_discs(
-    params: EvasionParams, around: Surroundings, tracks: Tracks, now_s: float, times_s: Floats
+    params: EvasionParams,
+    around: Surroundings,
+    tracks: Tracks,
+    now_s: float,
+    times_s: Floats,
+    recalls: bool = True,
 ) -> Floats:
     """Return where the obstacles will be that can come near within the horizon.
 
@@ -252,6 +263,7 @@ def predicted_discs(
         tracks: The moving obstacles, in the local costmap's frame.
         now_s: Present time.
         times_s: float64[t], times after now.
+        recalls: Use the memory of how obstacles have moved.
 
     Returns:
         float64[t, n, 4]: x and y relative to the robot, radius with that of the robot and the
@@ -264,7 +276,8 @@ def predicted_discs(
     reach_m = radii + (speeds + around.max_speed_mps) * float(times_s[-1])
     near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
     place = around.pose.x_m, around.pose.y_m
-    discs = predict(now.chosen(near), around.memory, times_s, place)
+    foresee = predict if recalls else extrapolate
+    discs = foresee(now.chosen(near), around.memory, times_s, place)
     discs[:, :, 2] = discs[:, :, 2] + around.radius_m + params.clearance_m
     return discs
 

@@ -56,26 +56,48 @@ def predict(
         position. The discs of periodic motions follow those of the tracks. A disc is out of reach,
         ``FAR_M`` away, at times at which nothing is known of it or another disc has its place.
     """
-    discs = np.empty((len(times_s), len(tracks), 4))
-    offsets = tracks.states[:, :2] - np.array(origin)
-    discs[:, :, :2] = offsets + times_s[:, None, None] * tracks.states[:, 2:]
-    discs[:, :, 2] = tracks.radii_m
-    position = np.trace(tracks.covariances[:, :2, :2], axis1=1, axis2=2) / 2
-    velocity = np.trace(tracks.covariances[:, 2:, 2:], axis1=1, axis2=2) / 2
-    growth = np.clip(np.sqrt(velocity), _SIGMA_MPS, _MAX_SIGMA_MPS)
-    discs[:, :, 3] = np.sqrt(position + _SIGMA_M**2) + times_s[:, None] * growth
+    discs = extrapolate(tracks, memory, times_s, origin)
     _recall(memory, tracks.numbers, times_s, discs)
     replays = memory.replay(tracks.time_s + times_s)
     if not len(replays.radii_m):
         return discs
     places, velocities = replays.places - np.array(origin), replays.velocities
     follow_replays(discs, tracks.states[:, 2:], places, velocities, times_s, _SAME, FAR_M)
-    if memory.most_repeat:
-        is_hidden = position > SEEN_M**2  # most of these are not there: they have turned
-        holds_replay = _holds_any(offsets, tracks.radii_m, places[0])
+    if memory.most_repeat:  # most of those that are hidden are not there: they have turned
+        is_hidden = _variances(tracks, 0) > SEEN_M**2
+        holds_replay = _holds_any(
+            tracks.states[:, :2] - np.array(origin), tracks.radii_m, places[0]
+        )
         discs[:, (is_hidden | holds_replay) & (discs[0, :, 0] != FAR_M), :2] = FAR_M
         forget_after(discs, times_s, _UNKNOWN_S, FAR_M)
     return np.concatenate([discs, _replayed(places, replays.radii_m, times_s)], axis=1)
+
+
+def extrapolate(
+    tracks: Tracks, memory: MotionMemory, times_s: Floats, origin: Tuple[float, float] = (0.0, 0.0)
+) -> Floats:
+    """Return where obstacles will be that do not repeat what they or others have done before.
+
+    Arguments and result are those of ``predict``, with one disc for each track.
+    """
+    discs = np.empty((len(times_s), len(tracks), 4))
+    offsets = tracks.states[:, :2] - np.array(origin)
+    discs[:, :, :2] = offsets + times_s[:, None, None] * tracks.states[:, 2:]
+    during = np.minimum(times_s, _ACCELERATES_S)
+    turned = during * (times_s - 0.5 * during)
+    for k, number in enumerate(tracks.numbers.tolist()):
+        discs[:, k, :2] += turned[:, None] * memory.acceleration(number)
+    discs[:, :, 2] = tracks.radii_m
+    growth = np.clip(np.sqrt(_variances(tracks, 2)), _SIGMA_MPS, _MAX_SIGMA_MPS)
+    discs[:, :, 3] = np.sqrt(_variances(tracks, 0) + _SIGMA_M**2) + times_s[:, None] * growth
+    return discs
+
+
+def _variances(tracks: Tracks, first: int) -> Floats:
+    """Return the mean variances of positions (0) or velocities (2) along x and y, float64[n]."""
+    parts = tracks.covariances[:, first : first + 2, first : first + 2]
+    means: Floats = np.trace(parts, axis1=1, axis2=2) / 2
+    return means
 
 
 def _holds_any(centres: Floats, radii_m: Floats, places: Floats) -> NDArray[np.bool_]:
@@ -102,14 +124,10 @@ def _replayed(places: Floats, radii_m: Floats, times_s: Floats) -> Floats:
 def _recall(
     memory: MotionMemory, numbers: NDArray[np.int64], times_s: Floats, discs: Floats
 ) -> None:
-    """Move the discs of obstacles as the memory recalls; others keep their acceleration a while."""
-    during = np.minimum(times_s, _ACCELERATES_S)
-    turned = during * (times_s - 0.5 * during)
+    """Move the discs of obstacles that the memory recalls."""
     for k, number in enumerate(numbers.tolist()):
         recalled = memory.recall(number, times_s)
-        if not recalled.known:
-            discs[:, k, :2] += turned[:, None] * memory.acceleration(number)
-        else:
+        if recalled.known:
             discs[:, k, :2] = discs[0, k, :2] + recalled.moves
             known = min(discs[0, k, 3], _RECALLED_SIGMA_M) + times_s * _RECALLED_SIGMA_MPS
             discs[: recalled.known, k, 3] = known[: recalled.known]
