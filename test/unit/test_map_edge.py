@@ -29,8 +29,7 @@ def navigator_with(costmap=None, **fixes):
     """A navigator before a wall across its map, from y = 0.5 m up: only the edge is free."""
     tree = {"global_costmap": {**TREE, **(costmap or {})}, "fixes": fixes}
     navigator = build_navigator(load(tree))
-    if costmap is None:
-        navigator.global_costmap.costs[5:, 50] = LETHAL
+    navigator.global_costmap.costs[5:, 50] = LETHAL
     return navigator
 
 

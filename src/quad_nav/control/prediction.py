@@ -76,7 +76,7 @@ def predict(
 def extrapolate(
     tracks: Tracks, memory: MotionMemory, times_s: Floats, origin: Tuple[float, float] = (0.0, 0.0)
 ) -> Floats:
-    """Return where obstacles will be that do not repeat what they or others have done before.
+    """Return where obstacles will be by their acceleration and velocity alone.
 
     Arguments and result are those of ``predict``, with one disc for each track.
     """
