@@ -52,7 +52,7 @@ def tracks(*states):
 
 
 def test_discs_move_on_with_their_velocity_and_uncertainty():
-    discs = predicted_discs(ON, around(), tracks([3.0, 1.0, -1.0, 0.0]), 10.5, TIMES_S)
+    discs, _ = predicted_discs(ON, around(), tracks([3.0, 1.0, -1.0, 0.0]), 10.5, TIMES_S)
     assert discs.shape == (61, 1, 4)  # 6 s, five times in each step of 0.5 s
     np.testing.assert_allclose(discs[0, 0, :3], [2.5, 1.0, 0.85])
     np.testing.assert_allclose(discs[20, 0, :3], [0.5, 1.0, 0.85])
@@ -68,7 +68,8 @@ def test_motions_that_repeat_are_predicted_for_longer():
 def test_obstacles_out_of_reach_have_no_discs():
     # within 6 s: 0.85 m of radii, 6 m of its own way and 3 m of the robot's
     near, far = [9.8, 0.0, -1.0, 0.0], [9.9, 0.0, -1.0, 0.0]
-    assert predicted_discs(ON, around(), tracks(near, far), 10.0, TIMES_S).shape[1] == 1
+    found = predicted_discs(ON, around(), tracks(near, far), 10.0, TIMES_S)
+    assert [discs.shape[1] for discs in found] == [1, 1]
 
 
 def test_threat_grows_inside_and_falls_off_outside():

@@ -15,7 +15,8 @@ import pytest
 from quad_nav.kernels import jit, library
 from quad_nav.kernels.build_library import BuildError, build
 
-SOURCES = Path(__file__).resolve().parents[2] / "src"
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ROOT / "src"
 
 
 class Inner(NamedTuple):
@@ -247,12 +248,28 @@ def test_environment_chooses_numba(monkeypatch, variable, value):
     assert module is None and reason.startswith(variable)
 
 
-def test_flight_needs_no_numba_with_the_library():
-    """The library of this checkout, where it is built: `make workspace` and catkin build it."""
+WARM_UP = "from quad_nav.scenario.warm_up import fly_missions; fly_missions()"
+AMONG_PEOPLE = f"""
+from pathlib import Path
+from quad_nav.offline.run import fly
+from quad_nav.scenario.flight_setup import FlightOptions, read_setup
+scene = Path("{ROOT}/scenes/examples/walkers.yaml")
+goals = Path("{ROOT}/goals/examples/walkers")
+at_once = (("fixes/moving_obstacle_watch", 0.0),)
+fly(read_setup(FlightOptions(scene, goals, "people", at_once, time_limit_s=15.0)), ())
+"""
+
+
+@pytest.mark.parametrize("flight", [WARM_UP, AMONG_PEOPLE], ids=["warm-up", "among people"])
+def test_flight_needs_no_numba_with_the_library(flight):
+    """The library of this checkout, where it is built: `make workspace` and catkin build it.
+
+    numba would compile in flight, and the robot would fly on with its last command for seconds.
+    """
     code = (
-        "import sys; from quad_nav.kernels import jit; "
-        "print(jit._LIBRARY is not None); from quad_nav.scenario.warm_up import fly_missions; "
-        "fly_missions(); print(*jit.library_remarks()); print('numba' in sys.modules)"
+        "import sys; from quad_nav.kernels import jit\n"
+        f"print(jit._LIBRARY is not None)\n{flight}\n"
+        "print(*jit.library_remarks()); print('numba' in sys.modules)"
     )
     environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
     environment["PYTHONPATH"] = str(SOURCES)

@@ -13,7 +13,7 @@ from local_planner_cases import ORIGIN, SQUARE, WINDOW, free, line
 from quad_nav.control.dwa_critics import Critics
 from quad_nav.control.dwa_oscillation import OscillationCritic
 from quad_nav.control.dwa_planner import DwaParams, DwaPlanner
-from quad_nav.control.prediction import FAR_M, NO_DISCS, predict, rollout_discs
+from quad_nav.control.prediction import FAR_M, NO_DISCS, join_discs, predict, rollout_discs
 from quad_nav.control.rollout import Rollout
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.geometry import Twist2D
@@ -199,3 +199,12 @@ def test_a_track_with_a_periodic_motion_counts_once():
     found = predict(tracks([1.0, 0.0, 0.5, 0.0]), memory, np.array([0.0, 2.0]), (0.0, 0.0))
     np.testing.assert_allclose(found[:, 0, 0], FAR_M)
     np.testing.assert_allclose(found[:, 1, :2], [[1.0, 0.0], [1.5, 1.0]])
+
+
+def test_joined_discs_are_in_c_order():
+    # an index with a mask puts the masked axis first in memory
+    masked = np.arange(24.0).reshape(2, 3, 4)[:, np.array([True, False, True])]
+    assert not masked.flags.c_contiguous
+    joined = join_discs(masked, np.zeros((2, 1, 4)))
+    assert joined.flags.c_contiguous and joined.shape == (2, 3, 4)
+    assert joined[1, :, 0].tolist() == [12.0, 20.0, 0.0]

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
-from quad_nav.control.prediction import extrapolate, predict
+from quad_nav.control.prediction import extrapolate, join_discs, remember
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.kernels.body_response import Body, rest_s
@@ -145,14 +145,13 @@ def evade(
     """
     search = _search_of(around.max_speed_mps, around.usual_speed_mps)
     times_s = prediction_times(around.memory, search.step_s)
-    strangers = predicted_discs(params, around, tracks, now_s, times_s)
+    strangers, plain = predicted_discs(params, around, tracks, now_s, times_s)
     if not strangers.shape[1] and around.is_following and not around.is_fast:
         return wish
     commands = _commands(around.max_speed_mps, around.pose.rotate(wish.vx_mps, wish.vy_mps))
     possible = strangers
     if params.deviation_mps > 0.0:  # who turned here before may go on this time
-        plain = predicted_discs(params, around, tracks, now_s, times_s, recalls=False)
-        possible = np.concatenate([strangers, plain], axis=1)
+        possible = join_discs(strangers, plain)
     found = _costs_of(commands, params, around, search, strangers, possible, route, last)
     if np.isinf(found).all():
         return Twist2D(-around.velocity.vx_mps, -around.velocity.vy_mps, wish.vyaw_radps)
@@ -187,11 +186,11 @@ def _costs_of(
     is_safe = _rest_in_time(params, around, search, possible, standing, start, flown)
     if is_safe.any():
         times_s = search.step_s / SUBSTEPS * np.arange(len(strangers))
-        discs = np.concatenate([strangers, around.neighbours.discs(around.pose, times_s)], axis=1)
+        discs = join_discs(strangers, around.neighbours.discs(around.pose, times_s))
         costs = _motion_costs(around, search, discs, standing, route)
         seconds = _polar(around.max_speed_mps, _SECOND_SPEEDS, _SECOND_COURSES)
-        found = command_costs(search, _BODY, discs, standing, costs, start, flown, seconds)
-        found[~is_safe] = math.inf
+        safe = flown[is_safe]
+        found[is_safe] = command_costs(search, _BODY, discs, standing, costs, start, safe, seconds)
     return found
 
 
@@ -248,13 +247,8 @@ def _acceleration(velocity: Tuple[float, float], command: Tuple[float, float]) -
 
 
 def predicted_discs(
-    params: EvasionParams,
-    around: Surroundings,
-    tracks: Tracks,
-    now_s: float,
-    times_s: Floats,
-    recalls: bool = True,
-) -> Floats:
+    params: EvasionParams, around: Surroundings, tracks: Tracks, now_s: float, times_s: Floats
+) -> Tuple[Floats, Floats]:
     """Return where the obstacles will be that can come near within the horizon.
 
     Args:
@@ -263,23 +257,24 @@ def predicted_discs(
         tracks: The moving obstacles, in the local costmap's frame.
         now_s: Present time.
         times_s: float64[t], times after now.
-        recalls: Use the memory of how obstacles have moved.
 
     Returns:
-        float64[t, n, 4]: x and y relative to the robot, radius with that of the robot and the
-        clearance, standard deviation of the position.
+        Two arrays, float64[t, n, 4]: x and y relative to the robot, radius with that of the robot
+        and the clearance, standard deviation of the position. The first is predicted with the
+        memory of how obstacles have moved, the second without it.
     """
     now = tracks.at(now_s)
     offsets = now.states[:, :2] - np.array([around.pose.x_m, around.pose.y_m])
     speeds = np.hypot(now.states[:, 2], now.states[:, 3])
     radii = now.radii_m + around.radius_m + params.clearance_m
     reach_m = radii + (speeds + around.max_speed_mps) * float(times_s[-1])
-    near = np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m
+    near = now.chosen(np.hypot(offsets[:, 0], offsets[:, 1]) <= reach_m)
     place = around.pose.x_m, around.pose.y_m
-    foresee = predict if recalls else extrapolate
-    discs = foresee(now.chosen(near), around.memory, times_s, place)
-    discs[:, :, 2] = discs[:, :, 2] + around.radius_m + params.clearance_m
-    return discs
+    plain = extrapolate(near, around.memory, times_s, place)
+    remembered = remember(plain, near, around.memory, times_s, place)
+    for discs in (remembered, plain):
+        discs[:, :, 2] = discs[:, :, 2] + around.radius_m + params.clearance_m
+    return remembered, plain
 
 
 def prediction_times(memory: MotionMemory, step_s: float) -> Floats:

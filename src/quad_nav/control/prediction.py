@@ -57,20 +57,7 @@ def predict(
         ``FAR_M`` away, at times at which nothing is known of it or another disc has its place.
     """
     discs = extrapolate(tracks, memory, times_s, origin)
-    _recall(memory, tracks.numbers, times_s, discs)
-    replays = memory.replay(tracks.time_s + times_s)
-    if not len(replays.radii_m):
-        return discs
-    places, velocities = replays.places - np.array(origin), replays.velocities
-    follow_replays(discs, tracks.states[:, 2:], places, velocities, times_s, _SAME, FAR_M)
-    if memory.most_repeat:  # most of those that are hidden are not there: they have turned
-        is_hidden = _variances(tracks, 0) > SEEN_M**2
-        holds_replay = _holds_any(
-            tracks.states[:, :2] - np.array(origin), tracks.radii_m, places[0]
-        )
-        discs[:, (is_hidden | holds_replay) & (discs[0, :, 0] != FAR_M), :2] = FAR_M
-        forget_after(discs, times_s, _UNKNOWN_S, FAR_M)
-    return np.concatenate([discs, _replayed(places, replays.radii_m, times_s)], axis=1)
+    return remember(discs, tracks, memory, times_s, origin)
 
 
 def extrapolate(
@@ -88,16 +75,45 @@ def extrapolate(
     for k, number in enumerate(tracks.numbers.tolist()):
         discs[:, k, :2] += turned[:, None] * memory.acceleration(number)
     discs[:, :, 2] = tracks.radii_m
-    growth = np.clip(np.sqrt(_variances(tracks, 2)), _SIGMA_MPS, _MAX_SIGMA_MPS)
-    discs[:, :, 3] = np.sqrt(_variances(tracks, 0) + _SIGMA_M**2) + times_s[:, None] * growth
+    growth = np.clip(np.sqrt(tracks.velocity_variances), _SIGMA_MPS, _MAX_SIGMA_MPS)
+    discs[:, :, 3] = np.sqrt(tracks.position_variances + _SIGMA_M**2) + times_s[:, None] * growth
     return discs
 
 
-def _variances(tracks: Tracks, first: int) -> Floats:
-    """Return the mean variances of positions (0) or velocities (2) along x and y, float64[n]."""
-    parts = tracks.covariances[:, first : first + 2, first : first + 2]
-    means: Floats = np.trace(parts, axis1=1, axis2=2) / 2
-    return means
+def remember(
+    extrapolated: Floats,
+    tracks: Tracks,
+    memory: MotionMemory,
+    times_s: Floats,
+    origin: Tuple[float, float],
+) -> Floats:
+    """Return extrapolated discs, moved to where the memory knows better.
+
+    Arguments and result are those of ``predict``; the discs are those of ``extrapolate``.
+    """
+    discs = extrapolated.copy()
+    _recall(memory, tracks.numbers, times_s, discs)
+    replays = memory.replay(tracks.time_s + times_s)
+    if not len(replays.radii_m):
+        return discs
+    places, velocities = replays.places - np.array(origin), replays.velocities
+    follow_replays(discs, tracks.states[:, 2:], places, velocities, times_s, _SAME, FAR_M)
+    if memory.most_repeat:  # most of those that are hidden are not there: they have turned
+        is_hidden = tracks.position_variances > SEEN_M**2
+        holds_replay = _holds_any(
+            tracks.states[:, :2] - np.array(origin), tracks.radii_m, places[0]
+        )
+        discs[:, (is_hidden | holds_replay) & (discs[0, :, 0] != FAR_M), :2] = FAR_M
+        forget_after(discs, times_s, _UNKNOWN_S, FAR_M)
+    return join_discs(discs, _replayed(places, replays.radii_m, times_s))
+
+
+def join_discs(first: Floats, second: Floats) -> Floats:
+    """Return the discs of both, float64[t, n + m, 4].
+
+    They are in C order, for which kernels are compiled: an array indexed with a mask has another.
+    """
+    return np.ascontiguousarray(np.concatenate([first, second], axis=1))
 
 
 def _holds_any(centres: Floats, radii_m: Floats, places: Floats) -> NDArray[np.bool_]:

@@ -100,7 +100,7 @@ def track_obstacle() -> None:
 
 
 def evade_obstacle() -> None:
-    """Evade an obstacle that comes every ten seconds, so that every kernel is called."""
+    """Evade an obstacle that comes every ten seconds, and its replay: every kernel is called."""
     memory = MotionMemory()
     well_seen = 1e-4 * np.eye(4)[np.newaxis]  # the memory keeps nothing else
     one = Tracks(0.0, np.array([0]), np.zeros((1, 4)), well_seen, np.array([0.3]))

@@ -114,8 +114,7 @@ class MotionMemory:
         for number in [one for one in self._trails if one not in self._places]:
             trail = self._trails.pop(number)
             self._end(trail)
-        spread = np.trace(tracks.covariances[:, :2, :2], axis1=1, axis2=2) / 2.0
-        seen = tracks.chosen(spread <= SEEN_M**2)
+        seen = tracks.chosen(tracks.position_variances <= SEEN_M**2)
         for number, state in zip(seen.numbers.tolist(), seen.states):
             self._add(number, state)
         self._periodic.add(self._now_s, seen.numbers, seen.states, seen.radii_m)

@@ -67,6 +67,21 @@ class Tracks:
     def __len__(self) -> int:
         return len(self.numbers)
 
+    @property
+    def position_variances(self) -> Floats:
+        """Mean variances of the positions along x and y, float64[n]."""
+        return self._mean_variances(0)
+
+    @property
+    def velocity_variances(self) -> Floats:
+        """Mean variances of the velocities along x and y, float64[n]."""
+        return self._mean_variances(2)
+
+    def _mean_variances(self, first: int) -> Floats:
+        along_x, along_y = (self.covariances[:, k, k] for k in (first, first + 1))
+        means: Floats = (along_x + along_y) / 2.0
+        return means
+
     def chosen(self, rows: NDArray[np.bool_]) -> Tracks:
         """Return some of the obstacles, bool[n]."""
         return Tracks(
