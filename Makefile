@@ -24,7 +24,7 @@ fly: workspace  ## Fly the mission: make fly ARGS="config:=tutorial rate:=2"
 	    echo "quad: flying without a page: NiceGUI cannot be installed"))
 	@scripts/ros_env scripts/fly $(ARGS)
 
-test: unit unit38 web lint docs rostest first-hour  ## Run every test and static check
+test: workspace unit unit38 web lint docs rostest first-hour  ## Run every test and static check
 	@echo "quad: all tests passed"
 
 unit: venv  ## The unit tests

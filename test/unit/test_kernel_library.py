@@ -255,8 +255,7 @@ from quad_nav.offline.run import fly
 from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 scene = Path("{ROOT}/scenes/examples/walkers.yaml")
 goals = Path("{ROOT}/goals/examples/walkers")
-at_once = (("fixes/moving_obstacle_watch", 0.0),)
-fly(read_setup(FlightOptions(scene, goals, "people", at_once, time_limit_s=15.0)), ())
+fly(read_setup(FlightOptions(scene, goals, "people", time_limit_s=15.0)), ())
 """
 
 
