@@ -104,6 +104,10 @@ class ScanIntake:
         if self._tracker is not None:
             self._tracker.reset()
 
+    def is_late(self, stamp_s: float, now_s: float) -> bool:
+        """Tell whether a scan with this stamp is rejected now for its age."""
+        return self._params.reject_implausible_scans and bool(self._validator.late(stamp_s, now_s))
+
     def add_scan(
         self, scan: Scan, poses: Sequence[SensorPose], received_s: float, now_s: float
     ) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import List, Sequence
+from typing import List, Optional, Sequence
 
 import rospy
 
@@ -63,6 +63,8 @@ class NavigatorLoop:
                     stalled_s,
                 )
                 rospy.rostime.wallsleep(DRAIN_S)
+                for robot in self._robots:
+                    robot.discard_late_scans()
                 self._start_s = rospy.get_time()
                 continue
             self._step(self._now_s)
@@ -116,18 +118,19 @@ class NavigatorLoop:
 class StallDetector:
     """Measure how long the clock has stopped: a stopped process, a cut link or a pause.
 
-    Messages that queued up meanwhile are old. The robots must not act on the first of them.
+    Messages that queued up meanwhile are old. The robots must not act on the first of them. What
+    comes before the clock's first step is no stop: the simulator waits for the robots.
     """
 
     def __init__(self, now_s: float) -> None:
         """Start measuring at a time of the clock."""
-        self._now_s, self._wall_s = now_s, time.monotonic()
+        self._now_s = now_s
+        self._wall_s: Optional[float] = None  # of the clock's last step
 
     def ended_after_s(self, now_s: float) -> float:
         """Return how long the clock stood still before `now_s`, in wall time; 0 until it moves."""
-        wall_s = time.monotonic()
-        stalled_s = wall_s - self._wall_s
         if now_s == self._now_s:
             return 0.0
-        self._now_s, self._wall_s = now_s, wall_s
-        return stalled_s
+        before_s, self._wall_s = self._wall_s, time.monotonic()
+        self._now_s = now_s
+        return 0.0 if before_s is None else self._wall_s - before_s

@@ -30,6 +30,8 @@ from quad_nav.topics.validation import odometry_problem
 from quad_nav.tracking.tracker import ObstacleTracker
 
 POLL_S = 0.05  # delay after which an idle navigator notices a goal
+FIRST_POSE_S = 0.5
+"""Longest wait for the first pose; then the navigator runs, and says what is missing."""
 
 
 class RobotNavigator:
@@ -62,6 +64,7 @@ class RobotNavigator:
         self._navigator = navigator = build_navigator(configuration)
         self._velocity = Twist2D()
         self._odometry_s: Optional[float] = None  # time of the last odometry message
+        self._start = NavigatorStart()
         self._transforms, self._peers = transforms, peers
         costmaps = (navigator.global_costmap, navigator.local_costmap)
         self._odometry = rospy.Subscriber(names("odom"), Odometry, self._on_odometry, queue_size=1)
@@ -100,12 +103,17 @@ class RobotNavigator:
                 self._interface.abort(error)
             self.due_s = max(min(self._navigator.next_due_s, now_s + POLL_S), now_s)
 
+    def discard_late_scans(self) -> None:
+        """Discard the scans that were queued while the clock stood still."""
+        for sensor in self._sensors:
+            sensor.discard_late()
+
     def restart(self, now_s: float) -> None:
         """Discard messages and restart all schedules after a clock jump."""
         with self._interface.lock:
             for sensor in self._sensors:
                 sensor.reset()
-            self._odometry_s = None
+            self._odometry_s, self._start = None, NavigatorStart()
             self._navigator.restart(now_s)
             self._interface.restart(now_s)
             self.due_s = now_s
@@ -133,6 +141,8 @@ class RobotNavigator:
         for costmap in (navigator.global_costmap, navigator.local_costmap):
             static_maps.place_maps(self.name, costmap, self._transforms, self._warnings)
         in_global, located = self._locate(now_s)
+        if not self._start.is_over(now_s, in_global is not None):
+            return
         peers = self._peers.near(self.number, located.in_global, navigator.peers.reach_m)
         start_s = time.perf_counter()
         tick = navigator.tick(now_s, located, self._velocity, peers, self._tracker.active_tracks)
@@ -168,3 +178,19 @@ class RobotNavigator:
     def _located_now(self) -> Tuple[float, RobotPoses]:
         now_s = rospy.get_time()
         return now_s, self._locate(now_s)[1]
+
+
+class NavigatorStart:
+    """Tell when a navigator starts: with its first pose, or a while after its first step."""
+
+    def __init__(self) -> None:
+        self._first_step_s: Optional[float] = None
+        self._is_over = False
+
+    def is_over(self, now_s: float, is_located: bool) -> bool:
+        """Return whether the navigator runs in a step at a time, with or without a pose."""
+        if self._first_step_s is None:
+            self._first_step_s = now_s
+        if is_located or now_s - self._first_step_s >= FIRST_POSE_S:
+            self._is_over = True
+        return self._is_over

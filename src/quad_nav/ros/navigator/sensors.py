@@ -90,6 +90,21 @@ class Sensor:
             self._waiting.clear()
         self.intake.reset()
 
+    def discard_late(self) -> None:
+        """Discard the waiting scans that are too old to be used, after the clock has stopped."""
+        if self.data_type != "LaserScan":
+            return
+        now_s = rospy.get_time()
+        with self._lock:
+            self._waiting = deque(
+                (
+                    (message, received_s)
+                    for message, received_s in self._waiting
+                    if not self.intake.is_late(message.header.stamp.to_sec(), now_s)
+                ),
+                maxlen=QUEUE_LENGTH,
+            )
+
     def deliver(self, transforms: Transforms) -> None:
         """Hand every message whose transforms are known to the layers.
 

@@ -1,0 +1,87 @@
+"""A clock that stops and goes on: how long it stopped, and which of the waiting scans are used."""
+
+from __future__ import annotations
+
+import pytest
+
+rospy = pytest.importorskip("rospy")
+
+from ros.fake_ros import FakeRos, deliver  # noqa: E402
+from sensor_msgs.msg import LaserScan  # noqa: E402
+
+from quad_nav.costmap.layered import CostmapParams, LayeredCostmap  # noqa: E402
+from quad_nav.costmap.observation import SourceParams  # noqa: E402
+from quad_nav.costmap.obstacle import ObstacleLayerParams  # noqa: E402
+from quad_nav.costmap.scan_intake import sinks_of  # noqa: E402
+from quad_nav.costmap.scan_validator import ScanValidatorParams  # noqa: E402
+from quad_nav.ros.navigator import loop  # noqa: E402
+from quad_nav.ros.navigator.loop import StallDetector  # noqa: E402
+from quad_nav.ros.navigator.sensors import Sensor  # noqa: E402
+from quad_nav.tracking.tracker import ObstacleTracker, TrackerParams  # noqa: E402
+
+
+@pytest.fixture
+def ros():
+    with FakeRos("/stopped_clock") as fake:
+        yield fake
+
+
+@pytest.fixture
+def wall(monkeypatch):
+    class Wall:
+        now_s = 100.0
+
+        def monotonic(self):
+            return self.now_s
+
+    wall = Wall()
+    monkeypatch.setattr(loop, "time", wall)
+    return wall
+
+
+def test_a_clock_that_stops_in_flight(wall):
+    stall = StallDetector(1.0)
+    stall.ended_after_s(1.05)
+    wall.now_s += 0.1
+    assert stall.ended_after_s(1.1) == pytest.approx(0.1)
+    wall.now_s += 2.0
+    assert stall.ended_after_s(1.1) == 0.0
+    wall.now_s += 1.0
+    assert stall.ended_after_s(1.15) == pytest.approx(3.0)
+
+
+def test_the_wait_for_the_first_step_is_no_stop(wall):
+    stall = StallDetector(1.0)
+    wall.now_s += 30.0
+    assert stall.ended_after_s(1.0) == 0.0
+    assert stall.ended_after_s(1.05) == 0.0
+
+
+def sensor_with(**params):
+    source = SourceParams("laser", data_type="LaserScan", expected_update_period_s=0.5)
+    layer = ObstacleLayerParams(sources=(source,))
+    costmap = LayeredCostmap(CostmapParams(layers=(("obstacle_layer", layer),)))
+    return Sensor(
+        "quad0",
+        "/scan0",
+        "LaserScan",
+        sinks_of([costmap]),
+        ScanValidatorParams(**params),
+        ObstacleTracker(TrackerParams(), "map"),
+    )
+
+
+def scan_stamped(stamp_s):
+    scan = LaserScan(angle_increment=0.1, range_min=0.1, range_max=10.0, ranges=[1.0, 2.0])
+    scan.header.stamp, scan.header.frame_id = rospy.Time.from_sec(stamp_s), "Lidar0"
+    return scan
+
+
+@pytest.mark.parametrize(("reject", "left"), [(True, [1.75, 2.0]), (False, [1.5, 1.75, 2.0])])
+def test_late_scans_are_discarded(ros, reject, left):
+    sensor = sensor_with(reject_implausible_scans=reject)
+    ros.set_time(2.0)
+    for stamp_s in (1.5, 1.75, 2.0):
+        deliver("/scan0", scan_stamped(stamp_s))
+    sensor.discard_late()
+    assert [message.header.stamp.to_sec() for message, _ in sensor._waiting] == left
