@@ -55,6 +55,15 @@ def pid_of(name):
         return None  # the dead node's address is still registered
 
 
+def trigger(name):
+    """Call a service without arguments, and return its message."""
+    rospy.wait_for_service(name, PATIENCE_S)
+    answer = rospy.ServiceProxy(name, Trigger)()
+    if not answer.success:
+        raise AssertionError(f"{name}: {answer.message}")
+    return answer.message
+
+
 class Latest:
     """The last message of a topic, and how many there were."""
 
@@ -128,8 +137,7 @@ class FlightCase(unittest.TestCase):
     @classmethod
     def start(cls):
         """Simulation running, odometry heard, navigators that hear goals and send results here."""
-        rospy.wait_for_service("/simulation/start", timeout=PATIENCE_S)
-        rospy.ServiceProxy("/simulation/start", Trigger)()
+        trigger("/simulation/start")
         for client in cls.clients:
             if not client.wait_for_server(rospy.Duration(PATIENCE_S)):
                 raise AssertionError(f"no action server for {client.action_client.ns}")

@@ -9,12 +9,12 @@ import rosgraph
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
-from flight_case import PATIENCE_S, FlightCase, pid_of
+from flight_case import PATIENCE_S, FlightCase, pid_of, trigger
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 from test_ros_topics import absent
 
 ROBOTS, SEPARATE = 5, 2
@@ -96,12 +96,12 @@ class Composed(FlightCase):
         self.assertLessEqual(len(scans.messages), count + 1)
         rospy.ServiceProxy("/simulation/lidar4/enable", SetBool)(True)
         self.wait(lambda: len(scans.messages) > count + 1, "scans again")
-        rospy.ServiceProxy("/simulation/pause", Trigger)()
+        trigger("/simulation/pause")
         paused_s = rospy.get_time()
         # A subscriber that comes while the simulation is paused gets the last scan.
         self.assertGreater(len(rospy.wait_for_message("/scan0", LaserScan, PATIENCE_S).ranges), 0)
         self.assertEqual(rospy.get_time(), paused_s)
-        rospy.ServiceProxy("/simulation/start", Trigger)()
+        trigger("/simulation/start")
 
     def test_5_a_killed_worker_is_started_again(self):
         pid = pid_of("/fleet1")

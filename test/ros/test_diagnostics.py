@@ -7,9 +7,9 @@ import time
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flight_case import FlightCase, goal_pose
+from flight_case import FlightCase, goal_pose, trigger
 from rosgraph_msgs.msg import Log
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 OK, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 NAVIGATORS = {f"move_base{i}: {part}" for i in (0, 1) for part in ("control", "inputs", "loop")}
@@ -81,7 +81,7 @@ class Diagnostics(FlightCase):
         self.assertEqual([new for _, new, _ in changes[:-1]], [old for old, _, _ in changes[1:]])
 
     def test_4_statuses_continue_while_the_simulation_is_paused(self):
-        rospy.ServiceProxy("/simulation/pause", Trigger)()
+        trigger("/simulation/pause")
         self.wait(lambda: self.statuses["simulator: clock"].message == "paused", "paused")
         before = len(self.arrivals)
         self.wait(lambda: len(self.arrivals) >= before + 3, "three messages more")

@@ -10,11 +10,10 @@ from pathlib import Path as File
 
 import rospy
 import rostest
-from flight_case import goal_pose
+from flight_case import goal_pose, trigger
 from geometry_msgs.msg import PoseStamped, Twist
 from move_base_msgs.msg import MoveBaseActionFeedback
 from nav_msgs.msg import Path
-from std_srvs.srv import Trigger
 from upstream_case import UpstreamCase
 
 sys.path.insert(1, str(File(__file__).resolve().parents[1]))
@@ -68,7 +67,7 @@ class FirstCommand(UpstreamCase):
     def return_to_start(self):
         """From there the first cycle has a valid trajectory."""
         self.rest(0)
-        rospy.ServiceProxy("/simulation/reset", Trigger)()
+        trigger("/simulation/reset")
         self.wait(lambda: self.distance(0, *START) < 0.01, "robot 0 at its start")
 
     def check(self, before, fixes, periods):

@@ -12,10 +12,10 @@ import numpy as np
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
+from flight_case import trigger
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
-from std_srvs.srv import Trigger
 
 VEHICLES = Path(__file__).resolve().parents[1] / "vehicles" / "udp_vehicles.py"
 PATIENCE_S = 60.0
@@ -79,13 +79,10 @@ class MixedVehicles(unittest.TestCase):
         self.wait(lambda: set(self.scans) == set(self.odometry) == {0, 1}, "scans and odometry")
         # Before the take-off the simulated one looks over the real one, to the wall behind.
         self.assertAlmostEqual(self.range_m(1, 0.0), 5.5, delta=0.1)
-        rospy.wait_for_service("/vehicles/take_off", PATIENCE_S)
-        response = rospy.ServiceProxy("/vehicles/take_off", Trigger)()
-        self.assertTrue(response.success, response.message)
+        trigger("/vehicles/take_off")
         self.they_see_each_other()
         self.the_simulated_one_touches_the_real_one()
-        response = rospy.ServiceProxy("/vehicles/land", Trigger)()
-        self.assertTrue(response.success, response.message)
+        trigger("/vehicles/land")
 
     def they_see_each_other(self):
         near_m = APART_M - RADIUS_M

@@ -9,10 +9,9 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from dynamic_reconfigure.client import Client
-from flight_case import FlightCase, Record, pid_of
+from flight_case import FlightCase, Record, pid_of, trigger
 from move_base_msgs.msg import MoveBaseActionResult
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 
 class Stop(FlightCase):
@@ -30,12 +29,6 @@ class Stop(FlightCase):
         for status in message.status:
             cls.statuses[status.name] = {pair.key: pair.value for pair in status.values}
 
-    def call(self, name):
-        rospy.wait_for_service(name, timeout=30.0)
-        answer = rospy.ServiceProxy(name, Trigger)()
-        self.assertTrue(answer.success, answer.message)
-        return answer.message
-
     def sent(self):
         events = [json.loads(message.data) for message in self.events.messages]
         return [one for one in events if one["event"] == "sent"]
@@ -45,7 +38,7 @@ class Stop(FlightCase):
 
     def test_a_mission_stops_stays_stopped_and_resumes(self):
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying")
-        self.assertIn("/mission/resume", self.call("/mission/stop"))
+        self.assertIn("/mission/resume", trigger("/mission/stop"))
         count = len(self.sent())
         self.wait(lambda: max(self.speed(0), self.speed(1)) < 0.05, "both hovering")
         self.wait(lambda: self.value("mission: quad1", "stopped") == "True", "the diagnostics")
@@ -55,7 +48,7 @@ class Stop(FlightCase):
         self.simulated_seconds(6.0)  # a navigator without a goal would get it again after 5 s
         self.assertEqual(len(self.sent()), count)
         self.assertLess(max(self.speed(0), self.speed(1)), 0.05)
-        self.assertIn("resumed", self.call("/mission/resume"))
+        self.assertIn("resumed", trigger("/mission/resume"))
         self.wait(lambda: min(self.speed(0), self.speed(1)) > 0.2, "both flying again")
         goals = [(one["robot"], one["goal"], one["attempt"]) for one in self.sent()[count:]]
         self.assertEqual(sorted(goals[:2]), [(0, 0, 1), (1, 0, 1)])

@@ -16,10 +16,10 @@ import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus
+from flight_case import trigger
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Empty, String
-from std_srvs.srv import Trigger
 
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.nav_messages import pose_stamped
@@ -70,10 +70,6 @@ class Vehicles(unittest.TestCase):
             self.assertLess(time.monotonic(), end_s, f"no {what}: {self.values}")
             time.sleep(0.02)
 
-    def call(self, name):
-        rospy.wait_for_service(name, PATIENCE_S)
-        return rospy.ServiceProxy(name, Trigger)()
-
     def speed(self, number):
         twist = self.odometry[number].twist.twist.linear
         return math.hypot(twist.x, twist.y)
@@ -111,8 +107,7 @@ class Vehicles(unittest.TestCase):
         self.assertEqual(self.states[1], "flying")
 
     def somebody_resumes_it(self):
-        response = self.call("/vehicle0/resume")
-        self.assertTrue(response.success, response.message)
+        trigger("/vehicle0/resume")
         self.wait(lambda: not rospy.get_param("/mission/quad0/stopped"), "mission of quad0")
         self.wait(lambda: self.states[0] == "flying" and self.speed(0) > 0.2, "flight again")
 
@@ -142,7 +137,7 @@ class Vehicles(unittest.TestCase):
         return client.get_state(), client.get_goal_status_text()
 
     def actions_take_off_and_land(self):
-        self.call("/mission/quad0/stop")
+        trigger("/mission/quad0/stop")
         self.wait(lambda: self.states[0] in ("ready", "landed"), "readiness of vehicle 0")
         client, _ = self.act(
             "take_off", target_pose=pose_stamped(Pose3D(0, 0, 3), "odom0", rospy.Time())

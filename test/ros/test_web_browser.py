@@ -8,9 +8,8 @@ from pathlib import Path
 import psutil
 import rospy
 import rostest
-from flight_case import FlightCase, pid_of
+from flight_case import FlightCase, pid_of, trigger
 from playwright.sync_api import expect
-from std_srvs.srv import Trigger
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test" / "web"))
@@ -45,11 +44,6 @@ class WebBrowser(FlightCase):
         token = rospy.get_param("/web/steer_token")
         return f"http://127.0.0.1:{rospy.get_param('/web/port')}/?token={token}"
 
-    def call(self, name):
-        """Call a service of the sequencer."""
-        answer = rospy.ServiceProxy(name, Trigger)()
-        self.assertTrue(answer.success, answer.message)
-
     def restart_node(self):
         """Kill the node, and have it restarted once the page has noticed."""
         node = psutil.Process(pid_of("/web"))
@@ -80,7 +74,7 @@ class WebBrowser(FlightCase):
         driver = self.driver
         # A goal of the mission would replace this one, on a busy machine soon after it is sent.
         self.wait(lambda: self.speed(0) > 0.2, "quad0 flying to its first goal")
-        self.call("/mission/stop")
+        trigger("/mission/stop")
         goal = 3.0, 9.0
         driver.select(0)
         driver.use_goal_tool()
@@ -90,7 +84,7 @@ class WebBrowser(FlightCase):
         self.wait(lambda: self.distance(0, *goal) < 0.5, lambda: f"{self.position(0)}, not {goal}")
         robot = "arena.fleet.robots[0]"
         driver.wait_for_arena(f"Math.hypot({robot}.x - {goal[0]}, {robot}.y - {goal[1]}) < 1.0")
-        self.call("/mission/resume")
+        trigger("/mission/resume")
         self.wait(lambda: self.speed(0) > 0.2, "quad0 flying to its first goal again")
 
     def test_3_stop_all_stops_all(self):
