@@ -103,6 +103,15 @@ class FakeService:
         FakeService.all[self.resolved_name] = self
 
 
+class FakeWall:
+    """Wall time that a test sets, in place of the module `time`."""
+
+    now_s = 100.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+
 class Lines(logging.Handler):
     """Lines that were logged."""
 

@@ -10,7 +10,7 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
-from ros.fake_ros import FakePublisher, FakeRos, deliver, subscribed  # noqa: E402
+from ros.fake_ros import FakePublisher, FakeRos, FakeWall, deliver, subscribed  # noqa: E402
 from tf2_msgs.msg import TFMessage  # noqa: E402
 
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw  # noqa: E402
@@ -47,14 +47,7 @@ def ros():
 @pytest.fixture
 def wall(monkeypatch):
     """Wall time of the choice between topics; its worker threads are joined at each check."""
-
-    class Wall:
-        now_s = 100.0
-
-        def monotonic(self):
-            return self.now_s
-
-    wall = Wall()
+    wall = FakeWall()
     monkeypatch.setattr(state_topics, "time", wall)
     return wall
 

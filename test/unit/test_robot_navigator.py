@@ -63,3 +63,10 @@ def test_it_does_not_wait_longer_than_half_a_second(ros, robot):
     step(ros, robot, 1.0)
     step(ros, robot, 1.5)
     assert ros.log.lines == NOT_UPDATED
+
+
+def test_it_does_not_wait_after_a_clock_jump(ros, robot):
+    step(ros, robot, 1.0)
+    robot.restart(0.8)
+    step(ros, robot, 0.8)
+    assert ros.log.lines == NOT_UPDATED

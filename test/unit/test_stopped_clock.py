@@ -6,7 +6,7 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
-from ros.fake_ros import FakeRos, deliver  # noqa: E402
+from ros.fake_ros import FakeRos, FakeWall, deliver  # noqa: E402
 from sensor_msgs.msg import LaserScan  # noqa: E402
 
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap  # noqa: E402
@@ -28,13 +28,7 @@ def ros():
 
 @pytest.fixture
 def wall(monkeypatch):
-    class Wall:
-        now_s = 100.0
-
-        def monotonic(self):
-            return self.now_s
-
-    wall = Wall()
+    wall = FakeWall()
     monkeypatch.setattr(loop, "time", wall)
     return wall
 

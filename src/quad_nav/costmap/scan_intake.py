@@ -106,7 +106,8 @@ class ScanIntake:
 
     def is_late(self, stamp_s: float, now_s: float) -> bool:
         """Tell whether a scan with this stamp is rejected now for its age."""
-        return self._params.reject_implausible_scans and bool(self._validator.late(stamp_s, now_s))
+        rejects = self._params.reject_implausible_scans
+        return rejects and bool(self._validator.late_reason(stamp_s, now_s))
 
     def add_scan(
         self, scan: Scan, poses: Sequence[SensorPose], received_s: float, now_s: float

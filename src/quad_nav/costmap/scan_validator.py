@@ -79,7 +79,7 @@ class ScanValidator:
             np.float32(0.5 * scan.range_max_m),
         )
         reason = (
-            self.late(scan.stamp_s, now_s)
+            self.late_reason(scan.stamp_s, now_s)
             or _empty(ranges, returns)
             or self._repeated(ranges, here, returns)
             or self._lost_returns(scan, here, returns)
@@ -88,8 +88,8 @@ class ScanValidator:
             self._accepted = here, len(ranges), near
         return reason
 
-    def late(self, stamp_s: float, now_s: float) -> str:
-        """Return that a scan with this stamp arrives too late now, "" if it does not."""
+    def late_reason(self, stamp_s: float, now_s: float) -> str:
+        """Return why a scan with this stamp is too old now, "" if it is not."""
         age_s, limit_s = now_s - stamp_s, self.expected_period_s
         if not 0.0 < limit_s <= age_s:
             return ""

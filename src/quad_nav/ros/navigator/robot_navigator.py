@@ -109,11 +109,15 @@ class RobotNavigator:
             sensor.discard_late()
 
     def restart(self, now_s: float) -> None:
-        """Discard messages and restart all schedules after a clock jump."""
+        """Discard messages and restart all schedules after a clock jump.
+
+        It does not wait for a pose again: a robot that flies without one has to be stopped.
+        """
         with self._interface.lock:
             for sensor in self._sensors:
                 sensor.reset()
-            self._odometry_s, self._start = None, NavigatorStart()
+            self._odometry_s = None
+            self._start.end()
             self._navigator.restart(now_s)
             self._interface.restart(now_s)
             self.due_s = now_s
@@ -194,3 +198,7 @@ class NavigatorStart:
         if is_located or now_s - self._first_step_s >= FIRST_POSE_S:
             self._is_over = True
         return self._is_over
+
+    def end(self) -> None:
+        """Wait no longer."""
+        self._is_over = True
