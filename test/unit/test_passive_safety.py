@@ -23,13 +23,13 @@ AHEAD, HOVER = [1.0, 0.0], [0.0, 0.0]
 PEOPLE = EvasionParams(True, clearance_m=0.1, speed_mps=2.0, deviation_mps=0.5)
 
 
-def rests(gap_m, command, vx_mps=0.0, deviation_mps=0.5, standing=OPEN, speed_mps=1.0):
+def rests(gap_m, command, vx_mps=0.0, deviation_mps=0.5, standing=OPEN, speed_mps=1.0, early=0):
     """An obstacle of 0.5 m, with the robot's radius, before a robot that holds 0.2 s."""
     times_s = PERIOD_S * np.arange(101)
     discs = np.tile([gap_m + 0.5, 0.0, 0.5, 0.1], (101, 1, 1))
     discs[:, 0, 0] += vx_mps * times_s
     start, commands = (speed_mps, 0.0, 0.0, 0.0), np.array([command])
-    found = rest_in_time(BODY, discs, PERIOD_S, deviation_mps, standing, start, commands, 10)
+    found = rest_in_time(BODY, discs, PERIOD_S, deviation_mps, standing, start, commands, 10, early)
     return bool(found[0])
 
 
@@ -47,6 +47,20 @@ def test_a_command_needs_the_way_to_rest_and_what_the_obstacle_may_do(
 ):
     assert rests(needed_m + 0.04, AHEAD, obstacle_mps, deviation_mps)
     assert not rests(needed_m - 0.04, AHEAD, obstacle_mps, deviation_mps)
+
+
+def test_a_robot_rests_some_time_before_an_obstacle_reaches_it():
+    """An obstacle that comes at 1 m/s may be 1.5 times 0.2 m nearer by then, one that leaves not.
+
+    Behind an obstacle that is as fast, the robot is nearest 0.25 s after it begins to brake.
+    """
+    needed_m = 0.45 + 1.5 * 0.675
+    assert rests(needed_m + 0.3 + 0.04, AHEAD, -1.0, early=10)
+    assert not rests(needed_m + 0.3 - 0.04, AHEAD, -1.0, early=10)
+    behind_m = 0.5 * 0.45 - 0.25**2
+    for early in (0, 10):
+        assert rests(behind_m + 0.02, AHEAD, 1.0, early=early)
+        assert not rests(behind_m - 0.02, AHEAD, 1.0, early=early)
 
 
 def test_a_robot_at_rest_may_be_touched():

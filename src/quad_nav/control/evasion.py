@@ -58,6 +58,7 @@ _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest sp
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _FASTER_MPS = 0.2  # above its usual speed: the robot has evaded
 _HOLD_PERIODS = 2.0  # for which a command acts; the velocity is up to a period old
+_EARLY_S = 0.3  # by which the robot rests before an obstacle reaches it
 _SPEEDS, _COURSES = 4, 24
 _SECOND_SPEEDS, _SECOND_COURSES = 2, 12
 
@@ -209,8 +210,9 @@ def _rest_in_time(
     bodies = discs - np.array([0.0, 0.0, params.clearance_m, 0.0])
     period_s = search.step_s / SUBSTEPS
     hold = max(round(_HOLD_PERIODS * around.period_s / period_s), 1)
+    early = round(_EARLY_S / period_s)
     safe: NDArray[np.bool_] = rest_in_time(
-        _BODY, bodies, period_s, params.deviation_mps, standing, start, flown, hold
+        _BODY, bodies, period_s, params.deviation_mps, standing, start, flown, hold, early
     )
     return safe
 

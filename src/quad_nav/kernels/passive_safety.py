@@ -31,10 +31,12 @@ def rest_in_time(
     start: Tuple[float, float, float, float],
     commands: NDArray[np.float64],
     hold: int,
+    early: int,
 ) -> NDArray[np.bool_]:
     """Return after which commands the robot can brake and rest before any obstacle reaches it.
 
-    Until then it comes into no standing obstacle either, or no deeper than it is.
+    Until it rests no obstacle is where the robot is, nor gets there soon after. It comes into no
+    standing obstacle either, or no deeper than it is.
 
     Args:
         body: Response of the body.
@@ -46,6 +48,7 @@ def rest_in_time(
         start: Velocity of the robot, m/s, and its acceleration, m/s^2, along x and y.
         commands: float64[c, 2], vx and vy in m/s.
         hold: The number of predictions until the robot brakes.
+        early: The number of predictions by which it rests before an obstacle gets there.
 
     Returns:
         bool[c].
@@ -60,8 +63,10 @@ def rest_in_time(
         speeds = np.sqrt(moving[2] ** 2 + moving[3] ** 2)
         for c in np.flatnonzero(rests & (speeds >= AT_REST_MPS)):
             x, y = moving[0, c], moving[1, c]
-            is_reached = _reaches(discs[k], deviation_mps * k * period_s, x, y)
-            rests[c] = not is_reached and gap_at(standing, x, y) >= deepest
+            rests[c] = gap_at(standing, x, y) >= deepest
+            for ahead in (k, min(k + early, len(discs) - 1)):
+                deviation_m = deviation_mps * period_s * ahead
+                rests[c] = rests[c] and not _reaches(discs[ahead], deviation_m, x, y)
         if k >= hold:
             flown[:] = -moving[2:4].T
             if not np.any(rests & (speeds >= AT_REST_MPS)):
