@@ -58,7 +58,7 @@ _CHANGE_S = 0.1  # cost of another command than the last one, at the greatest sp
 _WISH_S = 0.1  # by how much a command has to be better than the wish
 _FASTER_MPS = 0.2  # above its usual speed: the robot has evaded
 _HOLD_PERIODS = 2.0  # for which a command acts; the velocity is up to a period old
-_EARLY_S = 0.3  # by which the robot rests before an obstacle reaches it
+_EARLY_S = 0.25  # by which the robot rests before an obstacle reaches it
 _SPEEDS, _COURSES = 4, 24
 _SECOND_SPEEDS, _SECOND_COURSES = 2, 12
 
