@@ -11,8 +11,9 @@ costs what it gains on the way, so that a robot is fast only to get out of the w
 robot goes behind, in front, back or waits as it costs least against all obstacles together. It
 keeps the wish where nothing is much better.
 People turn, and they go around a robot that rests. With ``deviation_mps`` the robot flies only
-commands after which it can rest before an obstacle reaches it that leaves its prediction, and
-brakes if there is none: passive safety. It holds for predictions with and without the memory.
+commands after which it can rest before an obstacle reaches it that leaves its prediction, some
+time early, and brakes if there is none: passive safety. It holds for predictions with and without
+the memory.
 Peers are in the way as well: commands are judged as the robot's Voronoi cell will leave them, and
 peers are expected to keep their velocities.
 
