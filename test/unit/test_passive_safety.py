@@ -117,6 +117,16 @@ def test_a_robot_that_cannot_rest_in_time_brakes():
     assert (command.vx_mps, command.vy_mps) == (-1.5, 0.5)
 
 
+def test_a_robot_brakes_rather_than_evade_at_the_last_moment():
+    """A person comes at 1 m/s, 0.9 m from the hull of a robot at 0.5 m/s.
+
+    After an evasion backwards it would rest just in time, but not 0.25 s before.
+    """
+    wish = Twist2D(vx_mps=0.5)
+    command = command_of(PEOPLE, person(1.5, 0.0, -1.0, 0.0), wish, wish)
+    assert (command.vx_mps, command.vy_mps) == (-0.5, 0.0)
+
+
 def test_a_slower_control_cycle_needs_more_room():
     """A person stands 0.8 m ahead of the hull, the robot flies at 0.5 m/s.
 
