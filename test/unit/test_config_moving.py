@@ -21,7 +21,10 @@ def parameters(name):
 @pytest.mark.parametrize(
     "name, differences",
     [
-        ("people", {"fixes/moving_obstacle_deviation", "fixes/moving_obstacle_evasion_speed"}),
+        (
+            "people",
+            {"fixes/moving_obstacle_max_acceleration", "fixes/moving_obstacle_evasion_speed"},
+        ),
         (
             "dynabarn",
             {

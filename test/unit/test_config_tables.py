@@ -28,7 +28,7 @@ from quad_nav.config.tables.recoveries import (
 )
 from quad_nav.config.tables.trajectory_planner import TRAJECTORY_PLANNER_TABLE
 from quad_nav.control.dwa_planner import DwaParams
-from quad_nav.control.evasion import EvasionParams
+from quad_nav.control.surroundings import EvasionParams
 from quad_nav.control.trajectory_planner import TrajectoryPlannerParams
 from quad_nav.costmap.inflation import InflationLayerParams
 from quad_nav.costmap.layered import CostmapParams

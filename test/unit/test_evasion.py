@@ -9,13 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from quad_nav.control.evasion import (
-    EvasionParams,
-    Surroundings,
-    evade,
-    predicted_discs,
-    prediction_times,
-)
+from quad_nav.control.evasion import evade, predicted_discs, prediction_times
+from quad_nav.control.surroundings import EvasionParams, Surroundings
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import INSCRIBED, LETHAL, GridSpec
 from quad_nav.kernels.evasion_commands import Body, command_costs
@@ -52,7 +47,7 @@ def tracks(*states):
 
 
 def test_discs_move_on_with_their_velocity_and_uncertainty():
-    discs, _ = predicted_discs(ON, around(), tracks([3.0, 1.0, -1.0, 0.0]), 10.5, TIMES_S)
+    discs = predicted_discs(ON, around(), tracks([3.0, 1.0, -1.0, 0.0]), 10.5, TIMES_S)
     assert discs.shape == (61, 1, 4)  # 6 s, five times in each step of 0.5 s
     np.testing.assert_allclose(discs[0, 0, :3], [2.5, 1.0, 0.85])
     np.testing.assert_allclose(discs[20, 0, :3], [0.5, 1.0, 0.85])
@@ -69,7 +64,7 @@ def test_obstacles_out_of_reach_have_no_discs():
     # within 6 s: 0.85 m of radii, 6 m of its own way and 3 m of the robot's
     near, far = [9.8, 0.0, -1.0, 0.0], [9.9, 0.0, -1.0, 0.0]
     found = predicted_discs(ON, around(), tracks(near, far), 10.0, TIMES_S)
-    assert [discs.shape[1] for discs in found] == [1, 1]
+    assert found.shape[1] == 1
 
 
 def test_threat_grows_inside_and_falls_off_outside():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from quad_nav.config import load
-from quad_nav.control.evasion import EvasionParams
+from quad_nav.control.surroundings import EvasionParams
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import LETHAL, GridSpec
 from quad_nav.navigator.evasion_guard import EvasionGuard, SpeedLimits, speed_limits

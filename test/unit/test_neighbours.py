@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from quad_nav.control.evasion import EvasionParams, Surroundings, evade
+from quad_nav.control.evasion import evade
 from quad_nav.control.neighbours import NO_NEIGHBOURS
+from quad_nav.control.surroundings import EvasionParams, Surroundings
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.grid import GridSpec
 from quad_nav.peers.peer import Peer

@@ -29,7 +29,7 @@ from quad_nav.config.recoveries import (
 )
 from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
 from quad_nav.config.workload import rollout_problem, size_problem
-from quad_nav.control.evasion import EvasionParams
+from quad_nav.control.surroundings import EvasionParams
 from quad_nav.costmap.layered import CostmapParams
 from quad_nav.costmap.scan_validator import ScanValidatorParams
 from quad_nav.errors import InputError

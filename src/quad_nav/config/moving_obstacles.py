@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Tuple
 
 from quad_nav.config.spec import Parameter, double, flag
-from quad_nav.control.evasion import EvasionParams
+from quad_nav.control.surroundings import EvasionParams
 from quad_nav.tracking.tracks import TrackerParams
 
 Switch = Tuple[Parameter, Tuple[type, ...]]
@@ -156,12 +156,25 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
     ),
     (
         double(
-            "moving_obstacle_deviation",
+            "moving_obstacle_max_acceleration",
             0.0,
-            "deviation_mps",
+            "acceleration_mps2",
+            "metres/s^2",
+            "Greatest acceleration of obstacles: a robot that flies sideways is at rest before an"
+            " obstacle can reach it; 0: it need not be.",
+            low=0,
+            high=100,
+        ),
+        (EvasionParams,),
+    ),
+    (
+        double(
+            "moving_obstacle_max_speed",
+            1.6,
+            "walking_mps",
             "metres/s",
-            "How fast a tracked obstacle may leave its prediction: a robot that flies sideways is"
-            " at rest before such an obstacle reaches it; 0: no limit.",
+            "Greatest speed of obstacles with moving_obstacle_max_acceleration, unless they are"
+            " faster already.",
             low=0,
             high=10,
         ),

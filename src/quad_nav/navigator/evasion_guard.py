@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.control.dwa_planner_params import DwaParams
-from quad_nav.control.evasion import EvasionParams, Surroundings, evade
+from quad_nav.control.evasion import evade
+from quad_nav.control.halted_obstacles import HaltedObstacles
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import NO_DISCS, rollout_discs
+from quad_nav.control.surroundings import EvasionParams, Surroundings
 from quad_nav.control.trajectory_planner_params import TrajectoryPlannerParams
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Twist2D, angle_difference
@@ -65,6 +67,7 @@ class EvasionGuard:
         self._costmap = local_costmap
         self._last = (0.0, 0.0)
         self._memory = MotionMemory()
+        self._halted = HaltedObstacles()
         self._watches_since_s, self._has_seen_many, self._has_watched = math.inf, False, False
         self._point: Optional[Pose2D] = None  # where a robot that follows no plan stopped
 
@@ -93,10 +96,10 @@ class EvasionGuard:
         local_from_global = poses.local_from_global
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
             return None
-        self._memory.add(tracks)
         pose, is_displaced = poses.in_local, self._is_displaced(plan, poses.in_global)
+        self._remember(tracks, pose)
         around = self._surroundings(pose, velocity, limits, plan is not None, neighbours)
-        if not len(tracks) and not is_displaced and not around.is_fast:
+        if not self._is_near(tracks) and not is_displaced and not around.is_fast:
             return self._end(tick)
         route = self._route(plan, local_from_global)
         wish = tick.command or Twist2D()
@@ -109,15 +112,24 @@ class EvasionGuard:
         tick.evades = self.is_evading = True
         return None
 
+    def _remember(self, tracks: Tracks, pose: Pose2D) -> None:
+        self._memory.add(tracks)
+        if self.params.acceleration_mps2 > 0.0:
+            self._halted.update(tracks, pose, self._costmap.spec, self._costmap.costs)
+
     def _choose(
         self, around: Surroundings, tracks: Tracks, now_s: float, route: Floats, wish: Twist2D
     ) -> Twist2D:
         pose = around.pose
-        is_evasion = len(tracks) or around.is_fast
+        is_evasion = self._is_near(tracks) or around.is_fast
         last = self._last if is_evasion else pose.rotate(wish.vx_mps, wish.vy_mps)
         command = evade(self.params, around, tracks, now_s, route, wish, last)
         self._last = pose.rotate(command.vx_mps, command.vy_mps)
         return command
+
+    def _is_near(self, tracks: Tracks) -> bool:
+        """Return whether there is anything that moves or may."""
+        return bool(len(tracks) or len(self._halted.discs))
 
     def watches(self, now_s: float, tracks: Tracks) -> bool:
         """Return whether the robot hovers before its first goal, to learn how obstacles move."""
@@ -167,6 +179,7 @@ class EvasionGuard:
             memory=self._memory,
             period_s=self.period_s,
             neighbours=neighbours,
+            halted=self._halted.discs,
         )
 
     def _turn(self, now_s: float, route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:

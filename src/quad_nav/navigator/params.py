@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from quad_nav.control.evasion import EvasionParams
+from quad_nav.control.surroundings import EvasionParams
 from quad_nav.navigator.control_supervisor import ProgressParams
 
 

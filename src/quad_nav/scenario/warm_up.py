@@ -20,7 +20,8 @@ from typing import Any, Dict, Tuple
 import numpy as np
 
 from quad_nav import config
-from quad_nav.control.evasion import EvasionParams, Surroundings, evade
+from quad_nav.control.evasion import evade
+from quad_nav.control.surroundings import EvasionParams, Surroundings
 from quad_nav.control.trajectory_planner import TrajectoryPlanner
 from quad_nav.costmap.obstacle import ObstacleLayer
 from quad_nav.costmap.scan_validator import ScanValidator
@@ -114,7 +115,7 @@ def evade_obstacle() -> None:
     costs = np.zeros(spec.shape, np.uint8)
     still = Pose2D(0.0, 0.0), Twist2D()
     around = Surroundings(spec, costs, *still, 0.3, 0.5, 0.5, False, memory, period_s=0.1)
-    params = EvasionParams(True, deviation_mps=0.5)
+    params = EvasionParams(True, acceleration_mps2=6.0)
     evade(params, around, one, one.time_s, np.zeros((1, 2)), Twist2D(), (0.0, 0.0))
 
 

@@ -1,0 +1,119 @@
+"""What a robot that evades is to keep to, what is around it, and what it can do."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
+from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.grid import GridSpec
+from quad_nav.kernels.body_response import Body
+from quad_nav.kernels.standing_obstacles import StandingObstacles, fill_gaps
+from quad_nav.tracking.motion_memory import MotionMemory
+
+Floats = NDArray[np.float64]
+
+BODY = Body(gain_per_s=25.0 / 8.0, lag_s=2.0 / 25.0, acceleration_mps2=2.0)
+"""Response of a quadcopter, as of ``sim/flight.py``."""
+_FASTER_MPS = 0.2  # above its usual speed: the robot has evaded
+
+
+@dataclass(frozen=True)
+class EvasionParams:
+    """Parameters of the evasion of moving obstacles, see ``docs/moving_obstacles.md``.
+
+    Attributes:
+        avoid_moving_obstacles: Evade tracked obstacles; False restores upstream behaviour.
+        clearance_m: Distance that the robot keeps from where obstacles are predicted.
+        glance_rad: Angle by which a robot that evades looks to both sides of its way, for what a
+            LIDAR that does not see all around hides; it turns steadily at pi.
+        watch_s: Time for which the robot hovers before its first goal, and watches three or more
+            obstacles.
+        speed_mps: Greatest speed while the robot evades; 0 for that of the local planner.
+        acceleration_mps2: Greatest acceleration of an obstacle: the robot rests before one can
+            reach it, see ``control/passive_safety.py``; 0 for no passive safety.
+        walking_mps: Greatest speed of an obstacle then, unless it is faster already.
+    """
+
+    avoid_moving_obstacles: bool = False
+    clearance_m: float = 0.1
+    glance_rad: float = 0.0
+    watch_s: float = 0.0
+    speed_mps: float = 0.0
+    acceleration_mps2: float = 0.0
+    walking_mps: float = 1.6
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The robot among its peers and what stands, in the local costmap's frame.
+
+    Attributes:
+        spec: Grid of the local costmap.
+        costs: uint8[H, W] on it.
+        pose: Pose of the robot.
+        velocity: Velocity of the robot, in its own frame.
+        radius_m: Radius of the robot.
+        max_speed_mps: Greatest speed of the robot in any direction, while it evades.
+        usual_speed_mps: Greatest speed otherwise.
+        is_following: The robot follows a plan; else it stays near a point.
+        memory: The memory of how obstacles have moved.
+        period_s: Time between two commands.
+        neighbours: The peers.
+        halted: float64[k, 3], x, y and radius of obstacles that have stopped.
+    """
+
+    spec: GridSpec
+    costs: NDArray[np.uint8]
+    pose: Pose2D
+    velocity: Twist2D
+    radius_m: float
+    max_speed_mps: float
+    usual_speed_mps: float
+    is_following: bool
+    memory: MotionMemory
+    period_s: float
+    neighbours: Neighbours = NO_NEIGHBOURS
+    halted: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def is_fast(self) -> bool:
+        """The robot is faster than the navigator expects: it has evaded."""
+        speed_mps = math.hypot(self.velocity.vx_mps, self.velocity.vy_mps)
+        return speed_mps > self.usual_speed_mps + _FASTER_MPS
+
+    def motion(self, last: Tuple[float, float]) -> Tuple[float, float, float, float]:
+        """Return the robot's velocity, m/s, and its acceleration by the last command, m/s^2.
+
+        They are along the axes of the costmap's frame, as the last command is.
+        """
+        velocity = self.pose.rotate(self.velocity.vx_mps, self.velocity.vy_mps)
+        ax, ay = (BODY.gain_per_s * (c - v) for c, v in zip(last, velocity))
+        shorten = BODY.acceleration_mps2 / max(math.hypot(ax, ay), BODY.acceleration_mps2)
+        return (*velocity, shorten * ax, shorten * ay)
+
+    def twist(self, command: Floats, vyaw_radps: float) -> Twist2D:
+        """Return a velocity along the axes of the costmap's frame, float64[2], as a command."""
+        turned = Pose2D(0.0, 0.0, -self.pose.yaw_rad).rotate(*command.tolist())
+        return Twist2D(*turned, vyaw_radps)
+
+    def standing(self) -> StandingObstacles:
+        """Return the distances from what stands in the local costmap."""
+        spec = self.spec
+        gaps = np.empty(self.costs.shape)
+        fill_gaps(self.costs, spec.resolution_m, self.radius_m, gaps)
+        x_m, y_m = spec.origin_x_m - self.pose.x_m, spec.origin_y_m - self.pose.y_m
+        return StandingObstacles(gaps, x_m, y_m, spec.resolution_m)
+
+
+def polar(max_speed_mps: float, speeds: int, courses: int) -> Floats:
+    """Return the hover and a polar grid of velocities, float64[c, 2]."""
+    angles = np.arange(courses) * (2.0 * math.pi / courses)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    steps = max_speed_mps * np.arange(1, speeds + 1) / speeds
+    return np.concatenate([np.zeros((1, 2)), *(speed * ring for speed in steps)])
