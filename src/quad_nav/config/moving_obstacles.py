@@ -175,7 +175,7 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
             "metres/s",
             "Greatest speed of obstacles with moving_obstacle_max_acceleration, unless they are"
             " faster already.",
-            low=0,
+            low=0.1,
             high=10,
         ),
         (EvasionParams,),

@@ -108,7 +108,7 @@ def _costs_of(
     steps = len(discs) // SUBSTEPS
     middle = _middle(search, steps)
     offsets = np.arange(-middle, middle + 1) * search.cell_m
-    standing = around.standing()
+    standing = around.standing
     costs = np.full((steps + 1, len(offsets), len(offsets)), math.inf)
     overlaps, to_go = overlap_costs(standing, offsets), _to_go(around, offsets, route[-1])
     fill_costs(search, discs, overlaps, to_go, costs)

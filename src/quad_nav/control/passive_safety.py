@@ -64,7 +64,7 @@ def safe_commands(
         return np.ones(len(commands), np.bool_)
     hold = max(round(hold_s / _PERIOD_S), 1)
     safe: NDArray[np.bool_] = rest_in_time(
-        BODY, reachable, _PERIOD_S, around.standing(), start, commands, hold
+        BODY, reachable, _PERIOD_S, around.standing, start, commands, hold
     )
     return safe
 

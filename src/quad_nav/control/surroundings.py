@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Tuple
 
 import numpy as np
@@ -102,8 +103,9 @@ class Surroundings:
         turned = Pose2D(0.0, 0.0, -self.pose.yaw_rad).rotate(*command.tolist())
         return Twist2D(*turned, vyaw_radps)
 
+    @cached_property
     def standing(self) -> StandingObstacles:
-        """Return the distances from what stands in the local costmap."""
+        """The distances from what stands in the local costmap."""
         spec = self.spec
         gaps = np.empty(self.costs.shape)
         fill_gaps(self.costs, spec.resolution_m, self.radius_m, gaps)
