@@ -158,7 +158,7 @@ def test_a_robot_that_cannot_rest_in_time_brakes():
 def test_a_robot_does_not_fly_off_beside_a_person_who_may_turn_back():
     """The person is 0.15 m from the hull and walks away at 0.9 m/s, the robot is at rest.
 
-    With 10 m/s^2 a person can come back faster than the robot gets away.
+    With 6 m/s^2 the robot gets away in time, with 10 m/s^2 the person can come back faster.
     """
     beside, wish = person(-0.75, 0.0, -0.9, 0.0), Twist2D(vx_mps=0.5)
     assert command_of(PEOPLE, beside, wish) is wish

@@ -1,4 +1,4 @@
-"""What a robot that evades is to keep to, what is around it, and what it can do."""
+"""What an evasion knows: its parameters, the robot, and what is around the robot."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _DEEPER_M = 0.01  # by which standing obstacles may be overlapped more than now
 
 
 class Reachable(NamedTuple):
-    """Where n obstacles can be at t times after now, robot's radius included.
+    """Where n obstacles can be at t times; radii include that of the robot.
 
     An obstacle can be where both of its discs are: it accelerates no more, and is no faster.
 
