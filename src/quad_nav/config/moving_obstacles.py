@@ -158,14 +158,14 @@ MOVING_OBSTACLES: Tuple[Switch, ...] = (
         double(
             "moving_obstacle_max_acceleration",
             0.0,
-            "acceleration_mps2",
+            "max_acceleration_mps2",
             "metres/s^2",
             "Greatest acceleration of obstacles: a robot that flies sideways is at rest before an"
             " obstacle can reach it; 0: it need not be.",
             low=0,
             high=100,
         ),
-        (EvasionParams,),
+        (EvasionParams, TrackerParams),
     ),
     (
         double(

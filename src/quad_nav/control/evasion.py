@@ -78,7 +78,7 @@ def evade(
     search = _search_of(around.max_speed_mps, around.usual_speed_mps)
     times_s = prediction_times(around.memory, search.step_s)
     discs = predicted_discs(params, around, tracks, now_s, times_s)
-    is_near = discs.shape[1] or len(around.halted)
+    is_near = discs.shape[1] or len(tracks.suspects)
     if not is_near and around.is_following and not around.is_fast:
         return wish
     discs = join_discs(discs, around.neighbours.discs(around.pose, times_s))

@@ -52,7 +52,7 @@ def safe_commands(
         commands: float64[c, 2], velocities along the axes of the same frame, m/s.
         last: The last command.
     """
-    if params.acceleration_mps2 <= 0.0:
+    if params.max_acceleration_mps2 <= 0.0:
         return np.ones(len(commands), np.bool_)
     start = around.motion(last)
     hold_s = _HOLD_PERIODS * around.period_s
@@ -83,19 +83,17 @@ def reachable_places(
         tracks: The moving obstacles now, in the local costmap's frame.
         times_s: float64[t], times after now.
     """
-    halted = around.halted
-    still = np.zeros((len(halted), 2))
-    states = np.concatenate([tracks.states, np.column_stack([halted[:, :2], still])])
+    states = np.concatenate([tracks.states, tracks.suspects[:, :4]])
     places = states[:, :2] - (around.pose.x_m, around.pose.y_m)
     speeds_mps = np.hypot(*states[:, 2:].T)
     fastest_mps = np.maximum(speeds_mps, params.walking_mps)
-    radii_m = np.append(tracks.radii_m, halted[:, 2]) + around.radius_m + _MARGIN_M
+    radii_m = np.append(tracks.radii_m, tracks.suspects[:, 4]) + around.radius_m + _MARGIN_M
     reach_m = radii_m + float(times_s[-1]) * (fastest_mps + around.max_speed_mps)
     near = np.hypot(*places.T) <= reach_m
     after_s = times_s[:, np.newaxis]
     predicted = np.empty((len(times_s), int(near.sum()), 3))
     predicted[:, :, :2] = places[near] + after_s[:, :, np.newaxis] * states[near, 2:]
-    accelerations = 0.5 * params.acceleration_mps2 * (1.0 + speeds_mps / fastest_mps)
+    accelerations = 0.5 * params.max_acceleration_mps2 * (1.0 + speeds_mps / fastest_mps)
     predicted[:, :, 2] = (radii_m + 0.5 * accelerations * after_s**2)[:, near]
     walked = (radii_m + fastest_mps * after_s)[:, near]
     return Reachable(predicted, places[near], np.ascontiguousarray(walked))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Tuple
 
@@ -36,7 +36,7 @@ class EvasionParams:
         watch_s: Time for which the robot hovers before its first goal, and watches three or more
             obstacles.
         speed_mps: Greatest speed while the robot evades; 0 for that of the local planner.
-        acceleration_mps2: Greatest acceleration of an obstacle: the robot rests before one can
+        max_acceleration_mps2: Greatest acceleration of an obstacle: the robot rests before one can
             reach it, see ``control/passive_safety.py``; 0 for no passive safety.
         walking_mps: Greatest speed of an obstacle then, unless it is faster already.
     """
@@ -46,7 +46,7 @@ class EvasionParams:
     glance_rad: float = 0.0
     watch_s: float = 0.0
     speed_mps: float = 0.0
-    acceleration_mps2: float = 0.0
+    max_acceleration_mps2: float = 0.0
     walking_mps: float = 1.6
 
 
@@ -66,7 +66,6 @@ class Surroundings:
         memory: The memory of how obstacles have moved.
         period_s: Time between two commands.
         neighbours: The peers.
-        halted: float64[k, 3], x, y and radius of obstacles that have stopped.
     """
 
     spec: GridSpec
@@ -80,7 +79,6 @@ class Surroundings:
     memory: MotionMemory
     period_s: float
     neighbours: Neighbours = NO_NEIGHBOURS
-    halted: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def is_fast(self) -> bool:

@@ -16,6 +16,8 @@ from quad_nav.kernels.jit import njit
 UNKNOWN, OCCUPIED, FREED = 0, 1, 2
 """Evidence about a point: unseen or in doubt, occupied earlier, free space earlier."""
 _MAX_SIDE_BEAMS = 64
+PROBES = 3
+"""Points of a cluster that stands that an earlier scan is asked about."""
 _STANDS = 3  # recent scans that see a point occupied, and none free: it stands
 
 
@@ -276,3 +278,45 @@ def _majority(stands: NDArray[np.bool_], starts: NDArray[np.bool_], k: int) -> b
     left = stands[k] if starts[k] else stands[before]
     right = stands[k] if starts[after] else stands[after]
     return int(left) + int(stands[k]) + int(right) >= 2
+
+
+@njit(cache=True, nogil=True)
+def find_arrived(
+    scan: ScanView,
+    earlier: EarlierScans,
+    order: Order,
+    doubts: Doubts,
+    widest: float,
+    points: NDArray[np.float64],
+    clusters: NDArray[np.int64],
+    arrived: NDArray[np.bool_],
+) -> None:
+    """Find clusters that stand and that some earlier scan saw free: they have come and stopped.
+
+    Args:
+        scan: The scan.
+        earlier: Earlier scans.
+        order: Slots to compare with.
+        doubts: Limits.
+        widest: Wider clusters have not come, metres.
+        points: float64[n, 3], as ``compare_scan`` writes them.
+        clusters: int64[m, 4], as ``find_clusters`` writes them.
+        arrived: bool[m], written.
+    """
+    n = scan.ranges.shape[0]
+    for row in range(clusters.shape[0]):
+        first, beams = clusters[row, 0], clusters[row, 1]
+        middle = (first + beams // 2) % n
+        width = beams * abs(scan.increment) * float(scan.ranges[middle])
+        arrived[row] = False
+        if clusters[row, 3] == 0 or beams < PROBES or width > widest:
+            continue
+        for i in range(order.slots.shape[0]):
+            freed = 0
+            for probe in range(PROBES):
+                k = (first + (2 * probe + 1) * beams // (2 * PROBES)) % n
+                point = (points[k, 0], points[k, 1], points[k, 2])
+                freed += _evidence(earlier, order.slots[i], scan, doubts, point) == FREED
+            if freed == PROBES:
+                arrived[row] = True
+                break

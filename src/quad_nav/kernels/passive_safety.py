@@ -15,7 +15,7 @@ from quad_nav.kernels.body_response import Body, move_bodies
 from quad_nav.kernels.jit import njit
 from quad_nav.kernels.standing_obstacles import StandingObstacles, gap_at
 
-AT_REST_MPS = 0.04
+AT_REST_MPS = 0.03
 """Speed below which a robot rests."""
 _DEEPER_M = 0.01  # by which standing obstacles may be overlapped more than now
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from quad_nav.control.dwa_planner_params import DwaParams
 from quad_nav.control.evasion import evade
-from quad_nav.control.halted_obstacles import HaltedObstacles
 from quad_nav.control.neighbours import NO_NEIGHBOURS, Neighbours
 from quad_nav.control.prediction import NO_DISCS, rollout_discs
 from quad_nav.control.surroundings import EvasionParams, Surroundings
@@ -67,7 +66,6 @@ class EvasionGuard:
         self._costmap = local_costmap
         self._last = (0.0, 0.0)
         self._memory = MotionMemory()
-        self._halted = HaltedObstacles()
         self._watches_since_s, self._has_seen_many, self._has_watched = math.inf, False, False
         self._point: Optional[Pose2D] = None  # where a robot that follows no plan stopped
 
@@ -97,9 +95,9 @@ class EvasionGuard:
         if poses.in_local is None or poses.in_global is None or local_from_global is None:
             return None
         pose, is_displaced = poses.in_local, self._is_displaced(plan, poses.in_global)
-        self._remember(tracks, pose)
+        self._memory.add(tracks)
         around = self._surroundings(pose, velocity, limits, plan is not None, neighbours)
-        if not self._is_near(tracks) and not is_displaced and not around.is_fast:
+        if not _is_near(tracks) and not is_displaced and not around.is_fast:
             return self._end(tick)
         route = self._route(plan, local_from_global)
         wish = tick.command or Twist2D()
@@ -112,24 +110,15 @@ class EvasionGuard:
         tick.evades = self.is_evading = True
         return None
 
-    def _remember(self, tracks: Tracks, pose: Pose2D) -> None:
-        self._memory.add(tracks)
-        if self.params.acceleration_mps2 > 0.0:
-            self._halted.update(tracks, pose, self._costmap.spec, self._costmap.costs)
-
     def _choose(
         self, around: Surroundings, tracks: Tracks, now_s: float, route: Floats, wish: Twist2D
     ) -> Twist2D:
         pose = around.pose
-        is_evasion = self._is_near(tracks) or around.is_fast
+        is_evasion = _is_near(tracks) or around.is_fast
         last = self._last if is_evasion else pose.rotate(wish.vx_mps, wish.vy_mps)
         command = evade(self.params, around, tracks, now_s, route, wish, last)
         self._last = pose.rotate(command.vx_mps, command.vy_mps)
         return command
-
-    def _is_near(self, tracks: Tracks) -> bool:
-        """Return whether there is anything that moves or may."""
-        return bool(len(tracks) or len(self._halted.discs))
 
     def watches(self, now_s: float, tracks: Tracks) -> bool:
         """Return whether the robot hovers before its first goal, to learn how obstacles move."""
@@ -179,7 +168,6 @@ class EvasionGuard:
             memory=self._memory,
             period_s=self.period_s,
             neighbours=neighbours,
-            halted=self._halted.discs,
         )
 
     def _turn(self, now_s: float, route: Floats, pose: Pose2D, limits: SpeedLimits) -> float:
@@ -210,6 +198,11 @@ class EvasionGuard:
         else:
             x, y = np.array([self._point.x_m]), np.array([self._point.y_m])
         return np.column_stack(local_from_global.transform(x, y))
+
+
+def _is_near(tracks: Tracks) -> bool:
+    """Return whether there is anything that moves or may."""
+    return bool(len(tracks) or len(tracks.suspects))
 
 
 def _return(command: Twist2D, point: Floats, pose: Pose2D, limits: SpeedLimits) -> Twist2D:

@@ -115,7 +115,7 @@ def evade_obstacle() -> None:
     costs = np.zeros(spec.shape, np.uint8)
     still = Pose2D(0.0, 0.0), Twist2D()
     around = Surroundings(spec, costs, *still, 0.3, 0.5, 0.5, False, memory, period_s=0.1)
-    params = EvasionParams(True, acceleration_mps2=6.0)
+    params = EvasionParams(True, max_acceleration_mps2=6.0)
     evade(params, around, one, one.time_s, np.zeros((1, 2)), Twist2D(), (0.0, 0.0))
 
 

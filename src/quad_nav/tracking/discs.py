@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.kernels.discs import fit_disc, outline_clusters
+from quad_nav.kernels.earlier_scans import ScanView
 from quad_nav.tracking.moving_points import RANGE_NOISE_M, ScanClusters
 
 Floats = NDArray[np.float64]
@@ -118,10 +120,37 @@ def fit(clusters: ScanClusters, row: int, guess: Floats, radius: Radius, is_whol
         radius: What is known of the size.
         is_whole: Both edges of the cluster are in sight.
     """
-    view, fitted = clusters.view, np.empty(6)
     first, beams = int(clusters.rows[row, 0]), int(clusters.rows[row, 1])
+    return _fit(clusters.view, clusters.points, (first, beams), guess, radius, is_whole)
+
+
+def fit_points(
+    clusters: ScanClusters, beams: NDArray[np.bool_], guess: Floats, radius: Radius
+) -> DiscFit:
+    """Fit the disc of a known radius to the points of some beams, as ``fit`` does.
+
+    Args:
+        clusters: Clusters of a scan.
+        beams: bool[n], beams that hit the obstacle.
+        guess: float64[2], where the centre may be.
+        radius: What is known of the size.
+    """
+    points = clusters.points[beams]
+    return _fit(clusters.view, points, (0, len(points)), guess, radius, False)
+
+
+def _fit(
+    view: ScanView,
+    points: Floats,
+    part: Tuple[int, int],
+    guess: Floats,
+    radius: Radius,
+    is_whole: bool,
+) -> DiscFit:
+    """Fit a disc to a part of the points: the first one, and their number."""
+    fitted = np.empty(6)
     noise_m = math.hypot(RANGE_NOISE_M, _SHAPE_NOISE_M)
-    fit_disc(clusters.points, first, beams, guess, radius.circle_m, noise_m, _GUESS_M, fitted)
+    fit_disc(points, *part, guess, radius.circle_m, noise_m, _GUESS_M, fitted)
     x, y, xx, yy, xy, farthest_m = fitted.tolist()
     away_x, away_y = x - float(view.origin[0]), y - float(view.origin[1])
     distance_m = max(float(np.hypot(away_x, away_y)), 1e-6)

@@ -31,6 +31,7 @@ from quad_nav.kernels.earlier_scans import (
     Order,
     ScanView,
     compare_scan,
+    find_arrived,
     find_clusters,
 )
 from quad_nav.tracking.tracks import TrackerParams
@@ -63,17 +64,44 @@ class ScanClusters:
         labels: int32[n], row of each point's cluster, -1 for none.
         rows: int64[m, 4]: first beam, number of beams, number of points in space that was free,
             and 1 if the cluster stands.
+        arrived: bool[m], clusters that stand where an earlier scan saw free space; none without
+            passive safety.
     """
 
     view: ScanView
     points: Floats
     labels: NDArray[np.int32]
     rows: NDArray[np.int64]
+    arrived: NDArray[np.bool_]
 
     def beams(self, row: int) -> NDArray[np.bool_]:
         """Return which beams hit a cluster, bool[n]."""
         mask: NDArray[np.bool_] = self.labels == row
         return mask
+
+    def sees_through(self, place: Floats, radius_m: float, behind_m: float) -> bool:
+        """Return whether the LIDAR sees what is behind the middle half of a disc.
+
+        Args:
+            place: float64[2], the middle of the disc in the fixed frame, metres.
+            radius_m: Its radius.
+            behind_m: Distance from its middle beyond which is behind it.
+        """
+        view = self.view
+        away = np.array([place[0] - view.origin[0], place[1] - view.origin[1], 0.0])
+        x_m, y_m, z_m = (view.rotation.T @ away).tolist()
+        distance_m = math.hypot(x_m, y_m)
+        if distance_m <= radius_m or abs(z_m) > LEVEL_M:
+            return False
+        n = len(view.ranges)
+        middle = (math.atan2(y_m, x_m) - view.angle_min) / view.increment
+        half = int(0.5 * math.asin(radius_m / distance_m) / abs(view.increment))
+        beams = round(middle) + np.arange(-half, half + 1)
+        if view.is_full_turn:
+            beams %= n
+        elif beams[0] < 0 or beams[-1] >= n:
+            return False
+        return bool((view.ranges[beams] > distance_m + behind_m).all())
 
 
 class MovingPoints:
@@ -124,12 +152,26 @@ class MovingPoints:
         )
         if not is_idle:
             compare_scan(view, earlier, order, is_thorough, 1, doubts, points, evidence)
+        clusters = None if is_idle else self._cut(view, points, evidence, doubts, params)
         self._keep(view, scan.stamp_s, earlier)
-        if is_idle:
-            return None
+        return clusters
+
+    def _cut(
+        self,
+        view: ScanView,
+        points: Floats,
+        evidence: NDArray[np.uint8],
+        doubts: Doubts,
+        params: TrackerParams,
+    ) -> ScanClusters:
+        count = len(points)
         labels, rows = np.empty(count, np.int32), np.empty((count, 4), np.int64)
         found = find_clusters(view, points, evidence, _INCIDENCE_RAD, RANGE_NOISE_M, labels, rows)
-        return ScanClusters(view, points, labels, rows[:found])
+        rows, arrived = rows[:found], np.zeros(found, np.bool_)
+        if params.max_acceleration_mps2 > 0.0:
+            earlier, widest_m = self._slots(count), 2.0 * params.max_radius_m
+            find_arrived(view, earlier, self._order, doubts, widest_m, points, rows, arrived)
+        return ScanClusters(view, points, labels, rows, arrived)
 
     def _slots(self, beams: int) -> EarlierScans:
         """Return the earlier scans."""

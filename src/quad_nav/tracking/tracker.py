@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 from quad_nav.geometry import Pose3D, Scan
 from quad_nav.tracking.association import assign
 from quad_nav.tracking.discs import Outlines, Radius, fit, outlines
+from quad_nav.tracking.halted_obstacles import SLOW_MPS, HaltedObstacles
 from quad_nav.tracking.kalman import Filters
-from quad_nav.tracking.moving_points import LEVEL_M, Heights, MovingPoints, ScanClusters
+from quad_nav.tracking.moving_points import Heights, MovingPoints, ScanClusters
 from quad_nav.tracking.tracks import TrackerParams, Tracks
 
 Floats = NDArray[np.float64]
@@ -34,7 +35,7 @@ FIRST_SPEED_MPS = 1.0
 """Standard deviation of each component of an obstacle's velocity when it is first seen."""
 _MIN_POINTS = 3
 _FREED_SHARE = 0.5
-_HITS = 3
+_HITS, _SUSPECT_HITS = 3, 2
 _MOVED_M = 0.12
 _SIGNIFICANT = 13.8  # chi-square, 2 degrees of freedom, 0.1 %
 _SEEN_THROUGH_S = 0.3  # patience with a track at whose place there is nothing
@@ -42,6 +43,7 @@ _RESTART_S = 1.5  # time in which a track is confirmed, or measured from another
 _TENTATIVE_S = 0.3  # patience with a track that is not confirmed
 _IN_DOUBT_S = 0.6  # time for which a track may be in space that was never seen: slivers of walls
 _BESIDE_M = 0.15
+_INNER_PART = 0.6  # of a circle: who has halted here is what the circle is, not one beside it
 _TRAIL_SCANS = 60
 _NO_CIRCLES = np.empty((0, 3))
 _NO_POINTS = np.empty((0, 3))
@@ -113,7 +115,7 @@ class ObstacleTracker:
     def _end_all(self, now_s: float) -> None:
         self._now_s = now_s
         self._lives: List[_Life] = []
-        self._filters = Filters()
+        self._filters, self._halted = Filters(), HaltedObstacles()
         self.tracks, self.unseen_s = Tracks.none(now_s), np.empty(0)
 
     def add_scan(
@@ -143,9 +145,8 @@ class ObstacleTracker:
             return None
         moving = self._points.setdefault(sensor, MovingPoints())
         now_s = scan.stamp_s
-        clusters = moving.compare(
-            scan, frame_from_sensor, heights_m, self.params, bool(self._lives)
-        )
+        is_thorough = bool(self._lives) or len(self._halted) > 0
+        clusters = moving.compare(scan, frame_from_sensor, heights_m, self.params, is_thorough)
         if clusters is None:
             if len(self.tracks):
                 self._end_all(now_s)
@@ -166,6 +167,7 @@ class ObstacleTracker:
         self._drop(now_s, {track for track, _ in pairs}, clusters, seen)
         self._begin(now_s, clusters, seen, usable, {row for _, row in pairs})
         result = self._confirm(clusters, seen)
+        self._follow_halted(now_s, clusters, seen, known_circles)
         self._tell(now_s)
         return result
 
@@ -182,8 +184,35 @@ class ObstacleTracker:
             self._states[told],
             covariances,
             np.array([self._lives[k].radius.outer_m for k in told], float),
+            self._suspects(),
         )
         self.unseen_s = np.array([now_s - self._lives[k].seen_s for k in told], float)
+
+    def _suspects(self) -> Floats:
+        """Return what may move but has no confirmed track, float64[k, 5]."""
+        if self.params.max_acceleration_mps2 <= 0.0:
+            return np.empty((0, 5))
+        halted = self._halted.rows
+        new = [
+            (*state, life.radius.outer_m)
+            for state, life in zip(self._states, self._lives)
+            if not life.is_confirmed
+            and life.hits >= _SUSPECT_HITS
+            and (np.hypot(*(halted[:, :2] - state[:2]).T) > halted[:, 4]).all()
+        ]
+        return np.concatenate([halted, np.array(new, float).reshape(-1, 5)])
+
+    def _follow_halted(
+        self, now_s: float, clusters: ScanClusters, seen: Outlines, known_circles: Floats
+    ) -> None:
+        """Follow obstacles that have stopped, until they have a track again."""
+        self._halted.follow(now_s, clusters, seen, self.params)
+        told = [life.is_confirmed and life.seen_s == now_s for life in self._lives]
+        radii_m = np.array([life.radius.circle_m for life in self._lives], float)
+        tracked = np.column_stack([self._states[told, :2], radii_m[told]])
+        others = np.concatenate([tracked, known_circles])
+        self._halted.forget(others[:, :2], _INNER_PART * others[:, 2])
+        self._halted.notice(clusters, seen, self.params, others)
 
     def _usable(
         self, clusters: ScanClusters, seen: Outlines, known_circles: Floats
@@ -210,6 +239,8 @@ class ObstacleTracker:
         self._now_s = now_s
         for x_m, y_m, radius_m in known_circles:
             away_m = np.hypot(self._states[:, 0] - x_m, self._states[:, 1] - y_m)
+            for track in np.flatnonzero(away_m <= radius_m).tolist():
+                self._halt(track, now_s)
             self._keep(away_m > radius_m)
 
     @property
@@ -251,11 +282,24 @@ class ObstacleTracker:
                 keep[track] = unseen_s <= _TENTATIVE_S
             elif self._stands(track, clusters, seen):
                 keep[track] = False
-            elif _sees_through(clusters, self._states[track], life.radius.circle_m):
+            elif self._is_seen_through(track, clusters):
                 keep[track] = unseen_s <= _SEEN_THROUGH_S
             else:
                 keep[track] = unseen_s <= self.params.lost_after_s
+            if not keep[track]:
+                self._halt(track, now_s)
         self._keep(keep)
+
+    def _is_seen_through(self, track: int, clusters: ScanClusters) -> bool:
+        radius_m = self._lives[track].radius.circle_m
+        return clusters.sees_through(self._states[track, :2], radius_m, radius_m)
+
+    def _halt(self, track: int, now_s: float) -> None:
+        """Follow the obstacle of a track that ends, if it has stopped."""
+        life, speed_mps = self._lives[track], math.hypot(*self._states[track, 2:])
+        if self.params.max_acceleration_mps2 > 0.0 and life.is_confirmed and speed_mps < SLOW_MPS:
+            noise = self._filters.covariances[track, :2, :2]
+            self._halted.add(self._states[track, :2], noise, life.radius, now_s)
 
     def _stands(self, track: int, clusters: ScanClusters, seen: Outlines) -> bool:
         """Return whether a track that was not seen has become a standing cluster."""
@@ -335,22 +379,3 @@ class ObstacleTracker:
         if not keep.all():
             self._lives = [life for life, is_kept in zip(self._lives, keep) if is_kept]
             self._filters.keep(keep)
-
-
-def _sees_through(clusters: ScanClusters, state: Floats, radius_m: float) -> bool:
-    """Return whether the LIDAR sees what is behind the middle half of a disc."""
-    view = clusters.view
-    away = np.array([state[0] - view.origin[0], state[1] - view.origin[1], 0.0])
-    x_m, y_m, z_m = (view.rotation.T @ away).tolist()
-    distance_m = math.hypot(x_m, y_m)
-    if distance_m <= radius_m or abs(z_m) > LEVEL_M:
-        return False
-    n = len(view.ranges)
-    middle = (math.atan2(y_m, x_m) - view.angle_min) / view.increment
-    half = int(0.5 * math.asin(radius_m / distance_m) / abs(view.increment))
-    beams = round(middle) + np.arange(-half, half + 1)
-    if view.is_full_turn:
-        beams %= n
-    elif beams[0] < 0 or beams[-1] >= n:
-        return False
-    return bool((view.ranges[beams] > distance_m + radius_m).all())

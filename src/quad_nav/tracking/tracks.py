@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ class TrackerParams:
         acceleration_mps2: Standard deviation of the obstacles' accelerations.
         lost_after_s: Time for which an obstacle that is hidden is predicted.
         margin_m: A point moves if it is inside space that was free, by so much.
+        max_acceleration_mps2: Greatest acceleration of an obstacle for passive safety; above 0
+            what may walk on or in is told as well, see ``Tracks.suspects``.
     """
 
     track_moving_obstacles: bool = False
@@ -33,6 +35,7 @@ class TrackerParams:
     acceleration_mps2: float = 1.5
     lost_after_s: float = 1.5
     margin_m: float = 0.12
+    max_acceleration_mps2: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Tracks:
         states: float64[n, 4]: x and y, m, and their velocities, m/s, in one fixed frame.
         covariances: float64[n, 4, 4] of the states.
         radii_m: float64[n], radii of the discs that hold the obstacles.
+        suspects: float64[k, 5], rows x, y, vx, vy and radius of what is no track, but may move:
+            obstacles that have stopped, and what moves for the first time.
     """
 
     time_s: float
@@ -52,6 +57,7 @@ class Tracks:
     states: Floats
     covariances: Floats
     radii_m: Floats
+    suspects: Floats = field(default_factory=lambda: np.empty((0, 5)))
 
     @classmethod
     def none(cls, time_s: float) -> Tracks:
@@ -84,12 +90,12 @@ class Tracks:
 
     def chosen(self, rows: NDArray[np.bool_]) -> Tracks:
         """Return some of the obstacles, bool[n]."""
-        return Tracks(
-            self.time_s,
-            self.numbers[rows],
-            self.states[rows],
-            self.covariances[rows],
-            self.radii_m[rows],
+        return replace(
+            self,
+            numbers=self.numbers[rows],
+            states=self.states[rows],
+            covariances=self.covariances[rows],
+            radii_m=self.radii_m[rows],
         )
 
     def at(self, time_s: float) -> Tracks:
@@ -99,20 +105,32 @@ class Tracks:
         """
         step = np.eye(4)
         step[0, 2] = step[1, 3] = time_s - self.time_s
-        return Tracks(
-            time_s,
-            self.numbers,
-            self.states @ step.T,
-            step @ self.covariances @ step.T,
-            self.radii_m,
+        suspects = self.suspects.copy()
+        suspects[:, :4] = suspects[:, :4] @ step.T
+        return replace(
+            self,
+            time_s=time_s,
+            states=self.states @ step.T,
+            covariances=step @ self.covariances @ step.T,
+            suspects=suspects,
         )
 
     def transformed(self, a_from_b: Pose2D) -> Tracks:
         """Return the tracks in frame a, of tracks in frame b; neither frame moves."""
-        x, y, vx, vy = self.states.T
-        states = np.column_stack([*a_from_b.transform(x, y), *a_from_b.rotate(vx, vy)])
         turn = np.kron(
             np.eye(2), np.column_stack([a_from_b.rotate(1.0, 0.0), a_from_b.rotate(0.0, 1.0)])
         )
-        covariances = turn @ self.covariances @ turn.T
-        return Tracks(self.time_s, self.numbers, states, covariances, self.radii_m)
+        return replace(
+            self,
+            states=_transformed(a_from_b, self.states),
+            covariances=turn @ self.covariances @ turn.T,
+            suspects=np.column_stack(
+                [_transformed(a_from_b, self.suspects[:, :4]), self.suspects[:, 4]]
+            ),
+        )
+
+
+def _transformed(a_from_b: Pose2D, states: Floats) -> Floats:
+    """Return states in frame a, float64[n, 4], of states in frame b."""
+    x, y, vx, vy = states.T
+    return np.column_stack([*a_from_b.transform(x, y), *a_from_b.rotate(vx, vy)])
