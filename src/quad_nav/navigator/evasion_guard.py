@@ -97,7 +97,7 @@ class EvasionGuard:
         pose, is_displaced = poses.in_local, self._is_displaced(plan, poses.in_global)
         self._memory.add(tracks)
         around = self._surroundings(pose, velocity, limits, plan is not None, neighbours)
-        if not _is_near(tracks) and not is_displaced and not around.is_fast:
+        if not tracks.any_may_move and not is_displaced and not around.is_fast:
             return self._end(tick)
         route = self._route(plan, local_from_global)
         wish = tick.command or Twist2D()
@@ -114,7 +114,7 @@ class EvasionGuard:
         self, around: Surroundings, tracks: Tracks, now_s: float, route: Floats, wish: Twist2D
     ) -> Twist2D:
         pose = around.pose
-        is_evasion = _is_near(tracks) or around.is_fast
+        is_evasion = tracks.any_may_move or around.is_fast
         last = self._last if is_evasion else pose.rotate(wish.vx_mps, wish.vy_mps)
         command = evade(self.params, around, tracks, now_s, route, wish, last)
         self._last = pose.rotate(command.vx_mps, command.vy_mps)
@@ -198,11 +198,6 @@ class EvasionGuard:
         else:
             x, y = np.array([self._point.x_m]), np.array([self._point.y_m])
         return np.column_stack(local_from_global.transform(x, y))
-
-
-def _is_near(tracks: Tracks) -> bool:
-    """Return whether there is anything that moves or may."""
-    return bool(len(tracks) or len(tracks.suspects))
 
 
 def _return(command: Twist2D, point: Floats, pose: Pose2D, limits: SpeedLimits) -> Twist2D:

@@ -177,7 +177,10 @@ class StateMachine:
             self.control.restart_timers(tick.now_s)
 
     def _neighbours(self, poses: RobotPoses, velocity: Twist2D) -> Neighbours:
-        if poses.in_global is None or poses.local_from_global is None or not self.control.tracks:
+        tracks = self.control.tracks
+        if tracks is None or not tracks.any_may_move:
+            return NO_NEIGHBOURS
+        if poses.in_global is None or poses.local_from_global is None:
             return NO_NEIGHBOURS
         return self._peers.neighbours(
             poses.in_global, velocity, poses.local_from_global, self._period_s

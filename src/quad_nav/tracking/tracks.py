@@ -74,6 +74,11 @@ class Tracks:
         return len(self.numbers)
 
     @property
+    def any_may_move(self) -> bool:
+        """True if there is a track or a suspect."""
+        return bool(len(self.numbers) or len(self.suspects))
+
+    @property
     def position_variances(self) -> Floats:
         """Mean variances of the positions along x and y, float64[n]."""
         return self._mean_variances(0)
