@@ -91,7 +91,8 @@ def warm_up(configuration: config.Configuration) -> None:
 
 def track_obstacle() -> None:
     """Track an obstacle that crosses free space, so that every kernel is called."""
-    tracker = ObstacleTracker(TrackerParams(track_moving_obstacles=True), "map")
+    params = TrackerParams(track_moving_obstacles=True, max_acceleration_mps2=6.0)
+    tracker = ObstacleTracker(params, "map")
     lidar = Pose3D(0.0, 0.0, 1.0)
     for step in range(12):
         ranges = np.full(256, 6.0, np.float32)
