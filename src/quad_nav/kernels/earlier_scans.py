@@ -16,8 +16,7 @@ from quad_nav.kernels.jit import njit
 UNKNOWN, OCCUPIED, FREED = 0, 1, 2
 """Evidence about a point: unseen or in doubt, occupied earlier, free space earlier."""
 _MAX_SIDE_BEAMS = 64
-PROBES = 3
-"""Points of a cluster that stands that an earlier scan is asked about."""
+_PROBES = 3  # points of a standing cluster about which an earlier scan is asked
 _STANDS = 3  # recent scans that see a point occupied, and none free: it stands
 
 
@@ -309,14 +308,14 @@ def find_arrived(
         middle = (first + beams // 2) % n
         width = beams * abs(scan.increment) * float(scan.ranges[middle])
         arrived[row] = False
-        if clusters[row, 3] == 0 or beams < PROBES or width > widest:
+        if clusters[row, 3] == 0 or beams < _PROBES or width > widest:
             continue
         for i in range(order.slots.shape[0]):
             freed = 0
-            for probe in range(PROBES):
-                k = (first + (2 * probe + 1) * beams // (2 * PROBES)) % n
+            for probe in range(_PROBES):
+                k = (first + (2 * probe + 1) * beams // (2 * _PROBES)) % n
                 point = (points[k, 0], points[k, 1], points[k, 2])
                 freed += _evidence(earlier, order.slots[i], scan, doubts, point) == FREED
-            if freed == PROBES:
+            if freed == _PROBES:
                 arrived[row] = True
                 break
