@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ TRACKS = Tracks(
     np.array([COVARIANCE, COVARIANCE]),
     np.array([0.3, 0.5]),
 )
+SUSPECTS = np.array([(1.0, 2.0, 0.0, 0.0, 0.25), (3.0, 4.0, -0.8, 0.0, 0.3)])
 
 
 def test_a_track_has_a_disc_an_ellipse_and_an_arrow_to_where_it_is_in_a_second():
@@ -46,6 +48,18 @@ def test_a_track_that_stands_has_no_arrow_and_a_hidden_one_is_paler():
     seen = next(one for one in markers if one.number == 7 and one.namespace == "disc")
     assert "velocity" not in standing
     assert standing["disc"].rgba[3] < seen.rgba[3]
+
+
+def test_a_suspect_has_a_disc_of_another_colour_and_an_arrow_if_it_moves():
+    markers = track_markers(replace(TRACKS, suspects=SUSPECTS), np.zeros(2), "map")
+    assert markers[:-3] == track_markers(TRACKS, np.zeros(2), "map")
+    still, disc, arrow = markers[-3:]
+    assert still.namespace == disc.namespace == "suspect" and [still.number, disc.number] == [0, 1]
+    assert still.kind == CYLINDER and still.size_m[:2] == (0.5, 0.5)
+    assert still.rgba[:3] != markers[0].rgba[:3]
+    assert disc.place_m[:2] == arrow.place_m[:2] == (3.0, 4.0)
+    assert (arrow.kind, arrow.number, arrow.size_m[0]) == (ARROW, 1, 0.8)
+    assert arrow.yaw_rad == pytest.approx(math.pi)
 
 
 def test_the_ellipse_is_turned_to_its_larger_axis():
@@ -76,3 +90,13 @@ def test_tracks_are_published_at_10_hz_and_once_more_when_they_end():
     tracker.tracks = Tracks.none(4.0)
     ended = [schedule.pop(4.0 + k / 40) for k in range(40)]
     assert [len(one) for one in ended if one is not None] == [0]
+
+
+def test_suspects_are_published_without_any_track_and_once_more_when_they_end():
+    tracker = ObstacleTracker(TrackerParams(True), "map")
+    schedule = TrackSchedule(tracker)
+    tracker.tracks = replace(Tracks.none(3.0), suspects=SUSPECTS)
+    assert schedule.pop(3.0) is tracker.tracks
+    tracker.tracks = Tracks.none(3.1)
+    assert schedule.pop(3.1) is tracker.tracks
+    assert schedule.pop(3.2) is None

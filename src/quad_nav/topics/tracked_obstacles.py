@@ -37,6 +37,7 @@ SIGMAS = 2.0
 
 _DISC_RGBA: Rgba = (0.95, 0.35, 0.10, 0.45)
 _HIDDEN_RGBA: Rgba = (0.95, 0.35, 0.10, 0.18)
+_SUSPECT_RGBA: Rgba = (0.95, 0.80, 0.10, 0.45)
 _ELLIPSE_RGBA: Rgba = (0.55, 0.10, 0.60, 0.40)
 _ARROW_RGBA: Rgba = (0.75, 0.10, 0.05, 0.9)
 _TEXT_RGBA: Rgba = (0.1, 0.1, 0.1, 0.9)
@@ -46,7 +47,7 @@ _SLOWEST_MPS = 0.05
 
 
 class TrackSchedule:
-    """Decides when a robot's tracks are published: at a rate, and once more when they end."""
+    """Decides when tracks and suspects are published: at a rate, and once more when they end."""
 
     def __init__(self, tracker: ObstacleTracker) -> None:
         """Publish the tracks of a tracker."""
@@ -62,7 +63,7 @@ class TrackSchedule:
     def pop(self, now_s: float) -> Optional[Tracks]:
         """Return the tracks to publish now, None if nothing is due or nothing has changed."""
         tracks = self._tracker.tracks
-        has_any = len(tracks) > 0
+        has_any = tracks.any_may_move
         if not (has_any or self._had_any) or not self._schedule.pop(now_s):
             return None
         self._had_any = has_any
@@ -72,12 +73,14 @@ class TrackSchedule:
 def track_markers(tracks: Tracks, unseen_s: NDArray[np.float64], frame: str) -> List[Marker]:
     """Return discs, arrows of the velocities, ellipses of two sigma and numbers.
 
+    Suspects have discs of another colour and arrows only.
+
     Args:
         tracks: The tracks.
         unseen_s: float64[n], times for which they have not been seen; those discs are paler.
         frame: Frame of the tracks.
     """
-    return [
+    markers = [
         marker
         for number, state, covariance, radius_m, hidden_s in zip(
             tracks.numbers.tolist(),
@@ -88,6 +91,10 @@ def track_markers(tracks: Tracks, unseen_s: NDArray[np.float64], frame: str) -> 
         )
         for marker in _markers(frame, number, state, covariance, radius_m, hidden_s > 0.0)
     ]
+    for number, (*state, radius_m) in enumerate(tracks.suspects.tolist()):
+        disc = _disc(frame, "suspect", number, state, radius_m, _SUSPECT_RGBA)
+        markers += [disc, *_arrows(frame, "suspect velocity", number, state)]
+    return markers
 
 
 def _markers(
@@ -98,25 +105,38 @@ def _markers(
     radius_m: float,
     is_hidden: bool,
 ) -> List[Marker]:
-    x_m, y_m, vx_mps, vy_mps = state
+    x_m, y_m = state[:2]
     number %= 2**31  # an int32 in the message
     rgba = _HIDDEN_RGBA if is_hidden else _DISC_RGBA
     (major_m, minor_m), turn_rad = ellipse(covariance[:2, :2])
-    disc = (2.0 * radius_m, 2.0 * radius_m, _HEIGHT_M)
     flat = (2.0 * SIGMAS * major_m, 2.0 * SIGMAS * minor_m, _ELLIPSE_M)
     text, name = (0.0, 0.0, _TEXT_M), str(number)
-    middle, top = (x_m, y_m, 0.5 * _HEIGHT_M), (x_m, y_m, _HEIGHT_M)
-    above = (x_m, y_m, _HEIGHT_M + _TEXT_M)
-    markers = [
-        Marker(frame, "disc", number, CYLINDER, middle, disc, rgba),
+    top, above = (x_m, y_m, _HEIGHT_M), (x_m, y_m, _HEIGHT_M + _TEXT_M)
+    return [
+        _disc(frame, "disc", number, state, radius_m, rgba),
         Marker(frame, "ellipse", number, CYLINDER, top, flat, _ELLIPSE_RGBA, turn_rad),
         Marker(frame, "number", number, TEXT, above, text, _TEXT_RGBA, text=name),
+        *_arrows(frame, "velocity", number, state),
     ]
+
+
+def _disc(
+    frame: str, namespace: str, number: int, state: List[float], radius_m: float, rgba: Rgba
+) -> Marker:
+    middle = (state[0], state[1], 0.5 * _HEIGHT_M)
+    size = (2.0 * radius_m, 2.0 * radius_m, _HEIGHT_M)
+    return Marker(frame, namespace, number, CYLINDER, middle, size, rgba)
+
+
+def _arrows(frame: str, namespace: str, number: int, state: List[float]) -> List[Marker]:
+    """Return the arrow of a velocity, none for what stands."""
+    x_m, y_m, vx_mps, vy_mps = state
     speed_mps = math.hypot(vx_mps, vy_mps)
-    if speed_mps > _SLOWEST_MPS:
-        arrow, turn_rad = (_ARROW_S * speed_mps, _ARROW_M, _ARROW_M), math.atan2(vy_mps, vx_mps)
-        markers.append(Marker(frame, "velocity", number, ARROW, top, arrow, _ARROW_RGBA, turn_rad))
-    return markers
+    if speed_mps <= _SLOWEST_MPS:
+        return []
+    top, turn_rad = (x_m, y_m, _HEIGHT_M), math.atan2(vy_mps, vx_mps)
+    arrow = (_ARROW_S * speed_mps, _ARROW_M, _ARROW_M)
+    return [Marker(frame, namespace, number, ARROW, top, arrow, _ARROW_RGBA, turn_rad)]
 
 
 def ellipse(covariance: NDArray[np.float64]) -> Tuple[Tuple[float, float], float]:
