@@ -50,6 +50,21 @@ def test_a_track_that_stands_has_no_arrow_and_a_hidden_one_is_paler():
     assert standing["disc"].rgba[3] < seen.rgba[3]
 
 
+def test_an_ellipse_four_times_as_wide_as_an_opaque_one_has_a_quarter_of_its_opacity():
+    """Two standard deviations of 0.15 m and 0.6 m are 0.3 m and 1.2 m."""
+    variances = np.array([np.eye(4) * sigma_m**2 for sigma_m in (0.05, 0.15, 0.6)])
+    tracks = replace(
+        TRACKS,
+        numbers=np.arange(3),
+        states=np.zeros((3, 4)),
+        covariances=variances,
+        radii_m=np.ones(3),
+    )
+    markers = track_markers(tracks, np.zeros(3), "map")
+    alphas = [one.rgba[3] for one in markers if one.namespace == "ellipse"]
+    assert alphas == pytest.approx([alphas[0], alphas[0], alphas[0] / 4.0])
+
+
 def test_a_suspect_has_a_disc_of_another_colour_and_an_arrow_if_it_moves():
     markers = track_markers(replace(TRACKS, suspects=SUSPECTS), np.zeros(2), "map")
     assert markers[:-3] == track_markers(TRACKS, np.zeros(2), "map")

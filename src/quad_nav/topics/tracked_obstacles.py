@@ -37,8 +37,9 @@ SIGMAS = 2.0
 
 _DISC_RGBA: Rgba = (0.95, 0.35, 0.10, 0.45)
 _HIDDEN_RGBA: Rgba = (0.95, 0.35, 0.10, 0.18)
-_SUSPECT_RGBA: Rgba = (0.95, 0.80, 0.10, 0.45)
-_ELLIPSE_RGBA: Rgba = (0.55, 0.10, 0.60, 0.40)
+_SUSPECT_RGBA: Rgba = (0.95, 0.75, 0.05, 0.6)
+_ELLIPSE_RGB = (0.55, 0.10, 0.60)
+_ELLIPSE_ALPHA, _ELLIPSE_OPAQUE_M = 0.40, 0.3  # wider ellipses are paler, to hide less of the scene
 _ARROW_RGBA: Rgba = (0.75, 0.10, 0.05, 0.9)
 _TEXT_RGBA: Rgba = (0.1, 0.1, 0.1, 0.9)
 _HEIGHT_M, _ELLIPSE_M, _TEXT_M, _ARROW_M = 0.5, 0.02, 0.25, 0.08
@@ -110,11 +111,13 @@ def _markers(
     rgba = _HIDDEN_RGBA if is_hidden else _DISC_RGBA
     (major_m, minor_m), turn_rad = ellipse(covariance[:2, :2])
     flat = (2.0 * SIGMAS * major_m, 2.0 * SIGMAS * minor_m, _ELLIPSE_M)
+    wide_m = max(SIGMAS * math.sqrt(major_m * minor_m), _ELLIPSE_OPAQUE_M)
+    pale: Rgba = (*_ELLIPSE_RGB, _ELLIPSE_ALPHA * _ELLIPSE_OPAQUE_M / wide_m)
     text, name = (0.0, 0.0, _TEXT_M), str(number)
     top, above = (x_m, y_m, _HEIGHT_M), (x_m, y_m, _HEIGHT_M + _TEXT_M)
     return [
         _disc(frame, "disc", number, state, radius_m, rgba),
-        Marker(frame, "ellipse", number, CYLINDER, top, flat, _ELLIPSE_RGBA, turn_rad),
+        Marker(frame, "ellipse", number, CYLINDER, top, flat, pale, turn_rad),
         Marker(frame, "number", number, TEXT, above, text, _TEXT_RGBA, text=name),
         *_arrows(frame, "velocity", number, state),
     ]
