@@ -20,7 +20,7 @@ from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 
-PATIENCE_S = 60.0  # wall time; generous, because a condition that holds ends the wait
+PATIENCE_S = 120.0  # wall time; generous, because a condition that holds ends the wait
 PUBLISHERS = ("/simulator", "/move_base0", "/move_base1")
 
 

@@ -17,7 +17,7 @@ sys.path.insert(0, str(ROOT / "test" / "web"))
 from browser import DESKTOP, Watch, chromium  # noqa: E402
 from driver import Driver  # noqa: E402
 
-PATIENCE_MS = 60000
+PATIENCE_MS = 120000
 NOTICE = ".quad-link-notice"
 SILENT = re.compile("No data for [1-9]")
 GONE = r"ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|WebSocket|Failed to load"
