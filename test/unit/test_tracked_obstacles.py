@@ -50,7 +50,7 @@ def test_a_track_that_stands_has_no_arrow_and_a_hidden_one_is_paler():
     assert standing["disc"].rgba[3] < seen.rgba[3]
 
 
-def test_an_ellipse_four_times_as_wide_as_an_opaque_one_has_a_quarter_of_its_opacity():
+def test_ellipses_beyond_0_3_m_are_paler_by_the_ratio_of_their_radii():
     """Two standard deviations of 0.15 m and 0.6 m are 0.3 m and 1.2 m."""
     variances = np.array([np.eye(4) * sigma_m**2 for sigma_m in (0.05, 0.15, 0.6)])
     tracks = replace(

@@ -39,7 +39,8 @@ _DISC_RGBA: Rgba = (0.95, 0.35, 0.10, 0.45)
 _HIDDEN_RGBA: Rgba = (0.95, 0.35, 0.10, 0.18)
 _SUSPECT_RGBA: Rgba = (0.95, 0.75, 0.05, 0.6)
 _ELLIPSE_RGB = (0.55, 0.10, 0.60)
-_ELLIPSE_ALPHA, _ELLIPSE_OPAQUE_M = 0.40, 0.3  # wider ellipses are paler, to hide less of the scene
+_ELLIPSE_ALPHA = 0.40
+_PALER_BEYOND_M = 0.3  # ellipses with a larger mean radius are paler, to hide less of the scene
 _ARROW_RGBA: Rgba = (0.75, 0.10, 0.05, 0.9)
 _TEXT_RGBA: Rgba = (0.1, 0.1, 0.1, 0.9)
 _HEIGHT_M, _ELLIPSE_M, _TEXT_M, _ARROW_M = 0.5, 0.02, 0.25, 0.08
@@ -77,9 +78,9 @@ def track_markers(tracks: Tracks, unseen_s: NDArray[np.float64], frame: str) -> 
     Suspects have discs of another colour and arrows only.
 
     Args:
-        tracks: The tracks.
-        unseen_s: float64[n], times for which they have not been seen; those discs are paler.
-        frame: Frame of the tracks.
+        tracks: The tracks and suspects.
+        unseen_s: float64[n], times for which the tracks have not been seen; those discs are paler.
+        frame: Frame of both.
     """
     markers = [
         marker
@@ -111,13 +112,13 @@ def _markers(
     rgba = _HIDDEN_RGBA if is_hidden else _DISC_RGBA
     (major_m, minor_m), turn_rad = ellipse(covariance[:2, :2])
     flat = (2.0 * SIGMAS * major_m, 2.0 * SIGMAS * minor_m, _ELLIPSE_M)
-    wide_m = max(SIGMAS * math.sqrt(major_m * minor_m), _ELLIPSE_OPAQUE_M)
-    pale: Rgba = (*_ELLIPSE_RGB, _ELLIPSE_ALPHA * _ELLIPSE_OPAQUE_M / wide_m)
+    mean_m = SIGMAS * math.sqrt(major_m * minor_m)
+    alpha = _ELLIPSE_ALPHA * _PALER_BEYOND_M / max(mean_m, _PALER_BEYOND_M)
     text, name = (0.0, 0.0, _TEXT_M), str(number)
     top, above = (x_m, y_m, _HEIGHT_M), (x_m, y_m, _HEIGHT_M + _TEXT_M)
     return [
         _disc(frame, "disc", number, state, radius_m, rgba),
-        Marker(frame, "ellipse", number, CYLINDER, top, flat, pale, turn_rad),
+        Marker(frame, "ellipse", number, CYLINDER, top, flat, (*_ELLIPSE_RGB, alpha), turn_rad),
         Marker(frame, "number", number, TEXT, above, text, _TEXT_RGBA, text=name),
         *_arrows(frame, "velocity", number, state),
     ]
