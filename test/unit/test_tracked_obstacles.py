@@ -8,13 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quad_nav.recording.messages import marker_array
 from quad_nav.topics.markers import ARROW, CYLINDER
 from quad_nav.topics.tracked_obstacles import (
     CLOUD_FIELDS,
+    TrackKind,
     TrackSchedule,
     cloud_rows,
     ellipse,
+    rows_of_markers,
     track_markers,
+    track_rows,
 )
 from quad_nav.tracking.tracker import ObstacleTracker
 from quad_nav.tracking.tracks import TrackerParams, Tracks
@@ -75,6 +79,34 @@ def test_a_suspect_has_a_disc_of_another_colour_and_an_arrow_if_it_moves():
     assert disc.place_m[:2] == arrow.place_m[:2] == (3.0, 4.0)
     assert (arrow.kind, arrow.number, arrow.size_m[0]) == (ARROW, 1, 0.8)
     assert arrow.yaw_rad == pytest.approx(math.pi)
+
+
+def test_markers_tell_the_rows_of_tracks_and_suspects():
+    known, unseen_s = replace(TRACKS, suspects=SUSPECTS), np.array([0.0, 0.4])
+    expected = [
+        (1.0, 2.0, 0.0, 1.5, 0.3, TrackKind.SEEN),
+        (4.0, 5.0, 0.0, 0.0, 0.5, TrackKind.HIDDEN),
+        (1.0, 2.0, 0.0, 0.0, 0.25, TrackKind.SUSPECT),
+        (3.0, 4.0, -0.8, 0.0, 0.3, TrackKind.SUSPECT),
+    ]
+    assert track_rows(known, unseen_s).tolist() == [list(map(float, row)) for row in expected]
+    shown = marker_array(track_markers(known, unseen_s, "odom0"), replaces_all=True)
+    frame, rows = rows_of_markers(shown.markers)
+    assert frame == "odom0" and rows == pytest.approx(np.array(expected))
+
+
+def test_markers_without_tracks_have_no_frame_and_no_rows():
+    frame, rows = rows_of_markers(marker_array([], replaces_all=True).markers)
+    assert (
+        (frame, rows.shape) == ("", (0, 6)) == ("", track_rows(Tracks.none(0.0), np.empty(0)).shape)
+    )
+
+
+def test_a_marker_that_is_nowhere_is_refused():
+    shown = marker_array(track_markers(TRACKS, np.zeros(2), "map"))
+    shown.markers[0].pose.position.x = math.nan
+    with pytest.raises(ValueError, match="marker disc 7: .*; expected finite numbers"):
+        rows_of_markers(shown.markers)
 
 
 def test_the_ellipse_is_turned_to_its_larger_axis():

@@ -37,6 +37,7 @@ from quad_nav.view.items import (
     robots_item,
     scan_item,
     scene_item,
+    track_item,
 )
 from quad_nav.view.rows import (
     contacts_item,
@@ -202,6 +203,14 @@ def test_trails_keep_spaced_points():
     assert trail.arrays["points"][:, 0].tolist() == [1.0 + k for k in range(TRAIL_POINTS)]
     trails.clear()
     assert trails.items([3]) == []
+
+
+def test_tracks_and_their_velocities_are_turned_into_map():
+    """The frame is at (1, 2), and its x axis is the map's y axis."""
+    item = track_item(3, [(4.0, 0.0, 0.5, 0.0, 0.3, 2.0)], Pose2D(1.0, 2.0, math.pi / 2))
+    assert item.key == "track/3" and item.arrays["rows"].dtype == np.float32
+    assert item.arrays["rows"][0].tolist() == pytest.approx([1.0, 6.0, 0.0, 0.5, 0.3, 2.0])
+    assert track_item(0, np.empty((0, 6))).arrays["rows"].shape == (0, 6)
 
 
 def test_cell_ends_half_way_less_the_safety_radius():

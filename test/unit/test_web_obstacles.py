@@ -1,4 +1,4 @@
-"""Moving obstacles as the node of the page hears of them."""
+"""Moving obstacles, and what robots track, as the node of the page hears of them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ import pytest
 
 rospy = pytest.importorskip("rospy")
 
-from quad_nav.ros.common.conversions import marker_array  # noqa: E402
+from quad_nav.geometry import Pose3D, quaternion_from_yaw  # noqa: E402
+from quad_nav.ros.common.conversions import marker_array, replacing_markers  # noqa: E402
+from quad_nav.ros.web.layers import TrackIntake  # noqa: E402
 from quad_nav.ros.web.obstacles import Obstacles  # noqa: E402
 from quad_nav.sim.motion import Motion, Walkers  # noqa: E402
 from quad_nav.sim.movers import Movers  # noqa: E402
 from quad_nav.sim.scene import Box, MovingObstacle, Scene, Walls  # noqa: E402
 from quad_nav.topics.markers import OBSTACLES_TOPIC, moving_markers, moving_poses  # noqa: E402
+from quad_nav.topics.tracked_obstacles import track_markers  # noqa: E402
+from quad_nav.tracking.tracks import Tracks  # noqa: E402
 
 CART = MovingObstacle(
     Box("cart", 1.0, 6.0, 1.0, 0.5, 2.0), Motion((0.0, 10.0), ((1.0, 6.0, -3.0), (5.0, 6.0, -3.0)))
@@ -24,11 +28,30 @@ STREET = Scene("street", 10.0, 8.0, 1.0, Walls(), (), (), moving=(CART,), walker
 EMPTY = Scene("empty", 10.0, 8.0, 1.0, Walls(), (), ())
 
 
+TRACKS = Tracks(
+    3.0, np.array([7]), np.array([(1.0, 0.0, 0.5, 0.0)]), np.eye(4)[None], np.array([0.3])
+)
+
+
+class FakeFrames:
+    """Knows where ``odom0`` is in ``map`` once it is told."""
+
+    def __init__(self) -> None:
+        self.map_from_odom = None
+
+    def find(self, to_frame, from_frame):
+        assert (to_frame, from_frame) in (("map", "odom0"), ("map", "map"))
+        return Pose3D(0.0, 0.0, 0.0) if from_frame == "map" else self.map_from_odom
+
+
 def hear(obstacles: Obstacles, message) -> None:
     """Give it a message as rospy does, which has its bytes only."""
+    deliver(obstacles.topics(STREET)[OBSTACLES_TOPIC], message)
+
+
+def deliver(topic, message) -> None:
     buffer = io.BytesIO()
     message.serialize(buffer)
-    topic = obstacles.topics(STREET)[OBSTACLES_TOPIC]
     topic.callback(topic.message_type().deserialize(buffer.getvalue()))
 
 
@@ -70,3 +93,33 @@ def test_markers_that_are_no_obstacles_are_dropped(number, x_m):
     message.markers[0].id, message.markers[0].pose.position.x = number, x_m
     hear(obstacles, message)
     assert obstacles.items(STREET) == obstacles.solids() == []
+
+
+def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
+    """odom0 is at (2, 1) in map and turned by 90 degrees."""
+    frames = FakeFrames()
+    tracked = TrackIntake(0, frames)
+    ((name, topic),) = tracked.topics().items()
+    assert name == "/move_base0/moving_obstacles" and tracked.item() is None
+    shown = replacing_markers(track_markers(TRACKS, np.zeros(1), "odom0"))
+    deliver(topic, shown)
+    assert tracked.item() is None  # nobody has said where odom0 is
+    frames.map_from_odom = Pose3D(2.0, 1.0, 0.0, quaternion_from_yaw(math.pi / 2))
+    deliver(topic, shown)
+    item = tracked.item()
+    assert item.key == "track/0"
+    (row,) = item.arrays["rows"].tolist()
+    assert row == pytest.approx([2.0, 2.0, 0.0, 0.5, 0.3, 0.0])
+    assert tracked.item() is None
+    deliver(topic, replacing_markers([]))
+    assert tracked.item().arrays["rows"].shape == (0, 6)
+
+
+def test_tracks_that_are_nowhere_are_refused():
+    tracked = TrackIntake(0, FakeFrames())
+    (topic,) = tracked.topics().values()
+    message = replacing_markers(track_markers(TRACKS, np.zeros(1), "map"))
+    message.markers[1].scale.x = math.inf
+    deliver(topic, message)
+    with pytest.raises(ValueError, match="marker disc 7"):
+        tracked.item()

@@ -8,7 +8,7 @@ import time
 from typing import Any, Dict, List, Optional
 
 import numpy as np
-from synthetic_scene import obstacles, scene, statuses
+from synthetic_scene import obstacles, scene, statuses, tracks
 
 from quad_nav.view.state import FleetState, Item
 
@@ -144,7 +144,9 @@ class SyntheticFleet:
                 Item("yields", {"yields": self.yields(pose)}),
             ]
         if self.has_obstacles:
-            items.append(obstacles(self.size_m, self.time_s))
+            places = obstacles(self.size_m, self.time_s)
+            wanted = [i for i in range(self.n) if self.state.is_wanted("track", i)]
+            items += [places, *(tracks(i, places) for i in wanted)]
         if self._steps % 100 == 99:
             self.touch(pose)
         self.state.put_all(items)

@@ -114,6 +114,19 @@ def obstacles(size_m: Size, time_s: float) -> Item:
     return Item("obstacles", None, {"poses": np.array([cart, person], np.float32)})
 
 
+def tracks(robot: int, places: Item) -> Item:
+    """Return what a robot tracks: the cart, the person, who is hidden, and a suspect at (6, 1).
+
+    Both go at 0.5 m/s; the person is tracked 0.1 m to the east.
+    """
+    rows = []
+    for (x_m, y_m, yaw_rad), radius_m, kind in zip(places.arrays["poses"], (0.5, 0.3), (0, 1)):
+        velocity = 0.5 * math.cos(yaw_rad), 0.5 * math.sin(yaw_rad)
+        rows.append((x_m + 0.1 * kind, y_m, *velocity, radius_m, kind))
+    rows.append((6.0, 1.0, 0.0, 0.0, 0.4, 2))
+    return Item(f"track/{robot}", None, {"rows": np.array(rows, np.float32)})
+
+
 def statuses(n: int) -> List[Dict[str, Any]]:
     """Return diagnostics: one warning, and the rest is well."""
     simulator = {"real_time_factor": "1.00", "rate": "1", "contacts": "0"}

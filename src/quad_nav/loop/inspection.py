@@ -20,8 +20,9 @@ from quad_nav.loop.navigator_group import LocatedScan, LoopRobot, NavigatorGroup
 from quad_nav.navigator.tick import State
 from quad_nav.peers.right_of_way import YieldDecision
 from quad_nav.scenario.assembly import apply_configuration
+from quad_nav.tracking.tracks import Tracks
 
-PLAN, LOCAL_PLAN, SCAN = "plan", "local_plan", "scan"
+PLAN, LOCAL_PLAN, SCAN, TRACK = "plan", "local_plan", "scan", "track"
 GLOBAL_COSTMAP, LOCAL_COSTMAP = "global_costmap", "local_costmap"
 
 Change = Callable[[NavigatorGroup], None]
@@ -35,7 +36,7 @@ class Inspection:
 
     Attributes:
         parts: Numbers of the robots by part: "plan", "local_plan", "scan", "global_costmap",
-            "local_costmap".
+            "local_costmap", "track".
     """
 
     parts: Mapping[str, FrozenSet[int]] = field(default_factory=dict)
@@ -61,6 +62,21 @@ class CostmapView:
 
 
 @dataclass(frozen=True)
+class TrackView:
+    """What a robot tracks.
+
+    Attributes:
+        tracks: Tracks and suspects, in the tracker's frame.
+        unseen_s: float64[n], times for which the tracks have not been seen.
+        map_from_frame: Pose of the frame in ``map``.
+    """
+
+    tracks: Tracks
+    unseen_s: NDArray[np.float64]
+    map_from_frame: Pose2D
+
+
+@dataclass(frozen=True)
 class NavigatorView:
     """A navigator as it is now.
 
@@ -79,6 +95,7 @@ class NavigatorView:
         local_plan: float64[n, 2], local plan in ``map``; the same.
         scan: The last scan; None without one or if not asked for.
         costmaps: The costmaps that were asked for, by part.
+        track: Tracks and suspects; None without any or if not asked for.
     """
 
     robot: int
@@ -95,6 +112,7 @@ class NavigatorView:
     local_plan: Optional[NDArray[np.float64]] = None
     scan: Optional[LocatedScan] = None
     costmaps: Mapping[str, CostmapView] = field(default_factory=dict)
+    track: Optional[TrackView] = None
 
 
 def inspect_group(group: NavigatorGroup, what: Inspection, now_s: float) -> List[NavigatorView]:
@@ -159,6 +177,7 @@ def _view(
             )
             if what.includes(part, number)
         },
+        _track(robot, now_s) if what.includes(TRACK, number) else None,
     )
 
 
@@ -182,3 +201,10 @@ def _plan(
 def _costmap(robot: LoopRobot, costmap: LayeredCostmap, now_s: float) -> CostmapView:
     frame = costmap.params.global_frame
     return CostmapView(costmap.spec, costmap.costs, robot.map_from(frame, now_s))
+
+
+def _track(robot: LoopRobot, now_s: float) -> Optional[TrackView]:
+    tracker = robot.tracker
+    if not tracker.tracks.any_may_move:
+        return None
+    return TrackView(tracker.tracks, tracker.unseen_s, robot.map_from(tracker.frame, now_s))

@@ -12,6 +12,7 @@ from typing import Any, Callable, Dict, Hashable, Iterable, List, Mapping, Optio
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Scan
 from quad_nav.recording.bag_file import Progress, no_progress
 from quad_nav.recording.bag_index import RecordingIndex
@@ -27,6 +28,7 @@ from quad_nav.recording.recorded_robot import (
 )
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.topics.markers import OBSTACLES_TOPIC
+from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
 from quad_nav.view import rows
 from quad_nav.view.cells import cell_items
 from quad_nav.view.items import (
@@ -36,11 +38,12 @@ from quad_nav.view.items import (
     robots_item,
     scan_item,
     scene_item,
+    track_item,
 )
 from quad_nav.view.state import Item
 
 SHOWN_FOR_S = 1.0
-"""Scans and local plans are shown for so long, unless there are newer ones."""
+"""Scans, local plans and tracks are shown for so long, unless there are newer ones."""
 _MARGIN_M = 0.05  # of peers, where the recording has no parameters
 _LAYERS = {
     "scan": (r"/scan([0-9]{1,4})", "sensor_msgs/LaserScan"),
@@ -50,7 +53,9 @@ _LAYERS = {
         "nav_msgs/OccupancyGrid",
     ),
     "local_costmap": (r"/move_base([0-9]{1,4})/local_costmap/costmap", "nav_msgs/OccupancyGrid"),
+    "track": (rf"/move_base([0-9]{{1,4}})/{MARKERS_TOPIC}", "visualization_msgs/MarkerArray"),
 }
+_PASSING = ("scan", "local_plan", "track")
 _UPDATES = r"/move_base[0-9]{1,4}/(global|local)_costmap/costmap_updates"
 
 Part = Tuple[Hashable, Callable[[], Optional[Item]]]
@@ -224,18 +229,18 @@ class RecordedFlight:
         topic = self._topics.get((layer, robot))
         if topic is None:
             return None
-        if layer in ("scan", "local_plan"):
+        if layer in _PASSING:
             return self._passing_part(layer, robot, topic, time_s)
         costmap = self._costmap(topic)
         place = costmap.place(time_s)
         return place and (place, lambda: self._costmap_item(layer, robot, costmap, place, time_s))
 
     def _passing_part(self, layer: str, robot: int, topic: str, time_s: float) -> Optional[Part]:
-        """Return a scan or local plan, unless it is old."""
+        """Return a scan, a local plan or tracks, unless they are old."""
         number = int(np.searchsorted(self._times[topic], time_s, side="right")) - 1
         if number < 0 or time_s - self._times[topic][number] > SHOWN_FOR_S:
             return None
-        make = self._scan if layer == "scan" else self._local_plan
+        make = {"scan": self._scan, "local_plan": self._local_plan, "track": self._track}[layer]
         return number, lambda: make(robot, topic, number)
 
     def _scan(self, robot: int, topic: str, number: int) -> Optional[Item]:
@@ -260,6 +265,15 @@ class RecordedFlight:
         points = np.array(places, np.float64).reshape(-1, 2)
         frame = self._map_from(message.header.frame_id, robot, float(self._times[topic][number]))
         return line_item("local_plan", robot, frame.transform_points(points))
+
+    def _track(self, robot: int, topic: str, number: int) -> Item:
+        markers = self._index.read(topic, number).content.markers
+        try:
+            frame, rows_of = rows_of_markers(markers)
+        except ValueError as error:
+            raise InputError([f"{topic}: message {number}: {error}"]) from error
+        at_s = float(self._times[topic][number])
+        return track_item(robot, rows_of, self._map_from(frame, robot, at_s))
 
     def _costmap(self, topic: str) -> CostmapTrack:
         if topic not in self._costmaps:

@@ -16,6 +16,7 @@ from quad_nav.loop.inspection import (
     LOCAL_PLAN,
     PLAN,
     SCAN,
+    TRACK,
     Inspection,
     NavigatorView,
 )
@@ -23,6 +24,7 @@ from quad_nav.mission.sequencer import Sequencer
 from quad_nav.offline.flight import Flight
 from quad_nav.recording.web_actions import HAS_ENDED, FlightActions
 from quad_nav.sim.contacts import Contact
+from quad_nav.topics.tracked_obstacles import track_rows
 from quad_nav.view import rows
 from quad_nav.view.cells import cell_items
 from quad_nav.view.items import (
@@ -35,11 +37,12 @@ from quad_nav.view.items import (
     robots_item,
     scan_item,
     scene_item,
+    track_item,
 )
 from quad_nav.view.state import Item, Wanted, robots_by_layer
 
 TRACK_PERIOD_S = 0.2
-_PARTS = (PLAN, LOCAL_PLAN, SCAN, GLOBAL_COSTMAP, LOCAL_COSTMAP)
+_PARTS = (PLAN, LOCAL_PLAN, SCAN, GLOBAL_COSTMAP, LOCAL_COSTMAP, TRACK)
 
 
 class FlightItems:
@@ -229,6 +232,9 @@ def _navigator_items(view: NavigatorView) -> List[Item]:
             items.append(line_item(layer, view.robot, points))
     if view.scan is not None:
         items.append(scan_item(view.robot, *view.scan))
+    if view.track is not None:
+        rows_of = track_rows(view.track.tracks, view.track.unseen_s)
+        items.append(track_item(view.robot, rows_of, view.track.map_from_frame))
     for layer, costmap in view.costmaps.items():
         items.append(
             costmap_item(

@@ -1,5 +1,7 @@
 """Tracked moving obstacles as topics: markers for people, and a point cloud for programs.
 
+The page in the browser shows the rows that ``rows_of_markers`` reads from the markers.
+
 No message for tracked objects is packaged for both Debian 12 and ROS Noetic: ``vision_msgs``,
 ``people_msgs`` and ``costmap_converter`` are not on the former. A ``sensor_msgs/PointCloud2`` is
 everywhere, has all obstacles of one time in one message, and its fields have names.
@@ -8,7 +10,8 @@ everywhere, has all obstacles of one time in one message, and its fields have na
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Tuple
+from enum import IntEnum
+from typing import Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +38,10 @@ RATE_HZ = 10.0
 SIGMAS = 2.0
 """Half axes of the ellipse of the position, in standard deviations."""
 
+_DISC, _VELOCITY = "disc", "velocity"
+_SUSPECT, _SUSPECT_VELOCITY = "suspect", "suspect velocity"
+_ARROWS_OF = {_DISC: _VELOCITY, _SUSPECT: _SUSPECT_VELOCITY}
+
 _DISC_RGBA: Rgba = (0.95, 0.35, 0.10, 0.45)
 _HIDDEN_RGBA: Rgba = (0.95, 0.35, 0.10, 0.18)
 _SUSPECT_RGBA: Rgba = (0.95, 0.75, 0.05, 0.6)
@@ -46,6 +53,12 @@ _TEXT_RGBA: Rgba = (0.1, 0.1, 0.1, 0.9)
 _HEIGHT_M, _ELLIPSE_M, _TEXT_M, _ARROW_M = 0.5, 0.02, 0.25, 0.08
 _ARROW_S = 1.0  # the arrow leads to where the obstacle is after this time
 _SLOWEST_MPS = 0.05
+
+
+class TrackKind(IntEnum):
+    """What a row of ``track_rows`` is."""
+
+    SEEN, HIDDEN, SUSPECT = range(3)
 
 
 class TrackSchedule:
@@ -94,8 +107,8 @@ def track_markers(tracks: Tracks, unseen_s: NDArray[np.float64], frame: str) -> 
         for marker in _markers(frame, number, state, covariance, radius_m, hidden_s > 0.0)
     ]
     for number, (*state, radius_m) in enumerate(tracks.suspects.tolist()):
-        disc = _disc(frame, "suspect", number, state, radius_m, _SUSPECT_RGBA)
-        markers += [disc, *_arrows(frame, "suspect velocity", number, state)]
+        disc = _disc(frame, _SUSPECT, number, state, radius_m, _SUSPECT_RGBA)
+        markers += [disc, *_arrows(frame, _SUSPECT_VELOCITY, number, state)]
     return markers
 
 
@@ -117,10 +130,10 @@ def _markers(
     text, name = (0.0, 0.0, _TEXT_M), str(number)
     top, above = (x_m, y_m, _HEIGHT_M), (x_m, y_m, _HEIGHT_M + _TEXT_M)
     return [
-        _disc(frame, "disc", number, state, radius_m, rgba),
+        _disc(frame, _DISC, number, state, radius_m, rgba),
         Marker(frame, "ellipse", number, CYLINDER, top, flat, (*_ELLIPSE_RGB, alpha), turn_rad),
         Marker(frame, "number", number, TEXT, above, text, _TEXT_RGBA, text=name),
-        *_arrows(frame, "velocity", number, state),
+        *_arrows(frame, _VELOCITY, number, state),
     ]
 
 
@@ -163,3 +176,59 @@ def cloud_rows(tracks: Tracks) -> NDArray[np.float32]:
     rows[:, 5], rows[:, 6] = tracks.radii_m, tracks.numbers
     rows[:, 7:] = tracks.covariances.reshape(count, 16)
     return rows
+
+
+def track_rows(tracks: Tracks, unseen_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return tracks and suspects as one table.
+
+    Args:
+        tracks: The tracks and suspects.
+        unseen_s: float64[n], times for which the tracks have not been seen.
+
+    Returns:
+        float64[k, 6], columns x and y (m), their velocities (m/s), radius (m) and ``TrackKind``.
+    """
+    kinds = np.where(unseen_s > 0.0, TrackKind.HIDDEN, TrackKind.SEEN)
+    known = np.column_stack((tracks.states, tracks.radii_m, kinds))
+    kinds = np.full(len(tracks.suspects), TrackKind.SUSPECT)
+    return np.vstack((known, np.column_stack((tracks.suspects, kinds))))
+
+
+def rows_of_markers(markers: Sequence[Any]) -> Tuple[str, NDArray[np.float64]]:
+    """Return what a message on ``MARKERS_TOPIC`` says, the inverse of ``track_markers``.
+
+    Args:
+        markers: Of type `visualization_msgs/Marker`.
+
+    Returns:
+        The frame, "" if there is no track and no suspect, and rows as of ``track_rows``.
+
+    Raises:
+        ValueError: A marker's numbers are not finite.
+    """
+    velocities = {(one.ns, one.id): _velocity(one) for one in markers if one.type == ARROW}
+    frame, rows = "", []
+    for marker in markers:
+        arrow = _ARROWS_OF.get(marker.ns)
+        if arrow is None:
+            continue
+        place, velocity = marker.pose.position, velocities.get((arrow, marker.id), (0.0, 0.0))
+        row = (place.x, place.y, *velocity, marker.scale.x / 2.0, _kind(marker))
+        if not np.isfinite(row).all():
+            raise ValueError(f"marker {marker.ns} {marker.id}: {row}; expected finite numbers")
+        frame = marker.header.frame_id
+        rows.append(row)
+    return frame, np.array(rows, np.float64).reshape(-1, 6)
+
+
+def _velocity(arrow: Any) -> Tuple[float, float]:
+    turn, speed_mps = arrow.pose.orientation, arrow.scale.x / _ARROW_S
+    turn_rad = 2.0 * math.atan2(turn.z, turn.w)  # it turns about z only
+    return speed_mps * math.cos(turn_rad), speed_mps * math.sin(turn_rad)
+
+
+def _kind(disc: Any) -> TrackKind:
+    if disc.ns == _SUSPECT:
+        return TrackKind.SUSPECT
+    is_pale = disc.color.a < 0.5 * (_DISC_RGBA[3] + _HIDDEN_RGBA[3])
+    return TrackKind.HIDDEN if is_pale else TrackKind.SEEN

@@ -163,6 +163,20 @@ def line_item(layer: str, robot: int, points: Any) -> Item:
     return Item(f"{layer}/{robot}", None, {"points": plane})
 
 
+def track_item(robot: int, rows: Any, map_from_frame: Pose2D = _MAP) -> Item:
+    """Return what a robot tracks.
+
+    Args:
+        robot: Number of the robot.
+        rows: float64[k, 6] as of ``topics.tracked_obstacles.track_rows``.
+        map_from_frame: Their frame in ``map``.
+    """
+    placed = np.array(rows, np.float64)
+    placed[:, :2] = map_from_frame.transform_points(placed[:, :2])
+    placed[:, 2:4] = Pose2D(0.0, 0.0, map_from_frame.yaw_rad).transform_points(placed[:, 2:4])
+    return Item(f"track/{robot}", None, {"rows": placed.astype(np.float32)})
+
+
 def scan_item(robot: int, scan: Scan, map_from_lidar: Pose3D) -> Item:
     """Return a scan's hit points."""
     points = hit_points(scan, map_from_lidar).astype(np.float32)

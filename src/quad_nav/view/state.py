@@ -35,6 +35,8 @@ key                       data                                arrays
 ``global_costmap/i``      x, y, yaw, resolution_m             costs i1[rows, columns]
 ``local_costmap/i``       the same                            costs i1[rows, columns]
 ``cell/i``                                                    points f4[k, 2]
+``track/i``                                                   rows f4[k, 6]: x, y, vx, vy, radius,
+                                                              kind: 0 seen, 1 hidden, 2 suspect
 ========================  ==================================  =====================================
 
 Metres, radians and seconds, in ``map``. NaN in an array, and None in data, is unknown: a robot that
@@ -53,13 +55,22 @@ from typing import Any, Callable, Deque, Dict, FrozenSet, List, Mapping, Optiona
 import numpy as np
 from numpy.typing import NDArray
 
-LAYERS = ("trail", "plan", "local_plan", "scan", "global_costmap", "local_costmap", "cell")
+LAYERS = (
+    "trail",
+    "plan",
+    "local_plan",
+    "scan",
+    "global_costmap",
+    "local_costmap",
+    "cell",
+    "track",
+)
 """Kinds of items that a client can switch on and off. All others are always sent."""
 
 OF_ONE_ROBOT = ("global_costmap", "local_costmap")
 """Layers that are shown of the selected robot only."""
 
-COSTLY = ("scan", "local_plan")
+COSTLY = ("scan", "local_plan", "track")
 """Layers of which a page of a large fleet shows the selected robot's only: new ones come at the
 rates of LIDAR and controller, and a node that has listeners must publish them."""
 

@@ -29,6 +29,7 @@ SHOWN = {
     "global_costmap": "Global costmap",
     "local_costmap": "Local costmap",
     "cell": "Voronoi cells",
+    "track": "Tracked obstacles",
     "goals": "Goals",
     "yields": "Yields",
     "contacts": "Contacts",
@@ -36,7 +37,17 @@ SHOWN = {
 }
 """What can be switched on and off in the arena, with its name for people."""
 
-SHOWN_AT_FIRST = ("trail", "plan", "local_plan", "scan", "goals", "yields", "contacts", "labels")
+SHOWN_AT_FIRST = (
+    "trail",
+    "plan",
+    "local_plan",
+    "scan",
+    "track",
+    "goals",
+    "yields",
+    "contacts",
+    "labels",
+)
 
 
 def static_path() -> str:

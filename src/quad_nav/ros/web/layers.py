@@ -1,4 +1,4 @@
-"""What a page can switch on of each robot: its scan, plans and costmaps."""
+"""What a page can switch on of each robot: its scan, plans, costmaps and tracks."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from nav_msgs.msg import OccupancyGrid, Path
 from numpy.typing import NDArray
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan
+from visualization_msgs.msg import MarkerArray
 
 from quad_nav.config.plugins import plugin_name
 from quad_nav.grid import GridSpec
@@ -20,13 +21,14 @@ from quad_nav.ros.common.packed_messages import read_path
 from quad_nav.ros.web.frames import Frames
 from quad_nav.ros.web.intake import Newest, Topic, decoded, raw_type
 from quad_nav.ros.web.poses import MAP, Bodies
+from quad_nav.topics.tracked_obstacles import MARKERS_TOPIC, rows_of_markers
 from quad_nav.topics.validation import grid_problem, path_problem, scan_problem
-from quad_nav.view.items import costmap_item, line_item, scan_item
+from quad_nav.view.items import costmap_item, line_item, scan_item, track_item
 from quad_nav.view.state import OF_ONE_ROBOT, Item
 
 COSTMAP_PERIOD_S = 0.2  # wall time between two items of a costmap
 _PLANNERS = {"plan": "base_global_planner", "local_plan": "base_local_planner"}
-_TOPICS = ("scan", "plan", "local_plan", *OF_ONE_ROBOT)
+_TOPICS = ("scan", "plan", "local_plan", "track", *OF_ONE_ROBOT)
 _GridMessage, _UpdateMessage = numpy_msg(OccupancyGrid), numpy_msg(OccupancyGridUpdate)
 
 Tree = Mapping[str, Any]
@@ -97,6 +99,31 @@ class PlanIntake:
         if map_from_plan is None:
             return None
         return line_item(self._layer, self._robot, map_from_plan.to_2d().transform_points(points))
+
+
+class TrackIntake:
+    """What a robot tracks."""
+
+    def __init__(self, robot: int, frames: Frames) -> None:
+        """Receive the markers of tracks and suspects."""
+        self._robot, self._frames = robot, frames
+        self._name = f"/move_base{robot}/{MARKERS_TOPIC}"
+        self._newest = Newest(self._name, MarkerArray)
+
+    def topics(self) -> Dict[str, Topic]:
+        """Return the topic."""
+        return {self._name: self._newest.topic}
+
+    def item(self) -> Optional[Item]:
+        """Return the newest tracks; none once the last one has ended."""
+        message = self._newest.take()
+        if message is None:
+            return None
+        frame, rows = rows_of_markers(message.markers)
+        map_from_frame = self._frames.find(MAP, frame or MAP)
+        if map_from_frame is None:
+            return None
+        return track_item(self._robot, rows, map_from_frame.to_2d())
 
 
 class CostmapIntake:
@@ -202,6 +229,8 @@ class Layers:
             return ScanIntake(robot, self._bodies, self._frames)
         if layer in OF_ONE_ROBOT:
             return CostmapIntake(layer, robot, self._frames)
+        if layer == "track":
+            return TrackIntake(robot, self._frames)
         planner = self._tree_of(robot).get(_PLANNERS[layer])
         if not isinstance(planner, str):
             return None

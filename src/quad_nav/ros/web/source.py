@@ -183,8 +183,11 @@ class FlightSource:
         for i in range(len(self._names)):
             if not self.health.has_lidar(i):
                 keys.discard(f"scan/{i}")
-            if self.health.navigator(i)[0] == "idle":
+            state, silent_s, _ = self.health.navigator(i)
+            if state == "idle":
                 keys -= {f"plan/{i}", f"local_plan/{i}"}
+            if silent_s > LOST_AFTER_S:
+                keys.discard(f"track/{i}")
         before, self._passing = self._passing, frozenset(keys)
         return {key for key in before | self._layers.keys if key not in keys}
 

@@ -13,6 +13,8 @@ export const INK = {
   solidEdge: "#4b5766",
   moving: "#cc5c33",
   movingEdge: "#7d3217",
+  tracked: "#f2591a",
+  suspect: "#f2bf0d",
   passed: "#aab4c0",
   text: "#1f2933",
   accent: "#0b63ce",

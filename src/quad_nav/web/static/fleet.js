@@ -13,9 +13,10 @@ export const STREAMED_LAYERS = [
   "global_costmap",
   "local_costmap",
   "cell",
+  "track",
 ];
 
-/** In larger fleets LIDAR points and local plans are those of the selected robot. */
+/** In larger fleets LIDAR points, local plans and tracks are those of the selected robot. */
 export const LARGE_FLEET = 20;
 
 /** Those of them that are shown of the selected robot only. */
@@ -32,6 +33,8 @@ export const YIELD_COLOURS = {
 const CONTACT_FRESH_S = 20;
 const MOST_CONTACTS = 200;
 const POSE_LENGTH = 9;
+const TRACK_LENGTH = 6;
+const TRACK_KINDS = ["seen", "hidden", "suspect"]; // as in `view/state.py`
 const DEFAULT_RADIUS_M = 0.3;
 
 /**
@@ -76,6 +79,7 @@ export function fleetOf(store, choices) {
     localPlans: polylines("local_plan"),
     cells: polylines("cell"),
     scans: polylines("scan"),
+    tracks: shown("track") ? tracksOf(store, colourOf, choices) : [],
     costmaps: OF_ONE_ROBOT.filter(shown).flatMap((kind) => store.all(kind)),
     goals: shown("goals") ? goalsOf(store, colourOf, choices) : [],
     yields: shown("yields") ? yieldsOf(store, robots) : [],
@@ -124,6 +128,18 @@ function obstaclesOf(store, scene) {
     return { ...solid, index, x, y, yaw: Number.isFinite(yaw) ? yaw : 0, hasHeading };
   });
   return placed.filter(({ x, y }) => Number.isFinite(x) && Number.isFinite(y));
+}
+
+/** What robots track, discs with velocities: of the selected robot, or of all without one. */
+function tracksOf(store, colourOf, { selected }) {
+  const isShown = ({ robot }) => selected === null || robot === selected;
+  return store.all("track").filter(isShown).flatMap(({ robot, arrays: { rows } }) =>
+    Array.from({ length: rows.shape[0] }, (_, index) => {
+      const first = index * TRACK_LENGTH;
+      const [x, y, vx, vy, radius, kind] = rows.values.subarray(first, first + TRACK_LENGTH);
+      return { robot, colour: colourOf(robot), x, y, vx, vy, radius, kind: TRACK_KINDS[kind] };
+    }),
+  );
 }
 
 function goalsOf(store, colourOf, { editing, selected }) {

@@ -9,6 +9,7 @@ import { drawArrow, drawContacts, drawCross, drawGoal, GOAL_SIZES } from "./map_
 import { drawPaths, drawScans } from "./map_paths.js";
 import { drawRobot } from "./map_robots.js";
 import { drawObstacles, drawSolids } from "./map_scene.js";
+import { drawTracks } from "./map_tracks.js";
 import { Viewport } from "./viewport.js";
 
 const WIDTH = 40;
@@ -70,6 +71,13 @@ function moving(shape) {
   };
 }
 
+function track(kind) {
+  return (context) => {
+    const place = { x: kind === "suspect" ? 0 : -6, y: 0, radius: 8, colour: COLOUR };
+    drawTracks(context, viewport(), [{ ...place, vx: kind === "suspect" ? 0 : 20, vy: 0, kind }]);
+  };
+}
+
 function costs(first, last) {
   return (context) => {
     for (let i = 0; i < WIDTH; i += 1) {
@@ -115,6 +123,9 @@ const ENTRIES = [
   ["local_plan", "Local plan", path("localPlans")],
   ["scan", "LIDAR points", scan],
   ["cell", "Voronoi cell", cell],
+  ["track", "Tracked obstacle; the line is its way in 1 s", track("seen")],
+  ["track", "Tracked, but hidden: predicted", track("hidden")],
+  ["track", "Suspect: may move", track("suspect")],
   ["yields", "Waits for the other", arrow("waits")],
   ["yields", "Makes room for the other", arrow("makes room")],
   ["yields", "Place where it will hold", hold],

@@ -15,6 +15,7 @@ import { drawGoalNumbers, GoalMarks } from "./orbit_goals.js";
 import { MovingObstacles } from "./orbit_obstacles.js";
 import { Quadcopters } from "./orbit_robots.js";
 import { CostmapPlanes, disposeParts, sceneGroup } from "./orbit_scene.js";
+import { addTracks } from "./orbit_tracks.js";
 
 const FIELD_OF_VIEW_DEG = 45;
 const ELEVATION_RAD = (52 * Math.PI) / 180;
@@ -233,7 +234,7 @@ export class OrbitView {
     this._scene.add(this._arena);
   }
 
-  _drawPaths({ trails, plans, localPlans, cells, scans, robots, goals, altitude }) {
+  _drawPaths({ trails, plans, localPlans, tracks, cells, scans, robots, goals, altitude }) {
     const pixel = this.metresPerPixel;
     this._ribbons.clear();
     for (const path of trails) {
@@ -245,6 +246,7 @@ export class OrbitView {
     for (const path of localPlans) {
       this._ribbons.add(path, altitude, path.colour, 1, 4.5 * pixel, 0.5);
     }
+    addTracks(this._ribbons, tracks, altitude, 2 * pixel);
     this._ribbons.finish();
     this._points.update(scans);
     this._lines.clear();
