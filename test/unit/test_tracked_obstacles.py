@@ -102,11 +102,19 @@ def test_markers_without_tracks_have_no_frame_and_no_rows():
     )
 
 
-def test_a_marker_that_is_nowhere_is_refused():
+@pytest.mark.parametrize("x_m, diameter_m", [(math.nan, 0.6), (1e7, 0.6), (1.0, -0.6)])
+def test_a_marker_that_is_nowhere_or_has_no_size_is_refused(x_m, diameter_m):
     shown = marker_array(track_markers(TRACKS, np.zeros(2), "map"))
-    shown.markers[0].pose.position.x = math.nan
-    with pytest.raises(ValueError, match="marker disc 7: .*; expected finite numbers"):
+    shown.markers[0].pose.position.x, shown.markers[0].scale.x = x_m, diameter_m
+    with pytest.raises(ValueError, match="marker disc 7: .*; expected a disc in the world"):
         rows_of_markers(shown.markers)
+
+
+def test_more_markers_than_a_page_can_draw_are_refused():
+    shown = marker_array(track_markers(TRACKS, np.zeros(2), "map"))
+    assert len(rows_of_markers(shown.markers[:1] * 1000)[1]) == 1000
+    with pytest.raises(ValueError, match="1001 tracks and suspects; expected 1000 at most"):
+        rows_of_markers(shown.markers[:1] * 1001)
 
 
 def test_the_ellipse_is_turned_to_its_larger_axis():

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from quad_nav.timing import Schedule
 from quad_nav.topics.markers import ARROW, CYLINDER, TEXT, Marker, Rgba
+from quad_nav.topics.validation import MAX_MAGNITUDE
 from quad_nav.tracking.tracker import ObstacleTracker
 from quad_nav.tracking.tracks import Tracks
 
@@ -37,6 +38,9 @@ CLOUD_FIELDS = (
 RATE_HZ = 10.0
 SIGMAS = 2.0
 """Half axes of the ellipse of the position, in standard deviations."""
+
+MAX_ROWS = 1000
+"""Tracks and suspects that ``rows_of_markers`` takes: the page draws each of them."""
 
 _DISC, _VELOCITY = "disc", "velocity"
 _SUSPECT, _SUSPECT_VELOCITY = "suspect", "suspect velocity"
@@ -204,7 +208,7 @@ def rows_of_markers(markers: Sequence[Any]) -> Tuple[str, NDArray[np.float64]]:
         The frame, "" if there is no track and no suspect, and rows as of ``track_rows``.
 
     Raises:
-        ValueError: A marker's numbers are not finite.
+        ValueError: A marker is nowhere, has no size, or there are more than ``MAX_ROWS``.
     """
     velocities = {(one.ns, one.id): _velocity(one) for one in markers if one.type == ARROW}
     frame, rows = "", []
@@ -214,10 +218,12 @@ def rows_of_markers(markers: Sequence[Any]) -> Tuple[str, NDArray[np.float64]]:
             continue
         place, velocity = marker.pose.position, velocities.get((arrow, marker.id), (0.0, 0.0))
         row = (place.x, place.y, *velocity, marker.scale.x / 2.0, _kind(marker))
-        if not np.isfinite(row).all():
-            raise ValueError(f"marker {marker.ns} {marker.id}: {row}; expected finite numbers")
+        if not (np.abs(row) <= MAX_MAGNITUDE).all() or marker.scale.x < 0.0:
+            raise ValueError(f"marker {marker.ns} {marker.id}: {row}; expected a disc in the world")
         frame = marker.header.frame_id
         rows.append(row)
+    if len(rows) > MAX_ROWS:
+        raise ValueError(f"{len(rows)} tracks and suspects; expected {MAX_ROWS} at most")
     return frame, np.array(rows, np.float64).reshape(-1, 6)
 
 
