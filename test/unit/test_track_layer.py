@@ -1,4 +1,4 @@
-"""What robots track, on a page: of a flight without ROS and of its recording."""
+"""The layer of tracks on a page: of a flight without ROS and of its recording."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fake_page import Clock, FakePage
 
 from quad_nav.offline.run import fly
 from quad_nav.recording.recorded_flight import SHOWN_FOR_S, RecordedFlight
@@ -17,29 +18,11 @@ from quad_nav.scenario.flight_setup import FlightOptions, read_setup
 from quad_nav.sim.motion import Motion
 from quad_nav.sim.scene import Cylinder, MovingObstacle
 from quad_nav.topics.tracked_obstacles import TrackKind
-from quad_nav.view.state import FleetState, Wanted
+from quad_nav.view.state import Wanted
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYER = Wanted(frozenset({"track"}), 0)
 SPEED_MPS, RADIUS_M = 1.0, 0.3
-
-
-class FakePage:
-    """A page that takes every batch."""
-
-    def __init__(self) -> None:
-        self.wanted, self.calls, self.is_alive, self.can_take = (LAYER,), [], True, True
-        self.state, self.removed = FleetState(), []
-
-    def send(self, batch) -> None:
-        self.state.put_all(batch.items, batch.removed)
-        self.removed += batch.removed
-
-    def poll(self) -> None:
-        pass
-
-    def wait(self, timeout_s: float) -> None:
-        pass
 
 
 def setup_of(time_limit_s: float):
@@ -65,14 +48,20 @@ def assert_is_walker(rows, time_s: float) -> None:
     assert radius_m == pytest.approx(RADIUS_M, abs=0.1) and kind == TrackKind.SEEN
 
 
+def page_after(seconds: float, processes: int) -> FakePage:
+    clock = Clock(0.005)
+    page = FakePage(clock, [LAYER])
+    view = WebView(page, FlightActions(rate=0.0), clock)
+    fly(setup_of(seconds), [view], processes=processes)
+    return page
+
+
 @pytest.mark.parametrize("processes", [1, 2])
 def test_a_page_shows_the_tracks_of_a_flight_and_drops_those_that_have_ended(processes):
-    page = FakePage()
-    fly(setup_of(4.0), [WebView(page, FlightActions(rate=0.0))], processes=processes)
-    assert_is_walker(page.state.item("track/0").arrays["rows"], 4.0)
-    page = FakePage()
-    fly(setup_of(12.0), [WebView(page, FlightActions(rate=0.0))], processes=processes)
-    assert page.state.item("track/0") is None  # the walker has stopped at 6 s
+    assert_is_walker(page_after(4.0, processes).state.item("track/0").arrays["rows"], 4.0)
+    assert (
+        page_after(12.0, processes).state.item("track/0") is None
+    )  # the walker has stopped at 6 s
 
 
 @pytest.mark.parametrize("suffix", [".bag", ".mcap"])

@@ -1,4 +1,4 @@
-"""Moving obstacles, and what robots track, as the node of the page hears of them."""
+"""Messages of moving obstacles and of tracks, received by the node of the page."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_tracks_are_shown_in_map_until_the_last_one_has_ended():
     assert name == "/move_base0/moving_obstacles" and tracked.item() is None
     shown = replacing_markers(track_markers(TRACKS, np.zeros(1), "odom0"))
     deliver(topic, shown)
-    assert tracked.item() is None  # nobody has said where odom0 is
+    assert tracked.item() is None  # the transform of odom0 is not known yet
     frames.map_from_odom = Pose3D(2.0, 1.0, 0.0, quaternion_from_yaw(math.pi / 2))
     deliver(topic, shown)
     item = tracked.item()

@@ -6,10 +6,10 @@ import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import List
 
 import numpy as np
 import pytest
+from fake_page import EVERYTHING, Clock, FakePage
 
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.summary import to_json
@@ -22,60 +22,9 @@ from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.movers import Movers
 from quad_nav.sim.simulation import SimulationParams
 from quad_nav.view.actions import GoalChange
-from quad_nav.view.state import LAYERS, FleetState, Wanted
-from quad_nav.web.process import Batch, Call
+from quad_nav.view.state import LAYERS, Wanted
 
 ROOT = Path(__file__).resolve().parents[2]
-EVERYTHING = Wanted(frozenset(LAYERS), 0)
-
-
-class Clock:
-    """Wall clock that stands unless somebody waits or ``tick_s`` is set: the cost of a look."""
-
-    def __init__(self, tick_s: float = 0.0) -> None:
-        self.now_s, self.tick_s = 100.0, tick_s
-
-    def __call__(self) -> float:
-        self.now_s += self.tick_s
-        return self.now_s
-
-
-class FakePage:
-    """Pages that show ``wanted``, and take batches while ``takes`` is set."""
-
-    def __init__(self, clock: Clock, wanted=(EVERYTHING,)) -> None:
-        self.clock, self.wanted, self.calls = clock, tuple(wanted), []
-        self.is_alive = self.can_take = True
-        self.batches: List[Batch] = []
-        self.times_s: List[float] = []
-        self.answers: List[object] = []
-        self.on_wait = None
-
-    def send(self, batch: Batch) -> None:
-        self.batches.append(batch)
-        self.times_s.append(self.clock.now_s)
-
-    def answer(self, call: Call, value: object) -> None:
-        self.answers.append(value)
-
-    def poll(self) -> None:
-        pass
-
-    def wait(self, timeout_s: float) -> None:
-        self.clock.now_s += timeout_s
-        if self.on_wait is not None:
-            self.on_wait(self)
-
-    def do(self, name: str, **arguments) -> None:
-        self.calls = [*self.calls, Call(0, name, arguments)]
-
-    @property
-    def state(self) -> FleetState:
-        """The items after all batches."""
-        state = FleetState()
-        for batch in self.batches:
-            state.put_all(batch.items, batch.removed)
-        return state
 
 
 class Track(FlightObserver):

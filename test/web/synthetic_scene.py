@@ -115,7 +115,7 @@ def obstacles(size_m: Size, time_s: float) -> Item:
 
 
 def tracks(robot: int, places: Item) -> Item:
-    """Return what a robot tracks: the cart, the person, who is hidden, and a suspect at (6, 1).
+    """Return a robot's tracks of the cart and of the hidden person, and a suspect at (6, 1).
 
     Both go at 0.5 m/s; the person is tracked 0.1 m to the east.
     """

@@ -1,4 +1,4 @@
-"""Obstacles that move, and what robots track of them."""
+"""Moving obstacles and tracks in the arena."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_moving_obstacles_are_drawn_in_space(street):
 
 
 def test_what_robots_track_is_drawn_and_can_be_switched_off(street):
-    """Each of the two robots tracks the cart, the person, who is hidden, and a suspect."""
+    """Both robots have a track of the cart, one of the hidden person, and a suspect."""
     street.wait_for_arena("arena.fleet.tracks.length === 6")
     rings = "tracks.map(({ robot, kind, radius }) => [robot, kind, radius])"
     of_one = [("seen", 0.5), ("hidden", 0.3), ("suspect", 0.4)]

@@ -63,7 +63,7 @@ class CostmapView:
 
 @dataclass(frozen=True)
 class TrackView:
-    """What a robot tracks.
+    """The tracks and suspects of a robot's tracker.
 
     Attributes:
         tracks: Tracks and suspects, in the tracker's frame.

@@ -60,7 +60,7 @@ _SLOWEST_MPS = 0.05
 
 
 class TrackKind(IntEnum):
-    """What a row of ``track_rows`` is."""
+    """Kinds of obstacles in ``track_rows``: a track seen now or hidden, or a suspect."""
 
     SEEN, HIDDEN, SUSPECT = range(3)
 

@@ -164,7 +164,7 @@ def line_item(layer: str, robot: int, points: Any) -> Item:
 
 
 def track_item(robot: int, rows: Any, map_from_frame: Pose2D = _MAP) -> Item:
-    """Return what a robot tracks.
+    """Return the tracks and suspects of a robot.
 
     Args:
         robot: Number of the robot.

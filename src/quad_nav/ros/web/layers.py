@@ -1,4 +1,4 @@
-"""What a page can switch on of each robot: its scan, plans, costmaps and tracks."""
+"""Layers of each robot that a page can switch on: scan, plans, costmaps and tracks."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class PlanIntake:
 
 
 class TrackIntake:
-    """What a robot tracks."""
+    """Tracks and suspects of a robot."""
 
     def __init__(self, robot: int, frames: Frames) -> None:
         """Receive the markers of tracks and suspects."""

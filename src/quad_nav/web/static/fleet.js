@@ -130,7 +130,7 @@ function obstaclesOf(store, scene) {
   return placed.filter(({ x, y }) => Number.isFinite(x) && Number.isFinite(y));
 }
 
-/** What robots track, discs with velocities: of the selected robot, or of all without one. */
+/** Tracks and suspects, discs with velocities: of the selected robot, or of all without one. */
 function tracksOf(store, colourOf, { selected }) {
   const isShown = ({ robot }) => selected === null || robot === selected;
   return store.all("track").filter(isShown).flatMap(({ robot, arrays: { rows } }) =>

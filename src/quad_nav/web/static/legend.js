@@ -73,8 +73,8 @@ function moving(shape) {
 
 function track(kind) {
   return (context) => {
-    const place = { x: kind === "suspect" ? 0 : -6, y: 0, radius: 8, colour: COLOUR };
-    drawTracks(context, viewport(), [{ ...place, vx: kind === "suspect" ? 0 : 20, vy: 0, kind }]);
+    const motion = kind === "suspect" ? { x: 0, vx: 0 } : { x: -6, vx: 20 };
+    drawTracks(context, viewport(), [{ y: 0, vy: 0, radius: 8, colour: COLOUR, kind, ...motion }]);
   };
 }
 
@@ -123,7 +123,7 @@ const ENTRIES = [
   ["local_plan", "Local plan", path("localPlans")],
   ["scan", "LIDAR points", scan],
   ["cell", "Voronoi cell", cell],
-  ["track", "Tracked obstacle; the line is its way in 1 s", track("seen")],
+  ["track", "Tracked obstacle; the line ends where it is in 1 s", track("seen")],
   ["track", "Tracked, but hidden: predicted", track("hidden")],
   ["track", "Suspect: may move", track("suspect")],
   ["yields", "Waits for the other", arrow("waits")],

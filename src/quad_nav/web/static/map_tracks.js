@@ -1,11 +1,11 @@
 /**
- * Map view: what robots track. Each ring has its robot's colour: who knows of whom is seen.
+ * Map view: tracks and suspects. A ring has the colour of the robot that tracks the obstacle.
  */
 
 import { INK, withAlpha } from "./colours.js";
 
 /** Seconds after which a tracked obstacle is at the end of its line. */
-export const AHEAD_S = 1;
+const AHEAD_S = 1;
 /** Slower ones have no line. */
 const SLOWEST_MPS = 0.05;
 
@@ -33,7 +33,8 @@ export function drawTracks(context, viewport, tracks) {
   for (const track of tracks) {
     const { fill, ring, dash } = LOOKS[track.kind];
     context.beginPath();
-    context.arc(...viewport.toScreen(track.x, track.y), track.radius * viewport.scale, 0, 7);
+    const [px, py] = viewport.toScreen(track.x, track.y);
+    context.arc(px, py, track.radius * viewport.scale, 0, 2 * Math.PI);
     context.fillStyle = fill;
     context.fill();
     context.setLineDash(dash);

@@ -1,5 +1,5 @@
 /**
- * View in space: what robots track, as rings at the flying altitude.
+ * View in space: tracks and suspects, as rings at the flying altitude.
  */
 
 import { INK } from "./colours.js";
