@@ -10,17 +10,22 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from flight_case import FlightCase, pid_of
+from visualization_msgs.msg import MarkerArray
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
 
 from quad_nav.geometry import Pose2D
+from quad_nav.ros.common.conversions import marker_array
 from quad_nav.ros.web.actions import FlightActions
 from quad_nav.ros.web.source import FlightSource
 from quad_nav.topics.right_of_way import RIGHT_OF_WAY_STATUS, RightOfWay
+from quad_nav.topics.tracked_obstacles import track_markers
+from quad_nav.tracking.tracks import Tracks
 from quad_nav.view.actions import GoalChange
 from quad_nav.view.codec import decode
 from quad_nav.view.state import LAYERS, FleetState, Wanted
@@ -229,13 +234,31 @@ class Web(FlightCase):
         self.assertIn("has changed", self.refuse("save_goals", 1, view.version, goals))
 
     def test_7_a_dead_navigator_is_lost_and_comes_back(self):
+        self.show_a_track()
         pid = pid_of("/move_base1")
         os.kill(pid, signal.SIGSTOP)
         self.wait(lambda: self.page.row(1)["state"] == "lost", "a robot that is lost")
         self.assertIn("no message of its navigator", self.page.row(1)["reason"])
         self.assertNotEqual(self.page.row(0)["state"], "lost")
+        self.wait(lambda: "track/1" not in self.page.items, "no tracks of a lost navigator")
         os.kill(pid, signal.SIGKILL)
         self.wait(lambda: self.page.row(1)["state"] == "flying", "another navigator")
+
+    def show_a_track(self):
+        """Publish a track as the navigator of robot 1 does where something moves."""
+        topic = rospy.Publisher("/move_base1/moving_obstacles", MarkerArray, queue_size=1)
+        self.addCleanup(topic.unregister)
+        states, covariances = np.array([(3.0, 2.0, 0.5, 0.0)]), np.eye(4)[None]
+        tracks = Tracks(0.0, np.array([7]), states, covariances, np.array([0.3]))
+        message = marker_array(track_markers(tracks, np.zeros(1), "map"))
+
+        def is_shown():  # once the node web is connected
+            topic.publish(message)
+            return "track/1" in self.page.items
+
+        self.wait(is_shown, "the track on the page")
+        ((x, y, *_),) = self.page.arrays["track/1"]["rows"].tolist()
+        self.assertEqual((x, y), (3.0, 2.0))
 
     def test_8_the_page_comes_back_at_its_address(self):
         port = rospy.get_param("/web/port")
