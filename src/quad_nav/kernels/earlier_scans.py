@@ -18,6 +18,7 @@ UNKNOWN, OCCUPIED, FREED = 0, 1, 2
 _MAX_SIDE_BEAMS = 64
 _PROBES = 3  # points of a standing cluster about which an earlier scan is asked
 _STANDS = 3  # recent scans that see a point occupied, and none free: it stands
+_ASK = 3  # a point about which earlier scans are to be asked
 
 
 class ScanView(NamedTuple):
@@ -30,6 +31,14 @@ class ScanView(NamedTuple):
     is_full_turn: bool  # beam 0 follows beam n - 1
     origin: NDArray[np.float64]  # [3], metres
     rotation: NDArray[np.float64]  # [3, 3], frame from sensor
+
+
+class _Beams(NamedTuple):
+    """What tells the beam of a direction, without the arrays, which are slow to hand on."""
+
+    angle_min: float
+    increment: float
+    is_full_turn: bool
 
 
 class EarlierScans(NamedTuple):
@@ -80,16 +89,17 @@ def bearing(y: float, x: float) -> float:
     return -angle if y < 0.0 else angle
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def _evidence(
-    earlier: EarlierScans,
+    ranges: NDArray[np.float32],
+    origins: NDArray[np.float64],
+    turns: NDArray[np.float64],
     slot: int,
-    scan: ScanView,
+    beams: _Beams,
     doubts: Doubts,
     point: Tuple[float, float, float],
 ) -> int:
     """Return what one earlier scan tells about a point (x, y, z) in the fixed frame."""
-    ranges, origins, turns = earlier
     dx = point[0] - origins[slot, 0]
     dy = point[1] - origins[slot, 1]
     dz = point[2] - origins[slot, 2]
@@ -100,14 +110,14 @@ def _evidence(
     y = turns[slot, 0, 1] * dx + turns[slot, 1, 1] * dy + turns[slot, 2, 1] * dz
     n = ranges.shape[1]
     distance = math.sqrt(x * x + y * y)
-    turn = (bearing(y, x) - scan.angle_min) / scan.increment
-    if scan.is_full_turn:
+    turn = (bearing(y, x) - beams.angle_min) / beams.increment
+    if beams.is_full_turn:
         turn -= n * math.floor(turn / n)
     beam = int(math.floor(turn + 0.5))
-    if scan.is_full_turn and beam >= n:
+    if beams.is_full_turn and beam >= n:
         beam -= n
     if beam < 1 or beam >= n - 1:
-        if not scan.is_full_turn:
+        if not beams.is_full_turn:
             return UNKNOWN
     nearest, farthest = np.inf, 0.0
     for step in range(-1, 2):
@@ -120,12 +130,12 @@ def _evidence(
         return UNKNOWN
     if nearest <= distance + doubts.margin:
         return OCCUPIED if farthest >= distance - doubts.margin else UNKNOWN
-    wide = math.ceil(doubts.margin / max(distance * abs(scan.increment), 1e-9))
+    wide = math.ceil(doubts.margin / max(distance * abs(beams.increment), 1e-9))
     side = min(int(wide), _MAX_SIDE_BEAMS)
     for step in range(-side, side + 1):
         k = beam + step
         if k < 0 or k >= n:
-            if not scan.is_full_turn:
+            if not beams.is_full_turn:
                 return UNKNOWN
             k = k + n if k < 0 else k - n
         if doubts.range_min <= float(ranges[slot, k]) <= distance + doubts.margin:
@@ -134,26 +144,31 @@ def _evidence(
 
 
 @njit(cache=True, nogil=True)
-def _ask(
-    earlier: EarlierScans,
-    order: Order,
-    is_thorough: bool,
+def _place_points(
     scan: ScanView,
+    step: int,
     doubts: Doubts,
-    point: Tuple[float, float, float],
-) -> int:
-    """Return what the earlier scans tell about a point, see ``compare_scan``."""
-    occupied = 0
-    for i in range(order.slots.shape[0]):
-        if i == order.recent and occupied >= _STANDS:
-            break
-        found = _evidence(earlier, order.slots[i], scan, doubts, point)
-        if found == FREED:
-            return FREED
-        occupied += found == OCCUPIED
-        if occupied and not is_thorough:
-            break
-    return OCCUPIED if occupied else UNKNOWN
+    points: NDArray[np.float64],
+    evidence: NDArray[np.uint8],
+) -> None:
+    """Write the points of a scan, and in ``evidence`` _ASK or else UNKNOWN."""
+    ranges, directions, origin, rotation = scan.ranges, scan.directions, scan.origin, scan.rotation
+    for k in range(0, ranges.shape[0], step):
+        one = float(ranges[k])
+        evidence[k] = UNKNOWN
+        points[k, 0] = points[k, 1] = points[k, 2] = np.nan
+        if not doubts.range_min <= one < doubts.range_max:
+            continue
+        sx, sy = one * directions[k, 0], one * directions[k, 1]
+        up = rotation[2, 0] * sx + rotation[2, 1] * sy
+        z = origin[2] + up
+        if abs(up) > doubts.upright or z < doubts.low_z or z > doubts.high_z:
+            continue
+        points[k, 0] = origin[0] + rotation[0, 0] * sx + rotation[0, 1] * sy
+        points[k, 1] = origin[1] + rotation[1, 0] * sx + rotation[1, 1] * sy
+        points[k, 2] = z
+        if abs(up) <= doubts.level:
+            evidence[k] = _ASK
 
 
 @njit(cache=True, nogil=True)
@@ -184,25 +199,25 @@ def compare_scan(
     Returns:
         Number of points that are FREED.
     """
-    rotation, freed = scan.rotation, 0
-    for k in range(0, scan.ranges.shape[0], step):
-        one = float(scan.ranges[k])
-        evidence[k] = UNKNOWN
-        points[k, 0] = points[k, 1] = points[k, 2] = np.nan
-        if not doubts.range_min <= one < doubts.range_max:
+    _place_points(scan, step, doubts, points, evidence)
+    beams = _Beams(scan.angle_min, scan.increment, scan.is_full_turn)
+    ranges, origins, turns = earlier
+    slots, recent = order
+    freed = 0
+    for k in range(0, evidence.shape[0], step):
+        if evidence[k] != _ASK:
             continue
-        sx, sy = one * scan.directions[k, 0], one * scan.directions[k, 1]
-        up = rotation[2, 0] * sx + rotation[2, 1] * sy
-        z = scan.origin[2] + up
-        if abs(up) > doubts.upright or z < doubts.low_z or z > doubts.high_z:
-            continue
-        x = scan.origin[0] + rotation[0, 0] * sx + rotation[0, 1] * sy
-        y = scan.origin[1] + rotation[1, 0] * sx + rotation[1, 1] * sy
-        points[k, 0], points[k, 1], points[k, 2] = x, y, z
-        if abs(up) > doubts.level:
-            continue
-        evidence[k] = _ask(earlier, order, is_thorough, scan, doubts, (x, y, z))
-        freed += evidence[k] == FREED
+        point = (points[k, 0], points[k, 1], points[k, 2])
+        occupied, found = 0, UNKNOWN
+        for i in range(slots.shape[0]):
+            if i == recent and occupied >= _STANDS:
+                break
+            found = _evidence(ranges, origins, turns, slots[i], beams, doubts, point)
+            occupied += found == OCCUPIED
+            if found == FREED or (occupied and not is_thorough):
+                break
+        evidence[k] = FREED if found == FREED else OCCUPIED if occupied else UNKNOWN
+        freed += found == FREED
     return freed
 
 
@@ -303,19 +318,22 @@ def find_arrived(
         arrived: bool[m], written.
     """
     n = scan.ranges.shape[0]
+    beams = _Beams(scan.angle_min, scan.increment, scan.is_full_turn)
+    ranges, origins, turns = earlier
     for row in range(clusters.shape[0]):
-        first, beams = clusters[row, 0], clusters[row, 1]
-        middle = (first + beams // 2) % n
-        width = beams * abs(scan.increment) * float(scan.ranges[middle])
+        first, count = clusters[row, 0], clusters[row, 1]
+        middle = (first + count // 2) % n
+        width = count * abs(scan.increment) * float(scan.ranges[middle])
         arrived[row] = False
-        if clusters[row, 3] == 0 or beams < _PROBES or width > widest:
+        if clusters[row, 3] == 0 or count < _PROBES or width > widest:
             continue
         for i in range(order.slots.shape[0]):
             freed = 0
             for probe in range(_PROBES):
-                k = (first + (2 * probe + 1) * beams // (2 * _PROBES)) % n
+                k = (first + (2 * probe + 1) * count // (2 * _PROBES)) % n
                 point = (points[k, 0], points[k, 1], points[k, 2])
-                freed += _evidence(earlier, order.slots[i], scan, doubts, point) == FREED
+                found = _evidence(ranges, origins, turns, order.slots[i], beams, doubts, point)
+                freed += found == FREED
             if freed == _PROBES:
                 arrived[row] = True
                 break

@@ -143,7 +143,9 @@ class ObstacleTracker:
             if self._points:
                 self.reset()
             return None
-        moving = self._points.setdefault(sensor, MovingPoints())
+        moving = self._points.get(sensor)
+        if moving is None:
+            moving = self._points[sensor] = MovingPoints()
         now_s = scan.stamp_s
         is_thorough = bool(self._lives) or len(self._halted) > 0
         clusters = moving.compare(scan, frame_from_sensor, heights_m, self.params, is_thorough)
