@@ -16,6 +16,7 @@ import rosgraph
 import rosgraph.network
 import rospy
 from rospy.impl.paramserver import get_param_server_cache
+from rospy.impl.tcpros_base import init_tcpros_server
 
 from quad_nav.errors import QuadError, excerpt, printable
 
@@ -27,6 +28,7 @@ SILENT_AFTER_S = 3.0
 REPEAT_S = 15.0
 MAX_LOG = 50_000  # characters of a line and of each of its arguments
 _MAX_HEADER = 4096  # bytes
+_WAITING_CONNECTIONS = 128
 _ROSOUT_PARAMETER = "/rosout_disable_topics_generation"
 
 
@@ -41,8 +43,7 @@ def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
         at_signal: Called in the other thread, before anything is shut down.
     """
     rospy.init_node(name, disable_signals=True)
-    escape_log_messages()
-    log_without_master()
+    set_up_node()
 
     def shut_down(number: int, _frame: Optional[FrameType]) -> None:
         reason = signal.Signals(number).name
@@ -55,6 +56,24 @@ def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, shut_down)
+
+
+def set_up_node() -> None:
+    """Set up logging and connections of a node that has just been initialized."""
+    accept_many_connections()
+    escape_log_messages()
+    log_without_master()
+
+
+def accept_many_connections() -> None:
+    """Let more nodes connect to this one at the same time.
+
+    rospy lets five connections wait. Linux drops further ones, and their nodes try again after 1 s:
+    until then a navigator that has just started does not hear the clock.
+    """
+    server = init_tcpros_server()
+    server.start_server()
+    server.tcp_ros_server.server_sock.listen(_WAITING_CONNECTIONS)
 
 
 def server_parameters() -> Dict[str, Any]:

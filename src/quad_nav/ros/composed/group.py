@@ -18,7 +18,7 @@ from quad_nav.loop import LoopSetup
 from quad_nav.loop.navigator_group import LocatedScan, NavigatorGroup, NavigatorResult
 from quad_nav.ros.common.conversions import ScanMessage, scan_message
 from quad_nav.ros.common.diagnostics import publish_health
-from quad_nav.ros.common.readiness import TopicWatch, escape_log_messages, log_without_master
+from quad_nav.ros.common.readiness import TopicWatch, set_up_node
 from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers, set_time
 from quad_nav.ros.composed.robot import ComposedRobot
 from quad_nav.ros.composed.transforms import ComposedTransforms
@@ -167,8 +167,7 @@ def _start_node(
         argv=[one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
         disable_signals=True,
     )
-    escape_log_messages()
-    log_without_master()
+    set_up_node()
     group = _WorkerGroup(setup, robots, lidars)
     rospy.loginfo("%s: ready, robots: %d", rospy.get_name().lstrip("/"), len(robots))
     return group

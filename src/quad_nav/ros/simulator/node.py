@@ -34,11 +34,7 @@ from quad_nav.errors import InputError, printable
 from quad_nav.files.values import is_number
 from quad_nav.kernels.jit import cache_warnings
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
-from quad_nav.ros.common.readiness import (
-    escape_log_messages,
-    log_without_master,
-    server_parameters,
-)
+from quad_nav.ros.common.readiness import server_parameters, set_up_node
 from quad_nav.ros.composed.fleet import ComposedFleet
 from quad_nav.ros.composed.group import is_handed_over
 from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers, set_time
@@ -327,8 +323,7 @@ def main() -> int:
     own = OwnNodes()
     ignore_publishers(own, is_handed_over)
     rospy.init_node("simulator", disable_signals=True)
-    escape_log_messages()
-    log_without_master()
+    set_up_node()
     name = rospy.get_name().lstrip("/")
     try:
         setup = _read_setup(name)
