@@ -18,7 +18,7 @@ UNKNOWN, OCCUPIED, FREED = 0, 1, 2
 _MAX_SIDE_BEAMS = 64
 _PROBES = 3  # points of a standing cluster about which an earlier scan is asked
 _STANDS = 3  # recent scans that see a point occupied, and none free: it stands
-_ASK = 3  # a point about which earlier scans are to be asked
+_ASK = 3  # evidence until the earlier scans are asked about a point
 
 
 class ScanView(NamedTuple):
@@ -34,7 +34,10 @@ class ScanView(NamedTuple):
 
 
 class _Beams(NamedTuple):
-    """What tells the beam of a direction, without the arrays, which are slow to hand on."""
+    """Angles of a scan's beams, as in `ScanView`.
+
+    Without its arrays: handing them to a kernel for each point takes longer than comparing it.
+    """
 
     angle_min: float
     increment: float

@@ -1,4 +1,4 @@
-"""Start a node: signals, and waiting for what it needs, with the names of what is missing."""
+"""Start a node: signals, log, connections, and waiting for what it needs."""
 
 from __future__ import annotations
 
