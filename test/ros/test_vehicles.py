@@ -124,14 +124,14 @@ class Vehicles(unittest.TestCase):
         os.kill(pid, signal.SIGKILL)
         self.wait(lambda: pid_of("/sequencer") not in (None, pid), "a sequencer again")
         self.wait(lambda: len(self.events) > told, "goals of another sequencer")
+        armed = [key.value for one in states for key in one.values if key.key == "armed"]
+        self.assertEqual(set(armed), {"false"})
         self.assertEqual(
             {(one["robot"], one["event"]) for one in self.events[told:]}, {(0, "sent")}
         )
         self.assertTrue(rospy.get_param("/mission/quad1/stopped"))
         self.assertFalse(rospy.get_param("/mission/quad0/stopped"))
         self.wait(lambda: self.states[0] == "flying" and self.speed(0) > 0.2, "flight of vehicle 0")
-        armed = [key.value for one in states for key in one.values if key.key == "armed"]
-        self.assertEqual(set(armed), {"false"})
         self.a_person_lets_it_fly_again()
 
     def a_person_lets_it_fly_again(self):

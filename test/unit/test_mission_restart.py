@@ -93,6 +93,36 @@ def test_a_clock_that_goes_back_takes_nothing_off(mission):
     assert mission.fly(50.0) == [(0, 10.0), (1, 10.0)]
 
 
+@pytest.mark.parametrize(("stopped_s", "resumed_s"), [(50.0, 50.0), (50.0, 70.0), (110.0, 50.0)])
+def test_a_clock_that_goes_back_at_a_stop_keeps_the_times(mission, stopped_s, resumed_s):
+    mission.begin()
+    mission.fly(100.0)
+    mission.fly(110.0)
+    mission.runner._watch_clock(110.0)
+    call("/mission/stop", stopped_s)  # the main thread has not noticed yet
+    if resumed_s == 50.0:
+        call("/mission/resume", 50.0)
+    mission.runner._watch_clock(50.0)
+    if resumed_s > 50.0:
+        call("/mission/resume", resumed_s)
+    mission.fly(resumed_s)
+    mission.fly(resumed_s + 5.0, (10.0, 0.0), (10.0, 5.0))
+    for robot in mission.runner._record.log.robots.values():
+        assert [leg.time_s for leg in robot.legs] == [15.0]
+
+
+def test_a_restart_does_not_wait_for_what_is_stopped(mission):
+    """Such as a vehicle that its pilot has landed and switched off."""
+    mission.begin()
+    mission.fly(100.0)
+    every = len(mission.runner.needs())
+    call("/mission/quad1/stop", 100.0)
+    mission.begin(respawned=True)
+    needs = mission.runner.needs()
+    assert len(needs) == 1 + (every - 1) / 2  # the service, and what quad0 needs
+    assert mission.fly(110.0) == [(0, 10.0)]
+
+
 def test_a_simulation_that_is_resumed_is_started(mission):
     mission = Mission(mission.ros, mission._folder, simulation=True, start_service="")
     mission.begin()

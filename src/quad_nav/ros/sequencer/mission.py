@@ -133,7 +133,8 @@ class MissionRunner:
             else []
         )
         for robot in self.robots:
-            needs += _robot_needs(robot, self._feed)
+            if not robot.is_stopped:  # such as one whose pilot has switched it off
+                needs += _robot_needs(robot, self._feed)
         return needs
 
     def start(self) -> None:

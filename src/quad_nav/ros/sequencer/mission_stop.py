@@ -53,7 +53,8 @@ class MissionStop:
             robot.is_stopped = is_stopped or rospy.get_param(STOPPED_PARAMETER, False) is True
         self._store(robots)
         for prefix in [ALL] if self._are_all_stopped() else map(_prefix, self._stopped(robots)):
-            rospy.logwarn("sequencer: %s stays stopped; %s/resume resumes it", prefix, prefix)
+            subject = _subject(prefix)
+            rospy.logwarn("sequencer: the %s stays stopped; %s/resume resumes it", subject, prefix)
         groups = {ALL: robots, **{_prefix(robot): [robot] for robot in robots}}
         self._services = [
             rospy.Service(f"{prefix}/{name}", Trigger, partial(handler, prefix, group))

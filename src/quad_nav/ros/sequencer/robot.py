@@ -95,7 +95,7 @@ class MissionRobot:
     def hold(self, now_s: float) -> None:
         """Stop the mission: forget the goal that was sent last; `is_stopped` has been set."""
         if self.sequencer.held_s is None:
-            self.sequencer.hold(now_s)
+            self.sequencer.hold(max(now_s, self.now_s))  # the clock may have gone back
             self.link.clear()
             self.link.received.set()
 
@@ -104,7 +104,7 @@ class MissionRobot:
         if self.is_stopped:
             self.hold(now_s)  # in case the stop has not got as far
             self.is_stopped = False
-            self.sequencer.release(now_s)
+            self.sequencer.release(max(now_s, self.now_s))
             self.link.received.set()
 
     def step(self, record: FlightRecord) -> bool:
