@@ -107,6 +107,11 @@ class Vehicles(unittest.TestCase):
         self.assertFalse(rospy.get_param("/mission/quad1/stopped"))
         self.wait(lambda: self.speed(0) < 0.05, "hover of vehicle 0")
         self.assertEqual(self.states[1], "flying")
+        # It neither keeps a take-off waiting nor lets a resumption of all fly it.
+        self.assertIn("left out: quad0: taken over", trigger("/vehicles/take_off"))
+        trigger("/mission/resume")
+        self.wait(lambda: rospy.get_param("/mission/quad0/stopped"), "stop by the bridge")
+        self.assertEqual((self.states[0], self.states[1]), ("taken over", "flying"))
 
     def somebody_resumes_it(self):
         trigger("/vehicle0/resume")

@@ -111,6 +111,21 @@ def test_a_clock_that_goes_back_at_a_stop_keeps_the_times(mission, stopped_s, re
         assert [leg.time_s for leg in robot.legs] == [15.0]
 
 
+def test_the_journal_knows_of_a_stop_while_the_clock_goes_back(mission):
+    mission.begin()
+    mission.fly(100.0)
+    mission.fly(110.0)
+    mission.runner._watch_clock(110.0)
+    call("/mission/stop", 50.0)
+    mission.runner._watch_clock(50.0)
+    mission.fly(60.0)
+    mission.begin(respawned=True)
+    call("/mission/resume", 70.0)
+    mission.fly(75.0, (10.0, 0.0), (10.0, 5.0))
+    for robot in mission.runner._record.log.robots.values():
+        assert [leg.time_s for leg in robot.legs] == [15.0]
+
+
 def test_a_restart_does_not_wait_for_what_is_stopped(mission):
     """Such as a vehicle that its pilot has landed and switched off."""
     mission.begin()

@@ -72,7 +72,7 @@ class MissionRobot:
         self.lock = threading.Lock()
         self.is_done = self.clock_went_back = self.is_stopped = False
         self.now_s = 0.0
-        self._recorded_held_s: Optional[float] = None  # what the journal says
+        self._is_recorded = True  # whether the journal says whether the mission is stopped
         self._reports: List[NavigatorReport] = []  # for the next tick
         self._file = goals.file
         self._next_poll_s = 0.0
@@ -83,8 +83,8 @@ class MissionRobot:
 
     def begin(self, now_s: float, progress: SequenceProgress = START) -> None:
         """Begin with the first goal, or resume the progress of another sequencer."""
-        self._recorded_held_s = progress.held_s
         self.sequencer = Sequencer(self.sequencer.sequence, progress)
+        self._is_recorded = progress.held_s is None and not self.is_stopped
         (self.sequencer.hold if self.is_stopped else self.sequencer.release)(now_s)
         self.pose, self._reports, self.now_s = None, [], now_s
         self.is_done = self.clock_went_back = False
@@ -96,6 +96,7 @@ class MissionRobot:
         """Stop the mission: forget the goal that was sent last; `is_stopped` has been set."""
         if self.sequencer.held_s is None:
             self.sequencer.hold(max(now_s, self.now_s))  # the clock may have gone back
+            self._is_recorded = False
             self.link.clear()
             self.link.received.set()
 
@@ -105,6 +106,7 @@ class MissionRobot:
             self.hold(now_s)  # in case the stop has not got as far
             self.is_stopped = False
             self.sequencer.release(max(now_s, self.now_s))
+            self._is_recorded = False
             self.link.received.set()
 
     def step(self, record: FlightRecord) -> bool:
@@ -124,9 +126,9 @@ class MissionRobot:
         self.now_s, inbox = now_s, self.link.pop()
         if self.is_stopped:
             self.hold(now_s)  # in case the stop has found the step before in progress
-        if self.sequencer.held_s != self._recorded_held_s:
+        if not self._is_recorded:
             record.add_progress(self.name, self.sequencer, now_s)
-            self._recorded_held_s = self.sequencer.held_s
+            self._is_recorded = True
         track = self.odometry.take(inbox.states, inbox.odometry, now_s)
         self._log_recoveries(inbox.recoveries)
         record.add_flight(self.name, track, inbox.reports, len(inbox.recoveries))
