@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 
 rospy = pytest.importorskip("rospy")
 
 from ros.fake_mission import STARTS, Mission, call, stopped  # noqa: E402
-from ros.fake_ros import FakeRos  # noqa: E402
+from ros.fake_ros import FakePublisher, FakeRos  # noqa: E402
 
 from quad_nav.mission.sequencer import NavigatorReport, Verdict  # noqa: E402
 
@@ -149,3 +151,20 @@ def test_a_step_that_a_stop_meets_sends_no_goal(mission, monkeypatch):
     monkeypatch.setattr(record, "add_actions", add_actions)
     call("/mission/resume", 110.0)
     assert mission.fly(110.0) == [(0, 10.0), (1, 10.0)]
+
+
+def test_a_stop_during_a_resumption_cancels_at_once_and_lasts(mission):
+    mission.begin()
+    mission.fly(100.0)
+    cancelled = threading.Event()
+    FakePublisher.all["/move_base0/cancel"].publish = lambda _: cancelled.set()
+    robot = mission.runner.robots[0]
+    with mission.runner._stop._lock:  # a resumption is under way
+        thread = threading.Thread(target=call, args=("/mission/quad0/stop", 110.0))
+        thread.start()
+        assert cancelled.wait(10.0)
+        cancelled.clear()
+        robot.release(110.0)
+    thread.join()
+    assert robot.is_stopped and cancelled.is_set()
+    assert mission.fly(120.0) == []

@@ -182,6 +182,21 @@ def test_an_order_to_stop_ends_a_take_off_that_waits(flown, order):
     assert LAND_ALL_TOPIC not in subscribed()
 
 
+def test_a_landing_during_the_take_off_lands_what_takes_off_after_it(flown):
+    flown.tell(vehicle0="ready", vehicle1="ready")
+    respond = flown.respond
+
+    def land_and_respond(name):
+        if name == TAKE_OFFS[0]:
+            deliver(LAND_ALL_TOPIC, Empty())  # before the bridge has heard of the take-off
+        return respond(name)
+
+    flown.respond = land_and_respond
+    response = flown.take_off()
+    assert not response.success and "ordered to land" in response.message
+    assert flown.landings == 1
+
+
 def test_a_take_off_of_stopped_missions_that_a_person_asks_for(flown):
     """After a restart: the missions were stopped before the request."""
     flown.ros._parameters.update(STOPPED)
