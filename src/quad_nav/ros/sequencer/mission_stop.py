@@ -66,12 +66,11 @@ class MissionStop:
         """Stop the missions of some robots."""
         self._cancel(robots)  # at once
         with self._lock:
-            self._cancel(robots)  # a resumption may have come between
             for robot in robots:
                 if robot.lock.acquire(timeout=LOCK_S):
                     robot.hold(rospy.get_time())
                     robot.lock.release()
-            self._cancel(robots)  # where a step has sent a goal meanwhile
+            self._cancel(robots)  # a step or a resumption may have come between
             self._store(robots)
 
     def _cancel(self, robots: Sequence[MissionRobot]) -> None:
