@@ -227,3 +227,10 @@ def test_nothing_moves_a_quadcopter_that_has_lost_its_data(config, goal, fault, 
     limit_s = BEGIN_S + TIMEOUT_S + CONTROL_PERIOD_S
     assert any(tick.evades for tick in commands.ticks if tick.now_s < limit_s)
     assert commands.moves(limit_s) == []
+
+
+@pytest.mark.parametrize("config, lost_after_s", [("moving", 4.0), ("dynabarn", 1.5)])
+def test_tracks_end_in_flight_without_scans(config, lost_after_s, tmp_path):
+    commands = fly(tmp_path, config, HOVERS, NoScans(BEGIN_S, 1e9))
+    known_s = [now_s for now_s, count in commands.tracks if count]
+    assert BEGIN_S < max(known_s) <= BEGIN_S + lost_after_s
