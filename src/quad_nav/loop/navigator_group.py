@@ -36,12 +36,12 @@ from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import OdomFrames, pose_in
 from quad_nav.sim.robot_state import RobotState, RobotStates
 from quad_nav.sim.simulation import STEPS_PER_S
+from quad_nav.timing import is_due
 from quad_nav.tracking.tracker import ObstacleTracker
 
 LocatedScan = Tuple[Scan, Pose3D]
 """A scan and ``map_from_lidar``, the LIDAR's pose at its stamp."""
 _IDENTITY = Pose2D(0.0, 0.0)
-SAME_TIME_S = 1e-9
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class LoopRobot:
             navigator.set_goal(goal, now_s)
             self.waiting_goal = None
         self.due_s = -math.inf if navigator.has_work else navigator.next_due_s
-        return self.due_s <= now_s + SAME_TIME_S
+        return is_due(self.due_s, now_s)
 
     def navigate(
         self, now_s: float, state: RobotState, peers: Sequence[Peer]
@@ -291,11 +291,11 @@ class NavigatorGroup:
         for number, goal in goals.items():
             self.robots[number].waiting_goal = goal
         self.before_ticks(now_s)
-        soon_s = now_s + SAME_TIME_S
         due = [
             number
             for number, robot in self.robots.items()
-            if (robot.due_s <= soon_s or robot.waiting_goal is not None) and robot.is_due(now_s)
+            if (is_due(robot.due_s, now_s) or robot.waiting_goal is not None)
+            and robot.is_due(now_s)
         ]
         peers = self._peers_in_reach(due, now_s, states)
         results = [self.tick(number, now_s, states, peers[number]) for number in due]
