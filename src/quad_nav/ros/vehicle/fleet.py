@@ -6,8 +6,10 @@ asks for it, and publishes the scene. The vehicles fly on without it.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
+from functools import partial
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple
 
 import rospy
@@ -28,10 +30,10 @@ from quad_nav.files.values import (
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.vehicle.node import LAND_ALL_TOPIC
 from quad_nav.ros.vehicle.scene_topics import SceneLidars, SceneTopics
-from quad_nav.ros.vehicle.simulated import TICK_S, SimulatedVehicles
+from quad_nav.ros.vehicle.simulated import TICK_S, SimulatedVehicles, starts_of
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
-from quad_nav.sim.scene_file import load_scene
+from quad_nav.sim.scene_file import load_scene, outside_problem
 from quad_nav.topics.flight_info import EVENTS_TOPIC, from_text
 from quad_nav.vehicle.orders import IN_FLIGHT, State
 from quad_nav.vehicle.vehicle_file import Vehicle, load_vehicles
@@ -41,6 +43,8 @@ READY_WAIT_S = 90.0
 CALL_WAIT_S = 40.0
 LAND_WAIT_S = 30.0
 LAND_AFTER_S = 1.0
+SILENT_S = 3.0
+"""Bridges publish their states once a second; one that is silent for this long has died."""
 _IN_THE_AIR = tuple(state.value for state in (*IN_FLIGHT, State.TAKEN_OVER))
 _DEFAULTS: Dict[str, Any] = {
     "vehicles": "",
@@ -80,7 +84,7 @@ class VehicleFleet:
         self._robots = len(vehicles)
         self._done: Set[int] = set()
         self._lands_when_done = lands_when_done
-        self._states: Dict[int, Tuple[str, str]] = {}
+        self._states: Dict[int, Tuple[str, str, float]] = {}  # state, reason, monotonic time
         self._land_all = rospy.Publisher(LAND_ALL_TOPIC, Empty, queue_size=1)
         self._subscribers = [
             rospy.Subscriber(
@@ -96,7 +100,8 @@ class VehicleFleet:
 
     def _on_state(self, message: DiagnosticStatus, number: int) -> None:
         values = {one.key: one.value for one in message.values}
-        self._states[number] = values.get("state", ""), values.get("reason", "")
+        state, reason = values.get("state", ""), values.get("reason", "")
+        self._states[number] = state, reason, time.monotonic()
 
     def _on_event(self, message: String) -> None:
         """Land when the last robot has flown all its goals."""
@@ -114,18 +119,33 @@ class VehicleFleet:
             threading.Timer(LAND_AFTER_S, self._land_all.publish, (Empty(),)).start()
 
     def _land(self, _: TriggerRequest) -> TriggerResponse:
-        """Land all vehicles, and respond when none is in the air."""
+        """Land all vehicles, and respond when none is in the air, or nothing is known of them."""
         self._land_all.publish(Empty())
         end_s = time.monotonic() + LAND_WAIT_S
         while time.monotonic() < end_s and not rospy.is_shutdown():
-            flying = [one.name for one in self._real if self._is_in_the_air(one.number)]
+            flying = [one for one in self._real if self._is_in_the_air(one.number)]
             if not flying:
                 return TriggerResponse(True, "all vehicles have landed")
+            if all(self._is_silent(one.number) for one in flying):
+                break
             time.sleep(0.1)
-        return TriggerResponse(False, f"still in the air: {', '.join(flying)}")
+        states = (f"{one.name} ({self._state(one.number)})" for one in flying)
+        return TriggerResponse(False, f"still in the air: {', '.join(states)}")
 
     def _is_in_the_air(self, number: int) -> bool:
-        return self._states.get(number, ("", ""))[0] in _IN_THE_AIR
+        """Return whether a vehicle was in the air when its bridge told its state last."""
+        return number in self._states and self._states[number][0] in _IN_THE_AIR
+
+    def _is_silent(self, number: int) -> bool:
+        told_s = self._states[number][2] if number in self._states else -math.inf
+        return time.monotonic() - told_s > SILENT_S
+
+    def _state(self, number: int) -> str:
+        """Describe the state of a vehicle; that of a bridge that has died is not known."""
+        if number not in self._states:
+            return "no bridge"
+        text = ": ".join(filter(None, self._states[number][:2]))
+        return f"its bridge is silent, last state: {text}" if self._is_silent(number) else text
 
     def _take_off(self, _: TriggerRequest) -> TriggerResponse:
         """Take all vehicles off when all are ready; land all if one does not."""
@@ -143,10 +163,9 @@ class VehicleFleet:
         good = ("ready", "landed", "flying", "holding")
         while not rospy.is_shutdown():
             missing = [
-                f"{one.name}: {': '.join(filter(None, state)) or 'no bridge'}"
+                f"{one.name}: {self._state(one.number)}"
                 for one in self._real
-                for state in [self._states.get(one.number, ("", ""))]
-                if state[0] not in good
+                if self._is_silent(one.number) or self._states[one.number][0] not in good
             ]
             if not missing or time.monotonic() > end_s:
                 return missing
@@ -192,11 +211,14 @@ def read_setup(
     vehicles: Tuple[Vehicle, ...] = ()
     scene: Optional[Scene] = None
     try:
-        vehicles = load_vehicles(values["vehicles"]) if not problems else ()
+        scene = load_scene(values["scene"]) if values["scene"] and not problems else None
     except InputError as error:
         problems += error.problems
+    room = None if scene is None else partial(outside_problem, scene)
     try:
-        scene = load_scene(values["scene"]) if values["scene"] and not problems else None
+        vehicles = load_vehicles(values["vehicles"], room) if not problems else ()
+        if scene is not None:
+            starts_of(scene, vehicles)
     except InputError as error:
         problems += error.problems
     if values["lidar_for"] == "vehicles" and not values["scene"]:
