@@ -57,16 +57,21 @@ def estimator(flags, position=0.005, velocity=0.01):
         (system(9000), 0.0, ""),
         (system(0), 10.5, ""),  # not measured
         (system(65535), 10.5, ""),
-        (system(health=SENSORS & ~BATTERY), 10.5, "the autopilot says that the battery is low"),
+        (
+            system(health=SENSORS & ~BATTERY),
+            10.5,
+            "the autopilot says that the battery is low or broken",
+        ),
     ],
 )
 def test_a_charge_of_100_percent_hides_no_low_battery(message, least_v, problem):
     assert watch(BATT_LOW_VOLT=least_v).battery_problem(message, is_armed=True) == problem
 
 
-def test_a_battery_that_is_not_watched_is_not_low():
+@pytest.mark.parametrize("bits", ["present", "enabled"])
+def test_a_battery_that_is_not_watched_is_not_low(bits):
     message = system(health=0)
-    message.onboard_control_sensors_enabled = 0
+    setattr(message, f"onboard_control_sensors_{bits}", 0)
     assert watch().battery_problem(message, is_armed=True) == ""
 
 

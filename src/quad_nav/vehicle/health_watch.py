@@ -79,7 +79,10 @@ class HealthWatch:
         millivolts = message.voltage_battery
         if least and millivolts not in _UNKNOWN_MV and millivolts < 1e3 * least:
             return f"battery at {millivolts / 1e3:.2f} V, expected {least:g} V or more"
-        is_watched = message.onboard_control_sensors_enabled & _BATTERY
-        if is_watched and not message.onboard_control_sensors_health & _BATTERY:
-            return self._battery_text or "the autopilot says that the battery is low"
+        present, enabled = (
+            message.onboard_control_sensors_present,
+            message.onboard_control_sensors_enabled,
+        )
+        if present & enabled & ~message.onboard_control_sensors_health & _BATTERY:
+            return self._battery_text or "the autopilot says that the battery is low or broken"
         return self._battery_text
