@@ -15,7 +15,6 @@ os.environ["MAVLINK20"] = "1"  # pymavlink reads it at its import
 from quad_nav.errors import InputError
 from quad_nav.vehicle.autopilots import AUTOPILOT_COMPONENT
 from quad_nav.vehicle.exchanges import Message
-from quad_nav.vehicle.failsafes import OUR_SYSTEM
 from quad_nav.vehicle.link import VehicleLink
 from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
 from quad_nav.vehicle.states import VehicleMachine
@@ -68,7 +67,7 @@ class MavlinkLink(VehicleLink[Message]):
             self._connection = self._open()
         except (ConnectionError, TimeoutError):  # nothing listens there yet
             self._reopen_s = clock() + _REOPEN_S
-        except (OSError, ValueError) as error:
+        except (OSError, OverflowError, ValueError) as error:
             raise InputError(
                 [f"{vehicle.name}: address {vehicle.address} cannot be opened: {error}"]
             ) from error
@@ -77,7 +76,7 @@ class MavlinkLink(VehicleLink[Message]):
         # Without its own reconnection: it sleeps and prints in the thread that reads.
         return mavutil.mavlink_connection(
             self._vehicle.address,
-            source_system=OUR_SYSTEM,
+            source_system=self._vehicle.bridge_system,
             source_component=OUR_COMPONENT,
             dialect="ardupilotmega",
             autoreconnect=False,
@@ -110,11 +109,12 @@ class MavlinkLink(VehicleLink[Message]):
             return None
 
     def _pass(self, message: Any) -> None:
-        name = message.get_type()
-        if message.get_srcSystem() != self._vehicle.system or name == "BAD_DATA":
-            return
+        name, system = message.get_type(), message.get_srcSystem()
         with self.lock:
-            self.adapter.receive(name, message.get_srcComponent(), message, self._clock())
+            if system == self._vehicle.system and name != "BAD_DATA":
+                self.adapter.receive(name, message.get_srcComponent(), message, self._clock())
+            elif name == "HEARTBEAT":
+                self.adapter.receive_other(system, message, self._clock())
 
     def _try_again(self, timeout_s: float) -> None:
         if self._clock() < self._reopen_s:
@@ -123,7 +123,7 @@ class MavlinkLink(VehicleLink[Message]):
         self._empty, self._reopen_s = 0, self._clock() + _REOPEN_S
         try:
             self._connection = self._open()
-        except (OSError, ValueError):
+        except (OSError, OverflowError, ValueError):
             self._connection = None
 
     def _send(self, messages: List[Message]) -> None:
