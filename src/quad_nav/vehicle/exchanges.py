@@ -107,11 +107,13 @@ class Parameters:
         self._tries, self._next_s = {}, -math.inf
 
     def take(self, name: str, value: float, kind: int) -> bool:
-        """Take a PARAM_VALUE; return whether it is one of ours."""
+        """Take a PARAM_VALUE; return False for one of ours that is no finite number."""
         if name not in self._names:
-            return False
+            return True
         if self._sends_bits and kind in _WHOLE:
             value = struct.unpack(_WHOLE[kind], struct.pack("<f", value))[0]
+        if not math.isfinite(value):
+            return False
         self.values[name], self._types[name] = float(value), kind
         self._tries.pop(name, None)
         wanted = self._writes.get(name)

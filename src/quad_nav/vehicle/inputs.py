@@ -20,6 +20,8 @@ from quad_nav.vehicle.telemetry import Estimate, Landed, Limits, Status
 TEXT_S = 35.0
 """How long a refusal counts as a reason; ArduPilot repeats its own every 31 s."""
 REFUSAL_S = 5.0
+MOST_TEXTS = 10
+"""Reasons that count at the same time, the latest ones: each is part of the state's topic."""
 _NEVER_S = -math.inf
 
 
@@ -116,11 +118,15 @@ class Inputs:
 
     def take_text(self, text: str, now_s: float) -> None:
         """Take a reason of the autopilot for not being ready."""
-        self._texts[text] = now_s + TEXT_S
+        self._count(text, now_s + TEXT_S)
 
     def refuse(self, reason: str, now_s: float) -> None:
         """Count a refusal as a reason for a short time."""
-        self._texts[reason] = now_s + REFUSAL_S
+        self._count(reason, now_s + REFUSAL_S)
+
+    def _count(self, reason: str, until_s: float) -> None:
+        others = [item for item in self._texts.items() if item[0] != reason]
+        self._texts = dict([*others[1 - MOST_TEXTS :], (reason, until_s)])
 
     def clear_texts(self) -> None:
         """Forget the autopilot's reasons: it has said that it is ready."""

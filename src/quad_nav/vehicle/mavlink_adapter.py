@@ -9,6 +9,7 @@ import math
 from types import MappingProxyType
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
 
+from quad_nav.errors import printable
 from quad_nav.geometry import Pose3D, Quaternion, rotate
 from quad_nav.vehicle import failsafes
 from quad_nav.vehicle.adapter import VehicleAdapter
@@ -22,6 +23,7 @@ from quad_nav.vehicle.frames import (
     scan_from_obstacle_distance,
 )
 from quad_nav.vehicle.orders import IN_FLIGHT, Answer, Order, Output, State
+from quad_nav.vehicle.ranges import MAVLINK
 from quad_nav.vehicle.setpoints import led, limited, setpoint_fields
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate, Landed, Velocity
@@ -50,6 +52,8 @@ _IN_PROGRESS = 5  # MAV_RESULT
 _OUR_TYPE, _OUR_AUTOPILOT, _ACTIVE = 6, 8, 4
 _REBOOT_MS = 1000
 _TEXT_BYTES = 50
+_MOST_TEXT = 5 * _TEXT_BYTES
+_MOST_REASONS = 10
 
 
 class MavlinkAdapter(VehicleAdapter[Message]):
@@ -101,7 +105,13 @@ class MavlinkAdapter(VehicleAdapter[Message]):
             self.machine.inputs.hear(now_s)
         handler = self._HANDLERS.get(name)
         if handler is not None:
-            handler(self, message, now_s)
+            self._handle(
+                name,
+                lambda field: getattr(message, field),
+                MAVLINK.get(name, {}),
+                lambda: handler(self, message, now_s),
+                now_s,
+            )
 
     def _on_heartbeat(self, message: Any, now_s: float) -> None:
         if message.autopilot != self._autopilot.number:
@@ -183,16 +193,14 @@ class MavlinkAdapter(VehicleAdapter[Message]):
             if text.startswith(beginning):
                 self.machine.inputs.take_text(text, now_s)
         if any(text.startswith(beginning) for beginning in self._autopilot.refusals):
-            self._reasons.append(text)
+            self._reasons = [*self._reasons, text][:_MOST_REASONS]
 
     def _whole_text(self, message: Any) -> Optional[str]:
         """Return the text, joined if it came in parts of 50 bytes; None before the last part."""
         number = message.id
-        if not number:
-            return str(message.text).rstrip()  # PX4 marks some with a tab at their end
-        text = self._chunks.pop(number, "") + message.text
-        if len(message.text) < _TEXT_BYTES:
-            return text.rstrip()
+        text = f"{self._chunks.pop(number, '') if number else ''}{message.text}"[:_MOST_TEXT]
+        if not number or len(message.text) < _TEXT_BYTES:
+            return printable(text.rstrip())  # PX4 marks some with a tab at their end
         self._chunks = {number: text}
         return None
 
@@ -205,9 +213,11 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         else:
             self._refused = order, now_s + ANSWER_WAIT_S
 
-    def _on_parameter(self, message: Any, _: float) -> None:
-        name = str(message.param_id).rstrip("\0")
-        self.parameters.take(name, message.param_value, message.param_type)
+    def _on_parameter(self, message: Any, now_s: float) -> None:
+        name, value = str(message.param_id).rstrip("\0"), message.param_value
+        if not self.parameters.take(name, value, message.param_type):
+            line = f"PARAM_VALUE: {name} is {value}, expected a finite number"
+            self.drop(f"PARAM_VALUE {name}", line, now_s)
 
     def _on_time(self, message: Any, now_s: float) -> None:
         reply = self.clock.take(message.tc1, message.ts1, now_s)
