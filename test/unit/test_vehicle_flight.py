@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 from vehicles import failures
-from vehicles.virtual_flight import STEP_S, Flight
+from vehicles.virtual_flight import STEP_S, Flight, StandInFlight
 
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.vehicle.autopilots import SET_MESSAGE_INTERVAL
 from quad_nav.vehicle.orders import Permissions, State
 
 
@@ -342,3 +343,43 @@ def test_a_dry_run_notices_the_pilot_and_missing_commands(autopilot):
     flight.vehicle.set_mode(flight.vehicle.kind["other"])
     assert flight.run(0.1, lambda: flight.state is State.TAKEN_OVER)
     assert flight.pauses == 1
+
+
+def restarted(autopilot, dead_s):
+    """A flight whose bridge dies under a command, and another bridge that has seen a heartbeat."""
+    flight = StandInFlight(autopilot).to_flight(Twist2D(0.4, 0.1, 0.2))
+    flight.is_alive = False
+    flight.run(dead_s)
+    flight.start_bridge()
+    flight.is_alive, flight.pauses, flight.sent = True, 0, []
+    assert flight.run(2.0, lambda: flight.state is State.TAKEN_OVER)
+    return flight
+
+
+def orders_of(flight):
+    orders = [fields["command"] for _, name, fields in flight.sent if name == "COMMAND_LONG"]
+    return [number for number in orders if number != SET_MESSAGE_INTERVAL]
+
+
+def test_a_bridge_that_starts_beside_a_flying_vehicle_lets_it_hover():
+    flight = restarted("ardupilot", 3.0)
+    assert flight.machine.reason == "bridge started in flight; mode GUIDED; resume or land it"
+    assert flight.pauses == 1  # of the mission
+    flight.run(30.0)
+    assert flight.state is State.TAKEN_OVER and flight.vehicle.mode == 4
+    assert flight.speed_mps < 0.02 and flight.height_m == pytest.approx(1.2, abs=0.05)
+    assert flight.setpoints_since(0.0) == [] and orders_of(flight) == []
+    assert flight.machine.resume(flight.now_s).is_accepted
+    assert flight.run(2.0, lambda: flight.state is State.FLYING)
+    flight.run(3.0)
+    assert flight.speed_mps > 0.3
+    flight.end()
+
+
+def test_a_bridge_that_starts_beside_a_landing_vehicle_lets_it_land():
+    """PX4's failsafe has changed the mode, which is nobody's business but its pilot's."""
+    flight = restarted("px4", 3.0)
+    assert "bridge started in flight; mode AUTO.L" in flight.machine.reason
+    assert flight.run(20.0, lambda: not flight.vehicle.armed)
+    assert flight.setpoints_since(0.0) == [] and orders_of(flight) == []
+    flight.end()

@@ -53,16 +53,21 @@ class Flight:
     def __init__(self, autopilot="ardupilot", permissions=MAY_ARM, seed=0, **limits):
         self.vehicle = self.make_vehicle(autopilot, seed)
         limits = Limits(**{"speed_mps": 1.0, **limits})
-        self.machine = VehicleMachine(1.2, limits, AUTOPILOTS[autopilot].traits, permissions)
-        self.adapter = MavlinkAdapter(
-            Vehicle(0, "mavlink", autopilot, altitude_m=1.2, limits=limits), self.machine
-        )
+        self._vehicle = Vehicle(0, "mavlink", autopilot, altitude_m=1.2, limits=limits)
+        self._permissions = permissions
+        self.start_bridge()
         self.now_s = 100.0
         self.sent = []  # (time, name, fields)
         self.news, self.states, self.pauses = [], [], 0
         self.hears = self.is_heard = self.is_alive = True
         self.command = None  # Twist2D of each 50 ms
         self._next_command_s = 0.0
+
+    def start_bridge(self):
+        """Start the bridge; a second time after it has died, which knows nothing."""
+        traits = AUTOPILOTS[self._vehicle.autopilot].traits
+        self.machine = VehicleMachine(1.2, self._vehicle.limits, traits, self._permissions)
+        self.adapter = MavlinkAdapter(self._vehicle, self.machine)
 
     def make_vehicle(self, autopilot, seed):
         return PointVehicle(KINDS[autopilot], heading_rad=0.6, boot_s=40.0)

@@ -12,7 +12,6 @@ from collections import deque
 from types import MappingProxyType
 from typing import Any, Deque, Dict, List, Mapping, Optional, Sequence, Tuple
 
-from quad_nav.files.values import is_number
 from quad_nav.vehicle.autopilots import SET_MESSAGE_INTERVAL, command_fields
 
 Message = Tuple[str, Dict[str, Any]]
@@ -115,11 +114,13 @@ class Parameters:
         self._tries, self._next_s = {}, -math.inf
 
     def take(self, name: str, value: float, kind: int) -> bool:
-        """Take a PARAM_VALUE; return whether it is one of ours."""
-        if name not in self._names or not is_number(value):
-            return False
+        """Take a PARAM_VALUE; return False for one of ours that is no finite number."""
+        if name not in self._names:
+            return True
         if self._sends_bits and kind in _WHOLE:
             value = struct.unpack(_WHOLE[kind], struct.pack("<f", value))[0]
+        if not math.isfinite(value):
+            return False
         self.values[name], self._types[name] = float(value), kind
         self.values.update(dict.fromkeys(self._renamed.get(name, ())))
         self._tries.pop(name, None)

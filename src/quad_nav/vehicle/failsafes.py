@@ -8,6 +8,7 @@ they are written too.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Callable, Dict, List, Mapping, Optional, Tuple
@@ -138,8 +139,9 @@ def is_equal(value: Optional[float], other: float) -> bool:
 
 
 def _value(values: Values, name: str) -> float:
+    """Return a parameter; 0 for one that is missing or no finite number."""
     value = values.get(name)
-    return 0.0 if value is None else value
+    return value if value is not None and math.isfinite(value) else 0.0
 
 
 def _climb(values: Values, vehicle: Vehicle) -> str:

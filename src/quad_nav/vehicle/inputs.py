@@ -23,6 +23,8 @@ REFUSAL_S = 5.0
 EXPLAIN_S = 1.5
 """How long a text explains what the autopilot does; heartbeats tell that it disarms up to 1 s
 later."""
+MOST_TEXTS = 10
+"""Reasons that count at the same time, the latest ones: each is part of the state's topic."""
 _NEVER_S = -math.inf
 
 
@@ -138,7 +140,7 @@ class Inputs:
 
     def take_text(self, text: str, now_s: float) -> None:
         """Take a reason of the autopilot for not being ready."""
-        self._texts[text] = now_s + TEXT_S
+        self._count(text, now_s + TEXT_S)
 
     def take_act(self, text: str, now_s: float) -> None:
         """Take the autopilot's words about what it does by itself."""
@@ -147,7 +149,11 @@ class Inputs:
 
     def refuse(self, reason: str, now_s: float) -> None:
         """Count a refusal as a reason for a short time."""
-        self._texts[reason] = now_s + REFUSAL_S
+        self._count(reason, now_s + REFUSAL_S)
+
+    def _count(self, reason: str, until_s: float) -> None:
+        others = [item for item in self._texts.items() if item[0] != reason]
+        self._texts = dict([*others[1 - MOST_TEXTS :], (reason, until_s)])
 
     def clear_texts(self) -> None:
         """Forget the autopilot's reasons: it has said that it is ready."""

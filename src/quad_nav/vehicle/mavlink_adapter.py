@@ -10,6 +10,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Callable, Dict, List, Mapping, Optional, Set, Tuple
 
+from quad_nav.errors import printable
 from quad_nav.geometry import Pose3D, Quaternion, rotate
 from quad_nav.vehicle import failsafes
 from quad_nav.vehicle.adapter import VehicleAdapter
@@ -24,6 +25,7 @@ from quad_nav.vehicle.frames import (
 )
 from quad_nav.vehicle.health_watch import HealthWatch
 from quad_nav.vehicle.orders import IN_FLIGHT, Answer, Order, Output, State
+from quad_nav.vehicle.ranges import MAVLINK
 from quad_nav.vehicle.setpoints import led, limited, setpoint_fields
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate, Landed, Velocity
@@ -56,6 +58,8 @@ _IN_PROGRESS = 5  # MAV_RESULT
 _OUR_TYPE, _NO_AUTOPILOT, _ACTIVE = 6, 8, 4
 _REBOOT_MS = 1000
 _TEXT_BYTES = 50
+_MOST_TEXT = 5 * _TEXT_BYTES
+_MOST_REASONS = 10
 
 
 class MavlinkAdapter(VehicleAdapter[Message]):
@@ -118,9 +122,16 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         self._rates.count(name)
         if self._first_s is not None:
             self.machine.inputs.hear(now_s)
-        handler = self._HANDLERS.get(name)
+        is_estimator = name == self._autopilot.estimator[1]
+        handler = self._HANDLERS.get("estimator" if is_estimator else name)
         if handler is not None:
-            handler(self, message, now_s)
+            self._handle(
+                name,
+                lambda field: getattr(message, field),
+                MAVLINK.get(name, {}),
+                lambda: handler(self, message, now_s),
+                now_s,
+            )
 
     def receive_other(self, system: int, message: Any, now_s: float) -> None:
         """Take a heartbeat of another system than the vehicle's."""
@@ -232,7 +243,7 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         if text.startswith(autopilot.complaints):
             inputs.take_text(text, now_s)
         if text.startswith(autopilot.refusals):
-            self._reasons.append(text)
+            self._reasons = [*self._reasons, text][:_MOST_REASONS]
         if self._health.take_text(text, now_s):
             inputs.take_battery(inputs.battery, now_s, text)
         if autopilot.acts.search(text):
@@ -241,11 +252,9 @@ class MavlinkAdapter(VehicleAdapter[Message]):
     def _whole_text(self, message: Any) -> Optional[str]:
         """Return the text, joined if it came in parts of 50 bytes; None before the last part."""
         number = message.id
-        if not number:
-            return str(message.text).rstrip()  # PX4 marks some with a tab at their end
-        text = self._chunks.pop(number, "") + message.text
-        if len(message.text) < _TEXT_BYTES:
-            return text.rstrip()
+        text = f"{self._chunks.pop(number, '') if number else ''}{message.text}"[:_MOST_TEXT]
+        if not number or len(message.text) < _TEXT_BYTES:
+            return printable(text.rstrip())  # PX4 marks some with a tab at their end
         self._chunks = {number: text}
         return None
 
@@ -258,9 +267,11 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         else:
             self._refused = order, now_s + ANSWER_WAIT_S
 
-    def _on_parameter(self, message: Any, _: float) -> None:
-        name = str(message.param_id).rstrip("\0")
-        self.parameters.take(name, message.param_value, message.param_type)
+    def _on_parameter(self, message: Any, now_s: float) -> None:
+        name, value = str(message.param_id).rstrip("\0"), message.param_value
+        if not self.parameters.take(name, value, message.param_type):
+            line = f"PARAM_VALUE: {name} is {value}, expected a finite number"
+            self.drop(f"PARAM_VALUE {name}", line, now_s)
 
     def _on_time(self, message: Any, now_s: float) -> None:
         reply = self.clock.take(message.tc1, message.ts1, now_s)
@@ -279,8 +290,7 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         "EXTENDED_SYS_STATE": _on_landed,
         "SYS_STATUS": _on_system,
         "GPS_RAW_INT": _on_receiver,
-        "EKF_STATUS_REPORT": _on_estimator,
-        "ESTIMATOR_STATUS": _on_estimator,
+        "estimator": _on_estimator,  # each autopilot has its own message
         "RC_CHANNELS": _on_sticks,
         "STATUSTEXT": _on_text,
         "COMMAND_ACK": _on_answer,

@@ -235,8 +235,8 @@ class VehicleMachine:
             self._enter(State.HOLDING, "link restored", now_s)
         else:
             self._pauses = True
-            what = "the link was lost" if before in IN_FLIGHT else "it was in the air at the start"
-            self._enter(State.TAKEN_OVER, f"{what}; mode {status.mode}", now_s)
+            what = "bridge started in flight" if before is State.NO_LINK else "the link was lost"
+            self._enter(State.TAKEN_OVER, f"{what}; mode {status.mode}; resume or land it", now_s)
         return None
 
     def _on_ground(self, now_s: float) -> Optional[Velocity]:
