@@ -95,7 +95,13 @@ def test_late_scans_are_discarded(ros, reject, left):
     ],
 )
 def test_a_clock_is_named_where_there_is_one(ros, wall, monkeypatch, has_clock, stopped, jumped):
-    steps = [(1.1, 0.1), (1.2, 2.0), (1.3, 0.1), (0.3, 0.1), (0.4, 0.1)]  # time of the clock, wall time since
+    steps = [
+        (1.1, 0.1),
+        (1.2, 2.0),
+        (1.3, 0.1),
+        (0.3, 0.1),
+        (0.4, 0.1),
+    ]  # time of the clock, wall time since
 
     def sleep(_):
         now_s, since_s = steps.pop(0)

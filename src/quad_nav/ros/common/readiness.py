@@ -22,6 +22,7 @@ from quad_nav.ros.common.rospy_repairs import (
     connect_once,
     hear_one_clock,
     log_without_master,
+    register_again,
 )
 
 WARN_EVERY_S = 10.0  # wall time, as all durations here
@@ -72,6 +73,7 @@ def start_node(name: str, argv: Optional[Sequence[str]] = None) -> None:
     accept_many_connections()
     escape_log_messages()
     log_without_master()
+    register_again()
 
 
 def server_parameters() -> Dict[str, Any]:

@@ -5,6 +5,8 @@
 * It lets five connections wait. Linux drops further ones, and their nodes try again after 1 s:
   until then a navigator that has just started does not hear the clock.
 * It takes the time from every publisher of `/clock`: with two the time jumps to and fro.
+* It registers once. A ROS master that is started again does not know the node: nobody finds its
+  services, and new nodes do not connect to its topics. Those that are connected stay so.
 * Each log call reads a parameter, and asks the master for it as long as it is not set.
 """
 
@@ -14,7 +16,9 @@ import socket
 import sys
 import threading
 import time
+from http.client import HTTPException
 from typing import Any, Callable, Dict, List, Tuple
+from xmlrpc.client import ServerProxy
 
 import rosgraph
 import rosgraph.network
@@ -23,6 +27,7 @@ from rosgraph_msgs.msg import Clock
 from rospy.impl import simtime
 from rospy.impl.masterslave import ROSHandler
 from rospy.impl.paramserver import get_param_server_cache
+from rospy.impl.registration import get_service_manager, get_topic_manager
 from rospy.impl.tcpros_base import init_tcpros_server
 
 from quad_nav.errors import InputError, excerpt
@@ -33,6 +38,7 @@ _ANSWERS_WITHIN_S = 1.0  # wall time, as the following ones
 _ASK_AGAIN_S = 1.0
 _SHUTDOWN_S = 2.0
 _POLL_S = 0.1
+_WATCH_S = 2.0
 _START_SERVICE = "/simulation/start"
 _ROSOUT_PARAMETER = "/rosout_disable_topics_generation"
 _connect_topic: Callable[..., Tuple[int, str, int]] = ROSHandler._connect_topic
@@ -66,6 +72,39 @@ def log_without_master() -> None:
     """
     if rospy.get_param_cached(_ROSOUT_PARAMETER, None) is None:
         get_param_server_cache().set(_ROSOUT_PARAMETER, False)
+
+
+def register_again() -> None:
+    """Watch the ROS master, and register this node with another one that has taken its place."""
+    threading.Thread(target=_watch_master, name="master", daemon=True).start()
+
+
+def _watch_master() -> None:
+    while not rospy.core.is_shutdown_requested():
+        master = rosgraph.Master(rospy.get_name())
+        try:
+            _register_if_unknown(master)
+        except (OSError, HTTPException, rosgraph.MasterException):
+            pass  # it has died; another one may come
+        time.sleep(_WATCH_S)
+
+
+def _register_if_unknown(master: rosgraph.Master) -> None:
+    try:
+        master.lookupNode(rospy.get_name())
+        return
+    except rosgraph.MasterError:
+        if rospy.core.is_shutdown_requested():
+            return
+    node, topics = rospy.get_node_uri(), get_topic_manager()
+    for topic, kind in topics.get_publications():
+        master.registerPublisher(topic, kind, node)
+    for service, address in get_service_manager().get_services():
+        master.registerService(service, address, node)
+    for topic, kind in topics.get_subscriptions():
+        publishers = master.registerSubscriber(topic, kind, node)
+        ServerProxy(node).publisherUpdate("/master", topic, publishers)
+    rospy.logwarn("%s: registered again: the ROS master was restarted", rospy.get_name())
 
 
 def set_time(now: rospy.Time) -> None:
