@@ -45,7 +45,7 @@ class TwoClocks(FlightCase):
                 check=False,
             )
             self.assertEqual(second.returncode, 2)
-            self.assertIn(b"not started: /simulator provides /simulation/start", second.stderr)
+            self.assertIn(b"not started: /simulator runs already", second.stderr)
             self.assertNotIn(b"Traceback", second.stderr)
         self.assertEqual(pid_of("/simulator"), first)
 

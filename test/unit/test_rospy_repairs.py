@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import socket
 import threading
+from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
@@ -15,7 +16,6 @@ from ros.fake_ros import FakeRos, FakeSubscriber, FakeWall  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from rospy.impl.masterslave import ROSHandler  # noqa: E402
 
-from quad_nav.errors import InputError  # noqa: E402
 from quad_nav.ros.common import rospy_repairs  # noqa: E402
 from quad_nav.ros.common.rospy_repairs import ClockSource, publishers_of  # noqa: E402
 
@@ -99,12 +99,19 @@ def master(monkeypatch):
     """A ROS master that knows of publishers of `/clock` that live, were killed or have gone."""
     with contextlib.ExitStack() as stack:
         ports = {}
-        for name in ("/player", "/simulator", "/killed"):
-            server = stack.enter_context(socket.socket())
-            server.bind(("127.0.0.1", 0))
-            ports[name] = server.getsockname()[1]
-            if name != "/killed":
-                server.listen()
+        for name in ("/player", "/simulator"):
+            server = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False)
+            server.register_function(lambda _: (1, "", 42), "getPid")
+            threading.Thread(target=server.serve_forever, args=(0.05,)).start()
+            stack.callback(server.server_close)
+            stack.callback(server.shutdown)
+            ports[name] = server.server_address[1]
+        for name in ("/killed", "/stopped"):
+            waiting = stack.enter_context(socket.socket())
+            waiting.bind(("127.0.0.1", 0))
+            ports[name] = waiting.getsockname()[1]
+            if name == "/stopped":
+                waiting.listen()
         state = [
             [["/clock", ["/killed", "/player", "/gone", "/simulator"]], ["/tf", ["/other"]]],
             [],
@@ -126,12 +133,27 @@ def test_publishers_are_alive_and_simulators_come_first(master):
     assert publishers_of("/odom0") == []
 
 
-def test_a_second_simulator_is_refused(master, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "is_simulator", "argv", "other"),
+    [
+        ("player", False, [], "/player"),
+        ("sequencer", False, ["__name:=player"], "/player"),
+        ("stopped", False, [], "/stopped"),
+        ("player", False, ["__ns:=/lab"], ""),
+        ("killed", False, [], ""),
+        ("gone", False, [], ""),
+        ("sequencer", True, [], "/simulator"),
+        ("sequencer", True, ["/simulation/start:=/a/start"], ""),
+    ],
+)
+def test_a_node_that_runs_already_is_not_started_again(
+    master, monkeypatch, capsys, name, is_simulator, argv, other
+):
     monkeypatch.setattr(rospy_repairs, "_SHUTDOWN_S", 0.0)
-    with pytest.raises(InputError, match="simulator: not started: /simulator provides /sim"):
-        rospy_repairs.refuse_second_simulator("simulator")
-    monkeypatch.setattr("sys.argv", ["simulator", "/simulation/start:=/a/start"])
-    rospy_repairs.refuse_second_simulator("simulator")  # that one was killed
+    monkeypatch.setattr("sys.argv", ["node", *argv])
+    with pytest.raises(SystemExit) if other else contextlib.nullcontext():
+        rospy_repairs.refuse_second(name, is_simulator)
+    assert capsys.readouterr().err.count(f"not started: {other} runs already") == bool(other)
 
 
 def test_two_threads_do_not_connect_to_one_publisher_at_the_same_time(monkeypatch):

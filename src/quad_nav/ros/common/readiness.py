@@ -22,6 +22,7 @@ from quad_nav.ros.common.rospy_repairs import (
     connect_once,
     hear_one_clock,
     log_without_master,
+    refuse_second,
     register_again,
 )
 
@@ -45,6 +46,7 @@ def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
         name: Name of the node.
         at_signal: Called in the other thread, before anything is shut down.
     """
+    refuse_second(name)
     start_node(name)
     hear_one_clock()
 

@@ -18,10 +18,11 @@ import threading
 import time
 from http.client import HTTPException
 from typing import Any, Callable, Dict, List, Tuple
-from xmlrpc.client import ServerProxy
+from xmlrpc.client import Error as XmlRpcError
+from xmlrpc.client import ServerProxy, Transport
 
 import rosgraph
-import rosgraph.network
+import rosgraph.names
 import rospy
 from rosgraph_msgs.msg import Clock
 from rospy.impl import simtime
@@ -30,7 +31,7 @@ from rospy.impl.paramserver import get_param_server_cache
 from rospy.impl.registration import get_service_manager, get_topic_manager
 from rospy.impl.tcpros_base import init_tcpros_server
 
-from quad_nav.errors import InputError, excerpt
+from quad_nav.errors import excerpt, printable
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 
 _WAITING_CONNECTIONS = 128
@@ -177,45 +178,60 @@ def publishers_of(topic: str) -> List[str]:
     return [name for name in names if _is_alive(master, name)]
 
 
-def refuse_second_simulator(name: str) -> None:
-    """Raise an error if there is a simulator already, and it does not shut down in a while.
+def refuse_second(name: str, is_simulator: bool = False) -> None:
+    """End this process with exit status 2 if the node that it would be runs already.
 
-    Call it before the node `name` registers: that ends another one with its name.
+    To register would end the other one, which may fly. It has a while to shut down.
 
-    Raises:
-        InputError: There is a simulator already.
+    Args:
+        name: Name of the node, unless the command line has another one.
+        is_simulator: Whether there can be one such node only, whatever its name.
     """
-    service = rosgraph.names.load_mappings(sys.argv).get(_START_SERVICE, _START_SERVICE)
+    mappings = rosgraph.names.load_mappings(sys.argv)
+    namespace = rosgraph.names.get_ros_namespace(argv=sys.argv)
+    node = rosgraph.names.ns_join(namespace, mappings.get("__name", name))
+    service = mappings.get(_START_SERVICE, _START_SERVICE) if is_simulator else ""
     end_s = time.monotonic() + _SHUTDOWN_S
     while True:
-        others = _providers_of(service)
+        others = _others(node, service)
         if not others:
             return
         if time.monotonic() >= end_s:
             break
         time.sleep(_POLL_S)
-    raise InputError(
-        [
-            f"{name}: not started: {others[0]} provides {service} already, expected one simulator"
-            " for each ROS master; stop it, or start this one with another: roslaunch -p PORT"
-        ]
+    print(
+        f"{printable(node)}: not started: {printable(others[0])} runs already; stop it, or start"
+        " this flight with a ROS master of its own: roslaunch -p PORT",
+        file=sys.stderr,
     )
+    raise SystemExit(2)
 
 
-def _providers_of(service: str) -> List[str]:
+def _others(node: str, service: str) -> List[str]:
     master = rosgraph.Master(rospy.get_name())
     try:
-        names = dict(master.getSystemState()[2]).get(service, [])
+        providers = dict(master.getSystemState()[2]).get(service, [])
     except (OSError, rosgraph.MasterException):  # rospy waits for the ROS master
         return []
-    return [name for name in names if _is_alive(master, name)]
+    return [name for name in (node, *providers) if _is_alive(master, name)]
+
+
+class _Transport(Transport):
+    """Connections to nodes, which may hang."""
+
+    def make_connection(self, host: Any) -> Any:
+        """Return a connection that waits for an answer for a limited time."""
+        connection = super().make_connection(host)
+        connection.timeout = _ANSWERS_WITHIN_S
+        return connection
 
 
 def _is_alive(master: rosgraph.Master, node: str) -> bool:
-    """Return whether a registered node listens; one that was killed stays registered."""
+    """Return whether a registered node lives, perhaps stopped; a killed one stays registered."""
     try:
-        address = rosgraph.network.parse_http_host_and_port(master.lookupNode(node))
-        socket.create_connection(address, _ANSWERS_WITHIN_S).close()
-    except (OSError, ValueError, rosgraph.MasterException):
+        ServerProxy(master.lookupNode(node), _Transport()).getPid(rospy.get_name())
+    except socket.timeout:
+        return True
+    except (OSError, ValueError, HTTPException, XmlRpcError, rosgraph.MasterException):
         return False
     return True

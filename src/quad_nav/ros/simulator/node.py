@@ -36,7 +36,7 @@ from quad_nav.kernels.jit import cache_warnings
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.readiness import server_parameters, start_node
-from quad_nav.ros.common.rospy_repairs import leave_clock, refuse_second_simulator, set_time
+from quad_nav.ros.common.rospy_repairs import leave_clock, refuse_second, set_time
 from quad_nav.ros.composed.fleet import ComposedFleet
 from quad_nav.ros.composed.group import is_handed_over
 from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
@@ -323,13 +323,12 @@ def main() -> int:
     if this thread is publishing.
 
     Returns:
-        0 after a shutdown, 2 if the parameters or the scene are not valid, or there is another
-        simulator.
+        0 after a shutdown, 2 if the parameters or the scene are not valid.
     """
     own = OwnNodes()
     ignore_publishers(own, is_handed_over)
+    refuse_second("simulator", is_simulator=True)
     try:
-        refuse_second_simulator("simulator")
         start_node("simulator")
         leave_clock()
         name = rospy.get_name().lstrip("/")
