@@ -26,7 +26,7 @@ from quad_nav.ros.navigator.obstacle_topics import ObstacleTopics
 from quad_nav.ros.navigator.plan_services import PlanServices
 from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.ros.navigator.reconfigure import serve_namespaces
-from quad_nav.scenario.assembly import apply_configuration
+from quad_nav.scenario.assembly import reconfigure_robot
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.tracking.tracker import ObstacleTracker
 
@@ -103,10 +103,7 @@ class RobotInterface:
     def _on_reconfigure(self, namespace: str, changes: Dict[str, Any]) -> config.Configuration:
         with self.lock:
             configuration = config.updated(self._configuration, namespace, changes)
-            apply_configuration(self._navigator, configuration)
-            for intake in self._intakes:
-                intake.reconfigure(configuration.scan_validator)
-            self._tracker.params = configuration.tracker
+            reconfigure_robot(configuration, self._navigator, self._tracker, self._intakes)
             self._configuration = configuration
             return configuration
 
