@@ -17,6 +17,7 @@ from quad_nav.errors import PluginError
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import Outcome, RobotPoses, Tick
+from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
@@ -146,7 +147,7 @@ class RobotInterface:
         if in_global is not None:
             self._topics.publish(tick, in_global)
             if tick.cycle:
-                self._goals.publish_feedback(in_global, rospy.Time.from_sec(tick.now_s))
+                self._goals.publish_feedback(in_global, time_message(tick.now_s))
         elif tick.command is not None:
             self._topics.stop()
         self._obstacles.publish(tick.now_s)
