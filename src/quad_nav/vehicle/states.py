@@ -320,8 +320,8 @@ class VehicleMachine:
         status = self.inputs.status
         assert status is not None
         self._explain(now_s)
-        if not self._wants_control:
-            return None
+        if not self._wants_control or self.inputs.landed is Landed.TAKING_OFF:
+            return None  # a set-point would cancel somebody's take-off
         streams = self.traits.streams_before_control
         if status.is_controlled:
             self._hold(now_s)
