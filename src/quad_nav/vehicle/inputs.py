@@ -23,6 +23,8 @@ REFUSAL_S = 5.0
 EXPLAIN_S = 1.5
 """How long a text explains what the autopilot does; heartbeats tell that it disarms up to 1 s
 later."""
+MOST_ACTS = 4
+"""Texts that one reason holds at most, whatever an autopilot says."""
 _NEVER_S = -math.inf
 
 
@@ -142,8 +144,8 @@ class Inputs:
 
     def take_act(self, text: str, now_s: float) -> None:
         """Take the autopilot's words about what it does by itself."""
-        self._acts = {words: s for words, s in self._acts.items() if now_s - s < EXPLAIN_S}
-        self._acts[text] = now_s
+        others = [(words, s) for words, s in self._acts.items() if words != text]
+        self._acts = dict([*others[1 - MOST_ACTS :], (text, now_s)])
 
     def refuse(self, reason: str, now_s: float) -> None:
         """Count a refusal as a reason for a short time."""
