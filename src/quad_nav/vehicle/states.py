@@ -219,7 +219,7 @@ class VehicleMachine:
     def _in_no_link(self, now_s: float) -> Optional[Velocity]:
         status, problem = self.inputs.status, self.inputs.link_problem(now_s)
         if status is None or problem:
-            self._enter(State.NO_LINK, problem, now_s)
+            self._enter(State.NO_LINK, self.reason if status else problem, now_s)
             return None
         if self.inputs.status_s < self._state_s:  # a heartbeat, not only an echo from before
             return None
