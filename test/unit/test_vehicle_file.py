@@ -128,6 +128,7 @@ def two(first, second):
             "address: udpin:0.0.0.0:14550 takes what vehicles[0] has, udpin:127.0.0.1:14550;"
             " expected a port for each",
         ),
+        ({"number": 0}, None),
         ({"system": 240}, None),
         ({"system": 2, "bridge_system": 240}, "bridge_system: 240, the number of a vehicle or of"),
         ({"system": 2, "bridge_system": 1}, "bridge_system: 1, the number of a vehicle or of"),
@@ -141,7 +142,9 @@ def test_a_fault_is_listed_with_file_and_place(second, fault):
     with pytest.raises(InputError) as error:
         vehicles_from_document(yaml.safe_load(two({}, second)), "v.yaml", room)
     (found,) = error.value.problems
-    if fault is None:  # vehicle 1 has the number of the first bridge
+    if "number" in second:
+        assert found == "v.yaml: vehicles: numbers [0, 0], expected each of 0 to 1 once"
+    elif fault is None:  # vehicle 1 has the number of the first bridge
         assert found.startswith("v.yaml: vehicles[0].bridge_system: 240, the number of a vehicle")
     else:
         assert found.startswith(f"v.yaml: vehicles[1].{fault}")

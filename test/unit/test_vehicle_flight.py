@@ -383,3 +383,21 @@ def test_a_bridge_that_starts_beside_a_landing_vehicle_lets_it_land():
     assert flight.run(20.0, lambda: not flight.vehicle.armed)
     assert flight.setpoints_since(0.0) == [] and orders_of(flight) == []
     flight.end()
+
+
+def test_a_resumption_does_not_cancel_somebodys_take_off():
+    """ArduPilot gives a take-off up at the first set-point, without a word."""
+    flight = Flight()
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    vehicle = flight.vehicle
+    for number, parameters in [(176, {"param2": 4.0}), (400, {"param1": 1.0}), (22, {})]:
+        fields = {"param1": 0.0, "param2": 0.0, "param7": 1.2, **parameters}
+        vehicle.receive("COMMAND_LONG", {"command": number, **fields})
+    assert flight.run(5.0, lambda: flight.state is State.TAKEN_OVER)
+    start_s = flight.now_s
+    assert flight.machine.resume(flight.now_s).is_accepted
+    assert flight.run(5.0, lambda: vehicle.landed == 2)
+    assert flight.setpoints_since(start_s) == []
+    assert flight.run(1.0, lambda: flight.state is State.HOLDING)
+    flight.run(1.0)
+    assert flight.height_m > 1.1

@@ -276,6 +276,16 @@ def test_the_autopilots_own_reason_for_disarming():
     assert flight.machine.reason == f"the motors were disarmed by the autopilot: {words}"
 
 
+def test_many_texts_make_no_long_reason():
+    flight = Flight().to_flight()
+    for k in range(1000):
+        flight.adapter.receive("STATUSTEXT", 1, text(f"Failsafe {k}"), flight.now_s)
+    flight.vehicle.set_mode(9)
+    flight.run(0.1)
+    told = "; ".join(f"Failsafe {k}" for k in range(996, 1000))
+    assert flight.machine.reason == f"the mode was changed to LAND by the autopilot: {told}"
+
+
 def test_an_old_text_explains_nothing():
     flight = Flight().to_flight()
     words = "Radio Failsafe - Continuing Guided Mode"

@@ -25,6 +25,8 @@ EXPLAIN_S = 1.5
 later."""
 MOST_TEXTS = 10
 """Reasons that count at the same time, the latest ones: each is part of the state's topic."""
+MOST_ACTS = 4
+"""Texts that one reason holds at most, whatever an autopilot says."""
 _NEVER_S = -math.inf
 
 
@@ -144,8 +146,8 @@ class Inputs:
 
     def take_act(self, text: str, now_s: float) -> None:
         """Take the autopilot's words about what it does by itself."""
-        self._acts = {words: s for words, s in self._acts.items() if now_s - s < EXPLAIN_S}
-        self._acts[text] = now_s
+        others = [(words, s) for words, s in self._acts.items() if words != text]
+        self._acts = dict([*others[1 - MOST_ACTS :], (text, now_s)])
 
     def refuse(self, reason: str, now_s: float) -> None:
         """Count a refusal as a reason for a short time."""

@@ -220,7 +220,7 @@ class VehicleMachine:
     def _in_no_link(self, now_s: float) -> Optional[Velocity]:
         status, problem = self.inputs.status, self.inputs.link_problem(now_s)
         if status is None or problem:
-            self._enter(State.NO_LINK, problem, now_s)
+            self._enter(State.NO_LINK, self.reason if status else problem, now_s)
             return None
         if self.inputs.status_s < self._state_s:  # a heartbeat, not only an echo from before
             return None
@@ -324,8 +324,8 @@ class VehicleMachine:
             self._wants_control, self.refusal = False, "no effect of the order to take control"
             self._news.append(self.refusal)
         self._explain(now_s)
-        if not self._wants_control:
-            return None
+        if not self._wants_control or self.inputs.landed is Landed.TAKING_OFF:
+            return None  # a set-point would cancel somebody's take-off
         if status.is_controlled:
             self._hold(now_s)
             return self._hover(now_s)

@@ -298,18 +298,20 @@ def _read_lidar(check: Checker, value: Any, place: str, kind: str) -> Optional[L
 
 def _check_numbers(check: Checker, found: Sequence[Optional[Vehicle]]) -> None:
     """Find numbers that are given twice or left out, and system numbers of a bridge."""
-    numbers = sorted(-1 if vehicle is None else vehicle.number for vehicle in found)
     if check.problems:
         return
+    vehicles = [vehicle for vehicle in found if vehicle is not None]
+    numbers = sorted(vehicle.number for vehicle in vehicles)
     if numbers != list(range(len(found))):
         check.fault("vehicles", f"numbers {numbers}, expected each of 0 to {len(found) - 1} once")
-    taken = {one.system for one in found if one is not None and one.kind == "mavlink"}
-    for k, one in enumerate(found):
-        if one is not None and one.kind == "mavlink":
-            if one.bridge_system in taken:
-                what = f"{one.bridge_system}, the number of a vehicle or of another bridge"
-                check.fault(f"vehicles[{k}].bridge_system", f"{what}, expected one of its own")
-            taken.add(one.bridge_system)
+        return
+    bridged = [(k, vehicle) for k, vehicle in enumerate(vehicles) if vehicle.kind == "mavlink"]
+    taken = {vehicle.system for _, vehicle in bridged}
+    for k, vehicle in bridged:
+        if vehicle.bridge_system in taken:
+            what = f"{vehicle.bridge_system}, the number of a vehicle or of another bridge"
+            check.fault(f"vehicles[{k}].bridge_system", f"{what}, expected one of its own")
+        taken.add(vehicle.bridge_system)
 
 
 def _check_starts(
