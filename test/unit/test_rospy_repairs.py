@@ -14,6 +14,7 @@ rospy = pytest.importorskip("rospy")
 import rosgraph  # noqa: E402
 from ros.fake_ros import FakeRos, FakeSubscriber, FakeWall  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
+from rospy.impl import simtime  # noqa: E402
 from rospy.impl.masterslave import ROSHandler  # noqa: E402
 
 from quad_nav.ros.common import rospy_repairs  # noqa: E402
@@ -92,6 +93,17 @@ def test_without_a_master_the_present_one_counts(ros, heard, monkeypatch):
     assert heard.after("/simulator", 5.0) == 5.0
     assert heard.after("/player", 7.0) == 5.0
     assert heard.after("/simulator", 5.5) == 5.5
+
+
+def test_a_node_that_hears_one_clock_can_leave_it(monkeypatch):
+    clock = rospy.topics.Subscriber("/clock", Clock, simtime._set_rostime_clock_wrapper)
+    monkeypatch.setattr(simtime, "_clock_sub", clock, raising=False)
+    impl = clock.impl
+    rospy_repairs.hear_one_clock()
+    ((callback, _),) = impl.callbacks
+    assert isinstance(callback, ClockSource)
+    rospy_repairs.leave_clock()
+    assert impl.callbacks == []
 
 
 @pytest.fixture

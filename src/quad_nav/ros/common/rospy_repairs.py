@@ -125,8 +125,10 @@ def hear_one_clock() -> None:
     """Let this node take the time from one publisher of `/clock`."""
     clock = getattr(simtime, "_clock_sub", None)
     if clock is not None:
-        clock.impl.add_callback(ClockSource(clock.resolved_name), None)
-        clock.impl.remove_callback(simtime._set_rostime_clock_wrapper, None)
+        source = ClockSource(clock.resolved_name)
+        clock.impl.add_callback(source, None)
+        clock.impl.remove_callback(clock.callback, None)
+        clock.callback = source
 
 
 class ClockSource:
