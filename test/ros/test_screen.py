@@ -55,6 +55,7 @@ class Screen(unittest.TestCase):
         first = next(i for i, line in enumerate(lines) if "goal 1 of" in line)
         self.assertLess(first, SCREEN, text)
         self.assertIn("quad0: ready", text)
+        self.assertNotIn("Inbound TCP/IP connection failed", text)
         self.assertNotIn("move_base", text)
         self.assertNotIn("pybullet", text)
         self.assertNotIn("killing on exit", text)
