@@ -138,8 +138,8 @@ class NoPose(SensorFault):
     def faulty_tick(self, now_s, state, peers):
         if now_s - self.begin_s <= self._configuration.local_costmap.transform_tolerance_s:
             return self._navigate(now_s, state, peers)
-        located = RobotPoses(None, None)
-        return self._robot.navigator.tick(now_s, located, state.twist, peers), located
+        located, tracks = RobotPoses(None, None), self._robot.tracker.active_tracks
+        return self._robot.navigator.tick(now_s, located, state.twist, peers, tracks), located
 
 
 class ShiftedPose(SensorFault):

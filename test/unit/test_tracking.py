@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,6 +89,28 @@ def test_a_crossing_cylinder_is_tracked(speed_mps, rate_hz):
 def test_an_obstacle_that_comes_nearer_is_tracked():
     *_, (_, _, tracker) = track(lambda t: ((5.0 - t, 0.0, 0.3),), times(2.0))
     np.testing.assert_allclose(tracker.tracks.states, [(3.0, 0.0, -1.0, 0.0)], atol=0.1)
+
+
+@pytest.mark.parametrize("older_s", [0.005, 0.03, 0.09, 0.2])
+@pytest.mark.parametrize("speed_mps", [0.5, 1.0, 2.0])
+def test_two_lidars_measure_one_speed(speed_mps, older_s):
+    """The scans of the second LIDAR come at the same time as those of the first, but are older."""
+
+    def disc_at(now_s):
+        return ((3.0, -4.0 + speed_mps * now_s, 0.3),)
+
+    tracker, errors = ObstacleTracker(ON, "map"), []
+    for now_s in times(7.0 / speed_mps):
+        for sensor, stamp_s in (("front", now_s), ("back", now_s - older_s)):
+            if stamp_s >= 0.0:
+                tracker.add_scan(sensor, scan_of(stamp_s, disc_at(stamp_s)), LIDAR)
+                if len(tracker.tracks):
+                    truth = (*disc_at(tracker.tracks.time_s)[0][:2], 0.0, speed_mps)
+                    errors.append(tracker.tracks.states[0] - truth)
+                    assert tracker.tracks.numbers.tolist() == [1]
+    settled = np.abs(errors[20:])
+    assert settled[:, :2].max() < 0.05 and settled[:, 2:].max() < 0.15
+    assert abs(np.mean(errors[20:], axis=0)[3]) < 0.02 * speed_mps
 
 
 @pytest.mark.parametrize("noise_m", [0.0, 0.02])
@@ -265,6 +288,52 @@ def test_off_nothing_is_tracked():
     results = list(track(lambda t: ((3.0, -2.0 + t, 0.3),), times(2.0), params=TrackerParams()))
     assert all(result is None for _, result, _ in results)
     assert len(results[-1][2].tracks) == 0 and results[-1][2].active_tracks is None
+
+
+@pytest.mark.parametrize("lost_after_s", [0.5, 1.5, 4.0])
+def test_a_track_ends_by_the_clock(lost_after_s):
+    """Nothing scans after 3 s."""
+    params = replace(ON, lost_after_s=lost_after_s, max_acceleration_mps2=6.0)
+    *_, (_, _, tracker) = track(lambda t: ((3.0, -3.0 + t, 0.3),), times(3.0), params=params)
+    number = tracker.tracks.numbers.tolist()
+    tracker.end_unseen(3.0 + lost_after_s)
+    assert tracker.tracks.numbers.tolist() == number and len(tracker.unseen_s) == 1
+    tracker.end_unseen(3.01 + lost_after_s)
+    assert not tracker.tracks.any_may_move and len(tracker.unseen_s) == 0
+
+
+def test_who_was_hidden_before_the_scans_ended_is_forgotten_earlier():
+    """It goes behind a pillar after 3 s, and nothing scans after 4 s."""
+    pillar = (2.0, 0.5, 0.5)
+    *_, (_, _, tracker) = track(lambda t: ((3.0, -3.0 + t, 0.2), pillar), times(4.0))
+    hidden_s = tracker.unseen_s[0]
+    assert 0.3 < hidden_s < 1.2
+    tracker.end_unseen(4.0 + 1.5 - hidden_s - 0.01)
+    assert len(tracker.tracks) == 1
+    tracker.end_unseen(4.0 + 1.5 - hidden_s + 0.01)
+    assert len(tracker.tracks) == 0
+
+
+def test_a_track_of_before_a_silence_is_not_continued_elsewhere():
+    """Another obstacle than that of before goes by after 10 s: it has a track of its own speed."""
+
+    def discs(now_s):
+        return ((3.0, -3.0 + now_s, 0.3),) if now_s < 5.0 else ((-3.0, 13.0 - now_s, 0.3),)
+
+    after = [now_s for now_s in times(14.0) if now_s <= 2.0 or now_s >= 12.0]
+    for now_s, _, tracker in track(discs, after):
+        if now_s >= 12.0:
+            assert 1 not in tracker.tracks.numbers
+    np.testing.assert_allclose(tracker.tracks.states, [(-3.0, -1.0, 0.0, -1.0)], atol=0.1)
+
+
+@pytest.mark.parametrize("back_s", [0.5, 100.0])
+def test_a_lidar_whose_clock_is_set_back_goes_on(back_s):
+    tracker = ObstacleTracker(ON, "map")
+    for now_s in times(5.0):
+        stamp_s = 200.0 + now_s - (back_s if now_s >= 2.0 else 0.0)
+        tracker.add_scan("scan", scan_of(stamp_s, ((3.0, -3.0 + now_s, 0.3),)), LIDAR)
+    np.testing.assert_allclose(tracker.tracks.states, [(3.0, 2.0, 0.0, 1.0)], atol=0.1)
 
 
 def test_covariances_are_honest():

@@ -205,6 +205,7 @@ def _costmap(robot: LoopRobot, costmap: LayeredCostmap, now_s: float) -> Costmap
 
 def _track(robot: LoopRobot, now_s: float) -> Optional[TrackView]:
     tracker = robot.tracker
+    tracker.end_unseen(now_s)
     if not tracker.tracks.any_may_move:
         return None
     return TrackView(tracker.tracks, tracker.unseen_s, robot.map_from(tracker.frame, now_s))

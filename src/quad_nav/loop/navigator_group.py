@@ -145,6 +145,7 @@ class LoopRobot:
         map_from_global = self.map_from_global(now_s)
         if map_from_global != _IDENTITY:
             peers = [peer.relative_to(map_from_global) for peer in peers]
+        self.tracker.end_unseen(now_s)
         tick = self.navigator.tick(now_s, located, state.twist, peers, self.tracker.active_tracks)
         self.due_s = -math.inf if self.navigator.has_work else self.navigator.next_due_s
         self._remember(tick)

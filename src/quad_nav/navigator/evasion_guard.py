@@ -1,8 +1,9 @@
-"""Evasion guard: the last word on the command when moving obstacles come near.
+"""Evasion guard: takes the command when moving obstacles come near.
 
-It acts in every state: while the robot follows a plan, waits for a peer, recovers, or hovers
-without a goal, and after an evasion until the robot is as slow again as the navigator expects. A
-robot that stands still stays near the point where it stopped, and returns to it.
+It acts in every state, as long as the robot has its data: while the robot follows a plan, waits for
+a peer, recovers, or hovers without a goal, and after an evasion until the robot is as slow again as
+the navigator expects. A robot that stands still stays near the point where it stopped, and returns
+to it.
 """
 
 from __future__ import annotations
@@ -109,6 +110,11 @@ class EvasionGuard:
         tick.command = replace(command, vyaw_radps=turn_radps)
         tick.evades = self.is_evading = True
         return None
+
+    def stop(self) -> bool:
+        """Evade no longer, for lack of data; return whether the last command evaded."""
+        evaded, self.is_evading, self._last = self.is_evading, False, (0.0, 0.0)
+        return evaded
 
     def _choose(
         self, around: Surroundings, tracks: Tracks, now_s: float, route: Floats, wish: Twist2D

@@ -145,7 +145,7 @@ class StateMachine:
         if self._is_search_due(tick.now_s):
             self._search_plan(tick, poses.in_global)
         if self.recovery.is_running:
-            if self._stops_without_data and self._updates.missing_data(tick.now_s):
+            if self._stops_without_data and self._missing_data(tick.now_s, poses):
                 self.recovery.pause(tick.now_s)
             else:
                 self._step_recovery(tick, poses)
@@ -158,11 +158,19 @@ class StateMachine:
             self._search_plan(tick, poses.in_global)
 
     def evade(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
-        """Replace a command that moving obstacles threaten; without a goal, hover or evade."""
+        """Replace a command that moving obstacles threaten; without a goal, hover or evade.
+
+        Without data nobody knows where obstacles are, and an evasion ends with a stop.
+        """
         self.guard.params = self.params.evasion
         self.guard.period_s = self._period_s
         limits = speed_limits(self.control.limiter.usual)
         if self.control.tracks is None or limits is None:
+            return
+        missing = self._missing_data(tick.now_s, poses)
+        if missing:
+            if self.guard.stop() and not tick.is_stopped:
+                self._stop_without_data(tick, missing)
             return
         follows = tick.control is not None and self.state is State.CONTROLLING
         if follows and self.guard.watches(tick.now_s, self.control.tracks):
@@ -193,7 +201,7 @@ class StateMachine:
 
     def limit_command(self, tick: Tick, pose: Optional[Pose2D], velocity: Twist2D) -> None:
         """Limit the final command so that it cannot lead to a collision with a peer."""
-        if tick.command is None or pose is None:
+        if tick.command is None or pose is None or tick.is_stopped:
             return
         limited = self._peers.limit(pose, velocity, tick.command, self._period_s)
         tick.command, tick.limited_by = limited.command, limited.limited_by
@@ -244,15 +252,17 @@ class StateMachine:
     # -- control -------------------------------------------------------------------------
 
     def _run_control_cycle(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
-        if poses.in_global is None or poses.in_local is None:
-            self._stop_without_data(tick, poses.unknown_reason or "robot pose unknown")
-            return
-        if self.control.track(tick.now_s, poses.in_global, self.params.oscillation_distance_m):
+        if (
+            poses.in_global is not None
+            and poses.in_local is not None
+            and self.control.track(tick.now_s, poses.in_global, self.params.oscillation_distance_m)
+        ):
             self.recovery.reset_after(Trigger.OSCILLATION)
-        outdated = self._updates.outdated_reason(tick.now_s)
-        if outdated:
-            self._stop_without_data(tick, outdated)
+        missing = self._missing_data(tick.now_s, poses)
+        if missing:
+            self._stop_without_data(tick, missing)
             return
+        assert poses.in_global is not None
         if self._yield_to_peers(tick, poses.in_global):
             return
         plan = self._search.pop_plan()
@@ -267,6 +277,12 @@ class StateMachine:
             self._search.notify_thread()
             if self.params.stop_while_planning or self._starts_from_rest:
                 tick.command = Twist2D()
+
+    def _missing_data(self, now_s: float, poses: RobotPoses) -> str:
+        """Return what a robot that moves has to know and this one does not, "" if nothing."""
+        if poses.in_global is None or poses.in_local is None:
+            return poses.unknown_reason or "robot pose unknown"
+        return self._updates.outdated_reason(now_s)
 
     def _stop_without_data(self, tick: Tick, reason: str) -> None:
         tick.warnings.append(f"stopping: {reason}")

@@ -38,7 +38,6 @@ class HaltedObstacles:
         self._filters = Filters()
         self._radii: List[Radius] = []
         self._seen_s: List[float] = []
-        self._now_s = 0.0
 
     def __len__(self) -> int:
         return len(self._radii)
@@ -58,9 +57,7 @@ class HaltedObstacles:
         self, now_s: float, clusters: ScanClusters, seen: Outlines, params: TrackerParams
     ) -> None:
         """Move the discs to where a scan shows them; forget who is gone."""
-        if len(self) and now_s > self._now_s:
-            self._filters.predict(now_s - self._now_s, params.acceleration_mps2)
-        self._now_s = now_s
+        self._filters.predict(now_s, params.acceleration_mps2)
         if not len(self):
             return
         is_small = np.append(seen.radii_m <= params.max_radius_m, False)[clusters.labels]
@@ -87,7 +84,7 @@ class HaltedObstacles:
             radius, is_whole = Radius(), bool(seen.is_whole[row])
             radius.see(float(seen.radii_m[row]), is_whole)
             disc = fit(clusters, int(row), seen.centres[row], radius, is_whole)
-            self.add(disc.position, disc.noise, radius, self._now_s)
+            self.add(disc.position, disc.noise, radius, self._filters.time_s)
 
     def forget(self, places: Floats, radii_m: Floats) -> None:
         """Forget those in discs, float64[n, 2] and float64[n], that are known otherwise."""
@@ -102,13 +99,13 @@ class HaltedObstacles:
         if beams.sum() >= _MIN_POINTS:
             disc = fit_points(clusters, beams, place.copy(), radius)
             self._filters.update(row, disc.position, disc.noise)
-            self._seen_s[row] = self._now_s
+            self._seen_s[row] = self._filters.time_s
         else:
             self._filters.states[row, 2:] = 0.0
 
     def _is_gone(self, row: int, clusters: ScanClusters) -> bool:
         place, circle_m = self._filters.states[row, :2], self._radii[row].circle_m
-        unseen_s = self._now_s - self._seen_s[row]
+        unseen_s = self._filters.time_s - self._seen_s[row]
         is_through = unseen_s > _SEEN_THROUGH_S and clusters.sees_through(place, circle_m, 0.0)
         return is_through or unseen_s > _HIDDEN_S
 

@@ -9,6 +9,8 @@ and Navigation", 2001, sections 6.3.2 (discrete white noise acceleration), 5.4 (
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,12 +27,14 @@ class Filters:
     """Filters of several tracks.
 
     Attributes:
+        time_s: Time of the states.
         states: float64[m, 4].
         covariances: float64[m, 4, 4].
     """
 
     def __init__(self) -> None:
         """Start without tracks."""
+        self.time_s = self._newest_s = -math.inf
         self.states, self.covariances = np.empty((0, 4)), np.empty((0, 4, 4))
         self._levels, self._innovations = np.empty(0), np.empty(0)
 
@@ -58,14 +62,26 @@ class Filters:
         self.states, self.covariances = self.states[kept], self.covariances[kept]
         self._levels, self._innovations = self._levels[kept], self._innovations[kept]
 
-    def predict(self, step_s: float, acceleration_mps2: float) -> None:
-        """Predict all states.
+    def predict(self, time_s: float, acceleration_mps2: float) -> None:
+        """Predict all states to a time.
+
+        A time before the newest one is that of a measurement which comes late: the states go back
+        with their velocities. Accelerations count once, from the newest time on.
 
         Args:
-            step_s: The step of time.
+            time_s: The time.
             acceleration_mps2: Standard deviation of each component of the usual acceleration.
         """
-        predict_states(self.states, self.covariances, step_s, acceleration_mps2 * self._levels)
+        before_s, newest_s = self.time_s, self._newest_s
+        self.time_s, self._newest_s = time_s, max(time_s, newest_s)
+        if not len(self):
+            return
+        known_s = min(time_s, newest_s)
+        if known_s != before_s:
+            predict_states(self.states, self.covariances, known_s - before_s, 0.0 * self._levels)
+        if time_s > newest_s:
+            accelerations = acceleration_mps2 * self._levels
+            predict_states(self.states, self.covariances, time_s - newest_s, accelerations)
 
     def update(self, track: int, position: Floats, noise: Floats) -> float:
         """Take a measurement into one state.

@@ -15,7 +15,7 @@ of Modern Tracking Systems", 1999, sections 6.2 and 6.4; discs and filters as in
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Dict, List, Optional, Set
 
 import numpy as np
@@ -91,7 +91,8 @@ class ObstacleTracker:
     Attributes:
         params: The parameters; they may change in flight.
         frame: Name of the fixed frame.
-        tracks: The confirmed tracks, at the time of the last scan; empty ones may be older.
+        tracks: The confirmed tracks, at the time of the last scan; empty ones may be older. Call
+            ``end_unseen`` before, because they end without scans as well.
         unseen_s: float64[n], times for which each of them has not been seen, but predicted.
     """
 
@@ -113,10 +114,19 @@ class ObstacleTracker:
         self._end_all(0.0)
 
     def _end_all(self, now_s: float) -> None:
-        self._now_s = now_s
         self._lives: List[_Life] = []
         self._filters, self._halted = Filters(), HaltedObstacles()
         self.tracks, self.unseen_s = Tracks.none(now_s), np.empty(0)
+
+    def end_unseen(self, now_s: float) -> None:
+        """End the tracks that were not seen for too long, though no scan has come since."""
+        tracks, lost_s = self.tracks, self.params.lost_after_s
+        silent_s = now_s - tracks.time_s
+        kept = self.unseen_s + silent_s <= lost_s
+        if not kept.all():
+            self.tracks, self.unseen_s = tracks.chosen(kept), self.unseen_s[kept]
+        if silent_s > lost_s and len(tracks.suspects):
+            self.tracks = replace(self.tracks, suspects=tracks.suspects[:0])
 
     def add_scan(
         self,
@@ -158,6 +168,7 @@ class ObstacleTracker:
     def _track(self, now_s: float, clusters: ScanClusters, known_circles: Floats) -> TrackedScan:
         seen = outlines(clusters)
         usable = self._usable(clusters, seen, known_circles)
+        self._check_continuity(now_s)
         self._predict(now_s, known_circles)
         pairs = [
             (track, row)
@@ -172,6 +183,15 @@ class ObstacleTracker:
         self._follow_halted(now_s, clusters, seen, known_circles)
         self._tell(now_s)
         return result
+
+    def _check_continuity(self, now_s: float) -> None:
+        """End the tracks if no scan came for longer than an obstacle is predicted."""
+        step_s = now_s - self._filters.time_s
+        if abs(step_s) <= max(self.params.lost_after_s, _RESTART_S):
+            return
+        self._keep(np.zeros(len(self._lives), bool), now_s)
+        if step_s < 0.0:  # the LIDAR's clock was set back
+            self._end_all(now_s)
 
     def _tell(self, now_s: float) -> None:
         """Tell others of the confirmed tracks."""
@@ -236,14 +256,10 @@ class ObstacleTracker:
 
     def _predict(self, now_s: float, known_circles: Floats) -> None:
         """Predict all tracks up to now; end those of what is known otherwise."""
-        if self._lives and now_s > self._now_s:
-            self._filters.predict(now_s - self._now_s, self.params.acceleration_mps2)
-        self._now_s = now_s
+        self._filters.predict(now_s, self.params.acceleration_mps2)
         for x_m, y_m, radius_m in known_circles:
             away_m = np.hypot(self._states[:, 0] - x_m, self._states[:, 1] - y_m)
-            for track in np.flatnonzero(away_m <= radius_m).tolist():
-                self._halt(track, now_s)
-            self._keep(away_m > radius_m)
+            self._keep(away_m > radius_m, now_s)
 
     @property
     def _states(self) -> Floats:
@@ -288,9 +304,7 @@ class ObstacleTracker:
                 keep[track] = unseen_s <= _SEEN_THROUGH_S
             else:
                 keep[track] = unseen_s <= self.params.lost_after_s
-            if not keep[track]:
-                self._halt(track, now_s)
-        self._keep(keep)
+        self._keep(keep, now_s)
 
     def _is_seen_through(self, track: int, clusters: ScanClusters) -> bool:
         radius_m = self._lives[track].radius.circle_m
@@ -377,7 +391,10 @@ class ObstacleTracker:
         square = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
         return bool(square > _SIGNIFICANT)
 
-    def _keep(self, keep: NDArray[np.bool_]) -> None:
+    def _keep(self, keep: NDArray[np.bool_], now_s: float) -> None:
+        """Keep some tracks; of the others, follow the obstacles that have stopped."""
+        for track in np.flatnonzero(~keep).tolist():
+            self._halt(track, now_s)
         if not keep.all():
             self._lives = [life for life, is_kept in zip(self._lives, keep) if is_kept]
             self._filters.keep(keep)

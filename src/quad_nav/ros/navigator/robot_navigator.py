@@ -148,6 +148,7 @@ class RobotNavigator:
         if not self._start.is_over(now_s, in_global is not None):
             return
         peers = self._peers.near(self.number, located.in_global, navigator.peers.reach_m)
+        self._tracker.end_unseen(now_s)
         start_s = time.perf_counter()
         tick = navigator.tick(now_s, located, self._velocity, peers, self._tracker.active_tracks)
         self._interface.publish(tick, in_global, located, time.perf_counter() - start_s)
