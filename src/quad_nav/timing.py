@@ -7,6 +7,14 @@ from typing import Optional
 
 from quad_nav.geometry import Pose2D
 
+SAME_TIME_S = 1e-6
+"""Times that differ by less are the same: clocks of whole nanoseconds are early, floats round."""
+
+
+def is_due(due_s: float, now_s: float) -> bool:
+    """Return whether a due time has come."""
+    return now_s >= due_s - SAME_TIME_S
+
 
 class Schedule:
     """The due times of a periodic task.
@@ -40,10 +48,12 @@ class Schedule:
 
         Due times that have passed meanwhile are dropped.
         """
-        if now_s < self.due_s - 1e-9:
+        if not is_due(self.due_s, now_s):
             return False
-        missed = math.floor((now_s - self.due_s + 1e-9) / self.period_s)
+        missed = max(math.floor((now_s - self.due_s + SAME_TIME_S) / self.period_s), 0)
         self.due_s += (missed + 1) * self.period_s
+        if is_due(self.due_s, now_s):  # by rounding
+            self.due_s += self.period_s
         return True
 
 

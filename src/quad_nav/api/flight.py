@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
@@ -17,7 +16,6 @@ from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.mission.summary import summarize
 from quad_nav.navigator.tick import Tick
 from quad_nav.offline import flight as offline
-from quad_nav.scenario.assembly import apply_configuration
 from quad_nav.scenario.flight_setup import FlightSetup
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.flight import BodyState
@@ -151,19 +149,21 @@ class Flight:
 
         Raises:
             InputError: Every change that is refused; then nothing is changed.
+            ValueError: The robot has no navigator.
         """
-        flown = self._loop.robots[robot]
-        configuration = flown.configuration
+        if robot not in self._loop.offline_robots:
+            raise ValueError(
+                f"reconfigure: robot {robot} has no navigator; expected one of"
+                f" {sorted(self._loop.offline_robots)}"
+            )
+        configuration = self._loop.robots[robot].configuration
         groups: Dict[str, Dict[str, Any]] = {}
         for path, value in parameters.items():
             namespace, _, name = path.rpartition("/")
             groups.setdefault(namespace, {})[name] = value
         for namespace, changes in groups.items():
             configuration = updated(configuration, namespace, changes)
-        navigated = self._loop.offline_robots[robot]
-        apply_configuration(navigated.navigator, configuration)
-        navigated.due_s = -math.inf
-        flown.configuration = configuration
+        self._loop.reconfigure(robot, configuration)
         return configuration
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Callable, List, Optional, Tuple, Union
 
@@ -110,13 +110,18 @@ class ObservationBuffer:
         self.params = params
         self.observations: List[Observation] = []
         self._persistence_ns = _nanoseconds(params.observation_persistence_s)
-        self._period_ns = _nanoseconds(params.expected_update_period_s)
+        self.expect_within(params.expected_update_period_s)
         self._in_order = True  # no stamp of an observation is above that of a newer one
         self._last_reception_s: Optional[float] = None
         self._stack = _make_stack(0, 0)
         self._newest = 0  # slot of the stack
         self._unstored = 0  # newest observations that are not in the stack
         self._ranges: Optional[Ranges] = None  # of the observations in it
+
+    def expect_within(self, period_s: float) -> None:
+        """Expect a message within another period."""
+        self.params = replace(self.params, expected_update_period_s=period_s)
+        self._period_ns = _nanoseconds(period_s)
 
     def stack(self, ranges: Ranges) -> Tuple[ObservationStack, int, int]:
         """Return the observations for the kernels.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,7 @@ class ObstacleLayerParams(LayerParams):
 class ObstacleLayer(GridLayer):
     """Layer of what sensors see; ``add_scan`` and ``add_cloud`` write to it.
 
-    The sources are fixed at construction; ``reconfigure`` changes the other parameters.
+    The sources are fixed at construction, but for the periods within which they are expected.
 
     Attributes:
         buffers: Observations by source.
@@ -203,6 +203,12 @@ class ObstacleLayer(GridLayer):
         rows, columns = rows[inside], columns[inside]
         marked = costs[rows, columns] == LETHAL
         return rows[marked], columns[marked]
+
+    def reconfigure(self, params: Any) -> None:
+        """Take other parameters; of the sources only the expected periods change."""
+        super().reconfigure(params)
+        for source in params.sources:
+            self.buffers[source.name].expect_within(source.expected_update_period_s)
 
     def set_footprint(self, footprint: NDArray[np.float64], inscribed_radius_m: float) -> None:
         """Take another footprint, under which the layer clears."""

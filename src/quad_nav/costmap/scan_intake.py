@@ -95,8 +95,9 @@ class ScanIntake:
         return self._validator.expected_period_s
 
     def reconfigure(self, params: ScanValidatorParams) -> None:
-        """Take other parameters; what the validator has seen stays."""
+        """Take other parameters, and those of the buffers; what the validator has seen stays."""
         self._params = params
+        self._validator.expect(buffer.params for buffer in self._buffers)
 
     def reset(self) -> None:
         """Forget earlier scans, after the clock has jumped."""

@@ -52,9 +52,13 @@ class ScanValidator:
     """
 
     def __init__(self, sources: Iterable[SourceParams]) -> None:
+        self.expect(sources)
+        self.reset()
+
+    def expect(self, sources: Iterable[SourceParams]) -> None:
+        """Take the shortest period within which the sources are expected."""
         periods_s = [source.expected_update_period_s for source in sources]
         self.expected_period_s = min((one for one in periods_s if one > 0.0), default=0.0)
-        self.reset()
 
     def reset(self) -> None:
         """Forget earlier scans, after the clock has jumped."""

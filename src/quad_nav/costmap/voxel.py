@@ -86,7 +86,8 @@ class VoxelLayer(ObstacleLayer):
 
         With ``redraw_emptied_voxels`` equal parameters empty nothing.
         """
-        old, self.params = self.params, params
+        old = self.params
+        super().reconfigure(params)
         switched = replace(
             old,
             clip_voxel_rays=params.clip_voxel_rays,

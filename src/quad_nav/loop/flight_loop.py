@@ -15,7 +15,6 @@ from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.loop import LoopSetup, inspection
 from quad_nav.loop.inspection import Change, Inspection, NavigatorView, inspect_group
 from quad_nav.loop.navigator_group import (
-    SAME_TIME_S,
     GroupFactory,
     LocatedScan,
     NavigatorGroup,
@@ -26,6 +25,7 @@ from quad_nav.peers.peer import Intention
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.robot_state import RobotStates
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation
+from quad_nav.timing import is_due
 
 STEPS_PER_ODOMETRY = STEPS_PER_S // 40
 
@@ -168,7 +168,7 @@ class FlightLoop:
                 worker.goals.update((n, goals[n]) for n in worker.robots if n in goals)
         self._for_each_worker(lambda worker: worker.begin_navigating(now_s, states))
         results: List[NavigatorResult] = []
-        if own or self.group.due_s <= now_s + SAME_TIME_S:
+        if own or is_due(self.group.due_s, now_s):
             results += self.group.navigate(now_s, states, own)
         self._for_each_worker(lambda worker: results.extend(worker.results(self._patience_s)))
         for result in results:

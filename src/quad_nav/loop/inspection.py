@@ -19,7 +19,6 @@ from quad_nav.grid import GridSpec
 from quad_nav.loop.navigator_group import LocatedScan, LoopRobot, NavigatorGroup
 from quad_nav.navigator.tick import State
 from quad_nav.peers.right_of_way import YieldDecision
-from quad_nav.scenario.assembly import apply_configuration
 from quad_nav.tracking.tracks import Tracks
 
 PLAN, LOCAL_PLAN, SCAN, TRACK = "plan", "local_plan", "scan", "track"
@@ -140,10 +139,7 @@ def clear_costmaps(group: NavigatorGroup, robot: int, now_s: float) -> None:
 
 def reconfigure(group: NavigatorGroup, robot: int, configuration: Configuration) -> None:
     """Change every parameter of a navigator that may change in flight."""
-    hosted = group.robots[robot]
-    apply_configuration(hosted.navigator, configuration)
-    hosted.tracker.params = configuration.tracker
-    hosted.due_s = -math.inf
+    group.robots[robot].reconfigure(configuration)
 
 
 def _view(

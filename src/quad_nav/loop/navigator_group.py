@@ -29,19 +29,19 @@ from quad_nav.peers.peer import Intention, Peer, idle_priority
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
 from quad_nav.plan.wavefront import Wavefront
-from quad_nav.scenario.assembly import build_navigator
+from quad_nav.scenario.assembly import build_navigator, reconfigure_robot
 from quad_nav.scenario.scene_map import SceneMaps
 from quad_nav.sim.casters import Lidars
 from quad_nav.sim.lidar import base_from_lidar
 from quad_nav.sim.odometry import OdomFrames, pose_in
 from quad_nav.sim.robot_state import RobotState, RobotStates
 from quad_nav.sim.simulation import STEPS_PER_S
+from quad_nav.timing import is_due
 from quad_nav.tracking.tracker import ObstacleTracker
 
 LocatedScan = Tuple[Scan, Pose3D]
 """A scan and ``map_from_lidar``, the LIDAR's pose at its stamp."""
 _IDENTITY = Pose2D(0.0, 0.0)
-SAME_TIME_S = 1e-9
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class LoopRobot:
     Attributes:
         navigator: The navigator.
         tracker: The tracker of moving obstacles.
+        intakes: Intakes of the robot's sensors.
         waiting_goal: The last goal that was sent, in ``map``, until the navigator takes it.
         due_s: Time before which no tick is due, unless a goal waits. Who changes the navigator
             between ticks sets it to -inf.
@@ -103,6 +104,12 @@ class LoopRobot:
         costmaps = (self.navigator.global_costmap, self.navigator.local_costmap)
         self.tracker = ObstacleTracker(configuration.tracker, costmaps[1].params.global_frame)
         self._intake = ScanIntake(sinks_of(costmaps), configuration.scan_validator, self.tracker)
+        self.intakes = [self._intake]
+
+    def reconfigure(self, configuration: Configuration) -> None:
+        """Change every parameter that may change in flight."""
+        reconfigure_robot(configuration, self.navigator, self.tracker, self.intakes)
+        self.due_s = -math.inf
 
     def add_scan(self, scan: Scan, map_from_lidar: Pose3D, now_s: float) -> str:
         """Hand a scan that arrives now to the costmaps; return why not, "" if they have it."""
@@ -125,7 +132,7 @@ class LoopRobot:
             navigator.set_goal(goal, now_s)
             self.waiting_goal = None
         self.due_s = -math.inf if navigator.has_work else navigator.next_due_s
-        return self.due_s <= now_s + SAME_TIME_S
+        return is_due(self.due_s, now_s)
 
     def navigate(
         self, now_s: float, state: RobotState, peers: Sequence[Peer]
@@ -173,7 +180,8 @@ class LoopRobot:
         self._frames, self._start_s = frames, start_s
         self.due_s = -math.inf
         if jumped_back:
-            self._intake.reset()
+            for intake in self.intakes:
+                intake.reset()
             self.navigator.restart(start_s)
 
     def map_from_global(self, now_s: float) -> Pose2D:
@@ -291,11 +299,11 @@ class NavigatorGroup:
         for number, goal in goals.items():
             self.robots[number].waiting_goal = goal
         self.before_ticks(now_s)
-        soon_s = now_s + SAME_TIME_S
         due = [
             number
             for number, robot in self.robots.items()
-            if (robot.due_s <= soon_s or robot.waiting_goal is not None) and robot.is_due(now_s)
+            if (is_due(robot.due_s, now_s) or robot.waiting_goal is not None)
+            and robot.is_due(now_s)
         ]
         peers = self._peers_in_reach(due, now_s, states)
         results = [self.tick(number, now_s, states, peers[number]) for number in due]

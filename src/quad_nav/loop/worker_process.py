@@ -24,13 +24,14 @@ from quad_nav.errors import InputError, PluginError
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.loop import LoopSetup
 from quad_nav.loop.inspection import Change, Inspection, NavigatorView, inspect_group
-from quad_nav.loop.navigator_group import SAME_TIME_S, GroupFactory, NavigatorGroup, NavigatorResult
+from quad_nav.loop.navigator_group import GroupFactory, NavigatorGroup, NavigatorResult
 from quad_nav.navigator.tick import RobotPoses, State, Tick
 from quad_nav.peers.peer import Intention
 from quad_nav.sim.casters import Lidars, kernel_lidars
 from quad_nav.sim.flight import BODY_VALUES, BodyState
 from quad_nav.sim.robot_state import RobotStates
 from quad_nav.sim.simulation import STEPS_PER_S
+from quad_nav.timing import is_due
 
 PROCESS_NAME = "navigators"
 START_METHOD = "fork" if sys.platform == "linux" else "spawn"
@@ -188,10 +189,10 @@ class WorkerProcess:
         Raises:
             WorkerProcessError: The process failed.
         """
-        is_due = self.goals or self._due_s <= now_s + SAME_TIME_S
+        is_wanted = self.goals or is_due(self._due_s, now_s)
         # The slots of unanswered scans are not written again.
-        is_due = is_due or self._unanswered >= SharedStates.SLOTS - STEPS_PER_S // 40
-        if is_due and self.is_ready:
+        is_wanted = is_wanted or self._unanswered >= SharedStates.SLOTS - STEPS_PER_S // 40
+        if is_wanted and self.is_ready:
             slot = self._write(states.bodies)
             self._send("navigate", now_s, slot, self.goals, self.intentions)
             self.goals, self.intentions = {}, {}

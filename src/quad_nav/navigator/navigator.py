@@ -230,6 +230,7 @@ class Navigator:
         """Guard the command of a control cycle; without a goal, at the same frequency."""
         if not self.params.evasion.avoid_moving_obstacles:
             return
+        self._idle_guard.set_frequency(self.params.controller_frequency_hz, tick.now_s)
         is_due = self._idle_guard.pop(tick.now_s) and self.state is State.IDLE
         if is_due or tick.command is not None:
             self._machine.evade(tick, poses, velocity)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from quad_nav.navigator.params import NavigatorParams
 from quad_nav.navigator.tick import State
-from quad_nav.timing import Schedule
+from quad_nav.timing import Schedule, is_due
 
 
 class PlannerThread:
@@ -49,7 +49,7 @@ class PlannerThread:
 
     def is_due(self, now_s: float) -> bool:
         """Return whether the thread searches now."""
-        return self.is_running and (self._is_woken or now_s >= self._due_s - 1e-9)
+        return self.is_running and (self._is_woken or is_due(self._due_s, now_s))
 
 
 class PlanSearch:
@@ -91,7 +91,7 @@ class PlanSearch:
     def is_due(self, state: State, now_s: float, cycle_due_s: float) -> bool:
         """Return whether to search now; ``cycle_due_s`` is the time of the next control cycle."""
         if state is State.PLANNING:
-            return now_s >= cycle_due_s - 1e-9
+            return is_due(cycle_due_s, now_s)
         return state is State.CONTROLLING and self._schedule.pop(now_s)
 
     def is_retry_due(self, state: State, now_s: float, cycle_due_s: float) -> bool:
@@ -101,7 +101,7 @@ class PlanSearch:
         searches stands for all, the one right before a control cycle.
         """
         repeats = self.thread.is_running and self._failures > 0 and not self._is_periodic
-        return repeats and state is State.PLANNING and now_s >= cycle_due_s - 1e-9
+        return repeats and state is State.PLANNING and is_due(cycle_due_s, now_s)
 
     def notify_thread(self) -> None:
         """Wake upstream's thread in a control cycle without a plan, unless it searches anyway."""

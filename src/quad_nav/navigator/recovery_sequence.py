@@ -10,6 +10,7 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.navigator.parameter_limiter import ParameterLimiter
 from quad_nav.navigator.tick import RecoveryStart, RobotPoses, Tick, Trigger
 from quad_nav.recovery import Recovery, RecoveryContext
+from quad_nav.timing import is_due
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class RecoverySequence:
         The command and the message of the step go into the tick, its limit to ``limiter``.
         """
         assert self._active is not None
-        if tick.now_s < self.due_s - 1e-9:
+        if not is_due(self.due_s, tick.now_s):
             return False
         step = self._active.step(self._context(tick, poses))
         self.due_s = tick.now_s + self._active.period_s
@@ -102,7 +103,7 @@ class RecoverySequence:
     def pause(self, now_s: float) -> None:
         """Skip the running behaviour's step if it is due."""
         assert self._active is not None
-        if now_s >= self.due_s - 1e-9:
+        if is_due(self.due_s, now_s):
             self.due_s = now_s + self._active.period_s
 
     def _context(self, tick: Tick, poses: RobotPoses) -> RecoveryContext:

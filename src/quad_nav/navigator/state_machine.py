@@ -29,7 +29,7 @@ from quad_nav.navigator.recovery_sequence import NamedRecovery, RecoverySequence
 from quad_nav.navigator.tick import Outcome, RobotPoses, State, Tick, Trigger
 from quad_nav.peers.coordinator import PeerCoordinator
 from quad_nav.plan.planner import GlobalPlanner
-from quad_nav.timing import Schedule
+from quad_nav.timing import Schedule, is_due
 
 
 class StateMachine:
@@ -130,7 +130,7 @@ class StateMachine:
 
     def is_cycle_due(self, now_s: float) -> bool:
         """Return whether a control cycle is due."""
-        return now_s >= self._cycle.due_s - 1e-9
+        return is_due(self._cycle.due_s, now_s)
 
     def run(self, tick: Tick, poses: RobotPoses, velocity: Twist2D) -> None:
         """Do what is due for the goal: search a plan, recover, control.

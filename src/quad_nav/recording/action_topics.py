@@ -9,6 +9,7 @@ from quad_nav.geometry import Pose2D
 from quad_nav.navigator.tick import Outcome
 from quad_nav.recording.messages import constant, header, message, planar_pose, pose_stamped, time
 from quad_nav.recording.record_file import TopicWriter, stamp_at
+from quad_nav.timing import is_due
 
 STATUS_PERIOD_S = 0.2
 ENDED_GOALS_STAY_S = 5.0
@@ -116,7 +117,7 @@ class ActionTopics:
 
     def write_due_status(self, now_s: float) -> None:
         """Write the goal status if its period is over."""
-        if now_s >= self._next_status_s - 1e-9:
+        if is_due(self._next_status_s, now_s):
             self._write_status(now_s)
 
     def _end(self, now_s: float, status: int, text: str) -> None:

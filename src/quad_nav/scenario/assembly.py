@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable, Dict, Iterable, Optional
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from quad_nav.costmap.layer import LayerParams
 from quad_nav.costmap.layered import CostmapParams, LayeredCostmap
 from quad_nav.costmap.obstacle import ObstacleLayerParams
 from quad_nav.costmap.peer_layer import PeerLayerParams
+from quad_nav.costmap.scan_intake import ScanIntake
 from quad_nav.geometry import Pose2D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.recovery_sequence import NamedRecovery
@@ -36,6 +37,7 @@ from quad_nav.recovery import (
     Recovery,
     Rotate,
 )
+from quad_nav.tracking.tracker import ObstacleTracker
 
 # The planner that each dataclass of parameters is for; both take the footprint, float64[n, 2].
 GLOBAL_PLANNERS: Dict[type, Callable[[Any, NDArray[np.float64]], GlobalPlanner]] = {
@@ -80,8 +82,28 @@ def build_navigator(configuration: Configuration, number: Optional[int] = None) 
     )
 
 
+def reconfigure_robot(
+    configuration: Configuration,
+    navigator: Navigator,
+    tracker: ObstacleTracker,
+    intakes: Iterable[ScanIntake],
+) -> None:
+    """Change every parameter of a robot that may change in flight; plan and goal stay.
+
+    Args:
+        configuration: The configuration from now on.
+        navigator: The robot's navigator.
+        tracker: Its tracker of moving obstacles.
+        intakes: Those of all of its sensors.
+    """
+    apply_configuration(navigator, configuration)
+    tracker.params = configuration.tracker
+    for intake in intakes:
+        intake.reconfigure(configuration.scan_validator)
+
+
 def apply_configuration(navigator: Navigator, configuration: Configuration) -> None:
-    """Change every parameter that may change in flight; plan and goal stay."""
+    """Change every parameter of a navigator that may change in flight; plan and goal stay."""
     footprint = navigator.global_costmap.footprint
     navigator.set_params(configuration.navigator)
     navigator.peers.params = configuration.peers

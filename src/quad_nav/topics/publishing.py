@@ -9,9 +9,7 @@ from quad_nav.costmap.cost_grid import NO_CELLS, Window
 from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.grid import GridSpec
-from quad_nav.timing import Schedule
-
-CLOCK_GRAIN_S = 1e-6  # a clock of whole nanoseconds may be this early
+from quad_nav.timing import Schedule, is_due
 
 PATH_PERIOD_S = 0.5
 PATH_SPACING_M = 0.05
@@ -81,7 +79,7 @@ class CostmapSchedule:
         """
         self._changed = self._changed.union(window)
         self._schedule.set_frequency(self._costmap.params.publish_frequency_hz, now_s)
-        return self._schedule.pop(now_s + CLOCK_GRAIN_S)
+        return self._schedule.pop(now_s)
 
     def pop(self) -> Window:
         """Return the window that has changed since the last call."""
@@ -128,7 +126,7 @@ class FlownPath(Generic[T]):
             self._last = here
             self.poses.append(self._make(stamp_s, pose))
             self._has_grown = True
-        if not self._has_grown or stamp_s < self._next_s:
+        if not self._has_grown or not is_due(self._next_s, stamp_s):
             return False
         self._has_grown = False
         self._next_s = stamp_s + PATH_PERIOD_S

@@ -8,6 +8,7 @@ import rospy
 from actionlib import SimpleActionServer
 from actionlib_msgs.msg import GoalID
 
+from quad_nav.ros.common.conversions import time_message
 from quad_nav.timing import Schedule
 from quad_nav.topics.validation import goal_id_problem
 
@@ -86,7 +87,7 @@ class PolledActionServer(SimpleActionServer):
     def restart(self, now_s: float) -> None:
         """Restart the status schedule after a clock jump, and adapt stamps from the future."""
         self._status.start(now_s)
-        server, now = self.action_server, rospy.Time.from_sec(now_s)
+        server, now = self.action_server, time_message(now_s)
         with server.lock:
             server.last_cancel = min(server.last_cancel, now)
             for one in server.status_list:

@@ -139,21 +139,22 @@ class Transforms:
         elif is_new:
             self._buffer.set_transform(message, "")
 
-    def lookup(self, to_frame: str, from_frame: str, stamp_s: Optional[float] = None) -> Pose3D:
+    def lookup(self, to_frame: str, from_frame: str, stamp: Optional[rospy.Time] = None) -> Pose3D:
         """Return the pose of `from_frame` in `to_frame`.
 
         Args:
             to_frame: Target frame.
             from_frame: Source frame.
-            stamp_s: Time of the transform; None for the latest.
+            stamp: Time of the transform, as the message has it: through seconds it may become a
+                nanosecond earlier than the first transform. None for the latest.
 
         Raises:
             TransformUnavailable: If a frame is unknown, the frames are not connected, or the time
                 is outside of the received ones.
         """
-        return self._lookup(to_frame, from_frame, stamp_s)[0]
+        return self._lookup(to_frame, from_frame, stamp)[0]
 
-    def lookup_near(self, to_frame: str, from_frame: str, stamp_s: float) -> Pose3D:
+    def lookup_near(self, to_frame: str, from_frame: str, stamp: rospy.Time) -> Pose3D:
         """Return the pose of `from_frame` in `to_frame` at a time, else the latest one.
 
         For frames that move slowly, such as `odom` in `map`: their transform may come later than
@@ -163,7 +164,7 @@ class Transforms:
             TransformUnavailable: If a frame is unknown, or the frames are not connected.
         """
         try:
-            return self.lookup(to_frame, from_frame, stamp_s)
+            return self.lookup(to_frame, from_frame, stamp)
         except TransformUnavailable as error:
             if not error.later:
                 raise
@@ -187,7 +188,7 @@ class Transforms:
         return [found[one] for one in wanted]
 
     def _lookup(
-        self, to_frame: str, from_frame: str, stamp_s: Optional[float]
+        self, to_frame: str, from_frame: str, stamp: Optional[rospy.Time]
     ) -> Tuple[Pose3D, float]:
         if self._held:
             with self._lock:
@@ -198,11 +199,11 @@ class Transforms:
         problem = frame_problem(to_frame) or frame_problem(from_frame)
         if problem:
             raise TransformUnavailable(f"{problem}, such as '{to_frame or 'map'}'")
-        if stamp_s is not None and not 0.0 <= stamp_s <= MAX_STAMP_S:
+        stamp = stamp or rospy.Time()
+        if not 0.0 <= stamp.to_sec() <= MAX_STAMP_S:
             raise TransformUnavailable(
-                f"stamp {stamp_s:.2f} s, expected 0 to {MAX_STAMP_S:.0f} s", later=False
+                f"stamp {stamp.to_sec():.2f} s, expected 0 to {MAX_STAMP_S:.0f} s", later=False
             )
-        stamp = rospy.Time(0) if stamp_s is None else rospy.Time.from_sec(stamp_s)
         try:
             message = self._buffer.lookup_transform_core(to_frame, from_frame, stamp)
         except tf2_ros.ExtrapolationException as error:

@@ -14,6 +14,8 @@ import rosgraph
 import rospy
 from rospy.topics import _SubscriberImpl
 
+from quad_nav.ros.common.conversions import time_message
+
 
 class OwnNodes:
     """The nodes of a composed fleet, by their names.
@@ -67,4 +69,4 @@ def ignore_publishers(own: OwnNodes, is_handed_over: Callable[[str], bool]) -> N
 def set_time(now_s: float) -> None:
     """Set the time of this node, which does not hear its own clock."""
     if not rospy.rostime.is_wallclock():
-        rospy.rostime._set_rostime(rospy.Time.from_sec(now_s))
+        rospy.rostime._set_rostime(time_message(now_s))

@@ -62,8 +62,8 @@ class ComposedRobot(LoopRobot):
         self._intake = ScanIntake(lidar, configuration.scan_validator, self.tracker)
         others, validator = [one for one in sinks if one not in lidar], configuration.scan_validator
         self._sensors = sensors.connect(f"quad{number}", others, validator, self.tracker, names)
-        self._transforms = transforms
-        self._now_s = start_s
+        self.intakes = [self._intake, *(sensor.intake for sensor in self._sensors)]
+        self._transforms, self._now_s = transforms, start_s
         self._state: Optional[RobotState] = None
         self.interface = RobotInterface(
             configuration,
@@ -72,7 +72,7 @@ class ComposedRobot(LoopRobot):
             transforms,
             self._located_now,
             names,
-            [self._intake, *(sensor.intake for sensor in self._sensors)],
+            self.intakes,
             self._new_meters(names),
         )
         self._maps = static_maps.connect(costmaps, self.interface.lock, names)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Optional, Tuple
 
+import rospy
+
 from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.ros.common.conversions import time_message, transform_message
 from quad_nav.ros.common.transforms import Transforms
@@ -59,7 +61,7 @@ class ComposedTransforms(Transforms):
                     self._store(transform_message(pose, parent, child, stamp), is_static=False)
 
     def _lookup(
-        self, to_frame: str, from_frame: str, stamp_s: Optional[float]
+        self, to_frame: str, from_frame: str, stamp: Optional[rospy.Time]
     ) -> Tuple[Pose3D, float]:
         self.store()
-        return super()._lookup(to_frame, from_frame, stamp_s)
+        return super()._lookup(to_frame, from_frame, stamp)

@@ -21,6 +21,7 @@ from quad_nav.costmap.layered import LayeredCostmap
 from quad_nav.costmap.voxel import VoxelLayer
 from quad_nav.footprint import oriented
 from quad_nav.geometry import Pose2D
+from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.nav_messages import grid_message, polygon_message, update_message
 from quad_nav.topics.publishing import CostmapSchedule, Names, own_node
 
@@ -86,7 +87,7 @@ class CostmapPublisher:
             pose: Robot pose in the costmap's global frame.
             window: Window that the update changed.
         """
-        params, stamp = self._costmap.params, rospy.Time.from_sec(now_s)
+        params, stamp = self._costmap.params, time_message(now_s)
         if self._footprint.get_num_connections() > 0:
             self._footprint.publish(
                 polygon_message(oriented(self._costmap.footprint, pose), params.global_frame, stamp)

@@ -12,6 +12,7 @@ from quad_nav.ros.common.readiness import TopicWatch
 from quad_nav.ros.navigator.health_meters import LoopHealth
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_navigator import POLL_S, RobotNavigator
+from quad_nav.timing import is_due
 from quad_nav.topics.health import Health
 
 STALL_S = 0.5  # wall time, as the next
@@ -103,7 +104,7 @@ class NavigatorLoop:
                 " lower rate:=, fewer robots or more hosts:=)",
             )
         for robot in self._robots:
-            if robot.due_s <= now_s + 1e-9:
+            if is_due(robot.due_s, now_s):
                 robot.step(now_s)
         self._topic_watch.check()
 

@@ -6,7 +6,7 @@ import rospy
 from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import MarkerArray
 
-from quad_nav.ros.common.conversions import replacing_markers
+from quad_nav.ros.common.conversions import replacing_markers, time_message
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.tracked_obstacles import (
     CLOUD_FIELDS,
@@ -43,7 +43,7 @@ class ObstacleTopics:
             shown = track_markers(tracks, self._tracker.unseen_s, frame)
             self._markers.publish(replacing_markers(shown))
         if self._cloud.get_num_connections() > 0:
-            stamp = rospy.Time.from_sec(tracks.time_s if len(tracks) else now_s)
+            stamp = time_message(tracks.time_s if len(tracks) else now_s)
             self._cloud.publish(cloud_message(tracks, frame, stamp))
 
 

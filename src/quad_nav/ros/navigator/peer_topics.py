@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D, yaws_from_quaternions
 from quad_nav.peers.peer import Intention, Peer
-from quad_nav.ros.common.conversions import odometry_from_message
+from quad_nav.ros.common.conversions import odometry_from_message, time_message
 from quad_nav.ros.common.packed_messages import (
     STATES_TOPIC,
     Floats,
@@ -98,7 +98,9 @@ class PeerTopics:
             self._store(states, Pose2D(0.0, 0.0))
             return True
         try:
-            pose = self._transforms.lookup_near(self._frame, states.frame, states.stamp_s)
+            pose = self._transforms.lookup_near(
+                self._frame, states.frame, time_message(states.stamp_s)
+            )
         except TransformUnavailable as error:
             rospy.logwarn_throttle(
                 5.0, f"{STATES_TOPIC}: states dropped: pose in {self._frame} unknown: {error}"
@@ -179,7 +181,7 @@ class PeerTopics:
         name, stamp_s = f"quad{number}", odometry.header.stamp.to_sec()
         try:
             global_from_odom = self._transforms.lookup_near(
-                self._frame, odometry.header.frame_id, stamp_s
+                self._frame, odometry.header.frame_id, odometry.header.stamp
             )
         except TransformUnavailable as error:
             rospy.logwarn_throttle(

@@ -20,7 +20,7 @@ from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import State, Tick
 from quad_nav.plan.global_planner import SearchPlanner
 from quad_nav.plan.navfn import Navfn
-from quad_nav.ros.common.conversions import key_values, twist_message
+from quad_nav.ros.common.conversions import key_values, time_message, twist_message
 from quad_nav.ros.common.nav_messages import (
     cost_cloud_message,
     path_message,
@@ -69,7 +69,7 @@ class PlanTopics:
 
     def publish(self, tick: Tick, pose: Pose3D) -> None:
         """Publish the results of a tick; `pose` is the robot's in the global frame."""
-        now = rospy.Time.from_sec(tick.now_s)
+        now = time_message(tick.now_s)
         if tick.state is not self._published_state:
             self._published_state = tick.state
             self._state.publish(tick.state.value)

@@ -17,6 +17,7 @@ from quad_nav.errors import PluginError
 from quad_nav.geometry import Pose3D
 from quad_nav.navigator.navigator import Navigator
 from quad_nav.navigator.tick import Outcome, RobotPoses, Tick
+from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.costmap_publisher import CostmapPublisher
@@ -26,7 +27,7 @@ from quad_nav.ros.navigator.obstacle_topics import ObstacleTopics
 from quad_nav.ros.navigator.plan_services import PlanServices
 from quad_nav.ros.navigator.plan_topics import PlanTopics
 from quad_nav.ros.navigator.reconfigure import serve_namespaces
-from quad_nav.scenario.assembly import apply_configuration
+from quad_nav.scenario.assembly import reconfigure_robot
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.tracking.tracker import ObstacleTracker
 
@@ -103,10 +104,7 @@ class RobotInterface:
     def _on_reconfigure(self, namespace: str, changes: Dict[str, Any]) -> config.Configuration:
         with self.lock:
             configuration = config.updated(self._configuration, namespace, changes)
-            apply_configuration(self._navigator, configuration)
-            for intake in self._intakes:
-                intake.reconfigure(configuration.scan_validator)
-            self._tracker.params = configuration.tracker
+            reconfigure_robot(configuration, self._navigator, self._tracker, self._intakes)
             self._configuration = configuration
             return configuration
 
@@ -149,7 +147,7 @@ class RobotInterface:
         if in_global is not None:
             self._topics.publish(tick, in_global)
             if tick.cycle:
-                self._goals.publish_feedback(in_global, rospy.Time.from_sec(tick.now_s))
+                self._goals.publish_feedback(in_global, time_message(tick.now_s))
         elif tick.command is not None:
             self._topics.stop()
         self._obstacles.publish(tick.now_s)

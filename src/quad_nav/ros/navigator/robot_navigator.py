@@ -25,6 +25,7 @@ from quad_nav.ros.navigator.health_meters import InputMeter, NavigatorHealth
 from quad_nav.ros.navigator.peer_topics import PeerTopics
 from quad_nav.ros.navigator.robot_interface import RobotInterface
 from quad_nav.scenario.assembly import build_navigator
+from quad_nav.timing import is_due
 from quad_nav.topics.publishing import Names, own_node
 from quad_nav.topics.validation import odometry_problem
 from quad_nav.tracking.tracker import ObstacleTracker
@@ -140,7 +141,7 @@ class RobotNavigator:
             sensor.deliver(self._transforms)
         self._interface.poll(now_s)
         self._peers.publish(self.number, navigator.peers.intention, now_s)
-        if navigator.next_due_s > now_s + 1e-9 and not navigator.has_work:
+        if not is_due(navigator.next_due_s, now_s) and not navigator.has_work:
             return
         for costmap in (navigator.global_costmap, navigator.local_costmap):
             static_maps.place_maps(self.name, costmap, self._transforms, self._warnings)

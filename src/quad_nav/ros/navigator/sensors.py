@@ -161,12 +161,12 @@ class Sensor:
 
     def _poses(self, transforms: Transforms, message: Any) -> List[SensorPose]:
         """Look up the sensor's poses for each sink, each pair of frames once."""
-        stamp_s, frame = message.header.stamp.to_sec(), message.header.frame_id
+        stamp, frame = message.header.stamp, message.header.frame_id
         known: Dict[Tuple[str, str], Pose3D] = {}
 
         def pose(to_frame: str, from_frame: str) -> Pose3D:
             if (to_frame, from_frame) not in known:
-                known[to_frame, from_frame] = transforms.lookup(to_frame, from_frame, stamp_s)
+                known[to_frame, from_frame] = transforms.lookup(to_frame, from_frame, stamp)
             return known[to_frame, from_frame]
 
         return [

@@ -80,7 +80,7 @@ class OdometryIntake:
         """True while odometry has jumped, so that the pose is not known."""
         return self._filter.is_jumping
 
-    def map_from(self, frame: str, stamp_s: Optional[float] = None) -> Pose3D:
+    def map_from(self, frame: str, stamp: Optional[rospy.Time] = None) -> Pose3D:
         """Return the pose of a frame in `map` at a time if tf knows it, else the latest.
 
         Raises:
@@ -88,9 +88,9 @@ class OdometryIntake:
         """
         if frame == "map":
             return Pose3D(0.0, 0.0, 0.0)
-        if stamp_s is None:
+        if stamp is None:
             return self._transforms().lookup("map", frame)
-        return self._transforms().lookup_near("map", frame, stamp_s)
+        return self._transforms().lookup_near("map", frame, stamp)
 
     def take(
         self, states: Sequence[TimedPose], messages: Sequence[Odometry], now_s: float
@@ -178,21 +178,21 @@ class OdometryIntake:
 
         A frame whose latest pose is that of the step before has not moved: one lookup will do.
         """
-        frames = [(message.header.frame_id, stamp_s) for message, stamp_s, _ in valid]
+        frames = [(message.header.frame_id, message.header.stamp) for message, _, _ in valid]
         before = self._latest
         self._latest = {frame: self._origin(frame, now_s) for frame in dict(frames)}
         return [
             self._latest[frame]
             if self._latest[frame] == before.get(frame)
-            else self._origin(frame, now_s, stamp_s)
-            for frame, stamp_s in frames
+            else self._origin(frame, now_s, stamp)
+            for frame, stamp in frames
         ]
 
     def _origin(
-        self, frame: str, now_s: float, stamp_s: Optional[float] = None
+        self, frame: str, now_s: float, stamp: Optional[rospy.Time] = None
     ) -> Optional[Pose3D]:
         try:
-            map_from_odom = self.map_from(frame, stamp_s)
+            map_from_odom = self.map_from(frame, stamp)
         except TransformUnavailable as error:
             problem = str(error)
         else:

@@ -69,7 +69,7 @@ class PoseListener:
         self._robots = robots
         self._lock = threading.Lock()
         self._odom: Dict[int, Pose3D] = {}
-        self._base: Dict[int, Tuple[Pose3D, float]] = {}
+        self._base: Dict[int, Tuple[Pose3D, rospy.Time]] = {}
         self._subscriber = rospy.Subscriber("/tf", TFMessage, self._take, queue_size=100)
 
     def _take(self, message: TFMessage) -> None:
@@ -84,9 +84,9 @@ class PoseListener:
                 if found[1] == "odom" and one.header.frame_id == "map":
                     self._odom[robot] = pose
                 elif found[1] == "base_link":
-                    self._base[robot] = pose, one.header.stamp.to_sec()
+                    self._base[robot] = pose, one.header.stamp
 
-    def pose(self, robot: int) -> Optional[Tuple[Pose3D, float]]:
+    def pose(self, robot: int) -> Optional[Tuple[Pose3D, rospy.Time]]:
         """Return the pose in `map` and its stamp; None if it is not known yet."""
         with self._lock:
             base, map_from_odom = self._base.get(robot), self._odom.get(robot)
@@ -115,7 +115,7 @@ class SceneLidars:
         self._publishers = {
             i: rospy.Publisher(f"/scan{i}", ScanMessage, queue_size=2) for i in scanned
         }
-        self._stamps_s: Dict[int, float] = {}
+        self._stamps: Dict[int, rospy.Time] = {}
 
     def publish(self) -> None:
         """Publish a scan of each vehicle whose pose is new, with the pose's stamp."""
@@ -126,15 +126,15 @@ class SceneLidars:
             found = self._poses.pose(robot)
             if found is None:
                 continue
-            pose, stamp_s = found
+            pose, stamp = found
             rows[robot, :7] = (pose.x_m, pose.y_m, pose.z_m, *pose.quaternion)
-            if robot in self._publishers and self._stamps_s.get(robot) != stamp_s:
-                self._stamps_s[robot] = stamp_s
+            if robot in self._publishers and self._stamps.get(robot) != stamp:
+                self._stamps[robot] = stamp
                 due.append(robot)
         if not due:
             return
         bodies = BodyState(rows)
         for robot, scan in zip(due, self._lidars.scan(bodies, due, 0.0)):
             message = scan_message(scan, f"Lidar{robot}")
-            message.header.stamp = rospy.Time.from_sec(self._stamps_s[robot])
+            message.header.stamp = self._stamps[robot]
             self._publishers[robot].publish(message)

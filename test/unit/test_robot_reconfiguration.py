@@ -1,0 +1,115 @@
+"""A robot whose parameters change in flight: each of its parts follows, in each shell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_stop_without_data import Threatened, hovers
+from test_tracking_flights import walker
+
+import quad_nav
+from quad_nav.config import updated
+from quad_nav.costmap.scan_intake import SensorPose
+from quad_nav.errors import InputError
+from quad_nav.geometry import Pose3D, Scan
+from quad_nav.loop.inspection import TRACK, Inspection
+from quad_nav.offline import flight as offline
+
+GOALS = [[[1.0, 4.5]], [[8.5, 1.5]]]
+FIXES = {"track_moving_obstacles": True, "reject_implausible_scans": False, "sensor_timeout": 0.2}
+EVERY = {f"fixes/{name}": value for name, value in FIXES.items()}
+
+
+def setup_of(config="default", robots=2):
+    simulation = quad_nav.lidar_simulation(beams=128)
+    setup = quad_nav.prepare(goals=GOALS[:robots], config=config, simulation=simulation)
+    walks = walker((5.0, 1.5), (5.0, 6.0))
+    return replace(setup, scene=replace(setup.scene, moving=(walks,)))
+
+
+def assert_follows(robot):
+    """Every part of a robot has the values of ``FIXES``."""
+    assert robot.tracker.params.track_moving_obstacles
+    assert robot.navigator.params.sensor_timeout_s == 0.2
+    for intake in robot.intakes:
+        assert intake.expected_period_s == 0.2
+        assert not intake.is_late(0.0, 100.0)  # it takes implausible scans
+    for costmap in (robot.navigator.global_costmap, robot.navigator.local_costmap):
+        for buffer in costmap.layers["obstacle_layer"].buffers.values():
+            assert buffer.params.expected_update_period_s == 0.2
+
+
+def test_every_part_follows_python():
+    with quad_nav.Flight(setup_of()) as flight:
+        flight.reconfigure(0, EVERY)
+        for _ in range(120):
+            flight.step()
+        robots = flight._loop.offline_robots
+        assert_follows(robots[0])
+        assert len(robots[0].tracker.tracks) == 1 and len(robots[1].tracker.tracks) == 0
+
+
+def test_no_part_follows_a_refused_change():
+    with quad_nav.Flight(setup_of()) as flight:
+        with pytest.raises(InputError, match="fixes/sensor_timeout"):
+            flight.reconfigure(0, {**EVERY, "fixes/sensor_timeout": "soon"})
+        robot = flight._loop.offline_robots[0]
+        assert not robot.tracker.params.track_moving_obstacles
+        assert robot.intakes[0].is_late(0.0, 100.0)
+
+
+def test_a_robot_without_a_navigator_cannot_be_reconfigured():
+    with quad_nav.Flight(setup_of(), navigators=False) as flight:
+        with pytest.raises(ValueError, match="robot 0 has no navigator"):
+            flight.reconfigure(0, EVERY)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_every_part_follows_in_each_process(processes):
+    """Without scans the robots stop after 0.2 s instead of 0.5 s."""
+    flight = offline.Flight(setup_of(), processes=processes)
+    try:
+        for robot in (0, 1):
+            configuration = updated(flight.robots[robot].configuration, "fixes", FIXES)
+            flight.reconfigure(robot, configuration)
+        for robot in flight.offline_robots.values():
+            assert_follows(robot)
+        while flight.now_s < 4.0:
+            flight.advance()
+        views = flight.loop.inspect(Inspection({TRACK: frozenset((0, 1))}))
+        assert [len(view.track.tracks) for view in views] == [1, 1]
+        assert [view.stopped_reason for view in views] == ["", ""]
+        for robot in (0, 1):
+            flight.loop.enable_lidar(robot, False)
+        while flight.now_s < 4.4:
+            flight.advance()
+        reasons = [view.stopped_reason for view in flight.loop.inspect(Inspection())]
+        assert all(reason.startswith("stopping: no data from") for reason in reasons)
+    finally:
+        flight.end()
+
+
+def test_the_validator_follows_a_longer_time_out():
+    """The tutorial's own limit is 21 s."""
+    with quad_nav.Flight(setup_of("tutorial", robots=1)) as flight:
+        intake = flight._loop.offline_robots[0].intakes[0]
+        scan = Scan(0.0, -np.pi, np.pi / 64, 0.02, 60.0, np.full(128, 3.0, np.float32))
+        lidar = Pose3D(1.0, 1.0, 0.3)
+        poses = [SensorPose(lidar, lidar)] * len(intake.sinks)
+        assert "expected less than 1.00 s" in intake.add_scan(scan, poses, 1.5, 1.5)
+        flight.reconfigure(0, {"fixes/sensor_timeout": 2.0})
+        assert intake.add_scan(scan, poses, 1.5, 1.5) == ""
+
+
+@pytest.mark.parametrize("frequency_hz", [2.0, 20.0])
+def test_an_idle_robot_evades_at_a_changed_frequency(frequency_hz):
+    flight = Threatened()
+    hovers(flight)
+    flight.ticks(1.0)
+    params = replace(flight.navigator.params, controller_frequency_hz=frequency_hz)
+    flight.navigator.set_params(params)
+    ticks = [tick for tick in flight.ticks(3.0) if tick.command]
+    periods = np.diff([tick.now_s for tick in ticks])
+    assert len(ticks) > 5 and periods == pytest.approx(1.0 / frequency_hz)
