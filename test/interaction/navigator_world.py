@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import rospy
-from actionlib_msgs.msg import GoalID
+from actionlib_msgs.msg import GoalID, GoalStatus
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import PoseStamped, Twist
@@ -43,6 +43,8 @@ CONTROL_HZ = 5.0
 SECOND_S = 0.03  # the second LIDAR scans so long before the first one
 ROOM_M, FAR_M = 8.0, 100.0
 BEAMS, WALKER_M = 180, 0.3
+ASIDE_M = 0.8
+"""A walker that comes so close to a quadcopter goes away."""
 LEASE_S = 0.5
 STARTS = (Pose2D(1.5, 4.0), Pose2D(FAR_M + 1.5, 4.0))
 FAR_GOAL = Pose2D(FAR_M + 6.5, 4.5)
@@ -121,12 +123,14 @@ class Command(NamedTuple):
         flown_s: When it came, as `NavigatorWorld.flown_s`.
         now_s: The same on the virtual clock, as in the log.
         twist: Velocities.
+        pose: Where it was then.
         oldest_s: Age of its oldest data then.
     """
 
     flown_s: float
     now_s: float
     twist: Twist2D
+    pose: Pose2D
     oldest_s: float
 
     @property
@@ -146,10 +150,10 @@ class NavigatorWorld:
         walkers: Those in room 0.
         peer: Pose of quadcopter 2; None if it is not there.
         lost: What quadcopter 0 does not get, of "scan", "second scan", "odometry", "tf", "peer".
-        last_s: `flown_s` at which it got each of them last.
+        last_s: `flown_s` at which it got each of them last, or its navigator began anew.
         commands: Those that quadcopter 0 has got.
         cycles: `flown_s` of the control cycles of its goal.
-        results: (flown_s, text) of its goals that have ended.
+        results: `flown_s` at which its goals have ended by themselves.
         fleets: What the nodes run, by the numbers of their robots.
     """
 
@@ -196,6 +200,7 @@ class NavigatorWorld:
             NavigatorLoop(fleet.robots, fleet.peers, 0.001).run()
 
         self._nodes[robots] = self.graph.start(f"/move_base{robots[0]}", main)
+        self._begin_anew()
 
     def kill_navigators(self, robots):
         self.graph.kill(self._nodes.pop(robots))
@@ -205,6 +210,15 @@ class NavigatorWorld:
         """Start it: its clock and the quadcopters are where they begin."""
         self.ns, self.bodies = self._begin_ns, [Body(start) for start in STARTS]
         self._simulator = self.graph.start("/simulator", self._simulate)
+        self._begin_anew()
+
+    def step_clock(self, seconds):
+        self.ns += round(seconds * 1e9)
+        self._begin_anew()
+
+    def _begin_anew(self):
+        """Count the ages of all data from now on: the navigators have forgotten them."""
+        self.last_s = dict.fromkeys(self.last_s, self.flown_s)
 
     def kill_simulator(self):
         self.graph.kill(self._simulator)
@@ -253,14 +267,19 @@ class NavigatorWorld:
             body.advance()
         for walker in self.walkers:
             walker.age_s += STEP_S
-        self.walkers = [one for one in self.walkers if one.is_in_room]
+        here = self.bodies[0].pose.x_m, self.bodies[0].pose.y_m
+        self.walkers = [
+            one
+            for one in self.walkers
+            if one.is_in_room and math.dist(one.place(), here) > ASIDE_M
+        ]
 
     def _on_command(self, message, robot):
         twist = conversions.twist_from_message(message)
         self.bodies[robot].take(twist)
         if robot == 0:
-            now_s = self.graph.threads.now_s
-            self.commands.append(Command(self.flown_s, now_s, twist, self.oldest_s))
+            now_s, pose = self.graph.threads.now_s, self.bodies[0].pose
+            self.commands.append(Command(self.flown_s, now_s, twist, pose, self.oldest_s))
 
     @property
     def oldest_s(self):
@@ -276,7 +295,8 @@ class NavigatorWorld:
         self.cycles.append(self.flown_s)
 
     def _on_result(self, message):
-        self.results.append((self.flown_s, message.status.text))
+        if message.status.status in (GoalStatus.SUCCEEDED, GoalStatus.ABORTED):
+            self.results.append(self.flown_s)
 
     def _gives(self, name, robot):
         """Return whether a quadcopter gets something now, and note that it does."""
