@@ -20,7 +20,13 @@ from geometry_msgs.msg import Twist
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.mission import journal
 from quad_nav.ros.common import conversions
-from quad_nav.ros.common.packed_messages import STATES_TOPIC, States, StatesMessage, pose_row, states_message
+from quad_nav.ros.common.packed_messages import (
+    STATES_TOPIC,
+    States,
+    StatesMessage,
+    pose_row,
+    states_message,
+)
 from quad_nav.ros.sequencer import node
 from quad_nav.ros.sequencer.mission import MissionRunner
 from quad_nav.scenario.mission_setup import read_setup

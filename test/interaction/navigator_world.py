@@ -269,9 +269,7 @@ class NavigatorWorld:
             walker.age_s += STEP_S
         here = self.bodies[0].pose.x_m, self.bodies[0].pose.y_m
         self.walkers = [
-            one
-            for one in self.walkers
-            if one.is_in_room and math.dist(one.place(), here) > ASIDE_M
+            one for one in self.walkers if one.is_in_room and math.dist(one.place(), here) > ASIDE_M
         ]
 
     def _on_command(self, message, robot):

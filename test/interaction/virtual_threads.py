@@ -140,9 +140,7 @@ class VirtualThreads:
                 "Condition": Condition,
             }.items()
         }
-        clock = {
-            name: lambda: self.now_s for name in ("monotonic", "perf_counter", "time")
-        }
+        clock = {name: lambda: self.now_s for name in ("monotonic", "perf_counter", "time")}
         modules = {
             id(threading): SimpleNamespace(**{**vars(threading), **bound}),
             id(time): SimpleNamespace(**{**vars(time), **clock, "sleep": self.sleep}),
