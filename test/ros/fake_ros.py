@@ -51,6 +51,9 @@ class FakeSubscriber:
             self.impl.add_callback(callback, callback_args)
         FakeSubscriber.all.append(self)
 
+    def get_num_connections(self) -> int:
+        return 1
+
     def unregister(self) -> None:
         FakeSubscriber.all = [one for one in FakeSubscriber.all if one is not self]
         self.impl = None

@@ -3,6 +3,7 @@
 
 import json
 import math
+import os
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus
-from flight_case import trigger
+from flight_case import pid_of, trigger
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Empty, String
@@ -80,6 +81,7 @@ class Vehicles(unittest.TestCase):
         self.the_frames_agree()
         self.a_pilot_takes_one_over()
         self.somebody_resumes_it()
+        self.a_landed_vehicle_outlives_the_sequencer()
         self.all_land()
         self.actions_take_off_and_land()
         self.a_cancelled_take_off_lands()
@@ -105,11 +107,47 @@ class Vehicles(unittest.TestCase):
         self.assertFalse(rospy.get_param("/mission/quad1/stopped"))
         self.wait(lambda: self.speed(0) < 0.05, "hover of vehicle 0")
         self.assertEqual(self.states[1], "flying")
+        # It neither keeps a take-off waiting nor lets a resumption of all fly it.
+        self.assertIn("left out: quad0: taken over", trigger("/vehicles/take_off"))
+        trigger("/mission/resume")
+        self.wait(lambda: rospy.get_param("/mission/quad0/stopped"), "stop by the bridge")
+        self.assertEqual((self.states[0], self.states[1]), ("taken over", "flying"))
 
     def somebody_resumes_it(self):
         trigger("/vehicle0/resume")
         self.wait(lambda: not rospy.get_param("/mission/quad0/stopped"), "mission of quad0")
         self.wait(lambda: self.states[0] == "flying" and self.speed(0) > 0.2, "flight again")
+
+    def a_landed_vehicle_outlives_the_sequencer(self):
+        """Another sequencer flies vehicle 0 on, and leaves vehicle 1 where it has landed."""
+        trigger("/vehicle1/land")
+        self.wait(lambda: self.values[1]["armed"] == "false", "landing of vehicle 1")
+        pid, told, states = pid_of("/sequencer"), len(self.events), []
+        self.subscribers.append(
+            rospy.Subscriber("/vehicle1/state", DiagnosticStatus, lambda one: states.append(one))
+        )
+        os.kill(pid, signal.SIGKILL)
+        self.wait(lambda: pid_of("/sequencer") not in (None, pid), "a sequencer again")
+        self.wait(lambda: len(self.events) > told, "goals of another sequencer")
+        armed = [key.value for one in states for key in one.values if key.key == "armed"]
+        self.assertEqual(set(armed), {"false"})
+        self.assertEqual(
+            {(one["robot"], one["event"]) for one in self.events[told:]}, {(0, "sent")}
+        )
+        self.assertTrue(rospy.get_param("/mission/quad1/stopped"))
+        self.assertFalse(rospy.get_param("/mission/quad0/stopped"))
+        self.wait(lambda: self.states[0] == "flying" and self.speed(0) > 0.2, "flight of vehicle 0")
+        self.a_person_lets_it_fly_again()
+
+    def a_person_lets_it_fly_again(self):
+        with self.assertRaisesRegex(AssertionError, "take off first"):
+            trigger("/vehicle1/resume")
+        self.wait(lambda: self.states[1] in ("ready", "landed"), "readiness of vehicle 1")
+        trigger("/vehicle1/take_off")
+        self.assertTrue(rospy.get_param("/mission/quad1/stopped"))
+        trigger("/vehicle1/resume")
+        self.wait(lambda: self.states[1] == "flying" and self.speed(1) > 0.2, "flight again")
+        self.assertFalse(rospy.get_param("/mission/quad1/stopped"))
 
     def all_land(self):
         publisher = rospy.Publisher("/vehicles/land_all", Empty, queue_size=1)

@@ -193,12 +193,34 @@ def test_a_dwell_continues_on_a_new_clock():
     assert len(shorter.fly(111.0, A.pose)) == 1
 
 
+def test_a_stop_continues_on_a_new_clock():
+    mission = a_mission_on_its_second_goal()  # sent at 110 s
+    mission.sequencer.hold(112.0)
+    mission.fly(113.0, Pose2D(2.8, 0.0))
+    record = robot_record("quad0", mission.sequencer, mission.log, None, START_S)
+    mission.records.append({**record, "mission_s": 20.0, "wall_s": 9.0})
+    later = mission.taken_over(-20.0)  # 20 s of the mission have passed, now it is 0
+    assert later.sequencer.held_s == -8.0
+    assert later.fly(30.0, Pose2D(2.8, 0.0)) == []
+    later.sequencer.release(30.0)
+    later.fly(30.0, Pose2D(2.8, 0.0))
+    ended, _ = later.fly(33.0, B.pose)
+    assert ended.time_s == pytest.approx(2.0 + 3.0)
+
+
+def test_the_latest_record_tells_how_long_a_mission_lasts():
+    """Two robots' threads may add their records in the other order."""
+    mission = a_mission_on_its_second_goal()
+    mission.records.append({**mission.records[-1], "leg": None, "mission_s": 9.8})
+    assert mission.checkpoint().mission_s == 10.0
+
+
 def test_journals_of_older_versions_are_resumed():
     mission = JournaledRobot(C, A)
     mission.fly(100.0, START)
     mission.fly(110.0, C.pose)
     for record in mission.records[1:]:
-        del record["dwell"]
+        del record["dwell"], record["held_s"]
         for part in (record["active_goal"]["goal"], *([record["leg"]] if record["leg"] else [])):
             for key in ("wait_s", "tolerance_m", "yaw_tolerance_rad", "yaw_error_rad"):
                 part.pop(key, None)
@@ -223,6 +245,7 @@ def test_journals_of_older_versions_are_resumed():
         {"dwell": {"since_s": 1.0}},
         {"dwell": {"since_s": "1", "goal": {"x_m": 1.0, "y_m": 1.0, "yaw_rad": None}}},
         {"dwell": 3.0},
+        {"held_s": "1"},
         {"leg": "none"},
         {"robot": "quad7"},
         {"robot": ["quad0"]},

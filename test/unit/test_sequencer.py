@@ -313,3 +313,66 @@ def test_edited_settings_of_the_active_goal_apply_without_sending_it_again():
     assert s.tick(1.0, at(A, 0.3)) == []
     assert len(s.tick(2.0, at(A, 0.09))) == 1
     assert s.dwell == Dwell(Goal(3.0, 4.0, wait_s=5.0, tolerance_m=0.1), 2.0)
+
+
+def test_a_stop_lets_no_time_pass():
+    s = flying(A, B, goal_timeout_s=30.0, retries=1)
+    sent = s.active_goal.pose
+    s.hold(10.0)
+    assert s.tick(100.0, at(A), [ABORTED], navigator_idle=True) == []
+    s.hold(100.0)  # stopped twice
+    s.release(200.0)
+    assert s.tick(200.0, START) == [SendGoal(0, 1, sent, 1, "the mission was stopped and resumed")]
+    assert s.tick(219.9, START) == []
+    assert s.tick(220.0, START) == [SendGoal(0, 1, sent, 2, "not reached in 30 s")]
+    assert s.tick(225.0, at(A))[0] == GoalEnded(0, 1, A, True, 35.0, 2)
+
+
+def test_a_resumption_of_what_is_not_stopped_changes_nothing():
+    s = flying(A, goal_timeout_s=30.0, retries=0)
+    s.release(20.0)
+    assert s.tick(20.0, START) == []
+    assert s.tick(30.0, START)[0] == GoalEnded(0, 1, A, False, 30.0, 1, "not reached in 30 s")
+
+
+def test_a_stop_interrupts_a_stay():
+    stay = Goal(3.0, 4.0, wait_s=10.0)
+    s = flying(stay, B)
+    s.tick(5.0, at(stay))
+    s.hold(8.0)
+    assert s.tick(50.0, at(stay)) == []
+    s.release(100.0)
+    assert s.dwell == Dwell(stay, 97.0)
+    assert s.tick(106.9, at(stay)) == []
+    assert [action.index for action in s.tick(107.0, at(stay))] == [1]
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_reports_on_the_goal_that_a_stop_has_cancelled_do_not_count(verdict):
+    s = flying(A, B, retries=0)
+    s.hold(5.0)
+    s.release(6.0)
+    (sent,) = s.tick(6.0, START, [NavigatorReport(verdict)])
+    assert (sent.index, sent.attempt) == (0, 1) and not s.active_goal.replaced
+
+
+def test_a_stop_before_the_first_goal_and_of_a_mission_that_has_ended():
+    s = sequencer(A)
+    s.hold(0.0)
+    assert s.tick(5.0, START) == []
+    s.release(10.0)
+    assert [type(one) for one in s.tick(10.0, START)] == [SendGoal]
+    s.tick(12.0, at(A))
+    later = Sequencer(s.sequence, s.progress)  # of a sequencer that restarts
+    later.hold(20.0)
+    assert later.tick(21.0, at(A)) == [SequenceDone()] and later.done
+
+
+def test_an_edited_file_does_not_end_a_stop():
+    s = flying(A)
+    s.hold(5.0)
+    s.replace_sequence(GoalSequence((B,), SequenceSettings()))
+    assert s.tick(10.0, START) == []
+    s.release(20.0)
+    (sent,) = s.tick(20.0, START)
+    assert (sent.pose.y_m, sent.resend_reason, s.active_goal.first_sent_s) == (8.0, "", 20.0)

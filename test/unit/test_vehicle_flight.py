@@ -91,6 +91,105 @@ def test_a_taken_over_vehicle_flies_again_when_somebody_resumes_it(autopilot):
     assert flight.vehicle.mode == flight.vehicle.kind["control"]
 
 
+def on_ground(state):
+    """A flight whose vehicle is on the ground in a state."""
+    if state in (State.LANDED, State.TAKEN_OVER):
+        flight = Flight().to_flight()
+        flight.command = None
+        flight.machine.land(flight.now_s, "asked")
+        if state is State.TAKEN_OVER:
+            flight.vehicle.set_mode(flight.vehicle.kind["other"])  # the pilot, who lands it
+            assert flight.run(1.0, lambda: flight.state is State.TAKEN_OVER)
+            flight.vehicle.set_mode(flight.vehicle.kind["land"])
+            flight.run(15.0, lambda: not flight.vehicle.armed)
+            flight.vehicle.set_mode(flight.vehicle.kind["control"])
+            flight.run(1.0)
+        assert flight.run(15.0, lambda: flight.state is state), flight.state
+        return flight
+    flight = Flight()
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    if state is State.NOT_READY:
+        flight.vehicle.battery = 10
+        assert flight.run(2.0, lambda: flight.state is State.NOT_READY)
+    if state is State.ARMING:
+        flight.vehicle.refuses_arming = "Gyros inconsistent"
+        assert flight.machine.take_off(flight.now_s).is_accepted
+        assert flight.state is State.ARMING
+    return flight
+
+
+@pytest.mark.parametrize(
+    ("state", "text"),
+    [
+        (State.NOT_READY, "battery at 10 %"),
+        (State.READY, "take off first"),
+        (State.LANDED, "take off first"),
+        (State.TAKEN_OVER, "take off first"),
+        (State.ARMING, "arming"),
+    ],
+)
+def test_a_resumption_on_the_ground_fails_with_the_reason(state, text):
+    flight = on_ground(state)
+    response = flight.machine.resume(flight.now_s)
+    assert not response.is_accepted
+    assert state is State.TAKEN_OVER or response.text.startswith(state.value)
+    assert text in response.text
+    flight.run(5.0)
+    assert not flight.vehicle.armed
+    assert flight.state in (State.NOT_READY, State.READY, State.LANDED)
+
+
+def test_a_vehicle_that_its_pilot_has_landed_flies_after_a_resumption_and_a_take_off():
+    flight = on_ground(State.TAKEN_OVER)
+    refused = flight.machine.take_off(flight.now_s)
+    assert not refused.is_accepted and refused.text.startswith("taken over")
+    flight.machine.resume(flight.now_s)
+    assert flight.run(2.0, lambda: flight.state is State.READY)
+    assert flight.machine.take_off(flight.now_s).is_accepted
+    assert flight.run(20.0, lambda: flight.state is State.HOLDING)
+    assert flight.machine.resume(flight.now_s).is_accepted
+
+
+def test_a_resumption_without_effect_is_given_up_and_can_be_asked_for_again(autopilot):
+    flight, _, _ = failures.fly_row("the pilot changes the mode", autopilot, 0.5)
+    flight.is_heard = False  # the orders get lost
+    for _ in range(2):
+        assert flight.machine.resume(flight.now_s).is_accepted
+        assert flight.machine.refusal == ""
+        assert not flight.run(2.0, lambda: flight.machine.refusal)
+        assert flight.run(8.0, lambda: flight.machine.refusal)
+        assert flight.state is State.TAKEN_OVER
+    flight.is_heard = True
+    assert flight.machine.resume(flight.now_s).is_accepted
+    assert flight.run(4.0, lambda: flight.state is State.FLYING)
+
+
+def test_a_vehicle_that_is_disarmed_in_a_resumption_is_not_resumed():
+    flight, _, _ = failures.fly_row("the pilot changes the mode", "ardupilot", 0.5)
+    flight.is_heard = False
+    assert flight.machine.resume(flight.now_s).is_accepted
+    flight.run(0.5)
+    flight.vehicle.kill_motors()
+    assert flight.run(2.0, lambda: flight.machine.refusal)
+    flight.vehicle.set_mode(flight.vehicle.kind["control"])
+    told = len(flight.states)
+    flight.run(2.0)
+    assert flight.state is State.TAKEN_OVER and len(flight.states) == told
+
+
+@pytest.mark.parametrize("state", [State.TAKING_OFF, State.LANDING])
+def test_a_resumption_in_a_climb_or_landing_fails(state):
+    flight = Flight()
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    flight.machine.take_off(flight.now_s)
+    assert flight.run(5.0, lambda: flight.state is State.TAKING_OFF)
+    if state is State.LANDING:
+        flight.machine.land(flight.now_s, "asked")
+    response = flight.machine.resume(flight.now_s)
+    assert not response.is_accepted and response.text.startswith(state.value)
+    assert flight.state is state
+
+
 def test_no_heartbeat_leaves_while_the_link_is_lost_in_flight(autopilot):
     """Otherwise the autopilot's failsafe would not act when only its messages are lost."""
     flight = Flight(autopilot).to_flight()

@@ -27,7 +27,8 @@ from typing import (
 from quad_nav.errors import InputError
 from quad_nav.files.values import is_number, is_whole
 from quad_nav.mission.flight_log import FlightLog, Leg, RobotLogState
-from quad_nav.mission.sequencer import START, ActiveGoal, Dwell, SequenceProgress, Sequencer
+from quad_nav.mission.progress import START, ActiveGoal, Dwell, SequenceProgress
+from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.contacts import Contact
 
 T = TypeVar("T")
@@ -82,7 +83,7 @@ def robot_record(
     name: str, sequencer: Sequencer, log: FlightLog, leg: Optional[Leg], start_s: float
 ) -> Dict[str, Any]:
     """Return the record of a robot's state; ``leg`` is the leg that has just ended, if any."""
-    progress = _shifted(sequencer.progress, -start_s)
+    progress = sequencer.progress.shifted(-start_s)
     active, dwell = progress.active_goal, progress.dwell
     state = dataclasses.asdict(dataclasses.replace(log.robots[name].state, legs=()))
     del state["legs"]  # each has a record of its own
@@ -93,6 +94,7 @@ def robot_record(
         "lap": progress.lap,
         "active_goal": None if active is None else dataclasses.asdict(active),
         "dwell": None if dwell is None else dataclasses.asdict(dwell),
+        "held_s": progress.held_s,
         "log": state,
         "leg": None if leg is None else dataclasses.asdict(leg),
         "clearance_m": clearance_m,
@@ -152,12 +154,12 @@ def _read_mission(records: Sequence[Mapping[str, Any]], names: Sequence[str]) ->
             robots[name] = _read_robot(robots[name], record)
         else:
             head = record
-    last = records[-1]
+    times_s = [_value(record.get("mission_s", 0.0), float) for record in records]
     return MissionCheckpoint(
         _value(head["clock_s"], float),
         _value(head["epoch_s"], float),
-        _value(last.get("mission_s", 0.0), float),
-        _value(last.get("wall_s", 0.0), float),
+        max(times_s),  # the threads of the robots do not add their records in order
+        _value(records[-1].get("wall_s", 0.0), float),
         robots,
         tuple(contacts),
     )
@@ -172,6 +174,7 @@ def _read_robot(before: RobotCheckpoint, record: Mapping[str, Any]) -> RobotChec
         _value(record["lap"], int),
         _value(record["active_goal"], Optional[ActiveGoal]),
         _value(record.get("dwell"), Optional[Dwell]),
+        _value(record.get("held_s"), Optional[float]),
     )
     if progress.index < 0 or progress.lap < 1:
         raise ValueError(f"goal {progress.index} of lap {progress.lap}, expected 0 or more of 1")
@@ -185,18 +188,7 @@ def _read_robot(before: RobotCheckpoint, record: Mapping[str, Any]) -> RobotChec
 
 def shift_to_clock(progress: SequenceProgress, start_s: float) -> SequenceProgress:
     """Shift times since the start of the mission to a clock that was ``start_s`` then."""
-    return _shifted(progress, start_s)
-
-
-def _shifted(progress: SequenceProgress, by_s: float) -> SequenceProgress:
-    active, dwell = progress.active_goal, progress.dwell
-    if active is not None:
-        active = dataclasses.replace(
-            active, first_sent_s=active.first_sent_s + by_s, sent_s=active.sent_s + by_s
-        )
-    if dwell is not None:
-        dwell = dataclasses.replace(dwell, since_s=dwell.since_s + by_s)
-    return dataclasses.replace(progress, active_goal=active, dwell=dwell)
+    return progress.shifted(start_s)
 
 
 def _instance(values: Any, kind: Callable[..., T]) -> T:

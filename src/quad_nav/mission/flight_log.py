@@ -177,7 +177,8 @@ class RobotLog:
             for index, goal in enumerate(sequencer.sequence.goals[first:], start=first)
         ]
         if active is not None and rest:
-            time_s = now_s - active.first_sent_s
+            until_s = now_s if sequencer.held_s is None else sequencer.held_s
+            time_s = until_s - active.first_sent_s
             error_rad = None if self._pose is None else active.goal.yaw_error_rad(self._pose)
             rest[0] = self._present_leg(
                 GoalEnded(

@@ -23,6 +23,7 @@ from typing import List, Optional, Sequence, Union
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.goal_file import GoalSequence
+from quad_nav.mission.progress import START, ActiveGoal, Dwell, SequenceProgress
 
 GOAL_LOST_AFTER_S = 5.0
 """A navigator that is idle for so long has lost the goal: it restarted, or was not ready."""
@@ -91,60 +92,6 @@ class SequenceDone:
 Action = Union[SendGoal, GoalEnded, SequenceDone]
 
 
-@dataclass(frozen=True)
-class ActiveGoal:
-    """Goal that the robot flies to.
-
-    Attributes:
-        goal: The goal as in the goal file.
-        pose: The pose that was sent, with the yaw that was chosen.
-        first_sent_s: Time of the first attempt.
-        sent_s: Start of the present attempt.
-        attempt: 1 for the first one.
-        replaced: The navigator flies another node's goal instead.
-    """
-
-    goal: Goal
-    pose: Pose2D
-    first_sent_s: float
-    sent_s: float
-    attempt: int = 1
-    replaced: bool = False
-
-
-@dataclass(frozen=True)
-class Dwell:
-    """Stay at a goal that was reached at ``since_s``, for its ``wait_s``."""
-
-    goal: Goal
-    since_s: float
-
-    @property
-    def until_s(self) -> float:
-        """Time from which the next goal is due."""
-        return self.since_s + self.goal.wait_s
-
-
-@dataclass(frozen=True)
-class SequenceProgress:
-    """Snapshot of a sequencer.
-
-    Attributes:
-        index: Index of the active or next goal.
-        lap: Round through the goals, 1 for the first.
-        active_goal: The goal that the robot flies to.
-        dwell: The stay at the goal before ``index``.
-    """
-
-    index: int = 0
-    lap: int = 1
-    active_goal: Optional[ActiveGoal] = None
-    dwell: Optional[Dwell] = None
-
-
-START = SequenceProgress()
-
-
 class Sequencer:
     """Decides which goal to send next, and when to send, retry or skip it.
 
@@ -160,14 +107,17 @@ class Sequencer:
         resume_reason: str = "the sequencer or the clock restarted",
     ) -> None:
         self._sequence = sequence
+        self._done = False
+        self._resume(progress, resume_reason)
+        self._adopt_goals()
+
+    def _resume(self, progress: SequenceProgress, reason: str) -> None:
         self._index, self._lap, self._active = progress.index, progress.lap, progress.active_goal
-        self._dwell = progress.dwell
+        self._dwell, self._held_s = progress.dwell, progress.held_s
         self._is_resumed = progress.active_goal is not None
-        self._resume_reason = resume_reason
+        self._resume_reason = reason
         self._busy_s = 0.0  # the last time at which the navigator was not known to be idle
         self._stopped_s: Optional[float] = None  # since when it reports the goal as reached
-        self._done = False
-        self._adopt_goals()
 
     @property
     def sequence(self) -> GoalSequence:
@@ -197,12 +147,24 @@ class Sequencer:
     @property
     def progress(self) -> SequenceProgress:
         """Snapshot that another sequencer can resume from."""
-        return SequenceProgress(self._index, self._lap, self._active, self._dwell)
+        return SequenceProgress(self._index, self._lap, self._active, self._dwell, self._held_s)
+
+    @property
+    def held_s(self) -> Optional[float]:
+        """Time at which the mission was stopped; None if it is not stopped."""
+        return self._held_s
 
     @property
     def done(self) -> bool:
         """True when all goals have ended."""
         return self._done
+
+    @property
+    def has_goals_left(self) -> bool:
+        """False when nothing is left but to say that all goals have ended."""
+        is_between = self._active is None and self._dwell is None
+        is_behind_last = self._index >= len(self._sequence.goals)
+        return not is_between or not is_behind_last or self._sequence.settings.loop
 
     def due_s(self, navigator_idle: bool) -> float:
         """Return the time before which ``tick`` returns no action.
@@ -222,6 +184,20 @@ class Sequencer:
     def note_busy(self, now_s: float) -> None:
         """Know that the navigator has had a goal until now, without a tick."""
         self._busy_s = now_s
+
+    def hold(self, now_s: float) -> None:
+        """Stop the mission: no goal is sent and no time counts until ``release``."""
+        if self._held_s is None:
+            self._held_s = now_s
+
+    def release(self, now_s: float) -> None:
+        """Resume a stopped mission as if no time had passed; its active goal is sent again."""
+        if self._held_s is None:
+            return
+        progress = self.progress.shifted(now_s - self._held_s)
+        self._resume(
+            dataclasses.replace(progress, held_s=None), "the mission was stopped and resumed"
+        )
 
     def replace_sequence(self, sequence: GoalSequence) -> None:
         """Follow an edited goal file from the next tick on.
@@ -263,7 +239,7 @@ class Sequencer:
             reports: What the navigator has reported on the last sent goal since the last tick.
             navigator_idle: True if the navigator runs and has no goal.
         """
-        if self._done:
+        if self._done or (self._held_s is not None and self.has_goals_left):
             return []
         if self._dwell is not None:
             if now_s < self._dwell.until_s:
@@ -273,6 +249,8 @@ class Sequencer:
             return self._start_next(now_s, pose)
         if not navigator_idle:
             self._busy_s = now_s
+        if self._is_resumed:
+            reports = ()  # on the goal that was sent before, such as that a stop has cancelled it
         if any(report.verdict is Verdict.REPLACED for report in reports):
             self._active = dataclasses.replace(self._active, replaced=True)
         return self._check_active(self._active, now_s, pose, reports)

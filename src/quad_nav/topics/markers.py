@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose2D
+from quad_nav.mission.goal import Goal
 from quad_nav.mission.sequencer import Sequencer
 from quad_nav.sim.colours import robot_rgba
 from quad_nav.sim.lidar import MOUNT_HEIGHT_M
@@ -226,13 +227,14 @@ def goal_markers(sequencers: Sequence[Sequencer], altitude_m: float) -> List[Mar
     return [
         marker
         for robot, sequencer in enumerate(sequencers)
-        for index in range(len(sequencer.sequence.goals))
-        for marker in _goal_markers(robot, index, sequencer, altitude_m)
+        for index, goal in enumerate(sequencer.sequence.goals)
+        for marker in _goal_markers(robot, index, goal, sequencer, altitude_m)
     ]
 
 
-def _goal_markers(robot: int, index: int, sequencer: Sequencer, altitude_m: float) -> List[Marker]:
-    goal = sequencer.sequence.goals[index]
+def _goal_markers(
+    robot: int, index: int, goal: Goal, sequencer: Sequencer, altitude_m: float
+) -> List[Marker]:
     is_active = sequencer.active_goal is not None and index == sequencer.index
     alpha = 1.0 if is_active else _REACHED_ALPHA if index < sequencer.index else _PENDING_ALPHA
     diameter_m = _ACTIVE_GOAL_DIAMETER_M if is_active else _GOAL_DIAMETER_M

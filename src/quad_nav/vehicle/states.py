@@ -56,7 +56,7 @@ class VehicleMachine:
         odom_from_start: Where the vehicle stood before the last take-off.
         ground_m: Height of that place in the odometry frame.
         altitude_m: Flying altitude above it.
-        refusal: Why the last take-off was given up before the vehicle left the ground.
+        refusal: Why the last take-off or resumption was given up before it took effect.
         traits: What is special about the kind of autopilot.
     """
 
@@ -127,17 +127,18 @@ class VehicleMachine:
         return Response(True, self.state.value)
 
     def resume(self, now_s: float) -> Response:
-        """Ask to fly again after the vehicle was taken over."""
+        """Ask to fly again after the vehicle was taken over; on the ground it takes nothing off."""
         status = self.inputs.status
-        if self.state is not State.TAKEN_OVER or status is None:
-            return Response(self.state is not State.NO_LINK, self.state.value)
-        self.inputs.moved_sticks = ""
-        if not status.is_armed or self.inputs.landed is Landed.ON_GROUND:
+        if self.state is State.TAKEN_OVER and status is not None:
+            self.inputs.moved_sticks = ""
+            if status.is_armed and self.inputs.landed is not Landed.ON_GROUND:
+                self._wants_control, self.refusal, self._state_s = True, "", now_s
+                self._order, self._orders = None, 0
+                return Response(True, "taking control")
             self._enter(State.NOT_READY, "on the ground", now_s)
-            return Response(True, "on the ground: take off again")
-        self._wants_control, self._state_s = True, now_s
-        self._order = None
-        return Response(True, "taking control")
+        text = self.state.value + (f": {self.reason}" if self.reason else "")
+        hint = "; take off first, then resume" if self.state in ON_GROUND else ""
+        return Response(self.state in (State.FLYING, State.HOLDING), text + hint)
 
     # The machine.
 
@@ -173,7 +174,7 @@ class VehicleMachine:
         elif self.state is State.TAKING_OFF and self._orders >= MOST_ORDERS:
             self._enter(State.LANDING, reason, now_s)
         elif self.state is State.TAKEN_OVER:
-            self._wants_control = False
+            self._wants_control, self.refusal = False, reason
             self._news.append(reason)
 
     def _watch(self, now_s: float) -> None:
@@ -326,6 +327,9 @@ class VehicleMachine:
     def _in_taken_over(self, now_s: float) -> Optional[Velocity]:
         status = self.inputs.status
         assert status is not None
+        if self._wants_control and (self._orders > MOST_ORDERS or not status.is_armed):
+            self._wants_control, self.refusal = False, "no effect of the order to take control"
+            self._news.append(self.refusal)
         if not self._wants_control:
             return None
         streams = self.traits.streams_before_control
@@ -334,9 +338,6 @@ class VehicleMachine:
             return self._hover(now_s)
         if not streams or now_s - self._state_s >= STREAM_S:
             self._give(Order.TAKE_CONTROL, now_s)
-        if self._orders > MOST_ORDERS:
-            self._wants_control = False
-            self._news.append("no effect of the order to take control")
         return Velocity() if streams else None
 
     # Parts of the steps.

@@ -129,7 +129,7 @@ class ThrottledWarnings:
             return False
         if kind not in self._logged_s and len(self._logged_s) >= MAX_KINDS:
             self._logged_s = {
-                one: at_s for one, at_s in self._logged_s.items() if now_s - at_s < REPEAT_S
+                one: at_s for one, at_s in list(self._logged_s.items()) if now_s - at_s < REPEAT_S
             }
             if len(self._logged_s) >= MAX_KINDS:
                 return False

@@ -18,7 +18,8 @@ from quad_nav.mission.checkpoint import (
     shift_to_clock,
 )
 from quad_nav.mission.flight_log import FlightLog, Leg
-from quad_nav.mission.sequencer import Action, NavigatorReport, SequenceProgress, Sequencer, Verdict
+from quad_nav.mission.progress import SequenceProgress
+from quad_nav.mission.sequencer import Action, NavigatorReport, Sequencer, Verdict
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
 from quad_nav.ros.sequencer.odometry import Track
 from quad_nav.sim.contacts import Contact
@@ -47,9 +48,10 @@ class FlightRecord:
 
     def begin(self, now_s: float) -> None:
         """Start with an empty log and journal."""
-        with self.lock:
+        with self.lock:  # what others add now comes after both
             self.log = self._new_log()
-        self.journal.begin(now_s)
+            self.journal.begin(now_s)
+        self.journal.wait()
 
     def add_flight(
         self,
@@ -85,15 +87,22 @@ class FlightRecord:
             legs = [self.log.robots[name].add_action(action) for action in actions]
             ended = next((leg for leg in legs if leg is not None), None)
             record = robot_record(name, sequencer, self.log, ended, self.journal.start_s)
-        self.journal.wait(self.journal.put(record, now_s))
+            number = self.journal.put(record, now_s)
+        self.journal.wait(number)
         return legs
+
+    def add_progress(self, name: str, sequencer: Sequencer, now_s: float) -> None:
+        """Add that the mission of a robot has been stopped or resumed."""
+        with self.lock:
+            record = robot_record(name, sequencer, self.log, None, self.journal.start_s)
+            self.journal.put(record, now_s)
 
     def add_contact(self, contact: Contact, now_s: float) -> bool:
         """Add a contact; return False if it is known already."""
         with self.lock:
             is_new = self.log.add_contact(contact)
-        if is_new:
-            self.journal.put_contact(contact, now_s)
+            if is_new:
+                self.journal.put_contact(contact, now_s)
         return is_new
 
     def checkpoint(self, now_s: float, progress: Sequence[SequenceProgress]) -> MissionCheckpoint:
@@ -128,12 +137,13 @@ class FlightRecord:
             now_s: Present time on the clock.
             same_clock: Whether the clock has continued to run since, and the robots have flown on.
         """
-        self.journal.resume(before, now_s, same_clock)
-        start_s = self.journal.start_s
         with self.lock:
+            self.journal.resume(before, now_s, same_clock)
+            start_s = self.journal.start_s
             self.log = self._new_log()
             for name, robot in before.robots.items():
                 state = robot.log if same_clock else replace(robot.log, pose=None)
                 self.log.resume(name, state, robot.clearance_m, robot.separation_m)
             for contact in before.contacts:
                 self.log.add_contact(replace(contact, time_s=contact.time_s + start_s))
+        self.journal.wait()

@@ -10,7 +10,7 @@ import contextlib
 import threading
 import time
 from dataclasses import replace
-from typing import Dict, Iterator, List, Optional
+from typing import Dict, Iterator, List, Optional, Sequence
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -29,7 +29,7 @@ from quad_nav.ros.common.transforms import TransformUnavailable
 from quad_nav.ros.sequencer.flight_record import FlightRecord
 from quad_nav.ros.sequencer.mission_diagnostics import progress_message
 from quad_nav.ros.sequencer.mission_journal import MissionJournal
-from quad_nav.ros.sequencer.mission_stop import MissionStop
+from quad_nav.ros.sequencer.mission_stop import MissionStop, VehicleStates
 from quad_nav.ros.sequencer.robot import MissionRobot
 from quad_nav.ros.sequencer.robot_thread import RobotThread
 from quad_nav.ros.sequencer.simulator_topics import ContactTopic, PeopleTopic
@@ -69,6 +69,7 @@ class MissionRunner:
         self._before = journal.read() if setup.resume or respawned else None
         if self._before is None:
             journal.begin(0.0)  # removes the journal of an older mission
+            journal.wait()
         self._record = FlightRecord(self._new_log, journal)
         self._news = threading.Event()
         self._feed = StateFeed(len(setup.robots))
@@ -85,7 +86,13 @@ class MissionRunner:
         self._next_goals_s = 0.0
         self._warnings = ThrottledWarnings()
         self._connect()
+        before = self._before.robots if self._before is not None else {}
+        for robot in self.robots:
+            robot.is_stopped = before[robot.name].progress.held_s is not None if before else False
         self._stop = MissionStop(self.robots, respawned)
+        # After a restart no vehicle takes off unless a person says so.
+        takes_off = setup.simulation or not (setup.resume or respawned)
+        self._vehicles = None if takes_off else VehicleStates(len(self.robots))
 
     def _connect(self) -> None:
         setup = self._setup
@@ -126,7 +133,8 @@ class MissionRunner:
             else []
         )
         for robot in self.robots:
-            needs += _robot_needs(robot, self._feed)
+            if not robot.is_stopped:  # such as one whose pilot has switched it off
+                needs += _robot_needs(robot, self._feed)
         return needs
 
     def start(self) -> None:
@@ -135,14 +143,38 @@ class MissionRunner:
         Raises:
             ServiceException: If the simulator or a vehicle refuses.
         """
-        self._start_simulation()
-        if self._before is None:
-            self._begin(rospy.get_time())
-        else:
-            self._resume(self._before, rospy.get_time(), self._respawned)
+        if self._vehicles is None:
+            self._start_simulation()
+        with self._paused_robots():
+            if self._before is None:
+                self._begin(rospy.get_time())
+            else:
+                self._resume(self._before, rospy.get_time(), self._respawned)
+        if self._vehicles is not None:
+            self._leave_on_ground(self._vehicles.are_down())
         for robot, thread in zip(self.robots, self._threads):
             robot.link.pop()  # messages from before the start are not part of the flight
             thread.start()
+
+    def _leave_on_ground(self, are_down: Sequence[bool]) -> None:
+        """Stop the missions of vehicles that are not in the air, and say what a person can do."""
+        down = [
+            robot
+            for robot, is_down in zip(self.robots, are_down)
+            if is_down and robot.sequencer.has_goals_left
+        ]
+        self._stop.stop(down)
+        for robot in down:
+            number = self.robots.index(robot)
+            rospy.logwarn(
+                "%s: its vehicle is not in the air, and a resumed mission takes nothing off: the"
+                " mission of %s is stopped. Call /vehicle%d/take_off to take it off, then"
+                " /vehicle%d/resume to resume its mission",
+                robot.name,
+                robot.name,
+                number,
+                number,
+            )
 
     def _start_simulation(self) -> None:
         if self._setup.start_service:
@@ -192,8 +224,10 @@ class MissionRunner:
             )
             with self._paused_robots():
                 progress = [robot.sequencer.progress for robot in self.robots]
+                before_s = max(before_s, *(robot.now_s for robot in self.robots))
                 self._resume(self._record.checkpoint(before_s, progress), now_s, False)
-            self._start_new_simulation()
+            if self._setup.simulation:
+                self._start_new_simulation()
         else:
             self._now_s = now_s
 
@@ -299,8 +333,10 @@ class MissionRunner:
 
 
 def _pop_change(thread: RobotThread) -> bool:
-    changed, thread.goals_changed = thread.goals_changed, False
-    return changed
+    if not thread.goals_changed:  # its thread may set it now: only a set one is reset
+        return False
+    thread.goals_changed = False
+    return True
 
 
 @contextlib.contextmanager

@@ -74,12 +74,12 @@ def _robot_status(robot: MissionRobot, log: FlightLog, failure: str) -> Diagnost
 def _state(robot: MissionRobot, distance_m: Optional[float]) -> str:
     if robot.is_stopped:
         return "stopped, /mission/resume resumes it"
-    sequencer = robot.sequencer
+    sequencer, dwell = robot.sequencer, robot.sequencer.dwell
     count = len(sequencer.sequence.goals)
     if distance_m is not None:
         return f"flying to goal {sequencer.index + 1} of {count}, {distance_m:.2f} m away"
-    if sequencer.dwell is not None:
-        left_s = max(sequencer.dwell.until_s - rospy.get_time(), 0.0)
+    if dwell is not None:
+        left_s = max(dwell.until_s - rospy.get_time(), 0.0)
         return f"staying at goal {sequencer.index} of {count} for {left_s:.0f} s"
     return "done" if sequencer.done else "starting"
 

@@ -140,13 +140,12 @@ class MissionJournal:
         return read_checkpoint(records, self._names, str(self._journal.path))
 
     def begin(self, now_s: float) -> None:
-        """Start the mission from its first goals and replace the journal."""
+        """Start the mission from its first goals and replace the journal, without a wait."""
         self.start_s, self.start_epoch_s = now_s, time.time()
-        writer = self._start_writer()
-        writer.wait(writer.put(self._head(), clears=True))
+        self._start_writer().put(self._head(), clears=True)
 
     def resume(self, before: MissionCheckpoint, now_s: float, same_clock: bool) -> None:
-        """Resume the mission from a checkpoint.
+        """Resume the mission from a checkpoint, without a wait for the disk.
 
         Args:
             before: The checkpoint.
@@ -158,7 +157,7 @@ class MissionJournal:
         else:
             self.start_s = now_s - before.mission_s
             self.start_epoch_s = time.time() - before.wall_s
-        self.wait(self.put(self._head(), now_s))
+        self.put(self._head(), now_s)
 
     def put(self, record: Dict[str, Any], now_s: float) -> int:
         """Hand a record to the thread that writes; return its number."""

@@ -14,16 +14,14 @@ from std_msgs.msg import String
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D, Pose3D
-from quad_nav.mission.checkpoint import shift_to_clock
 from quad_nav.mission.flight_log import Leg
+from quad_nav.mission.progress import START, SequenceProgress
 from quad_nav.mission.robot_goals import RobotGoals
 from quad_nav.mission.sequencer import (
-    START,
     Action,
     NavigatorReport,
     SendGoal,
     SequenceDone,
-    SequenceProgress,
     Sequencer,
 )
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
@@ -50,6 +48,7 @@ class MissionRobot:
         link: Its topics.
         odometry: Its odometry.
         pose: Last pose in `map`.
+        now_s: Time on the clock at the last step.
         lock: Held during a step; whoever restarts the mission holds it.
         is_done: Whether all goals have ended and are in the log.
         clock_went_back: Whether a step has seen this; steps do nothing until `begin`.
@@ -72,7 +71,8 @@ class MissionRobot:
         self.pose: Optional[Pose3D] = None
         self.lock = threading.Lock()
         self.is_done = self.clock_went_back = self.is_stopped = False
-        self._now_s = self._held_s = 0.0
+        self.now_s = 0.0
+        self._is_recorded = True  # whether the journal says whether the mission is stopped
         self._reports: List[NavigatorReport] = []  # for the next tick
         self._file = goals.file
         self._next_poll_s = 0.0
@@ -84,26 +84,30 @@ class MissionRobot:
     def begin(self, now_s: float, progress: SequenceProgress = START) -> None:
         """Begin with the first goal, or resume the progress of another sequencer."""
         self.sequencer = Sequencer(self.sequencer.sequence, progress)
-        self.pose, self._reports, self._now_s, self._held_s = None, [], now_s, now_s
+        self._is_recorded = progress.held_s is None and not self.is_stopped
+        (self.sequencer.hold if self.is_stopped else self.sequencer.release)(now_s)
+        self.pose, self._reports, self.now_s = None, [], now_s
         self.is_done = self.clock_went_back = False
         self.odometry.begin(now_s)
         self.link.clear()
         self._path.clear()
 
     def hold(self, now_s: float) -> None:
-        """Forget the goal that was sent last; `is_stopped` has been set."""
-        self.link.clear()
-        self._held_s = now_s
+        """Stop the mission: forget the goal that was sent last; `is_stopped` has been set."""
+        if self.sequencer.held_s is None:
+            self.sequencer.hold(max(now_s, self.now_s))  # the clock may have gone back
+            self._is_recorded = False
+            self.link.clear()
+            self.link.received.set()
 
     def release(self, now_s: float) -> None:
         """Resume a stopped mission: send the goal again, as if no time had passed."""
-        self.is_stopped = False
-        if not self.is_done:
-            progress = shift_to_clock(self.sequencer.progress, now_s - self._held_s)
-            sequence = self.sequencer.sequence
-            self.sequencer = Sequencer(sequence, progress, "the mission was stopped and resumed")
-        self.link.clear()  # what was reported on the goal that the stop has cancelled
-        self.link.received.set()
+        if self.is_stopped:
+            self.hold(now_s)  # in case the stop has not got as far
+            self.is_stopped = False
+            self.sequencer.release(max(now_s, self.now_s))
+            self._is_recorded = False
+            self.link.received.set()
 
     def step(self, record: FlightRecord) -> bool:
         """Process the messages of the robot and act on them.
@@ -115,11 +119,16 @@ class MissionRobot:
             Whether the goals or their states have changed.
         """
         now_s = rospy.get_time()
-        if now_s < self._now_s:
+        if now_s < self.now_s:
             self.clock_went_back = True
         if self.clock_went_back:
             return False
-        self._now_s, inbox = now_s, self.link.pop()
+        self.now_s, inbox = now_s, self.link.pop()
+        if self.is_stopped:
+            self.hold(now_s)  # in case the stop has found the step before in progress
+        if not self._is_recorded:
+            record.add_progress(self.name, self.sequencer, now_s)
+            self._is_recorded = True
         track = self.odometry.take(inbox.states, inbox.odometry, now_s)
         self._log_recoveries(inbox.recoveries)
         record.add_flight(self.name, track, inbox.reports, len(inbox.recoveries))
@@ -128,8 +137,6 @@ class MissionRobot:
             self.pose = planar_pose(Pose2D(x_m, y_m, yaw_rad), z_m)
             self._path.add(track)
         self._serve_subscribers(inbox)
-        if self.is_stopped:
-            return False
         self._reports += inbox.reports
         if self.pose is None or (self.odometry.is_jumping and not len(track.stamps_s)):
             return False
@@ -220,6 +227,8 @@ class MissionRobot:
         return True
 
     def _do(self, action: Action, leg: Optional[Leg], now_s: float) -> None:
+        if isinstance(action, SendGoal) and self.is_stopped:
+            return  # stopped during this step; the resumption sends the goal
         self._events.publish(to_text(event(self._index, now_s, action)))
         if isinstance(action, SendGoal):
             self.link.send(action.pose)

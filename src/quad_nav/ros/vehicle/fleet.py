@@ -33,7 +33,7 @@ from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
 from quad_nav.sim.scene_file import load_scene
 from quad_nav.topics.flight_info import EVENTS_TOPIC, from_text
-from quad_nav.vehicle.orders import IN_FLIGHT, State
+from quad_nav.vehicle.orders import IN_FLIGHT, ON_GROUND, State
 from quad_nav.vehicle.vehicle_file import Vehicle, load_vehicles
 
 READY_WAIT_S = 90.0
@@ -41,7 +41,10 @@ READY_WAIT_S = 90.0
 CALL_WAIT_S = 40.0
 LAND_WAIT_S = 30.0
 LAND_AFTER_S = 1.0
-_IN_THE_AIR = tuple(state.value for state in (*IN_FLIGHT, State.TAKEN_OVER))
+_TAKEN_OVER = State.TAKEN_OVER.value
+_ON_GROUND = tuple(state.value for state in ON_GROUND)
+_IN_THE_AIR = (*(state.value for state in IN_FLIGHT), _TAKEN_OVER)
+_CAN_FLY = tuple(state.value for state in (State.READY, State.LANDED, State.FLYING, State.HOLDING))
 _DEFAULTS: Dict[str, Any] = {
     "vehicles": "",
     "scene": "",
@@ -81,6 +84,8 @@ class VehicleFleet:
         self._done: Set[int] = set()
         self._lands_when_done = lands_when_done
         self._states: Dict[int, Tuple[str, str]] = {}
+        self._lock = threading.Lock()
+        self._is_over = False  # the missions of all that fly for them
         self._land_all = rospy.Publisher(LAND_ALL_TOPIC, Empty, queue_size=1)
         self._subscribers = [
             rospy.Subscriber(
@@ -97,21 +102,35 @@ class VehicleFleet:
     def _on_state(self, message: DiagnosticStatus, number: int) -> None:
         values = {one.key: one.value for one in message.values}
         self._states[number] = values.get("state", ""), values.get("reason", "")
+        self._land_at_end()
 
     def _on_event(self, message: String) -> None:
-        """Land when the last robot has flown all its goals."""
         event = from_text(message.data) or {}
         robot = event.get("robot")
         if not isinstance(robot, int) or not 0 <= robot < self._robots:
             return
         if event.get("event") != "done":
             self._done.discard(robot)
-            return
-        self._done.add(robot)
-        if len(self._done) >= self._robots and self._lands_when_done:
+        else:
+            self._done.add(robot)
+        self._land_at_end()
+
+    def _land_at_end(self) -> None:
+        """Land once when every robot has flown all its goals, or does not fly for its mission."""
+        with self._lock:
+            was_over = self._is_over
+            self._is_over = bool(self._done) and all(
+                robot in self._done or self._is_away(robot) for robot in range(self._robots)
+            )
+            is_end = self._is_over and not was_over and self._lands_when_done
+        if is_end:
             rospy.loginfo("vehicles: all missions have ended; landing")
-            self._done.clear()
             threading.Timer(LAND_AFTER_S, self._land_all.publish, (Empty(),)).start()
+
+    def _is_away(self, robot: int) -> bool:
+        """Return whether a pilot has a vehicle, or it stands on the ground, its mission stopped."""
+        state = self._states.get(robot, ("", ""))[0]
+        return state == _TAKEN_OVER or (state in _ON_GROUND and _is_stopped(robot))
 
     def _land(self, _: TriggerRequest) -> TriggerResponse:
         """Land all vehicles, and respond when none is in the air."""
@@ -128,55 +147,98 @@ class VehicleFleet:
         return self._states.get(number, ("", ""))[0] in _IN_THE_AIR
 
     def _take_off(self, _: TriggerRequest) -> TriggerResponse:
-        """Take all vehicles off when all are ready; land all if one does not."""
-        problems = self._wait_ready()
-        if not problems:
-            problems = self._call_all("take_off")
-        if problems:
-            self._land_all.publish(Empty())
-            return TriggerResponse(False, "; ".join(problems))
-        return TriggerResponse(True, "all vehicles are in the air")
+        """Take all vehicles off when all are ready; land all if one refuses.
 
-    def _wait_ready(self) -> List[str]:
-        """Wait until every vehicle is ready or in the air; return why not."""
+        A vehicle is left out that a pilot has taken over, or whose mission is stopped meanwhile.
+        """
+        left_out: Dict[str, str] = {}
+        landings: List[Empty] = []
+        orders = rospy.Subscriber(LAND_ALL_TOPIC, Empty, landings.append, queue_size=1)
+        problems = self._wait_ready(left_out, landings)
+        if not problems:
+            chosen = [one for one in self._real if one.name not in left_out]
+            refused = self._call_all("take_off", chosen)
+            for name in [name for name, text in refused.items() if text.startswith(_TAKEN_OVER)]:
+                left_out[name] = refused.pop(name)
+            problems = _lines(refused) + _ordered(landings)
+            if problems:
+                self._land_all.publish(Empty())
+        orders.unregister()
+        if not problems and len(left_out) == self._robots:
+            problems = ["no vehicle is left to take off"]
+        text = "; ".join(problems) or "all vehicles are in the air"
+        if left_out:
+            text += f"; left out: {'; '.join(_lines(left_out))}"
+        return TriggerResponse(not problems, text)
+
+    def _wait_ready(self, left_out: Dict[str, str], landings: Sequence[Empty]) -> List[str]:
+        """Wait until every vehicle is ready or in the air; return why not.
+
+        Args:
+            left_out: Gets the vehicles that do not take off, with the reasons.
+            landings: Orders to land all that come meanwhile.
+        """
         end_s = time.monotonic() + READY_WAIT_S
-        good = ("ready", "landed", "flying", "holding")
+        names = {one.number: one.name for one in self._real}
+        were_stopped = set(filter(_is_stopped, names))
         while not rospy.is_shutdown():
-            missing = [
-                f"{one.name}: {': '.join(filter(None, state)) or 'no bridge'}"
-                for one in self._real
-                for state in [self._states.get(one.number, ("", ""))]
-                if state[0] not in good
-            ]
-            if not missing or time.monotonic() > end_s:
-                return missing
+            missing = {}
+            for robot, name in names.items():
+                state, reason = self._states.get(robot, ("", ""))
+                text = f"{state}: {reason}" if reason else state or "no bridge"
+                if state == _TAKEN_OVER:
+                    left_out[name] = text
+                elif state not in _CAN_FLY and name not in left_out:
+                    missing[name] = text
+            if landings or not missing:
+                stopped = set(filter(_is_stopped, names)) - were_stopped
+                left_out.update({names[one]: "its mission was stopped" for one in sorted(stopped)})
+                return _ordered(landings)
+            if time.monotonic() > end_s:
+                return _lines(missing)
             time.sleep(0.1)
         return ["shutdown"]
 
-    def _call_all(self, action: str) -> List[str]:
-        """Call a service of all real vehicles at the same time; return the refusals."""
-        problems: List[str] = []
+    def _call_all(self, action: str, vehicles: Sequence[Vehicle]) -> Dict[str, str]:
+        """Call a service of some vehicles at the same time; return the refusals by their names."""
+        refused = {one.name: f"no response within {CALL_WAIT_S:g} s" for one in vehicles}
 
         def call(vehicle: Vehicle) -> None:
-            found = _call(f"/vehicle{vehicle.number}/{action}")
-            problems.extend(f"{vehicle.name}: {problem}" for problem in found)
+            problem = _call(f"/vehicle{vehicle.number}/{action}")
+            if problem:
+                refused[vehicle.name] = problem
+            else:
+                del refused[vehicle.name]
 
-        threads = [threading.Thread(target=call, args=(one,), daemon=True) for one in self._real]
+        threads = [threading.Thread(target=call, args=(one,), daemon=True) for one in vehicles]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join(CALL_WAIT_S)
-        return problems
+        return dict(refused)
 
 
-def _call(service: str) -> List[str]:
-    """Call a service; return why it has failed, if it has."""
+def _lines(texts: Mapping[str, str]) -> List[str]:
+    return [f"{name}: {text}" for name, text in texts.items()]
+
+
+def _ordered(landings: Sequence[Empty]) -> List[str]:
+    return ["all vehicles were ordered to land meanwhile"] if landings else []
+
+
+def _is_stopped(robot: int) -> bool:
+    """Return whether the mission of a robot is stopped."""
+    return rospy.get_param(f"/mission/quad{robot}/stopped", False) is True
+
+
+def _call(service: str) -> str:
+    """Call a service; return why it has failed, "" if it has not."""
     try:
         rospy.wait_for_service(service, 2.0)
         response = rospy.ServiceProxy(service, Trigger)()
     except (rospy.ROSException, rospy.ServiceException) as error:
-        return [f"{service}: {error}"]
-    return [] if response.success else [response.message]
+        return f"{service}: {error}"
+    return "" if response.success else response.message or "refused without giving a reason"
 
 
 def read_setup(

@@ -45,7 +45,7 @@ class Maneuver:
         state = machine.state
         if state in self.ends:
             return Response(True, state.value)
-        if state in self.passes:
+        if state in self.passes and not machine.refusal:
             return None
         return Response(False, f"{state.value}: {machine.refusal or machine.reason}")
 
@@ -66,7 +66,7 @@ LAND = Maneuver(
 RESUMPTION = Maneuver(
     "resumption",
     VehicleMachine.resume,
-    (State.HOLDING, State.FLYING, *ON_GROUND),
+    (State.HOLDING, State.FLYING),
     (State.TAKEN_OVER,),
 )
 

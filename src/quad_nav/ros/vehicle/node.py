@@ -55,7 +55,7 @@ class VehicleNode:
         i = vehicle.number
         self._vehicle, self._bridge = vehicle, bridge
         self._topics = VehicleTopics(vehicle)
-        self._pause = MissionPause(i)
+        self._pause = MissionPause(i, lambda: bridge.machine.state is State.TAKEN_OVER)
         self._lease = CommandLease(COMMAND_HOVER_S)
         self._warnings = ThrottledWarnings()
         self._state: Optional[Tuple[State, str]] = None

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 import time
 from dataclasses import replace
-from typing import Dict, Optional
+from typing import Callable, Dict, Optional
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -31,6 +30,7 @@ from quad_nav.vehicle.telemetry import Estimate
 from quad_nav.vehicle.vehicle_file import Vehicle
 
 _MISSION_WAIT_S = 2.0
+_MISSION_PERIOD_S = 1.0
 _GOOD = (State.READY, State.FLYING, State.HOLDING, State.LANDED, State.TAKING_OFF, State.ARMING)
 
 
@@ -158,41 +158,68 @@ def vehicle_health(vehicle: Vehicle, machine: VehicleMachine) -> Health:
 
 
 class MissionPause:
-    """Calls the sequencer's services of one robot, in the order in which they are asked for."""
+    """Stops and resumes the mission of one robot by the sequencer's services.
 
-    def __init__(self, robot: int) -> None:
+    What was asked for last is tried again until the sequencer has done it.
+    """
+
+    def __init__(self, robot: int, is_taken_over: Callable[[], bool] = lambda: False) -> None:
         """Start the thread that calls.
 
         Args:
             robot: Number of the robot.
+            is_taken_over: Whether its mission must be stopped now, whatever sequencer has started.
         """
-        self._name = f"quad{robot}"
-        self._calls: queue.Queue[Optional[str]] = queue.Queue()
+        self._prefix, self._is_taken_over = f"/mission/quad{robot}", is_taken_over
+        self._wanted, self._problem = "", ""
+        self._changed = threading.Condition()
         threading.Thread(target=self._run, name="mission pause", daemon=True).start()
 
     def pause(self) -> None:
         """Stop the robot's mission until somebody resumes it."""
-        self._calls.put("stop")
+        self._want("stop")
 
     def resume(self) -> None:
         """Resume the robot's mission."""
-        self._calls.put("resume")
+        self._want("resume")
+
+    def _want(self, action: str) -> None:
+        with self._changed:
+            self._wanted = action
+            self._changed.notify_all()
 
     def _run(self) -> None:
         while not rospy.is_shutdown():
-            try:
-                action = self._calls.get(timeout=0.5)
-            except queue.Empty:
-                continue
-            self._call(f"/mission/{self._name}/{action}")
+            with self._changed:
+                self._changed.wait_for(lambda: self._wanted, _MISSION_PERIOD_S)
+            if not self.deliver():
+                time.sleep(_MISSION_PERIOD_S)
 
-    def _call(self, service: str) -> None:
-        """Call a service; without a sequencer there is no mission to pause."""
+    def deliver(self) -> bool:
+        """Call the service that is due; return False to try again."""
+        wanted = self._wanted
+        try:
+            if not wanted and self._is_taken_over():
+                wanted = "" if rospy.get_param(f"{self._prefix}/stopped", False) else "stop"
+            problem = wanted and self._call(f"{self._prefix}/{wanted}")
+        except Exception as error:  # without this thread no stop would be delivered any more
+            problem = f"{self._prefix}: {error!r}"
+        if problem and problem != self._problem and not rospy.core.is_shutdown_requested():
+            rospy.logwarn("%s; tries again until it succeeds", problem)
+        self._problem = problem
+        with self._changed:
+            if not problem and self._wanted == wanted:
+                self._wanted = ""
+        return not problem
+
+    def _call(self, service: str) -> str:
+        """Call a service; return why it has failed, "" if it has not."""
         try:
             rospy.wait_for_service(service, _MISSION_WAIT_S)
             response = rospy.ServiceProxy(service, Trigger)()
         except (rospy.ROSException, rospy.ServiceException) as error:
-            if not rospy.is_shutdown():
-                rospy.logwarn("%s: %s: %s", self._name, service, error)
-            return
-        rospy.loginfo("%s: %s", self._name, response.message)
+            return f"{service}: {error}"
+        if not response.success:
+            return f"{service}: {response.message or 'refused without giving a reason'}"
+        rospy.loginfo("%s: %s", service, response.message)
+        return ""

@@ -1,0 +1,267 @@
+"""Take-off and landing of all vehicles, among pilots who take one over: the node `vehicles`."""
+
+from __future__ import annotations
+
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+rospy = pytest.importorskip("rospy")
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue  # noqa: E402
+from ros.fake_ros import FakePublisher, FakeRos, FakeService, deliver, subscribed  # noqa: E402
+from std_msgs.msg import Empty, String  # noqa: E402
+from std_srvs.srv import TriggerRequest, TriggerResponse  # noqa: E402
+
+from quad_nav.geometry import Pose2D  # noqa: E402
+from quad_nav.ros.vehicle import fleet  # noqa: E402
+from quad_nav.ros.vehicle.node import LAND_ALL_TOPIC  # noqa: E402
+from quad_nav.topics.flight_info import EVENTS_TOPIC  # noqa: E402
+from quad_nav.vehicle.vehicle_file import Vehicle  # noqa: E402
+
+
+class Fleet:
+    """Two real vehicles, and simulated ones, whose bridges the test plays.
+
+    Attributes:
+        now_s: The virtual clock, which sleeping advances.
+        calls: Services of the bridges that were called.
+        landings: Number of orders to land that the node has published.
+        answers: What `/vehicle{i}/take_off` responds, if it does not succeed.
+        script: Functions by the times at which they are called.
+    """
+
+    def __init__(self, ros, monkeypatch, simulated=0):
+        self.ros, self.now_s, self.calls, self.landings = ros, 0.0, [], 0
+        self.answers, self.script = {}, {}
+        clock = SimpleNamespace(monotonic=lambda: self.now_s, sleep=self.sleep)
+        monkeypatch.setattr(fleet, "time", clock)
+        monkeypatch.setattr(rospy, "wait_for_service", lambda *_: None)
+        monkeypatch.setattr(rospy, "ServiceProxy", lambda name, _: lambda: self.respond(name))
+        monkeypatch.setattr(fleet.threading, "Timer", self.timer)
+        kinds = ["mavlink", "mavlink", *["simulated"] * simulated]
+        vehicles = [
+            Vehicle(k, kind, map_from_start=Pose2D(1.0 + k, 1.0, 0.0))
+            for k, kind in enumerate(kinds)
+        ]
+        self.node = fleet.VehicleFleet(vehicles, lands_when_done=True)
+        FakePublisher.all[LAND_ALL_TOPIC].publish = self.count_landing
+
+    def sleep(self, seconds):
+        self.now_s += seconds
+        for at_s in [at_s for at_s in self.script if at_s <= self.now_s]:
+            self.script.pop(at_s)()
+
+    def timer(self, _, function, arguments):
+        return SimpleNamespace(start=lambda: function(*arguments))
+
+    def count_landing(self, _):
+        self.landings += 1
+        if LAND_ALL_TOPIC in subscribed():
+            deliver(LAND_ALL_TOPIC, Empty())  # rospy's nodes hear themselves
+
+    def respond(self, name):
+        self.calls.append(name)
+        return self.answers.get(name, TriggerResponse(True, "holding"))
+
+    def tell(self, **states):
+        for name, state in states.items():
+            values = [KeyValue("state", state), KeyValue("reason", "as the test says")]
+            deliver(f"/{name}/state", DiagnosticStatus(values=values))
+
+    def say(self, robot, event):
+        deliver(EVENTS_TOPIC, String(f'{{"event": "{event}", "robot": {robot}}}'))
+
+    def take_off(self):
+        return FakeService.all["/vehicles/take_off"].handler(TriggerRequest())
+
+
+@pytest.fixture
+def ros():
+    with FakeRos("/vehicles") as fake:
+        yield fake
+
+
+@pytest.fixture
+def flown(ros, monkeypatch):
+    return Fleet(ros, monkeypatch)
+
+
+TAKE_OFFS = ["/vehicle0/take_off", "/vehicle1/take_off"]
+
+
+def test_all_take_off_when_the_last_is_ready(flown):
+    flown.tell(vehicle0="ready", vehicle1="not ready")
+    flown.script[45.0] = lambda: flown.tell(vehicle1="ready")
+    assert flown.take_off().success
+    assert sorted(flown.calls) == TAKE_OFFS
+    assert flown.now_s == pytest.approx(45.0, abs=0.11)
+
+
+def test_a_vehicle_that_was_taken_over_does_not_delay_the_others(flown):
+    flown.tell(vehicle0="flying", vehicle1="taken over")
+    response = flown.take_off()
+    assert response.success
+    assert "quad1" in response.message and "taken over" in response.message
+    assert (flown.calls, flown.landings, flown.now_s) == (TAKE_OFFS[:1], 0, 0.0)
+
+
+def test_a_vehicle_that_is_taken_over_in_the_wait_is_left_out_for_good(flown):
+    """A person who resumes it on the ground has not asked for a take-off."""
+    flown.tell(vehicle0="ready", vehicle1="not ready")
+    flown.script[10.0] = lambda: flown.tell(vehicle0="taken over")
+    flown.script[20.0] = lambda: flown.tell(vehicle0="ready")
+    flown.script[30.0] = lambda: flown.tell(vehicle1="ready")
+    assert flown.take_off().success
+    assert flown.calls == TAKE_OFFS[1:]
+
+
+def test_a_pilot_who_takes_over_in_the_climb_lands_nobody(flown):
+    flown.tell(vehicle0="ready", vehicle1="ready")
+    flown.answers["/vehicle1/take_off"] = TriggerResponse(False, "taken over: LOITER")
+    response = flown.take_off()
+    assert response.success and "quad1: taken over: LOITER" in response.message
+    assert flown.landings == 0
+
+
+def test_no_take_off_of_taken_over_vehicles_alone(flown):
+    flown.tell(vehicle0="taken over", vehicle1="taken over")
+    response = flown.take_off()
+    assert not response.success and "quad0: taken over" in response.message
+    assert (flown.calls, flown.landings) == ([], 0)
+
+
+def test_a_vehicle_that_does_not_get_ready_leaves_the_others_as_they_are(flown):
+    flown.tell(vehicle0="flying", vehicle1="not ready")
+    response = flown.take_off()
+    assert not response.success
+    assert response.message.startswith("quad1: not ready: as the test says")
+    assert (flown.calls, flown.landings) == ([], 0)
+
+
+def test_a_refusal_to_arm_lands_those_that_have_taken_off(flown):
+    flown.tell(vehicle0="ready", vehicle1="ready")
+    flown.answers["/vehicle1/take_off"] = TriggerResponse(False, "the autopilot refuses to arm")
+    response = flown.take_off()
+    assert (response.success, response.message) == (False, "quad1: the autopilot refuses to arm")
+    assert flown.landings == 1
+
+
+def test_a_bridge_that_does_not_respond_is_no_success(flown, monkeypatch):
+    flown.tell(vehicle0="ready", vehicle1="ready")
+    monkeypatch.setattr(fleet, "CALL_WAIT_S", 0.01)
+    released = threading.Event()
+    respond = flown.respond
+    flown.respond = lambda name: (name == TAKE_OFFS[1] and released.wait(), respond(name))[1]
+    response = flown.take_off()
+    released.set()
+    assert not response.success and "quad1: no response" in response.message
+
+
+STOPPED = {"/mission/quad0/stopped": True, "/mission/quad1/stopped": True}
+ORDERS = {
+    "land all": (lambda flown: deliver(LAND_ALL_TOPIC, Empty()), "ordered to land"),
+    "land": (
+        lambda flown: FakeService.all["/vehicles/land"].handler(TriggerRequest()),
+        "ordered to land",
+    ),
+    "stop": (lambda flown: flown.ros._parameters.update(STOPPED), "no vehicle is left"),
+}
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_an_order_to_stop_ends_a_take_off_that_waits(flown, order):
+    give, text = ORDERS[order]
+    flown.tell(vehicle0="ready", vehicle1="not ready")
+    flown.script[10.0] = lambda: give(flown)
+    flown.script[50.0] = lambda: flown.tell(vehicle1="ready")
+    response = flown.take_off()
+    assert not response.success and text in response.message
+    assert flown.calls == []
+    assert LAND_ALL_TOPIC not in subscribed()
+
+
+def test_a_landing_during_the_take_off_lands_what_takes_off_after_it(flown):
+    flown.tell(vehicle0="ready", vehicle1="ready")
+    respond = flown.respond
+
+    def land_and_respond(name):
+        if name == TAKE_OFFS[0]:
+            deliver(LAND_ALL_TOPIC, Empty())  # before the bridge has heard of the take-off
+        return respond(name)
+
+    flown.respond = land_and_respond
+    response = flown.take_off()
+    assert not response.success and "ordered to land" in response.message
+    assert flown.landings == 1
+
+
+def test_a_take_off_of_stopped_missions_that_a_person_asks_for(flown):
+    """After a restart: the missions were stopped before the request."""
+    flown.ros._parameters.update(STOPPED)
+    flown.tell(vehicle0="landed", vehicle1="ready")
+    assert flown.take_off().success
+    assert sorted(flown.calls) == TAKE_OFFS
+
+
+def test_a_robot_that_is_stopped_in_the_wait_stays_on_the_ground(flown):
+    flown.tell(vehicle0="ready", vehicle1="not ready")
+    flown.script[10.0] = lambda: flown.ros._parameters.update({"/mission/quad0/stopped": True})
+    flown.script[50.0] = lambda: flown.tell(vehicle1="ready")
+    response = flown.take_off()
+    assert response.success and "quad0" in response.message
+    assert flown.calls == TAKE_OFFS[1:]
+
+
+def test_the_last_goal_lands_all(flown):
+    flown.tell(vehicle0="flying", vehicle1="flying")
+    flown.say(0, "done")
+    assert flown.landings == 0
+    flown.say(1, "done")
+    assert flown.landings == 1
+
+
+def test_the_others_land_when_the_rest_is_taken_over(flown):
+    flown.tell(vehicle0="flying", vehicle1="taken over")
+    flown.say(0, "sent")
+    flown.tell(vehicle0="flying", vehicle1="taken over")
+    assert flown.landings == 0
+    flown.say(0, "done")
+    assert flown.landings == 1
+    flown.tell(vehicle0="landing", vehicle1="taken over")
+    assert flown.landings == 1
+
+
+def test_the_others_land_when_the_last_one_is_taken_over(flown):
+    flown.tell(vehicle0="flying", vehicle1="flying")
+    flown.say(0, "done")
+    flown.tell(vehicle1="taken over")
+    assert flown.landings == 1
+
+
+@pytest.mark.parametrize("is_stopped", [False, True])
+def test_a_vehicle_on_the_ground_is_waited_for_unless_its_mission_is_stopped(flown, is_stopped):
+    flown.ros._parameters["/mission/quad1/stopped"] = is_stopped
+    flown.tell(vehicle0="flying", vehicle1="landed")
+    flown.say(0, "done")
+    assert flown.landings == is_stopped
+    flown.ros._parameters["/mission/quad1/stopped"] = False
+    flown.tell(vehicle0="landed", vehicle1="flying")
+    flown.say(1, "sent")
+    flown.say(1, "done")
+
+
+def test_a_vehicle_that_flies_again_lands_after_its_own_last_goal(ros, monkeypatch):
+    flown = Fleet(ros, monkeypatch, simulated=1)
+    flown.tell(vehicle0="flying", vehicle1="taken over")
+    flown.say(2, "done")
+    flown.say(0, "done")
+    assert flown.landings == 1
+    flown.tell(vehicle0="landed", vehicle1="flying")
+    flown.say(1, "sent")
+    ros._parameters["/mission/quad0/stopped"] = False
+    flown.tell(vehicle0="landed")
+    assert flown.landings == 1
+    flown.say(1, "done")
+    assert flown.landings == 2
