@@ -66,6 +66,7 @@ class MissionWorld:
         runner: Its mission.
         events: What it has said on its topic.
         steps: Steps of the simulation so far.
+        on_step: Called after each step, and with each event: `on_step(None)`, `on_step(event)`.
     """
 
     def __init__(self):
@@ -75,6 +76,7 @@ class MissionWorld:
         self._commands = {}
         self.graph = Graph(lambda: rospy.Time(*divmod(self.ns, 10**9)))
         self.events, self.pilots, self._pilot_nodes = [], {}, {}
+        self.on_step = lambda event: None
         self._folder = tempfile.TemporaryDirectory(prefix="quad_mission_")
         self.folder = Path(self._folder.name)
         for robot in range(ROBOTS):
@@ -139,38 +141,51 @@ class MissionWorld:
     # The simulator.
 
     def start_simulator(self):
-        self.ns, self.is_running = 10**8, False
+        self.ns, self.is_running, self._is_reset = 10**8, False, False
         self.poses = [start_of(robot) for robot in range(ROBOTS)]
         self._commands = {}
         self._simulator = self.graph.start("/simulator", self._simulate)
 
     def kill_simulator(self):
+        self.is_running = False
         self.graph.kill(self._simulator)
 
     def reset(self):
-        """Put the quadcopters back."""
-        self.poses = [start_of(robot) for robot in range(ROBOTS)]
-        self._resets.publish(Time(self.graph._clock()))
+        """Put the quadcopters back with the next step, as `/simulation/reset` does."""
+        self._is_reset = True
+
+    def step_clock(self, seconds):
+        self.ns = max(self.ns + round(seconds * 1e9), 0)
 
     def _simulate(self):
         self._states = rospy.Publisher(STATES_TOPIC, StatesMessage, queue_size=9)
         self._resets = rospy.Publisher(RESET_TOPIC, Time, queue_size=1, latch=True)
         rospy.Service("/simulation/start", Trigger, self._on_start)
-        rospy.Subscriber(EVENTS_TOPIC, String, lambda m: self.events.append(json.loads(m.data)))
+        rospy.Subscriber(EVENTS_TOPIC, String, self._on_event)
         for robot in range(ROBOTS):
             rospy.Subscriber(f"/cmd_vel{robot}", Twist, self._on_command, robot)
         while True:
+            if self._is_reset:
+                self._is_reset = False
+                self.poses, self._commands = [start_of(robot) for robot in range(ROBOTS)], {}
+                self.on_step({"event": "reset"})
+                self._resets.publish(Time(rospy.Time.now()))
             if self.is_running:
                 self.ns += STEP_NS
                 self.steps += 1
                 for robot in range(ROBOTS):
                     self._move(robot)
+                self.on_step(None)
             self._publish()
             self.graph.threads.sleep(STEP_S)
 
     def _on_start(self, _):
         self.is_running = True
         return TriggerResponse(True, "")
+
+    def _on_event(self, message):
+        self.events.append(json.loads(message.data))
+        self.on_step(self.events[-1])
 
     def _on_command(self, message, robot):
         self._commands[robot] = conversions.twist_from_message(message), self.now_s

@@ -41,6 +41,8 @@ class VirtualThreads:
         crashes: (node, traceback) of each task that an exception has ended.
     """
 
+    is_patched = False
+
     def __init__(self):
         self.now_s, self.node = 100.0, None
         self.crashes = []
@@ -116,7 +118,8 @@ class VirtualThreads:
     @contextlib.contextmanager
     def patch(self, *packages):
         """Replace threads, queues and time in the loaded modules of some packages."""
-        replacements = self._replacements()
+        assert not VirtualThreads.is_patched, "another virtual clock is in use"
+        VirtualThreads.is_patched, replacements = True, self._replacements()
         with contextlib.ExitStack() as stack:
             for name, module in list(sys.modules.items()):
                 if name.split(".")[0] not in packages:
@@ -125,6 +128,7 @@ class VirtualThreads:
                     if id(value) in replacements:
                         new = replacements[id(value)]
                         stack.enter_context(mock.patch.object(module, attribute, new))
+            stack.callback(setattr, VirtualThreads, "is_patched", False)
             yield
 
     def _replacements(self):
