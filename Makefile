@@ -81,9 +81,14 @@ fly-vehicles: venv  ## The tutorial's mission with stand-in vehicles and the bri
 replay-airframe: venv  ## Compare the airframe with recorded flights: make replay-airframe DIR=folder
 	@PYTHONPATH=src:test $(PYTHON) test/vehicles/airframe_check.py $(DIR)
 
-fuzz: venv  ## Feed what reads files with made-up bytes: make fuzz TARGET=scene SECONDS=60
+fuzz: venv  ## Feed what reads files or messages with made-up bytes: make fuzz TARGET=scene SECONDS=60
+ifeq ($(TARGET),vehicle)
+	@scripts/make_venv .venv requirements-mavlink.txt
+	PYTHONPATH=src:test $(PYTHON) test/fuzz/vehicle.py $(SECONDS) $(addprefix --messages=,$(MESSAGES))
+else
 	@scripts/make_venv .venv requirements-fuzz.txt
 	PYTHONPATH=src $(PYTHON) test/fuzz/run.py $(TARGET) $(SECONDS)
+endif
 
 bench: NAME := bench-$(shell date +%Y%m%d-%H%M%S)
 bench: venv  ## How long parts, scans and flights take; writes a file: make bench NAME=before

@@ -117,6 +117,7 @@ class Navigators:
             names("move_base_simple/goal"): lambda: self._goal(k),
             names("move_base/goal"): lambda: self._action_goal(k),
             names("move_base/cancel"): lambda: self._action_goal(k).goal_id,
+            f"/move_base{k}/cancel": lambda: self._action_goal(k).goal_id,
         }
 
     # -- what happens between hostile messages ---------------------------------------

@@ -9,9 +9,11 @@ import time
 import unittest
 from pathlib import Path
 
+import rosnode
 import rospy
 import rostest
-from flight_case import PATIENCE_S, pid_of
+from flight_case import PATIENCE_S, Latest, pid_of
+from rosgraph_msgs.msg import Clock
 
 ROOT = Path(__file__).resolve().parents[2]
 NODE, CONFIG = str(ROOT / "nodes" / "simulator"), str(ROOT / "config" / "default")
@@ -33,6 +35,10 @@ def runs(pid):
 
 
 class ComposedProcesses(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("test_composed_processes")
+
     def start(self, **parameters):
         """The simulator's process."""
         rospy.set_param("/use_sim_time", True)
@@ -62,6 +68,17 @@ class ComposedProcesses(unittest.TestCase):
             self.assertIn(pid_of("/fleet1"), workers)
             simulator.send_signal(number)
             self.assertEqual(simulator.wait(PATIENCE_S), status)
+            self.wait(lambda w=workers: not any(map(runs, w)), "the end of the workers")
+
+    def test_a_simulator_that_ros_shuts_down_ends_in_order(self):
+        for _ in range(3):
+            simulator = self.start(rate=1000.0, start_paused=False)
+            clock = Latest("/clock", Clock)
+            self.wait(lambda c=clock: c.count > 100, "a running simulation")
+            workers = children(simulator.pid)
+            rosnode.kill_nodes(["/simulator"])
+            self.assertEqual(simulator.wait(PATIENCE_S), 0)
+            self.assertNotIn(b"Traceback", simulator.stderr.read())
             self.wait(lambda w=workers: not any(map(runs, w)), "the end of the workers")
 
     def test_faults_are_listed_and_end_the_simulator(self):

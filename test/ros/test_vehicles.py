@@ -5,13 +5,16 @@ import json
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 import unittest
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import actionlib
+import rosgraph
 import rospy
 import rostest
 import tf2_ros
@@ -20,11 +23,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from flight_case import pid_of, trigger
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
+from pymavlink.dialects.v20 import ardupilotmega
 from std_msgs.msg import Empty, String
 
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.nav_messages import pose_stamped
 
+HEARTBEAT = ardupilotmega.MAVLink_heartbeat_message(2, 3, 81, 9, 3, 3)
 VEHICLES = Path(__file__).resolve().parents[1] / "vehicles" / "udp_vehicles.py"
 PATIENCE_S = 60.0
 
@@ -82,6 +87,8 @@ class Vehicles(unittest.TestCase):
         self.a_pilot_takes_one_over()
         self.somebody_resumes_it()
         self.a_landed_vehicle_outlives_the_sequencer()
+        self.strangers_change_nothing()
+        self.a_killed_bridge_comes_back_and_lets_its_vehicle_hover()
         self.all_land()
         self.actions_take_off_and_land()
         self.a_cancelled_take_off_lands()
@@ -148,6 +155,33 @@ class Vehicles(unittest.TestCase):
         trigger("/vehicle1/resume")
         self.wait(lambda: self.states[1] == "flying" and self.speed(1) > 0.2, "flight again")
         self.assertFalse(rospy.get_param("/mission/quad1/stopped"))
+
+    def strangers_change_nothing(self):
+        """A datagram from each of many ports, some of which say that vehicle 0 has landed."""
+        beat = HEARTBEAT.pack(ardupilotmega.MAVLink(None, 1, 1))
+        for data in (b"x", b"", beat) * 100:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+                stranger.sendto(data, ("127.0.0.1", 14651))
+        rospy.sleep(1.5)  # the state is told once a second
+        self.assertEqual((self.states[0], self.values[0]["mode"]), ("flying", "GUIDED"))
+
+    def a_killed_bridge_comes_back_and_lets_its_vehicle_hover(self):
+        before = self.buffer.lookup_transform("map", "odom0", rospy.Time()).transform
+        node = ServerProxy(rosgraph.Master("/test_vehicles").lookupNode("/vehicle0"))
+        os.kill(node.getPid("/test_vehicles")[2], signal.SIGKILL)
+        self.wait(lambda: "started in flight" in self.values[0]["reason"], "restarted bridge")
+        self.assertEqual(self.states[0], "taken over")
+        self.wait(lambda: rospy.get_param("/mission/quad0/stopped"), "stop of its mission")
+        self.wait(lambda: self.speed(0) < 0.05, "hover of vehicle 0")
+        rospy.sleep(6.0)  # the autopilot's failsafe would land after 5 s
+        self.assertEqual((self.states[0], self.values[0]["mode"]), ("taken over", "GUIDED"))
+        self.assertLess(self.speed(0), 0.05)
+        self.assertAlmostEqual(self.odometry[0].pose.pose.position.z, 1.0, delta=0.15)
+        self.assertEqual(self.states[1], "flying")
+        after = self.buffer.lookup_transform("map", "odom0", rospy.Time()).transform
+        self.assertAlmostEqual(after.translation.x, before.translation.x, delta=1e-6)
+        self.assertAlmostEqual(after.rotation.z, before.rotation.z, delta=1e-6)
+        self.somebody_resumes_it()
 
     def all_land(self):
         publisher = rospy.Publisher("/vehicles/land_all", Empty, queue_size=1)

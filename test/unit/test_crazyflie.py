@@ -211,3 +211,14 @@ def test_stamps_are_on_our_clock_across_the_turn_of_the_counter():
         ours_s = clock.ours_s(stamp_ms, sent_s + delays_s[k % 4])
         if k:
             assert ours_s == pytest.approx(sent_s + 0.002, abs=1e-9)
+
+
+@pytest.mark.parametrize("step_ms", [-2500, 2500])
+def test_stamps_follow_a_step_of_the_clock_within_two_seconds(step_ms):
+    clock = ArrivalClock()
+    for k in range(200):
+        now_s = 7.0 + 0.05 * k
+        ours_s = clock.ours_s(10_000 + 50 * k + (step_ms if k >= 100 else 0), now_s)
+        if not 100 <= k < 141:
+            assert ours_s == pytest.approx(now_s, abs=1e-9)
+        assert ours_s < now_s + 1e-9

@@ -106,6 +106,30 @@ def test_a_connection_that_ends_is_opened_again(desk):
     assert any("no connection" in text for _, text in desk.link.pop_texts())
 
 
+def test_no_event_and_no_reason_of_the_library_ends_the_bridge(desk):
+    desk.until_state(State.READY)
+    desk.link.pop_texts()
+    desk.link._events.put(lambda: {}["odd"])
+    desk.link._events.put(lambda: desk.link._lost(" "))
+    desk.until(lambda: not desk.link._is_ready)
+    told = [text for _, text in desk.link.pop_texts()]
+    assert "an event of the radio: KeyError: 'odd'; dropped" in told
+    assert "no connection: no reason" in told
+    desk.until(lambda: desk.link._is_ready)
+
+
+def test_no_error_of_sending_ends_the_bridge(desk):
+    desk.until_state(State.READY)
+
+    def fail(*_):
+        raise RuntimeError("driver")
+
+    desk.link._crazyflie.commander.send_hover_setpoint = fail
+    desk.link._send([("hover", (0.0, 0.0, 0.0, 0.5))])
+    desk.until(lambda: any("cannot send: driver" in text for _, text in desk.link.pop_texts()))
+    desk.until_state(State.READY)
+
+
 def test_a_flight_without_cflib_says_what_to_install(monkeypatch):
     monkeypatch.setattr(crazyflie_link, "cflib", None)
     vehicle = Vehicle(0, "crazyflie", address="radio://0/80")

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("rospy")
 
-from quad_nav.ros.common import readiness  # noqa: E402
+from quad_nav.ros.common import rospy_repairs  # noqa: E402
 
 
 def test_fifty_nodes_connect_while_one_accepts_none(monkeypatch):
@@ -21,8 +21,8 @@ def test_fifty_nodes_connect_while_one_accepts_none(monkeypatch):
         server = SimpleNamespace(
             start_server=lambda: None, tcp_ros_server=SimpleNamespace(server_sock=waiting)
         )
-        monkeypatch.setattr(readiness, "init_tcpros_server", lambda: server)
-        readiness.accept_many_connections()
+        monkeypatch.setattr(rospy_repairs, "init_tcpros_server", lambda: server)
+        rospy_repairs.accept_many_connections()
         for _ in range(50):
             address = waiting.getsockname()
             opened.enter_context(socket.create_connection(address, timeout=0.9))

@@ -31,7 +31,7 @@ from quad_nav.ros.navigator.intention_topics import (  # noqa: E402
     intentions_message,
 )
 from quad_nav.ros.navigator.peer_topics import PeerTopics  # noqa: E402
-from quad_nav.topics.publishing import in_fleet  # noqa: E402
+from quad_nav.topics.publishing import in_fleet, own_node  # noqa: E402
 
 ROBOTS = 4
 NO_PATH = Intention(idle_priority(2))
@@ -205,6 +205,34 @@ def test_own_robots_that_come_from_odometry_are_published_in_one_message(ros, wa
     assert [peer.x_m for peer in peers.near(0, None, 0.0)] == [10.25, 10.5, 10.75]
 
 
+def test_peers_that_nobody_has_counted_are_those_that_publish(ros, wall, monkeypatch):
+    published = ["/odom2", "/rosout"]
+    topics = lambda: [(name, "nav_msgs/Odometry") for name in published]  # noqa: E731
+    monkeypatch.setattr(rospy, "get_published_topics", topics)
+    peers = PeerTopics({1: own_node}, 0, Transforms(), "map")
+    for published[1:], heard in (
+        ([], ["/odom2"]),
+        (["/odom", "/odom3"], ["/odom", "/odom2", "/odom3"]),
+    ):
+        wall.now_s += 1.0
+        joined(peers._topics._own)
+        assert odometry_topics() == heard
+    deliver(STATES_TOPIC, states_message(states([0, 1])))
+    deliver("/odom3", odometry(3, 7.0))
+    for _ in range(2):
+        peers.refresh(1.0)
+    assert [peer.name for peer in peers.near(1, None, 0.0)] == ["quad0", "quad3"]
+    assert ros.log.lines == [
+        "quad1: found quad0, avoiding it",
+        "quad1: found quad3, avoiding it",
+    ]
+
+
+def test_a_single_robot_hears_no_peers(ros):
+    PeerTopics({0: own_node}, 1, Transforms(), "map")
+    assert not {STATES_TOPIC, INTENTIONS_TOPIC} & set(subscribed())
+
+
 def test_frames_of_other_robots_are_received_when_they_are_looked_up(ros):
     transforms = Transforms(others=(2, 3))
     chains = [
@@ -301,3 +329,17 @@ def test_intentions_of_a_host_are_published_together_when_one_changes(ros):
     topic = FakePublisher.all[INTENTIONS_TOPIC]
     alone.publish(9.0)
     assert topic.last is None
+
+
+def test_another_navigator_of_the_same_robot_is_named(ros):
+    peers = host(own=(0,))
+    message = intentions_message({0: PATH, 2: PATH}, "map", rospy.get_time())
+    deliver(INTENTIONS_TOPIC, message, "/fleet0")  # its own
+    assert ros.log.lines == []
+    deliver(INTENTIONS_TOPIC, message, "/planner")
+    (line,) = ros.log.lines
+    assert line.startswith("quad0: /planner flies quad0 too, and neither avoids the other")
+    deliver(STATES_TOPIC, states_message(states([0, 2])))
+    peers.refresh(1.0)
+    (peer,) = peers.near(0, None, 0.0)
+    assert len(peer.intention.path) == 3

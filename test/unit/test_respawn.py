@@ -33,12 +33,13 @@ print(program.wait(), flush=True)
 """
 
 
-def respawned(program: str, *arguments: str) -> subprocess.Popen:
+def respawned(program: str, *arguments: str, options: tuple = ()) -> subprocess.Popen:
     return subprocess.Popen(
         [
             sys.executable,
             "-m",
             "quad_nav.mission.respawn",
+            *options,
             sys.executable,
             "-c",
             program,
@@ -61,6 +62,15 @@ def test_a_killed_node_is_restarted_until_it_exits():
 def test_a_node_that_exits_is_not_restarted():
     process = respawned("import sys; print('once'); sys.exit(2)")
     assert process.communicate(timeout=60)[0] == "once\n" and process.returncode == 2
+
+
+@pytest.mark.parametrize("status", [0, 2])
+def test_a_node_that_raises_is_restarted_if_asked_for(status):
+    """Python ends with 1 after an exception; 2 is a fault of the files."""
+    program = f"import sys; sys.exit({status} if sys.argv[1:] == ['--respawned'] else 1)"
+    process = respawned(program, options=("--after-error",))
+    assert "ended with an error, restarting" in process.communicate(timeout=60)[1]
+    assert process.returncode == status
 
 
 def test_signals_are_passed_on():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from vehicles import failures
 from vehicles.ardupilot import GUIDED, LAND, LOITER, RTL, ArduPilot
 from vehicles.bodies import Bodies
 from vehicles.estimator import LocalFrame
@@ -216,6 +217,136 @@ def test_without_a_radio_it_climbs(flying):
     assert max(heights) == pytest.approx(15.0, abs=0.5)
 
 
+def moments(desk, seconds):
+    """Run; return the times since now of texts, modes and states of landing, each once."""
+    vehicle, start_s, found = desk.vehicle, desk.vehicle.now_s, {}
+    desk.got.clear()
+    while vehicle.now_s < start_s + seconds:
+        before = len(desk.got)
+        desk.run(0.01)
+        now_s = vehicle.now_s - start_s
+        found.setdefault(("landed", vehicle.landed), now_s)
+        found.setdefault(("mode", vehicle.mode), now_s)
+        for _, name, fields in desk.got[before:]:
+            if name == "STATUSTEXT":
+                found.setdefault(fields["text"].split(" at ")[0], now_s)
+            elif name == "HEARTBEAT":
+                found.setdefault(("armed", fields["base_mode"] >= 128), now_s)
+    return found
+
+
+def test_a_flight_at_one_metre_takes_as_long_as_recorded(desk):
+    desk.command(176, param1=1, param2=GUIDED)
+    desk.command(400, param1=1)
+    desk.run(0.2)
+    desk.vehicle.receive("COMMAND_LONG", {"command": 22, "param7": 1.0})
+    rises = moments(desk, 4.95)
+    assert rises["landed", TAKING_OFF] == pytest.approx(2.9, abs=0.15)
+    assert -desk.vehicle.estimator.position_ned[2] == pytest.approx(0.97, abs=0.03)
+    desk.run(4.0)
+    desk.vehicle.receive("COMMAND_LONG", {"command": 176, "param2": LAND})
+    lands = moments(desk, 6.0)
+    assert lands["SIM Hit ground"] == pytest.approx(2.3, abs=0.15)
+    (hit,) = [words for words in desk.texts() if words.startswith("SIM Hit ground at ")]
+    assert float(hit.split()[4]) == pytest.approx(0.49, abs=0.005)
+    # A heartbeat tells it, up to 1 s after the motors have stopped.
+    assert lands["Disarming motors"] < 5.2 < lands["Disarming motors"] + 1.0
+    assert lands["armed", False] < lands["Disarming motors"] + 1.0
+
+
+def test_after_the_bridge_has_died_it_comes_down_as_recorded(desk):
+    desk.vehicle.parameters["FS_GCS_ENABLE"] = 5.0
+    desk.command(176, param1=1, param2=GUIDED)
+    desk.command(400, param1=1)
+    desk.command(22, param7=1.0)
+    desk.run(9.0)
+    desk.vehicle.receive("HEARTBEAT", {"type": 6})
+    desk.run(0.5)  # then the bridge dies, in the middle between two heartbeats
+    height_m = desk.vehicle.height_m
+    comes = moments(desk, 9.3)  # 4.8 s, and 4.5 s
+    assert comes["mode", LAND] == pytest.approx(4.8, abs=0.1)
+    assert height_m - desk.vehicle.height_m == pytest.approx(0.05, abs=0.04)
+    comes = moments(desk, 6.0)
+    assert 9.3 + comes["SIM Hit ground"] == pytest.approx(11.3, abs=0.2)
+    assert 9.3 + comes["armed", False] == pytest.approx(14.0, abs=0.7)
+
+
+def test_a_low_voltage_is_no_low_charge_and_latches_until_a_reboot(flying):
+    flying.vehicle.battery, flying.vehicle.voltage_v = 100, 9.0
+    flying.command(511, param1=1, param2=1e6)
+    flying.run(9.5)
+    health = [f for _, name, f in flying.got if name == "SYS_STATUS"][-1]
+    assert (health["battery_remaining"], health["voltage_battery"]) == (100, 9000)
+    assert health["onboard_control_sensors_health"] & 1 << 25
+    flying.run(1.6)
+    health = [f for _, name, f in flying.got if name == "SYS_STATUS"][-1]
+    assert not health["onboard_control_sensors_health"] & 1 << 25
+    assert flying.texts()[-2:] == ["Battery 1 is low 9.00V used 0 mAh", "Battery Failsafe"]
+    assert flying.vehicle.mode == GUIDED  # BATT_FS_LOW_ACT 0: the flight goes on
+    flying.vehicle.voltage_v = 12.6
+    flying.command(176, param1=1, param2=LAND)
+    flying.run(8.0)
+    flying.command(176, param1=1, param2=GUIDED)
+    assert flying.command(400, param1=1) == (FAILED, ["Arm: Battery failsafe"])
+    flying.command(246, param1=1)
+    assert not flying.vehicle.has_low_battery
+
+
+def test_it_lands_by_itself_for_a_low_battery_if_it_was_told_to(desk):
+    desk.vehicle.parameters["BATT_FS_LOW_ACT"] = 1.0
+    desk.to_hover().vehicle.voltage_v = 9.0
+    assert desk.run(9.9).vehicle.mode == GUIDED
+    assert desk.run(0.3).vehicle.mode == LAND
+
+
+def test_without_gps_it_drifts_unseen_until_it_lands(flying):
+    """Recorded: 0.63 m from its place after 8 s."""
+    estimator = flying.vehicle.estimator
+    true, told = flying.bodies.place(0), estimator.position_ned
+    flying.vehicle.lose_receiver()
+    flying.command(511, param1=24, param2=2e5)
+    flying.stream(7.95)
+    message = [f for _, name, f in flying.got if name == "GPS_RAW_INT"][-1]
+    assert (message["fix_type"], message["satellites_visible"]) == (1, 3)
+    now = flying.bodies.place(0)
+    north, east = estimator.ned(now[0] - true[0], now[1] - true[1])
+    moved = [after - before for after, before in zip(estimator.position_ned, told)]
+    assert math.hypot(north - moved[0], east - moved[1]) == pytest.approx(0.63, abs=0.03)
+    assert math.hypot(north, east) > 0.5 and math.hypot(*moved) < 0.1
+    assert flying.vehicle.mode == GUIDED
+    assert flying.run(0.3).vehicle.mode == LAND
+
+
+def test_after_a_glitch_the_estimate_jumps_to_the_receiver(flying):
+    north_m = flying.vehicle.estimator.position_ned[0]
+    flying.vehicle.glitch(north_m=3.0)
+    flying.command(511, param1=193, param2=2e5)
+    flying.run(9.9)
+    report = [f for _, name, f in flying.got if name == "EKF_STATUS_REPORT"][-1]
+    assert report["pos_horiz_variance"] > 1.0
+    assert flying.vehicle.estimator.position_ned[0] == pytest.approx(north_m, abs=0.05)
+    flying.run(0.3)
+    assert flying.vehicle.estimator.position_ned[0] == pytest.approx(north_m + 3.0, abs=0.05)
+
+
+def test_its_clock_steps(flying):
+    flying.command(511, param1=30, param2=1e5)
+    flying.run(1.0)
+    before = flying.got[-1][2]["time_boot_ms"]
+    flying.vehicle.clock_step_s = -2.5
+    flying.run(0.2)
+    assert flying.got[-1][2]["time_boot_ms"] == pytest.approx(before + 200 - 2500, abs=110)
+    flying.vehicle.receive("TIMESYNC", {"tc1": 0, "ts1": 7})
+    flying.run(0.05)
+    (answer,) = [f for _, name, f in flying.got if name == "TIMESYNC" and f["ts1"] == 7]
+    assert answer["tc1"] / 1e9 == pytest.approx(flying.vehicle.boot_s - 2.5, abs=0.06)
+
+
+def test_the_pilots_transmitter_is_missed_after_a_second(flying):
+    flying.vehicle.lose_radio()
+    assert moments(flying, 1.5)["Radio Failsafe"] == pytest.approx(0.99, abs=0.03)
+
+
 def test_without_our_heartbeats_it_lands_if_it_was_told_to(desk):
     desk.vehicle.parameters["FS_GCS_ENABLE"] = 5.0
     desk.to_hover()
@@ -307,6 +438,24 @@ def test_the_bridge_flies_it_to_a_hover_and_lands_it():
     flight.machine.land(flight.now_s, "asked")
     assert flight.run(15.0, lambda: flight.state is State.LANDED)
     assert not flight.vehicle.armed and flight.height_m < 0.02
+    flight.end()
+
+
+def test_a_ground_station_does_not_hide_that_the_bridge_has_died():
+    """Its heartbeats have the number 255; the autopilot counts those of its bridge."""
+    flight = StandInFlight(seed=3)
+    flight.has_station = True
+    flight.to_flight()
+    flight.is_alive = False
+    assert flight.run(6.0, lambda: flight.vehicle.mode == LAND)
+    assert flight.run(10.0, lambda: not flight.vehicle.armed)
+    flight.end()
+
+
+def test_stamps_are_right_again_1_s_after_a_step_of_the_clock():
+    """The vehicle flies on, and its scans are not too old for the navigator."""
+    flight, wrong_s = failures.fly_clock_row("ardupilot", 0.7, seed=2)
+    assert wrong_s < 1.2
     flight.end()
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 rospy = pytest.importorskip("rospy")
@@ -15,7 +17,7 @@ from quad_nav.costmap.obstacle import ObstacleLayerParams  # noqa: E402
 from quad_nav.costmap.scan_intake import sinks_of  # noqa: E402
 from quad_nav.costmap.scan_validator import ScanValidatorParams  # noqa: E402
 from quad_nav.ros.navigator import loop  # noqa: E402
-from quad_nav.ros.navigator.loop import StallDetector  # noqa: E402
+from quad_nav.ros.navigator.loop import NavigatorLoop, StallDetector  # noqa: E402
 from quad_nav.ros.navigator.sensors import Sensor  # noqa: E402
 from quad_nav.tracking.tracker import ObstacleTracker, TrackerParams  # noqa: E402
 
@@ -79,3 +81,48 @@ def test_late_scans_are_discarded(ros, reject, left):
         deliver("/scan0", scan_stamped(stamp_s))
     sensor.discard_late()
     assert [message.header.stamp.to_sec() for message, _ in sensor._waiting] == left
+
+
+@pytest.mark.parametrize(
+    ("has_clock", "stopped", "jumped"),
+    [
+        (True, "/clock stopped for 2.0 s", "/clock jumped back by 1.00 s"),
+        (
+            False,
+            "the node was stopped or busy for 2.0 s",
+            "the system's clock jumped back by 1.00 s",
+        ),
+    ],
+)
+def test_a_clock_is_named_where_there_is_one(ros, wall, monkeypatch, has_clock, stopped, jumped):
+    steps = [
+        (1.1, 0.1),
+        (1.2, 2.0),
+        (1.3, 0.1),
+        (0.3, 0.1),
+        (0.4, 0.1),
+    ]  # time of the clock, wall time since
+
+    def sleep(_):
+        now_s, since_s = steps.pop(0)
+        wall.now_s += since_s
+        ros.set_time(now_s)
+
+    robot = SimpleNamespace(
+        name="quad0",
+        subscribers=[],
+        stop=lambda: None,
+        due_s=0.0,
+        step=lambda _: None,
+        restart=lambda _: None,
+        discard_late_scans=lambda: None,
+    )
+    monkeypatch.setattr(loop, "is_wallclock", lambda: not has_clock)
+    monkeypatch.setattr(rospy, "sleep", sleep)
+    monkeypatch.setattr(rospy, "is_shutdown", lambda: not steps)
+    monkeypatch.setattr(loop, "publish_health", lambda _: None)
+    NavigatorLoop([robot], [], 0.001).run()
+    assert [line for line in ros.log.lines if "behind" not in line] == [
+        f"quad0: {stopped}; discarding queued messages",
+        f"quad0: {jumped}; restarting all schedules",
+    ]

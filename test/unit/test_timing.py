@@ -6,7 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from test_navigator import GOAL, HERE, Flight
 
+from quad_nav.geometry import Twist2D
+from quad_nav.navigator.tick import RobotPoses
 from quad_nav.timing import Schedule
 
 DAY_S = 86_400.0
@@ -90,3 +93,16 @@ def test_a_frequency_of_zero_is_never_due():
     schedule = Schedule(0.0)
     schedule.start(0.0)
     assert schedule.due_s == math.inf and not schedule.pop(1e9)
+
+
+@CLOCKS
+@pytest.mark.parametrize("first", [3, 6, 9, 2424])
+def test_a_navigator_of_any_clock_searches_and_commands_once_in_each_period(clock, first):
+    """With a clock of 240 Hz. A search that fails is repeated in each control cycle."""
+    flight = Flight(fixes={}, controller_frequency_hz=1.0, planner_patience_s=100.0)
+    flight.planner.fails, here = True, RobotPoses(HERE, HERE)
+    times_s = [clock((first + k) / 240) for k in range(240 * 18)]
+    flight.navigator.set_goal(GOAL, times_s[0])
+    ticks = [flight.navigator.tick(now_s, here, Twist2D()) for now_s in times_s]
+    assert [tick.now_s for tick in ticks if tick.command] == times_s[::240]
+    assert flight.planner.calls == 18

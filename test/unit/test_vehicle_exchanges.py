@@ -75,6 +75,39 @@ def test_clock_takes_the_exchange_with_the_shortest_trip(offset_s):
     assert clock.ours_s(31.0 + offset_s, 30.0) == 30.0  # never in the future
 
 
+def exchange(clock, sent_s, trip_s, offset_s):
+    """Let a clock take an answer that was made in the middle of the trip."""
+    theirs_ns = round((sent_s + trip_s / 2.0 + offset_s) * 1e9)
+    clock.take(theirs_ns, round(sent_s * 1e9), sent_s + trip_s)
+
+
+@pytest.mark.parametrize("step_s", [-2.5, -0.05, 0.05, 2.5])
+def test_a_step_of_the_clock_drops_the_samples_before_it(step_s):
+    clock = ClockSync()
+    for k in range(20):
+        exchange(clock, 10.0 + k, 0.002, 100.0)
+    assert clock.ours_s(130.0, 40.0) == pytest.approx(30.0, abs=1e-6)
+    exchange(clock, 30.0, 0.006, 100.0 + step_s)  # the first after the step; a longer trip
+    assert clock.ours_s(130.0 + step_s, 40.0) == pytest.approx(30.0, abs=1e-6)
+
+
+def test_an_answer_that_was_late_on_one_way_is_no_step():
+    clock = ClockSync()
+    exchange(clock, 10.0, 0.002, 100.0)
+    theirs_ns = round((11.0 + 0.001 + 100.0) * 1e9)  # there in 1 ms, back in 500 ms
+    clock.take(theirs_ns, round(11.0 * 1e9), 11.501)
+    exchange(clock, 12.0, 0.004, 100.0)
+    assert len(clock._samples) == 3
+    assert clock.ours_s(130.0, 40.0) == pytest.approx(30.0, abs=1e-6)
+
+
+def test_an_autopilot_with_the_new_name_of_a_parameter_is_not_asked_for_the_old_one():
+    parameters = Parameters(["OLD", "NEW"], sends_bits=False, renamed={"NEW": ("OLD",)})
+    parameters.take("NEW", 255.0, 9)
+    assert parameters.is_read and parameters.values == {"OLD": None, "NEW": 255.0}
+    assert parameters.requests(0.0) == []
+
+
 def test_the_autopilots_own_question_is_answered():
     assert ClockSync().take(0, 77, 2.5) == ("TIMESYNC", {"tc1": 2500000000, "ts1": 77})
 

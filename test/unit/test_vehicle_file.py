@@ -10,7 +10,8 @@ import yaml
 
 from quad_nav.errors import InputError
 from quad_nav.geometry import Pose2D
-from quad_nav.vehicle.vehicle_file import load_vehicles, vehicles_from_document
+from quad_nav.vehicle.addresses import address_problem, share
+from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, load_vehicles, vehicles_from_document
 
 ROOT = Path(__file__).resolve().parents[2]
 GOOD = """
@@ -84,6 +85,107 @@ vehicles:
 )
 def test_fault(change, text):
     assert any(text in line for line in faults(GOOD.replace(*change)))
+
+
+def two(first, second):
+    """A file with two vehicles, each with the given fields beside the usual ones."""
+    usual = [
+        {"kind": "mavlink", "address": f"udpin:127.0.0.1:1455{k}", "start": [1.5, 1.5 + k, 0.0]}
+        for k in range(2)
+    ]
+    vehicles = [{"number": k, **usual[k], **one} for k, one in enumerate((first, second))]
+    return yaml.safe_dump({"vehicles": vehicles})
+
+
+@pytest.mark.parametrize(
+    "second, fault",
+    [
+        (
+            {"start": [1.5, 1.5, 2.0]},
+            "start: 0.00 m from vehicles[0].start, expected 0.2 m or more",
+        ),
+        (
+            {"start": [1.6, 1.5, 0.0]},
+            "start: 0.10 m from vehicles[0].start, expected 0.2 m or more",
+        ),
+        ({"start": [50.0, 1.5, 0.0]}, "start: (50, 1.5) is not in the room"),
+        ({"altitude": 0.01}, "altitude: 0.01, expected 0.2 m or more"),
+        ({"limits": {"speed": 50}}, "limits.speed: 50, expected 5 or less"),
+        ({"limits": {"climb": 50}}, "limits.climb: 50, expected 2.5 or less"),
+        ({"limits": {"yaw_rate": 50}}, "limits.yaw_rate: 50, expected 3.5 or less"),
+        ({"limits": {"height": 1e4}}, "limits.height: 10000, expected 120 or less"),
+        ({"limits": {"radius": 1e5}}, "limits.radius: 100000, expected 500 or less"),
+        (
+            {"address": "udpin:127.0.0.1:99999"},
+            "address: udpin:127.0.0.1:99999, expected udpin:HOST:PORT with a port from 1 to 65535",
+        ),
+        (
+            {"address": "tcp:127.0.0.1"},
+            "address: tcp:127.0.0.1, expected tcp:HOST:PORT with a port from 1 to 65535",
+        ),
+        (
+            {"address": "udpin:0.0.0.0:14550"},
+            "address: udpin:0.0.0.0:14550 takes what vehicles[0] has, udpin:127.0.0.1:14550;"
+            " expected a port for each",
+        ),
+        ({"number": 0}, None),
+        ({"system": 240}, None),
+        ({"system": 2, "bridge_system": 240}, "bridge_system: 240, the number of a vehicle or of"),
+        ({"system": 2, "bridge_system": 1}, "bridge_system: 1, the number of a vehicle or of"),
+        ({"bridge_system": 255}, "bridge_system: 255, expected a whole number, 1 to 254"),
+    ],
+)
+def test_a_fault_is_listed_with_file_and_place(second, fault):
+    def room(start):
+        return "" if start.x_m < 20.0 else f"({start.x_m:g}, {start.y_m:g}) is not in the room"
+
+    with pytest.raises(InputError) as error:
+        vehicles_from_document(yaml.safe_load(two({}, second)), "v.yaml", room)
+    (found,) = error.value.problems
+    if "number" in second:
+        assert found == "v.yaml: vehicles: numbers [0, 0], expected each of 0 to 1 once"
+    elif fault is None:  # vehicle 1 has the number of the first bridge
+        assert found.startswith("v.yaml: vehicles[0].bridge_system: 240, the number of a vehicle")
+    else:
+        assert found.startswith(f"v.yaml: vehicles[1].{fault}")
+
+
+def test_each_bridge_has_a_system_number_of_its_own():
+    first, second = read(two({}, {"system": 2}))
+    assert (first.bridge_system, second.bridge_system) == (OUR_SYSTEM, OUR_SYSTEM - 1) == (240, 239)
+    first, _ = read(two({"bridge_system": 17}, {}))
+    assert first.bridge_system == 17
+
+
+@pytest.mark.parametrize(
+    "address, other, is_shared",
+    [
+        ("udpin:127.0.0.1:14550", "udpin:0.0.0.0:14550", True),
+        ("udp:0.0.0.0:14550", "udpin:192.168.1.5:14550", True),
+        ("0.0.0.0:14550", "udpin:127.0.0.1:14550", True),
+        ("udpin:localhost:14550", "udpin:127.0.0.1:14550", True),
+        ("udpin:127.0.0.1:14550", "udpin:127.0.0.1:014550", True),
+        ("udpin:127.0.0.1:14550", "udpin:192.168.1.5:14550", False),
+        ("udpin:0.0.0.0:14550", "udpin:0.0.0.0:14551", False),
+        ("udpout:192.168.1.5:14550", "udpout:192.168.1.6:14550", False),
+        ("tcpin:0.0.0.0:5760", "udpin:0.0.0.0:5760", False),
+        ("/dev/ttyUSB0,57600", "/dev/ttyUSB0,115200", True),
+        ("/dev/ttyUSB0,57600", "/dev/ttyUSB1,57600", False),
+        ("radio://0/80/2M/E7E7E7E7E7", "radio://0/90/2M/E7E7E7E7E8", True),
+        ("radio://0/80/2M/E7E7E7E7E7", "radio://1/80/2M/E7E7E7E7E7", False),
+        ("tcp://127.0.0.1:14661", "tcp://127.0.0.1:14662", False),
+    ],
+)
+def test_what_two_addresses_share(address, other, is_shared):
+    assert share(address, other) == share(other, address) == is_shared
+
+
+def test_a_file_is_no_address(tmp_path):
+    """Pymavlink would replay it, or run a program."""
+    path = tmp_path / "vehicle.elf"
+    path.write_text("")
+    assert address_problem(str(path)) == f"{path} is a file, expected a serial line or a port"
+    assert address_problem("/dev/null") == ""
 
 
 CRAZYFLIE = """

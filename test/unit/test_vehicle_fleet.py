@@ -34,7 +34,7 @@ class Fleet:
 
     def __init__(self, ros, monkeypatch, simulated=0):
         self.ros, self.now_s, self.calls, self.landings = ros, 0.0, [], 0
-        self.answers, self.script = {}, {}
+        self.answers, self.script, self.states = {}, {}, {}
         clock = SimpleNamespace(monotonic=lambda: self.now_s, sleep=self.sleep)
         monkeypatch.setattr(fleet, "time", clock)
         monkeypatch.setattr(rospy, "wait_for_service", lambda *_: None)
@@ -52,6 +52,7 @@ class Fleet:
         self.now_s += seconds
         for at_s in [at_s for at_s in self.script if at_s <= self.now_s]:
             self.script.pop(at_s)()
+        self.tell(**self.states)  # as bridges do once a second
 
     def timer(self, _, function, arguments):
         return SimpleNamespace(start=lambda: function(*arguments))
@@ -66,6 +67,7 @@ class Fleet:
         return self.answers.get(name, TriggerResponse(True, "holding"))
 
     def tell(self, **states):
+        self.states.update(states)
         for name, state in states.items():
             values = [KeyValue("state", state), KeyValue("reason", "as the test says")]
             deliver(f"/{name}/state", DiagnosticStatus(values=values))

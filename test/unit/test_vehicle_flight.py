@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 from vehicles import failures
-from vehicles.virtual_flight import STEP_S, Flight
+from vehicles.virtual_flight import STEP_S, Flight, StandInFlight
 
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.vehicle.autopilots import SET_MESSAGE_INTERVAL
 from quad_nav.vehicle.orders import Permissions, State
 
 
@@ -342,3 +343,61 @@ def test_a_dry_run_notices_the_pilot_and_missing_commands(autopilot):
     flight.vehicle.set_mode(flight.vehicle.kind["other"])
     assert flight.run(0.1, lambda: flight.state is State.TAKEN_OVER)
     assert flight.pauses == 1
+
+
+def restarted(autopilot, dead_s):
+    """A flight whose bridge dies under a command, and another bridge that has seen a heartbeat."""
+    flight = StandInFlight(autopilot).to_flight(Twist2D(0.4, 0.1, 0.2))
+    flight.is_alive = False
+    flight.run(dead_s)
+    flight.start_bridge()
+    flight.is_alive, flight.pauses, flight.sent = True, 0, []
+    assert flight.run(2.0, lambda: flight.state is State.TAKEN_OVER)
+    return flight
+
+
+def orders_of(flight):
+    orders = [fields["command"] for _, name, fields in flight.sent if name == "COMMAND_LONG"]
+    return [number for number in orders if number != SET_MESSAGE_INTERVAL]
+
+
+def test_a_bridge_that_starts_beside_a_flying_vehicle_lets_it_hover():
+    flight = restarted("ardupilot", 3.0)
+    assert flight.machine.reason == "bridge started in flight; mode GUIDED; resume or land it"
+    assert flight.pauses == 1  # of the mission
+    flight.run(30.0)
+    assert flight.state is State.TAKEN_OVER and flight.vehicle.mode == 4
+    assert flight.speed_mps < 0.02 and flight.height_m == pytest.approx(1.2, abs=0.05)
+    assert flight.setpoints_since(0.0) == [] and orders_of(flight) == []
+    assert flight.machine.resume(flight.now_s).is_accepted
+    assert flight.run(2.0, lambda: flight.state is State.FLYING)
+    flight.run(3.0)
+    assert flight.speed_mps > 0.3
+    flight.end()
+
+
+def test_a_bridge_that_starts_beside_a_landing_vehicle_lets_it_land():
+    """PX4's failsafe has changed the mode, which is nobody's business but its pilot's."""
+    flight = restarted("px4", 3.0)
+    assert "bridge started in flight; mode AUTO.L" in flight.machine.reason
+    assert flight.run(20.0, lambda: not flight.vehicle.armed)
+    assert flight.setpoints_since(0.0) == [] and orders_of(flight) == []
+    flight.end()
+
+
+def test_a_resumption_does_not_cancel_somebodys_take_off():
+    """ArduPilot gives a take-off up at the first set-point, without a word."""
+    flight = Flight()
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    vehicle = flight.vehicle
+    for number, parameters in [(176, {"param2": 4.0}), (400, {"param1": 1.0}), (22, {})]:
+        fields = {"param1": 0.0, "param2": 0.0, "param7": 1.2, **parameters}
+        vehicle.receive("COMMAND_LONG", {"command": number, **fields})
+    assert flight.run(5.0, lambda: flight.state is State.TAKEN_OVER)
+    start_s = flight.now_s
+    assert flight.machine.resume(flight.now_s).is_accepted
+    assert flight.run(5.0, lambda: vehicle.landed == 2)
+    assert flight.setpoints_since(start_s) == []
+    assert flight.run(1.0, lambda: flight.state is State.HOLDING)
+    flight.run(1.0)
+    assert flight.height_m > 1.1

@@ -13,7 +13,7 @@ from quad_nav.vehicle.mavlink_link import MavlinkLink, mavutil
 from quad_nav.vehicle.orders import Permissions
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Vehicle
+from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, Vehicle
 
 PATIENCE_S = 20.0
 
@@ -96,7 +96,24 @@ def test_a_vehicle_that_is_not_there_yet_is_no_fault(server):
     link.close()
 
 
-@pytest.mark.parametrize("address", ["udpin:nowhere", "udpin:256.1.1.1:5", "/dev/no_such_line"])
+def test_heartbeats_of_others_are_told(server):
+    link = link_to(f"tcp:127.0.0.1:{server.getsockname()[1]}")
+    vehicle, _ = server.accept()
+    vehicle.sendall(heartbeat(4, system=2))
+    read_until(link, lambda: link.tick().news)
+    assert link.machine.reason == "heartbeats of system 2, expected 1"
+    vehicle.sendall(heartbeat(0, system=OUR_SYSTEM, component=190))
+    told = []
+    read_until(link, lambda: told.extend(link.tick().news) or told)
+    assert told[0].startswith(f"another station sends heartbeats as system {OUR_SYSTEM}")
+    link.close()
+    vehicle.close()
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["udpin:nowhere", "udpin:256.1.1.1:5", "/dev/no_such_line", "udpin:127.0.0.1:99999"],
+)
 def test_an_address_that_cannot_be_opened_is_named(address):
     with pytest.raises(InputError) as error:
         link_to(address)
@@ -125,5 +142,5 @@ def test_nothing_but_the_planned_bytes_leaves():
         values = message.to_dict()
         assert values.pop("mavpackettype") == "SET_POSITION_TARGET_LOCAL_NED"
         assert values == {**fields, "target_system": 1, "target_component": 1}
-        assert (message.get_srcSystem(), message.get_srcComponent()) == (255, 191)
+        assert (message.get_srcSystem(), message.get_srcComponent()) == (OUR_SYSTEM, 191)
         link.close()

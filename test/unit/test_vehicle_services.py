@@ -14,7 +14,6 @@ from ros.fake_ros import FakeRos, FakeService  # noqa: E402
 from std_srvs.srv import TriggerRequest  # noqa: E402
 from vehicles.virtual_flight import Flight  # noqa: E402
 
-from quad_nav.geometry import Pose2D  # noqa: E402
 from quad_nav.ros.vehicle import maneuvers, node  # noqa: E402
 from quad_nav.vehicle.orders import Output, State  # noqa: E402
 from quad_nav.vehicle.vehicle_file import Vehicle  # noqa: E402
@@ -47,7 +46,7 @@ def bridge(monkeypatch):
             monkeypatch.setattr(module, "time", clock)
         monkeypatch.setattr(node, "MissionPause", mock.Mock())
         monkeypatch.setattr(node, "publish_health", mock.Mock())
-        made.node = node.VehicleNode(Vehicle(0, "mavlink", map_from_start=Pose2D(1.0, 1.0)), made)
+        made.node = node.VehicleNode(Vehicle(0, "mavlink"), made)
         made.ros, made.pause = ros, made.node._pause
         yield made
 

@@ -2,7 +2,7 @@
 
 Times, texts and refusals are those of recordings of the autopilot in software, without wind and
 with its default parameters. Not modelled: turning to a heading (masks that use yaw), parameters
-beside ``DEFAULTS``, the fence, and its own failsafe for a low battery.
+beside ``DEFAULTS``, and the fence.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ FORCE = 21196
 BRAKE_S = {BRAKE: 2.6, LOITER: 1.1, POSHOLD: 1.1}  # from any speed to a stop
 SWING_MPS, SWING_S, SWING_LATE_S = 0.58, 1.09, 0.743
 SWING_FROM_MPS = 0.1
-LANDING_S = 0.2
+LANDING_S, LAND_MPS = 0.2, 0.49
 RTL_MPS2, RTL_UP_MPS, RTL_LATE_S = 0.78, 1.5, 0.52
 YAW_ALIGNED_M, RTL_BELOW_M = 2.6, 0.6
 
@@ -141,7 +141,7 @@ class ArduPilot(ArduPilotWatch):
         return ACCEPTED, []
 
     def _reboot(self, _):
-        self.armed = self._is_flying = self.is_critical = False
+        self.armed = self._is_flying = self.is_critical = self.has_low_battery = False
         self.mode, self.landed, self._fired = STABILIZE, ON_GROUND, set()
         self.reboot(REBOOT_S)
         self._told = BOOT_TEXTS[0][0] + 0.001  # the first text comes before the connection
@@ -281,7 +281,7 @@ class ArduPilot(ArduPilotWatch):
                 self._stop()
                 self._is_stopped = True
         elif self.mode == LAND and self.now_s >= self._descent_s:
-            self.climb.set_velocity(-0.5, delay_s=0.1)
+            self.climb.set_velocity(-LAND_MPS, delay_s=0.1)
         elif self.mode == RTL:
             self._return()
         elif self.mode in HOLDS_STICK:

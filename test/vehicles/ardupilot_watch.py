@@ -30,7 +30,9 @@ BOOT_TEXTS = (
 )
 STANDBY_S, ACCELS_S, GYROS_S, HOME_S, POSITION_S = 3.9, 14.0, 24.5, 20.754, 42.156
 PREARM_S = 31.18
-GCS_S, RADIO_S, GPS_S, GPS_END_S = 5.3, 1.0, 8.13, 15.19
+GCS_S, RADIO_S, GPS_S, GPS_END_S = 5.3, 0.99, 8.13, 15.19
+LOW_VOLTAGE_S = 10.0  # BATT_LOW_TIMER
+BATTERY_MODES = {1: LAND, 2: RTL, 3: RTL, 4: LAND, 6: RTL}
 LAND_PAUSE_S = 4.0  # before the descent of a failsafe
 
 
@@ -47,6 +49,8 @@ class ArduPilotWatch(StandIn):
         "FS_EKF_ACTION": 1.0,
         "RTL_ALT": 1500.0,
         "BATT_FS_LOW_ACT": 0.0,
+        "BATT_LOW_VOLT": 10.5,
+        "EK3_SRC1_POSXY": 3.0,
         "FENCE_ENABLE": 0.0,
         "FENCE_TYPE": 7.0,
         "FENCE_ACTION": 1.0,
@@ -80,6 +84,8 @@ class ArduPilotWatch(StandIn):
             return [self.refuses_arming]
         if "radio" in self._fired:
             return ["Radio failsafe on"]
+        if self.has_low_battery:
+            return ["Battery failsafe"]
         found = []
         if self.boot_s < ACCELS_S:
             found.append("Accels inconsistent")
@@ -97,6 +103,14 @@ class ArduPilotWatch(StandIn):
             if "gcs" in self._fired:
                 self._clear("gcs", "GCS Failsafe Cleared")
 
+    def lose_receiver(self):
+        """Let the receiver lose its position."""
+        self.receive("PARAM_SET", {"param_id": "SIM_GPS_DISABLE", "param_value": 1.0})
+
+    def lose_radio(self):
+        """Let the pilot's transmitter fall silent."""
+        self.receive("PARAM_SET", {"param_id": "SIM_RC_FAIL", "param_value": 1.0})
+
     def parameter_changed(self, name, before):
         value = self.parameters[name]
         if name == "SIM_RC_FAIL":
@@ -105,6 +119,7 @@ class ArduPilotWatch(StandIn):
                 self._clear("radio", "Radio Failsafe Cleared")
         elif name == "SIM_GPS_DISABLE":
             self._gps_lost_s = self.now_s if value else None
+            self.estimator.is_dead_reckoning = bool(value)
 
     def _boot(self):
         for at_s, words in BOOT_TEXTS:
@@ -130,10 +145,20 @@ class ArduPilotWatch(StandIn):
             self._lose_radio()
         if self._gps_lost_s is not None:
             self._lose_position(self.now_s - self._gps_lost_s)
+        if self.is_voltage_low(self.parameters["BATT_LOW_VOLT"], LOW_VOLTAGE_S):
+            self._tell_low_battery()
         enabled = self.parameters["FS_GCS_ENABLE"]
         late = -math.inf < self._heard_s < self.now_s - GCS_S
         if self.armed and enabled and late and "gcs" not in self._fired:
             self._fire("gcs", LAND if enabled == 5 else RTL, "GCS Failsafe")
+
+    def _tell_low_battery(self):
+        """Tell it once and act; until a reboot it does not arm again."""
+        if self.armed and not self.has_low_battery:
+            self.has_low_battery = True
+            self.say(WARNING, f"Battery 1 is low {self.voltage_v:.2f}V used 0 mAh")
+            mode = BATTERY_MODES.get(int(self.parameters["BATT_FS_LOW_ACT"]))
+            self._fire("battery", mode, "Battery Failsafe")
 
     def _lose_radio(self):
         action = self.parameters["FS_THR_ENABLE"]
@@ -160,7 +185,7 @@ class ArduPilotWatch(StandIn):
     def _fire(self, name, mode, *texts):
         self._fired.add(name)
         self.is_critical = True
-        if mode is not None:
+        if mode is not None and mode != self.mode:
             self.set_mode(mode)
             self._descent_s = self.now_s + LAND_PAUSE_S
         for words in texts:

@@ -38,6 +38,7 @@ class Bodies:
         count: Steps since the start.
         contacts: Contacts since the start, without those with the floor.
         lift_mps2: Vertical acceleration of each body; None with the motors off.
+        drift_mps: Velocity (x, y) in ``map`` of each body that its estimator does not know.
     """
 
     def __init__(self, scene=EMPTY, starts=None, airframes=(AIRFRAME,)):
@@ -59,6 +60,7 @@ class Bodies:
         self.contacts = []
         self.state, self.count = self._world.state(), 0
         self.lift_mps2 = [None] * len(starts)
+        self.drift_mps = [(0.0, 0.0)] * len(starts)
 
     @property
     def now_s(self):
@@ -73,8 +75,10 @@ class Bodies:
         self._autopilots[robot].receive(0, command, self._one(robot), self.count)
 
     def _one(self, robot):
-        """Return the state of one body alone."""
-        return BodyState(self.state.rows[robot : robot + 1].copy())
+        """Return the state of one body alone, as its autopilot estimates it."""
+        rows = self.state.rows[robot : robot + 1].copy()
+        rows[0, 7:9] -= self.drift_mps[robot]
+        return BodyState(rows)
 
     def step(self):
         """Advance all bodies by one step of the simulation."""

@@ -11,6 +11,7 @@ from quad_nav.vehicle.frames import ned_from_frd
 GROUND_OFFSET_M = -0.035
 """Height that the recorded autopilot reports while it stands on the ground."""
 _DRIFT_S, _POSITION_SD_M, _HEIGHT_SD_M, _VELOCITY_SD_MPS = 20.0, 0.005, 0.005, 0.006
+DRIFT_MPS2 = 2.0 * 0.63 / 8.0**2  # 0.63 m off after 8 s without GPS
 _BARO_S = 1.2  # within this time the estimate follows an error of the barometer
 
 
@@ -37,6 +38,7 @@ class Estimator:
         jump_m: Fault: a jump (north, east, up).
         baro_error_m: Fault: an error of the barometer, which the estimate follows.
         is_lost: Whether there is no position any more.
+        is_dead_reckoning: Fault: nothing corrects the position, and the vehicle drifts unseen.
     """
 
     def __init__(self, bodies, robot, frame, seed):
@@ -48,7 +50,9 @@ class Estimator:
         self._noise = [0.0] * 7
         self._baro_m = 0.0
         self.is_frozen, self.jump_m, self.baro_error_m = False, (0.0, 0.0, 0.0), 0.0
-        self.is_lost = False
+        self.is_lost = self.is_dead_reckoning = False
+        self._drift_yaw_rad = self._random.uniform(-math.pi, math.pi)
+        self._drift_mps, self._drift_m = 0.0, 0.0
         self._held = None
 
     def step(self, seconds):
@@ -59,10 +63,23 @@ class Estimator:
         gauss = self._random.gauss
         self._noise = [n + spread * gauss(0.0, s) - share * n for n, s in zip(self._noise, sizes)]
         self._baro_m += (self.baro_error_m - self._baro_m) * min(1.0, seconds / _BARO_S)
+        self._drift(seconds)
         if not self.is_frozen:
             self._held = None
         elif self._held is None:
             self._held = (self._position(), self._velocity(), self._attitude(), self._rates())
+
+    def _drift(self, seconds):
+        """Move away from where the estimate is; with a receiver the error is gone at once."""
+        if self.is_dead_reckoning:
+            self._drift_mps += DRIFT_MPS2 * seconds
+            self._drift_m += self._drift_mps * seconds
+        else:
+            self._drift_mps = self._drift_m = 0.0
+        self._bodies.drift_mps[self._robot] = self._along_drift(self._drift_mps)
+
+    def _along_drift(self, size):
+        return size * math.cos(self._drift_yaw_rad), size * math.sin(self._drift_yaw_rad)
 
     @property
     def height_m(self):
@@ -98,7 +115,10 @@ class Estimator:
 
     def _position(self):
         pose = self._bodies.pose(self._robot)
-        north, east = self.ned(pose.x_m - self._start.x_m, pose.y_m - self._start.y_m)
+        drift_x, drift_y = self._along_drift(self._drift_m)
+        north, east = self.ned(
+            pose.x_m - self._start.x_m - drift_x, pose.y_m - self._start.y_m - drift_y
+        )
         n, e, up = self.jump_m
         return (
             self._frame.north_m + north + self._noise[0] + n,
@@ -108,7 +128,8 @@ class Estimator:
 
     def _velocity(self):
         x, y, z = self._bodies.velocity_mps(self._robot)
-        north, east = self.ned(x, y)
+        drift_x, drift_y = self._along_drift(self._drift_mps)
+        north, east = self.ned(x - drift_x, y - drift_y)
         return (north + self._noise[3], east + self._noise[4], -z + self._noise[5])
 
     def _attitude(self):

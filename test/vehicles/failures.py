@@ -20,6 +20,7 @@ from vehicles.virtual_flight import STAND_INS, Flight, PairFlight, StandInFlight
 from quad_nav.geometry import Twist2D
 from quad_nav.vehicle.orders import State
 
+CLOCK_ROW = "the vehicle's clock steps back"
 HOVER_MPS = 0.05
 NEIGHBOUR_M = 0.05
 """How far the other vehicle may be from its place; its estimate drifts."""
@@ -90,6 +91,26 @@ def _kill_bridge(flight):
     flight.is_alive = False
 
 
+def _kill_bridge_beside_station(flight):
+    flight.has_station, flight.is_alive = True, False
+
+
+def _lower_voltage(flight):
+    flight.vehicle.battery, flight.vehicle.voltage_v = 100, 9.0
+
+
+def _lose_receiver(flight):
+    flight.vehicle.lose_receiver()
+
+
+def _glitch(flight):
+    flight.vehicle.glitch(north_m=3.0)
+
+
+def _lose_radio(flight):
+    flight.vehicle.lose_radio()
+
+
 def _lands_by_itself(flight):
     return flight.vehicle.mode == flight.vehicle.kind["land"]
 
@@ -118,7 +139,41 @@ ROWS = {
 STAND_IN_ROWS = {
     **ROWS,
     "the barometer puts it on the ground": (_mislead_barometer, State.LANDING, 10.0, False),
+    "the bridge dies beside a station": (
+        _kill_bridge_beside_station,
+        _lands_by_itself,
+        17.0,
+        False,
+    ),
+    "voltage low, charge 100 %": (_lower_voltage, State.LANDING, 3.2, False),
+    "GPS lost: hover": (_lose_receiver, State.HOLDING, 0.9, False),
+    "GPS lost: land": (_lose_receiver, State.LANDING, 2.4, False),
+    "GPS glitch": (_glitch, State.LANDING, 2.4, False),
+    "radio lost": (_lose_radio, State.TAKEN_OVER, 1.1, True),
 }
+_GPS = {
+    "ardupilot": "the GPS has lost its position (3 satellites)",
+    "px4": "GNSS data fusion stopped",
+}
+REASONS = {
+    "battery low": dict.fromkeys(STAND_INS, "battery at 12 %, expected 20 % or more"),
+    "voltage low, charge 100 %": {
+        "ardupilot": "battery at 9.00 V, expected 10.5 V or more",
+        "px4": "Low battery",
+    },
+    "GPS lost: hover": _GPS,
+    "GPS lost: land": _GPS,
+    "GPS glitch": dict.fromkeys(STAND_INS, "the estimator rejects its measurements"),
+    "radio lost": {
+        "ardupilot": "the mode was changed to LAND by the autopilot: Radio Failsafe",
+        "px4": "the mode was changed to AUTO.LOITER by the autopilot: Failsafe activated",
+    },
+    "link lost to the vehicle": {
+        "ardupilot": "the mode was changed to LAND by the autopilot: GCS Failsafe",
+        "px4": "the mode was changed to AUTO.LOITER by the autopilot: Failsafe activated",
+    },
+}
+"""What the reason of the bridge must tell at the end of some rows."""
 LATE_S, ALWAYS_LATE_S = {"somebody disarms": 1.1}, 0.05
 """A real link is this much later; arming is told by the heartbeats, once a second."""
 STATES_WITHOUT_STREAM = (State.TAKEN_OVER, State.NO_LINK, State.LANDING)
@@ -161,9 +216,34 @@ def fly_row(name, autopilot, moment_s, command=COMMAND, make_flight=Flight, seed
     if state in STATES_WITHOUT_STREAM and flight.state in STATES_WITHOUT_STREAM:
         assert flight.setpoints_since(silent_s) == []
     assert (flight.pauses > 0) == pauses, flight.pauses
+    if issubclass(make_flight, StandInFlight):
+        assert REASONS.get(name, {}).get(autopilot, "") in flight.machine.reason
     if make_flight is PairFlight:
         _check_neighbour(flight, name)
     return flight, reached_s, safe_s
+
+
+def fly_clock_row(autopilot, moment_s, seed):
+    """Set the vehicle's clock back by 0.9 s; return the flight, and how long stamps are wrong.
+
+    Raises:
+        AssertionError: They stay wrong, or the flight does not go on.
+    """
+    flight = PairFlight(autopilot, seed=seed).to_flight(COMMAND)
+    flight.run(moment_s)
+    flight.mark()
+    start_s = flight.now_s
+    flight.vehicle.clock_step_s -= 0.9
+    flight.run(0.06)  # a message comes
+
+    def is_right():
+        return flight.now_s - flight.adapter.estimate.stamp_s < 0.1
+
+    assert flight.run(1.0, is_right), flight.now_s - flight.adapter.estimate.stamp_s
+    wrong_s = flight.now_s - start_s
+    assert not flight.run(1.0, lambda: not is_right() or flight.state is not State.FLYING)
+    _check_neighbour(flight, CLOCK_ROW)
+    return flight, wrong_s
 
 
 def _refuse_arming(flight, _):
@@ -228,6 +308,9 @@ def repeat(name, autopilot, repeats, moments):
             if name in TAKE_OFF_ROWS:
                 flight, reached_s = fly_take_off_row(name, autopilot, moment_s, seed)
                 safe_s = reached_s
+            elif name == CLOCK_ROW:
+                flight, reached_s = fly_clock_row(autopilot, moment_s, seed)
+                safe_s = reached_s
             else:
                 flight, reached_s, safe_s = fly_row(
                     name, autopilot, moment_s, make_flight=PairFlight, seed=seed
@@ -249,7 +332,7 @@ def main():
         f" {'other m':>8}"
     )
     good = True
-    for name in [*STAND_IN_ROWS, *TAKE_OFF_ROWS]:
+    for name in [*STAND_IN_ROWS, CLOCK_ROW, *TAKE_OFF_ROWS]:
         for autopilot in autopilots:
             if name == "a foreign set-point cancels the take-off" and autopilot != "ardupilot":
                 continue  # PX4 takes off by set-points

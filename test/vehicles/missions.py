@@ -42,7 +42,7 @@ from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
 from quad_nav.vehicle.orders import Permissions, State
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Vehicle
+from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, Vehicle
 
 BARE = {**BARE_AIRFRAMES, "crazyflie": CRAZYFLIE_AIRFRAME}
 TICK_STEPS = 6  # 25 ms, as in the node
@@ -103,7 +103,7 @@ class MavlinkBridge(Bridge):
 
     def send(self, messages):
         for name, fields in messages:
-            self.vehicle.receive(name, fields)
+            self.vehicle.receive(name, fields, (OUR_SYSTEM, 191))
 
 
 class CrazyflieBridge(Bridge):

@@ -11,6 +11,8 @@ import math
 from collections import deque
 from types import SimpleNamespace
 
+from quad_nav.vehicle.vehicle_file import OUR_SYSTEM
+
 ARDUPILOT = {
     "autopilot": 3,
     "control": 4,
@@ -19,12 +21,14 @@ ARDUPILOT = {
     "parameters": {
         "GUID_TIMEOUT": 3.0,
         "FS_GCS_ENABLE": 5.0,
-        "SYSID_MYGCS": 255.0,
+        "SYSID_MYGCS": float(OUR_SYSTEM),
         "FS_THR_ENABLE": 3.0,
         "FS_OPTIONS": 0.0,
         "FS_EKF_ACTION": 1.0,
         "RTL_ALT": 1500.0,
-        "BATT_FS_LOW_ACT": 0.0,
+        "BATT_FS_LOW_ACT": 1.0,
+        "BATT_LOW_VOLT": 10.5,
+        "EK3_SRC1_POSXY": 3.0,
         "FENCE_ENABLE": 0.0,
         "FENCE_TYPE": 7.0,
         "FENCE_ACTION": 1.0,
@@ -46,6 +50,7 @@ PX4 = {
         "NAV_RCL_ACT": 3.0,
         "COM_RCL_EXCEPT": 0.0,
         "COM_LOW_BAT_ACT": 2.0,
+        "EKF2_GPS_CTRL": 7.0,
         "RTL_RETURN_ALT": 30.0,
         "GF_ACTION": 0.0,
         "GF_MAX_HOR_DIST": 0.0,

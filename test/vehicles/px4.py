@@ -6,7 +6,7 @@ vehicle holds for COM_FAIL_ACT_T and then does what COM_OBL_RC_ACT says. It stre
 unasked. Whole-number parameters travel as their bits. Its dynamics are made up from its default
 gains: a velocity loop of 1.8/s, a yaw rate without overshoot.
 
-Not modelled: the geofence, the failsafe for a low battery, sticks that take over.
+Not modelled: the geofence, what it does itself about a low battery, sticks that take over.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ from vehicles.stand_in import (
     IN_AIR,
     INFO,
     LANDING,
+    MESSAGES,
     ON_GROUND,
     TAKING_OFF,
     UNSUPPORTED,
+    WARNING,
     StandIn,
     text,
 )
@@ -45,6 +47,7 @@ LANDED_S, DISARM_LANDED_S, DISARM_PREFLIGHT_S = 1.0, 2.0, 10.0
 LAND_MPS, RETURN_MPS, BRAKE_S = 0.7, 1.5, 0.6
 POSITION_S = 10.0
 FORCE = 21196
+LOW_V, NO_AID_S = 10.5, 5.0  # 3.5 V for each cell; EKF2_NOAID_TOUT
 UNASKED_S = {
     "ATTITUDE": 1 / 15.0,
     "LOCAL_POSITION_NED": 1.0,
@@ -67,6 +70,8 @@ class Px4(StandIn):
     """The autopilot; modes by PX4's own numbers."""
 
     NUMBER = 12
+    MESSAGES = {number: name for number, name in MESSAGES.items() if number != 193}
+    MESSAGES[230] = "ESTIMATOR_STATUS"
     DEFAULTS = {
         "COM_OF_LOSS_T": 1.0,
         "COM_OBL_RC_ACT": 0.0,
@@ -76,6 +81,7 @@ class Px4(StandIn):
         "NAV_RCL_ACT": 2.0,
         "COM_RCL_EXCEPT": 0.0,
         "COM_LOW_BAT_ACT": 0.0,
+        "EKF2_GPS_CTRL": 7.0,
         "RTL_RETURN_ALT": 60.0,
         "GF_ACTION": 2.0,
         "GF_MAX_HOR_DIST": 0.0,
@@ -92,6 +98,7 @@ class Px4(StandIn):
         self._flown_s = self._lift_s = -math.inf
         self._touch_s = self._brake = self._action = None
         self._is_flying, self._wants_up = False, 0.0
+        self._gps_lost_s = None
 
     @property
     def base_mode(self):
@@ -228,8 +235,30 @@ class Px4(StandIn):
             lift = None
         self._bodies.lift_mps2[self._robot] = lift
 
+    def lose_receiver(self):
+        """Let the receiver lose its position."""
+        self._gps_lost_s, self.estimator.is_dead_reckoning = self.now_s, True
+        self.say(WARNING, "GNSS data fusion stopped")
+
+    def lose_radio(self):
+        """Let the pilot's transmitter fall silent."""
+        mode = LINK_ACTIONS.get(int(self.parameters["NAV_RCL_ACT"]))
+        if mode is not None and not int(self.parameters["COM_RCL_EXCEPT"]) & 4:
+            self._hold_then(mode)
+
+    def _watch_sensors(self):
+        if self._gps_lost_s is not None and self.now_s - self._gps_lost_s > NO_AID_S:
+            self.estimator.is_lost = True
+            if self.armed and self.mode != LAND:
+                self.set_mode(LAND)
+                self.say(CRITICAL, "Failsafe activated")
+        if self.is_voltage_low(LOW_V, 1.0) and not self.has_low_battery:
+            self.has_low_battery = True
+            self.say(CRITICAL, "Low battery")
+
     def _watch(self):
         """Hold, and act later, when the stream or the ground station is lost."""
+        self._watch_sensors()
         if not self.armed:
             return
         if self._action is not None and self.now_s >= self._action[0]:

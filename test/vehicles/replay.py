@@ -28,7 +28,7 @@ from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
 from quad_nav.vehicle.orders import Permissions, State
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Vehicle
+from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, Vehicle
 
 TICK_S, COMMAND_S = 0.01, 0.05
 GUIDED = 4
@@ -50,12 +50,14 @@ PARAMETERS = {
     "FENCE_MARGIN": 0.25,
     "FENCE_ENABLE": 1.0,
     "FS_GCS_ENABLE": 5.0,
-    "SYSID_MYGCS": 255.0,
+    "SYSID_MYGCS": float(OUR_SYSTEM),
     "FS_THR_ENABLE": 3.0,
     "FS_OPTIONS": 0.0,
     "FS_EKF_ACTION": 1.0,
     "RTL_ALT": 1500.0,
-    "BATT_FS_LOW_ACT": 0.0,
+    "BATT_FS_LOW_ACT": 1.0,
+    "BATT_LOW_VOLT": 10.5,
+    "EK3_SRC1_POSXY": 3.0,
 }
 
 
@@ -129,7 +131,8 @@ class Replay:
         self.adapter.receive(row["name"], row["comp"], Fields(**fields), now_s)
 
     def _answer(self, name, fields, now_s):
-        if name in ("PARAM_REQUEST_READ", "PARAM_SET"):
+        known = fields.get("param_id") in PARAMETERS
+        if name in ("PARAM_REQUEST_READ", "PARAM_SET") and known:
             value = fields.get("param_value", PARAMETERS.get(fields["param_id"]))
             answer = Fields(param_id=fields["param_id"], param_value=value, param_type=9)
             self.adapter.receive("PARAM_VALUE", 1, answer, now_s)

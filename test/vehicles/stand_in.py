@@ -12,32 +12,23 @@ import math
 import random
 from types import SimpleNamespace
 
-from vehicles.estimator import Estimator, LocalFrame, euler
+from vehicles.estimator import Estimator, LocalFrame
+from vehicles.stand_in_messages import MESSAGES, Messages
 
 from quad_nav.sim.simulation import STEP_S
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
 CRITICAL, WARNING, INFO = 2, 4, 6
-MESSAGES = {
-    1: "SYS_STATUS",
-    24: "GPS_RAW_INT",
-    30: "ATTITUDE",
-    31: "ATTITUDE_QUATERNION",
-    32: "LOCAL_POSITION_NED",
-    65: "RC_CHANNELS",
-    85: "POSITION_TARGET_LOCAL_NED",
-    193: "EKF_STATUS_REPORT",
-    245: "EXTENDED_SYS_STATE",
-}
 ORIGIN = LocalFrame()
+FIX_S, GLITCH_S = 10.5, 10.1
 _HEARTBEAT_S, _TIMESYNC_S = 1.0, 10.0
 _LATENCY_S = (0.0005, 0.007)
 _LOST_BEFORE_S = 1.25
 """A rate that is asked for this soon after boot is acknowledged and forgotten."""
 
 
-class StandIn:
+class StandIn(Messages):
     """The endpoint; ``receive`` takes messages, ``messages`` returns those that arrive by now.
 
     Attributes:
@@ -49,6 +40,8 @@ class StandIn:
         parameters: Values by name.
         setpoints: (time, fields) of all set-points that came.
         battery: Charge in percent.
+        voltage_v: Voltage of its battery, with three cells.
+        clock_step_s: Fault: how far its clock has stepped.
         sticks: Pulse widths of channels 1 to 4.
         refuses_arming: Fault: reason for which arming is refused.
         loses_down: Fault: nothing that it sends arrives.
@@ -58,9 +51,11 @@ class StandIn:
         loss_share: Fault: share of the messages that are lost, both ways.
         hides_position: Fault: it sends no position.
         has_ended: Its program has crashed.
+        has_low_battery: It has told a low battery; latched.
     """
 
     NUMBER = 0  # MAV_AUTOPILOT
+    MESSAGES = MESSAGES
     DEFAULTS = {}
     STATUS_BEFORE_FLIGHT, STATUS_IN_FLIGHT, STATUS_CRITICAL = 3, 4, 5
 
@@ -71,12 +66,13 @@ class StandIn:
         self.parameters = {**self.DEFAULTS, **(parameters or {})}
         self.now_s, self.boot_s = 0.0, boot_s
         self.mode, self.armed, self.landed = 0, False, ON_GROUND
-        self.battery, self.sticks = 97, [1500, 1500, 1500, 1500]
+        self.battery, self.voltage_v, self.sticks = 97, 12.6, [1500, 1500, 1500, 1500]
+        self.clock_step_s, self._low_s, self._glitch = 0.0, None, None
         self.refuses_arming = ""
         self.loses_down = self.loses_up = self.hides_position = self.has_ended = False
         self.delay_down_s = self.delay_up_s = self.loss_share = 0.0
         self.setpoints, self.received = [], []
-        self.is_critical = False
+        self.is_critical = self.has_low_battery = False
         self._periods, self._due = {}, {"HEARTBEAT": 0.95, "TIMESYNC": 4.0}
         self._queue, self._inbox, self._sequence, self._last_s = [], [], 0, 0.0
 
@@ -100,7 +96,7 @@ class StandIn:
 
     def _on_timesync(self, message, _):
         if message.tc1 == 0:
-            self.send("TIMESYNC", tc1=int(self.boot_s * 1e9), ts1=message.ts1)
+            self.send("TIMESYNC", tc1=int(self.clock_s * 1e9), ts1=message.ts1)
 
     def _on_param_request_read(self, message, _):
         self._send_parameter(text(message.param_id))
@@ -152,7 +148,7 @@ class StandIn:
         )
 
     def _set_rate(self, number, interval_us):
-        name = MESSAGES.get(number)
+        name = self.MESSAGES.get(number)
         if name is None:
             return DENIED, [(CRITICAL, f"No ap_message for mavlink id ({number})")]
         if self.boot_s < _LOST_BEFORE_S:
@@ -174,6 +170,7 @@ class StandIn:
         self.now_s += STEP_S
         self.boot_s += STEP_S
         self.estimator.step(STEP_S)
+        self._end_glitch()
         if self.has_ended:
             return
         self.fly()
@@ -244,13 +241,18 @@ class StandIn:
         if self._is_due("HEARTBEAT", _HEARTBEAT_S):
             self.heartbeat()
         if self._is_due("TIMESYNC", _TIMESYNC_S):
-            self.send("TIMESYNC", tc1=0, ts1=int(self.boot_s * 1e9))
+            self.send("TIMESYNC", tc1=0, ts1=int(self.clock_s * 1e9))
         for name, period_s in list(self._periods.items()):
             if not self._is_due(name, period_s):
                 continue
             if name == "LOCAL_POSITION_NED" and (self.hides_position or not self.has_position):
                 continue
             self.send(name, **getattr(self, f"_make_{name.lower()}")())
+
+    @property
+    def has_receiver(self):
+        """Whether the receiver has a position."""
+        return self.boot_s >= FIX_S and not self.estimator.is_dead_reckoning
 
     @property
     def has_position(self):
@@ -265,74 +267,21 @@ class StandIn:
         return True
 
     @property
+    def clock_s(self):
+        """Time of its clock."""
+        return self.boot_s + self.clock_step_s
+
+    @property
     def _boot_ms(self):
-        return int(self.boot_s * 1e3)
+        return int(self.clock_s * 1e3)
 
-    def _make_sys_status(self):
-        sensors = 1 << 28
-        names = ("load", "drop_rate_comm", "errors_comm")
-        names += tuple(f"errors_count{k}" for k in (1, 2, 3, 4))
-        return dict(
-            onboard_control_sensors_present=sensors,
-            onboard_control_sensors_enabled=sensors,
-            onboard_control_sensors_health=0 if self.refuses_arming else sensors,
-            voltage_battery=12600,
-            current_battery=0,
-            battery_remaining=int(self.battery),
-            **dict.fromkeys(names, 0),
-        )
-
-    def _make_gps_raw_int(self):
-        zeros = dict.fromkeys(("lat", "lon", "alt", "vel", "cog"), 0)
-        return dict(
-            time_usec=int(self.boot_s * 1e6),
-            fix_type=6 if self.has_position else 0,
-            eph=121,
-            epv=200,
-            satellites_visible=10 if self.has_position else 0,
-            **zeros,
-        )
-
-    def _make_attitude(self):
-        roll, pitch, yaw = euler(self.estimator.attitude)
-        p, q, r = self.estimator.rates_frd
-        return dict(
-            time_boot_ms=self._boot_ms,
-            roll=roll,
-            pitch=pitch,
-            yaw=yaw,
-            rollspeed=p,
-            pitchspeed=q,
-            yawspeed=r,
-        )
-
-    def _make_attitude_quaternion(self):
-        w, x, y, z = self.estimator.attitude
-        p, q, r = self.estimator.rates_frd
-        rates = dict(rollspeed=p, pitchspeed=q, yawspeed=r)
-        return dict(time_boot_ms=self._boot_ms, q1=w, q2=x, q3=y, q4=z, **rates)
-
-    def _make_local_position_ned(self):
-        (x, y, z), (vx, vy, vz) = self.estimator.position_ned, self.estimator.velocity_ned
-        return dict(time_boot_ms=self._boot_ms, x=x, y=y, z=z, vx=vx, vy=vy, vz=vz)
-
-    def _make_rc_channels(self):
-        values = [*self.sticks, *(1000,) * 14]
-        channels = {f"chan{k}_raw": value for k, value in enumerate(values, 1)}
-        return dict(time_boot_ms=self._boot_ms, chancount=16, rssi=255, **channels)
-
-    def _make_position_target_local_ned(self):
-        names = ("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz", "yaw", "yaw_rate")
-        values = dict.fromkeys(names, 0.0)
-        return dict(time_boot_ms=self._boot_ms, coordinate_frame=1, type_mask=3079, **values)
-
-    def _make_ekf_status_report(self):
-        names = ("velocity_variance", "pos_horiz_variance", "pos_vert_variance")
-        names += ("compass_variance", "terrain_alt_variance")
-        return dict(flags=831 if self.has_position else 167, **dict.fromkeys(names, 0.01))
-
-    def _make_extended_sys_state(self):
-        return dict(vtol_state=3, landed_state=self.landed)
+    def is_voltage_low(self, least_v, seconds):
+        """Return whether the voltage has been too low for some seconds."""
+        if self.voltage_v >= least_v:
+            self._low_s = None
+        elif self._low_s is None:
+            self._low_s = self.now_s
+        return self._low_s is not None and self.now_s - self._low_s >= seconds
 
     # What tests inject, and what they read of the true body.
 
@@ -344,6 +293,15 @@ class StandIn:
     def freeze(self):
         """Let the estimate stay what it is."""
         self.estimator.is_frozen = True
+
+    def glitch(self, north_m):
+        """Let the receiver's position jump; the estimator takes it after GLITCH_S."""
+        self._glitch = (self.now_s + GLITCH_S, north_m)
+
+    def _end_glitch(self):
+        if self._glitch is not None and self.now_s >= self._glitch[0]:
+            self.jump(north_m=self._glitch[1])
+            self._glitch = None
 
     def jump(self, north_m=0.0, up_m=0.0):
         """Let the estimate jump."""

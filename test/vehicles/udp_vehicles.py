@@ -29,6 +29,7 @@ from vehicles.virtual_flight import AIRFRAMES, STAND_INS
 
 from quad_nav.geometry import Pose2D
 from quad_nav.sim.scene_file import load_scene
+from quad_nav.vehicle.vehicle_file import OUR_SYSTEM
 
 STEP_S = 1.0 / 120.0
 BOOT_S = 60.0
@@ -43,6 +44,8 @@ class UdpVehicle:
         place, heading_rad = (float(north), float(east)), math.radians(float(heading))
         if kind in STAND_INS:
             stand_in, safe = STAND_INS[kind]
+            if "SYSID_MYGCS" in safe:
+                safe = {**safe, "SYSID_MYGCS": float(OUR_SYSTEM - number)}
             frame = LocalFrame(*place, heading_rad)
             self.vehicle = stand_in(bodies, number, frame, number, BOOT_S, safe)
         else:

@@ -21,14 +21,25 @@ from quad_nav.vehicle.mavlink_adapter import MavlinkAdapter
 from quad_nav.vehicle.orders import Permissions, State
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Vehicle
+from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, Vehicle
 
 STEP_S = 0.01
 MAY_ARM, AHEAD = Permissions(may_arm=True), Twist2D(0.5, 0.0, 0.0)
-STAND_INS = {
-    "ardupilot": (ArduPilot, {"FS_GCS_ENABLE": 5.0, "FS_THR_ENABLE": 3.0}),
-    "px4": (Px4, {"COM_OBL_RC_ACT": 4.0, "NAV_DLL_ACT": 3.0, "NAV_RCL_ACT": 3.0}),
+SAFE_ARDUPILOT = {
+    "FS_GCS_ENABLE": 5.0,
+    "FS_THR_ENABLE": 3.0,
+    "SYSID_MYGCS": float(OUR_SYSTEM),
+    "BATT_FS_LOW_ACT": 1.0,
 }
+SAFE_PX4 = {
+    "COM_OBL_RC_ACT": 4.0,
+    "NAV_DLL_ACT": 3.0,
+    "NAV_RCL_ACT": 3.0,
+    "COM_LOW_BAT_ACT": 2.0,
+}
+STAND_INS = {"ardupilot": (ArduPilot, SAFE_ARDUPILOT), "px4": (Px4, SAFE_PX4)}
+GROUND_STATION = (255, 190)
+STATION_HEARTBEAT = {"type": 6, "autopilot": 8, "system_status": 4}
 AIRFRAMES = {"ardupilot": BARE_ARDUPILOT, "px4": BARE_PX4}
 STARTS = (Pose2D(200.0, 200.0, 0.0), Pose2D(200.0, 195.0, 0.0))
 KINDS = {"ardupilot": ARDUPILOT, "px4": PX4}
@@ -42,16 +53,21 @@ class Flight:
     def __init__(self, autopilot="ardupilot", permissions=MAY_ARM, seed=0, **limits):
         self.vehicle = self.make_vehicle(autopilot, seed)
         limits = Limits(**{"speed_mps": 1.0, **limits})
-        self.machine = VehicleMachine(1.2, limits, AUTOPILOTS[autopilot].traits, permissions)
-        self.adapter = MavlinkAdapter(
-            Vehicle(0, "mavlink", autopilot, altitude_m=1.2, limits=limits), self.machine
-        )
+        self._vehicle = Vehicle(0, "mavlink", autopilot, altitude_m=1.2, limits=limits)
+        self._permissions = permissions
+        self.start_bridge()
         self.now_s = 100.0
         self.sent = []  # (time, name, fields)
         self.news, self.states, self.pauses = [], [], 0
         self.hears = self.is_heard = self.is_alive = True
         self.command = None  # Twist2D of each 50 ms
         self._next_command_s = 0.0
+
+    def start_bridge(self):
+        """Start the bridge; a second time after it has died, which knows nothing."""
+        traits = AUTOPILOTS[self._vehicle.autopilot].traits
+        self.machine = VehicleMachine(1.2, self._vehicle.limits, traits, self._permissions)
+        self.adapter = MavlinkAdapter(self._vehicle, self.machine)
 
     def make_vehicle(self, autopilot, seed):
         return PointVehicle(KINDS[autopilot], heading_rad=0.6, boot_s=40.0)
@@ -89,7 +105,10 @@ class Flight:
         for name, fields in messages + more:
             self.sent.append((self.now_s, name, fields))
             if self.is_heard:
-                self.vehicle.receive(name, fields)
+                self._deliver(name, fields)
+
+    def _deliver(self, name, fields):
+        self.vehicle.receive(name, fields)
 
     @property
     def state(self):
@@ -131,9 +150,12 @@ class StandInFlight(Flight):
     """The same with a simulated body and a stand-in that behaves as the recorded autopilot.
 
     Its pilot has set the failsafes that the bridge asks for.
+
+    Attributes:
+        has_station: Whether a ground station is connected beside the bridge.
     """
 
-    step_s = 2.0 * STEP
+    step_s, has_station = 2.0 * STEP, False
 
     def __init__(
         self, autopilot="ardupilot", permissions=MAY_ARM, seed=0, bodies=None, robot=0, **limits
@@ -146,6 +168,14 @@ class StandInFlight(Flight):
         stand_in, safe = STAND_INS[autopilot]
         frame = LocalFrame(3.0, -2.0, 0.6)
         return stand_in(self.bodies, self._robot, frame, seed, 60.0 + seed % 7, safe)
+
+    def _deliver(self, name, fields):
+        self.vehicle.receive(name, fields, (OUR_SYSTEM, 191))
+
+    def _exchange(self, now_s, messages):
+        if self.has_station and int(now_s) > int(self.now_s):
+            self.vehicle.receive("HEARTBEAT", STATION_HEARTBEAT, GROUND_STATION)
+        super()._exchange(now_s, messages)
 
     def end(self):
         self.bodies.close()

@@ -56,6 +56,7 @@ class Configuration:
         clearing_radius_m: Half the side of the square that ``make_plan`` clears around the robot.
         body_radius_m: Radius of the simulated body; None for a quadcopter's own.
         robot: Number of the robot among the ``robots`` that fly together.
+        robots: Number of these; 0 for those that are found on the ROS graph.
         remarks: Remarks on parameters that are legal and odd.
         tree: The normalised tree, with ROS spellings.
         tree_at_start: The tree that ``restore_defaults`` restores.
@@ -74,7 +75,7 @@ class Configuration:
     clearing_radius_m: float
     body_radius_m: Optional[float] = None
     robot: int = 0
-    robots: int = 1
+    robots: int = 0
     remarks: Tuple[Remark, ...] = ()
     tree: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     tree_at_start: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -157,7 +158,7 @@ def _made(
         clearing_radius_m=tree.get("clearing_radius", circumscribed_radius_m(tree)),
         body_radius_m=tree.get("body_radius"),
         robot=tree.get("robot", 0),
-        robots=tree.get("robots", 1),
+        robots=tree.get("robots", 0),
         tree=pruned,
         tree_at_start=pruned,
     )

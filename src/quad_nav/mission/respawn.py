@@ -1,15 +1,17 @@
 """Run a node and restart it when a signal kills it.
 
-    python3 -m quad_nav.mission.respawn [--end-roslaunch] COMMAND [ARGUMENT...]
+    python3 -m quad_nav.mission.respawn [--end-roslaunch | --after-error] COMMAND [ARGUMENT...]
 
-The launch files use this as the sequencer's `launch-prefix`. roslaunch's own `respawn` also
-restarts a node that has finished, and excludes `required`. Here, a node that exits ends this
-program with the same status. A node that a signal kills is restarted with `--respawned` as its
-last argument, so that it resumes its mission from the journal.
+The launch files use this as the `launch-prefix` of nodes. roslaunch's own `respawn` also restarts
+a node that has finished, and excludes `required`. Here, a node that exits ends this program with
+the same status. A node that a signal kills is restarted with `--respawned` as its last argument, so
+that it goes on where it was: the sequencer resumes its mission from the journal.
 
 With `--end-roslaunch`, a node that exits ends the roslaunch that started this program, as Ctrl-C
 does. A node that is `required` does the same, but roslaunch reports that in red, also after a
 mission that has succeeded.
+
+With `--after-error`, a node that ends with 1, Python's status after an exception, is restarted too.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from typing import List
 from quad_nav.errors import printable
 
 RESPAWNED = "--respawned"
-END_ROSLAUNCH = "--end-roslaunch"
+END_ROSLAUNCH, AFTER_ERROR = "--end-roslaunch", "--after-error"
 DELAY_S = 1.0
 ENDS_WITHIN_S = 15.0
 ROSLAUNCH = (b"roslaunch", b"quiet_roslaunch")
@@ -40,8 +42,7 @@ def main() -> int:
         The command's exit status, or 128 plus the number of the signal passed on to it.
     """
     command, ended = sys.argv[1:], threading.Event()
-    ends_roslaunch = command[:1] == [END_ROSLAUNCH]
-    command = command[ends_roslaunch:]
+    option = command.pop(0) if command[0] in (END_ROSLAUNCH, AFTER_ERROR) else ""
     child = _start(command)
 
     def end(number: int, _frame: object) -> None:
@@ -52,17 +53,16 @@ def main() -> int:
         signal.signal(number, end)
     while True:
         status = child.wait()
-        if status >= 0 or ended.is_set():
-            if ends_roslaunch and not ended.is_set() and _end_roslaunch():
+        result = status if status >= 0 else 128 - status
+        is_fault = status < 0 or (option == AFTER_ERROR and status == 1)
+        if not is_fault or ended.is_set():
+            if option == END_ROSLAUNCH and not ended.is_set() and _end_roslaunch():
                 ended.wait(ENDS_WITHIN_S)  # roslaunch calls the end of a node in red
-            return status if status >= 0 else 128 - status
-        print(
-            f"{printable(command[0])}: killed by {signal.Signals(-status).name}, restarting",
-            file=sys.stderr,
-            flush=True,
-        )
+            return result
+        what = "ended with an error" if status > 0 else f"killed by {signal.Signals(-status).name}"
+        print(f"{printable(command[0])}: {what}, restarting", file=sys.stderr, flush=True)
         if ended.wait(DELAY_S):
-            return 128 - status
+            return result
         child = _start([*command, RESPAWNED])
 
 

@@ -330,7 +330,7 @@ def _check_starts(check: Checker, scene: Scene, starts: Sequence[Optional[Pose2D
     for k, start in readable:
         problem = _start_problem(scene, start)
         if problem:
-            check.fault(f"starts[{k}]", f"({start.x_m:g}, {start.y_m:g}) {problem}")
+            check.fault(f"starts[{k}]", problem)
         for other_k, other in readable[: readable.index((k, start))]:
             distance_m = start.distance_to(other)
             if distance_m <= 2 * BODY_RADIUS_M:
@@ -341,18 +341,27 @@ def _check_starts(check: Checker, scene: Scene, starts: Sequence[Optional[Pose2D
                 )
 
 
-def _start_problem(scene: Scene, start: Pose2D) -> Optional[str]:
-    if not scene.contains(start.x_m, start.y_m):
-        return (
-            f"is outside the arena, expected {scene.origin_x_m:g} < x < {scene.end_x_m:g} "
-            f"and {scene.origin_y_m:g} < y < {scene.end_y_m:g}"
-        )
+def outside_problem(scene: Scene, start: Pose2D) -> str:
+    """Return that a start pose is outside the arena, "" if it is not."""
+    if scene.contains(start.x_m, start.y_m):
+        return ""
+    return (
+        f"({start.x_m:g}, {start.y_m:g}) is outside the arena, expected"
+        f" {scene.origin_x_m:g} < x < {scene.end_x_m:g}"
+        f" and {scene.origin_y_m:g} < y < {scene.end_y_m:g}"
+    )
+
+
+def _start_problem(scene: Scene, start: Pose2D) -> str:
+    outside = outside_problem(scene, start)
+    if outside:
+        return outside
     point = (start.x_m, start.y_m, scene.altitude_m)
     nearest = scene.nearest(*point)
     distance_m = nearest.surface_distance_m(*point)
     if distance_m <= BODY_RADIUS_M:
         return (
-            f"is {distance_m:.2f} m from {nearest.name}, expected more than "
-            f"a quadcopter's radius, {BODY_RADIUS_M:g} m"
+            f"({start.x_m:g}, {start.y_m:g}) is {distance_m:.2f} m from {nearest.name}, expected "
+            f"more than a quadcopter's radius, {BODY_RADIUS_M:g} m"
         )
-    return None
+    return ""

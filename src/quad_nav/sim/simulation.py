@@ -112,9 +112,7 @@ class Simulation:
         self.step_count = start_step
         self.movers = Movers(scene, seed, start_step / STEPS_PER_S)
         self._law = FlightLaw(params.airframe, flight_params(params.airframe, params.flight))
-        self._command_steps = math.floor(
-            (params.command_timeout_s + params.controller_period_s) * STEPS_PER_S + 1e-9
-        )
+        self.wait_for_commands(params.controller_period_s)
         self._starts = start_poses(scene, n_robots, params.jitter_m, seed, params.airframe.radius_m)
         self._world = World(scene, self._starts, params.airframe, STEP_S, gui)
         # The engine's window and rays need the bodies in the engine.
@@ -196,6 +194,16 @@ class Simulation:
     def is_open(self) -> bool:
         """False after the window was closed."""
         return self._world.is_open
+
+    def wait_for_commands(self, period_s: float) -> float:
+        """Let commands be valid for the controllers' period and ``command_timeout_s``; return both.
+
+        Args:
+            period_s: Period of the slowest controller.
+        """
+        valid_s = self.params.command_timeout_s + period_s
+        self._command_steps = math.floor(valid_s * STEPS_PER_S + 1e-9)
+        return valid_s
 
     def set_command(self, robot: int, twist: Twist2D) -> None:
         """Set the commanded velocity of a quadcopter, from the next step on.

@@ -211,11 +211,14 @@ class CommandLease:
     """Accept velocity commands from one node at a time for each quadcopter.
 
     The first node that sends a command holds the lease until its last command has expired.
+
+    Attributes:
+        valid_s: Time for which a command stays in force.
     """
 
     def __init__(self, valid_s: float) -> None:
         """Start without holders; `valid_s` is how long a command stays in force."""
-        self._valid_s = valid_s
+        self.valid_s = valid_s
         self._holders: Dict[int, Tuple[str, float]] = {}  # node, and when its lease expires
 
     def holder(self, robot: int, node: str, now_s: float) -> str:
@@ -223,7 +226,7 @@ class CommandLease:
         holder, until_s = self._holders.get(robot, (node, now_s))
         if holder != node and now_s < until_s:
             return holder
-        self._holders[robot] = node, now_s + self._valid_s
+        self._holders[robot] = node, now_s + self.valid_s
         return node
 
     def clear(self) -> None:

@@ -3,6 +3,6 @@
 Nothing here reads a clock or starts a thread: the time is an argument. ``mavlink_link`` is the
 only module with a socket.
 
-Reading order: `vehicle_file`, `frames`, `telemetry`, `orders`, `states`, `inputs`, `safety`,
-`setpoints`.
+Reading order: `vehicle_file`, `ranges`, `frames`, `telemetry`, `orders`, `states`, `inputs`,
+`safety`, `setpoints`.
 """

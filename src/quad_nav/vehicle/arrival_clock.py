@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-WINDOW_S = 5.0
+WINDOW_S = 1.0
 _WRAP_MS = 1 << 24
 
 
@@ -12,8 +12,8 @@ class ArrivalClock:
     """Converts a counter of milliseconds modulo 2^24 to our clock.
 
     A message is never received before it is sent. So the smallest difference between arrival and
-    stamp, of the last 5 to 10 s, is the offset between the clocks, with the shortest delay of the
-    link in it. The window lets the offset follow a clock that drifts.
+    stamp, of the last 1 to 2 s, is the offset between the clocks, with the shortest delay of the
+    link in it. The window lets the offset follow a clock that drifts or steps.
     """
 
     def __init__(self) -> None:

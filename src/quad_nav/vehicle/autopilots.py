@@ -6,9 +6,10 @@ ArduPilot's values were measured on ArduCopter 4.5.3 in software. PX4's are from
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Dict, FrozenSet, Mapping, Tuple
+from typing import Any, Dict, FrozenSet, Mapping, Pattern, Tuple
 
 from quad_nav.vehicle.orders import Order, Traits
 from quad_nav.vehicle.telemetry import Status
@@ -43,6 +44,11 @@ class Autopilot:
             not as its value.
         refusals: Beginnings of texts with a reason for a refused order.
         complaints: Beginnings of texts with a reason for not being ready.
+        estimator: Number and name of the message with the state of its estimator, and its fields
+            that are 1 or more when the estimator rejects measurements.
+        low_battery: Texts that tell a low battery.
+        lost_position: Texts that tell a position which does not count any more.
+        acts: Texts that tell why it changes its mode or stops the motors by itself.
         turn_lead_s: Time by which its velocity follows a set-point. It turns a set-point by its
             heading at the arrival, so in a turn it would fly behind its heading.
     """
@@ -58,6 +64,10 @@ class Autopilot:
     sends_bits: bool
     refusals: Tuple[str, ...]
     complaints: Tuple[str, ...]
+    estimator: Tuple[int, str, Tuple[str, ...]]
+    low_battery: Pattern[str]
+    lost_position: Pattern[str]
+    acts: Pattern[str]
     turn_lead_s: float = 0.0
 
     def status(self, base_mode: int, custom_mode: int) -> Status:
@@ -126,6 +136,12 @@ ARDUPILOT = Autopilot(
     sends_bits=False,
     refusals=("Arm: ", "Mode change to "),
     complaints=("PreArm: ",),
+    estimator=(193, "EKF_STATUS_REPORT", ("velocity_variance", "pos_horiz_variance")),
+    low_battery=re.compile(r"Battery (Failsafe|\d+ is (low|critical))"),
+    lost_position=re.compile(
+        r"EKF variance|EKF3? IMU\d stopped aiding|GPS Glitch|Dead Reckoning started"
+    ),
+    acts=re.compile(r"^(?!.*Cleared).*(Failsafe|EKF variance|[Ff]ence|Crash)"),
     turn_lead_s=0.6,
 )
 
@@ -162,6 +178,10 @@ PX4 = Autopilot(
     sends_bits=True,
     refusals=("Preflight Fail", "Arming denied", "Switching to ", "Takeoff denied"),
     complaints=("Preflight Fail", "Preflight:"),
+    estimator=(230, "ESTIMATOR_STATUS", ("vel_ratio", "pos_horiz_ratio")),
+    low_battery=re.compile(r"(Low|Critical|Dangerous|Emergency) battery|Battery \d+( disc|: )"),
+    lost_position=re.compile(r"(GNSS|GPS) (data fusion stopped|signal spoofed|signal jammed)"),
+    acts=re.compile(r"[Ff]ailsafe|[Ff]ence| lost|terminat"),
     turn_lead_s=0.56,  # 1 / MPC_XY_VEL_P_ACC, whose default is 1.8/s; not measured
 )
 

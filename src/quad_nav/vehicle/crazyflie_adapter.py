@@ -23,6 +23,7 @@ from quad_nav.vehicle.adapter import VehicleAdapter
 from quad_nav.vehicle.arrival_clock import ArrivalClock
 from quad_nav.vehicle.frames import crazyflie_quaternion
 from quad_nav.vehicle.orders import Order, Output, State, Traits
+from quad_nav.vehicle.ranges import CRAZYFLIE
 from quad_nav.vehicle.setpoints import limited
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate, Landed, Status, Vector, Velocity
@@ -110,9 +111,13 @@ class CrazyflieAdapter(VehicleAdapter[Call]):
             values: Values by the variables' names.
             now_s: Time.
         """
-        stamp_s = self._clock.ours_s(stamp_ms, now_s)
         self.machine.inputs.hear(now_s)
-        self._HANDLERS[block](self, values, stamp_s, now_s)
+
+        def handle() -> None:
+            stamp_s = self._clock.ours_s(stamp_ms, now_s)
+            self._HANDLERS[block](self, values, stamp_s, now_s)
+
+        self._handle(block, values.__getitem__, CRAZYFLIE.get(block, {}), handle, now_s)
 
     def _on_pose(self, values: Values, stamp_s: float, now_s: float) -> None:
         velocity, rates, at_s = self._motion

@@ -80,10 +80,20 @@ class CrazyflieLink(VehicleLink[Call]):
         try:
             event = self._events.get(timeout=timeout_s)
             while True:
-                event()
+                self._run(event)
                 event = self._events.get_nowait()
         except queue.Empty:
             return
+
+    def _run(self, event: Callable[[], None]) -> None:
+        try:
+            event()
+        except Exception as error:  # cflib raises what its drivers raise
+            self._fail("an event of the radio", error)
+
+    def _fail(self, what: str, error: Exception) -> None:
+        with self.lock:
+            self.adapter.fail(what, error, self._clock())
 
     def _watch(self) -> None:
         """Open the connection if it is closed, and give one up on which nothing comes."""
@@ -153,7 +163,7 @@ class CrazyflieLink(VehicleLink[Call]):
         """
         self._is_open = self._is_ready = False
         self._reopen_s = self._clock() + _REOPEN_S
-        self._take_text(f"no connection: {reason.strip().splitlines()[0]}")
+        self._take_text(f"no connection: {(reason.strip().splitlines() or ['no reason'])[0]}")
         old, self._crazyflie = self._crazyflie, self._make()
         if old.link is not None:
             old.link.close()
@@ -170,7 +180,7 @@ class CrazyflieLink(VehicleLink[Call]):
                     crazyflie.commander.send_stop_setpoint()
                 else:
                     crazyflie.platform.send_arming_request(bool(values[0]))
-        except OSError as error:
+        except Exception as error:  # whatever the driver raises: the link is made anew
             self._is_ready = False
             reason = f"cannot send: {error}"
             self._events.put(lambda: self._lost(reason))

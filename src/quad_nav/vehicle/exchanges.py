@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import struct
 from collections import deque
+from types import MappingProxyType
 from typing import Any, Deque, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from quad_nav.vehicle.autopilots import SET_MESSAGE_INTERVAL, command_fields
@@ -71,16 +72,22 @@ class Parameters:
         has_given_up: Whether a write had no effect after all tries.
     """
 
-    def __init__(self, names: Sequence[str], sends_bits: bool) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        sends_bits: bool,
+        renamed: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    ) -> None:
         """Start with nothing read.
 
         Args:
             names: Parameters to read.
             sends_bits: Whether whole numbers travel as their bits.
+            renamed: Parameters that an autopilot with a parameter does not have.
         """
         self.values: Dict[str, Optional[float]] = {}
         self._types: Dict[str, int] = {}
-        self._names, self._sends_bits = tuple(names), sends_bits
+        self._names, self._sends_bits, self._renamed = tuple(names), sends_bits, renamed
         self._tries: Dict[str, int] = {}
         self._writes: Dict[str, float] = {}
         self._next_s = -math.inf
@@ -107,12 +114,15 @@ class Parameters:
         self._tries, self._next_s = {}, -math.inf
 
     def take(self, name: str, value: float, kind: int) -> bool:
-        """Take a PARAM_VALUE; return whether it is one of ours."""
+        """Take a PARAM_VALUE; return False for one of ours that is no finite number."""
         if name not in self._names:
-            return False
+            return True
         if self._sends_bits and kind in _WHOLE:
             value = struct.unpack(_WHOLE[kind], struct.pack("<f", value))[0]
+        if not math.isfinite(value):
+            return False
         self.values[name], self._types[name] = float(value), kind
+        self.values.update(dict.fromkeys(self._renamed.get(name, ())))
         self._tries.pop(name, None)
         wanted = self._writes.get(name)
         if wanted is not None and abs(wanted - value) <= 1e-5 * max(1.0, abs(wanted)):
@@ -185,9 +195,22 @@ class ClockSync:
         sent_s = ours_ns / 1e9
         trip_s = now_s - sent_s
         if 0.0 <= trip_s < 1.0:  # otherwise the answer to another station's question
-            self._samples.append((trip_s, theirs_ns / 1e9 - (sent_s + trip_s / 2.0)))
-            self._best_s = min(self._samples)[1]
+            self._add(trip_s, theirs_ns / 1e9 - (sent_s + trip_s / 2.0))
         return None
+
+    def _add(self, trip_s: float, offset_s: float) -> None:
+        """Add a sample, and drop those before a step of their clock.
+
+        An offset is wrong by half of its trip at most. When two samples differ by more than the
+        halves of both trips, their clock has stepped in between.
+        """
+        agreeing = [
+            (trip, offset)
+            for trip, offset in self._samples
+            if abs(offset - offset_s) <= (trip + trip_s) / 2.0
+        ]
+        self._samples = deque([*agreeing, (trip_s, offset_s)], maxlen=SYNC_SAMPLES)
+        self._best_s = min(self._samples)[1]
 
     def ours_s(self, theirs_s: float, now_s: float) -> float:
         """Return the time on our clock, at most now, for one on theirs.

@@ -8,17 +8,21 @@ they are written too.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Callable, Dict, List, Mapping, Optional, Tuple
 
 from quad_nav.vehicle.telemetry import Limits
-from quad_nav.vehicle.vehicle_file import Vehicle
+from quad_nav.vehicle.vehicle_file import OUR_SYSTEM, Vehicle
 
 STREAM_TIMEOUT_S = 0.5
 FENCE_MARGIN_M = 0.5
 """The autopilot's fence lies this far behind ours, which lands first."""
-OUR_SYSTEM = 255
-"""Our MAVLink system: ArduPilot counts only its own ground station's heartbeats."""
+RENAMED: Mapping[str, Tuple[str, ...]] = MappingProxyType(
+    {"SYSID_MYGCS": ("MAV_GCS_SYSID", "MAV_GCS_SYSID_HI"), "MAV_GCS_SYSID": ("SYSID_MYGCS",)}
+)
+"""An autopilot that has a parameter does not have these: ArduPilot 4.7 has renamed it."""
 
 Values = Mapping[str, Optional[float]]
 """Parameters by name; None for one that the autopilot does not have."""
@@ -31,18 +35,27 @@ class Failsafe:
     Attributes:
         parameter: Its name.
         problem: Returns what is wrong with the values of all parameters, "" if nothing is.
-        safe: Value that the bridge proposes.
+        safe: Value that the bridge proposes; None if only the pilot can know it.
         is_needed: Whether an autopilot without the parameter is refused.
+        older: Its name in older versions, if it had another one.
     """
 
     parameter: str
     problem: Callable[[Values, Vehicle], str]
-    safe: float
+    safe: Optional[float]
     is_needed: bool = True
+    older: str = ""
 
-    def safe_for(self, vehicle: Vehicle) -> float:
+    def safe_for(self, vehicle: Vehicle) -> Optional[float]:
         """Return the proposed value: without a radio its loss means nothing."""
+        if self.parameter == "MAV_GCS_SYSID":
+            return float(vehicle.bridge_system)
         return 0.0 if self.parameter == "FS_THR_ENABLE" and not vehicle.has_radio else self.safe
+
+    def name_in(self, values: Values) -> str:
+        """Return the name under which the autopilot has it."""
+        is_old = bool(self.older) and values.get(self.parameter) is None
+        return self.older if is_old else self.parameter
 
 
 def own_parameters(autopilot: str, limits: Limits) -> Dict[str, float]:
@@ -68,7 +81,12 @@ def own_parameters(autopilot: str, limits: Limits) -> Dict[str, float]:
 
 def names(vehicle: Vehicle) -> Tuple[str, ...]:
     """Return the parameters to read."""
-    read = [failsafe.parameter for failsafe in _FAILSAFES[vehicle.autopilot]]
+    read = [
+        name
+        for failsafe in _FAILSAFES[vehicle.autopilot]
+        for name in (failsafe.parameter, failsafe.older)
+        if name
+    ]
     return (*own_parameters(vehicle.autopilot, vehicle.limits), *read, *_ALSO[vehicle.autopilot])
 
 
@@ -77,8 +95,9 @@ def wanted(values: Values, vehicle: Vehicle) -> Dict[str, float]:
     ours = own_parameters(vehicle.autopilot, vehicle.limits)
     if vehicle.sets_failsafes:
         for failsafe in _FAILSAFES[vehicle.autopilot]:
-            if values.get(failsafe.parameter) is not None and failsafe.problem(values, vehicle):
-                ours[failsafe.parameter] = failsafe.safe_for(vehicle)
+            name, safe = failsafe.name_in(values), failsafe.safe_for(vehicle)
+            if safe is not None and failsafe.problem(values, vehicle):
+                ours[name] = safe
     return {
         name: value
         for name, value in ours.items()
@@ -95,16 +114,23 @@ def faults(values: Values, vehicle: Vehicle) -> List[str]:
         elif not is_equal(values[name], value):
             found.append(f"{name}: is {values[name]:g}, the autopilot does not take {value:g}")
     for failsafe in _FAILSAFES[vehicle.autopilot]:
-        value_ = values.get(failsafe.parameter)
+        name = failsafe.name_in(values)
+        value_ = values.get(name)
         if value_ is None:
             if failsafe.is_needed:
-                found.append(f"{failsafe.parameter}: the autopilot does not answer")
+                found.append(f"{name}: the autopilot does not answer")
             continue
         problem = failsafe.problem(values, vehicle)
         if problem:
             safe = failsafe.safe_for(vehicle)
-            found.append(f"{failsafe.parameter}: is {value_:g}: {problem}; set it to {safe:g}")
+            advice = "" if safe is None else f"; set it to {safe:g}"
+            found.append(f"{name}: is {value_:g}: {problem}{advice}")
     return found
+
+
+def uses_receiver(values: Values) -> bool:
+    """Return whether the estimator takes its position from a satellite receiver."""
+    return values.get("EK3_SRC1_POSXY") in (None, 3.0) and values.get("EKF2_GPS_CTRL") != 0.0
 
 
 def is_equal(value: Optional[float], other: float) -> bool:
@@ -113,8 +139,9 @@ def is_equal(value: Optional[float], other: float) -> bool:
 
 
 def _value(values: Values, name: str) -> float:
+    """Return a parameter; 0 for one that is missing or no finite number."""
     value = values.get(name)
-    return 0.0 if value is None else value
+    return value if value is not None and math.isfinite(value) else 0.0
 
 
 def _climb(values: Values, vehicle: Vehicle) -> str:
@@ -145,10 +172,19 @@ def _ardupilot_link(values: Values, vehicle: Vehicle) -> str:
     return "it does nothing when the link to this machine is lost"
 
 
-def _ardupilot_station(values: Values, _: Vehicle) -> str:
-    if _value(values, "SYSID_MYGCS") == OUR_SYSTEM:
+def _ardupilot_station(values: Values, vehicle: Vehicle) -> str:
+    if vehicle.bridge_system in (values.get("MAV_GCS_SYSID"), values.get("SYSID_MYGCS")):
         return ""
-    return f"it does not count our heartbeats, those of system {OUR_SYSTEM}"
+    return (
+        "it does not notice when the bridge dies, because it counts another station's heartbeats,"
+        f" not those of the bridge, system {vehicle.bridge_system}"
+    )
+
+
+def _ardupilot_more_stations(values: Values, vehicle: Vehicle) -> str:
+    if _value(values, "MAV_GCS_SYSID_HI") <= vehicle.bridge_system:
+        return ""
+    return "it does not notice when the bridge dies, because it counts other stations' heartbeats"
 
 
 def _ardupilot_radio(values: Values, vehicle: Vehicle) -> str:
@@ -166,8 +202,17 @@ def _ardupilot_estimate(values: Values, _: Vehicle) -> str:
 
 
 def _ardupilot_battery(values: Values, vehicle: Vehicle) -> str:
+    """0 nothing, 1 land, 2, 3, 4 and 6 return to launch, 5 stop the motors."""
     value = _value(values, "BATT_FS_LOW_ACT")
-    return _climb(values, vehicle) if value in (2.0, 3.0, 4.0) else ""
+    if value in (2.0, 3.0, 4.0, 6.0):
+        return _climb(values, vehicle)
+    return "" if value == 1.0 else "it does not land when the battery is low"
+
+
+def _ardupilot_voltage(values: Values, _: Vehicle) -> str:
+    if _value(values, "BATT_LOW_VOLT") > 0.0:
+        return ""
+    return "it does not notice a low voltage; set it to 3.5 for each cell of the battery"
 
 
 # PX4: 0 nothing, 1 hold, 2 return, 3 land, 5 terminate, 6 disarm. Lost offboard control: 0
@@ -185,7 +230,9 @@ def _px4_offboard(values: Values, vehicle: Vehicle) -> str:
     value = _value(values, "COM_OBL_RC_ACT")
     if value == 3.0:
         return _climb(values, vehicle)
-    return "" if value in (4.0, 5.0) else "it does not land or hold when the set-points stop"
+    if value == 5.0:  # NAV_DLL_ACT counts the heartbeats of every ground station
+        return "it holds for ever when the bridge dies beside another ground station"
+    return "" if value == 4.0 else "it does not land or hold when the set-points stop"
 
 
 def _px4_radio(values: Values, vehicle: Vehicle) -> str:
@@ -198,16 +245,22 @@ def _px4_radio(values: Values, vehicle: Vehicle) -> str:
 
 
 def _px4_battery(values: Values, vehicle: Vehicle) -> str:
-    return _climb(values, vehicle) if _value(values, "COM_LOW_BAT_ACT") == 3.0 else ""
+    """0 nothing, 2 land, 3 return to launch, at last land."""
+    value = _value(values, "COM_LOW_BAT_ACT")
+    if value == 3.0:
+        return _climb(values, vehicle)
+    return "" if value == 2.0 else "it does not land when the battery is low"
 
 
 _FAILSAFES: Mapping[str, Tuple[Failsafe, ...]] = {
     "ardupilot": (
         Failsafe("FS_GCS_ENABLE", _ardupilot_link, 5.0),
-        Failsafe("SYSID_MYGCS", _ardupilot_station, float(OUR_SYSTEM), is_needed=False),
+        Failsafe("MAV_GCS_SYSID", _ardupilot_station, OUR_SYSTEM, older="SYSID_MYGCS"),
+        Failsafe("MAV_GCS_SYSID_HI", _ardupilot_more_stations, 0.0, is_needed=False),
         Failsafe("FS_THR_ENABLE", _ardupilot_radio, 3.0),
         Failsafe("FS_EKF_ACTION", _ardupilot_estimate, 1.0, is_needed=False),
         Failsafe("BATT_FS_LOW_ACT", _ardupilot_battery, 1.0, is_needed=False),
+        Failsafe("BATT_LOW_VOLT", _ardupilot_voltage, None, is_needed=False),
     ),
     "px4": (
         Failsafe("NAV_DLL_ACT", _px4_link, 3.0),
@@ -217,6 +270,6 @@ _FAILSAFES: Mapping[str, Tuple[Failsafe, ...]] = {
     ),
 }
 _ALSO: Mapping[str, Tuple[str, ...]] = {
-    "ardupilot": ("FS_OPTIONS", "RTL_ALT"),
-    "px4": ("COM_RCL_EXCEPT", "RTL_RETURN_ALT"),
+    "ardupilot": ("FS_OPTIONS", "RTL_ALT", "EK3_SRC1_POSXY"),
+    "px4": ("COM_RCL_EXCEPT", "RTL_RETURN_ALT", "EKF2_GPS_CTRL"),
 }

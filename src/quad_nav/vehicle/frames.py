@@ -37,6 +37,7 @@ _FRD_FROM_FLU: Quaternion = (1.0, 0.0, 0.0, 0.0)  # half a turn about x
 _UNKNOWN_CM = 65535
 _BODY_FRD = 12
 _FULL_TURN_DEG = 360.0
+_LEAST_SECTOR_DEG = 0.01
 
 
 def enu_from_ned(vector: Vector) -> Vector:
@@ -152,8 +153,8 @@ def scan_from_obstacle_distance(
     increment_deg = float(message.increment_f) or float(message.increment)
     offset_rad = math.radians(float(message.angle_offset))
     nearest_m, furthest_m = message.min_distance / 100.0, message.max_distance / 100.0
-    is_sound = math.isfinite(increment_deg) and math.isfinite(offset_rad) and increment_deg != 0.0
-    if not is_sound or not nearest_m < furthest_m:
+    is_sound = math.isfinite(increment_deg) and math.isfinite(offset_rad)
+    if not is_sound or abs(increment_deg) < _LEAST_SECTOR_DEG or not nearest_m < furthest_m:
         return None
     sectors = min(len(message.distances), math.floor(_FULL_TURN_DEG / abs(increment_deg) + 1e-6))
     if sectors < 1:

@@ -20,6 +20,13 @@ from quad_nav.vehicle.telemetry import Estimate, Landed, Limits, Status
 TEXT_S = 35.0
 """How long a refusal counts as a reason; ArduPilot repeats its own every 31 s."""
 REFUSAL_S = 5.0
+EXPLAIN_S = 1.5
+"""How long a text explains what the autopilot does; heartbeats tell that it disarms up to 1 s
+later."""
+MOST_TEXTS = 10
+"""Reasons that count at the same time, the latest ones: each is part of the state's topic."""
+MOST_ACTS = 4
+"""Texts that one reason holds at most, whatever an autopilot says."""
 _NEVER_S = -math.inf
 
 
@@ -31,6 +38,7 @@ class Inputs:
         status_s: Time of that heartbeat.
         landed: Where the vehicle is.
         estimate: Last estimate with finite numbers.
+        heartbeat_problem: Why the heartbeats that come are not the vehicle's, "" if there are none.
         battery: Charge from 0 to 1; None if it is unknown.
         command: Last velocity command.
         command_s: Time of that command.
@@ -44,12 +52,15 @@ class Inputs:
         self.status: Optional[Status] = None
         self.landed = Landed.UNKNOWN
         self.estimate: Optional[Estimate] = None
+        self.heartbeat_problem = ""
         self.battery: Optional[float] = None
         self.command, self.command_s = Twist2D(), _NEVER_S
         self.moved_sticks = ""
         self.faults: Optional[Sequence[str]] = None
         self.status_s = self._heard_s = self._estimate_s = self._idle_s = _NEVER_S
         self._texts: Dict[str, float] = {}  # reason -> until when it counts
+        self._acts: Dict[str, float] = {}  # what the autopilot does by itself -> when it said so
+        self._battery_problem, self._estimate_problem = "", ""
         self._low_since_s: Optional[float] = None
         self._still_since_s: Optional[float] = None
         self._jump_m = 0.0
@@ -65,13 +76,19 @@ class Inputs:
         self.status, self.status_s = status, now_s
         self.hear(now_s)
 
-    def take_estimate(self, estimate: Estimate, now_s: float) -> None:
-        """Take an estimate; one with infinite numbers or NaN counts as none."""
+    def take_estimate(self, estimate: Estimate, now_s: float, problem: str = "") -> None:
+        """Take an estimate; one with infinite numbers or NaN counts as none.
+
+        Args:
+            estimate: The estimate.
+            now_s: Time.
+            problem: Why it does not count although it goes on, "" if it counts.
+        """
         if not estimate.is_finite:
             return
         before = self.estimate
-        self.estimate = estimate
-        if before is not None and self._is_frozen(before, estimate, now_s):
+        self.estimate, self._estimate_problem = estimate, problem
+        if problem or (before is not None and self._is_frozen(before, estimate, now_s)):
             return
         elapsed_s = now_s - self._estimate_s
         if before is not None and elapsed_s < 1.0:
@@ -95,10 +112,19 @@ class Inputs:
             self._still_since_s = now_s
         return now_s - self._still_since_s > STILL_S
 
-    def take_battery(self, share: Optional[float], now_s: float) -> None:
-        """Take the charge, 0 to 1; None if it is unknown."""
-        self.battery = share
-        if share is None or share >= self._limits.battery:
+    def take_battery(self, share: Optional[float], now_s: float, problem: str = "") -> None:
+        """Take the state of the battery.
+
+        Args:
+            share: Charge, 0 to 1; None if it is unknown.
+            now_s: Time.
+            problem: Why the battery is low, whatever the charge says; "" if it is not.
+        """
+        self.battery, least = share, self._limits.battery
+        if not problem and share is not None and share < least:
+            problem = f"battery at {100.0 * share:.0f} %, expected {100.0 * least:.0f} % or more"
+        self._battery_problem = problem
+        if not problem:
             self._low_since_s = None
         elif self._low_since_s is None:
             self._low_since_s = now_s
@@ -116,11 +142,20 @@ class Inputs:
 
     def take_text(self, text: str, now_s: float) -> None:
         """Take a reason of the autopilot for not being ready."""
-        self._texts[text] = now_s + TEXT_S
+        self._count(text, now_s + TEXT_S)
+
+    def take_act(self, text: str, now_s: float) -> None:
+        """Take the autopilot's words about what it does by itself."""
+        others = [(words, s) for words, s in self._acts.items() if words != text]
+        self._acts = dict([*others[1 - MOST_ACTS :], (text, now_s)])
 
     def refuse(self, reason: str, now_s: float) -> None:
         """Count a refusal as a reason for a short time."""
-        self._texts[reason] = now_s + REFUSAL_S
+        self._count(reason, now_s + REFUSAL_S)
+
+    def _count(self, reason: str, until_s: float) -> None:
+        others = [item for item in self._texts.items() if item[0] != reason]
+        self._texts = dict([*others[1 - MOST_TEXTS :], (reason, until_s)])
 
     def clear_texts(self) -> None:
         """Forget the autopilot's reasons: it has said that it is ready."""
@@ -142,7 +177,7 @@ class Inputs:
     def link_problem(self, now_s: float) -> str:
         """Return why the link counts as lost, "" if it does not."""
         if self.status is None:
-            return "no heartbeat yet"
+            return self.heartbeat_problem or "no heartbeat yet"
         if now_s - self._heard_s > SILENT_S and now_s - self.status_s > SILENT_S + 0.5:
             return f"nothing heard from the vehicle for {SILENT_S:g} s"
         if now_s - self.status_s > HEARTBEAT_S:
@@ -161,10 +196,9 @@ class Inputs:
         else:
             reasons += self.faults
         if self.is_estimate_late(now_s):
-            reasons.append("no position estimate")
-        if self.battery is not None and self.battery < self._limits.battery:
-            share = f"{100.0 * self.battery:.0f} %"
-            reasons.append(f"battery at {share}, expected {100.0 * self._limits.battery:.0f} %")
+            reasons.append(self._estimate_problem or "no position estimate")
+        if self._battery_problem:
+            reasons.append(self._battery_problem)
         self._texts = {text: end_s for text, end_s in self._texts.items() if end_s > now_s}
         return reasons + list(self._texts)
 
@@ -189,9 +223,14 @@ class Inputs:
             moved_sticks=self.moved_sticks,
             heard_age_s=now_s - self._heard_s,
             status_age_s=now_s - self.status_s,
+            autopilot_text="; ".join(
+                text for text, said_s in self._acts.items() if now_s - said_s < EXPLAIN_S
+            ),
             estimate_age_s=now_s - self._estimate_s,
+            estimate_problem=self._estimate_problem or "no new estimate",
             jump_m=self._jump_m,
             low_battery_s=0.0 if low_s is None else now_s - low_s,
+            battery_problem=self._battery_problem,
             height_m=self.height_m(ground_m),
             distance_m=distance_m,
             command_age_s=now_s - self.command_s,

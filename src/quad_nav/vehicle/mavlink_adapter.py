@@ -6,9 +6,11 @@ Messages are names and fields, so that recordings can take the place of an autop
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Set, Tuple
 
+from quad_nav.errors import printable
 from quad_nav.geometry import Pose3D, Quaternion, rotate
 from quad_nav.vehicle import failsafes
 from quad_nav.vehicle.adapter import VehicleAdapter
@@ -21,13 +23,16 @@ from quad_nav.vehicle.frames import (
     mavlink_quaternion,
     scan_from_obstacle_distance,
 )
+from quad_nav.vehicle.health_watch import HealthWatch
 from quad_nav.vehicle.orders import IN_FLIGHT, Answer, Order, Output, State
+from quad_nav.vehicle.ranges import MAVLINK
 from quad_nav.vehicle.setpoints import led, limited, setpoint_fields
 from quad_nav.vehicle.states import VehicleMachine
 from quad_nav.vehicle.telemetry import Estimate, Landed, Velocity
 from quad_nav.vehicle.vehicle_file import Vehicle
 
 ESTIMATE_HZ = 30.0
+ESTIMATOR_HZ = 5.0
 HEARTBEAT_PERIOD_S = 1.0
 ANSWER_WAIT_S = 0.2
 """A refusal waits this long for the texts with its reasons, which come after it."""
@@ -38,18 +43,23 @@ _RATES_HZ: Mapping[int, Tuple[str, float]] = MappingProxyType(
         245: ("EXTENDED_SYS_STATE", 5.0),
         1: ("SYS_STATUS", 1.0),
         65: ("RC_CHANNELS", 5.0),
+        24: ("GPS_RAW_INT", ESTIMATOR_HZ),
     }
 )
 _DISTANCE_RATE = {330: ("OBSTACLE_DISTANCE", 10.0)}
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK
+_STATION_S = 5.0
+"""A ground station that has not been heard for this long has gone."""
 _ATTITUDE_S = 0.2  # oldest attitude that belongs to a position
 _STICKS = MappingProxyType({1: "roll", 2: "pitch", 3: "throttle", 4: "yaw"})
 _STICK_US, _VALID_US = 120, (900, 2100)
 _IN_PROGRESS = 5  # MAV_RESULT
 # A ground station without an autopilot, active: both autopilots' failsafes count its heartbeats.
-_OUR_TYPE, _OUR_AUTOPILOT, _ACTIVE = 6, 8, 4
+_OUR_TYPE, _NO_AUTOPILOT, _ACTIVE = 6, 8, 4
 _REBOOT_MS = 1000
 _TEXT_BYTES = 50
+_MOST_TEXT = 5 * _TEXT_BYTES
+_MOST_REASONS = 10
 
 
 class MavlinkAdapter(VehicleAdapter[Message]):
@@ -65,9 +75,18 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         super().__init__(vehicle, machine)
         self._autopilot = AUTOPILOTS[vehicle.autopilot]
         self.clock = ClockSync()
-        self.parameters = Parameters(failsafes.names(vehicle), self._autopilot.sends_bits)
+        self.parameters = Parameters(
+            failsafes.names(vehicle), self._autopilot.sends_bits, failsafes.RENAMED
+        )
+        number, name, _ = self._autopilot.estimator
         has_distances = vehicle.lidar is not None and vehicle.lidar.is_obstacle_distance
-        self._rates = MessageRates({**_RATES_HZ, **(_DISTANCE_RATE if has_distances else {})})
+        self._rates = MessageRates(
+            {
+                **_RATES_HZ,
+                number: (name, ESTIMATOR_HZ),
+                **(_DISTANCE_RATE if has_distances else {}),
+            }
+        )
         self._first_s: Optional[float] = None  # first heartbeat
         self._boot_ms = 0
         self._attitude: Tuple[Quaternion, Tuple[float, float, float], float] = (
@@ -82,6 +101,10 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         self._sticks: Dict[int, int] = {}
         self._heartbeat_s = -math.inf
         self._replies: List[Message] = []
+        self._health = HealthWatch(self._autopilot, self.parameters)
+        self._systems: Set[int] = set()  # other vehicles that are heard
+        self._station_s = -math.inf  # last heartbeat of another station with our number
+        self._news: List[str] = []
 
     # From the vehicle.
 
@@ -99,16 +122,44 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         self._rates.count(name)
         if self._first_s is not None:
             self.machine.inputs.hear(now_s)
-        handler = self._HANDLERS.get(name)
+        is_estimator = name == self._autopilot.estimator[1]
+        handler = self._HANDLERS.get("estimator" if is_estimator else name)
         if handler is not None:
-            handler(self, message, now_s)
+            self._handle(
+                name,
+                lambda field: getattr(message, field),
+                MAVLINK.get(name, {}),
+                lambda: handler(self, message, now_s),
+                now_s,
+            )
+
+    def receive_other(self, system: int, message: Any, now_s: float) -> None:
+        """Take a heartbeat of another system than the vehicle's."""
+        if system == self._vehicle.bridge_system:
+            if now_s - self._station_s > _STATION_S:
+                self._news.append(self._station_fault)
+            self._station_s = now_s
+        elif message.autopilot != _NO_AUTOPILOT:
+            self._systems.add(system)
+            numbers = ", ".join(map(str, sorted(self._systems)))
+            self.machine.inputs.heartbeat_problem = (
+                f"heartbeats of system {numbers}, expected {self._vehicle.system}"
+            )
+
+    @property
+    def _station_fault(self) -> str:
+        return (
+            f"another station sends heartbeats as system {self._vehicle.bridge_system}, as the"
+            " bridge does, so the autopilot does not notice when the bridge dies; give one of them"
+            " another number (bridge_system)"
+        )
 
     def _on_heartbeat(self, message: Any, now_s: float) -> None:
         if message.autopilot != self._autopilot.number:
-            self.machine.inputs.faults = [
+            self.machine.inputs.heartbeat_problem = (
                 f"the autopilot's number is {message.autopilot}, expected"
                 f" {self._autopilot.number} ({self._autopilot.name})"
-            ]
+            )
             return
         if self._first_s is None:
             self._first_s = now_s
@@ -133,12 +184,14 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         )
         if estimate.is_finite:
             self.estimate = estimate
-            self.machine.inputs.take_estimate(estimate, now_s)
+            problem = self._health.position_problem(now_s)
+            self.machine.inputs.take_estimate(estimate, now_s, problem)
 
     def _rebooted(self) -> None:
         self.clock.forget()
         self.parameters.forget()
         self.machine.inputs.faults = None
+        self._health.forget()
 
     def _on_attitude(self, message: Any, now_s: float) -> None:
         attitude = enu_from_flu(mavlink_quaternion(message.roll, message.pitch, message.yaw))
@@ -150,14 +203,21 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         self.machine.inputs.landed = Landed(message.landed_state) if known else Landed.UNKNOWN
 
     def _on_system(self, message: Any, now_s: float) -> None:
-        inputs = self.machine.inputs
-        share = message.battery_remaining
-        inputs.take_battery(share / 100.0 if share >= 0 else None, now_s)
+        inputs, share = self.machine.inputs, message.battery_remaining
+        is_armed = inputs.status is not None and inputs.status.is_armed
+        problem = self._health.battery_problem(message, is_armed)
+        inputs.take_battery(share / 100.0 if share >= 0 else None, now_s, problem)
         if message.onboard_control_sensors_present & _PREARM_CHECK:
             if message.onboard_control_sensors_health & _PREARM_CHECK:
                 inputs.clear_texts()
             elif self.machine.state in (State.NOT_READY, State.READY, State.LANDED):
                 inputs.take_text("the autopilot's pre-arm checks fail", now_s)
+
+    def _on_receiver(self, message: Any, _: float) -> None:
+        self._health.take_receiver(message)
+
+    def _on_estimator(self, message: Any, _: float) -> None:
+        self._health.take_estimator(message)
 
     def _on_sticks(self, message: Any, _: float) -> None:
         """Compare the sticks with those at take-off."""
@@ -179,20 +239,22 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         if text is None:
             return
         self.take_text(text, message.severity)
-        for beginning in self._autopilot.complaints:
-            if text.startswith(beginning):
-                self.machine.inputs.take_text(text, now_s)
-        if any(text.startswith(beginning) for beginning in self._autopilot.refusals):
-            self._reasons.append(text)
+        autopilot, inputs = self._autopilot, self.machine.inputs
+        if text.startswith(autopilot.complaints):
+            inputs.take_text(text, now_s)
+        if text.startswith(autopilot.refusals):
+            self._reasons = [*self._reasons, text][:_MOST_REASONS]
+        if self._health.take_text(text, now_s):
+            inputs.take_battery(inputs.battery, now_s, text)
+        if autopilot.acts.search(text):
+            inputs.take_act(text, now_s)
 
     def _whole_text(self, message: Any) -> Optional[str]:
         """Return the text, joined if it came in parts of 50 bytes; None before the last part."""
         number = message.id
-        if not number:
-            return str(message.text).rstrip()  # PX4 marks some with a tab at their end
-        text = self._chunks.pop(number, "") + message.text
-        if len(message.text) < _TEXT_BYTES:
-            return text.rstrip()
+        text = f"{self._chunks.pop(number, '') if number else ''}{message.text}"[:_MOST_TEXT]
+        if not number or len(message.text) < _TEXT_BYTES:
+            return printable(text.rstrip())  # PX4 marks some with a tab at their end
         self._chunks = {number: text}
         return None
 
@@ -205,9 +267,11 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         else:
             self._refused = order, now_s + ANSWER_WAIT_S
 
-    def _on_parameter(self, message: Any, _: float) -> None:
-        name = str(message.param_id).rstrip("\0")
-        self.parameters.take(name, message.param_value, message.param_type)
+    def _on_parameter(self, message: Any, now_s: float) -> None:
+        name, value = str(message.param_id).rstrip("\0"), message.param_value
+        if not self.parameters.take(name, value, message.param_type):
+            line = f"PARAM_VALUE: {name} is {value}, expected a finite number"
+            self.drop(f"PARAM_VALUE {name}", line, now_s)
 
     def _on_time(self, message: Any, now_s: float) -> None:
         reply = self.clock.take(message.tc1, message.ts1, now_s)
@@ -225,6 +289,8 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         "ATTITUDE": _on_attitude,
         "EXTENDED_SYS_STATE": _on_landed,
         "SYS_STATUS": _on_system,
+        "GPS_RAW_INT": _on_receiver,
+        "estimator": _on_estimator,  # each autopilot has its own message
         "RC_CHANNELS": _on_sticks,
         "STATUSTEXT": _on_text,
         "COMMAND_ACK": _on_answer,
@@ -238,8 +304,9 @@ class MavlinkAdapter(VehicleAdapter[Message]):
     def tick(self, now_s: float) -> Tuple[Output, List[Message]]:
         """Return what the state machine says, and the messages to send now."""
         self._answer_refused(now_s)
-        self._check_parameters()
+        self._check_parameters(now_s)
         output = self.machine.tick(now_s)
+        output, self._news = replace(output, news=(*output.news, *self._news)), []
         messages, self._replies = self._replies, []
         if output.sends_heartbeat and now_s - self._heartbeat_s >= HEARTBEAT_PERIOD_S:
             self._heartbeat_s = now_s
@@ -276,7 +343,7 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         self.machine.answer(Answer(order, False, "; ".join(self._reasons)), now_s)
         self._reasons = []
 
-    def _check_parameters(self) -> None:
+    def _check_parameters(self, now_s: float) -> None:
         """Write what is ours and find faults, on the ground."""
         parameters, status = self.parameters, self.machine.inputs.status
         if not parameters.is_read or not parameters.is_written or status is None:
@@ -289,13 +356,16 @@ class MavlinkAdapter(VehicleAdapter[Message]):
         if missing and not parameters.has_given_up:
             parameters.write(missing)
             return
-        self.machine.inputs.faults = failsafes.faults(parameters.values, self._vehicle)
+        faults = failsafes.faults(parameters.values, self._vehicle)
+        if now_s - self._station_s < _STATION_S:
+            faults.append(self._station_fault)
+        self.machine.inputs.faults = faults
 
 
 def _heartbeat() -> Dict[str, Any]:
     return {
         "type": _OUR_TYPE,
-        "autopilot": _OUR_AUTOPILOT,
+        "autopilot": _NO_AUTOPILOT,
         "base_mode": 0,
         "custom_mode": 0,
         "system_status": _ACTIVE,

@@ -2,9 +2,9 @@
 
 1. A pilot or another station changes the mode, or moves the sticks: stop sending (taken over).
 2. The link is lost: stop sending, heartbeats included, so that the autopilot's own failsafe acts.
-3. The estimate jumps, stays away, the battery is low, or a limit of height or distance is crossed:
-   land.
-4. The estimate is late: hover.
+3. The estimate jumps, stays away or does not count, the battery is low, or a limit of height or
+   distance is crossed: land.
+4. The estimate is late or does not count: hover.
 5. No velocity command: hover after 0.5 s, land after 5 s.
 
 ``danger`` tests them in this order and returns the first.
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Callable, Optional, Sequence, Tuple
 
 from quad_nav.vehicle.telemetry import Limits, Status, Vector
@@ -68,11 +68,14 @@ class FlightView:
         status: Last heartbeat.
         may_land: Whether the mode for landing is ours too, because we have ordered it.
         moved_sticks: Sticks that the pilot has moved, "" for none.
+        autopilot_text: Why the autopilot acts by itself, in its own words; "" if it does not.
         heard_age_s: Age of the last message from the vehicle.
         status_age_s: Age of the last heartbeat.
         estimate_age_s: Age of the last estimate that counts.
+        estimate_problem: What is missing.
         jump_m: Jump of the estimate, 0 if there was none.
-        low_battery_s: How long the charge has been low.
+        low_battery_s: How long the battery has been low.
+        battery_problem: Why it counts as low.
         height_m: Height above the place of take-off.
         distance_m: Horizontal distance from the place of take-off.
         command_age_s: Age of the last velocity command.
@@ -83,16 +86,31 @@ class FlightView:
     status: Status
     may_land: bool = False
     moved_sticks: str = ""
+    autopilot_text: str = ""
     heard_age_s: float = 0.0
     status_age_s: float = 0.0
     estimate_age_s: float = 0.0
+    estimate_problem: str = "no new estimate"
     jump_m: float = 0.0
     low_battery_s: float = 0.0
+    battery_problem: str = "battery low"
     height_m: float = 0.0
     distance_m: float = 0.0
     command_age_s: float = 0.0
     waiting_age_s: float = 0.0
     is_grounded: bool = False
+
+    def on_desk(self) -> FlightView:
+        """Return what counts in a dry run, on the desk or carried by hand."""
+        return FlightView(
+            replace(self.status, is_armed=True),
+            moved_sticks=self.moved_sticks,
+            autopilot_text=self.autopilot_text,
+            heard_age_s=self.heard_age_s,
+            status_age_s=self.status_age_s,
+            command_age_s=self.command_age_s,
+            waiting_age_s=self.waiting_age_s,
+        )
 
 
 Test = Callable[[FlightView, Limits], str]
@@ -108,12 +126,13 @@ def danger(view: FlightView, limits: Limits) -> Optional[Danger]:
 
 
 def _taken_over(view: FlightView, _: Limits) -> str:
-    status = view.status
+    status, text = view.status, view.autopilot_text
+    who = f"by the autopilot: {text}" if text else "from outside"
     if not status.is_armed:
-        return "the motors were disarmed from outside"
+        return f"the motors were disarmed {who}"
     is_ours = status.is_controlled or status.is_settling or (view.may_land and status.is_landing)
     if not is_ours:
-        return f"the mode was changed to {status.mode} from outside"
+        return f"the mode was changed to {status.mode} {who}"
     return f"the pilot moved the sticks ({view.moved_sticks})" if view.moved_sticks else ""
 
 
@@ -129,9 +148,9 @@ def _must_land(view: FlightView, limits: Limits) -> str:
     if view.jump_m > 0.0:
         return f"the estimated position jumped by {view.jump_m:.2f} m"
     if view.estimate_age_s > ESTIMATE_LAND_S:
-        return f"no new estimate for {ESTIMATE_LAND_S:g} s"
+        return f"{view.estimate_problem} for {ESTIMATE_LAND_S:g} s"
     if view.low_battery_s > BATTERY_S:
-        return f"battery below {100.0 * limits.battery:.0f} %"
+        return view.battery_problem
     if view.height_m > limits.height_m:
         return f"height {view.height_m:.2f} m, the limit is {limits.height_m:g} m"
     if view.distance_m > limits.radius_m:
@@ -141,7 +160,7 @@ def _must_land(view: FlightView, limits: Limits) -> str:
 
 def _must_hover(view: FlightView, _: Limits) -> str:
     late = view.estimate_age_s > ESTIMATE_HOVER_S
-    return f"no new estimate for {ESTIMATE_HOVER_S:g} s" if late else ""
+    return f"{view.estimate_problem} for {ESTIMATE_HOVER_S:g} s" if late else ""
 
 
 def _never_commanded(view: FlightView, _: Limits) -> str:

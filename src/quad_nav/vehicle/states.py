@@ -199,16 +199,8 @@ class VehicleMachine:
             view = replace(view, is_grounded=self.inputs.landed is Landed.ON_GROUND)
         else:  # commands count only in flight
             view = replace(view, command_age_s=0.0, waiting_age_s=0.0)
-        if self._permissions.is_dry:  # on the desk, or carried by hand
-            status = replace(view.status, is_armed=True)
-            view = FlightView(
-                status,
-                moved_sticks=view.moved_sticks,
-                heard_age_s=view.heard_age_s,
-                status_age_s=view.status_age_s,
-                command_age_s=view.command_age_s,
-                waiting_age_s=view.waiting_age_s,
-            )
+        if self._permissions.is_dry:
+            view = view.on_desk()
         return replace(view, may_land=self.state is State.LANDING)
 
     def _taken_over(self, found: Danger, now_s: float) -> None:
@@ -226,8 +218,9 @@ class VehicleMachine:
     # One step for each state; it returns the set-point.
 
     def _in_no_link(self, now_s: float) -> Optional[Velocity]:
-        status = self.inputs.status
-        if status is None or self.inputs.link_problem(now_s):
+        status, problem = self.inputs.status, self.inputs.link_problem(now_s)
+        if status is None or problem:
+            self._enter(State.NO_LINK, self.reason if status else problem, now_s)
             return None
         if self.inputs.status_s < self._state_s:  # a heartbeat, not only an echo from before
             return None
@@ -242,8 +235,8 @@ class VehicleMachine:
             self._enter(State.HOLDING, "link restored", now_s)
         else:
             self._pauses = True
-            what = "the link was lost" if before in IN_FLIGHT else "it was in the air at the start"
-            self._enter(State.TAKEN_OVER, f"{what}; mode {status.mode}", now_s)
+            what = "bridge started in flight" if before is State.NO_LINK else "the link was lost"
+            self._enter(State.TAKEN_OVER, f"{what}; mode {status.mode}; resume or land it", now_s)
         return None
 
     def _on_ground(self, now_s: float) -> Optional[Velocity]:
@@ -330,15 +323,23 @@ class VehicleMachine:
         if self._wants_control and (self._orders > MOST_ORDERS or not status.is_armed):
             self._wants_control, self.refusal = False, "no effect of the order to take control"
             self._news.append(self.refusal)
-        if not self._wants_control:
-            return None
-        streams = self.traits.streams_before_control
+        self._explain(now_s)
+        if not self._wants_control or self.inputs.landed is Landed.TAKING_OFF:
+            return None  # a set-point would cancel somebody's take-off
         if status.is_controlled:
             self._hold(now_s)
             return self._hover(now_s)
+        streams = self.traits.streams_before_control
         if not streams or now_s - self._state_s >= STREAM_S:
             self._give(Order.TAKE_CONTROL, now_s)
         return Velocity() if streams else None
+
+    def _explain(self, now_s: float) -> None:
+        """Give the autopilot's own reason, which comes after its new mode."""
+        view = self._view(now_s)
+        found = danger(view, self._limits)
+        if view.autopilot_text and found and found.reaction is Reaction.TAKEN_OVER:
+            self._enter(State.TAKEN_OVER, found.reason, now_s)
 
     # Parts of the steps.
 
@@ -350,8 +351,7 @@ class VehicleMachine:
         twist, estimate = self.inputs.command, self.inputs.estimate
         if estimate is None or self.odom_from_start is None:
             return self._velocity(twist, now_s)
-        pose = estimate.odom_from_base.to_2d()
-        start = self.odom_from_start
+        pose, start = estimate.odom_from_base.to_2d(), self.odom_from_start
         vx, vy = inside_fence(
             pose.rotate(twist.vx_mps, twist.vy_mps),
             (pose.x_m - start.x_m, pose.y_m - start.y_m),

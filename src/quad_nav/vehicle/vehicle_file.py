@@ -7,6 +7,7 @@
         autopilot: ardupilot       # ardupilot or px4; of kind mavlink
         address: udpin:127.0.0.1:14550      # pymavlink's or cflib's address
         system: 1                  # MAVLink's system number of the vehicle; default 1
+        bridge_system: 240         # that of the bridge; default 240 minus the vehicle's number
         radio: true                # a pilot's transmitter is in use; default true
         altitude: 1.0              # flying altitude above the place of take-off, m
         start: [1.5, 1.5, 0.0]     # where it stands in map at take-off: x, y, yaw
@@ -33,11 +34,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Tuple, Union
+from types import MappingProxyType
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from quad_nav.errors import InputError
 from quad_nav.files.document import Checker, describe, read_yaml
 from quad_nav.geometry import Pose2D, Pose3D, quaternion_from_yaw
+from quad_nav.vehicle.addresses import check_addresses, read_address
 from quad_nav.vehicle.telemetry import Limits
 
 KINDS = ("mavlink", "crazyflie", "simulated")
@@ -55,6 +58,7 @@ _KEYS = [
     "autopilot",
     "address",
     "system",
+    "bridge_system",
     "radio",
     "altitude",
     "start",
@@ -66,7 +70,24 @@ _KEYS = [
     "link_lost",
 ]
 _MOUNT = (0.0, 0.0, 0.06, 0.0)
-_MAX_SYSTEM = 254  # 255 is ours
+OUR_SYSTEM = 240
+"""MAVLink's system number of the bridge of vehicle 0; that of vehicle i is i less. Each autopilot
+counts the heartbeats of its own bridge alone: those of another bridge, or of a ground station,
+which is 255 in most programs, would hide that its bridge has died."""
+_MAX_SYSTEM = 254
+LEAST_ALTITUDE_M = 0.2
+LEAST_APART_M = 0.2
+_LIMITS: Mapping[str, Tuple[str, float]] = MappingProxyType(
+    {
+        "speed": ("speed_mps", 5.0),  # ArduPilot's WPNAV_SPEED
+        "climb": ("climb_mps", 2.5),  # its WPNAV_SPEED_UP
+        "yaw_rate": ("yaw_rate_radps", 3.5),  # PX4's MC_YAWRATE_MAX, 200 degrees/s
+        "height": ("height_m", 120.0),  # the law's in many countries
+        "radius": ("radius_m", 500.0),  # about as far as a pilot sees it
+        "battery": ("battery", 1.0),
+    }
+)
+"""Attribute and largest value of each limit: a limit that cannot be right protects nobody."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +125,7 @@ class Vehicle:
         map_from_start: Where it stands in ``map`` at take-off; None for another way.
         map_from_odom: Fixed pose of the odometry frame; None for another way.
         sets_failsafes: Whether the bridge writes the failsafes' parameters.
+        bridge_system: MAVLink's number of the bridge.
     """
 
     number: int
@@ -119,6 +141,7 @@ class Vehicle:
     map_from_start: Optional[Pose2D] = None
     map_from_odom: Optional[Pose3D] = None
     sets_failsafes: bool = False
+    bridge_system: int = OUR_SYSTEM
 
     @property
     def name(self) -> str:
@@ -126,18 +149,35 @@ class Vehicle:
         return f"quad{self.number}"
 
 
-def load_vehicles(path: Union[str, Path]) -> Tuple[Vehicle, ...]:
+StartProblem = Callable[[Pose2D], str]
+"""Returns why a vehicle cannot stand at a pose in ``map``, "" if it can."""
+
+
+def load_vehicles(
+    path: Union[str, Path], start_problem: Optional[StartProblem] = None
+) -> Tuple[Vehicle, ...]:
     """Read the vehicles of a file, in the order of their numbers.
+
+    Args:
+        path: The file.
+        start_problem: Knows the room, if that is known.
 
     Raises:
         InputError: The file cannot be read, or has faults; lists all of them.
     """
     path = Path(path).expanduser()
-    return vehicles_from_document(read_yaml(path), str(path))
+    return vehicles_from_document(read_yaml(path), str(path), start_problem)
 
 
-def vehicles_from_document(document: Any, source: str) -> Tuple[Vehicle, ...]:
+def vehicles_from_document(
+    document: Any, source: str, start_problem: Optional[StartProblem] = None
+) -> Tuple[Vehicle, ...]:
     """Check a parsed document and return its vehicles.
+
+    Args:
+        document: The document.
+        source: Name of its file, for messages.
+        start_problem: Knows the room, if that is known.
 
     Raises:
         InputError: The document has faults; lists all of them.
@@ -152,7 +192,9 @@ def vehicles_from_document(document: Any, source: str) -> Tuple[Vehicle, ...]:
             check.fault("vehicles", f"{len(entries)} vehicles, expected 1 to {MAX_VEHICLES}")
         found = [_read_vehicle(check, entry, k, has_roof) for k, entry in enumerate(entries)]
         vehicles = [vehicle for vehicle in found if vehicle is not None]
-        _check_numbers(check, vehicles, len(entries))
+        _check_numbers(check, found)
+        check_addresses(check, [vehicle.address if vehicle else "" for vehicle in found])
+        _check_starts(check, found, start_problem)
     if check.problems:
         raise InputError(check.problems)
     return tuple(sorted(vehicles, key=lambda vehicle: vehicle.number))
@@ -167,16 +209,19 @@ def _read_vehicle(check: Checker, entry: Any, index: int, has_roof: bool) -> Opt
     limits = _read_limits(check, fields.get("limits", {}), f"{place}.limits")
     altitude_m = check.number(fields, "altitude", place, 1.0, positive=True)
     problem = limits.height_problem(altitude_m)
-    if problem and not check.problems:
+    if altitude_m < LEAST_ALTITUDE_M:
+        check.fault(f"{place}.altitude", f"{altitude_m:g}, expected {LEAST_ALTITUDE_M:g} m or more")
+    elif problem and not check.problems:
         check.fault(f"{place}.altitude", problem)
     if kind == "crazyflie" and fields.get("link_lost") != LINK_LOST:
         check.fault(f"{place}.link_lost", LINK_LOST_PROBLEM)
     start, odom = _read_frames(check, fields, place)
+    number = _whole(check, fields, "number", place, None, MAX_VEHICLES - 1)
     return Vehicle(
-        _whole(check, fields, "number", place, None, MAX_VEHICLES - 1),
+        number,
         kind,
         _choice(check, fields, "autopilot", place, AUTOPILOTS, "ardupilot"),
-        "" if kind == "simulated" else check.text(fields, "address", place, ""),
+        read_address(check, fields, place, kind),
         _whole(check, fields, "system", place, 1, _MAX_SYSTEM),
         _flag(check, fields, "radio", place, True),
         has_roof,
@@ -186,30 +231,22 @@ def _read_vehicle(check: Checker, entry: Any, index: int, has_roof: bool) -> Opt
         start,
         odom,
         _choice(check, fields, "failsafes", place, FAILSAFES, "check") == "set",
+        _whole(check, fields, "bridge_system", place, OUR_SYSTEM - number, _MAX_SYSTEM),
     )
 
 
 def _read_limits(check: Checker, value: Any, place: str) -> Limits:
     defaults = Limits()
-    names = {
-        "speed": "speed_mps",
-        "climb": "climb_mps",
-        "yaw_rate": "yaw_rate_radps",
-        "height": "height_m",
-        "radius": "radius_m",
-        "battery": "battery",
-    }
-    fields = check.mapping(value, place, list(names))
+    fields = check.mapping(value, place, list(_LIMITS))
     if fields is None:
         return defaults
-    limits = Limits(
-        **{
-            attribute: check.number(
-                fields, name, place, getattr(defaults, attribute), positive=name != "battery"
-            )
-            for name, attribute in names.items()
-        }
-    )
+    values: Dict[str, float] = {}
+    for name, (attribute, most) in _LIMITS.items():
+        default, is_positive = getattr(defaults, attribute), name != "battery"
+        values[attribute] = check.number(fields, name, place, default, is_positive)
+        if is_positive and values[attribute] > most:
+            check.fault(f"{place}.{name}", f"{values[attribute]:g}, expected {most:g} or less")
+    limits = Limits(**values)
     if not 0.0 <= limits.battery < 1.0:
         check.fault(f"{place}.battery", f"{limits.battery:g}, expected a share from 0 to 1")
     return limits
@@ -259,14 +296,38 @@ def _read_lidar(check: Checker, value: Any, place: str, kind: str) -> Optional[L
     )
 
 
-def _check_numbers(check: Checker, vehicles: List[Vehicle], entries: int) -> None:
-    """Find numbers that are given twice or left out, and addresses that two vehicles share."""
+def _check_numbers(check: Checker, found: Sequence[Optional[Vehicle]]) -> None:
+    """Find numbers that are given twice or left out, and system numbers of a bridge."""
+    if check.problems:
+        return
+    vehicles = [vehicle for vehicle in found if vehicle is not None]
     numbers = sorted(vehicle.number for vehicle in vehicles)
-    if len(vehicles) == entries and numbers != list(range(entries)) and not check.problems:
-        check.fault("vehicles", f"numbers {numbers}, expected each of 0 to {entries - 1} once")
-    addresses = [vehicle.address for vehicle in vehicles if vehicle.address]
-    for address in sorted({one for one in addresses if addresses.count(one) > 1}):
-        check.fault("vehicles", f"two vehicles have the address {address}, expected one for each")
+    if numbers != list(range(len(found))):
+        check.fault("vehicles", f"numbers {numbers}, expected each of 0 to {len(found) - 1} once")
+        return
+    bridged = [(k, vehicle) for k, vehicle in enumerate(vehicles) if vehicle.kind == "mavlink"]
+    taken = {vehicle.system for _, vehicle in bridged}
+    for k, vehicle in bridged:
+        if vehicle.bridge_system in taken:
+            what = f"{vehicle.bridge_system}, the number of a vehicle or of another bridge"
+            check.fault(f"vehicles[{k}].bridge_system", f"{what}, expected one of its own")
+        taken.add(vehicle.bridge_system)
+
+
+def _check_starts(
+    check: Checker, found: Sequence[Optional[Vehicle]], start_problem: Optional[StartProblem]
+) -> None:
+    """Find places that two vehicles cannot share, and those that are out of the room."""
+    starts = [None if vehicle is None else vehicle.map_from_start for vehicle in found]
+    for k, start in enumerate(starts):
+        place = f"vehicles[{k}].start"
+        problem = start_problem(start) if start and start_problem else ""
+        if problem:
+            check.fault(place, problem)
+        for j, other in enumerate(starts[:k]):
+            if start and other and start.distance_to(other) < LEAST_APART_M:
+                what = f"{start.distance_to(other):.2f} m from vehicles[{j}].start"
+                check.fault(place, f"{what}, expected {LEAST_APART_M:g} m or more")
 
 
 def _whole(

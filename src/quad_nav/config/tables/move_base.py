@@ -163,17 +163,18 @@ MOVE_BASE_TABLE = Table(
             0,
             "",
             "",
-            "Number of this robot in its fleet. Not in upstream move_base; see peers.md.",
+            "Number of this robot in its fleet; if unset, the number in its node's name, its"
+            " frames or its topics. Not in upstream move_base; see peers.md.",
             low=0,
         ),
         integer(
             "robots",
-            1,
+            0,
             "",
             "",
-            "Number of robots in the fleet; the peers are the other numbers below it. Not in"
-            " upstream move_base; see peers.md.",
-            low=1,
+            "Number of robots in the fleet; the peers are the other numbers below it. 0: the peers"
+            " are the robots that publish. Not in upstream move_base; see peers.md.",
+            low=0,
         ),
         flag(
             "size_from_scene",

@@ -113,15 +113,17 @@ class ThrottledWarnings:
             kind: Warnings of one kind are the same. Give it for a text with words from a message:
                 a flood of different words would be a flood of lines.
         """
-        text = excerpt(text, MAX_WARNING, keep="\n")
-        if self._is_due(kind or text):
-            rospy.logwarn("%s", text)
+        self.log(rospy.logwarn, text, kind)
 
     def error(self, text: str) -> None:
         """Log an error unless the same line was logged a short time ago."""
+        self.log(rospy.logerr, text)
+
+    def log(self, function: Callable[..., None], text: str, kind: str = "") -> None:
+        """Log by one of rospy's functions unless the same was logged a short time ago."""
         text = excerpt(text, MAX_WARNING, keep="\n")
-        if self._is_due(text):
-            rospy.logerr("%s", text)
+        if self._is_due(kind or text):
+            function("%s", text)
 
     def _is_due(self, text: str) -> bool:
         kind, now_s = _NUMBER.sub("#", text), time.monotonic()
@@ -129,7 +131,9 @@ class ThrottledWarnings:
             return False
         if kind not in self._logged_s and len(self._logged_s) >= MAX_KINDS:
             self._logged_s = {
-                one: at_s for one, at_s in list(self._logged_s.items()) if now_s - at_s < REPEAT_S
+                one: at_s
+                for one, at_s in list(self._logged_s.items())  # several threads warn
+                if now_s - at_s < REPEAT_S
             }
             if len(self._logged_s) >= MAX_KINDS:
                 return False

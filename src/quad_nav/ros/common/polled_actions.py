@@ -57,6 +57,10 @@ class PolledActionServer(SimpleActionServer):
         # `start` subscribes with these.
         server.internal_goal_callback, server.internal_cancel_callback = on_goal, on_cancel
 
+    def cancel(self, message: GoalID) -> None:
+        """Take a request to cancel that has come from another topic."""
+        self.action_server.internal_cancel_callback(message)
+
     def _is_valid(self, goal_id: GoalID, kind: str) -> bool:
         problem = goal_id_problem(goal_id.id, goal_id.stamp.to_sec(), rospy.get_time())
         if problem:

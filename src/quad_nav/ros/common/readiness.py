@@ -15,10 +15,16 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 import rosgraph
 import rosgraph.network
 import rospy
-from rospy.impl.paramserver import get_param_server_cache
-from rospy.impl.tcpros_base import init_tcpros_server
 
 from quad_nav.errors import QuadError, excerpt, printable
+from quad_nav.ros.common.rospy_repairs import (
+    accept_many_connections,
+    connect_once,
+    hear_one_clock,
+    log_without_master,
+    refuse_second,
+    register_again,
+)
 
 WARN_EVERY_S = 10.0  # wall time, as all durations here
 POLL_S = 0.1
@@ -28,8 +34,6 @@ SILENT_AFTER_S = 3.0
 REPEAT_S = 15.0
 MAX_LOG = 50_000  # characters of a line and of each of its arguments
 _MAX_HEADER = 4096  # bytes
-_WAITING_CONNECTIONS = 128
-_ROSOUT_PARAMETER = "/rosout_disable_topics_generation"
 
 
 def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
@@ -42,8 +46,9 @@ def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
         name: Name of the node.
         at_signal: Called in the other thread, before anything is shut down.
     """
-    rospy.init_node(name, disable_signals=True)
-    set_up_node()
+    refuse_second(name)
+    start_node(name)
+    hear_one_clock()
 
     def shut_down(number: int, _frame: Optional[FrameType]) -> None:
         reason = signal.Signals(number).name
@@ -58,22 +63,19 @@ def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
         signal.signal(number, shut_down)
 
 
-def set_up_node() -> None:
-    """Set up logging and connections of a node that has just been initialized."""
+def start_node(name: str, argv: Optional[Sequence[str]] = None) -> None:
+    """Call `rospy.init_node` without its handlers of signals, and set up logging and connections.
+
+    Args:
+        name: Name of the node.
+        argv: Its command line, with remappings; None for that of the process.
+    """
+    connect_once()
+    rospy.init_node(name, argv, disable_signals=True)
     accept_many_connections()
     escape_log_messages()
     log_without_master()
-
-
-def accept_many_connections() -> None:
-    """Let more nodes connect to this one at the same time.
-
-    rospy lets five connections wait. Linux drops further ones, and their nodes try again after 1 s:
-    until then a navigator that has just started does not hear the clock.
-    """
-    server = init_tcpros_server()
-    server.start_server()
-    server.tcp_ros_server.server_sock.listen(_WAITING_CONNECTIONS)
+    register_again()
 
 
 def server_parameters() -> Dict[str, Any]:
@@ -106,16 +108,6 @@ def _printable_argument(value: object) -> object:
     if isinstance(value, QuadError):
         return printable(value, "\n")
     return excerpt(str(value), MAX_LOG)
-
-
-def log_without_master() -> None:
-    """Let log calls return at once while the ROS master hangs.
-
-    Each log call of rospy reads a parameter, and asks the master for it as long as it is not set:
-    rospy does not cache that it is missing. This puts the default into the cache.
-    """
-    if rospy.get_param_cached(_ROSOUT_PARAMETER, None) is None:
-        get_param_server_cache().set(_ROSOUT_PARAMETER, False)
 
 
 @dataclass(frozen=True)

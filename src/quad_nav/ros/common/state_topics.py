@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 import time
 from functools import partial
-from typing import Callable, Dict, Iterable, Sequence
+from typing import Callable, Dict, Iterable, List, Optional, Sequence
 
 import numpy as np
 import rospy
@@ -24,6 +24,8 @@ from quad_nav.topics.validation import frame_problem, stamp_problem, valid_state
 CHECK_S = 0.1  # wall time
 MISSING_AFTER_S = 0.5
 """A robot that was on no bulk message for so long, in wall time and by the clock, is not there."""
+FIND_S = 1.0
+"""Wall time between two questions to the ROS master which robots there are."""
 STEADY_S = 2.0
 """Wall time for which bulk messages have carried a robot when its own topic is left."""
 
@@ -35,7 +37,11 @@ class OwnTopics:
     """
 
     def __init__(
-        self, robots: int, heard: Iterable[int], subscribe: Callable[[int], rospy.Subscriber]
+        self,
+        robots: int,
+        heard: Iterable[int],
+        subscribe: Callable[[int], rospy.Subscriber],
+        find: Optional[Callable[[int], str]] = None,
     ) -> None:
         """Start without subscriptions.
 
@@ -43,8 +49,10 @@ class OwnTopics:
             robots: Number of all robots.
             heard: Numbers of those to subscribe to.
             subscribe: Subscribes to the topic of a robot.
+            find: Returns the name of a robot's topic, and only topics that are published are
+                subscribed to: it is not known which robots there are. None if they are known.
         """
-        self._heard, self._subscribe = list(heard), subscribe
+        self._heard, self._subscribe, self._find = list(heard), subscribe, find
         self._subscribers: Dict[int, rospy.Subscriber] = {}
         now_s = time.monotonic()
         self._wall_s = np.full(robots, now_s)  # of the last bulk message with each robot
@@ -78,7 +86,7 @@ class OwnTopics:
         now_s = time.monotonic()
         if now_s < self._next_check_s:
             return
-        self._next_check_s = now_s + CHECK_S
+        self._next_check_s = now_s + (FIND_S if self._find else CHECK_S)
         missing = self._missing()
         steady = ~missing & (now_s - self._since_s > STEADY_S)
         wanted = [j for j in self._heard if missing[j] and j not in self._subscribers]
@@ -91,13 +99,21 @@ class OwnTopics:
 
     def _change(self, wanted: Sequence[int], unwanted: Sequence[int]) -> None:
         try:
-            for robot in wanted:
+            for robot in self._published(wanted) if self._find else wanted:
                 self._subscribers[robot] = self._subscribe(robot)
             for robot in unwanted:
                 self._subscribers.pop(robot).unregister()
         except rospy.ROSException:
             if not rospy.core.is_shutdown_requested():  # at shutdown rospy closes the topics
                 raise
+
+    def _published(self, robots: Sequence[int]) -> List[int]:
+        assert self._find is not None
+        try:
+            topics = {name for name, _ in rospy.get_published_topics()}
+        except OSError:  # the ROS master hangs
+            return []
+        return [robot for robot in robots if self._find(robot) in topics]
 
 
 class StateTopics:
@@ -110,6 +126,8 @@ class StateTopics:
         on_odometry: Callable[[int, Odometry], None],
         subscribed: Callable[[int, rospy.Subscriber], None] = lambda *_: None,
         queue_size: int = 1,
+        topic: Callable[[int], str] = "/odom{}".format,
+        only_published: bool = False,
     ) -> None:
         """Subscribe to the states.
 
@@ -119,11 +137,16 @@ class StateTopics:
             on_odometry: Called with a robot and its odometry message, which is not checked.
             subscribed: Called with a robot and the subscriber to its odometry, in another thread.
             queue_size: Length of the subscribers' queues.
+            topic: Returns the name of the topic of a robot's odometry.
+            only_published: Whether it is not known which robots there are: see `OwnTopics`.
         """
         self._robots, self._on_states, self._on_odometry = robots, on_states, on_odometry
         self._subscribed, self._queue_size = subscribed, queue_size
         self._reader, self._warnings = StatesReader(), ThrottledWarnings()
-        self._own = OwnTopics(robots, range(robots), self._subscribe)
+        self._topic = topic
+        self._own = OwnTopics(
+            robots, range(robots), self._subscribe, topic if only_published else None
+        )
         self.subscriber = rospy.Subscriber(
             STATES_TOPIC, StatesMessage, self._on_message, queue_size=queue_size, tcp_nodelay=True
         )
@@ -134,7 +157,7 @@ class StateTopics:
 
     def _subscribe(self, robot: int) -> rospy.Subscriber:
         subscriber = rospy.Subscriber(
-            f"/odom{robot}",
+            self._topic(robot),
             Odometry,
             partial(self._on_own_odometry, robot),
             queue_size=self._queue_size,

@@ -16,10 +16,11 @@ import rospy
 from quad_nav.geometry import Pose2D, Scan
 from quad_nav.loop import LoopSetup
 from quad_nav.loop.navigator_group import LocatedScan, NavigatorGroup, NavigatorResult
-from quad_nav.ros.common.conversions import ScanMessage, scan_message
+from quad_nav.ros.common.conversions import ScanMessage, scan_message, time_message
 from quad_nav.ros.common.diagnostics import publish_health
-from quad_nav.ros.common.readiness import TopicWatch, set_up_node
-from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers, set_time
+from quad_nav.ros.common.readiness import TopicWatch, start_node
+from quad_nav.ros.common.rospy_repairs import leave_clock, set_time
+from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
 from quad_nav.ros.composed.robot import ComposedRobot
 from quad_nav.ros.composed.transforms import ComposedTransforms
 from quad_nav.ros.navigator.costmap_publisher import NewSubscriber, Publish
@@ -86,7 +87,7 @@ class ComposedGroup(NavigatorGroup):
 
     def scan(self, now_s: float, states: RobotStates) -> Dict[int, LocatedScan]:
         """Take scans, hand them to the navigators and publish them."""
-        set_time(now_s)
+        set_time(time_message(now_s))
         scans = super().scan(now_s, states)
         for number, (scan, _) in scans.items():
             self._scans[number].publish(scan)
@@ -96,7 +97,7 @@ class ComposedGroup(NavigatorGroup):
         self, now_s: float, states: RobotStates, goals: Mapping[int, Pose2D]
     ) -> List[NavigatorResult]:
         """Tick the navigators that are due, and publish their results."""
-        set_time(now_s)
+        set_time(time_message(now_s))
         self._states = states
         self.transforms.update(now_s, states, self._frames, now_s - self._start_s)
         if self._needs_transforms:
@@ -162,12 +163,11 @@ def _start_node(
 ) -> ComposedGroup:
     ignore_publishers(OwnNodes(nodes), is_handed_over)
     # The simulator's name, log and remappings of its name do not concern this node.
-    rospy.init_node(
+    start_node(
         nodes[process].rsplit("/", 1)[1],
-        argv=[one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
-        disable_signals=True,
+        [one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
     )
-    set_up_node()
+    leave_clock()
     group = _WorkerGroup(setup, robots, lidars)
     rospy.loginfo("%s: ready, robots: %d", rospy.get_name().lstrip("/"), len(robots))
     return group

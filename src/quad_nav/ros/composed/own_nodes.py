@@ -14,8 +14,6 @@ import rosgraph
 import rospy
 from rospy.topics import _SubscriberImpl
 
-from quad_nav.ros.common.conversions import time_message
-
 
 class OwnNodes:
     """The nodes of a composed fleet, by their names.
@@ -64,9 +62,3 @@ def ignore_publishers(own: OwnNodes, is_handed_over: Callable[[str], bool]) -> N
         return is_handed_over(subscriber.resolved_name) and own.has(endpoint_id)
 
     _SubscriberImpl.has_connection = has_connection
-
-
-def set_time(now_s: float) -> None:
-    """Set the time of this node, which does not hear its own clock."""
-    if not rospy.rostime.is_wallclock():
-        rospy.rostime._set_rostime(time_message(now_s))

@@ -1,7 +1,8 @@
 """Receive goals through actionlib and `move_base_simple/goal`, and report their results.
 
 The action is named `move_base` in the node's namespace, as in C++ move_base. The launch files
-remap its five topics into the robot's own namespace.
+remap its five topics into the robot's own namespace, `/move_base{i}`. Requests to cancel are heard
+there with any launch file: those of the sequencer, which stops robots with them.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections import deque
 from typing import Deque, Optional
 
 import rospy
+from actionlib_msgs.msg import GoalID
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
 
@@ -28,17 +30,17 @@ class GoalServer:
     """Pass the newest goal to the navigator when it accepts one."""
 
     def __init__(
-        self, robot: str, transforms: Transforms, global_frame: str, names: Names = own_node
+        self, number: int, transforms: Transforms, global_frame: str, names: Names = own_node
     ) -> None:
         """Start the action server.
 
         Args:
-            robot: Name of the robot, for the log.
+            number: Number of the robot.
             transforms: Converts goals to the global frame.
             global_frame: Frame of the navigator's goals.
             names: Names of the robot's topics.
         """
-        self._robot = robot
+        self._robot = robot = f"quad{number}"
         self._transforms = transforms
         self._global_frame = global_frame
         self._current_goal = rospy.Publisher(names("~current_goal"), PoseStamped, queue_size=1)
@@ -48,6 +50,9 @@ class GoalServer:
             MoveBaseAction,
             lambda line: self._warnings.warn(f"{robot}: {line}"),
         )
+        own_cancel, cancel = f"/move_base{number}/cancel", names("move_base/cancel")
+        if rospy.resolve_name(cancel) != own_cancel:
+            self._cancel = rospy.Subscriber(own_cancel, GoalID, self._server.cancel)
         self._action_goal = rospy.Publisher(
             names("move_base/goal"), MoveBaseActionGoal, queue_size=1
         )

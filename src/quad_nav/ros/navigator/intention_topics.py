@@ -21,8 +21,10 @@ from nav_msgs.msg import Path
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
+from quad_nav.errors import excerpt
 from quad_nav.peers.peer import Intention, Peer, assumed_intention, idle_priority
 from quad_nav.ros.common.conversions import time_message
+from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.nav_messages import path_message
 from quad_nav.ros.common.state_topics import OwnTopics
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
@@ -37,6 +39,7 @@ from quad_nav.topics.validation import (
 )
 
 INTENTIONS_TOPIC = "/quad/intentions"
+_INTENTION_TOPIC = "/move_base{}/intention"
 REPEAT_S = 0.25
 INTENTION_VALID_S = 2.0  # the navigator that published an older intention has died
 _POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("robot", "<u4"), ("priority", "<f8")])
@@ -124,19 +127,32 @@ class FleetIntentionPublisher:
 class IntentionListener:
     """Receive the intentions of robots."""
 
-    def __init__(self, robots: Iterable[int], transforms: Transforms, frame: str) -> None:
+    def __init__(
+        self,
+        robots: Iterable[int],
+        transforms: Transforms,
+        frame: str,
+        own: Iterable[int] = (),
+        only_published: bool = False,
+    ) -> None:
         """Subscribe to the intentions of hosts.
 
         Args:
             robots: Numbers of the robots.
             transforms: Converts their intentions to `frame`.
             frame: Frame of the intentions.
+            own: Numbers of the robots that this node flies.
+            only_published: Whether it is not known which robots there are: see `OwnTopics`.
         """
         self._transforms, self._frame = transforms, frame
-        self._robots = frozenset(robots)
+        self._robots, self._own = frozenset(robots), frozenset(own)
+        self._warnings = ThrottledWarnings()
         self._intentions: Dict[int, Tuple[float, Intention]] = {}  # with the time
         self._own_topics = OwnTopics(
-            max(self._robots, default=0) + 1, self._robots, self._subscribe
+            max(self._robots, default=0) + 1,
+            self._robots,
+            self._subscribe,
+            _INTENTION_TOPIC.format if only_published else None,
         )
         self.subscribers: List[rospy.Subscriber] = []
         if self._robots:
@@ -146,7 +162,7 @@ class IntentionListener:
 
     def _subscribe(self, robot: int) -> rospy.Subscriber:
         return rospy.Subscriber(
-            f"/move_base{robot}/intention",
+            _INTENTION_TOPIC.format(robot),
             Path,
             partial(self._on_intention, robot),
             queue_size=1,
@@ -154,13 +170,23 @@ class IntentionListener:
 
     def _on_intentions(self, message: PointCloud2) -> None:
         sent_s, frame = message.header.stamp.to_sec(), message.header.frame_id
+        sender = excerpt(message._connection_header.get("callerid", "an unnamed node"))
+        if sender == rospy.get_name():
+            return
         try:
-            received = intentions_from_message(message, self._robots)
+            received = intentions_from_message(message, self._robots | self._own)
             if stamp_problem(sent_s, rospy.get_time()):
                 raise ValueError(stamp_problem(sent_s, rospy.get_time()))
         except ValueError as error:
             rospy.logwarn_throttle(5.0, f"{INTENTIONS_TOPIC}: intentions dropped: {error}")
             return
+        for robot in self._own.intersection(received):
+            del received[robot]
+            self._warnings.warn(
+                f"quad{robot}: {sender} flies quad{robot} too, and neither avoids the other;"
+                " expected one navigator for each robot: set another number with"
+                ' <param name="robot" value="..." /> in the <node> of one of them'
+            )
         try:
             received = self._in_own_frame(received, frame)
         except TransformUnavailable as error:

@@ -6,6 +6,7 @@ import time
 from typing import List, Optional, Sequence
 
 import rospy
+from rospy.rostime import is_wallclock
 
 from quad_nav.ros.common.diagnostics import publish_health
 from quad_nav.ros.common.readiness import TopicWatch
@@ -59,8 +60,9 @@ class NavigatorLoop:
             stalled_s = stall.ended_after_s(self._now_s)
             if stalled_s >= STALL_S:
                 rospy.loginfo(
-                    "%s: /clock stopped for %.1f s; discarding queued messages",
+                    "%s: %s for %.1f s; discarding queued messages",
                     self._name,
+                    "the node was stopped or busy" if is_wallclock() else "/clock stopped",
                     stalled_s,
                 )
                 rospy.rostime.wallsleep(DRAIN_S)
@@ -84,8 +86,9 @@ class NavigatorLoop:
         before_s, self._now_s = self._now_s, rospy.get_time()
         if self._now_s < before_s:
             rospy.logwarn(
-                "%s: /clock jumped back by %.2f s; restarting all schedules",
+                "%s: %s jumped back by %.2f s; restarting all schedules",
                 self._name,
+                "the system's clock" if is_wallclock() else "/clock",
                 before_s - self._now_s,
             )
             self._start_s = self._now_s
@@ -118,6 +121,8 @@ class NavigatorLoop:
 
 class StallDetector:
     """Measure how long the clock has stopped: a stopped process, a cut link or a pause.
+
+    The clock of the system does not stop; then it measures how long the process has.
 
     Messages that queued up meanwhile are old. The robots must not act on the first of them. What
     comes before the clock's first step is no stop: the simulator waits for the robots.

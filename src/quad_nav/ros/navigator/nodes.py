@@ -20,6 +20,7 @@ from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.common.transforms import Transforms
 from quad_nav.ros.navigator.loop import NavigatorLoop
 from quad_nav.ros.navigator.peer_topics import PeerTopics
+from quad_nav.ros.navigator.robot_identity import MAX_ROBOTS, identified
 from quad_nav.ros.navigator.robot_navigator import RobotNavigator
 from quad_nav.scenario.warm_up import warm_up
 from quad_nav.topics.publishing import Names, in_fleet, own_node
@@ -43,7 +44,7 @@ class Fleet:
         Raises:
             InputError: If a plugin refuses its parameters.
         """
-        robots = max(one.robots for one in configurations.values())
+        robots = max(one.robots for one in configurations.values()) or MAX_ROBOTS
         transforms = Transforms(set(range(robots)) - set(configurations))
         frames: Dict[str, List[Configuration]] = {}
         for one in configurations.values():
@@ -72,7 +73,8 @@ def move_base() -> int:
     init_node("move_base")
 
     def configurations() -> Dict[int, Configuration]:
-        one = config.load(rospy.get_param("~", {}), rospy.get_name())
+        given = rospy.get_param("~", {})
+        one = identified(config.load(given, rospy.get_name()), given)
         return {one.robot: one}
 
     return _run(configurations, lambda _: own_node)

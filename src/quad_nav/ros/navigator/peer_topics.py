@@ -7,7 +7,7 @@ other hosts in one message.
 
 from __future__ import annotations
 
-from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Set, Tuple
 
 import numpy as np
 import rospy
@@ -33,6 +33,7 @@ from quad_nav.ros.navigator.intention_topics import (
     IntentionListener,
     IntentionPublisher,
 )
+from quad_nav.ros.navigator.robot_identity import MAX_ROBOTS
 from quad_nav.topics.publishing import Names
 from quad_nav.topics.validation import odometry_problem, stamp_problem
 
@@ -59,31 +60,44 @@ class PeerTopics:
 
         Args:
             own: Names of the topics of the robots that this node flies, by their numbers.
-            robots: Number of all robots, numbered from 0.
+            robots: Number of all robots, numbered from 0; 0 if it is not known: then the peers are
+                those in messages and those whose odometry is published.
             transforms: Converts states to the global frame.
             global_frame: Frame of the peers' states.
         """
         self._own, self._transforms, self._frame = frozenset(own), transforms, global_frame
+        self._finds, robots = robots == 0, robots or max(MAX_ROBOTS, *(j + 1 for j in own))
+        self._found: Set[int] = set()
         self._odometry: Dict[int, Odometry] = {}
         self._states = np.full((robots, 5), np.nan)  # x, y, vx, vy in the frame, and the stamp
         self._peers: Dict[int, Peer] = {}  # of the last refresh, those that were asked for
         self._snapshot, self._now_s = self._states.copy(), 0.0
         self._topic_watch = TopicWatch()
         # Alone there is no peer to hear, and none that listens.
-        self._topics = (
-            StateTopics(robots, self._on_states, self._on_odometry, self._watch)
-            if robots > 1
-            else None
-        )
+        self._topics = self._subscribe(robots, own) if robots > 1 else None
         self._publisher = rospy.Publisher(STATES_TOPIC, StatesMessage, queue_size=10)
         self._intentions = IntentionListener(
-            (j for j in range(robots) if j not in own), transforms, global_frame
+            (j for j in range(robots) if j not in own),
+            transforms,
+            global_frame,
+            own,
+            self._finds,
         )
         self._publishers = {
             number: IntentionPublisher(names, global_frame) for number, names in own.items()
         }
         self._fleet_publisher = FleetIntentionPublisher(
             own, global_frame, len(self._intentions.subscribers)
+        )
+
+    def _subscribe(self, robots: int, own: Mapping[int, Names]) -> StateTopics:
+        return StateTopics(
+            robots,
+            self._on_states,
+            self._on_odometry,
+            self._watch,
+            topic=lambda j: rospy.resolve_name(own[j]("odom")) if j in own else f"/odom{j}",
+            only_published=self._finds,
         )
 
     def _watch(self, robot: int, subscriber: rospy.Subscriber) -> None:
@@ -127,8 +141,16 @@ class PeerTopics:
             self._topic_watch.check()
         self._take_odometry()
         self._now_s, self._snapshot = now_s, self._states.copy()
+        if self._finds:
+            self._log_found()
         self._peers.clear()
         self._fleet_publisher.publish(now_s)
+
+    def _log_found(self) -> None:
+        known = set(np.flatnonzero(~np.isnan(self._snapshot[:, 0])).tolist())
+        for robot in sorted(known - self._own - self._found):
+            self._found.add(robot)
+            rospy.loginfo("quad%d: found quad%d, avoiding it", min(self._own), robot)
 
     def _take_odometry(self) -> None:
         """Locate the robots that are in no state message; publish those of this node."""

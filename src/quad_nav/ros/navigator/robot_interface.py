@@ -98,7 +98,10 @@ class RobotInterface:
             names,
         )
         self._goals = GoalServer(
-            self.name, transforms, navigator.global_costmap.params.global_frame, names
+            self._configuration.robot,
+            transforms,
+            navigator.global_costmap.params.global_frame,
+            names,
         )
 
     def _on_reconfigure(self, namespace: str, changes: Dict[str, Any]) -> config.Configuration:

@@ -219,7 +219,8 @@ class MissionRunner:
                 thread.start()
         elif now_s < before_s or any(robot.clock_went_back for robot in self.robots):
             rospy.logwarn(
-                "sequencer: /clock jumped back by %.2f s; resuming the mission",
+                "sequencer: %s jumped back by %.2f s; resuming the mission",
+                "the system's clock" if rospy.rostime.is_wallclock() else "/clock",
                 max(before_s - now_s, 0.0),
             )
             with self._paused_robots():

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import collections
 import functools
-from typing import Deque, Optional, Sequence, Tuple
+from typing import Deque, Optional, Sequence, Set, Tuple
 
+import rosgraph
 import rospy
 from geometry_msgs.msg import Twist
 
 from quad_nav.errors import excerpt
+from quad_nav.files.values import is_number
 from quad_nav.geometry import Twist2D
 from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.sim.simulation import Simulation
@@ -35,7 +37,9 @@ class Commands:
         self._simulation = simulation
         params = simulation.params
         robots = range(simulation.n_robots) if robots is None else robots
+        self._period_s = params.controller_period_s
         self._lease = CommandLease(params.command_timeout_s + params.controller_period_s)
+        self._nodes: Set[str] = set()  # that have sent a command
         # Bounds the cost of a node that floods a topic.
         self._waiting: Deque[Tuple[int, Twist]] = collections.deque(
             maxlen=_COMMANDS_PER_ROBOT * len(robots)
@@ -52,7 +56,24 @@ class Commands:
         ]
 
     def _store(self, robot: int, message: Twist) -> None:
+        node = message._connection_header.get("callerid", "")
+        if node not in self._nodes:
+            self._nodes.add(node)
+            self._wait_for(node)
         self._waiting.append((robot, message))
+
+    def _wait_for(self, node: str) -> None:
+        """Wait as long for commands as a navigator pauses between two.
+
+        It may have started after the simulator, which asks those that it finds at its start.
+        """
+        try:
+            frequency_hz = rospy.get_param(f"{node}/controller_frequency", None)
+        except (OSError, rosgraph.MasterException):  # the ROS master hangs
+            return
+        if is_number(frequency_hz) and frequency_hz > 0.0:
+            self._period_s = max(1.0 / frequency_hz, self._period_s)
+            self._lease.valid_s = self._simulation.wait_for_commands(self._period_s)
 
     def take(self) -> None:
         """Pass on the commands that have come from topics."""

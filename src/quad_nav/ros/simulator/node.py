@@ -34,10 +34,12 @@ from quad_nav.errors import InputError, printable
 from quad_nav.files.values import is_number
 from quad_nav.kernels.jit import cache_warnings
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
-from quad_nav.ros.common.readiness import server_parameters, set_up_node
+from quad_nav.ros.common.conversions import time_message
+from quad_nav.ros.common.readiness import server_parameters, start_node
+from quad_nav.ros.common.rospy_repairs import leave_clock, refuse_second, set_time
 from quad_nav.ros.composed.fleet import ComposedFleet
 from quad_nav.ros.composed.group import is_handed_over
-from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers, set_time
+from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
 from quad_nav.ros.navigator.nodes import log_invalid, prepare
 from quad_nav.ros.navigator.reconfigure import ParameterServer, config_type
 from quad_nav.ros.simulator.commands import Commands
@@ -106,6 +108,9 @@ class SimulatorNode:
                 self._wait_paused()
             else:
                 self._advance()
+
+    def close(self) -> None:
+        """End the navigators' processes."""
         self._loop.close()
 
     def stop(self) -> None:
@@ -113,19 +118,20 @@ class SimulatorNode:
         self._stopping = True
 
     def _advertise_services(self) -> None:
-        for name, action in (
-            ("start", self._start),
-            ("pause", self._pause),
-            ("reset", self._reset),
-        ):
-            rospy.Service(f"/simulation/{name}", Trigger, self._trigger_handler(action))
+        """Advertise what starts the simulation last: then everything else is there."""
+        rospy.set_param("~rate", self._rate)
+        type_ = config_type("Simulator", [_rate_parameter(self._rate)])
+        self._parameters = ParameterServer(type_, self._reconfigure, "~", {"rate": self._rate})
         for i in range(self._setup.robots):
             rospy.Service(
                 f"/simulation/lidar{i}/enable", SetBool, functools.partial(self._enable_lidar, i)
             )
-        rospy.set_param("~rate", self._rate)
-        type_ = config_type("Simulator", [_rate_parameter(self._rate)])
-        self._parameters = ParameterServer(type_, self._reconfigure, "~", {"rate": self._rate})
+        for name, action in (
+            ("reset", self._reset),
+            ("pause", self._pause),
+            ("start", self._start),
+        ):
+            rospy.Service(f"/simulation/{name}", Trigger, self._trigger_handler(action))
 
     # Callbacks, in threads of their own.
 
@@ -251,8 +257,7 @@ class SimulatorNode:
         time.sleep(_PAUSED_SLEEP_S)
 
     def _publish_clock(self) -> None:
-        if self._fleet.hosted:
-            set_time(self._simulation.now_s)
+        set_time(time_message(self._simulation.now_s))
         self._topics.publish_clock()
 
     def _publish_all(self) -> None:
@@ -322,10 +327,11 @@ def main() -> int:
     """
     own = OwnNodes()
     ignore_publishers(own, is_handed_over)
-    rospy.init_node("simulator", disable_signals=True)
-    set_up_node()
-    name = rospy.get_name().lstrip("/")
+    refuse_second("simulator", is_simulator=True)
     try:
+        start_node("simulator")
+        leave_clock()
+        name = rospy.get_name().lstrip("/")
         setup = _read_setup(name)
     except InputError as error:
         print(printable(error, "\n"), file=sys.stderr)
@@ -346,6 +352,8 @@ def main() -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: node.stop())
     _run(node)
+    node.close()
+    rospy.signal_shutdown("the simulation is closed")
     return 0
 
 
@@ -360,8 +368,9 @@ def _read_setup(name: str) -> SimulatorSetup:
 def _run(node: SimulatorNode) -> None:
     try:
         node.run()
-    except BaseException:
+    except BaseException as error:
+        if isinstance(error, rospy.ROSException) and rospy.core.is_shutdown_requested():
+            return  # `rosnode kill` closes the topics while the loop publishes
         traceback.print_exc()
         sys.stderr.flush()
         os._exit(1)  # keeps the services: by them the sequencer knows a dead simulator
-    rospy.signal_shutdown("the simulation is closed")

@@ -6,8 +6,10 @@ asks for it, and publishes the scene. The vehicles fly on without it.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
+from functools import partial
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Set, Tuple
 
 import rospy
@@ -28,10 +30,10 @@ from quad_nav.files.values import (
 from quad_nav.ros.common.readiness import init_node
 from quad_nav.ros.vehicle.node import LAND_ALL_TOPIC
 from quad_nav.ros.vehicle.scene_topics import SceneLidars, SceneTopics
-from quad_nav.ros.vehicle.simulated import TICK_S, SimulatedVehicles
+from quad_nav.ros.vehicle.simulated import TICK_S, SimulatedVehicles, starts_of
 from quad_nav.sim.lidar import LidarParams
 from quad_nav.sim.scene import Scene
-from quad_nav.sim.scene_file import load_scene
+from quad_nav.sim.scene_file import load_scene, outside_problem
 from quad_nav.topics.flight_info import EVENTS_TOPIC, from_text
 from quad_nav.vehicle.orders import IN_FLIGHT, ON_GROUND, State
 from quad_nav.vehicle.vehicle_file import Vehicle, load_vehicles
@@ -45,6 +47,8 @@ _TAKEN_OVER = State.TAKEN_OVER.value
 _ON_GROUND = tuple(state.value for state in ON_GROUND)
 _IN_THE_AIR = (*(state.value for state in IN_FLIGHT), _TAKEN_OVER)
 _CAN_FLY = tuple(state.value for state in (State.READY, State.LANDED, State.FLYING, State.HOLDING))
+SILENT_S = 3.0
+"""Bridges publish their states once a second; one that is silent for this long has died."""
 _DEFAULTS: Dict[str, Any] = {
     "vehicles": "",
     "scene": "",
@@ -83,7 +87,7 @@ class VehicleFleet:
         self._robots = len(vehicles)
         self._done: Set[int] = set()
         self._lands_when_done = lands_when_done
-        self._states: Dict[int, Tuple[str, str]] = {}
+        self._states: Dict[int, Tuple[str, str, float]] = {}  # state, reason, monotonic time
         self._lock = threading.Lock()
         self._is_over = False  # the missions of all that fly for them
         self._land_all = rospy.Publisher(LAND_ALL_TOPIC, Empty, queue_size=1)
@@ -101,7 +105,8 @@ class VehicleFleet:
 
     def _on_state(self, message: DiagnosticStatus, number: int) -> None:
         values = {one.key: one.value for one in message.values}
-        self._states[number] = values.get("state", ""), values.get("reason", "")
+        state, reason = values.get("state", ""), values.get("reason", "")
+        self._states[number] = state, reason, time.monotonic()
         self._land_at_end()
 
     def _on_event(self, message: String) -> None:
@@ -129,22 +134,41 @@ class VehicleFleet:
 
     def _is_away(self, robot: int) -> bool:
         """Return whether a pilot has a vehicle, or it stands on the ground, its mission stopped."""
-        state = self._states.get(robot, ("", ""))[0]
-        return state == _TAKEN_OVER or (state in _ON_GROUND and _is_stopped(robot))
+        is_down = self._is(robot, *_ON_GROUND)
+        return self._is(robot, _TAKEN_OVER) or (is_down and _is_stopped(robot))
 
     def _land(self, _: TriggerRequest) -> TriggerResponse:
-        """Land all vehicles, and respond when none is in the air."""
+        """Land all vehicles, and respond when none is in the air, or nothing is known of them."""
         self._land_all.publish(Empty())
         end_s = time.monotonic() + LAND_WAIT_S
         while time.monotonic() < end_s and not rospy.is_shutdown():
-            flying = [one.name for one in self._real if self._is_in_the_air(one.number)]
+            flying = [one for one in self._real if self._is_in_the_air(one.number)]
             if not flying:
                 return TriggerResponse(True, "all vehicles have landed")
+            if all(self._is_silent(one.number) for one in flying):
+                break
             time.sleep(0.1)
-        return TriggerResponse(False, f"still in the air: {', '.join(flying)}")
+        states = (f"{one.name} ({self._state(one.number)})" for one in flying)
+        return TriggerResponse(False, f"still in the air: {', '.join(states)}")
 
     def _is_in_the_air(self, number: int) -> bool:
-        return self._states.get(number, ("", ""))[0] in _IN_THE_AIR
+        """Return whether a vehicle was in the air when its bridge told its state last."""
+        return self._is(number, *_IN_THE_AIR)
+
+    def _is(self, number: int, *states: str) -> bool:
+        """Return whether a vehicle is in one of some states, as its bridge told last."""
+        return number in self._states and self._states[number][0] in states
+
+    def _is_silent(self, number: int) -> bool:
+        told_s = self._states[number][2] if number in self._states else -math.inf
+        return time.monotonic() - told_s > SILENT_S
+
+    def _state(self, number: int) -> str:
+        """Describe the state of a vehicle; that of a bridge that has died is not known."""
+        if number not in self._states:
+            return "no bridge"
+        text = ": ".join(filter(None, self._states[number][:2]))
+        return f"its bridge is silent, last state: {text}" if self._is_silent(number) else text
 
     def _take_off(self, _: TriggerRequest) -> TriggerResponse:
         """Take all vehicles off when all are ready; land all if one refuses.
@@ -184,11 +208,12 @@ class VehicleFleet:
         while not rospy.is_shutdown():
             missing = {}
             for robot, name in names.items():
-                state, reason = self._states.get(robot, ("", ""))
-                text = f"{state}: {reason}" if reason else state or "no bridge"
-                if state == _TAKEN_OVER:
+                text = self._state(robot)
+                if self._is(robot, _TAKEN_OVER):
                     left_out[name] = text
-                elif state not in _CAN_FLY and name not in left_out:
+                elif name not in left_out and (
+                    self._is_silent(robot) or not self._is(robot, *_CAN_FLY)
+                ):
                     missing[name] = text
             if landings or not missing:
                 stopped = set(filter(_is_stopped, names)) - were_stopped
@@ -254,11 +279,14 @@ def read_setup(
     vehicles: Tuple[Vehicle, ...] = ()
     scene: Optional[Scene] = None
     try:
-        vehicles = load_vehicles(values["vehicles"]) if not problems else ()
+        scene = load_scene(values["scene"]) if values["scene"] and not problems else None
     except InputError as error:
         problems += error.problems
+    room = None if scene is None else partial(outside_problem, scene)
     try:
-        scene = load_scene(values["scene"]) if values["scene"] and not problems else None
+        vehicles = load_vehicles(values["vehicles"], room) if not problems else ()
+        if scene is not None:
+            starts_of(scene, vehicles)
     except InputError as error:
         problems += error.problems
     if values["lidar_for"] == "vehicles" and not values["scene"]:

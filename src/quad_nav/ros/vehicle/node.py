@@ -6,6 +6,7 @@ machine and sends. A velocity command is sent on from the callback that receives
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from typing import Callable, Dict, List, Optional, Tuple
@@ -19,6 +20,7 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from quad_nav.errors import InputError, excerpt, printable
 from quad_nav.files.values import is_whole
 from quad_nav.geometry import Scan
+from quad_nav.mission.respawn import RESPAWNED
 from quad_nav.ros.common.conversions import twist_from_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings, publish_health
 from quad_nav.ros.common.readiness import init_node
@@ -50,14 +52,20 @@ _BUSY = (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatu
 class VehicleNode:
     """Topics and services of one vehicle."""
 
-    def __init__(self, vehicle: Vehicle, bridge: VehicleLink) -> None:
-        """Advertise everything."""
+    def __init__(self, vehicle: Vehicle, bridge: VehicleLink, respawned: bool = False) -> None:
+        """Advertise everything.
+
+        Args:
+            vehicle: The vehicle.
+            bridge: Its connection.
+            respawned: Whether the bridge before was killed.
+        """
         i = vehicle.number
         self._vehicle, self._bridge = vehicle, bridge
-        self._topics = VehicleTopics(vehicle)
+        self._topics = VehicleTopics(vehicle, respawned)
         self._pause = MissionPause(i, lambda: bridge.machine.state is State.TAKEN_OVER)
         self._lease = CommandLease(COMMAND_HOVER_S)
-        self._warnings = ThrottledWarnings()
+        self._warnings, self._texts = ThrottledWarnings(), ThrottledWarnings()
         self._state: Optional[Tuple[State, str]] = None
         self._next_state_s = 0.0
         self._subscribers = [
@@ -117,19 +125,21 @@ class VehicleNode:
         published: Optional[Estimate] = None
         scanned: Optional[Scan] = None
         while not rospy.is_shutdown():
-            self._bridge.read(READ_S)
-            with self._bridge.lock:
-                estimate, scan = self._bridge.estimate, self._bridge.scan
             try:
+                self._bridge.read(READ_S)
+                with self._bridge.lock:
+                    estimate, scan = self._bridge.estimate, self._bridge.scan
                 if estimate is not None and estimate is not published:
                     published = estimate
                     self._topics.publish_estimate(estimate, self._bridge.machine)
                 if scan is not None and scan is not scanned:
                     scanned = scan
                     self._topics.publish_scan(scan)
-            except rospy.ROSException:
+            except Exception as error:  # nothing that comes ends the flight
                 if not rospy.core.is_shutdown_requested():  # at shutdown rospy closes the topics
-                    raise
+                    name = self._vehicle.name
+                    self._warnings.error(f"{name}: link: {type(error).__name__}: {error}; going on")
+                    time.sleep(TICK_S)
 
     # The main thread.
 
@@ -140,14 +150,16 @@ class VehicleNode:
         if output.pauses_mission:
             self._pause.pause()
         for line in output.news:
-            rospy.loginfo("%s: %s", self._vehicle.name, excerpt(line))
+            log = rospy.logwarn if output.pauses_mission else rospy.loginfo
+            log("%s: %s", self._vehicle.name, excerpt(line))
         with self._bridge.lock:
             texts = self._bridge.pop_texts()
             machine = self._bridge.machine
+            self._topics.starts.update(machine)
             state = (machine.state, machine.reason)
         for severity, text in texts:
             log = rospy.logwarn if severity <= 4 else rospy.loginfo
-            log("%s: autopilot: %s", self._vehicle.name, excerpt(text))
+            self._texts.log(log, f"{self._vehicle.name}: autopilot: {excerpt(text)}")
         now_s = time.monotonic()
         if state != self._state or now_s >= self._next_state_s:
             self._state, self._next_state_s = state, now_s + STATE_PERIOD_S
@@ -191,6 +203,10 @@ class VehicleNode:
 
     def _resume(self, _: TriggerRequest) -> TriggerResponse:
         """Take control again, and resume the mission."""
+        with self._bridge.lock:
+            machine = self._bridge.machine
+            if machine.state is State.TAKEN_OVER and self._topics.is_lost(machine):
+                return TriggerResponse(False, "its place in map is not known: land it")
         response = self._finish(RESUMPTION)
         if response.is_accepted:
             self._pause.resume()
@@ -287,7 +303,7 @@ def main() -> int:
     except InputError as error:
         rospy.logfatal("%s", printable(error, "\n"))
         return 2
-    nodes.append(VehicleNode(vehicle, bridge))
+    nodes.append(VehicleNode(vehicle, bridge, RESPAWNED in sys.argv))
     try:
         nodes[0].run()
     except rospy.ROSException:

@@ -29,7 +29,7 @@ from quad_nav.ros.simulator.commands import Commands
 from quad_nav.ros.vehicle.scene_topics import PoseListener
 from quad_nav.sim.contacts import Contact
 from quad_nav.sim.lidar import base_from_lidar
-from quad_nav.sim.scene import Scene
+from quad_nav.sim.scene import BODY_RADIUS_M, Scene
 from quad_nav.sim.simulation import STEPS_PER_S, Simulation
 from quad_nav.topics.flight_info import CONTACT_STATUS, contact_values
 from quad_nav.vehicle.vehicle_file import Vehicle
@@ -155,16 +155,21 @@ def starts_of(scene: Scene, vehicles: Sequence[Vehicle]) -> Tuple[Pose2D, ...]:
     """Return where each vehicle stands at first: its file's pose, or the scene's.
 
     Raises:
-        InputError: A vehicle has neither; lists all of them.
+        InputError: A simulated vehicle has neither, or touches another one; lists all of them.
     """
     starts: List[Optional[Pose2D]] = []
     problems = []
-    for one in vehicles:
+    for k, one in enumerate(vehicles):
         start = one.map_from_start
         if start is None and one.number < len(scene.starts):
             start = scene.starts[one.number]
         if start is None and one.kind == "simulated":
             problems.append(f"{one.name}: no start, and scene {scene.name} has none for it")
+        for before, its in zip(vehicles[:k], starts):
+            is_near = start and its and start.distance_to(its) <= 2.0 * BODY_RADIUS_M
+            if is_near and "simulated" in (one.kind, before.kind):
+                what = f"{one.name}: starts less than {2.0 * BODY_RADIUS_M:g} m from {before.name}"
+                problems.append(f"{what}, expected a place of its own")
         starts.append(start)
     if problems:
         raise InputError(problems)

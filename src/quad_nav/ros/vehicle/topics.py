@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import replace
-from typing import Callable, Dict, Optional
+from typing import Callable, Dict, Optional, Tuple
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -14,6 +14,7 @@ from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
+from quad_nav.files.values import is_number
 from quad_nav.geometry import Pose2D, Pose3D, Scan
 from quad_nav.ros.common.conversions import (
     ScanMessage,
@@ -24,21 +25,30 @@ from quad_nav.ros.common.conversions import (
     transform_message,
 )
 from quad_nav.topics.health import Health, Level
-from quad_nav.vehicle.orders import IN_FLIGHT, State
+from quad_nav.vehicle.orders import IN_FLIGHT, ON_GROUND, State
 from quad_nav.vehicle.states import VehicleMachine
-from quad_nav.vehicle.telemetry import Estimate
+from quad_nav.vehicle.telemetry import Estimate, Landed
 from quad_nav.vehicle.vehicle_file import Vehicle
 
 _MISSION_WAIT_S = 2.0
 _MISSION_PERIOD_S = 1.0
+_TAKE_OFFS = "~take_offs"  # parameter: x, y, yaw and z of the first and of the last one
+Place = Tuple[Pose2D, float]
+"""Where a vehicle has taken off: pose and height of the ground in the odometry frame."""
 _GOOD = (State.READY, State.FLYING, State.HOLDING, State.LANDED, State.TAKING_OFF, State.ARMING)
 
 
 class VehicleTopics:
     """Publishers of one vehicle."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
-        """Advertise the topics."""
+    def __init__(self, vehicle: Vehicle, respawned: bool) -> None:
+        """Advertise the topics.
+
+        Args:
+            vehicle: The vehicle.
+            respawned: Whether the bridge before was killed.
+        """
+        self.starts = StartMemory(respawned)
         i = vehicle.number
         self._vehicle = vehicle
         self._odom, self._base, self._lidar = f"odom{i}", f"base_link{i}", f"Lidar{i}"
@@ -48,6 +58,7 @@ class VehicleTopics:
             f"/vehicle{i}/state", DiagnosticStatus, queue_size=10, latch=True
         )
         self._map_from_odom: Optional[Pose3D] = vehicle.map_from_odom
+        self._on_ground: Optional[Pose3D] = None  # the same before the first take-off
         self._scan: Optional[rospy.Publisher] = None
         self._relay: Optional[rospy.Subscriber] = None
         self._advertise_scan()
@@ -100,15 +111,26 @@ class VehicleTopics:
         """Return the pose of the odometry frame; None if another node publishes it.
 
         With a known pose at the start it is fixed at the first take-off. Before, it follows the
-        estimate on the ground, which drifts while the vehicle stands still.
+        estimate on the ground, which drifts while the vehicle stands still. In the air nobody knows
+        it, if the vehicle was not seen on the ground.
         """
         start = self._vehicle.map_from_start
         if self._map_from_odom is not None or start is None:
             return self._map_from_odom
-        if machine.odom_from_start is not None:
-            self._map_from_odom = _frame_at(start, machine.odom_from_start, machine.ground_m)
+        if self.starts.first is not None:
+            self._map_from_odom = _frame_at(start, *self.starts.first)
             return self._map_from_odom
-        return _frame_at(start, odom_from_base.to_2d(), odom_from_base.z_m)
+        if machine.state in ON_GROUND:
+            self._on_ground = _frame_at(start, odom_from_base.to_2d(), odom_from_base.z_m)
+        return self._on_ground
+
+    def is_lost(self, machine: VehicleMachine) -> bool:
+        """Return whether the vehicle is in the air and nobody knows where in ``map``."""
+        status = machine.inputs.status
+        is_up = status is not None and status.is_armed
+        is_up = is_up and machine.inputs.landed is not Landed.ON_GROUND
+        is_known = self._on_ground is not None or self.starts.first is not None
+        return self._vehicle.map_from_start is not None and is_up and not is_known
 
     def publish_state(self, machine: VehicleMachine) -> None:
         """Publish the state, latched."""
@@ -136,6 +158,46 @@ def _frame_at(map_from_base: Pose2D, odom_from_base: Pose2D, ground_m: float) ->
 def _clock_offset_s() -> float:
     """Return ROS's time minus the monotonic one, which all parts of the bridge use."""
     return float(rospy.get_time()) - time.monotonic()
+
+
+class StartMemory:
+    """Places of the first and the last take-off, also those of a bridge that was killed.
+
+    The first one says where the odometry frame is in ``map``, the last one from where heights and
+    distances are measured. A parameter keeps both: a bridge that is restarted while its vehicle
+    flies would know neither.
+
+    Attributes:
+        first: Pose and height of the ground in the odometry frame; None before a take-off.
+        last: The same of the last take-off.
+    """
+
+    def __init__(self, respawned: bool) -> None:
+        """Start without a take-off, or with those of the bridge before."""
+        kept = rospy.get_param(_TAKE_OFFS, None) if respawned else None
+        self.first: Optional[Place] = None
+        self.last: Optional[Place] = None
+        if isinstance(kept, list) and len(kept) == 8 and all(map(is_number, kept)):
+            places = [(Pose2D(*kept[k : k + 3]), float(kept[k + 3])) for k in (0, 4)]
+            self.first, self.last = places
+
+    def update(self, machine: VehicleMachine) -> None:
+        """Tell a new state machine the last place, and keep that of a new take-off."""
+        if machine.odom_from_start is None:
+            if self.last is not None:
+                machine.odom_from_start, machine.ground_m = self.last
+            return
+        place = machine.odom_from_start, machine.ground_m
+        if place != self.last:
+            self.first, self.last = self.first or place, place
+            values = [
+                number
+                for pose, ground_m in (self.first, place)
+                for number in (pose.x_m, pose.y_m, pose.yaw_rad, ground_m)
+            ]
+            # In a thread of its own, because the master may hang.
+            keep = threading.Thread(target=rospy.set_param, args=(_TAKE_OFFS, values), daemon=True)
+            keep.start()
 
 
 def vehicle_health(vehicle: Vehicle, machine: VehicleMachine) -> Health:

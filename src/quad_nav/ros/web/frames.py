@@ -13,26 +13,18 @@ import time
 from typing import Dict, Optional, Tuple
 
 import rospy
-import rospy.impl.simtime
 from rosgraph_msgs.msg import Clock
 
 from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
+from quad_nav.ros.common.rospy_repairs import ClockSource
 from quad_nav.ros.common.transforms import Transforms, TransformUnavailable
-from quad_nav.ros.composed.own_nodes import set_time
 
 REFRESH_S = 3.0  # wall time, as the others
 USED_WITHIN_S = 10.0
 PATIENCE_S = 1.0
 _POLL_S = 0.02
 _SAME = Pose3D(0.0, 0.0, 0.0)
-
-
-def leave_clock() -> None:
-    """End this node's subscription to `/clock`, which wakes it at each tick."""
-    clock = getattr(rospy.impl.simtime, "_clock_sub", None)
-    if clock is not None:
-        clock.unregister()
 
 
 class Frames:
@@ -78,7 +70,7 @@ class Frames:
 
     def _look_up(self, pairs: Dict[Tuple[str, str], float]) -> None:
         """Hear transforms until all are known, at most for `PATIENCE_S`."""
-        clock = rospy.Subscriber("/clock", Clock, lambda now: set_time(now.clock.to_sec()))
+        clock = rospy.Subscriber("/clock", Clock, ClockSource())
         transforms = Transforms(range(self._robots))
         end_s, missing, problem = time.monotonic() + PATIENCE_S, set(pairs), ""
         try:

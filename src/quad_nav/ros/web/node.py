@@ -17,8 +17,8 @@ import rospy
 from quad_nav.errors import InputError, printable
 from quad_nav.files.values import Rule, is_whole, value_faults
 from quad_nav.ros.common.readiness import init_node, server_parameters
+from quad_nav.ros.common.rospy_repairs import leave_clock
 from quad_nav.ros.web.actions import FlightActions
-from quad_nav.ros.web.frames import leave_clock
 from quad_nav.ros.web.source import FlightSource
 from quad_nav.view.state import FleetState
 from quad_nav.web.server import Server, Urls, WebOptions

@@ -13,10 +13,10 @@ from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 
 from quad_nav.geometry import Pose3D, yaws_from_quaternions
-from quad_nav.ros.common.conversions import odometry_from_message
+from quad_nav.ros.common.conversions import odometry_from_message, time_message
 from quad_nav.ros.common.diagnostics import ThrottledWarnings
 from quad_nav.ros.common.packed_messages import STATES_TOPIC, States, StatesMessage, StatesReader
-from quad_nav.ros.composed.own_nodes import set_time
+from quad_nav.ros.common.rospy_repairs import set_time
 from quad_nav.ros.web.frames import Frames
 from quad_nav.ros.web.intake import Newest, Topic
 from quad_nav.topics.validation import odometry_problem, valid_states
@@ -85,7 +85,7 @@ class Bodies:
         for robot, newest in self._odometry.items():
             is_new = self._take_odometry(robot, newest) or is_new
         if is_new and not 0.0 <= rospy.get_time() - self.stamp_s < _BEHIND_S:
-            set_time(self.stamp_s)
+            set_time(time_message(self.stamp_s))
         return is_new
 
     def _read(self, message: StatesMessage) -> Optional[States]:

@@ -1,0 +1,183 @@
+"""What is mended in rospy: one connection to a publisher, one source of the time."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from xmlrpc.server import SimpleXMLRPCServer
+
+import pytest
+
+rospy = pytest.importorskip("rospy")
+
+import rosgraph  # noqa: E402
+from ros.fake_ros import FakeRos, FakeSubscriber, FakeWall  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from rospy.impl.masterslave import ROSHandler  # noqa: E402
+
+from quad_nav.ros.common import rospy_repairs  # noqa: E402
+from quad_nav.ros.common.rospy_repairs import ClockSource, publishers_of  # noqa: E402
+
+
+@pytest.fixture
+def ros():
+    with FakeRos("/sequencer") as fake:
+        yield fake
+
+
+@pytest.fixture
+def publishers(monkeypatch):
+    """The living publishers of `/clock`, in the order of their registration."""
+    names = []
+    monkeypatch.setattr(rospy_repairs, "publishers_of", lambda _: list(names))
+    return names
+
+
+class Heard:
+    """The clock of a node."""
+
+    def __init__(self, wall):
+        self._wall = wall
+        self._topic = FakeSubscriber("/clock", Clock, ClockSource())
+
+    def after(self, sender, now_s):
+        """The time of the node after a message."""
+        self._wall.now_s += 1.0
+        self._topic.receive(Clock(rospy.Time.from_sec(now_s)), sender)
+        return rospy.get_time()
+
+
+@pytest.fixture
+def heard(ros, monkeypatch):
+    wall = FakeWall()
+    monkeypatch.setattr(rospy_repairs, "time", wall)
+    return Heard(wall)
+
+
+def test_the_first_publisher_sets_the_clock_and_the_other_one_is_named(ros, heard, publishers):
+    publishers[:] = ["/simulator", "/player"]
+    assert heard.after("/simulator", 5.0) == 5.0
+    assert heard.after("/player", 1e9) == 5.0
+    assert heard.after("/simulator", 5.5) == 5.5
+    assert heard.after("/player", 1e9) == 5.5
+    (line,) = ros.log.lines
+    assert line.startswith("/clock: time of /player dropped: /simulator sets the clock")
+
+
+def test_a_node_that_hears_the_later_one_first_changes_to_the_first(ros, heard, publishers):
+    publishers[:] = ["/simulator", "/player"]
+    assert heard.after("/player", 100.0) == 100.0
+    assert heard.after("/simulator", 5.0) == 5.0
+    assert heard.after("/player", 100.1) == 5.0
+
+
+def test_another_one_counts_when_the_first_is_gone(heard, publishers):
+    publishers[:] = ["/simulator", "/player"]
+    heard.after("/simulator", 5.0)
+    del publishers[0]
+    assert heard.after("/player", 7.0) == 7.0
+
+
+def test_one_that_has_registered_and_is_silent_does_not_keep_others_from_it(heard, publishers):
+    publishers[:] = ["/player", "/simulator"]
+    assert heard.after("/simulator", 5.0) == 5.0
+
+
+def test_without_a_master_the_present_one_counts(ros, heard, monkeypatch):
+    def ask(_):
+        raise ConnectionRefusedError
+
+    monkeypatch.setattr(rospy_repairs, "publishers_of", ask)
+    assert heard.after("/simulator", 5.0) == 5.0
+    assert heard.after("/player", 7.0) == 5.0
+    assert heard.after("/simulator", 5.5) == 5.5
+
+
+@pytest.fixture
+def master(monkeypatch):
+    """A ROS master that knows of publishers of `/clock` that live, were killed or have gone."""
+    with contextlib.ExitStack() as stack:
+        ports = {}
+        for name in ("/player", "/simulator"):
+            server = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False)
+            server.register_function(lambda _: (1, "", 42), "getPid")
+            threading.Thread(target=server.serve_forever, args=(0.05,)).start()
+            stack.callback(server.server_close)
+            stack.callback(server.shutdown)
+            ports[name] = server.server_address[1]
+        for name in ("/killed", "/stopped"):
+            waiting = stack.enter_context(socket.socket())
+            waiting.bind(("127.0.0.1", 0))
+            ports[name] = waiting.getsockname()[1]
+            if name == "/stopped":
+                waiting.listen()
+        state = [
+            [["/clock", ["/killed", "/player", "/gone", "/simulator"]], ["/tf", ["/other"]]],
+            [],
+            [["/simulation/start", ["/simulator"]], ["/a/start", ["/killed"]]],
+        ]
+        monkeypatch.setattr(rosgraph.Master, "getSystemState", lambda _: state)
+
+        def look_up(_, name):
+            if name not in ports:
+                raise rosgraph.MasterError("unknown node")
+            return f"http://127.0.0.1:{ports[name]}/"
+
+        monkeypatch.setattr(rosgraph.Master, "lookupNode", look_up)
+        yield
+
+
+def test_publishers_are_alive_and_simulators_come_first(master):
+    assert publishers_of("/clock") == ["/simulator", "/player"]
+    assert publishers_of("/odom0") == []
+
+
+@pytest.mark.parametrize(
+    ("name", "is_simulator", "argv", "other"),
+    [
+        ("player", False, [], "/player"),
+        ("sequencer", False, ["__name:=player"], "/player"),
+        ("stopped", False, [], "/stopped"),
+        ("player", False, ["__ns:=/lab"], ""),
+        ("killed", False, [], ""),
+        ("gone", False, [], ""),
+        ("sequencer", True, [], "/simulator"),
+        ("sequencer", True, ["/simulation/start:=/a/start"], ""),
+    ],
+)
+def test_a_node_that_runs_already_is_not_started_again(
+    master, monkeypatch, capsys, name, is_simulator, argv, other
+):
+    monkeypatch.setattr(rospy_repairs, "_SHUTDOWN_S", 0.0)
+    monkeypatch.setattr("sys.argv", ["node", *argv])
+    with pytest.raises(SystemExit) if other else contextlib.nullcontext():
+        rospy_repairs.refuse_second(name, is_simulator)
+    assert capsys.readouterr().err.count(f"not started: {other} runs already") == bool(other)
+
+
+def test_two_threads_do_not_connect_to_one_publisher_at_the_same_time(monkeypatch):
+    entered, go_on = [], threading.Event()
+
+    def connect(_, topic, publisher):
+        entered.append((topic, publisher))
+        if topic == "/tf":
+            assert go_on.wait(30.0)
+        return 1, "", 0
+
+    monkeypatch.setattr(rospy_repairs, "_connect_topic", connect)
+    monkeypatch.setattr(ROSHandler, "_connect_topic", connect)
+    rospy_repairs.connect_once()
+    threads = [
+        threading.Thread(target=ROSHandler._connect_topic, args=(None, "/tf", "http://a/"))
+        for _ in range(2)
+    ]
+    for thread in threads:
+        thread.start()
+    threads[1].join(0.2)  # it ends in no case
+    assert entered == [("/tf", "http://a/")]
+    assert ROSHandler._connect_topic(None, "/clock", "http://a/") == (1, "", 0)
+    go_on.set()
+    for thread in threads:
+        thread.join()
+    assert entered.count(("/tf", "http://a/")) == 2
