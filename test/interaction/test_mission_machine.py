@@ -22,7 +22,6 @@ from interaction.mission_world import (  # noqa: E402
     ROBOTS,
     STEP_S,
     MissionWorld,
-    goals_of,
 )
 
 ROBOT = st.integers(0, ROBOTS - 2)
@@ -47,7 +46,7 @@ EDITS = st.sampled_from(
 def undisturbed():
     """Return the poses of `UNTOUCHED` by the step, while nothing happens to the others."""
     world, poses = MissionWorld(), {}
-    world.on_step = lambda _: poses.setdefault(world.steps, world.poses[UNTOUCHED])
+    world.on_step = lambda: poses.setdefault(world.steps, world.poses[UNTOUCHED])
     world.graph.run(30.0)
     world.close()
     return poses
@@ -90,10 +89,8 @@ class MissionMachine(RuleBasedStateMachine):
         self.waits_s, self.is_alone, self.faults = [0.0] * ROBOTS, True, []
         undisturbed()
         self.world = MissionWorld()
-        for event in self.world.events:
-            self.take_event(event)
-        self.world.on_step = lambda event: self.take_event(event) if event else self.take_step()
-        self.world.graph.run(1.0)
+        self.world.on_event, self.world.on_step = self.take_event, self.take_step
+        self.run(2.0)
 
     def teardown(self):
         if hasattr(self, "world"):
@@ -191,7 +188,7 @@ class MissionMachine(RuleBasedStateMachine):
 
     @rule(robot=ROBOT, places=EDITS)
     def goals_are_edited(self, robot, places):
-        self.world.write_goals(robot, goals_of(robot, places))
+        self.world.write_goals(robot, places)
         self.run(1.2)
 
     @rule(robot=ROBOT)

@@ -98,8 +98,13 @@ class Graph:
         )
         yield rospy, of_rospy
         yield rospy.rostime, {"wallsleep": self.threads.sleep, "get_rostime": self._clock}
-        yield readiness, {"service_exists": self.services.__contains__}
-        yield masterapi.Master, {"lookupService": mock.Mock(side_effect=masterapi.Error)}
+        yield (
+            masterapi.Master,
+            {
+                "lookupService": mock.Mock(side_effect=masterapi.Error),
+                "getSystemState": lambda _: self._system_state(),
+            },
+        )
 
     @contextlib.contextmanager
     def _logging(self):
@@ -141,6 +146,15 @@ class Graph:
     def run(self, seconds, until=lambda: False):
         """Let the nodes run for a time, or until something becomes true."""
         return self.threads.wait(until, seconds)
+
+    def _system_state(self):
+        """Return what the ROS master tells: published and subscribed topics, and services."""
+        kinds = [{name: ends[kind] for name, ends in self.topics.items()} for kind in (0, 1)]
+        kinds.append({name: [service] for name, service in self.services.items()})
+        return [
+            [(name, [end.node.name for end in ends]) for name, ends in found.items() if ends]
+            for found in kinds
+        ]
 
     def _sleep(self, duration):
         seconds = duration.to_sec() if isinstance(duration, rospy.Duration) else duration
@@ -244,11 +258,14 @@ class Subscriber:
         self.data_class, self.type = data_class, data_class._type
         self.node, self.impl = self.graph.node, self
         self._callbacks = [] if callback is None else [(callback, callback_args)]
-        publishers, self._subscribers = self.graph.topics[self.resolved_name]
+        self._publishers, self._subscribers = self.graph.topics[self.resolved_name]
         self._subscribers.append(self)
         self.node.ends.append(self)
-        for publisher in publishers:
+        for publisher in self._publishers:
             publisher.connect(self)
+
+    def get_num_connections(self):
+        return len(self._publishers)
 
     def add_callback(self, callback, args):
         self._callbacks.append((callback, args))

@@ -25,11 +25,14 @@ class PointBodies:
     Attributes:
         count: Steps since the start.
         lift_mps2: Vertical acceleration of each body; None with the motors off.
+        drift_mps: Velocity (x, y) in ``map`` of each body that its estimator does not know.
+        contacts: None: they pass through each other.
     """
 
     def __init__(self, starts=(Pose2D(0.0, 0.0),)):
         self._points = [_Point(start) for start in starts]
-        self.count, self.lift_mps2 = 0, [None] * len(self._points)
+        self.count, self.lift_mps2, self.contacts = 0, [None] * len(self._points), []
+        self.drift_mps = [(0.0, 0.0)] * len(self._points)
 
     def __len__(self):
         return len(self._points)
@@ -46,8 +49,8 @@ class PointBodies:
     def step(self):
         """Advance all bodies by one step of the simulation."""
         self.count += 1
-        for point, lift in zip(self._points, self.lift_mps2):
-            point.advance(self.now_s, lift)
+        for point, lift, drift in zip(self._points, self.lift_mps2, self.drift_mps):
+            point.advance(self.now_s, lift, drift)
 
     def height_m(self, robot):
         return self._points[robot].z_m
@@ -89,7 +92,7 @@ class _Point:
         self.wanted = deque()  # (time, forward, left, turn)
         self._target = (0.0, 0.0, 0.0)
 
-    def advance(self, now_s, lift_mps2):
+    def advance(self, now_s, lift_mps2, drift_mps):
         while self.wanted and self.wanted[0][0] <= now_s:
             self._target = self.wanted.popleft()[1:]
         if self.z_m <= 0.0 and (lift_mps2 is None or lift_mps2 <= 0.0):
@@ -98,16 +101,16 @@ class _Point:
         if lift_mps2 is None:  # it falls
             lift_mps2 = -GRAVITY_MPS2
         else:
-            self._follow()
+            self._follow(*drift_mps)
         self.vz_mps += lift_mps2 * STEP_S
         self.x_m += self.vx_mps * STEP_S
         self.y_m += self.vy_mps * STEP_S
         self.z_m = max(self.z_m + self.vz_mps * STEP_S, 0.0)
         self.yaw_rad += self.turn_radps * STEP_S
 
-    def _follow(self):
+    def _follow(self, drift_x_mps, drift_y_mps):
         forward, left, turn = self._target
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        self.vx_mps += _SHARE * (cos * forward - sin * left - self.vx_mps)
-        self.vy_mps += _SHARE * (sin * forward + cos * left - self.vy_mps)
+        self.vx_mps += _SHARE * (cos * forward - sin * left + drift_x_mps - self.vx_mps)
+        self.vy_mps += _SHARE * (sin * forward + cos * left + drift_y_mps - self.vy_mps)
         self.turn_radps += _YAW_SHARE * (turn - self.turn_radps)
