@@ -6,6 +6,8 @@ import http.client
 import json
 import os
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -258,6 +260,44 @@ def post(server, name, body):
     answer, text = ask(server, "POST", f"/{server.token}/{name}", body)
     assert answer.status == 200, text
     return json.loads(text)
+
+
+@pytest.mark.parametrize("sent", ["", "GET", "GET page", "POST body"])
+def test_a_client_that_leaves_leaves_no_traceback(server, capsys, monkeypatch, sent):
+    host = f"127.0.0.1:{server.server_port}"
+    post = (
+        f"POST /{server.token}/check HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n"
+        "Content-Type: application/json\r\nContent-Length: 1000\r\n\r\n{"
+    )
+    get = f"GET /{server.token}/ HTTP/1.1\r\nHost: {host}\r\n\r\n"
+    has_begun, may_go_on, ended = threading.Event(), threading.Event(), threading.Event()
+    make_page, shut_down = server.editor.page, server.shutdown_request
+
+    def page(nonce):
+        has_begun.set()
+        assert may_go_on.wait(20)
+        return make_page(nonce)
+
+    monkeypatch.setattr(server.editor, "page", page)
+    monkeypatch.setattr(
+        server, "shutdown_request", lambda request: (shut_down(request), ended.set())
+    )
+    with socket.create_connection(("127.0.0.1", server.server_port)) as client:
+        client.sendall({"GET page": get, "POST body": post}.get(sent, sent).encode())
+        if sent == "GET page":
+            assert has_begun.wait(20)
+        # It leaves with a reset, as a browser that is killed.
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    may_go_on.set()
+    assert ended.wait(20)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_fault_of_the_editor_is_reported(server, capsys, monkeypatch):
+    monkeypatch.setattr(server.editor, "page", lambda nonce: 1 // 0)
+    with pytest.raises(http.client.RemoteDisconnected):
+        page_data_of(server)
+    assert "ZeroDivisionError" in capsys.readouterr().err
 
 
 def test_a_dragged_goal_is_checked_and_saved(server, hall):

@@ -12,8 +12,9 @@ import pytest
 rospy = pytest.importorskip("rospy")
 
 import rosgraph  # noqa: E402
-from ros.fake_ros import FakeRos, FakeSubscriber, FakeWall  # noqa: E402
+from ros.fake_ros import FakeRos, FakeSubscriber, FakeWall, subscribed  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
+from rospy.impl import simtime  # noqa: E402
 from rospy.impl.masterslave import ROSHandler  # noqa: E402
 
 from quad_nav.ros.common import rospy_repairs  # noqa: E402
@@ -92,6 +93,19 @@ def test_without_a_master_the_present_one_counts(ros, heard, monkeypatch):
     assert heard.after("/simulator", 5.0) == 5.0
     assert heard.after("/player", 7.0) == 5.0
     assert heard.after("/simulator", 5.5) == 5.5
+
+
+@pytest.mark.parametrize(
+    ("use_sim_time", "hears_clock", "heard"),
+    [(True, True, ["/clock"]), (True, False, []), (False, True, [])],
+)
+def test_a_node_hears_the_clock_if_it_has_one(ros, monkeypatch, use_sim_time, hears_clock, heard):
+    monkeypatch.setattr(simtime, "init_simtime", simtime.init_simtime)
+    monkeypatch.setattr(simtime, "_is_use_simtime", lambda: use_sim_time)
+    rospy_repairs.hear_one_clock(hears_clock)
+    assert simtime.init_simtime()  # as rospy.init_node does
+    assert list(subscribed()) == heard
+    assert rospy.get_time() == (0.0 if use_sim_time else 1.0)
 
 
 @pytest.fixture

@@ -70,6 +70,19 @@ def ask(
     return answer
 
 
+@pytest.mark.parametrize("site", ["cross-site", "same-site", "Cross-Site", "", "other"])
+@pytest.mark.parametrize(
+    "path, kind", [("/", "http"), ("/_nicegui/x.js", "http"), ("/stream", "websocket")]
+)
+@pytest.mark.parametrize("tokens", [None, TOKENS])
+def test_requests_of_other_sites_without_an_origin_are_refused(site, path, kind, tokens):
+    headers = {"sec-fetch-site": site}
+    assert ask(path, "token=steer-abc", kind=kind, tokens=tokens, **headers).status == 403
+    for own in ("same-origin", "none"):
+        answer = ask(path, "token=steer-abc", kind=kind, tokens=tokens, **{"sec-fetch-site": own})
+        assert answer.status in (101, 200)
+
+
 def test_on_loopback_everyone_steers():
     answer = ask()
     assert (answer.status, answer.role, answer.body) == (200, Role.STEER, b"page")

@@ -10,7 +10,8 @@ that others fly.
 
 Checked for each log: nothing but known messages; finite set-points in frame 8 with mask 1479 at
 20 Hz; none while the vehicle is on the ground, taking off, landing, in another mode, or silent; no
-order but those that the state allows; and no order after the vehicle was taken over.
+order but those that the state allows; no order after the vehicle was taken over; and what the
+bridge says about the failsafes of `TOLD`.
 """
 
 from __future__ import annotations
@@ -40,6 +41,12 @@ KNOWN = {
     "PARAM_SET",
     "COMMAND_LONG",
     "SET_POSITION_TARGET_LOCAL_NED",
+}
+TOLD = {
+    "gcs_failsafe": "taken over: the mode was changed to LAND by the autopilot: GCS Failsafe",
+    "rc_failsafe": "taken over: the mode was changed to RTL by the autopilot: Radio Failsafe",
+    # At 6.2 s; the autopilot's own failsafe acts at 8.1 s.
+    "gps_lost": "landing: the GPS has lost its position (3 satellites) for 2 s",
 }
 PARAMETERS = {
     "GUID_TIMEOUT": 0.5,
@@ -82,7 +89,7 @@ class Replay:
         self.machine = VehicleMachine(1.5, limits, traits, Permissions(may_arm=True))
         vehicle = Vehicle(0, "mavlink", limits=limits, altitude_m=1.5, has_radio=False)
         self.adapter = MavlinkAdapter(vehicle, self.machine)
-        self.sent, self.states = [], []
+        self.sent, self.states, self.news, self._name = [], [], [], path.stem
         self._command_s = 0.0
         self.modes, self.landed = [], []  # (time, value) as received
 
@@ -99,7 +106,8 @@ class Replay:
             if now_s >= self._command_s:
                 self._command_s += COMMAND_S
                 messages = self.adapter.follow(Twist2D(0.3, 0.0, 0.1), now_s)[1]
-            _, more = self.adapter.tick(now_s)
+            output, more = self.adapter.tick(now_s)
+            self.news += output.news
             for name, fields in messages + more:
                 self.sent.append((now_s, name, fields))
                 self._answer(name, fields, now_s)
@@ -157,6 +165,9 @@ class Replay:
             if landed == 3 or (landed == 1 and at_s - self._landed_s(at_s) > NOTICED_S):
                 found.append(f"{at_s:.2f} s: set-point with landed_state {landed}")
         found += self._order_problems()
+        told = TOLD.get(self._name)
+        if told and told not in self.news:
+            found.append(f"not told: {told}")
         return list(dict.fromkeys(found))[:10]
 
     def _landed_s(self, at_s):

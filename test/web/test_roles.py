@@ -58,7 +58,6 @@ def test_what_a_watching_page_forges_is_not_done(open_page, server):
     steering = open_ready(open_page, server.urls[0])
     assert server.calls() == []
     steering.evaluate(FORGE)
-    # Each forged event that no element sends costs the server a traceback before it.
     until(steering, lambda: any("stop_all" in call for call in server.calls()), patience_s=40.0)
     server.forgive()  # handlers raise for events that no element sends
 

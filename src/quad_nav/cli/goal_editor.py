@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import secrets
+import sys
 import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -179,7 +180,9 @@ class GoalServer(ThreadingHTTPServer):
         return f"http://{_LOOPBACK}:{self.server_port}/{self.token}/"
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Report an error in a request, on standard error, and go on."""
+        """Report an error in a request, on standard error, and go on; a client may leave."""
+        if isinstance(sys.exc_info()[1], ConnectionError):
+            return
         echo("preview: a request of the page failed:", err=True)
         super().handle_error(request, client_address)
 

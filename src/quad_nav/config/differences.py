@@ -1,4 +1,4 @@
-"""Parameters of a tree that differ from move_base's defaults."""
+"""Parameters of a tree that are known, and those that differ from move_base's defaults."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Dict, Iterator, Mapping, Tuple
 
 from quad_nav.config.configuration import COSTMAPS
+from quad_nav.config.files import ParameterTree, set_value
 from quad_nav.config.fixes import FIXES, FIXES_TABLE
 from quad_nav.config.layers import LAYERS
 from quad_nav.config.notes import join
@@ -17,6 +18,9 @@ from quad_nav.config.spec import Table
 from quad_nav.config.tables.costmap import COSTMAP_TABLE
 from quad_nav.config.tables.layers import SOURCE_TABLE
 from quad_nav.config.tables.move_base import MOVE_BASE_TABLE
+from quad_nav.config.tables.recoveries import CLEAR_COSTMAP_TABLE
+
+Namespaced = Tuple[str, Table, Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,29 @@ class Difference:
     value: Any
     default: Any
     unit: str = ""
+
+
+def known_parameters(tree: Mapping[str, Any]) -> Dict[str, Any]:
+    """Return the parameters of a normalised tree that are known, for recordings.
+
+    Unknown ones may hold anything, such as variables of the environment in a launch file.
+    Parameters of plugins are not known.
+
+    Args:
+        tree: A tree of ``Configuration.to_tree``.
+    """
+    known = ParameterTree()
+    for path, table, namespace in (*_namespaces(tree), *_default_recoveries(tree)):
+        lists = ("layer_names",) if table is CLEAR_COSTMAP_TABLE else ()
+        for name in (*(parameter.name for parameter in table.parameters), *lists):
+            if name in namespace:
+                set_value(known, join(path, name), namespace[name], "")
+    for path, name in (("", "recovery_behaviors"), *((one, "plugins") for one in COSTMAPS)):
+        listed = (_below(tree, path) if path else tree).get(name)
+        if listed is not None:
+            entries = [{"name": entry["name"], "type": entry["type"]} for entry in listed]
+            set_value(known, join(path, name), entries, "")
+    return known
 
 
 def differences(tree: Mapping[str, Any]) -> Tuple[Difference, ...]:
@@ -53,7 +80,7 @@ def _differences(path: str, table: Table, namespace: Mapping[str, Any]) -> Itera
             yield Difference(join(path, parameter.name), value, parameter.in_force, unit)
 
 
-def _namespaces(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
+def _namespaces(tree: Mapping[str, Any]) -> Iterator[Namespaced]:
     """Yield (path, table, parameters) of each namespace whose parameters are known."""
     yield "", MOVE_BASE_TABLE, tree
     for key in SLOTS:
@@ -71,9 +98,13 @@ def _namespaces(tree: Mapping[str, Any]) -> Iterator[Tuple[str, Table, Mapping[s
     yield FIXES, FIXES_TABLE, _below(tree, FIXES)
 
 
-def _layers(
-    path: str, costmap: Mapping[str, Any]
-) -> Iterator[Tuple[str, Table, Mapping[str, Any]]]:
+def _default_recoveries(tree: Mapping[str, Any]) -> Iterator[Namespaced]:
+    if "recovery_behaviors" not in tree:
+        for name in ("conservative_reset", "aggressive_reset"):
+            yield name, CLEAR_COSTMAP_TABLE, _below(tree, name)
+
+
+def _layers(path: str, costmap: Mapping[str, Any]) -> Iterator[Namespaced]:
     for plugin in costmap.get("plugins", ()):
         if plugin["type"] not in LAYERS:
             continue

@@ -16,8 +16,8 @@ from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import yaml
 
 from quad_nav.config.notes import CAUTION, Remark
-from quad_nav.errors import InputError
-from quad_nav.files.document import yaml_fault
+from quad_nav.errors import MAX_PROBLEMS, InputError
+from quad_nav.files.document import MAX_TEXT_LENGTH, yaml_fault
 from quad_nav.files.plain_yaml import MAX_BYTES, MAX_LEVELS, PlainLoader
 from quad_nav.files.user_files import read_text
 
@@ -26,7 +26,8 @@ REQUIRED = (COMMON, "local_costmap_params", "global_costmap_params", "base_local
 OPTIONAL = ("move_base_params",)
 COSTMAPS = ("global_costmap", "local_costmap")
 _NODE = re.compile(r"/?move_base(_node)?\d*")
-_SUBSTITUTION = re.compile(r"\$\(([^)]*)\)")
+SUBSTITUTION = re.compile(r"\$\(([^()]*(?:\([^()]*\)[^()]*)*)\)")
+"""``$(...)`` of roslaunch, with calls inside."""
 
 
 @dataclass(frozen=True)
@@ -108,26 +109,6 @@ def _merge_namespace(namespace: Dict[str, Any], other: Mapping[str, Any]) -> Non
             _merge_namespace(namespace[key], value)
         elif not isinstance(value, dict):
             namespace[key] = value
-
-
-def merge_file(
-    tree: ParameterTree, path: Path, namespace: str, substitutions: Optional[Mapping[str, str]]
-) -> None:
-    """Load a file into a namespace as ``<rosparam>`` does.
-
-    Args:
-        tree: The tree, changed in place.
-        path: The file.
-        namespace: Names with / between them; "" for the top.
-        substitutions: Values of ``$(arg name)``; None leaves ``$( )`` as it is.
-
-    Raises:
-        InputError: The file cannot be read.
-    """
-    text = read_text(path, MAX_BYTES)
-    if substitutions is not None:
-        text = _substituted(text, path, substitutions)
-    merge_text(tree, text, path, namespace)
 
 
 def merge_text(tree: ParameterTree, text: str, path: Path, namespace: str) -> None:
@@ -320,12 +301,14 @@ def _substituted(text: str, path: Path, arguments: Mapping[str, str]) -> str:
         words = match.group(1).split()
         if len(words) == 2 and words[0] == "arg" and words[1] in arguments:
             return str(arguments[words[1]])
+        if len(problems) > MAX_PROBLEMS:
+            return match.group(0)
         line = text.count("\n", 0, match.start()) + 1
         known = ", ".join(f"$(arg {name})" for name in arguments) or "no $( )"
         problems.append(f"{path}:{line}: unknown {match.group(0)}; expected {known}")
         return match.group(0)
 
-    substituted = _SUBSTITUTION.sub(value, text)
+    substituted = SUBSTITUTION.sub(value, text)
     if problems:
         raise InputError(problems)
     return substituted
@@ -349,11 +332,13 @@ def _collect(
         key = str(loader.construct_object(key_node, deep=True))
         line = key_node.start_mark.line + 1
         path = above + tuple(filter(None, key.split("/")))
-        if not above < path or len(path) > MAX_LEVELS:
+        # Each value's path is kept: a long name above many values takes all memory.
+        if not above < path or len(path) > MAX_LEVELS or sum(map(len, path)) > MAX_TEXT_LENGTH:
             raise InputError(
                 [
                     f"{document.path}:{line}: {key[:40]!r} is not the name of a parameter; "
-                    f"expected 1 to {MAX_LEVELS} names with / between them"
+                    f"expected 1 to {MAX_LEVELS} names with / between them, of at most "
+                    f"{MAX_TEXT_LENGTH} characters"
                 ]
             )
         document.lines[path] = line

@@ -13,14 +13,15 @@ from typing import Any, Dict, List, Mapping, Sequence, Tuple
 
 import yaml
 
-from quad_nav.config.files import ParameterTree, merge_file, merge_text, set_value
+from quad_nav.config.files import ParameterTree, merge_text, set_value
 from quad_nav.config.notes import CAUTION, Remark
-from quad_nav.config.substitution import Substitution, Unresolved
+from quad_nav.config.substitution import Shared, Substitution, TooLarge, Unresolved, is_package
 from quad_nav.errors import InputError, excerpt
 from quad_nav.files import plain_yaml
-from quad_nav.files.xml_tree import Element, read_xml
+from quad_nav.files.document import MAX_TEXT_LENGTH
+from quad_nav.files.user_files import read_text, referenced_file
+from quad_nav.files.xml_tree import MAX_DEPTH, Element
 
-MAX_FILES = 100
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 _TYPES = ("move_base", "fleet")
 
@@ -43,8 +44,11 @@ def load_launch_file(
     Raises:
         InputError: One line for everything without which there are no parameters.
     """
-    reader = _Reader(number)
-    reader.read(path, _Scope(path, Substitution(path, dict(arguments)), given=dict(arguments)))
+    values = (Path(value) for _, value in arguments)
+    shared = Shared(path, [value for value in values if value.is_absolute()])
+    reader = _Reader(number, shared)
+    words = Substitution(path, dict(arguments), shared)
+    reader.read(path, _Scope(path, words, given=dict(arguments)))
     if reader.problems:
         raise InputError(reader.problems)
     tree = reader.tree_of_node(path)
@@ -68,20 +72,17 @@ class _Scope:
 class _Reader:
     """Collects a parameter server's tree from launch files."""
 
-    def __init__(self, number: str) -> None:
-        self._number = number
+    def __init__(self, number: str, shared: Shared) -> None:
+        self._number, self._shared = number, shared
         self._server = ParameterTree()
         self._nodes: List[str] = []
-        self._files = 0
+        self._depth = 0
         self.problems: List[str] = []
         self.unread: List[Tuple[str, str]] = []
 
     def read(self, path: Path, scope: _Scope) -> None:
         """Read a file's elements into the tree."""
-        self._files += 1
-        if self._files > MAX_FILES:
-            raise InputError([f"{path}: more than {MAX_FILES} included files"])
-        root = read_xml(path)
+        root = self._shared.read(path)
         if root.tag != "launch":
             raise InputError([f"{path}:{root.line}: <{root.tag}>; expected <launch>"])
         self._children(root, scope)
@@ -126,6 +127,9 @@ class _Reader:
             "rosparam": self._rosparam,
             "node": self._node,
         }
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise self._shared.too_large(f"{MAX_DEPTH} elements inside each other")
         for element in parent.children:
             reader = readers.get(element.tag)
             if reader is None:
@@ -135,8 +139,11 @@ class _Reader:
                     reader(element, scope)
             except Unresolved as error:
                 self._note_unread(element, scope, str(error))
+            except TooLarge:
+                raise
             except InputError as error:
                 self.problems += error.problems
+        self._depth -= 1
 
     def _note_unread(self, element: Element, scope: _Scope, reason: str) -> None:
         """Note what cannot be resolved; a fault in the node itself, where roslaunch ends too."""
@@ -170,9 +177,7 @@ class _Reader:
             known[name] = scope.words.text(attributes["default"])
 
     def _include(self, element: Element, scope: _Scope) -> None:
-        path = Path(scope.words.text(element.attributes.get("file", "")))
-        if not _is_file(path):
-            raise Unresolved(f"{excerpt(str(path))}: no such file")
+        path = self._file(element, scope)
         passed = element.attributes.get("pass_all_args", "").lower() in _TRUE
         given = dict(scope.words.arguments) if passed else {}
         for arg in element.all("arg"):
@@ -180,7 +185,7 @@ class _Reader:
                 value = arg.attributes.get("value", arg.attributes.get("default", ""))
                 given[arg.attributes.get("name", "")] = scope.words.text(value)
         inner = scope.below(scope.words.text(element.attributes.get("ns", "")))
-        words = Substitution(path, {})
+        words = Substitution(path, {}, self._shared)
         self.read(path, replace(inner, path=path, words=words, given=given))
 
     def _group(self, element: Element, scope: _Scope) -> None:
@@ -198,7 +203,7 @@ class _Reader:
 
     def _param(self, element: Element, scope: _Scope) -> None:
         attributes = element.attributes
-        place = _place(scope, attributes.get("name", ""))
+        place = _joined(scope.namespace, attributes.get("name", ""))
         if not self._is_of_navigation(place):
             return
         if "value" not in attributes:
@@ -216,22 +221,37 @@ class _Reader:
         attributes = element.attributes
         if attributes.get("command", "load") != "load":
             return
-        place = _place(scope, scope.words.text(attributes.get("ns", "")))
+        place = _joined(scope.namespace, scope.words.text(attributes.get("ns", "")))
         place = _joined(place, scope.words.text(attributes.get("param", "")))
-        if "file" not in attributes:
-            substituted = attributes.get("subst_value", "").lower() in _TRUE
-            text = scope.words.text(element.text) if substituted else element.text
-            merge_text(self._server, text, scope.path, place)
-            return
-        path = Path(scope.words.text(attributes["file"]))
-        if not _is_file(path):
-            raise Unresolved(f"{excerpt(str(path))}: no such file")
-        words = scope.words.arguments if "subst_value" in attributes else None
+        text, path = element.text, scope.path
+        if "file" in attributes:
+            path = self._file(element, scope)
+            text = read_text(path, plain_yaml.MAX_BYTES)
+            self._shared.take(len(text))
+        if attributes.get("subst_value", "").lower() in _TRUE:
+            text = scope.words.text(text)
         try:
-            merge_file(self._server, path, place, words)
+            merge_text(self._server, text, path, place)
         except InputError:
             if self._is_of_navigation(f"{place}/"):
                 raise
+
+    def _file(self, element: Element, scope: _Scope) -> Path:
+        """Return the path of the file that an element names.
+
+        Raises:
+            Unresolved: There is no such file, or it is in none of the folders that launch files
+                may name files in.
+        """
+        path = Path.cwd() / scope.words.text(element.attributes.get("file", ""))
+        packages = [*self._shared.packages.values(), *scope.path.resolve().parents]
+        allowed = [*filter(is_package, packages), *self._shared.given]
+        if not _is_file(path):
+            raise Unresolved(f"{excerpt(str(path))}: no such file")
+        try:
+            return referenced_file(scope.path.parent, str(path), allowed)
+        except InputError as error:
+            raise Unresolved(str(error)) from error
 
 
 def _number_of(node: str) -> str:
@@ -247,14 +267,17 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _place(scope: _Scope, name: str) -> str:
-    return name.strip("/") if name.startswith("/") else _joined(scope.namespace, name)
-
-
 def _joined(above: str, below: str) -> str:
-    if below.startswith("/"):
-        return below.strip("/")
-    return "/".join(part for part in (above, below.strip("~/")) if part)
+    """Join the names of namespaces; a name that begins with / stands for itself.
+
+    Raises:
+        Unresolved: The name is too long: that of each parameter has it.
+    """
+    names = [] if below.startswith("/") else [above]
+    joined = "/".join(part for part in (*names, below.strip("~/")) if part)
+    if len(joined) > MAX_TEXT_LENGTH:
+        raise Unresolved(f"{excerpt(joined)}: expected {MAX_TEXT_LENGTH} characters at most")
+    return joined
 
 
 def _value(text: str, kind: str) -> Any:

@@ -10,15 +10,24 @@ import ast
 import operator
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable, Dict, Optional, Sequence
 
+from quad_nav.config.files import SUBSTITUTION
 from quad_nav.errors import InputError, QuadError
-from quad_nav.files.xml_tree import read_xml
+from quad_nav.files.plain_yaml import MAX_BYTES, MAX_DIGITS
+from quad_nav.files.xml_tree import Element, read_xml
 
-_SUBSTITUTION = re.compile(r"\$\(([^()]*(?:\([^()]*\)[^()]*)*)\)")
+MAX_TEXT = MAX_BYTES
+"""Characters of a launch file, its included files, expanded texts and YAML files together."""
+MAX_ELEMENTS = 20_000
+"""Elements of a launch file and its included files together."""
+MAX_EXPRESSION = 1000
+"""Characters of an expression, and of each argument in it."""
+
 _PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,99}")
+_PACKAGE_FILE = "package.xml"
 _LEVELS = 6  # folders above a launch file in which packages are looked for
 _COMPARISONS: Dict[type, Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
@@ -42,6 +51,63 @@ class Unresolved(QuadError):
     """Something in a launch file that cannot be resolved here."""
 
 
+class TooLarge(InputError):
+    """A launch file exceeds a limit; nothing more is read of it."""
+
+
+@dataclass
+class Shared:
+    """What a launch file and its included files share.
+
+    Attributes:
+        path: The file that the user names.
+        given: Files and folders that the user names in arguments.
+        text_left: Number of characters that may still be read or expanded.
+        elements_left: Number of elements that may still be read.
+        packages: Folders of the packages that were found, by name.
+    """
+
+    path: Path = Path()
+    given: Sequence[Path] = ()
+    text_left: int = MAX_TEXT
+    elements_left: int = MAX_ELEMENTS
+    packages: Dict[str, Path] = field(default_factory=dict)
+
+    def take(self, characters: int) -> None:
+        """Count characters, before they are allocated where that is possible.
+
+        Raises:
+            TooLarge: They are too many.
+        """
+        self.text_left -= characters
+        if self.text_left < 0:
+            raise self.too_large(f"{MAX_TEXT} characters")
+
+    def read(self, path: Path) -> Element:
+        """Read an XML file and return its root element.
+
+        Raises:
+            InputError: It cannot be read.
+            TooLarge: It is too large.
+        """
+        if path.is_file():
+            self.take(path.stat().st_size)
+        root = read_xml(path, MAX_ELEMENTS)
+        self.elements_left -= root.size
+        if self.elements_left < 0:
+            raise self.too_large(f"{MAX_ELEMENTS} elements")
+        return root
+
+    def too_large(self, limit: str) -> TooLarge:
+        """Return the error of a launch file that exceeds a limit."""
+        return TooLarge(
+            [
+                f"{self.path}: more than {limit} with its included files, YAML files and $(...) "
+                "expanded; expected fewer"
+            ]
+        )
+
+
 @dataclass(frozen=True)
 class Substitution:
     """Substitutions in one launch file.
@@ -49,22 +115,31 @@ class Substitution:
     Attributes:
         path: The launch file.
         arguments: Values of ``<arg>``, which grow while the file is read.
+        shared: What it shares with the other files.
     """
 
     path: Path
     arguments: Dict[str, str]
+    shared: Shared = field(default_factory=Shared)
 
     def text(self, text: str) -> str:
         """Replace every ``$(...)`` in a text.
 
         Raises:
             Unresolved: One of them cannot be resolved.
+            TooLarge: The text is too long.
         """
+        self.shared.take(len(text))
         if text.startswith("$(eval ") and text.endswith(")"):
-            return str(self._evaluated(text[len("$(eval ") : -1]))
-        return _SUBSTITUTION.sub(lambda match: self._word(match.group(1)), text)
+            return self._word(text[2:-1])
+        return SUBSTITUTION.sub(lambda match: self._word(match.group(1)), text)
 
     def _word(self, inner: str) -> str:
+        word = self._resolved(inner)
+        self.shared.take(len(word))
+        return word
+
+    def _resolved(self, inner: str) -> str:
         name, _, rest = inner.strip().partition(" ")
         rest = rest.strip()
         if name == "arg":
@@ -95,11 +170,16 @@ class Substitution:
 
     def _package(self, name: str) -> Path:
         """Return the folder of a package: around the launch file, then ROS's package path."""
+        if name not in self.shared.packages:
+            self.shared.packages[name] = self._found(name)
+        return self.shared.packages[name]
+
+    def _found(self, name: str) -> Path:
         if not _PACKAGE.fullmatch(name):
             raise Unresolved(f"$(find {name}): expected the name of a package")
         above = list(self.path.resolve().parents)[:_LEVELS]
         for folder in above:
-            if folder.name == name or _package_name(folder) == name:
+            if folder.name == name or self._package_name(folder) == name:
                 return folder
         roots = [*above, *map(Path, filter(None, _package_path().split(os.pathsep)))]
         for root in roots:
@@ -108,7 +188,20 @@ class Substitution:
                     return found
         raise Unresolved(f"$(find {name}): no folder of this name around {self.path.parent}")
 
+    def _package_name(self, folder: Path) -> str:
+        """Return the name in a folder's ``package.xml``, "" without one."""
+        if not is_package(folder):
+            return ""
+        try:
+            return self.shared.read(folder / _PACKAGE_FILE).text_of("name")
+        except TooLarge:
+            raise
+        except InputError:  # then the folder's name counts
+            return ""
+
     def _evaluated(self, expression: str) -> Any:
+        if len(expression) > MAX_EXPRESSION:  # a deep one ends the interpreter in some versions
+            raise Unresolved(f"$(eval ...) of more than {MAX_EXPRESSION} characters")
         try:
             return self._value(ast.parse(expression.strip(), mode="eval").body)
         except _FAULTS as error:
@@ -146,6 +239,8 @@ class Substitution:
             "bool": bool,
         }
         if name in plain:
+            if name in ("int", "float") and len(str(arguments)) > MAX_EXPRESSION:
+                raise ValueError(f"{name}() of more than {MAX_EXPRESSION} characters")
             return plain[name](*arguments)
         if name == "arg":
             return _converted(self._arg(*arguments))
@@ -156,9 +251,11 @@ class Substitution:
 
 def _converted(word: str) -> Any:
     """Convert an argument as roslaunch does for expressions."""
+    if len(word) > MAX_EXPRESSION:
+        raise ValueError(f"an argument of more than {MAX_EXPRESSION} characters")
     if word.lower() in ("true", "false"):
         return word.lower() == "true"
-    for convert in (int, float):
+    for convert in (int, float) if len(word) <= MAX_DIGITS else ():
         try:
             return convert(word)
         except ValueError:
@@ -170,12 +267,6 @@ def _package_path() -> str:
     return os.environ.get("ROS_PACKAGE_PATH", "")
 
 
-def _package_name(folder: Path) -> str:
-    """Return the name in a folder's ``package.xml``, "" without one."""
-    path = folder / "package.xml"
-    if not path.is_file():
-        return ""
-    try:
-        return read_xml(path).text_of("name")
-    except InputError:  # then the folder's name counts
-        return ""
+def is_package(folder: Path) -> bool:
+    """Return whether a folder is that of a ROS package."""
+    return (folder / _PACKAGE_FILE).is_file()

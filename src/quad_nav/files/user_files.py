@@ -11,12 +11,13 @@ import os
 import resource
 import stat
 from pathlib import Path
-from typing import BinaryIO, Iterator, List, Optional, Sequence
+from typing import Any, BinaryIO, Callable, Iterator, List, Optional, Sequence, TypeVar
 
 from quad_nav.errors import InputError
 
 ALLOWED_FOLDERS = "QUAD_FILES_PATH"
 """Environment variable: folders that scene files may name files in, besides their own."""
+Result = TypeVar("Result")
 _STATM = Path("/proc/self/statm")
 
 
@@ -100,6 +101,28 @@ def referenced_file(folder: Path, name: str, also: Sequence[Path] = ()) -> Path:
             ]
         )
     return path
+
+
+@contextlib.contextmanager
+def outside_current_folder() -> Iterator[None]:
+    """Start Python processes inside that must not run the files of the current folder.
+
+    A new interpreter has the folder in which it starts on its path, and would import a ``yaml.py``
+    there. multiprocessing and joblib then give it the path of this process; with ``in_folder`` it
+    comes back.
+    """
+    folder = os.getcwd()
+    os.chdir(os.sep)
+    try:
+        yield
+    finally:
+        os.chdir(folder)
+
+
+def in_folder(folder: str, function: Callable[..., Result], *arguments: Any) -> Result:
+    """Call a function in a folder, in a process that was started elsewhere."""
+    os.chdir(folder)
+    return function(*arguments)
 
 
 @contextlib.contextmanager

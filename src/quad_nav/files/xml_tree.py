@@ -34,6 +34,11 @@ class Element:
     text: str = ""
     children: List[Element] = field(default_factory=list)
 
+    @property
+    def size(self) -> int:
+        """Number of elements, itself included."""
+        return 1 + sum(child.size for child in self.children)
+
     def all(self, tag: str) -> Iterator[Element]:
         """Return the children with a tag."""
         return (child for child in self.children if child.tag == tag)
@@ -48,13 +53,13 @@ class Element:
         return default if child is None else child.text.strip()
 
 
-def read_xml(path: Path) -> Element:
-    """Read an XML file and return its root element.
+def read_xml(path: Path, max_elements: int = MAX_ELEMENTS) -> Element:
+    """Read an XML file of at most ``max_elements`` and return its root element.
 
     Raises:
         InputError: The file cannot be read, is not XML, or is too large; with the line.
     """
-    builder = _Builder(path)
+    builder = _Builder(path, max_elements)
     content = read_bytes(path, MAX_BYTES)
     try:
         defusedxml.sax.parseString(content, builder, forbid_dtd=True)
@@ -76,9 +81,10 @@ def read_xml(path: Path) -> Element:
 
 
 class _Builder(ContentHandler):
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, max_elements: int) -> None:
         super().__init__()
         self._path = path
+        self._max_elements = max_elements
         self._open: List[Element] = []
         self._texts: List[List[str]] = []
         self._elements = 0
@@ -94,8 +100,10 @@ class _Builder(ContentHandler):
     def startElement(self, name: str, attrs: AttributesImpl) -> None:
         element = Element(name, dict(attrs.items()), self.line)
         self._elements += 1
-        if self._elements > MAX_ELEMENTS:
-            raise InputError([f"{self._path}: line {self.line}: more than {MAX_ELEMENTS} elements"])
+        if self._elements > self._max_elements:
+            raise InputError(
+                [f"{self._path}: line {self.line}: more than {self._max_elements} elements"]
+            )
         if len(self._open) >= MAX_DEPTH:
             raise InputError(
                 [

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quad_nav.errors import InputError, PluginError
+from quad_nav.files.user_files import in_folder, outside_current_folder
 from quad_nav.geometry import Pose2D, Twist2D
 from quad_nav.loop import LoopSetup
 from quad_nav.loop.inspection import Change, Inspection, NavigatorView, inspect_group
@@ -129,8 +130,10 @@ class WorkerProcess:
         self._shared = SharedStates(len(setup.names), len(setup.scene.moving_shapes), context)
         self._pipe, worker_end = context.Pipe()
         self._process = context.Process(  # type: ignore[attr-defined]
-            target=_serve,
+            target=in_folder,
             args=(
+                os.getcwd(),
+                _serve,
                 worker_end,
                 self._pipe if start_method == "fork" else None,
                 _WorkerSetup(setup, self.robots, make_group, self._shared, whole_ticks),
@@ -138,7 +141,8 @@ class WorkerProcess:
             name=PROCESS_NAME,
             daemon=True,
         )
-        self._process.start()
+        with outside_current_folder():
+            self._process.start()
         worker_end.close()
 
     @property

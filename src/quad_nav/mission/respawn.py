@@ -1,6 +1,6 @@
 """Run a node and restart it when a signal kills it.
 
-    python3 -m quad_nav.mission.respawn [--end-roslaunch | --after-error] COMMAND [ARGUMENT...]
+    run_module quad_nav.mission.respawn [--end-roslaunch | --after-error] COMMAND [ARGUMENT...]
 
 The launch files use this as the `launch-prefix` of nodes. roslaunch's own `respawn` also restarts
 a node that has finished, and excludes `required`. Here, a node that exits ends this program with

@@ -6,6 +6,7 @@ worker. A worker that dies costs the flights that it was flying, and they are fl
 
 from __future__ import annotations
 
+import os
 import signal
 from typing import Any, Callable, Iterable, Iterator, Optional, Protocol, Sequence, Tuple, TypeVar
 
@@ -13,6 +14,7 @@ import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from quad_nav.errors import InputError, QuadError
+from quad_nav.files.user_files import in_folder, outside_current_folder
 
 MAX_DEATHS = 3
 _RAY_BACKEND = "quad_ray"
@@ -64,12 +66,22 @@ class LocalWorkers:
         parallel = joblib.Parallel(
             self.count, backend="loky", batch_size=1, return_as="generator_unordered"
         )
+        here = os.getcwd()
+        calls = (
+            joblib.delayed(in_folder)(here, _run_in_worker, function, number, task)
+            for number, task in tasks
+        )
+        is_safe = "PYTHONSAFEPATH" in os.environ
+        os.environ["PYTHONSAFEPATH"] = "1"  # for workers that joblib replaces, from Python 3.11 on
         try:
-            yield from parallel(
-                joblib.delayed(_run_in_worker)(function, number, task) for number, task in tasks
-            )
+            with outside_current_folder():
+                results = parallel(calls)  # starts the workers
+            yield from results
         except TerminatedWorkerError as error:
             raise WorkerDied from error
+        finally:
+            if not is_safe:
+                del os.environ["PYTHONSAFEPATH"]
 
 
 class RayWorkers:
@@ -88,7 +100,8 @@ class RayWorkers:
                 ["--ray: Ray is not installed; expected it from pip install 'quad-nav[ray]'"]
             ) from error
         try:
-            ray.init(address=address, logging_level="ERROR", log_to_driver=False)
+            with outside_current_folder():  # Ray's workers import from the driver's
+                ray.init(address=address, logging_level="ERROR", log_to_driver=False)
         except (ConnectionError, OSError, RuntimeError, ValueError) as error:
             raise InputError(
                 [

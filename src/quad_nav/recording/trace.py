@@ -12,6 +12,7 @@ from typing import Any, List, Mapping, Optional, Tuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quad_nav.config.differences import known_parameters
 from quad_nav.geometry import Pose2D
 from quad_nav.mission.goal import Goal
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
@@ -62,7 +63,7 @@ class RobotTrace:
         states: (time, state) pairs, one for each change.
         recoveries: (time, name) pairs.
         goals: Goals in the order of flight.
-        parameters: move_base's parameters with ROS names; empty if unknown.
+        parameters: move_base's known parameters with ROS names; empty if unknown.
         mission: The goals of the goal file; empty if unknown.
         odom_frames: (time, pose in ``map``) pairs of the odometry frame, one for each change.
         rights_of_way: (time, right of way) pairs, one for each change.
@@ -241,7 +242,7 @@ class TraceObserver(FlightObserver):
                     tuple(record.states),
                     tuple(record.recoveries),
                     tuple(record.goals),
-                    robot.configuration.to_tree(),
+                    known_parameters(robot.configuration.to_tree()),
                 )
             )
         return tuple(traces)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
-from typing import Any, Dict, Sequence, Tuple
+from typing import Any, Dict, Iterator, Sequence, Tuple
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -78,9 +79,16 @@ def svg(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def styled() -> Any:
-    """Return the context manager in which figures must be created and drawn."""
-    return matplotlib.rc_context(RC)
+@contextlib.contextmanager
+def styled() -> Iterator[None]:
+    """Create and draw figures inside.
+
+    A file ``matplotlibrc`` in the current folder has no say: it may name a program as ffmpeg.
+    """
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(RC)
+        yield
 
 
 def label_log(axis: Axis) -> None:

@@ -1,6 +1,6 @@
 """Print a robot's parameters as YAML, for roslaunch to load: see ``launch/quad.launch``.
 
-    python3 -m quad_nav.scenario.robot_parameters --config default --robot 0 --robots 2
+    run_module quad_nav.scenario.robot_parameters --config default --robot 0 --robots 2
 
 The faults of the files go to stderr, one a line, with exit status 2, which ends roslaunch. With
 ``QUAD_COLLECT_FAULTS`` in the environment they are printed as a parameter instead, exit status 0:

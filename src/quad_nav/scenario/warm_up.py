@@ -204,7 +204,9 @@ def main() -> None:
             _build(library.library_path(library.FOLDER))
     elif jit.library_remarks():  # it lacks some types
         again = [sys.executable, "-m", "quad_nav.scenario.warm_up"]
-        subprocess.run(again, check=True, env={**os.environ, "QUAD_KERNELS": "numba"})
+        # -m imports from the folder in which it starts.
+        sources, environment = Path(__file__).parents[2], {**os.environ, "QUAD_KERNELS": "numba"}
+        subprocess.run(again, check=True, cwd=sources, env=environment)
 
 
 def _build(path: Path) -> None:

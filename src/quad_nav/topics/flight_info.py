@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from typing import Any, Dict, Mapping, Optional, Sequence
 
+from quad_nav.config.differences import known_parameters
 from quad_nav.mission.goal import goal_entry
 from quad_nav.mission.goal_file import GoalSequence
 from quad_nav.mission.sequencer import Action, GoalEnded, SendGoal
@@ -49,11 +50,16 @@ def mission_info(
 
     Args:
         sequences: Goals by the robot's name.
-        parameters: move_base's parameter tree of each robot, in the same order.
+        parameters: move_base's parameter tree of each robot, in the same order. Only known ones
+            are published.
         robot_radius_m: Radius of a robot's hull.
     """
     robots = [
-        {"name": name, "goals": [goal_entry(goal) for goal in sequence.goals], "parameters": tree}
+        {
+            "name": name,
+            "goals": [goal_entry(goal) for goal in sequence.goals],
+            "parameters": known_parameters(tree),
+        }
         for (name, sequence), tree in zip(sequences.items(), parameters)
     ]
     return {"robots": robots, "robot_radius_m": robot_radius_m}

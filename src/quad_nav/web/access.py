@@ -6,7 +6,7 @@ NiceGUI's own channel:
 * The name in ``Host`` must be one of the server's, so that no other site can be resolved to this
   address (DNS rebinding).
 * ``Origin``, which browsers send with WebSockets and with requests of other sites, must be the
-  page's own.
+  page's own, and ``Sec-Fetch-Site`` must not name another site.
 * With tokens, one of them must be in the URL, as ``?token=...``, or in the cookie that the page
   sets then. Tokens are compared in constant time.
 
@@ -38,6 +38,7 @@ Headers = List[Tuple[bytes, bytes]]
 
 _PATHS = ("/_nicegui/", "/_nicegui_ws/")  # below these; uploads are elsewhere
 _CACHED = ("static", "libraries", "components", "resources")  # their URLs change with them
+_OWN_SITES = ("none", "same-origin")  # typed by a person, or of the page; none is another port's
 _LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
@@ -98,10 +99,10 @@ class Access:
             _check_origin(headers)
             scope[ROLE], token = self._role(scope, headers)
         except Forbidden as forbidden:
-            await _refuse(scope, send, 403, str(forbidden))
+            await refuse(scope, send, 403, str(forbidden))
             return
         if not _is_served(scope):
-            await _refuse(scope, send, 404, f"nothing is here; expected {headers['host']}/")
+            await refuse(scope, send, 404, f"nothing is here; expected {headers['host']}/")
             return
         added = _security_headers(scope["path"], headers["host"])
         if token and scope["path"] == "/":
@@ -167,8 +168,13 @@ def _is_address(name: str) -> bool:
 
 def _check_origin(headers: Dict[str, str]) -> None:
     host, origin = headers["host"].lower(), headers.get("origin")
-    if origin is not None and origin.lower() not in (f"http://{host}", f"https://{host}"):
-        raise Forbidden(f"the request comes from another site; expected one from {host}")
+    is_foreign = origin is not None and origin.lower() not in (f"http://{host}", f"https://{host}")
+    # An image or a link of another page has no Origin.
+    if is_foreign or headers.get("sec-fetch-site", "none").strip().lower() not in _OWN_SITES:
+        raise Forbidden(
+            f"the request comes from another site; expected one from {host}, or the address typed "
+            "into the browser"
+        )
 
 
 def _cookie(text: str, name: str) -> str:
@@ -221,7 +227,8 @@ def _with_headers(send: Send, added: Headers) -> Send:
     return send_with_headers
 
 
-async def _refuse(scope: Message, send: Send, status: int, text: str) -> None:
+async def refuse(scope: Message, send: Send, status: int, text: str) -> None:
+    """Answer a request with a sentence, or close a WebSocket before it is accepted."""
     if scope["type"] == "websocket":
         await send({"type": "websocket.close"})  # before it is accepted: the answer is 403
         return

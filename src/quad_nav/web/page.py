@@ -85,9 +85,17 @@ class Page:
         self._show_tool("view")
         self.client.on_select(self._selected)
         self.refresh()
-        # Both end with the page: NiceGUI deletes them with the client.
-        self._timer = ui.timer(_REFRESH_S, self._tick)
-        ui.timer(_READ_S, self._read)
+        self._timer: Any = None
+        self._nicegui.on_connect(self._begin)
+
+    def _begin(self) -> None:
+        """Refresh from the first connection on; NiceGUI deletes the timers with the client.
+
+        A timer would keep a page for a minute that is only asked for.
+        """
+        if self._timer is None:
+            self._timer = ui.timer(_REFRESH_S, self._tick)
+            ui.timer(_READ_S, self._read)
 
     # -- elements --------------------------------------------------------------------
 

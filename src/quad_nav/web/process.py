@@ -12,6 +12,7 @@ import importlib.util
 import inspect
 import itertools
 import multiprocessing
+import os
 import signal
 import socket
 import threading
@@ -20,6 +21,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Callable, Dict, FrozenSet, List, Optional, Tuple
 
 from quad_nav.errors import InputError
+from quad_nav.files.user_files import in_folder, outside_current_folder
 from quad_nav.view.actions import Actions, Answer
 from quad_nav.view.message_socket import MessageSocket
 from quad_nav.view.state import FleetState, Item, Wanted
@@ -91,9 +93,12 @@ class ServerProcess:
         self._socket, there = MessageSocket.pair()
         context = multiprocessing.get_context("spawn")
         self._process = context.Process(
-            target=_run, args=(there, replace(options, on_ready=None), available), daemon=True
+            target=in_folder,
+            args=(os.getcwd(), _run, there, replace(options, on_ready=None), available),
+            daemon=True,
         )
-        self._process.start()
+        with outside_current_folder():
+            self._process.start()
         there.close()
         self._await_start()
 

@@ -17,10 +17,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Callable, Iterator, Optional, Tuple
 
-from quad_nav.errors import InputError, printable
+from quad_nav.errors import InputError
 from quad_nav.view.actions import Actions, Role, WatchOnly
 from quad_nav.view.state import FleetState
-from quad_nav.web.access import ROLE, Access, Tokens, is_loopback
+from quad_nav.web.access import ROLE, Access, Tokens, is_loopback, refuse
+from quad_nav.web.connections import MAX_OF_ADDRESS, limited
+from quad_nav.web.page_limits import Complaints, drop_old_pages, limit_pages, only_texts
 from quad_nav.web.stream import Message, Receive, Send, Stream
 
 _FIRST_PORT, _LAST_PORT = 8080, 8179
@@ -30,7 +32,15 @@ _TOKEN = re.compile("[A-Za-z0-9_-]+")
 _ENDS_WITHIN_S = 5.0
 _SILENT_FOR_MS = 20000
 _MAX_MESSAGE = 2**20  # from the page; a page's largest are edited goals
-_LOGGERS = ("uvicorn.error", "uvicorn.asgi", "nicegui", "engineio.server", "socketio.server")
+_MAX_HEAD = 2**16  # cookies of all ports of this host are in it
+_LOGGERS = (
+    "asyncio",
+    "uvicorn.error",
+    "uvicorn.asgi",
+    "nicegui",
+    "engineio.server",
+    "socketio.server",
+)
 
 # Once it is in a cookie, the token does not stay in the address, which others may see or copy.
 _HIDE_TOKEN = "<script>if (location.search) history.replaceState(null, '', '/')</script>"
@@ -97,7 +107,12 @@ class Server:
 
     def __init__(self, state: FleetState, actions: Actions, options: WebOptions) -> None:
         uvicorn = _imported("uvicorn")
-        pages = _nicegui_app(state, actions, options)
+        http, websocket = limited(
+            _imported("uvicorn.protocols.http.h11_impl").H11Protocol,
+            _imported("uvicorn.protocols.websockets.auto").AutoWebSocketsProtocol,
+        )
+        self._nicegui = _imported("nicegui")
+        pages = _nicegui_app(self._nicegui, state, actions, options)
         tokens = options.tokens()
         self._options = options
         self._socket = _bound(options)
@@ -111,6 +126,11 @@ class Server:
         config = uvicorn.Config(
             Access(self._route, options.address, port, tokens),
             interface="asgi3",
+            # httptools, the default, takes heads without an end. h11 refuses a long one.
+            http=http,
+            ws=websocket,
+            h11_max_incomplete_event_size=_MAX_HEAD,
+            backlog=MAX_OF_ADDRESS,  # connections that are accepted at once, before any is dropped
             proxy_headers=False,
             server_header=False,
             log_config=None,
@@ -150,26 +170,27 @@ class Server:
         self._socket.close()
 
     def _run(self) -> None:
+        complaints = Complaints(lambda: self._server.should_exit)
         loggers = [logging.getLogger(name) for name in _LOGGERS]
         for logger in loggers:
             logger.setLevel(logging.ERROR)
-            logger.addFilter(self._prefix)
+            logger.addFilter(complaints)
         try:
             self._server.run([self._socket])
         finally:
             for logger in loggers:
-                logger.removeFilter(self._prefix)
-
-    def _prefix(self, record: logging.LogRecord) -> bool:
-        """Say what a message is about; drop those about connections that a stop cuts off."""
-        record.msg, record.args = f"web: {printable(record.getMessage())}", ()
-        return not self._server.should_exit
+                logger.removeFilter(complaints)
 
     async def _route(self, scope: Message, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket" and scope["path"] == "/stream":
             await self._stream(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await self._pages(scope, only_texts(receive), send)
+        elif scope.get("path", "").startswith("/_nicegui_ws/"):  # socket.io without a WebSocket
+            await refuse(scope, send, 404, "nothing is here; expected a WebSocket")
         else:
             await self._pages(scope, receive, send)
+            drop_old_pages(self._nicegui)
 
 
 def serve(state: FleetState, actions: Actions, options: WebOptions) -> None:
@@ -200,9 +221,8 @@ def _imported(name: str) -> Any:
         ) from error
 
 
-def _nicegui_app(state: FleetState, actions: Actions, options: WebOptions) -> Any:
+def _nicegui_app(nicegui: Any, state: FleetState, actions: Actions, options: WebOptions) -> Any:
     """Return NiceGUI's application with the page; there is one application in a process."""
-    nicegui = _imported("nicegui")
     page = importlib.import_module("quad_nav.web.page")
     nicegui.app.config.add_run_config(
         reload=False,
@@ -218,6 +238,7 @@ def _nicegui_app(state: FleetState, actions: Actions, options: WebOptions) -> An
         prod_js=True,
         show_welcome_message=False,
     )
+    limit_pages(nicegui)
     run: Any = importlib.import_module("nicegui.run")
     run.thread_pool = ThreadPoolExecutor(thread_name_prefix="web")  # the last server's has ended
 

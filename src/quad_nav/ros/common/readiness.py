@@ -36,7 +36,9 @@ MAX_LOG = 50_000  # characters of a line and of each of its arguments
 _MAX_HEADER = 4096  # bytes
 
 
-def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
+def init_node(
+    name: str, at_signal: Callable[[], None] = lambda: None, hears_clock: bool = True
+) -> None:
     """Call `rospy.init_node` and let Ctrl-C and SIGTERM shut down from another thread.
 
     rospy's own handler closes the publishers in the thread that it interrupts. It deadlocks if
@@ -45,10 +47,10 @@ def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
     Args:
         name: Name of the node.
         at_signal: Called in the other thread, before anything is shut down.
+        hears_clock: False if the node sets its time itself.
     """
     refuse_second(name)
-    start_node(name)
-    hear_one_clock()
+    start_node(name, hears_clock=hears_clock)
 
     def shut_down(number: int, _frame: Optional[FrameType]) -> None:
         reason = signal.Signals(number).name
@@ -63,14 +65,16 @@ def init_node(name: str, at_signal: Callable[[], None] = lambda: None) -> None:
         signal.signal(number, shut_down)
 
 
-def start_node(name: str, argv: Optional[Sequence[str]] = None) -> None:
+def start_node(name: str, argv: Optional[Sequence[str]] = None, hears_clock: bool = True) -> None:
     """Call `rospy.init_node` without its handlers of signals, and set up logging and connections.
 
     Args:
         name: Name of the node.
         argv: Its command line, with remappings; None for that of the process.
+        hears_clock: False if the node sets its time itself.
     """
     connect_once()
+    hear_one_clock(hears_clock)
     rospy.init_node(name, argv, disable_signals=True)
     accept_many_connections()
     escape_log_messages()

@@ -114,19 +114,26 @@ def set_time(now: rospy.Time) -> None:
         rospy.rostime._set_rostime(now)
 
 
-def leave_clock() -> None:
-    """End this node's subscription to `/clock`: it sets its time itself."""
-    clock = getattr(simtime, "_clock_sub", None)
-    if clock is not None:
-        clock.unregister()
+def hear_one_clock(hears_clock: bool) -> None:
+    """Let this node take the time from one publisher of `/clock`, or set its time itself.
 
+    Call it before `rospy.init_node`. A node that subscribes to the clock and leaves it at once is a
+    warning in the simulator's log, like a connection that is dropped.
 
-def hear_one_clock() -> None:
-    """Let this node take the time from one publisher of `/clock`."""
-    clock = getattr(simtime, "_clock_sub", None)
-    if clock is not None:
-        clock.impl.add_callback(ClockSource(clock.resolved_name), None)
-        clock.impl.remove_callback(simtime._set_rostime_clock_wrapper, None)
+    Args:
+        hears_clock: False if the node sets its time itself.
+    """
+
+    def init_simtime() -> bool:
+        if simtime._is_use_simtime():
+            rospy.rostime._set_rostime(rospy.Time())
+            if hears_clock:
+                source = ClockSource(rospy.resolve_name("/clock"))
+                rospy.Subscriber("/clock", Clock, source, queue_size=1)
+        rospy.rostime.set_rostime_initialized(True)
+        return True
+
+    simtime.init_simtime = init_simtime
 
 
 class ClockSource:

@@ -19,7 +19,7 @@ from quad_nav.loop.navigator_group import LocatedScan, NavigatorGroup, Navigator
 from quad_nav.ros.common.conversions import ScanMessage, scan_message, time_message
 from quad_nav.ros.common.diagnostics import publish_health
 from quad_nav.ros.common.readiness import TopicWatch, start_node
-from quad_nav.ros.common.rospy_repairs import leave_clock, set_time
+from quad_nav.ros.common.rospy_repairs import set_time
 from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
 from quad_nav.ros.composed.robot import ComposedRobot
 from quad_nav.ros.composed.transforms import ComposedTransforms
@@ -166,8 +166,8 @@ def _start_node(
     start_node(
         nodes[process].rsplit("/", 1)[1],
         [one for one in sys.argv if not one.startswith(("__name:=", "__log:="))],
+        hears_clock=False,
     )
-    leave_clock()
     group = _WorkerGroup(setup, robots, lidars)
     rospy.loginfo("%s: ready, robots: %d", rospy.get_name().lstrip("/"), len(robots))
     return group
@@ -190,4 +190,4 @@ class _WorkerGroup(ComposedGroup):
 
 def is_handed_over(topic: str) -> bool:
     """Tell whether the loop hands over the messages of a topic between the fleet's processes."""
-    return topic in ("/clock", "/tf", "/tf_static") or topic.startswith("/cmd_vel")
+    return topic in ("/tf", "/tf_static") or topic.startswith("/cmd_vel")

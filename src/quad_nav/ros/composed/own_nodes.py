@@ -1,8 +1,7 @@
 """Keep the nodes of a composed fleet from hearing each other through sockets.
 
 rospy connects a subscriber to every publisher of its topic, also to one in the same process. What
-the loop hands over in memory would arrive a second time: each robot's commands, all transforms and
-the clock.
+the loop hands over in memory would arrive a second time: each robot's commands and all transforms.
 """
 
 from __future__ import annotations
@@ -47,8 +46,6 @@ class OwnNodes:
 
 def ignore_publishers(own: OwnNodes, is_handed_over: Callable[[str], bool]) -> None:
     """Let no subscriber of this process connect to publishers of the fleet's nodes.
-
-    Call it before `rospy.init_node`, which subscribes to `/clock`.
 
     Args:
         own: Nodes of the fleet.

@@ -36,7 +36,7 @@ from quad_nav.kernels.jit import cache_warnings
 from quad_nav.loop.flight_loop import STEPS_PER_ODOMETRY
 from quad_nav.ros.common.conversions import time_message
 from quad_nav.ros.common.readiness import server_parameters, start_node
-from quad_nav.ros.common.rospy_repairs import leave_clock, refuse_second, set_time
+from quad_nav.ros.common.rospy_repairs import refuse_second, set_time
 from quad_nav.ros.composed.fleet import ComposedFleet
 from quad_nav.ros.composed.group import is_handed_over
 from quad_nav.ros.composed.own_nodes import OwnNodes, ignore_publishers
@@ -329,8 +329,7 @@ def main() -> int:
     ignore_publishers(own, is_handed_over)
     refuse_second("simulator", is_simulator=True)
     try:
-        start_node("simulator")
-        leave_clock()
+        start_node("simulator", hears_clock=False)
         name = rospy.get_name().lstrip("/")
         setup = _read_setup(name)
     except InputError as error:

@@ -2,8 +2,8 @@
 
 A page needs where an odometry frame is in `map`, and where a LIDAR is on its robot. Hearing each
 message of a fleet for that would cost more than all the rest. So the transforms are looked up from
-time to time while somebody uses them. The node's own subscription to `/clock` ends at its start:
-the time is that of the newest poses.
+time to time while somebody uses them. The node does not subscribe to `/clock`: the time is that of
+the newest poses.
 """
 
 from __future__ import annotations

@@ -17,7 +17,6 @@ import rospy
 from quad_nav.errors import InputError, printable
 from quad_nav.files.values import Rule, is_whole, value_faults
 from quad_nav.ros.common.readiness import init_node, server_parameters
-from quad_nav.ros.common.rospy_repairs import leave_clock
 from quad_nav.ros.web.actions import FlightActions
 from quad_nav.ros.web.source import FlightSource
 from quad_nav.view.state import FleetState
@@ -53,8 +52,7 @@ def main() -> int:
     Returns:
         0 after a shutdown, 2 if the parameters are not valid or NiceGUI is not installed.
     """
-    init_node("web")
-    leave_clock()
+    init_node("web", hears_clock=False)
     values = {**DEFAULTS, **rospy.get_param("~", {})}
     try:
         faults = value_faults(values, _RULES, rospy.get_name().lstrip("/"))
