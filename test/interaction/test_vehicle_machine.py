@@ -164,7 +164,8 @@ class VehicleMachine(RuleBasedStateMachine):
     def the_pilot(self, number, does):
         vehicle, known = self.touch(number)
         machine = self.world.machines.get(number)
-        is_ours = machine is not None and machine.state in (State.FLYING, State.HOLDING)
+        state, was_ours = machine and machine.state, vehicle.mode == vehicle.kind["control"]
+        is_ours = state in (State.FLYING, State.HOLDING)
         if does in (CHANGES_MODE, MOVES_STICK) and is_ours and self.world.radios[number].hears:
             known.taken_s, known.is_stopped = known.taken_s or self.now_s, True
             known.changed_s = self.now_s
@@ -175,6 +176,8 @@ class VehicleMachine(RuleBasedStateMachine):
         else:
             vehicle.set_mode(vehicle.kind["other" if does == CHANGES_MODE else "control"])
         self.run(0.3)
+        if does == CHANGES_MODE and was_ours and state is State.ARMING and not vehicle.armed:
+            known.may_take_off = False
 
     @rule(number=NUMBER, fault=st.sampled_from(sorted(FAULTS)))
     def the_vehicle_has(self, number, fault):
