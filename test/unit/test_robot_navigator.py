@@ -70,3 +70,21 @@ def test_it_does_not_wait_after_a_clock_jump(ros, robot):
     robot.restart(0.8)
     step(ros, robot, 0.8)
     assert ros.log.lines == NOT_UPDATED
+
+
+def test_it_stops_without_odometry_that_has_never_come_or_not_since_a_clock_jump(ros, robot):
+    """It has poses from tf, but no velocity: as with odometry that was lost."""
+
+    def located(now_s):
+        ros.set_time(now_s)
+        pair = [transform("map", "odom0", now_s), transform("odom0", "base_link0", now_s)]
+        deliver("/tf", TFMessage(pair))
+        robot.step(now_s)
+        return robot._located_now()[1]
+
+    assert located(1.0).in_global is not None
+    assert located(1.5).in_global is not None
+    assert located(1.6).unknown_reason == "no message on /odom for 0.6 s"
+    robot.restart(0.8)
+    assert located(0.8).in_global is not None
+    assert located(1.4).unknown_reason == "no message on /odom for 0.6 s"

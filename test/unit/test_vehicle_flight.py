@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from vehicles import failures
+from vehicles.point_bodies import PointBodies
 from vehicles.virtual_flight import STEP_S, Flight, StandInFlight
 
 from quad_nav.geometry import Pose2D, Twist2D
@@ -218,6 +219,29 @@ def test_refused_arming_tells_the_autopilots_reason():
     flight.machine.take_off(flight.now_s)
     assert flight.run(3.0, lambda: flight.state is State.NOT_READY)
     assert flight.machine.refusal == "the autopilot refuses to arm: Arm: Gyros inconsistent"
+
+
+@pytest.fixture
+def arming():
+    """A vehicle that is armed, which its next heartbeat will tell up to 1 s later."""
+    flight = StandInFlight("px4", bodies=PointBodies())
+    assert flight.run(10.0, lambda: flight.state is State.READY)
+    assert flight.machine.take_off(flight.now_s).is_accepted
+    assert flight.run(3.0, lambda: flight.vehicle.armed) and flight.state is State.ARMING
+    return flight
+
+
+def test_a_vehicle_that_its_pilot_disarms_before_take_off_is_not_armed_again(arming):
+    arming.vehicle.armed = False
+    assert not arming.run(4.0, lambda: arming.vehicle.armed)
+    assert arming.machine.refusal == "the motors were disarmed from outside"
+
+
+def test_a_mode_that_the_pilot_sets_before_take_off_stays(arming):
+    arming.vehicle.set_mode(arming.vehicle.kind["other"])
+    assert not arming.run(4.0, lambda: arming.vehicle.mode == arming.vehicle.kind["control"])
+    assert arming.machine.refusal == "the mode was changed to POSCTL from outside"
+    assert arming.height_m < 0.02
 
 
 def test_never_arms_without_permission(autopilot):

@@ -27,6 +27,8 @@ SILENT_S = 1.0
 """The link is lost when nothing has come from the vehicle for this long."""
 HEARTBEAT_S = 3.5
 """The link is lost when no heartbeat has come for this long; they come once a second."""
+ARMED_S = 2.5
+"""Heartbeats have told by then that the motors are armed, unless somebody has disarmed them."""
 BATTERY_S = 2.0
 """The charge must be low for this long, because the voltage sags under load."""
 JUMP_M = 0.5
@@ -181,6 +183,20 @@ _TESTS: Sequence[Tuple[Reaction, Test]] = (
     (Reaction.HOVER, _must_hover),
     (Reaction.HOVER, _not_commanded),
 )
+
+
+def arming_problem(status: Status, is_accepted: bool, age_s: float) -> str:
+    """Return who has ended an arming before the take-off, "" if nobody has.
+
+    Args:
+        status: Last heartbeat.
+        is_accepted: Whether the autopilot has accepted the order to arm.
+        age_s: Age of the order.
+    """
+    if not (status.is_controlled or status.is_settling):
+        return f"the mode was changed to {status.mode} from outside"
+    ended = is_accepted and not status.is_armed and age_s > ARMED_S
+    return "the motors were disarmed from outside" if ended else ""
 
 
 def jump_m(before: Vector, velocity_mps: Vector, elapsed_s: float, after: Vector) -> float:

@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Callable, Dict, List, Optional
 
 from quad_nav.geometry import Pose2D, Twist2D
+from quad_nav.vehicle import safety
 from quad_nav.vehicle.inputs import Inputs
 from quad_nav.vehicle.orders import (
     IN_FLIGHT,
@@ -193,9 +194,8 @@ class VehicleMachine:
             self._enter(State.HOLDING, found.reason, now_s)
 
     def _view(self, now_s: float) -> FlightView:
-        is_commanded = self.state in (State.FLYING, State.HOLDING)
         view = self.inputs.view(now_s, self.odom_from_start, self.ground_m)
-        if is_commanded:
+        if self.state in (State.FLYING, State.HOLDING):
             view = replace(view, is_grounded=self.inputs.landed is Landed.ON_GROUND)
         else:  # commands count only in flight
             view = replace(view, command_age_s=0.0, waiting_age_s=0.0)
@@ -247,9 +247,7 @@ class VehicleMachine:
             return None
         reasons = self.inputs.not_ready(now_s)
         if reasons:
-            reason = "; ".join(reasons)
-            if self.state is not State.NOT_READY or reason != self.reason:
-                self._enter(State.NOT_READY, reason, now_s)
+            self._enter(State.NOT_READY, "; ".join(reasons), now_s)
         elif self.state is State.NOT_READY:
             self._enter(State.READY, "", now_s)
         return None
@@ -257,8 +255,12 @@ class VehicleMachine:
     def _in_arming(self, now_s: float) -> Optional[Velocity]:
         status = self.inputs.status
         assert status is not None
-        streams = self.traits.streams_before_control
-        if not status.is_controlled:
+        streams, age_s = self.traits.streams_before_control, now_s - self._order_s
+        arms = self._order is Order.ARM
+        problem = safety.arming_problem(status, self._is_confirmed, age_s) if arms else ""
+        if problem:
+            self._give_up(problem, now_s)
+        elif not status.is_controlled:
             if not streams or now_s - self._state_s >= STREAM_S:
                 self._give(Order.TAKE_CONTROL, now_s)
         elif self._permissions.is_dry:
@@ -362,9 +364,7 @@ class VehicleMachine:
 
     _STEPS: Dict[State, Callable[[VehicleMachine, float], Optional[Velocity]]] = {
         State.NO_LINK: _in_no_link,
-        State.NOT_READY: _on_ground,
-        State.READY: _on_ground,
-        State.LANDED: _on_ground,
+        **dict.fromkeys(ON_GROUND, _on_ground),
         State.ARMING: _in_arming,
         State.TAKING_OFF: _in_taking_off,
         State.FLYING: commanded_velocity,
@@ -383,8 +383,8 @@ class VehicleMachine:
     def _give(self, order: Order, now_s: float) -> None:
         """Give an order, again while it has no effect."""
         if order is not self._order:
-            self._order, self._orders = order, 0
-        elif now_s - self._order_s < RETRY_S:
+            self._order, self._orders, self._is_confirmed = order, 0, False
+        elif now_s - self._order_s < RETRY_S or (order is Order.ARM and self._is_confirmed):
             return
         self._order_s, self._orders = now_s, self._orders + 1
         self._orders_now.append(order)
@@ -393,8 +393,7 @@ class VehicleMachine:
         if state is not self.state or reason != self.reason:
             self._news.append(f"{state.value}: {reason}" if reason else state.value)
         if state is not self.state:
-            self._order, self._orders, self._state_s = None, 0, now_s
-            self._grounded_s = None
+            self._order, self._orders, self._state_s, self._grounded_s = None, 0, now_s, None
         if state not in ON_GROUND:
             self.refusal = ""
         self.state, self.reason = state, reason

@@ -64,7 +64,7 @@ class RobotNavigator:
         self._warnings = ThrottledWarnings()
         self._navigator = navigator = build_navigator(configuration)
         self._velocity = Twist2D()
-        self._odometry_s: Optional[float] = None  # time of the last odometry message
+        self._odometry_s: Optional[float] = None  # of the last message, at first of the first step
         self._start = NavigatorStart()
         self._transforms, self._peers = transforms, peers
         costmaps = (navigator.global_costmap, navigator.local_costmap)
@@ -117,7 +117,7 @@ class RobotNavigator:
         with self._interface.lock:
             for sensor in self._sensors:
                 sensor.reset()
-            self._odometry_s = None
+            self._odometry_s = now_s
             self._start.end()
             self._navigator.restart(now_s)
             self._interface.restart(now_s)
@@ -175,9 +175,11 @@ class RobotNavigator:
         )
 
     def _odometry_timeout(self, now_s: float) -> str:
-        """Say that odometry has timed out; "" before the first message."""
+        """Say that odometry has timed out, or that the first message has not come in time."""
+        if self._odometry_s is None:
+            self._odometry_s = now_s
         limit_s, received_s = self._navigator.params.sensor_timeout_s, self._odometry_s
-        if limit_s <= 0.0 or received_s is None or now_s - received_s <= limit_s:
+        if limit_s <= 0.0 or now_s - received_s <= limit_s:
             return ""
         return f"no message on {self._odometry.resolved_name} for {now_s - received_s:.1f} s"
 

@@ -227,6 +227,8 @@ class MissionRunner:
                 progress = [robot.sequencer.progress for robot in self.robots]
                 before_s = max(before_s, *(robot.now_s for robot in self.robots))
                 self._resume(self._record.checkpoint(before_s, progress), now_s, False)
+            if self._reset_s > now_s:  # on the clock before: this one would reach it, too
+                self._reset_s = 0.0
             if self._setup.simulation:
                 self._start_new_simulation()
         else:
