@@ -1,4 +1,4 @@
-"""Two vehicles on a mission: pilots, links, batteries and nodes fail in any order and combination."""
+"""Two vehicles on a mission: pilots, links, batteries and nodes fail in any combination."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ from quad_nav.geometry import Pose2D, Pose3D
 from quad_nav.sim.simulation import STEP_S
 
 GRAVITY_MPS2 = 9.81
+_AT_ORIGIN = (Pose2D(0.0, 0.0),)
 _TOUCHING_M = 0.015
 _SHARE, _YAW_SHARE = 1.0 - math.exp(-STEP_S / LAG_S), 1.0 - math.exp(-STEP_S / YAW_LAG_S)
 
@@ -29,7 +30,7 @@ class PointBodies:
         contacts: None: they pass through each other.
     """
 
-    def __init__(self, starts=(Pose2D(0.0, 0.0),)):
+    def __init__(self, starts=_AT_ORIGIN):
         self._points = [_Point(start) for start in starts]
         self.count, self.lift_mps2, self.contacts = 0, [None] * len(self._points), []
         self.drift_mps = [(0.0, 0.0)] * len(self._points)
