@@ -129,17 +129,11 @@ class WorkerProcess:
         context = multiprocessing.get_context(start_method)
         self._shared = SharedStates(len(setup.names), len(setup.scene.moving_shapes), context)
         self._pipe, worker_end = context.Pipe()
+        parent_end = self._pipe if start_method == "fork" else None
+        work = _WorkerSetup(setup, self.robots, make_group, self._shared, whole_ticks)
+        arguments = os.getcwd(), _serve, worker_end, parent_end, work
         self._process = context.Process(  # type: ignore[attr-defined]
-            target=in_folder,
-            args=(
-                os.getcwd(),
-                _serve,
-                worker_end,
-                self._pipe if start_method == "fork" else None,
-                _WorkerSetup(setup, self.robots, make_group, self._shared, whole_ticks),
-            ),
-            name=PROCESS_NAME,
-            daemon=True,
+            target=in_folder, args=arguments, name=PROCESS_NAME, daemon=True
         )
         with outside_current_folder():
             self._process.start()
