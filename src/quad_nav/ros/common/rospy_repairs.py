@@ -23,6 +23,7 @@ from xmlrpc.client import ServerProxy, Transport
 
 import rosgraph
 import rosgraph.names
+import rosgraph.network
 import rospy
 from rosgraph_msgs.msg import Clock
 from rospy.impl import simtime
@@ -236,9 +237,15 @@ class _Transport(Transport):
 def _is_alive(master: rosgraph.Master, node: str) -> bool:
     """Return whether a registered node lives, perhaps stopped; a killed one stays registered."""
     try:
-        ServerProxy(master.lookupNode(node), _Transport()).getPid(rospy.get_name())
+        uri = master.lookupNode(node)
+        address = rosgraph.network.parse_http_host_and_port(uri)
+        socket.create_connection(address, _ANSWERS_WITHIN_S).close()
+    except (OSError, ValueError, rosgraph.MasterException):
+        return False  # nor is one on a machine that does not respond
+    try:
+        ServerProxy(uri, _Transport()).getPid(rospy.get_name())
     except socket.timeout:
         return True
-    except (OSError, ValueError, HTTPException, XmlRpcError, rosgraph.MasterException):
+    except (OSError, HTTPException, XmlRpcError):
         return False
     return True
