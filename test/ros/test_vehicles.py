@@ -30,6 +30,7 @@ from quad_nav.geometry import Pose3D
 from quad_nav.ros.common.nav_messages import pose_stamped
 
 HEARTBEAT = ardupilotmega.MAVLink_heartbeat_message(2, 3, 81, 9, 3, 3)
+GCS_TIMEOUT_S = 15.0  # a bridge takes 4 s to come back, longer on a loaded machine
 VEHICLES = Path(__file__).resolve().parents[1] / "vehicles" / "udp_vehicles.py"
 PATIENCE_S = 60.0
 
@@ -39,7 +40,13 @@ class Vehicles(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("test_vehicles", disable_signals=True)
         cls.process = subprocess.Popen(
-            [sys.executable, str(VEHICLES), "ardupilot:14651:3:-2:30", "px4:14652:0:0:200"]
+            [
+                sys.executable,
+                str(VEHICLES),
+                f"--gcs-timeout={GCS_TIMEOUT_S}",
+                "ardupilot:14651:3:-2:30",
+                "px4:14652:0:0:200",
+            ]
         )
         cls.states, cls.values, cls.odometry, cls.events = {}, {}, {}, []
         cls.buffer = tf2_ros.Buffer()
@@ -173,7 +180,7 @@ class Vehicles(unittest.TestCase):
         self.assertEqual(self.states[0], "taken over")
         self.wait(lambda: rospy.get_param("/mission/quad0/stopped"), "stop of its mission")
         self.wait(lambda: self.speed(0) < 0.05, "hover of vehicle 0")
-        rospy.sleep(6.0)  # the autopilot's failsafe would land after 5 s
+        rospy.sleep(GCS_TIMEOUT_S + 1.0)  # the autopilot's failsafe would land it
         self.assertEqual((self.states[0], self.values[0]["mode"]), ("taken over", "GUIDED"))
         self.assertLess(self.speed(0), 0.05)
         self.assertAlmostEqual(self.odometry[0].pose.pose.position.z, 1.0, delta=0.15)

@@ -30,7 +30,7 @@ BOOT_TEXTS = (
 )
 STANDBY_S, ACCELS_S, GYROS_S, HOME_S, POSITION_S = 3.9, 14.0, 24.5, 20.754, 42.156
 PREARM_S = 31.18
-GCS_S, RADIO_S, GPS_S, GPS_END_S = 5.3, 0.99, 8.13, 15.19
+GCS_LATE_S, RADIO_S, GPS_S, GPS_END_S = 0.3, 0.99, 8.13, 15.19
 LOW_VOLTAGE_S = 10.0  # BATT_LOW_TIMER
 BATTERY_MODES = {1: LAND, 2: RTL, 3: RTL, 4: LAND, 6: RTL}
 LAND_PAUSE_S = 4.0  # before the descent of a failsafe
@@ -43,6 +43,7 @@ class ArduPilotWatch(StandIn):
     DEFAULTS = {
         "GUID_TIMEOUT": 3.0,
         "FS_GCS_ENABLE": 0.0,
+        "FS_GCS_TIMEOUT": 5.0,
         "SYSID_MYGCS": 255.0,
         "FS_THR_ENABLE": 1.0,
         "FS_OPTIONS": 0.0,
@@ -148,7 +149,8 @@ class ArduPilotWatch(StandIn):
         if self.is_voltage_low(self.parameters["BATT_LOW_VOLT"], LOW_VOLTAGE_S):
             self._tell_low_battery()
         enabled = self.parameters["FS_GCS_ENABLE"]
-        late = -math.inf < self._heard_s < self.now_s - GCS_S
+        silent_s = self.parameters["FS_GCS_TIMEOUT"] + GCS_LATE_S
+        late = -math.inf < self._heard_s < self.now_s - silent_s
         if self.armed and enabled and late and "gcs" not in self._fired:
             self._fire("gcs", LAND if enabled == 5 else RTL, "GCS Failsafe")
 

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Run stand-in vehicles over UDP: udp_vehicles.py [--scene FILE] KIND:PORT:NORTH:EAST:HEADING ...
+"""Run stand-in vehicles over UDP: udp_vehicles.py [OPTION ...] KIND:PORT:NORTH:EAST:HEADING ...
 
 Each sends to its port on this machine, where a bridge listens (`address: udpin:127.0.0.1:PORT`).
 North, east (m) and heading (degrees) are the vehicle's place in its own local frame. With a scene
 the vehicles stand at its start poses, and touch its walls and each other; contacts are printed.
+`--gcs-timeout` is how long ArduPilot waits for a silent ground station.
 KIND is `ardupilot` or `px4`, a stand-in with a simulated body, or `point`, a point without body.
 The signal SIGUSR1 changes the mode of the first one, as its pilot would.
 """
@@ -39,13 +40,14 @@ APART_M = 20.0
 class UdpVehicle:
     """One vehicle and its socket."""
 
-    def __init__(self, text, bodies, number):
+    def __init__(self, text, bodies, number, gcs_timeout_s):
         kind, port, north, east, heading = text.split(":")
         place, heading_rad = (float(north), float(east)), math.radians(float(heading))
         if kind in STAND_INS:
             stand_in, safe = STAND_INS[kind]
             if "SYSID_MYGCS" in safe:
-                safe = {**safe, "SYSID_MYGCS": float(OUR_SYSTEM - number)}
+                station = float(OUR_SYSTEM - number)
+                safe = {**safe, "SYSID_MYGCS": station, "FS_GCS_TIMEOUT": gcs_timeout_s}
             frame = LocalFrame(*place, heading_rad)
             self.vehicle = stand_in(bodies, number, frame, number, BOOT_S, safe)
         else:
@@ -100,6 +102,7 @@ def warm_up():
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--scene", default="")
+    parser.add_argument("--gcs-timeout", type=float, default=5.0, metavar="S")
     parser.add_argument("vehicles", nargs="+", metavar="KIND:PORT:NORTH:EAST:HEADING")
     options = parser.parse_args()
     count = len(options.vehicles)
@@ -113,7 +116,9 @@ def main():
         starts = [Pose2D(middle + APART_M * k, middle) for k in range(count)]
         bodies = Bodies(EMPTY, starts, airframes)
     warm_up()
-    links = [UdpVehicle(text, bodies, k) for k, text in enumerate(options.vehicles)]
+    links = [
+        UdpVehicle(text, bodies, k, options.gcs_timeout) for k, text in enumerate(options.vehicles)
+    ]
     vehicles = [link.vehicle for link in links]
     stand_ins = [one for one in vehicles if isinstance(one, StandIn)]
     first, told = vehicles[0], 0
