@@ -51,8 +51,9 @@ MOVING = (State.ARMING, State.TAKING_OFF, State.FLYING, State.HOLDING)
 ODD_FLOATS = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-45, 0.0, 1.0, -7.0, 1e4)
 NAMES = [name for kind in AUTOPILOTS for name in failsafes.names(Vehicle(0, "mavlink", kind))]
 BEGINNINGS = ["", "PreArm: ", "Arm: ", "Mode change to ", "Preflight Fail: ", "EKF", "\x1b[2J"]
-# And two that it ignores.
-HANDLED = (*MavlinkAdapter._HANDLERS, "GPS_RAW_INT", "EKF_STATUS_REPORT")
+# Each autopilot has its own message of the state of its estimator.
+HANDLED = [name for name in MavlinkAdapter._HANDLERS if name != "estimator"]
+HANDLED += [kind.estimator[1] for kind in AUTOPILOTS.values()]
 
 
 class Kind:

@@ -17,8 +17,8 @@ from tf2_msgs.msg import TFMessage  # noqa: E402
 from quad_nav.geometry import Pose3D  # noqa: E402
 from quad_nav.ros.common import conversions  # noqa: E402
 from quad_nav.ros.common.packed_messages import STATES_TOPIC, states_message  # noqa: E402
+from quad_nav.ros.common.rospy_repairs import set_time  # noqa: E402
 from quad_nav.ros.common.transforms import Transforms  # noqa: E402
-from quad_nav.ros.composed.own_nodes import set_time  # noqa: E402
 from quad_nav.ros.navigator.obstacle_topics import ObstacleTopics  # noqa: E402
 from quad_nav.ros.sequencer.odometry import OdometryIntake  # noqa: E402
 from quad_nav.topics.publishing import in_fleet  # noqa: E402
