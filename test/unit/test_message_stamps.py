@@ -168,7 +168,7 @@ def test_a_cloud_of_obstacles_has_the_stamp_of_their_scan(ros, stamp_ns):
 
 @pytest.mark.parametrize("stamp_ns", STAMPS_NS[:4])
 def test_a_node_that_sets_its_own_clock_has_the_nanoseconds_of_its_messages(ros, stamp_ns):
-    set_time(time_of(stamp_ns).to_sec())
+    set_time(conversions.time_message(time_of(stamp_ns).to_sec()))
     assert rospy.Time.now() == time_of(stamp_ns)
 
 
